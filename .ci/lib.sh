@@ -1,0 +1,300 @@
+# Steps shared by .ci/run and .ci/nightly; sourced with $checkout set.
+# shellcheck shell=bash
+
+python=${PYTHON:-python3}
+export CI=${CI:-true}
+export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1 PIP_ROOT_USER_ACTION=ignore
+export PYTHONDONTWRITEBYTECODE=1
+# Off-screen rendering without a display; VTK chooses its window by this
+export VTK_DEFAULT_OPENGL_WINDOW=${VTK_DEFAULT_OPENGL_WINDOW:-vtkEGLRenderWindow}
+export PYVISTA_OFF_SCREEN=true
+# A machine without an OpenCL device fails the tests that need one instead of skipping them
+export PYVISTA_VDI_REQUIRE_DEVICE=1
+# Tests of the distributions compare them with the files of the checkout
+export PYVISTA_VDI_CHECKOUT=$checkout
+# git reads a checkout that somebody else owns, as in a container
+export GIT_CONFIG_COUNT=1 GIT_CONFIG_KEY_0=safe.directory GIT_CONFIG_VALUE_0='*'
+
+if [[ -z ${PYVISTA_VDI_DATA:-} && -d $checkout/../shared/data ]]; then
+    PYVISTA_VDI_DATA=$(cd "$checkout/../shared/data" && pwd)
+    export PYVISTA_VDI_DATA
+fi
+
+results=()
+failed=0
+status=0 # of the last step
+
+log() { printf '%s\n' "-- $*"; }
+
+# Run a step in a shell of its own, so that its first failing command ends it; note time and result.
+run_step() {
+    local name=$1 start=$SECONDS
+    shift
+    printf '\n==== %s\n' "$name"
+    set +e
+    (set -euo pipefail && "$@") </dev/null
+    status=$?
+    set -e
+    if ((status == 0)); then
+        results+=("$(printf 'passed  %-20s %5d s' "$name" $((SECONDS - start)))")
+    else
+        results+=("$(printf 'FAILED  %-20s %5d s  (status %d)' "$name" $((SECONDS - start)) "$status")")
+        failed=1
+    fi
+    printf '==== %s\n' "${results[-1]}"
+}
+
+# A step that others do not need: left out where CI_ONLY does not name it.
+step() {
+    if [[ -z ${CI_ONLY:-} || " $CI_ONLY " == *" $1 "* ]]; then
+        run_step "$@"
+    fi
+}
+
+# A step without which the following ones make no sense.
+required_step() {
+    run_step "$@"
+    ((status == 0)) || summarise
+}
+
+summarise() {
+    printf '\n==== summary, %d s in all\n' "$SECONDS"
+    printf '%s\n' "${results[@]}"
+    exit "$failed"
+}
+
+prepare_work_folder() {
+    work=$(mktemp -d)
+    if [[ -n ${CI_KEEP:-} ]]; then
+        log "working in $work, which is kept"
+    else
+        trap 'rm -rf "$work"' EXIT
+    fi
+    mkdir -p "$work/source"
+    copy_checkout "$work/source"
+}
+
+# Copy the files that git tracks, or would: neither build products nor what is ignored.
+copy_checkout() {
+    local target=$1
+    cd "$checkout"
+    if command -v git >/dev/null && [[ -e .git ]]; then
+        git ls-files --cached --others --exclude-standard -z |
+            while IFS= read -r -d '' file; do
+                [[ ! -f $file ]] || printf '%s\0' "$file"
+            done | tar --null --files-from=- -cf - | tar -xf - -C "$target"
+    else
+        tar --exclude=.git --exclude='.venv*' -cf - . | tar -xf - -C "$target"
+    fi
+    cd - >/dev/null
+}
+
+describe_machine() {
+    log "$(uname -srm), $(nproc) cores, $("$python" --version)"
+    log "volumes that are not shipped: ${PYVISTA_VDI_DATA:-none (PYVISTA_VDI_DATA is not set)}"
+}
+
+# Install what a bare Debian lacks: a second OpenCL implementation, off-screen OpenGL, git, and the
+# packages given as arguments.
+install_system_packages() {
+    if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
+        log "not a Debian: taking the system as it is"
+        return 0
+    fi
+    local package missing=()
+    for package in pocl-opencl-icd libegl1 libgl1-mesa-dri "$@"; do
+        dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
+            missing+=("$package")
+    done
+    command -v git >/dev/null || missing+=(git)
+    "$python" -c 'import ensurepip' 2>/dev/null || missing+=(python3-venv)
+    if ((${#missing[@]} == 0)); then
+        log "every system package is there"
+        return 0
+    fi
+    local as_root=()
+    ((EUID == 0)) || as_root=(sudo -n)
+    log "installing ${missing[*]}"
+    export DEBIAN_FRONTEND=noninteractive
+    "${as_root[@]}" apt-get update -qq
+    "${as_root[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}"
+}
+
+# The wheel is built once; every environment installs that file.
+build_wheel() {
+    compgen -G "$work/dist/*.whl" >/dev/null ||
+        "$1" -m pip wheel --quiet --no-deps --wheel-dir "$work/dist" "$work/source"
+}
+
+# create_environment FOLDER PYTHON EXTRAS [more arguments of pip install]
+create_environment() {
+    local folder=$1 interpreter=$2 extras=$3
+    shift 3
+    "$interpreter" -m venv "$folder"
+    "$folder/bin/python" -m pip --version
+    build_wheel "$folder/bin/python"
+    install "$folder" "$extras" "$@"
+}
+
+# install FOLDER EXTRAS [more arguments of pip]
+install() {
+    local folder=$1 extras=$2 wheel
+    shift 2
+    wheel=$(compgen -G "$work/dist/*.whl")
+    "$folder/bin/python" -m pip install --quiet "pyvista-vdi$extras @ file://$wheel" "$@"
+}
+
+# The tests must see the installed package: they are copied away from it, with pytest's settings.
+copy_tests() {
+    mkdir -p "$work/tests-only"
+    cp -r "$work/source/tests" "$work/source/pyproject.toml" "$work/tests-only/"
+}
+
+check_installed_copy() {
+    copy_tests
+    cd "$work/tests-only"
+    "$work/venv/bin/python" - <<'PYTHON'
+import importlib.resources
+import sysconfig
+from pathlib import Path
+
+import pyvista_vdi
+
+place = Path(pyvista_vdi.__file__).resolve()
+site_packages = Path(sysconfig.get_path("purelib")).resolve()
+assert place.is_relative_to(site_packages), f"{place} is not inside {site_packages}"
+kernels = list(Path(str(importlib.resources.files("pyvista_vdi.opencl"))).rglob("*.cl"))
+assert kernels, "the installed package has no kernels"
+print(f"{place.parent}, version {pyvista_vdi.__version__}, {len(kernels)} kernel files")
+PYTHON
+}
+
+check_opencl_implementations() {
+    "$work/venv/bin/pyvista-vdi" devices
+    PYVISTA_VDI_MIN_PLATFORMS=${PYVISTA_VDI_MIN_PLATFORMS:-2} "$work/venv/bin/python" - <<'PYTHON'
+import os
+
+from pyvista_vdi.opencl_runtime import list_devices
+
+wanted = int(os.environ["PYVISTA_VDI_MIN_PLATFORMS"])
+platforms = sorted({device.platform for device in list_devices() if device.usable})
+print(f"usable OpenCL implementations: {', '.join(platforms) or 'none'}")
+if len(platforms) < wanted:
+    raise SystemExit(
+        f"{len(platforms)} usable OpenCL implementations, {wanted} wanted: install another one, "
+        "or set PYVISTA_VDI_MIN_PLATFORMS"
+    )
+PYTHON
+}
+
+# run_tests [more arguments of pytest]; the fixtures of tests/conftest.py run every test that needs
+# a device on each of them
+run_tests() {
+    copy_tests
+    cd "$work/tests-only"
+    local result=0
+    "$work/venv/bin/python" -m pytest -p no:cacheprovider -n "${CI_PYTEST_WORKERS:-0}" "$@" ||
+        result=$?
+    # 5: no test was selected, which is fine for a marker that no test carries yet
+    ((result == 0 || (result == 5 && $# > 0)))
+}
+
+check_lint() {
+    cd "$work/source"
+    "$work/venv/bin/ruff" check --no-cache .
+    "$work/venv/bin/ruff" format --no-cache --check .
+}
+
+check_types() {
+    cd "$work/source"
+    "$work/venv/bin/mypy" --cache-dir="$work/mypy-cache"
+}
+
+build_docs() {
+    "$work/venv/bin/python" -m sphinx -W --keep-going -q -b html \
+        "$work/source/docs" "$work/docs-html"
+    log "built $(find "$work/docs-html" -name '*.html' | wc -l) pages without a warning"
+}
+
+# Python in the pages and in docstrings runs against the installed package.
+run_documented_code() {
+    mkdir -p "$work/documented"
+    cp -r "$work/source/docs" "$work/source/pyproject.toml" "$work/documented/"
+    cp "$work/source/README.md" "$work/documented/docs/readme.md"
+    cd "$work/documented"
+    "$work/venv/bin/python" -m pytest -p no:cacheprovider -q docs
+    "$work/venv/bin/python" -m pytest -p no:cacheprovider -q --doctest-modules --pyargs pyvista_vdi
+}
+
+run_examples() {
+    local example
+    for example in "$work"/source/examples/*.py; do
+        log "$(basename "$example")"
+        mkdir -p "$work/examples/$(basename "$example" .py)"
+        cd "$work/examples/$(basename "$example" .py)"
+        timeout 300 "$work/venv/bin/python" "$example"
+        [[ -n $(find . -type f -size +0) ]] || {
+            log "$(basename "$example") wrote no file"
+            return 1
+        }
+    done
+}
+
+# The commands of the README, to the letter, in a clone of their own: the first one whole; of the
+# one that runs the tests, which have run already, the installation and the collection.
+run_readme_commands() {
+    copy_checkout_to_clone "$work/clone"
+    cd "$work/clone"
+    readme_command "main command" >"$work/main-command"
+    readme_command "test command" >"$work/test-command"
+    cat "$work/main-command"
+    bash -euo pipefail "$work/main-command"
+    [[ -n $(find out -type f -size +0) ]] || {
+        log "the README's first command wrote nothing into out/"
+        return 1
+    }
+    ls -l out
+    rm -rf .venv
+    cat "$work/test-command"
+    PYTEST_ADDOPTS="--collect-only -qq" bash -euo pipefail "$work/test-command" >"$work/collected"
+    log "the README's test command collects $(wc -l <"$work/collected") lines of tests"
+}
+
+copy_checkout_to_clone() {
+    mkdir -p "$1"
+    cp -r "$work/source/." "$1"
+}
+
+# Print the fenced block that follows the line  <!-- NAME -->  in README.md.
+readme_command() {
+    awk -v mark="<!-- $1 -->" '
+        $0 == mark { wanted = 1; next }
+        wanted && /^```/ { if (inside) exit; inside = 1; next }
+        inside { print; found = 1 }
+        END { if (!found) exit 1 }
+    ' "$work/source/README.md" || {
+        log "README.md has no fenced block after <!-- $1 -->" >&2
+        return 1
+    }
+}
+
+# The oldest interpreter with, of every dependency, the oldest version that pyproject.toml allows.
+create_oldest_environment() {
+    local oldest=${PYTHON_OLDEST:-python3.10}
+    if ! "$oldest" -c '' 2>/dev/null; then
+        log "$oldest is not installed: testing the oldest versions with $("$python" --version)"
+        oldest=$python
+    fi
+    "$work/venv/bin/python" "$work/source/.ci/lower_bounds.py" "$work/source/pyproject.toml" \
+        >"$work/constraints.txt"
+    cat "$work/constraints.txt"
+    create_environment "$work/oldest" "$oldest" "[test]" --constraint "$work/constraints.txt"
+}
+
+run_oldest_tests() {
+    copy_tests
+    cd "$work/tests-only"
+    # Old releases warn about what newer ones of their own dependencies deprecate: warnings are
+    # errors only with the current versions.
+    "$work/oldest/bin/python" -m pytest -p no:cacheprovider -n "${CI_PYTEST_WORKERS:-0}" -W default
+}

@@ -1,0 +1,34 @@
+"""Sphinx configuration; the build treats warnings as errors."""
+
+from __future__ import annotations
+
+from pyvista_vdi._version import __version__
+
+project = "pyvista-vdi"
+author = "The pyvista-vdi developers"
+copyright = f"2026, {author}"
+version = release = __version__
+
+extensions = [
+    "myst_parser",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+]
+templates_path = ["_templates"]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}  # .rst: autosummary's own pages
+exclude_patterns = ["_build", "readme.md"]
+
+myst_enable_extensions = ["deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+autosummary_generate = True
+autodoc_typehints = "none"  # numpydoc's Parameters sections say them, with shapes and units
+numpydoc_show_class_members = False  # autodoc lists the members
+numpydoc_class_members_toctree = False
+autodoc_default_options = {"members": True}
+
+html_theme = "furo"
+html_title = f"pyvista-vdi {version}"
+html_static_path: list[str] = []

@@ -1,0 +1,34 @@
+// Scalar to colour and extinction (DESIGN section 3, "From volume to medium").
+//
+// The table holds `entries` (R, G, B, opacity) at equidistant scalars; opacity is that of a slab of one opacity unit
+// distance. It is interpolated first and converted to optical depth then, as VTK does.
+#pragma OPENCL FP_CONTRACT OFF
+
+// Optical depth of a step through an opaque sample, whatever the unit distance: exp(-30) is 1e-13.
+#define OPAQUE_OPTICAL_DEPTH 30.0f
+
+// Colour (rgb) and opacity (w) of a scalar; NaN is transparent.
+inline float4 classify(float scalar, __global const float4 *table, int entries, float low, float per_scalar)
+{
+    if (isnan(scalar))
+        return (float4)(0.0f);
+    // per_scalar: (entries - 1) / (high - low), or a huge number where the range is a single scalar
+    const float x = clamp((scalar - low) * per_scalar, 0.0f, (float)(entries - 1));
+    const int i = min((int)x, max(entries - 2, 0));
+    const float4 here = table[i];
+    const float4 next = table[min(i + 1, entries - 1)];
+    return mix(here, next, x - (float)i);
+}
+
+// Optical depth of a step of `units` opacity unit distances through opacity a: -log1p(-a) units.
+inline float step_optical_depth(float opacity, float units)
+{
+    const float tau = -log1p(-opacity) * units;
+    return opacity < 1.0f ? tau : fmax(OPAQUE_OPTICAL_DEPTH, units);
+}
+
+// Opacity of an optical depth: 1 - exp(-tau) without cancellation.
+inline float opacity_of(float tau)
+{
+    return -expm1(-tau);
+}

@@ -1,0 +1,68 @@
+// The march along one ray of a volume: one place for the steps that generation and direct volume rendering share.
+//
+// Samples lie at the midpoints of steps of equal model length along the ray, the last one shorter (DESIGN section 3).
+// Every face is computed from its step's number, never accumulated.
+#include "common/rays.cl"
+#include "common/classification.cl"
+#include "common/volume_sampling.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+typedef struct {
+    __global const VOXEL_T *voxels;
+    int4 size;                    // points along x, y, z
+    __global const float4 *table; // transfer function
+    int entries;
+    float low, per_scalar;        // scalar to table position
+} Medium;
+
+typedef struct {
+    float3 start, slope; // position in index space at t = 0 and per unit of t
+    float t0, t1;        // where the ray is inside everything it is clipped to
+    float step;          // t of one full step
+    float units;         // opacity unit distances per unit of t
+    int steps;
+} March;
+
+// Model-frame direction of the ray per unit of t.
+inline float3 model_direction(__global const float *forms, float a, float b)
+{
+    return (float3)(form_slope(forms + 3 * FORM_SIZE, a, b), form_slope(forms + 4 * FORM_SIZE, a, b),
+                    form_slope(forms + 5 * FORM_SIZE, a, b));
+}
+
+// Set up the march of pixel offsets (a, b). `forms`: 3 index positions, 3 model directions, then `planes` to clip to.
+// `sample_distance` and `unit_distance` in model units. Returns false where the ray misses.
+inline bool begin_march(March *march, __global const float *forms, int planes, float a, float b,
+                        float sample_distance, float unit_distance, float t_end)
+{
+    march->t0 = -INFINITY;
+    march->t1 = t_end;
+    if (!clip_to_planes(forms + 6 * FORM_SIZE, planes, a, b, &march->t0, &march->t1))
+        return false;
+    march->start = (float3)(form_value(forms, a, b), form_value(forms + FORM_SIZE, a, b),
+                            form_value(forms + 2 * FORM_SIZE, a, b));
+    march->slope = (float3)(form_slope(forms, a, b), form_slope(forms + FORM_SIZE, a, b),
+                            form_slope(forms + 2 * FORM_SIZE, a, b));
+    const float speed = length(model_direction(forms, a, b)); // model units per unit of t
+    march->step = sample_distance / speed;
+    march->units = speed / unit_distance;
+    march->steps = (int)ceil((march->t1 - march->t0) / march->step);
+    return true;
+}
+
+inline float step_face(const March *march, int k)
+{
+    return fmin(fma((float)k, march->step, march->t0), march->t1);
+}
+
+// Colour (rgb) and optical depth (w) of the step between two faces.
+inline float4 step_medium(const March *march, const Medium *medium, float front, float back)
+{
+    const float t = 0.5f * (front + back);
+    const float scalar = sample_volume(medium->voxels, medium->size, fma(t, march->slope.x, march->start.x),
+                                       fma(t, march->slope.y, march->start.y), fma(t, march->slope.z, march->start.z));
+    float4 sample = classify(scalar, medium->table, medium->entries, medium->low, medium->per_scalar);
+    if (sample.w > 0.0f)
+        sample.w = step_optical_depth(sample.w, (back - front) * march->units);
+    return sample;
+}

@@ -1,0 +1,34 @@
+// Samples of a uniform grid, between its points.
+//
+// -D VOXEL_T  type of a voxel: uchar, char, ushort, short or float
+// -D INDEX_T  type of a voxel's address: uint, or ulong where the grid has 2^32 points or more
+// -D NEAREST  the nearest point's value (VTK's nearest interpolation); otherwise trilinear
+//
+// Positions are in index space: point (i, j, k) lies at (i, j, k); x is fastest in memory.
+#pragma OPENCL FP_CONTRACT OFF
+
+inline float sample_volume(__global const VOXEL_T *voxels, int4 size, float x, float y, float z)
+{
+#ifdef NEAREST
+    const int i = clamp((int)floor(x + 0.5f), 0, size.x - 1);
+    const int j = clamp((int)floor(y + 0.5f), 0, size.y - 1);
+    const int k = clamp((int)floor(z + 0.5f), 0, size.z - 1);
+    return (float)voxels[((INDEX_T)k * (INDEX_T)size.y + (INDEX_T)j) * (INDEX_T)size.x + (INDEX_T)i];
+#else
+    // Rounding can put a position on the far face a hair outside: clamp the cell, keep the weight in [0, 1]
+    const int i = clamp((int)x, 0, size.x - 2);
+    const int j = clamp((int)y, 0, size.y - 2);
+    const int k = clamp((int)z, 0, size.z - 2);
+    const float fx = clamp(x - (float)i, 0.0f, 1.0f);
+    const float fy = clamp(y - (float)j, 0.0f, 1.0f);
+    const float fz = clamp(z - (float)k, 0.0f, 1.0f);
+    const INDEX_T row = (INDEX_T)size.x;
+    const INDEX_T plane = row * (INDEX_T)size.y;
+    __global const VOXEL_T *v = voxels + ((INDEX_T)k * plane + (INDEX_T)j * row + (INDEX_T)i);
+    const float c00 = mix((float)v[0], (float)v[1], fx);
+    const float c10 = mix((float)v[row], (float)v[row + 1], fx);
+    const float c01 = mix((float)v[plane], (float)v[plane + 1], fx);
+    const float c11 = mix((float)v[plane + row], (float)v[plane + row + 1], fx);
+    return mix(mix(c00, c10, fy), mix(c01, c11, fy), fz);
+#endif
+}

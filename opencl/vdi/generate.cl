@@ -1,0 +1,165 @@
+// Volume to lists of supersegments, one march per ray (paper section 2; DESIGN section 3 "Merging", "Budget").
+//
+// -D VOXEL_T, INDEX_T, NEAREST: see common/volume_sampling.cl
+//
+// A ray's march is cut into chunks of equally many steps. march_lists takes the steps of one chunk and appends what is not
+// homogeneous with the run before; make_room_in_lists then shortens the records that have grown too long, and raises the
+// ray's threshold. After the last chunk merge_lists shortens each record to the budget, and pack_lists writes the arrays.
+// The march is one kernel and the merging another because they want different vector code on a CPU.
+//
+// Lengths along a ray are t, the view depth of V_O less the VDI's depth origin, world units.
+#include "common/march.cl"
+#include "vdi/runs.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+// Work-items are the pixels of V_O in rows first_row .. first_row + rows - 1, in blocks of 4 x 4; records are in the order
+// of the work-items, counts and offsets in the order of the lists.
+
+__kernel void march_lists(
+    __global const VOXEL_T *voxels,
+    int4 size,                     // points along x, y, z
+    __global const float4 *table,  // transfer function, `entries` (R, G, B, opacity)
+    int entries,
+    float low, float per_scalar,   // scalar to table position
+    __global const float *forms,   // see begin_march
+    int planes,
+    float sample_distance,         // model units
+    float unit_distance,           // opacity unit distance, model units
+    int width, int height,         // of V_O's window
+    int first_row, int rows,
+    int first_step, int steps,     // of this chunk
+    int capacity,                  // runs in a record: at least as many as are in it now and `steps` more
+    float reference_length,        // model units
+    float hidden_weight,           // weight of what the view from V_O cannot see, 0 to 1
+    __global const float *thresholds, // merge errors up to this are accepted, one per ray
+    __global float *records,
+    __global uint *counts)         // runs in each record, by list
+{
+    const uint item = (uint)get_global_id(0);
+    const int2 pixel = block_pixel(item, width);
+    if (pixel.x >= width || pixel.y >= rows)
+        return;
+    const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
+    const float b = (float)(first_row + pixel.y) + 0.5f - 0.5f * (float)height;
+    __global uint *length_of_list = counts + (size_t)pixel.y * width + pixel.x;
+    March march;
+    if (!begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, INFINITY))
+        return;
+    const Medium medium = {voxels, size, table, entries, low, per_scalar};
+    const float per_reference = march.units * unit_distance / reference_length;
+    const float threshold = thresholds[item];
+    __global float *record = records + record_start(item, capacity, RUN_WORDS);
+
+    // The record's last run may still grow
+    int count = (int)*length_of_list;
+    float8 run = (float8)(-INFINITY);
+    float4 feature = (float4)(0.0f);
+    float run_length = 0.0f, seen = 1.0f;
+    float transmittance = 1.0f;
+    if (count > 0) {
+        run = load_run(record, count - 1);
+        feature = run_feature(run, per_reference);
+        run_length = (run.BACK - run.FRONT) * per_reference;
+        seen = seen_weight(run, hidden_weight);
+        transmittance = run.TRANSMITTANCE - run.TRANSMITTANCE * run.OPACITY;
+    }
+    float front = step_face(&march, first_step);
+    for (int k = first_step; k < min(first_step + steps, march.steps); ++k) {
+        const float back = step_face(&march, k + 1);
+        const float4 step = step_medium(&march, &medium, front, back);
+        const float opacity = opacity_of(step.w);
+        if (opacity > 0.0f && back > front) {
+            const float8 sample = (float8)(front, back, step.w, transmittance, step.xyz * opacity, opacity);
+            const float sample_length = (back - front) * per_reference;
+            const float density = step.w / (step.w + sample_length);
+            const float4 sample_feature = (float4)(step.xyz * density, density);
+            transmittance -= transmittance * opacity;
+            // Against the run's mean feature so far, which is cheaper to keep than its medium's; a gap ends a run
+            const float share = sample_length / (run_length + sample_length);
+            const float4 difference = sample_feature - feature;
+            const float error = run_length * share * dot(difference, difference) * seen;
+            if (run.BACK == front && error <= threshold) {
+                run = merged_runs(run, sample);
+                feature += share * difference;
+                run_length += sample_length;
+            } else {
+                if (count > 0)
+                    store_run(record, count - 1, run);
+                ++count;
+                run = sample;
+                feature = sample_feature;
+                run_length = sample_length;
+                seen = seen_weight(run, hidden_weight);
+            }
+        }
+        front = back;
+    }
+    if (count > 0)
+        store_run(record, count - 1, run);
+    *length_of_list = (uint)count;
+}
+
+// Shorten records of more than `limit` runs: with `exactly`, at least error; otherwise by raising the ray's threshold.
+__kernel void shorten_lists(
+    int limit,
+    int exactly,
+    int width, int height,
+    int first_row, int rows,
+    __global const float *forms,
+    int capacity,
+    float reference_length,
+    float hidden_weight,
+    __global float *thresholds,
+    __global float *records,
+    __global float *all_errors,
+    __global uint *counts)
+{
+    const uint item = (uint)get_global_id(0);
+    const int2 pixel = block_pixel(item, width);
+    if (pixel.x >= width || pixel.y >= rows)
+        return;
+    __global uint *length_of_list = counts + (size_t)pixel.y * width + pixel.x;
+    const int count = (int)*length_of_list;
+    if (count <= limit)
+        return;
+    const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
+    const float b = (float)(first_row + pixel.y) + 0.5f - 0.5f * (float)height;
+    const float per_reference = length(model_direction(forms, a, b)) / reference_length;
+    __global float *record = records + record_start(item, capacity, RUN_WORDS);
+    __global float *errors = all_errors + record_start(item, capacity, 1);
+    if (exactly) {
+        *length_of_list = (uint)merge_to_limit(record, errors, count, limit, per_reference, hidden_weight);
+    } else {
+        float threshold = thresholds[item];
+        *length_of_list = (uint)make_room(record, errors, count, limit, &threshold, per_reference, hidden_weight);
+        thresholds[item] = threshold;
+    }
+}
+
+// Records of a slice of rays to the VDI's arrays.
+__kernel void pack_lists(
+    __global const float *records,
+    int capacity,
+    int width, int rows,            // of the slice
+    __global const ulong *offsets,  // where each list begins in the arrays; width * rows + 1
+    __global float *fronts,         // view depth less the depth origin, world units
+    __global float *backs,
+    __global float *colors,         // straight RGB, 3 per supersegment
+    __global float *optical_depths)
+{
+    const uint item = (uint)get_global_id(0);
+    const int2 pixel = block_pixel(item, width);
+    if (pixel.x >= width || pixel.y >= rows)
+        return;
+    __global const float *record = records + record_start(item, capacity, RUN_WORDS);
+    const size_t list = (size_t)pixel.y * width + pixel.x;
+    const ulong begin = offsets[list];
+    const int count = (int)(offsets[list + 1] - begin);
+    for (int k = 0; k < count; ++k) {
+        const float8 run = load_run(record, k);
+        fronts[begin + k] = run.FRONT;
+        backs[begin + k] = run.BACK;
+        optical_depths[begin + k] = run.TAU;
+        vstore3(clamp(run.COLOR / run.OPACITY, 0.0f, 1.0f), begin + k, colors);
+    }
+}

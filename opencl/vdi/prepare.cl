@@ -1,0 +1,57 @@
+// A VDI's arrays to what the raycaster reads: faces in list space and extinction in place of optical depth.
+//
+// The depth coordinate z grows with depth and is projective, so that straight rays stay straight (DESIGN section 3):
+//
+//     -D PARALLEL      z = Z - Z_ref             1/Z is not needed
+//     -D SHIFTED       z = (Z - Z_ref) / Z       long lens: what cancels in Z - Z_ref was taken out in float64 by the host
+//     otherwise        z = -1 / Z                the same relative precision at every depth
+//
+// with Z view depth from V_O in world units and Z_ref the VDI's depth origin; the arrays hold Z - Z_ref.
+#pragma OPENCL FP_CONTRACT OFF
+
+inline float depth_coordinate(float offset, float depth_origin)
+{
+#if defined(PARALLEL)
+    return offset;
+#elif defined(SHIFTED)
+    return offset / (offset + depth_origin);
+#else
+    return -1.0f / (offset + depth_origin);
+#endif
+}
+
+// One work-item per list.
+__kernel void prepare_lists(
+    __global const OFFSET_T *offsets,     // width * height + 1
+    __global const float *fronts,         // view depth less depth_origin
+    __global const float *backs,
+    __global const float *colors,         // straight RGB, 3 per supersegment
+    __global const float *optical_depths,
+    float depth_origin,                   // world units
+    float nearest,                        // least view depth that is in front of the eye, world units
+    int width, int height,
+    __global const float *centre_ray,     // 9: model-frame direction of the ray of pixel offsets (a, b), rows 1, a, b
+    __global float2 *faces,
+    __global float4 *media)               // straight RGB, extinction per model length
+{
+    const size_t list = get_global_id(0);
+    if (list >= (size_t)width * (size_t)height)
+        return;
+    const float a = (float)(list % (size_t)width) + 0.5f - 0.5f * (float)width;
+    const float b = (float)(list / (size_t)width) + 0.5f - 0.5f * (float)height;
+    const float3 direction = fma(b, vload3(2, centre_ray), fma(a, vload3(1, centre_ray), vload3(0, centre_ray)));
+    const float per_depth = length(direction); // model length per unit of view depth
+    for (OFFSET_T k = offsets[list]; k < offsets[list + 1]; ++k) {
+        const float front = fronts[k];
+        const float back = backs[k];
+#ifdef PARALLEL
+        const float z0 = front, z1 = back;
+#else
+        // A face on the eye's plane has no list coordinate; nothing nearer than `nearest` is ever looked up
+        const float z0 = depth_coordinate(fmax(front, nearest - depth_origin), depth_origin);
+        const float z1 = depth_coordinate(fmax(back, nearest - depth_origin), depth_origin);
+#endif
+        faces[k] = (float2)(z0, z1);
+        media[k] = (float4)(vload3(k, colors), optical_depths[k] / ((back - front) * per_depth));
+    }
+}

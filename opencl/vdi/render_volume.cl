@@ -1,0 +1,47 @@
+// Direct volume rendering: the baseline that a VDI is measured against, by the same march as generation.
+//
+// -D VOXEL_T, INDEX_T, NEAREST: see common/volume_sampling.cl
+#include "common/march.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+__kernel void render_volume(
+    __global const VOXEL_T *voxels,
+    int4 size,
+    __global const float4 *table,
+    int entries,
+    float low, float per_scalar,
+    __global const float *forms,          // see begin_march
+    int planes,
+    float sample_distance,                // model units
+    float unit_distance,                  // model units
+    int width, int height,
+    __global const float *opaque_depth,   // t at which each pixel's ray ends, top row first, if has_opaque_depth
+    int has_opaque_depth,
+    float transmittance_cutoff,           // the ray ends where no more than this is left; negative: never
+    __global float4 *image)               // premultiplied RGBA, top row first
+{
+    const int2 pixel = block_pixel((uint)get_global_id(0), width);
+    if (pixel.x >= width || pixel.y >= height)
+        return;
+    const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
+    const float b = (float)pixel.y + 0.5f - 0.5f * (float)height;
+    const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
+    const float t_end = has_opaque_depth ? opaque_depth[place] : INFINITY;
+
+    float3 color = (float3)(0.0f);
+    float transmittance = 1.0f;
+    March march;
+    if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, t_end)) {
+        const Medium medium = {voxels, size, table, entries, low, per_scalar};
+        float front = step_face(&march, 0);
+        for (int k = 0; k < march.steps && transmittance > transmittance_cutoff; ++k) {
+            const float back = step_face(&march, k + 1);
+            const float4 step = step_medium(&march, &medium, front, back);
+            const float weight = transmittance * opacity_of(step.w); // over, front to back
+            color += weight * step.xyz;
+            transmittance -= weight;
+            front = back;
+        }
+    }
+    image[place] = (float4)(color, 1.0f - transmittance);
+}

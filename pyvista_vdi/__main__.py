@@ -1,0 +1,15 @@
+"""``python -m pyvista_vdi``: the command line where its script is not on the path."""
+
+from __future__ import annotations
+
+import sys
+
+
+def _run() -> int:
+    from .cli import main
+
+    return main()
+
+
+if __name__ == "__main__":
+    sys.exit(_run())

@@ -1,0 +1,400 @@
+"""The public functions: a thin façade over the engine that takes VTK's and PyVista's objects too.
+
+Converters are imported only where an argument needs them: for a :class:`Volume`, a
+:class:`Camera` and a :class:`TransferFunction` neither VTK nor PyVista is loaded.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .camera import Camera
+from .classification import DEFAULTS, IN_PLACE, Classification
+from .errors import InvalidVDIError, InvalidVolumeError
+from .vdi import VDI
+from .volume import Volume
+
+if TYPE_CHECKING:
+    from .generation import Estimate
+
+__all__ = ["estimate", "generate", "read", "render", "render_volume"]
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def _classified(function: _Function) -> _Function:
+    """Show the classification arguments by name in the signature that ``help`` prints."""
+    signature = inspect.signature(function)
+    own = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
+    defaults = {**DEFAULTS, **dict.fromkeys(IN_PLACE)}
+    shared = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default)
+        for name, default in defaults.items()
+    ]
+    function.__signature__ = signature.replace(  # type: ignore[attr-defined]
+        parameters=[*own, *shared]
+    )
+    return function
+
+
+@_classified
+def generate(
+    volume: Any,
+    camera: Any,
+    window_size: Sequence[int],
+    *,
+    max_supersegments: int = 20,
+    sample_distance: float | None = None,
+    tolerance: float = 0.0,
+    view_cone: float = 60.0,
+    device: Any = None,
+    progress: Callable[[float], object] | None = None,
+    **classification: Any,
+) -> VDI:
+    """Generate a VDI: cut every pixel's ray through a classified volume into supersegments.
+
+    Parameters
+    ----------
+    volume : pyvista.ImageData or vtkImageData or Volume
+        Scalars on a uniform grid; spacing, origin and direction matrix are honoured, cell data
+        are converted as ``Plotter.add_volume`` does.
+    camera : pyvista.Camera or vtkCamera or Camera
+        The generating view V_O.
+    window_size : (int, int)
+        Width and height in pixels: lists along each edge of the viewport.
+    max_supersegments : int
+        Longest list, 1 to 4096. A promise: never exceeded, and nothing non-transparent is
+        dropped for it.
+    sample_distance : float, optional
+        Length of a step along the ray, model units; half the smallest spacing by default.
+    tolerance : float
+        Error per list that may be traded for shorter lists; 0 uses the budget.
+    view_cone : float
+        Half angle in degrees of the cone of new views that must be served: the wider, the more
+        of the budget goes to what V_O cannot see.
+    device : str, int or device, optional
+        Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
+    progress : callable, optional
+        Called with the finished fraction, 0 to 1; work stops if it returns ``False``.
+    **classification
+        ``Plotter.add_volume``'s arguments of the same names, defaults and meaning: scalars,
+        preference, clim, n_colors, opacity, cmap, flip_scalars, opacity_unit_distance,
+        log_scale, shade, ambient, diffuse, specular, specular_power, blending; and
+        ``interpolation`` (``"nearest"``, which is what ``add_volume`` draws, or ``"linear"``).
+        In their place either ``volume_property`` (a ``vtkVolumeProperty``) or
+        ``transfer_function`` (a :class:`TransferFunction`, which needs no PyVista).
+
+    Returns
+    -------
+    VDI
+        The supersegments of every list, with the view and what made them.
+
+    Raises
+    ------
+    TypeError
+        If a keyword is unknown.
+    InvalidVolumeError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+    UnsupportedError
+        If shading or another blending mode is asked for.
+    MissingDependencyError
+        If a colour map or an opacity is named and PyVista is not installed.
+    NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
+        If there is no device, or it fails.
+    Cancelled
+        If ``progress`` returned ``False``.
+
+    Examples
+    --------
+    >>> import pyvista_vdi as pvdi
+    >>> from pyvista_vdi.standard_cases import filling_camera
+    >>> volume = pvdi.examples.load_brain(as_volume=True)
+    >>> camera = filling_camera(volume.bounds, (640, 360))
+    >>> vdi = pvdi.generate(volume, camera, (640, 360), cmap="bone")  # doctest: +SKIP
+    """
+    looks = Classification(classification, "generate", _keywords(generate))
+    view = Camera.from_any(camera)
+    volume = as_volume(volume, looks.scalars, looks.preference)
+    from .generation import generate_vdi
+
+    return generate_vdi(
+        volume,
+        view,
+        window_size,
+        looks.transfer_function(volume),
+        max_supersegments=max_supersegments,
+        sample_distance=sample_distance,
+        tolerance=tolerance,
+        view_cone=view_cone,
+        device=device,
+        progress=progress,
+        metadata={"classification": looks.describe(), "scalars": volume.name},
+    )
+
+
+def render(
+    vdi: Any,
+    camera: Any,
+    window_size: Sequence[int] | None = None,
+    *,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+    device: Any = None,
+) -> NDArray[np.float32]:
+    """Raycast a VDI from a new view.
+
+    Parameters
+    ----------
+    vdi : VDI or vtkImageData
+        What :func:`generate` or :func:`read` returned, or its VTK form (``pv.read("x.vdi")``).
+    camera : pyvista.Camera or vtkCamera or Camera
+        The new view V_N. Its model transform places the VDI's model frame in the world.
+    window_size : (int, int), optional
+        Width and height of the image in pixels; the VDI's own by default.
+    opaque_depth : array_like of float32, shape (H, W), optional
+        Depth at which each ray ends: distance from the eye along the view direction, world
+        units, top row first; infinity where nothing is opaque.
+    clipping_planes : array_like of float, shape (k, 6), optional
+        Origin and normal of each plane, world coordinates; the side that the normal points to
+        is kept, as with VTK's mappers.
+    device : str, int or device, optional
+        Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
+
+    Returns
+    -------
+    numpy.ndarray
+        float32 (H, W, 4), premultiplied RGBA, top row first, no background blended in.
+
+    Raises
+    ------
+    InvalidVDIError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+    NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
+        If there is no device, or it fails.
+    """
+    view = Camera.from_any(camera)
+    vdi = as_vdi(vdi)
+    from .raycast import render_vdi
+
+    return render_vdi(
+        vdi,
+        view,
+        window_size,
+        opaque_depth=opaque_depth,
+        clipping_planes=clipping_planes,
+        device=device,
+    )
+
+
+@_classified
+def render_volume(
+    volume: Any,
+    camera: Any,
+    window_size: Sequence[int],
+    *,
+    sample_distance: float | None = None,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+    early_termination: bool = True,
+    device: Any = None,
+    **classification: Any,
+) -> NDArray[np.float32]:
+    """Raycast the volume itself: direct volume rendering, the baseline of a VDI.
+
+    Parameters
+    ----------
+    volume : pyvista.ImageData or vtkImageData or Volume
+        As for :func:`generate`.
+    camera : pyvista.Camera or vtkCamera or Camera
+        The view.
+    window_size : (int, int)
+        Width and height in pixels.
+    sample_distance : float, optional
+        Length of a step along the ray, model units; half the smallest spacing by default.
+    opaque_depth, clipping_planes
+        As for :func:`render`.
+    early_termination : bool
+        Stop a ray where what is behind can no longer be seen.
+    device : str, int or device, optional
+        Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
+    **classification
+        As for :func:`generate`.
+
+    Returns
+    -------
+    numpy.ndarray
+        float32 (H, W, 4), premultiplied RGBA, top row first, no background blended in.
+
+    Raises
+    ------
+    TypeError
+        If a keyword is unknown.
+    InvalidVolumeError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+    UnsupportedError
+        If shading or another blending mode is asked for.
+    MissingDependencyError
+        If a colour map or an opacity is named and PyVista is not installed.
+    NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
+        If there is no device, or it fails.
+    """
+    looks = Classification(classification, "render_volume", _keywords(render_volume))
+    view = Camera.from_any(camera)
+    volume = as_volume(volume, looks.scalars, looks.preference)
+    from .raycast_volume import raycast_volume
+
+    return raycast_volume(
+        volume,
+        view,
+        window_size,
+        looks.transfer_function(volume),
+        sample_distance=sample_distance,
+        opaque_depth=opaque_depth,
+        clipping_planes=clipping_planes,
+        early_termination=early_termination,
+        device=device,
+    )
+
+
+def read(path: str | os.PathLike[str]) -> VDI:
+    """Read a VDI from a file that :meth:`VDI.save` wrote.
+
+    Parameters
+    ----------
+    path : path-like
+        A ``.vdi`` file.
+
+    Returns
+    -------
+    VDI
+        The same to the last bit.
+
+    Raises
+    ------
+    VDIFileError
+        If the file is absent, foreign, of a newer version, truncated or damaged; the message
+        says which.
+    """
+    from .io import read as read_file
+
+    return read_file(path)
+
+
+def estimate(volume: Any, window_size: Sequence[int], *, max_supersegments: int = 20) -> Estimate:
+    """Return how much memory generating a VDI takes, before it is taken.
+
+    Parameters
+    ----------
+    volume : pyvista.ImageData or vtkImageData or Volume
+        What the VDI would be made of.
+    window_size : (int, int)
+        Width and height in pixels.
+    max_supersegments : int
+        Longest list.
+
+    Returns
+    -------
+    Estimate
+        Bytes of the volume, of the VDI at worst, of the working buffers, and their sum.
+
+    Raises
+    ------
+    InvalidVolumeError, InvalidArgumentError
+        If an argument cannot be used.
+    """
+    from .generation import estimate as estimate_bytes
+
+    return estimate_bytes(as_volume(volume), window_size, max_supersegments=max_supersegments)
+
+
+def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Volume:
+    """Return what a user calls a volume as a :class:`Volume`.
+
+    Parameters
+    ----------
+    volume : Volume or vtkImageData or pyvista.ImageData
+        VTK is imported only for its own objects.
+    scalars : str or array_like, optional
+        Name of the array, or values per point; the active array by default.
+    preference : {"point", "cell"}
+        Which array where both kinds have one of that name.
+
+    Raises
+    ------
+    InvalidVolumeError
+        If it is none of these, or has no such scalars.
+    """
+    if isinstance(volume, Volume):
+        return _with_scalars(volume, scalars)
+    if hasattr(volume, "GetClassName"):
+        from .vtk_pipeline.convert import volume_from_vtk
+
+        if scalars is not None and not isinstance(scalars, str):
+            from .plotting.volumes import as_image
+
+            volume, scalars = as_image(volume, scalars, None)
+        return volume_from_vtk(volume, scalars=scalars, preference=preference)
+    if isinstance(volume, np.ndarray):
+        raise InvalidVolumeError(
+            f"got a NumPy array of shape {volume.shape}, which has no spacing: "
+            "wrap it as pyvista_vdi.Volume(array, spacing), indexed [z, y, x]"
+        )
+    raise InvalidVolumeError(
+        f"expected a pyvista.ImageData, a vtkImageData or a pyvista_vdi.Volume; "
+        f"got {_described(volume)}"
+    )
+
+
+def _with_scalars(volume: Volume, scalars: Any) -> Volume:
+    if scalars is None or isinstance(scalars, str):
+        if scalars not in (None, volume.name):
+            raise InvalidVolumeError(
+                f"the volume has no array {scalars!r}: its only one is {volume.name!r}"
+            )
+        return volume
+    values = np.asarray(scalars)
+    if values.size != volume.array.size:
+        raise InvalidVolumeError(
+            f"scalars must have one value per point, {volume.array.size}; got {values.size}"
+        )
+    shaped = values.reshape(volume.array.shape)
+    return Volume(shaped, volume.spacing, volume.origin, volume.direction, name="scalars")
+
+
+def as_vdi(vdi: Any) -> VDI:
+    """Return a VDI, or its VTK form, as a :class:`VDI`.
+
+    Raises
+    ------
+    InvalidVDIError
+        If it is neither.
+    """
+    if isinstance(vdi, VDI):
+        return vdi
+    if hasattr(vdi, "GetClassName"):
+        from .vtk_pipeline.convert import vdi_from_image
+
+        return vdi_from_image(vdi)
+    hint = ": read it by pyvista_vdi.read(path)" if isinstance(vdi, str | os.PathLike) else ""
+    raise InvalidVDIError(
+        f"expected a VDI or its VTK form (a vtkImageData); got {_described(vdi)}{hint}"
+    )
+
+
+def _keywords(function: Callable[..., Any]) -> tuple[str, ...]:
+    """Return all keyword names of a function."""
+    return tuple(inspect.signature(function).parameters)
+
+
+def _described(thing: object) -> str:
+    return (
+        f"the path {os.fspath(thing)!r}"
+        if isinstance(thing, str | os.PathLike)
+        else (f"{type(thing).__name__}")
+    )

@@ -1,0 +1,75 @@
+"""The verbs that only report: ``devices`` and ``info``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict
+from typing import Any
+
+
+def devices(options: argparse.Namespace) -> int:
+    """Print every OpenCL device; exit status 1 if none is usable."""
+    from ..opencl_runtime import describe_devices, list_devices
+
+    infos = list_devices()
+    if options.json:
+        print(json.dumps([asdict(info) for info in infos], indent=1))
+    else:
+        print(describe_devices())
+    return 0 if any(info.usable for info in infos) else 1
+
+
+def info(options: argparse.Namespace) -> int:
+    """Print what a .vdi file says about itself."""
+    from ..io import FileInfo, read_info
+
+    about: FileInfo = read_info(options.file)
+    print(json.dumps(_plain(about), indent=1) if options.json else _text(about))
+    return 0
+
+
+def _plain(about: Any) -> dict[str, Any]:
+    state: dict[str, Any] = {**vars(about)}
+    state["path"] = str(about.path)
+    state["camera"] = about.camera.to_dict()
+    return state
+
+
+def _text(about: Any) -> str:
+    width, height = about.window_size
+    view = about.camera
+    lens = (
+        f"parallel scale {view.parallel_scale:g}"
+        if view.parallel_projection
+        else f"view angle {view.view_angle:g} degrees"
+    )
+    rows = {
+        "file": f"{about.path}, {_mebibytes(about.file_bytes)}, {about.codec}",
+        "written by": f"{about.written_by}, format version {about.format_version}",
+        "lists": f"{width} x {height}",
+        "supersegments": f"{about.n_supersegments}, "
+        f"{about.n_supersegments / (width * height):.2f} per list",
+        "in memory": _mebibytes(about.memory_bytes),
+        "eye": _vector(view.position),
+        "looking at": f"{_vector(view.focal_point)}, up {_vector(view.view_up)}, {lens}",
+        "bounds": _vector(about.bounds),
+        "depth origin": f"{about.depth_origin:g}",
+        **{name: _short(value) for name, value in about.metadata.items()},
+    }
+    column = max(len(name) for name in rows)
+    return "\n".join(f"{name:<{column}}  {value}" for name, value in rows.items())
+
+
+def _vector(values: Any) -> str:
+    return f"({', '.join(f'{v:g}' for v in values)})"
+
+
+def _short(value: Any, longest: int = 100) -> str:
+    """Return a metadata entry in one line; tables are left to ``--json``."""
+    text = json.dumps(value)
+    return text if len(text) <= longest else text[: longest - 4] + " ..."
+
+
+def _mebibytes(n: int) -> str:
+    return f"{n / 2**20:.1f} MiB"

@@ -1,0 +1,71 @@
+"""The verb ``generate``: a volume becomes a .vdi file."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+
+from ..api import generate as generate_vdi
+from ..camera import Camera
+from ..classification import Classification
+from ..generation import estimate
+from ..io import checked_target
+from ..plotting.progress import DelayedBar
+from ..standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
+from ..volume import Volume
+from .inputs import camera, classification, has_own_place, read_volume
+
+
+def generate(options: argparse.Namespace) -> int:
+    """Generate a VDI and write it."""
+    target = checked_target(options.output)
+    arguments = classification(options)
+    Classification(arguments, "generate")  # refused before the volume is read
+    volume = read_volume(options)
+    for name in ("scalars", "preference"):  # the array has been chosen
+        arguments.pop(name, None)
+    view = generating_view(options, volume)
+    needed = estimate(volume, options.size, max_supersegments=options.max_supersegments)
+    print(
+        f"{volume.dimensions[0]} x {volume.dimensions[1]} x {volume.dimensions[2]} points, "
+        f"{options.size[0]} x {options.size[1]} lists: up to {needed.total / 2**20:.0f} MiB",
+        file=sys.stderr,
+    )
+    bar = DelayedBar()
+    start = time.perf_counter()
+    try:
+        vdi = generate_vdi(
+            volume,
+            view,
+            options.size,
+            max_supersegments=options.max_supersegments,
+            sample_distance=options.sample_distance,
+            tolerance=options.tolerance,
+            view_cone=options.view_cone,
+            device=options.device,
+            progress=bar,
+            **arguments,
+        )
+    finally:
+        bar.close()
+    seconds = time.perf_counter() - start
+    vdi.save(target, compression=options.compression, level=options.level)
+    print(
+        f"{options.output}: {vdi.n_supersegments} supersegments in {options.size[0]} x "
+        f"{options.size[1]} lists, {target.stat().st_size / 2**20:.1f} MiB, {seconds:.1f} s"
+    )
+    return 0
+
+
+def generating_view(options: argparse.Namespace, volume: Volume) -> Camera:
+    """Return V_O: the options' own view, or the one that the volume fills, turned as asked."""
+    if has_own_place(options):
+        return camera(options, filling_camera(volume.bounds, options.size))
+    return filling_camera(
+        volume.bounds,
+        options.size,
+        azimuth=options.azimuth,
+        elevation=ELEVATION + options.elevation,
+        view_angle=VIEW_ANGLE if options.view_angle is None else options.view_angle,
+    )

@@ -1,0 +1,108 @@
+"""What several verbs read: volumes, cameras, transfer functions, classification options."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ..api import as_volume
+from ..camera import Camera
+from ..errors import InvalidArgumentError, VDIError
+from ..standard_cases import TRANSFER_FUNCTIONS
+from ..transfer_function import TransferFunction
+from ..volume import Volume
+
+_T = TypeVar("_T")
+
+#: Options that are arguments of the same name, given only if the user gave them.
+_CLASSIFICATION = (
+    "cmap",
+    "opacity",
+    "clim",
+    "n_colors",
+    "flip_scalars",
+    "log_scale",
+    "opacity_unit_distance",
+    "scalars",
+    "preference",
+    "interpolation",
+)
+
+
+def read_volume(options: argparse.Namespace) -> Volume:
+    """Return the volume that VOLUME or ``--example`` names, with the scalars asked for."""
+    if options.example is not None:
+        from .. import examples
+
+        volume: Any = examples.load_data(options.example, as_volume=True)
+    elif Path(options.volume).suffix.lower() in (".nrrd", ".nhdr"):
+        # By pynrrd: it needs no PyVista, and VTK takes the first axis for components in files
+        # that do not say what their axes are
+        from ..examples import read_nrrd
+
+        volume = read_nrrd(Path(options.volume), "values")
+    else:
+        from ..plotting.cli_support import read_volume as read_by_pyvista
+
+        volume = read_by_pyvista(options.volume)
+    return as_volume(volume, options.scalars, options.preference or "point")
+
+
+def volume_name(options: argparse.Namespace) -> str:
+    """Return a short name of the volume, for files and reports."""
+    return options.example or Path(options.volume).resolve().name.split(".")[0]
+
+
+def classification(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the classification arguments that the options stand for."""
+    given = dict(TRANSFER_FUNCTIONS[options.tf]) if options.tf else {}
+    for name in _CLASSIFICATION:
+        if getattr(options, name) is not None:
+            given[name] = getattr(options, name)
+    path = getattr(options, "transfer_function", None)
+    if path is not None:
+        given["transfer_function"] = _from_json(
+            path, TransferFunction.from_dict, "transfer function"
+        )
+    return given
+
+
+def camera(options: argparse.Namespace, default: Camera) -> Camera:
+    """Return the view that the camera options make of a default."""
+    view = default
+    if options.camera_json is not None:
+        view = _from_json(options.camera_json, Camera.from_dict, "camera")
+    names = ("position", "focal_point", "view_up", "view_angle")
+    changes = {n: getattr(options, n) for n in names if getattr(options, n) is not None}
+    if options.parallel_scale is not None:
+        changes |= {"parallel_scale": options.parallel_scale, "parallel_projection": True}
+    elif options.view_angle is not None:
+        changes["parallel_projection"] = False
+    if changes:
+        view = view.replace(**changes)
+    if options.azimuth:
+        view = view.azimuth(options.azimuth)
+    return view.elevation(options.elevation) if options.elevation else view
+
+
+def has_own_place(options: argparse.Namespace) -> bool:
+    """Whether the options say where the eye is, instead of turning the default view."""
+    names = ("camera_json", "position", "focal_point", "view_up", "parallel_scale")
+    return any(getattr(options, name) is not None for name in names)
+
+
+def _from_json(path: str, build: Callable[[dict[str, Any]], _T], kind: str) -> _T:
+    try:
+        state = json.loads(Path(path).read_text(encoding="utf-8"))
+        return build(state)
+    except VDIError:
+        raise
+    except OSError as error:
+        raise InvalidArgumentError(f"{path} cannot be read: {error.strerror or error}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InvalidArgumentError(
+            f"{path} is no {kind} in JSON ({error!r}): write one by json.dump(x.to_dict(), file)"
+        ) from error

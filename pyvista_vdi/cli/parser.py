@@ -1,0 +1,358 @@
+"""The verbs and their options; imports nothing but the standard library and plain constants."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import re
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any, NoReturn
+
+from .._version import __version__
+from ..camera import check_window_size
+from ..errors import InvalidArgumentError
+from ..standard_cases import ANGLES, ELEVATION, TRANSFER_FUNCTIONS, WINDOW_SIZE
+
+_DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
+
+
+class UsageError(Exception):
+    """A mistake in the arguments; the message says which and what is right."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """An argument parser that raises instead of leaving the process, and says one line."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message}; see {self.prog} --help")
+
+
+def parse(arguments: list[str]) -> argparse.Namespace | None:
+    """Parse the command line.
+
+    Parameters
+    ----------
+    arguments : list of str
+        Without the program's name.
+
+    Returns
+    -------
+    argparse.Namespace or None
+        Options, and ``run``, the verb's function; ``None`` if help or the version was asked for.
+
+    Raises
+    ------
+    UsageError
+        If they make no sense; the message suggests what may have been meant.
+    """
+    parser, verbs = _make_parser()
+    if not arguments:
+        parser.print_help()
+        return None
+    if not arguments[0].startswith("-") and arguments[0] not in verbs:
+        raise UsageError(
+            f"there is no verb {arguments[0]!r}: {_suggestion(arguments[0], list(verbs))}"
+        )
+    try:
+        options, unknown = parser.parse_known_args(arguments)
+    except SystemExit:  # after --help and --version
+        return None
+    if unknown:
+        verb = verbs[options.verb]
+        known = re.findall(r"--[\w-]+", verb.format_help())
+        hint = _suggestion(unknown[0].split("=")[0], known) if unknown[0].startswith("-") else ""
+        raise UsageError(
+            f"{options.verb} takes no argument {unknown[0]!r}"
+            + (f": {hint}" if hint else f"; see {verb.prog} --help")
+        )
+    return options
+
+
+def run_verb(options: argparse.Namespace) -> int:
+    """Import the verb's module, which brings what it needs, and run it."""
+    verb = import_module(f".{options.module}", __package__)
+    return int(getattr(verb, options.verb)(options))
+
+
+def _suggestion(name: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(dict.fromkeys(known))}"
+
+
+def _make_parser() -> tuple[_Parser, dict[str, _Parser]]:
+    parser = _Parser(
+        prog="pyvista-vdi",
+        description=_DESCRIPTION,
+        epilog="Each verb explains itself: pyvista-vdi generate --help",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"pyvista-vdi {__version__}")
+    subparsers = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
+    verbs: dict[str, _Parser] = {}
+    for name, (module, summary, example, add_options) in _VERBS.items():
+        verbs[name] = subparsers.add_parser(
+            name,
+            help=summary,
+            description=summary[0].upper() + summary[1:] + ".",
+            epilog=f"Example:\n  {example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,
+        )
+        add_options(verbs[name])
+        verbs[name].set_defaults(run=run_verb, module=module)
+    return parser, verbs
+
+
+# -- the verbs' options ----------------------------------------------------------------------------
+
+
+def _add_devices(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def _add_info(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="a .vdi file")
+    parser.add_argument("--json", action="store_true", help="print JSON, with all metadata")
+
+
+def _add_generate(parser: argparse.ArgumentParser) -> None:
+    _add_volume(parser)
+    parser.add_argument("-o", "--output", metavar="FILE", required=True, help=".vdi to write")
+    _add_size(parser, WINDOW_SIZE)
+    _add_camera(parser, f"the view that the volume fills, {ELEVATION:g} degrees above its middle")
+    _add_classification(parser)
+    _add_limits(parser)
+    group = parser.add_argument_group("file")
+    group.add_argument("--compression", choices=("zstd", "lz4", "none"), default="zstd")
+    group.add_argument("--level", type=int, default=1, help="1 (fast, default) to 9 (small)")
+    _add_device(parser)
+
+
+def _add_render(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="a .vdi file")
+    parser.add_argument("-o", "--output", metavar="FILE", required=True, help=".png to write")
+    _add_size(parser, None)
+    parser.add_argument(
+        "--background",
+        type=_color,
+        metavar="COLOR",
+        help="blend over this: a name, #rrggbb or R,G,B from 0 to 1; otherwise the picture is "
+        "transparent where the volume is",
+    )
+    _add_camera(parser, "the VDI's generating view")
+    _add_device(parser)
+
+
+def _add_view(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="a .vdi file")
+    _add_size(parser, None)
+    parser.add_argument("--screenshot", metavar="FILE", help="write this .png, open no window")
+
+
+def _add_compare(parser: argparse.ArgumentParser) -> None:
+    _add_volume(parser)
+    parser.add_argument("--out", metavar="FOLDER", default=".", help="where the files go")
+    _add_size(parser, WINDOW_SIZE)
+    parser.add_argument(
+        "--angles",
+        type=_numbers,
+        metavar="A,B,...",
+        default=ANGLES,
+        help=f"degrees from V_O (default: {','.join(f'{a:g}' for a in ANGLES)})",
+    )
+    parser.add_argument(
+        "--repeats", type=_count, default=3, help="timed frames of each kind (default: 3)"
+    )
+    parser.add_argument("--no-vtk", action="store_true", help="leave out VTK's mappers")
+    _add_classification(parser, tables=False)
+    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
+    parser.add_argument("--sample-distance", type=float, metavar="LENGTH")
+    _add_device(parser)
+
+
+_VERBS: dict[str, tuple[str, str, str, Any]] = {
+    "devices": (
+        "files",
+        "list the OpenCL devices, and say why one is not used",
+        "pyvista-vdi devices",
+        _add_devices,
+    ),
+    "generate": (
+        "generate",
+        "generate a VDI of a volume and write it to a file",
+        "pyvista-vdi generate knee.nrrd -o knee.vdi --cmap bone --opacity sigmoid_6 --azimuth 30",
+        _add_generate,
+    ),
+    "render": (
+        "render",
+        "render a VDI from a new view and write a picture",
+        "pyvista-vdi render knee.vdi -o knee.png --azimuth 20 --background white",
+        _add_render,
+    ),
+    "view": (
+        "render",
+        "open a window in which a VDI can be turned",
+        "pyvista-vdi view knee.vdi",
+        _add_view,
+    ),
+    "info": (
+        "files",
+        "say what a .vdi file holds, without reading its arrays",
+        "pyvista-vdi info knee.vdi --json",
+        _add_info,
+    ),
+    "compare": (
+        "comparison",
+        "render a volume by VTK's mappers, our raycaster and a VDI, and compare them",
+        "pyvista-vdi compare --example brain --tf soft --out out",
+        _add_compare,
+    ),
+}
+
+
+# -- groups of options -----------------------------------------------------------------------------
+
+
+def _add_volume(parser: argparse.ArgumentParser) -> None:
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument(
+        "volume",
+        metavar="VOLUME",
+        nargs="?",
+        help="a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), or a "
+        "folder of DICOM slices",
+    )
+    source.add_argument("--example", metavar="NAME", help="a volume known by name, e.g. brain")
+
+
+def _add_size(parser: argparse.ArgumentParser, default: tuple[int, int] | None) -> None:
+    shown = "the VDI's" if default is None else f"{default[0]}x{default[1]}"
+    parser.add_argument(
+        "--size",
+        type=_size,
+        metavar="WxH",
+        default=default,
+        help=f"window size in pixels (default: {shown})",
+    )
+
+
+def _add_camera(parser: argparse.ArgumentParser, default: str) -> None:
+    group = parser.add_argument_group("camera", f"By default {default}.")
+    triple: dict[str, Any] = {"nargs": 3, "type": float, "metavar": ("X", "Y", "Z")}
+    group.add_argument("--position", **triple, help="eye, world coordinates")
+    group.add_argument("--focal-point", **triple, help="point looked at, world coordinates")
+    group.add_argument("--view-up", **triple, help="direction that is up")
+    group.add_argument("--view-angle", type=float, metavar="DEGREES", help="vertical, full")
+    group.add_argument(
+        "--parallel-scale",
+        type=float,
+        metavar="LENGTH",
+        help="half the viewport's height in world units; makes the projection parallel",
+    )
+    group.add_argument("--camera-json", metavar="FILE", help="Camera.to_dict() as JSON")
+    group.add_argument("--azimuth", type=float, default=0.0, metavar="DEGREES", help="turn by")
+    group.add_argument("--elevation", type=float, default=0.0, metavar="DEGREES", help="lift by")
+
+
+def _add_classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> None:
+    group = parser.add_argument_group(
+        "classification", "Names, defaults and meaning are those of PyVista's add_volume."
+    )
+    group.add_argument(
+        "--tf",
+        choices=tuple(TRANSFER_FUNCTIONS),
+        help="a standard transfer function; --cmap and --opacity change parts of it",
+    )
+    group.add_argument("--cmap", metavar="NAME", help="colour map")
+    group.add_argument(
+        "--opacity", type=_opacity, metavar="NAME|A,B,...", help="name, or values from 0 to 1"
+    )
+    group.add_argument("--clim", nargs=2, type=float, metavar=("LOW", "HIGH"))
+    group.add_argument("--n-colors", type=int, metavar="N")
+    group.add_argument("--flip-scalars", action="store_true", default=None)
+    group.add_argument("--log-scale", action="store_true", default=None)
+    group.add_argument("--opacity-unit-distance", type=float, metavar="LENGTH")
+    group.add_argument("--scalars", metavar="NAME", help="which array")
+    group.add_argument("--preference", choices=("point", "cell"))
+    group.add_argument("--interpolation", choices=("nearest", "linear"))
+    if tables:
+        group.add_argument(
+            "--transfer-function",
+            metavar="FILE",
+            help="TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista",
+        )
+
+
+def _add_limits(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("limits")
+    group.add_argument(
+        "--max-supersegments", type=int, default=20, metavar="N", help="longest list (default: 20)"
+    )
+    group.add_argument(
+        "--sample-distance",
+        type=float,
+        metavar="LENGTH",
+        help="step along the ray, model units (default: half the smallest spacing)",
+    )
+    group.add_argument("--tolerance", type=float, default=0.0, help="error traded for length")
+    group.add_argument(
+        "--view-cone",
+        type=float,
+        default=60.0,
+        metavar="DEGREES",
+        help="half angle of the cone of new views to serve (default: 60)",
+    )
+
+
+def _add_device(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--device", metavar="NAME", help="OpenCL device, see pyvista-vdi devices")
+
+
+# -- types of options ------------------------------------------------------------------------------
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d+)[xX](\d+)", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"a size is WIDTHxHEIGHT, like 1280x720; got {text!r}")
+    try:
+        return check_window_size((int(match[1]), int(match[2])), name="the size")
+    except InvalidArgumentError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(
+            f"expected numbers with commas between them, like 0,5,30; got {text!r}"
+        ) from error
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number above 0; got {text!r}")
+    return int(text)
+
+
+def _opacity(text: str) -> str | list[float]:
+    return list(_numbers(text)) if re.match(r"[-+.\d]", text) else text
+
+
+def _color(text: str) -> tuple[float, ...]:
+    if re.match(r"[-+.\d]", text):
+        color = _numbers(text)
+        if len(color) != 3 or not all(0 <= c <= 1 for c in color):
+            raise argparse.ArgumentTypeError(f"expected R,G,B from 0 to 1; got {text!r}")
+        return color
+    from PIL import ImageColor
+
+    try:
+        red, green, blue = ImageColor.getrgb(text)[:3]
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no colour: give a name, #rrggbb or R,G,B from 0 to 1"
+        ) from error
+    return red / 255, green / 255, blue / 255

@@ -1,0 +1,35 @@
+"""The verbs that show a VDI: ``render`` and ``view``."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..api import read
+from ..api import render as render_vdi
+from ..io import checked_png_target, to_bytes, write_png
+from .inputs import camera
+
+
+def render(options: argparse.Namespace) -> int:
+    """Render a VDI from a new view and write the picture."""
+    target = checked_png_target(options.output)
+    vdi = read(options.file)
+    view = camera(options, vdi.camera)
+    image = render_vdi(vdi, view, options.size, device=options.device)
+    write_png(to_bytes(image, options.background), target)
+    print(f"{options.output}: {image.shape[1]} x {image.shape[0]}")
+    return 0
+
+
+def view(options: argparse.Namespace) -> int:
+    """Open a plotter on a VDI, or write what it shows."""
+    screenshot = None
+    if options.screenshot is not None:
+        screenshot = str(checked_png_target(options.screenshot))
+    vdi = read(options.file)
+    from ..plotting.cli_support import show
+
+    show(vdi, options.size, screenshot)
+    if screenshot is not None:
+        print(f"{options.screenshot}: written")
+    return 0

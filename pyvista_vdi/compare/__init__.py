@@ -1,0 +1,8 @@
+"""One volume rendered by VTK's mappers, our volume raycaster and a VDI, side by side."""
+
+from __future__ import annotations
+
+from .measure import AngleResult, Report, Settings, Timing, measure
+from .sheet import contact_sheet, table
+
+__all__ = ["AngleResult", "Report", "Settings", "Timing", "contact_sheet", "measure", "table"]

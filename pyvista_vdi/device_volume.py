@@ -1,0 +1,165 @@
+"""A volume and its classification on a device, shared by generation and direct volume rendering."""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import rays
+from .camera import Camera
+from .errors import InvalidArgumentError
+from .opencl_runtime import DeviceBuffer, Runtime
+from .transfer_function import TransferFunction
+from .volume import Volume
+
+#: Voxel types that the kernels read as they are; the others are scaled to float32 on the host.
+_DEVICE_TYPES = {
+    "uint8": "uchar",
+    "int8": "char",
+    "uint16": "ushort",
+    "int16": "short",
+    "float32": "float",
+}
+_uploads: weakref.WeakKeyDictionary[Volume, dict[Any, DeviceBuffer]] = weakref.WeakKeyDictionary()
+_lock = threading.Lock()
+
+
+class DeviceVolume:
+    """A classified volume as kernel arguments.
+
+    Parameters
+    ----------
+    runtime : Runtime
+        The device.
+    volume : Volume
+        Uploaded once per device and kept as long as the object lives.
+    transfer_function : TransferFunction
+        Its table is uploaded each time: a few kilobytes.
+    sample_distance : float, optional
+        Length of a step, model units; half the smallest spacing by default.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If ``sample_distance`` is not a positive length.
+    DeviceMemoryError
+        If the volume does not fit.
+    """
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        volume: Volume,
+        transfer_function: TransferFunction,
+        sample_distance: float | None = None,
+    ) -> None:
+        if not isinstance(volume, Volume):
+            raise InvalidArgumentError(f"expected a Volume, got {type(volume).__name__}")
+        if not isinstance(transfer_function, TransferFunction):
+            raise InvalidArgumentError(
+                f"expected a TransferFunction, got {type(transfer_function).__name__}"
+            )
+        self.volume = volume
+        self.unit_distance = transfer_function.unit_distance or volume.default_unit_distance
+        self.sample_distance = checked_sample_distance(volume, sample_distance)
+        low, high = transfer_function.scalar_range
+        native = volume.array.dtype.name in _DEVICE_TYPES
+        volume.finite_range()  # refuses a volume that is NaN throughout
+        self._voxels = _voxel_buffer(runtime, volume, None if native else (low, high))
+        self._low, span = (low, high - low) if native else (0.0, 1.0 if high > low else 0.0)
+        table = np.column_stack([transfer_function.colors, transfer_function.opacities])
+        self._entries = len(table)
+        self._per_scalar = _per_scalar(self._entries, span)
+        self._table = runtime.upload(np.ascontiguousarray(table), "transfer function")
+        self.defines: dict[str, str | int | None] = {
+            "VOXEL_T": _DEVICE_TYPES.get(volume.array.dtype.name, "float"),
+            "INDEX_T": "ulong" if volume.array.size >= 2**32 else "uint",
+        }
+        if transfer_function.interpolation == "nearest":
+            self.defines["NEAREST"] = 1
+
+    @property
+    def medium_arguments(self) -> tuple[Any, ...]:
+        """Arguments ``voxels, size, table, entries, low, per_scalar`` of the kernels."""
+        return (
+            self._voxels,
+            np.array([*self.volume.dimensions, 0], dtype=np.int32),
+            self._table,
+            np.int32(self._entries),
+            np.float32(self._low),
+            np.float32(self._per_scalar),
+        )
+
+    def forms(
+        self, camera: Camera, window_size: Sequence[int], clipping_planes: ArrayLike | None
+    ) -> tuple[NDArray[np.float32], rays.PixelRays, int]:
+        """Return the march's forms, the rays they belong to, and the number of planes in them."""
+        pixel_rays = rays.pixel_rays(camera, window_size, self.volume.bounds)
+        to_index = rays.inverse_affine(self.volume.index_to_model)
+        index = [pixel_rays.form(row[:3], row[3]) for row in to_index[:3]]
+        direction = [pixel_rays.form(axis) for axis in np.eye(3)]
+        planes = []
+        for form, points in zip(index, self.volume.dimensions, strict=True):
+            far = -form
+            far[0] += points - 1
+            planes += [form, far]
+        planes += rays.eye_plane(camera, pixel_rays)
+        planes += rays.user_planes(camera, pixel_rays, clipping_planes)
+        return rays.packed([*index, *direction, *planes]), pixel_rays, len(planes)
+
+
+def checked_sample_distance(volume: Volume, sample_distance: float | None) -> float:
+    """Return the length of a step in model units; half the smallest spacing by default."""
+    if sample_distance is None:
+        return min(volume.spacing) / 2
+    step = float(sample_distance)
+    # Beyond 2^24 steps across the bounds, float32 cannot number them
+    least = volume.length / 2**24
+    if not (np.isfinite(step) and step >= least):
+        raise InvalidArgumentError(
+            f"sample_distance must be a length of at least {least:.3g} model units "
+            f"(2^-24 of the volume's diagonal); got {sample_distance!r}"
+        )
+    return step
+
+
+def _per_scalar(entries: int, span: float) -> float:
+    """Table positions per unit of scalar; a huge number where the range is a single scalar."""
+    if entries == 1:
+        return 0.0
+    largest = float(np.finfo(np.float32).max)
+    return min((entries - 1) / span, largest) if span > 0 else largest
+
+
+def _voxel_buffer(
+    runtime: Runtime, volume: Volume, scale: tuple[float, float] | None
+) -> DeviceBuffer:
+    with _lock:
+        cache = _uploads.setdefault(volume, {})
+        for other in [key for key in cache if key[0] is runtime and key[1] != scale]:
+            del cache[other]  # one copy per device: the last classification's
+        key = (runtime, scale)
+        if key not in cache:
+            array = volume.array if scale is None else _scaled(volume.array, *scale)
+            cache[key] = runtime.upload(array, f"volume {volume.name!r}")
+        return cache[key]
+
+
+def _scaled(array: NDArray[Any], low: float, high: float) -> NDArray[np.float32]:
+    """32-bit integers and float64 to float32, taken relative to the transfer function's range.
+
+    float32 holds 24 bits: of a value far from zero compared with the range little would be left,
+    of its place in the range everything that the table can tell apart is.
+    """
+    if high > low:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return ((array.astype(np.float64) - low) / (high - low)).astype(np.float32)
+    scaled = (array > low).astype(np.float32)  # at or below the single scalar, or above it
+    if array.dtype.kind == "f":
+        scaled[np.isnan(array)] = np.nan
+    return scaled

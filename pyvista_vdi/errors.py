@@ -1,0 +1,107 @@
+"""Every error and warning of the package; each error is also the builtin that describes it."""
+
+from __future__ import annotations
+
+__all__ = [
+    "Cancelled",
+    "DataNotFoundError",
+    "DeviceError",
+    "DeviceMemoryError",
+    "InvalidArgumentError",
+    "InvalidCameraError",
+    "InvalidVDIError",
+    "InvalidVolumeError",
+    "KernelBuildError",
+    "MissingDependencyError",
+    "NoDeviceError",
+    "UnsupportedError",
+    "VDIError",
+    "VDIFileError",
+    "VDIWarning",
+]
+
+
+class VDIError(Exception):
+    """Base of all errors that this package raises on purpose.
+
+    A message names the thing, the values and a remedy.
+    """
+
+
+class InvalidVDIError(VDIError, ValueError):
+    """Arrays do not make a valid VDI; the message says which element breaks which rule."""
+
+
+class InvalidVolumeError(VDIError, ValueError):
+    """A volume cannot be used: no scalars, too few planes, no finite value, an unknown array."""
+
+
+class InvalidCameraError(VDIError, ValueError):
+    """A camera defines no view, for instance because eye and focal point coincide."""
+
+
+class InvalidArgumentError(VDIError, ValueError):
+    """Any other argument is out of its range: a window size, a limit, a tolerance, a name."""
+
+
+class UnsupportedError(VDIError, NotImplementedError):
+    """A feature was asked for that cannot be honoured; it is refused by name, never ignored."""
+
+
+class MissingDependencyError(VDIError, ImportError):
+    """An optional or broken dependency is needed; the message says how to install it."""
+
+
+class DataNotFoundError(VDIError, FileNotFoundError):
+    """An example volume's file is not there; the message names the file and the variable."""
+
+
+class NoDeviceError(VDIError, RuntimeError):
+    """No usable OpenCL device, or the one asked for is absent, ambiguous or fails its probe."""
+
+
+class DeviceMemoryError(VDIError, MemoryError):
+    """A buffer does not fit the device, or the driver ran out of memory or resources."""
+
+
+class DeviceError(VDIError, RuntimeError):
+    """The driver failed in any other way while it copied data or ran a kernel."""
+
+
+class KernelBuildError(VDIError, RuntimeError):
+    """A kernel source could not be assembled or compiled.
+
+    Parameters
+    ----------
+    message : str
+        What failed, for which device, with the end of the compiler's log.
+    log : str, default: ""
+        The compiler's whole log.
+    options : str, default: ""
+        The build options.
+    source : str, default: ""
+        The source as the compiler saw it: includes expanded, with ``#line`` marks.
+
+    Attributes
+    ----------
+    log, options, source : str
+        As given.
+    """
+
+    def __init__(self, message: str, *, log: str = "", options: str = "", source: str = "") -> None:
+        super().__init__(message)
+        self.log = log
+        self.options = options
+        self.source = source
+
+
+class VDIFileError(VDIError, ValueError):
+    """A file is truncated, foreign, of a newer version, or its target cannot be written."""
+
+
+class Cancelled(VDIError, RuntimeError):  # noqa: N818 - an outcome that a callback asked for
+    """Work was cancelled by a progress callback; nothing was written."""
+
+
+class VDIWarning(UserWarning):
+    """Base of the package's warnings: what was asked for was done, but not quite as asked."""

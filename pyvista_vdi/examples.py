@@ -1,0 +1,319 @@
+"""The shipped volumes, and those in the folder that ``PYVISTA_VDI_DATA`` names.
+
+Two volumes are part of the package: a brain (MRI) and a turbulent mixing layer (simulation).
+Their source and terms stand in ``pyvista_vdi/data/README.md``. The others listed by
+:data:`VOLUMES` are well-known test data whose terms do not allow shipping them; they are read
+from the folder that the environment variable ``PYVISTA_VDI_DATA`` names, where it has them.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from importlib import resources
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import (
+    DataNotFoundError,
+    InvalidArgumentError,
+    InvalidVolumeError,
+    MissingDependencyError,
+)
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+    from .volume import Volume
+
+#: Environment variable that names the folder with the volumes that are not shipped.
+DATA_VARIABLE = "PYVISTA_VDI_DATA"
+
+
+@dataclass(frozen=True)
+class ExampleVolume:
+    """A known volume: where it is and what it shows.
+
+    Parameters
+    ----------
+    file_name : str
+        Name of its NRRD file.
+    quantity : str
+        What a sample measures: the name of the point array.
+    description : str
+        One phrase: method and subject.
+    shipped : bool
+        Whether it is part of the package.
+    """
+
+    file_name: str
+    quantity: str
+    description: str
+    shipped: bool = False
+
+
+#: Every volume known by name.
+VOLUMES: dict[str, ExampleVolume] = {
+    "allen_mouse_brain": ExampleVolume(
+        "allen_mouse_brain_20um_660x400x570_u8.nrrd",
+        "intensity",
+        "serial two-photon tomography of mouse brains, average template, 20 um",
+    ),
+    "aneurism": ExampleVolume(
+        "aneurism_256_u8.nrrd", "intensity", "CT angiography of the arteries of a head"
+    ),
+    "berea": ExampleVolume(
+        "berea_sandstone_400_u8_binary.nrrd", "phase", "micro-CT of Berea sandstone, segmented"
+    ),
+    "bonsai": ExampleVolume("bonsai_256_u8.nrrd", "intensity", "CT of a bonsai tree"),
+    "brain": ExampleVolume(
+        "brain_colin27_181x217x181_u8.nrrd",
+        "intensity",
+        "MRI of a brain, mean of 27 scans of one person, 1 mm",
+        shipped=True,
+    ),
+    "brain_half_mm": ExampleVolume(
+        "brain_colin27_301x370x316_u8.nrrd",
+        "intensity",
+        "MRI of a brain, mean of 27 scans of one person, 0.5 mm",
+    ),
+    "catphan": ExampleVolume(
+        "catphan_cbct_512x512x64_i16.nrrd",
+        "hounsfield",
+        "cone-beam CT of a CatPhan phantom, anisotropic",
+    ),
+    "embryo": ExampleVolume("embryo_256_u8.nrrd", "intensity", "scan of an embryo"),
+    "heptane": ExampleVolume(
+        "heptane_302_u8.nrrd", "intensity", "simulation of a burning jet of heptane"
+    ),
+    "hydrogen_atom": ExampleVolume(
+        "hydrogen_atom_128_u8.nrrd", "density", "electron density of a hydrogen atom"
+    ),
+    "iguana_head": ExampleVolume(
+        "iguana_head_210x256x179_u8.nrrd", "intensity", "X-ray CT of an iguana's head"
+    ),
+    "isabel_wind": ExampleVolume(
+        "isabel_wind_125x125x25_f64.nrrd",
+        "wind_speed",
+        "simulation of hurricane Isabel, wind speed, float64",
+    ),
+    "rayleigh_taylor": ExampleVolume(
+        "rayleigh_taylor_dns_192x192x192_u8.nrrd",
+        "concentration",
+        "direct numerical simulation of a Rayleigh-Taylor mixing layer",
+        shipped=True,
+    ),
+    "t1w_head": ExampleVolume(
+        "t1w_head_274x384x384_i16.nrrd", "intensity", "T1-weighted MRI of a head, defaced"
+    ),
+    "tooth": ExampleVolume("tooth_103x94x161_u16.nrrd", "intensity", "CT of a tooth, uint16"),
+    "visible_female_head": ExampleVolume(
+        "visible_female_head_512x512x234_u8.nrrd", "intensity", "CT of a head and shoulders"
+    ),
+}
+
+
+def available() -> tuple[str, ...]:
+    """Return the names that :func:`load_data` can load here and now.
+
+    Returns
+    -------
+    tuple of str
+        Names from :data:`VOLUMES` whose file exists, sorted.
+    """
+    return tuple(name for name in sorted(VOLUMES) if _locate(VOLUMES[name]) is not None)
+
+
+def path(name: str) -> Path:
+    """Return where a volume's file is.
+
+    Parameters
+    ----------
+    name : str
+        A name from :data:`VOLUMES`.
+
+    Returns
+    -------
+    pathlib.Path
+        An existing NRRD file.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If no volume has that name.
+    DataNotFoundError
+        If its file is not there; the message names the file and the variable.
+    """
+    try:
+        example = VOLUMES[name]
+    except (KeyError, TypeError):
+        raise InvalidArgumentError(
+            f"no example volume is called {name!r}: choose one of {', '.join(sorted(VOLUMES))}"
+        ) from None
+    file = _locate(example)
+    if file is not None:
+        return file
+    if example.shipped:
+        raise DataNotFoundError(
+            f"pyvista_vdi/data/{example.file_name} is missing from the installed package: "
+            "install pyvista-vdi again"
+        )
+    folder = os.environ.get(DATA_VARIABLE)
+    where = (
+        f"the folder {folder!r} that {DATA_VARIABLE} names does not hold it"
+        if folder
+        else f"the environment variable {DATA_VARIABLE} is not set"
+    )
+    raise DataNotFoundError(
+        f"the volume {name!r} is not shipped with pyvista-vdi and {where}: put "
+        f"{example.file_name} into a folder and set {DATA_VARIABLE} to that folder"
+    )
+
+
+@overload
+def load_data(name: str, *, as_volume: Literal[False] = ...) -> pv.ImageData: ...
+@overload
+def load_data(name: str, *, as_volume: Literal[True]) -> Volume: ...
+def load_data(name: str, *, as_volume: bool = False) -> pv.ImageData | Volume:
+    """Load a volume by its name.
+
+    Parameters
+    ----------
+    name : str
+        A name from :data:`VOLUMES`; :func:`available` lists those that can be loaded here.
+    as_volume : bool, default: False
+        Return the engine's :class:`~pyvista_vdi.Volume`, which needs neither VTK nor PyVista.
+
+    Returns
+    -------
+    pyvista.ImageData or Volume
+        The volume in the units and along the axes of its source; the scalars are point data and
+        named by :attr:`ExampleVolume.quantity`.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If no volume has that name.
+    DataNotFoundError
+        If its file is not there.
+    InvalidVolumeError
+        If the file cannot be read.
+    MissingDependencyError
+        If PyVista is not installed and `as_volume` is false.
+
+    Examples
+    --------
+    >>> from pyvista_vdi import examples
+    >>> examples.load_data("brain", as_volume=True).dimensions
+    (181, 217, 181)
+    """
+    file = path(name)
+    if not as_volume and find_spec("pyvista") is None:
+        raise MissingDependencyError(
+            f"PyVista is not installed, so {name!r} cannot be a pyvista.ImageData: pass "
+            'as_volume=True, or install PyVista by pip install "pyvista-vdi[plot]"'
+        )
+    volume = read_nrrd(file, VOLUMES[name].quantity)
+    if as_volume:
+        return volume
+    from .plotting.convert import to_image_data
+
+    return to_image_data(volume, VOLUMES[name].quantity)
+
+
+@overload
+def load_brain(*, as_volume: Literal[False] = ...) -> pv.ImageData: ...
+@overload
+def load_brain(*, as_volume: Literal[True]) -> Volume: ...
+def load_brain(*, as_volume: bool = False) -> pv.ImageData | Volume:
+    """Load the shipped MRI of a brain (Colin27, skull removed).
+
+    181 x 217 x 181 points, uint8, 1 mm apart; x to the right, y to the front, z up.
+
+    Parameters
+    ----------
+    as_volume : bool, default: False
+        Return the engine's :class:`~pyvista_vdi.Volume`, which needs neither VTK nor PyVista.
+
+    Returns
+    -------
+    pyvista.ImageData or Volume
+        The scan; its scalars are called ``"intensity"``, 0 to 133.
+
+    Examples
+    --------
+    >>> from pyvista_vdi import examples
+    >>> examples.load_brain(as_volume=True).spacing
+    (1.0, 1.0, 1.0)
+    """
+    return load_data("brain", as_volume=as_volume)  # type: ignore[call-overload]
+
+
+@overload
+def load_rayleigh_taylor(*, as_volume: Literal[False] = ...) -> pv.ImageData: ...
+@overload
+def load_rayleigh_taylor(*, as_volume: Literal[True]) -> Volume: ...
+def load_rayleigh_taylor(*, as_volume: bool = False) -> pv.ImageData | Volume:
+    """Load the shipped simulation of a Rayleigh-Taylor mixing layer.
+
+    192 x 192 x 192 points, uint8, spacing 1: two fluids of nearly constant concentration and the
+    turbulent layer between them.
+
+    Parameters
+    ----------
+    as_volume : bool, default: False
+        Return the engine's :class:`~pyvista_vdi.Volume`, which needs neither VTK nor PyVista.
+
+    Returns
+    -------
+    pyvista.ImageData or Volume
+        The field; its scalars are called ``"concentration"``, 0 to 255.
+
+    Examples
+    --------
+    >>> from pyvista_vdi import examples
+    >>> examples.load_rayleigh_taylor(as_volume=True).array.dtype
+    dtype('uint8')
+    """
+    return load_data("rayleigh_taylor", as_volume=as_volume)  # type: ignore[call-overload]
+
+
+def _locate(example: ExampleVolume) -> Path | None:
+    """Return the file, or None where there is none."""
+    if example.shipped:
+        file = Path(str(resources.files("pyvista_vdi.data") / example.file_name))
+    elif folder := os.environ.get(DATA_VARIABLE):
+        file = Path(folder) / example.file_name
+    else:
+        return None
+    return file if file.is_file() else None
+
+
+def read_nrrd(file: Path, quantity: str) -> Volume:
+    """Read a three-dimensional NRRD file; axes as stored, so that x is the fastest."""
+    import nrrd
+
+    from .volume import Volume
+
+    try:
+        array, header = nrrd.read(str(file), index_order="C")
+    except (nrrd.NRRDError, OSError, ValueError, EOFError) as error:
+        raise InvalidVolumeError(f"{file} cannot be read as NRRD: {error}") from error
+    spacing, direction = _grid_axes(header)
+    origin = header.get("space origin", np.zeros(3))
+    return Volume(array, spacing, origin, direction, name=quantity)
+
+
+def _grid_axes(header: dict[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return spacing (3,) and direction (3, 3; columns are the x, y and z axes) of a header."""
+    steps = header.get("space directions")
+    if steps is None:
+        return np.asarray(header.get("spacings", np.ones(3)), dtype=np.float64), np.eye(3)
+    # NRRD's rows are the steps from sample to sample along each axis
+    steps = np.asarray(steps, dtype=np.float64)
+    spacing = np.linalg.norm(steps, axis=1)
+    return spacing, (steps / spacing[:, None]).T

@@ -1,0 +1,373 @@
+"""Volume to VDI, on a device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._version import __version__
+from .blocks import GROUP, block_items
+from .camera import Camera, check_window_size
+from .device_volume import DeviceVolume
+from .errors import Cancelled, InvalidArgumentError
+from .opencl_runtime import Runtime, get_runtime
+from .transfer_function import TransferFunction
+from .vdi import VDI
+from .volume import Volume
+
+#: Most supersegments that a list may be allowed.
+MAX_SUPERSEGMENTS = 4096
+
+#: Bytes of one recorded run on the device: eight float32 and its merge error.
+_RUN_BYTES = 9 * 4
+#: Bytes of runs that one slice of rays records at a time; also how often progress is reported.
+_SLICE_BYTES = 96 * 2**20
+#: Merge error that no picture shows: a difference of a thousandth of full opacity over one voxel.
+_INDISTINGUISHABLE = 1e-6
+#: Steps of a ray between two looks at the length of its record.
+_CHUNK_STEPS = 128
+
+Progress = Callable[[float], object]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Memory that making a VDI takes, in bytes.
+
+    Attributes
+    ----------
+    volume : int
+        The volume on the device.
+    vdi_worst_case : int
+        The VDI with every list full; most are far shorter.
+    working : int
+        Buffers on the device while a slice of rays is made.
+    total : int
+        All of these.
+    """
+
+    volume: int
+    vdi_worst_case: int
+    working: int
+
+    @property
+    def total(self) -> int:
+        """Sum of the three, bytes."""
+        return self.volume + self.vdi_worst_case + self.working
+
+
+def check_max_supersegments(max_supersegments: int) -> int:
+    """Return ``max_supersegments`` as an int between 1 and :data:`MAX_SUPERSEGMENTS`."""
+    try:
+        limit = int(max_supersegments)
+    except (TypeError, ValueError, OverflowError):
+        limit = 0
+    if limit != max_supersegments or not 1 <= limit <= MAX_SUPERSEGMENTS:
+        raise InvalidArgumentError(
+            f"max_supersegments must be a whole number from 1 to {MAX_SUPERSEGMENTS}; "
+            f"got {max_supersegments!r}"
+        )
+    return limit
+
+
+def estimate(
+    volume: Volume, window_size: Sequence[int], *, max_supersegments: int = 20
+) -> Estimate:
+    """State the memory that :func:`generate_vdi` takes, before it is taken.
+
+    Parameters
+    ----------
+    volume : Volume
+        What would be generated from.
+    window_size : (int, int)
+        Width and height of V_O's window in pixels.
+    max_supersegments : int
+        Most supersegments in a list.
+
+    Returns
+    -------
+    Estimate
+        Bytes.
+    """
+    width, height = check_window_size(window_size)
+    limit = check_max_supersegments(max_supersegments)
+    item = min(volume.array.dtype.itemsize, 4)  # float64 is scaled to float32 for the device
+    lists = width * height
+    plan = _Slices(width, height, limit)
+    return Estimate(
+        volume=volume.array.size * item,
+        vdi_worst_case=lists * (limit * 24 + 8) + 8,
+        working=plan.bytes,
+    )
+
+
+def generate_vdi(
+    volume: Volume,
+    camera: Camera,
+    window_size: Sequence[int],
+    transfer_function: TransferFunction,
+    *,
+    max_supersegments: int = 20,
+    sample_distance: float | None = None,
+    tolerance: float = 0.0,
+    view_cone: float = 60.0,
+    device: Any = None,
+    progress: Progress | None = None,
+    metadata: Mapping[str, Any] | None = None,
+) -> VDI:
+    """Make a VDI of a classified volume.
+
+    Each list's ray is marched once. Neighbouring samples are merged while the medium stays
+    homogeneous (the criterion of Frey et al. 2013, which the paper uses); what is recorded is then
+    merged at least error until ``max_supersegments`` are left. Lists go on behind what V_O sees,
+    because other views may see it.
+
+    Parameters
+    ----------
+    volume : Volume
+        The scalars.
+    camera : Camera
+        The generating view V_O.
+    window_size : (int, int)
+        Width and height of V_O's window in pixels: one list each.
+    transfer_function : TransferFunction
+        Scalar to colour and opacity.
+    max_supersegments : int
+        Most supersegments in a list, 1 to 4096; never exceeded, and nothing that is not
+        transparent is dropped.
+    sample_distance : float, optional
+        Length of a step, model units; half the smallest spacing by default.
+    tolerance : float
+        Neighbours are merged even under budget where this changes (opacity-weighted colour,
+        opacity) per voxel, in the root of the sum of squares along the ray, by no more than this.
+        0 merges only what is homogeneous.
+    view_cone : float
+        Half angle in degrees, 0 to 90, of the cone of views that must be served: what V_O cannot
+        see at all counts ``1 - cos(view_cone)`` as much as what it sees when lists are shortened.
+    device : optional
+        See :func:`pyvista_vdi.list_devices`.
+    progress : callable, optional
+        Called with the fraction done, 0 to 1, between slices of work; when it returns False the
+        work is given up.
+    metadata : mapping, optional
+        Entries to add to ``vdi.metadata``.
+
+    Returns
+    -------
+    VDI
+        With the view, the arrays, and in its metadata what made it.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If an argument is out of range.
+    Cancelled
+        If ``progress`` returned False.
+    DeviceMemoryError
+        If the device lacks the memory, see :func:`estimate`.
+    """
+    camera = Camera.from_any(camera)
+    width, height = check_window_size(window_size)
+    limit = check_max_supersegments(max_supersegments)
+    tolerance, hidden_weight = _check_criterion(tolerance, view_cone)
+    runtime = get_runtime(device)
+    medium = DeviceVolume(runtime, volume, transfer_function, sample_distance)
+    recorder = _Recorder(runtime, medium, camera, (width, height), limit, tolerance, hidden_weight)
+    parts = []
+    with recorder:
+        for first_row in range(0, height, recorder.slices.rows):
+            _report(progress, first_row / height)
+            rows = min(recorder.slices.rows, height - first_row)
+            recorder.march(first_row, rows)
+            parts.append(recorder.packed(rows))
+    _report(progress, 1.0)
+
+    lengths, front, back, color, optical_depth = (
+        np.concatenate(arrays) for arrays in zip(*parts, strict=True)
+    )
+    made_by = {
+        "generator": f"pyvista-vdi {__version__}",
+        "criterion": "homogeneity, least-error merging",
+        "max_supersegments": limit,
+        "tolerance": tolerance,
+        "view_cone": float(view_cone),
+        "sample_distance": medium.sample_distance,
+        "opacity_unit_distance": medium.unit_distance,
+        "transfer_function": transfer_function.to_dict(),
+        "volume": {
+            "name": volume.name,
+            "dimensions": list(volume.dimensions),
+            "spacing": list(volume.spacing),
+            "dtype": volume.array.dtype.name,
+        },
+        "device": runtime.info.name,
+    }
+    return VDI(
+        camera,
+        (width, height),
+        np.concatenate([np.zeros(1, np.uint64), np.cumsum(lengths, dtype=np.uint64)]),
+        front,
+        back,
+        color,
+        optical_depth,
+        volume.bounds,
+        depth_origin=recorder.depth_origin,
+        metadata={**made_by, **(metadata or {})},
+    )
+
+
+class _Slices:
+    """How many rows of lists are made at a time, and the buffers that this takes."""
+
+    def __init__(self, width: int, height: int, limit: int) -> None:
+        # Twice the budget: the records' thresholds then stay well below the final merges' errors
+        self.kept = max(2 * limit, limit + 12)
+        self.capacity = self.kept + _CHUNK_STEPS
+        per_block_row = block_items(width, 4) * self.capacity * _RUN_BYTES
+        self.rows = min(height, 4 * max(1, _SLICE_BYTES // per_block_row))
+        self.items = block_items(width, self.rows)
+        packed_bytes = self.items * (limit * 24 + 8)
+        self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + packed_bytes
+
+
+class _Recorder:
+    """The buffers and kernels that turn slices of rays into packed lists."""
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        medium: DeviceVolume,
+        camera: Camera,
+        size: tuple[int, int],
+        limit: int,
+        tolerance: float,
+        hidden_weight: float,
+    ) -> None:
+        self._runtime = runtime
+        self._medium = medium
+        self._size = size
+        self._limit = limit
+        self._threshold = np.float32(max(tolerance**2, _INDISTINGUISHABLE))
+        self._criterion = (
+            np.float32(min(medium.volume.spacing)),  # reference length: a voxel
+            np.float32(hidden_weight),
+        )
+        forms, rays, self._planes = medium.forms(camera, size, None)
+        self.depth_origin = rays.reference_depth
+        self._most_steps = int(np.ceil(medium.volume.length / medium.sample_distance)) + 1
+        self.slices = _Slices(*size, limit)
+        items, capacity = self.slices.items, self.slices.capacity
+        self._kernels = {
+            name: runtime.kernel("vdi/generate.cl", name, medium.defines)
+            for name in ("march_lists", "shorten_lists", "pack_lists")
+        }
+        with ExitStack() as stack:
+            keep = stack.enter_context
+            self._forms = keep(runtime.upload(forms, "rays"))
+            self._records = keep(runtime.buffer((items, capacity, 8), name="recorded runs"))
+            self._errors = keep(runtime.buffer((items, capacity), name="merge errors"))
+            self._thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
+            self._counts = keep(runtime.buffer((items,), np.uint32, "list lengths"))
+            self._buffers = stack.pop_all()
+
+    def __enter__(self) -> _Recorder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._runtime.finish()  # the forms may be host memory that the device still reads
+        self._buffers.close()
+
+    def march(self, first_row: int, rows: int) -> None:
+        """March the rays of some rows, and shorten their records to the budget."""
+        runtime, medium, (width, height) = self._runtime, self._medium, self._size
+        items = block_items(width, rows)
+        runtime.fill(self._counts, np.uint32(0))
+        runtime.fill(self._thresholds, self._threshold)
+        capacity = np.int32(self.slices.capacity)
+        for first_step in range(0, self._most_steps, _CHUNK_STEPS):
+            self._launch(
+                "march_lists",
+                items,
+                *medium.medium_arguments,
+                self._forms,
+                np.int32(self._planes),
+                np.float32(medium.sample_distance),
+                np.float32(medium.unit_distance),
+                *(np.int32(n) for n in (width, height, first_row, rows, first_step, _CHUNK_STEPS)),
+                capacity,
+                *self._criterion,
+                self._thresholds,
+                self._records,
+                self._counts,
+            )
+            last = first_step + _CHUNK_STEPS >= self._most_steps
+            self._launch(
+                "shorten_lists",
+                items,
+                np.int32(self._limit if last else self.slices.kept),
+                np.int32(last),
+                *(np.int32(n) for n in (width, height, first_row, rows)),
+                self._forms,
+                capacity,
+                *self._criterion,
+                self._thresholds,
+                self._records,
+                self._errors,
+                self._counts,
+            )
+
+    def packed(self, rows: int) -> tuple[NDArray[Any], ...]:
+        """Return lengths, fronts, backs, colours and optical depths of the slice's lists."""
+        runtime, width = self._runtime, self._size[0]
+        lengths = runtime.download(self._counts, count=rows * width)
+        offsets = np.zeros(rows * width + 1, np.uint64)
+        np.cumsum(lengths, dtype=np.uint64, out=offsets[1:])
+        n = int(offsets[-1])
+        with (
+            runtime.upload(offsets, "list offsets") as starts,
+            runtime.buffer((n,), name="front depths") as front,
+            runtime.buffer((n,), name="back depths") as back,
+            runtime.buffer((n, 3), name="supersegment colours") as color,
+            runtime.buffer((n,), name="optical depths") as optical_depth,
+        ):
+            self._launch(
+                "pack_lists",
+                block_items(width, rows),
+                self._records,
+                np.int32(self.slices.capacity),
+                np.int32(width),
+                np.int32(rows),
+                starts,
+                front,
+                back,
+                color,
+                optical_depth,
+            )
+            arrays = [runtime.download(buffer) for buffer in (front, back, color, optical_depth)]
+        return (lengths, *arrays)
+
+    def _launch(self, name: str, items: int, *arguments: Any) -> None:
+        self._runtime.launch(self._kernels[name], items, GROUP, *arguments)
+
+
+def _check_criterion(tolerance: float, view_cone: float) -> tuple[float, float]:
+    if not (np.isfinite(tolerance) and tolerance >= 0):
+        raise InvalidArgumentError(f"tolerance must be a number >= 0; got {tolerance!r}")
+    if not 0 <= view_cone <= 90:
+        raise InvalidArgumentError(
+            f"view_cone must be an angle between 0 and 90 degrees; got {view_cone!r}"
+        )
+    return float(tolerance), float(1 - np.cos(np.radians(view_cone)))
+
+
+def _report(progress: Progress | None, fraction: float) -> None:
+    if progress is not None and progress(fraction) is False:
+        raise Cancelled(f"generation was cancelled at {fraction:.0%}")
+
+
+__all__ = ["MAX_SUPERSEGMENTS", "Estimate", "estimate", "generate_vdi"]

@@ -1,0 +1,90 @@
+"""The .vdi format: what its writer and its reader agree on.
+
+A .vdi file is a ZIP archive of one JSON description and one member per array;
+``docs/files.md`` describes it for those who read it with other tools. Members are stored as they
+are (the arrays are compressed already), times are constant, and the description comes first: the
+same VDI gives the same bytes, and the description is read without the arrays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+#: Version of the format that is written; files of this and of lower versions are read.
+FORMAT_VERSION = 1
+
+#: What a description calls the format.
+FORMAT_NAME = "pyvista-vdi"
+
+#: The name that a file's name ends in.
+SUFFIX = ".vdi"
+
+#: The archive's first member.
+DESCRIPTION = "vdi.json"
+
+#: No description is longer: the longest metadata are a transfer function's table.
+MAX_DESCRIPTION_BYTES = 1 << 26
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How one array lies in its member.
+
+    Parameters
+    ----------
+    dtype : numpy.dtype
+        Type of its elements, little-endian.
+    row_shape : tuple of int
+        Shape of a row.
+    n_rows : int
+        Number of rows.
+    filter : {"none", "difference"}
+        What was done to the rows before they were compressed.
+    """
+
+    dtype: np.dtype[Any]
+    row_shape: tuple[int, ...]
+    n_rows: int
+    filter: str
+
+    @property
+    def row_bytes(self) -> int:
+        """Bytes of one row."""
+        return self.dtype.itemsize * int(np.prod(self.row_shape, dtype=np.int64))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what the description says about the array."""
+        return {
+            "dtype": self.dtype.str,
+            "shape": [self.n_rows, *self.row_shape],
+            "filter": self.filter,
+        }
+
+
+def layouts(
+    window_size: tuple[int, int], n: int, counts: np.dtype[Any], *, filtered: bool
+) -> dict[str, Layout]:
+    """Return the arrays of a file, in their order.
+
+    Parameters
+    ----------
+    window_size : (int, int)
+        W and H.
+    n : int
+        Supersegments in all lists.
+    counts : numpy.dtype
+        Type of the lists' lengths, as small as they allow.
+    filtered : bool
+        Whether depths are stored as differences.
+    """
+    f4, u4 = np.dtype("<f4"), np.dtype("<u4")
+    depth = Layout(u4, (2,), n, "difference") if filtered else Layout(f4, (2,), n, "none")
+    return {
+        "counts": Layout(counts, (), window_size[0] * window_size[1], "none"),
+        "depth": depth,
+        "color": Layout(f4, (3,), n, "none"),
+        "optical_depth": Layout(f4, (), n, "none"),
+    }

@@ -1,0 +1,87 @@
+"""Pictures as PNG files, by Pillow: eight bits per channel, no gamma."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InvalidArgumentError
+from ..metrics import over_background
+from .whole_file import check_writable, whole_file, with_suffix
+
+#: The name that a picture's name ends in.
+PNG_SUFFIX = ".png"
+
+
+def to_bytes(image: ArrayLike, background: Sequence[float] | None = None) -> NDArray[np.uint8]:
+    """Return a rendered image in eight bits per channel.
+
+    Parameters
+    ----------
+    image : array_like of float, shape (H, W, 4)
+        Premultiplied RGBA, top row first.
+    background : (float, float, float), optional
+        RGB, 0 to 1, to blend it over.
+
+    Returns
+    -------
+    numpy.ndarray
+        uint8 (H, W, 4), straight (not premultiplied) RGBA as PNG wants it, rounded; or, over a
+        background, uint8 (H, W, 3).
+
+    Raises
+    ------
+    InvalidArgumentError
+        If the background is not a colour, or the image no image.
+    """
+    pixels = np.asarray(image)
+    if background is not None:
+        return _rounded(over_background(pixels, background))
+    if pixels.ndim != 3 or pixels.shape[2] != 4:
+        raise InvalidArgumentError(
+            f"an image is premultiplied RGBA of shape (height, width, 4); got {pixels.shape}"
+        )
+    color, alpha = pixels[..., :3].astype(np.float64), pixels[..., 3:].astype(np.float64)
+    straight = np.divide(color, alpha, out=np.zeros_like(color), where=alpha > 0)
+    return _rounded(np.concatenate([straight, alpha], axis=2))
+
+
+def _rounded(values: NDArray[np.float64]) -> NDArray[np.uint8]:
+    return np.rint(np.clip(values, 0, 1) * 255).astype(np.uint8)
+
+
+def write_png(pixels: NDArray[np.uint8], path: str | os.PathLike[str]) -> Path:
+    """Write an image as PNG; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    pixels : numpy.ndarray
+        uint8 (H, W, 3) RGB or (H, W, 4) straight RGBA, top row first.
+    path : path-like
+        The target; its name ends in ``.png``.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    VDIFileError
+        If the target cannot be written.
+    """
+    from PIL import Image
+
+    target = with_suffix(Path(path), PNG_SUFFIX, "a picture")
+    with whole_file(target) as stream:
+        Image.fromarray(pixels).save(stream, format="png")
+    return target
+
+
+def checked_png_target(path: str | os.PathLike[str]) -> Path:
+    """Raise VDIFileError now if a picture could not be written there later."""
+    return check_writable(with_suffix(Path(path), PNG_SUFFIX, "a picture"))

@@ -1,0 +1,29 @@
+"""Devices, kernel sources, programs and buffers: the only importer of pyopencl.
+
+Importing this compiles nothing, prints nothing and touches no environment; drivers are looked for
+when a device is first asked for.
+"""
+
+from __future__ import annotations
+
+from pyvista_vdi.opencl_runtime.arguments import padded
+from pyvista_vdi.opencl_runtime.buffers import DeviceBuffer, LocalMemory, aligned_empty
+from pyvista_vdi.opencl_runtime.choice import describe_devices, get_runtime, list_devices
+from pyvista_vdi.opencl_runtime.devices import DeviceInfo
+from pyvista_vdi.opencl_runtime.profiling import KernelTime
+from pyvista_vdi.opencl_runtime.programs import Kernel
+from pyvista_vdi.opencl_runtime.runtime import Runtime
+
+__all__ = [
+    "DeviceBuffer",
+    "DeviceInfo",
+    "Kernel",
+    "KernelTime",
+    "LocalMemory",
+    "Runtime",
+    "aligned_empty",
+    "describe_devices",
+    "get_runtime",
+    "list_devices",
+    "padded",
+]

@@ -1,0 +1,234 @@
+"""Buffers on a device: sized, named, accounted for, and checked before they are taken."""
+
+from __future__ import annotations
+
+import math
+import threading
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
+
+HOST_ALIGNMENT = 4096
+"""Bytes; arrays that begin at a multiple are used in place by CPU drivers instead of copied."""
+
+
+@dataclass(frozen=True)
+class LocalMemory:
+    """Local memory of a work-group, as a kernel argument.
+
+    Attributes
+    ----------
+    nbytes : int
+        Bytes for each work-group.
+    """
+
+    nbytes: int
+
+
+def bytes_text(nbytes: int) -> str:
+    """A number of bytes for people: ``"1.50 GiB (1610612736 bytes)"``."""
+    for unit, size in (("GiB", 2**30), ("MiB", 2**20), ("KiB", 2**10)):
+        if nbytes >= size:
+            return f"{nbytes / size:.2f} {unit} ({nbytes} bytes)"
+    return f"{nbytes} bytes"
+
+
+def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+    """Uninitialised C-contiguous array that a CPU device can use without a copy.
+
+    Parameters
+    ----------
+    shape : int or tuple of int
+        Shape.
+    dtype : dtype_like
+        Element type.
+
+    Returns
+    -------
+    numpy.ndarray
+        Its data begin at a multiple of 4096 bytes.
+    """
+    dtype = np.dtype(dtype)
+    shape = (shape,) if isinstance(shape, int) else tuple(shape)
+    nbytes = math.prod(shape) * dtype.itemsize
+    raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
+    start = -raw.ctypes.data % HOST_ALIGNMENT
+    return raw[start : start + nbytes].view(dtype).reshape(shape)
+
+
+class Ledger:
+    """Bytes that one runtime holds on its device.
+
+    Parameters
+    ----------
+    device_name : str
+        For messages.
+    """
+
+    def __init__(self, device_name: str) -> None:
+        self.device_name = device_name
+        # Re-entrant: a garbage collection inside the lock may release other buffers.
+        self._lock = threading.RLock()
+        self.allocated = 0
+        self.peak = 0
+
+    def check_size(self, name: str, nbytes: int, max_allocation: int, global_memory: int) -> None:
+        """Refuse a buffer that is larger than the device allows for one; parameters as for take.
+
+        Raises
+        ------
+        DeviceMemoryError
+            If it is.
+        """
+        if nbytes > max_allocation:
+            raise DeviceMemoryError(
+                f"the buffer {name!r} needs {bytes_text(nbytes)}; {self.device_name!r} allows "
+                f"{bytes_text(max_allocation)} per buffer (of {bytes_text(global_memory)} in "
+                "all): use a smaller volume, window size or max_supersegments, or another device"
+            )
+
+    def take(self, name: str, nbytes: int, max_allocation: int, global_memory: int) -> None:
+        """Reserve bytes, or say why they cannot be had.
+
+        Parameters
+        ----------
+        name : str
+            What the buffer is for.
+        nbytes, max_allocation, global_memory : int
+            Bytes wanted, allowed in one buffer, and on the device.
+
+        Raises
+        ------
+        DeviceMemoryError
+            If either limit is passed; nothing is reserved then.
+        """
+        self.check_size(name, nbytes, max_allocation, global_memory)
+        with self._lock:
+            if self.allocated + nbytes > global_memory:
+                raise DeviceMemoryError(
+                    f"the buffer {name!r} needs {bytes_text(nbytes)} and "
+                    f"{bytes_text(self.allocated)} are in use already; {self.device_name!r} has "
+                    f"{bytes_text(global_memory)} in all: release VDIs or volumes that are no "
+                    "longer drawn, use a smaller window size or max_supersegments, or another "
+                    "device"
+                )
+            self.allocated += nbytes
+            self.peak = max(self.peak, self.allocated)
+
+    def give_back(self, nbytes: int) -> None:
+        """Return reserved bytes."""
+        with self._lock:
+            self.allocated -= nbytes
+
+
+class DeviceBuffer:
+    """Memory on a device, made by :class:`~pyvista_vdi.opencl_runtime.Runtime`.
+
+    Released by :meth:`release`, at the end of a ``with`` block, or with its last reference.
+
+    Attributes
+    ----------
+    nbytes : int
+        Size as asked for; may be 0.
+    shape : tuple of int
+        Shape of the array that :meth:`Runtime.download` returns.
+    dtype : numpy.dtype
+        Element type.
+    name : str
+        What it holds, for messages.
+    writable : bool
+        Whether :meth:`Runtime.write` and :meth:`Runtime.fill` may change it.
+    """
+
+    def __init__(
+        self,
+        memory: Any,
+        shape: tuple[int, ...],
+        dtype: np.dtype[Any],
+        name: str,
+        on_release: Callable[[], None],
+        *,
+        writable: bool = True,
+    ) -> None:
+        self.shape = shape
+        self.dtype = dtype
+        self.nbytes = math.prod(shape) * dtype.itemsize
+        self.name = name
+        self.writable = writable
+        self._memory = memory
+        self._finalizer = weakref.finalize(self, _release, memory, on_release)
+        self._finalizer.atexit = False  # the driver frees everything at exit
+
+    @property
+    def memory(self) -> Any:
+        """The driver's memory object.
+
+        Raises
+        ------
+        DeviceError
+            If the buffer has been released.
+        """
+        if self._memory is None:
+            raise DeviceError(f"the buffer {self.name!r} was used after its release")
+        return self._memory
+
+    @property
+    def released(self) -> bool:
+        """Whether the memory has been given back."""
+        return self._memory is None
+
+    def release(self) -> None:
+        """Give the memory back; a second call does nothing. Enqueued work still finishes."""
+        self._memory = None
+        self._finalizer()
+
+    def __enter__(self) -> DeviceBuffer:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.release()
+
+    def __repr__(self) -> str:
+        state = "released" if self.released else bytes_text(self.nbytes)
+        return f"<DeviceBuffer {self.name!r}: {self.dtype} {self.shape}, {state}>"
+
+
+def _release(memory: Any, on_release: Callable[[], None]) -> None:
+    try:
+        on_release()
+    finally:
+        memory.release()
+
+
+def shape_of(nbytes_or_shape: int | tuple[int, ...], dtype: np.dtype[Any]) -> tuple[int, ...]:
+    """Shape for an integer number of *bytes*, or the given shape, checked.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If a size is negative, or the bytes are no whole number of elements.
+    """
+    if isinstance(nbytes_or_shape, (int, np.integer)):
+        nbytes = int(nbytes_or_shape)
+        if nbytes < 0 or nbytes % dtype.itemsize:
+            raise InvalidArgumentError(
+                f"{nbytes} bytes are no whole number of {dtype} ({dtype.itemsize} bytes each); "
+                "an integer size is in bytes, a shape is a tuple"
+            )
+        return (nbytes // dtype.itemsize,)
+    shape = tuple(int(n) for n in nbytes_or_shape)
+    if any(n < 0 for n in shape):
+        raise InvalidArgumentError(f"a buffer's shape must not be negative: {shape}")
+    return shape

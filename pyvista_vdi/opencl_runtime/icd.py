@@ -1,0 +1,165 @@
+"""Make OpenCL drivers that came from pip visible to the loader, while it lists its platforms.
+
+The wheel ``intel-opencl-rt`` puts its library into ``sys.prefix/lib`` and a vendor file with a
+build machine's path into ``sys.prefix/etc``, so no loader finds it. The loader that pyopencl's
+Linux wheels bring reads the folder named by ``OCL_ICD_VENDORS`` in place of
+``/etc/OpenCL/vendors``, once, when the platforms are first listed. :func:`drivers_visible` names a
+temporary folder there that holds copies of the system's vendor files and one for Intel's library,
+and puts the environment back afterwards.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.metadata
+import importlib.util
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+SYSTEM_VENDORS = Path("/etc/OpenCL/vendors")
+"""Where Linux loaders look by default."""
+
+USER_VARIABLES = ("OCL_ICD_VENDORS", "OCL_ICD_FILENAMES")
+"""Set by a user who has decided which drivers are seen: then nothing is changed."""
+
+INTEL_DISTRIBUTION = "intel-opencl-rt"
+INTEL_LIBRARY = "libintelocl.so"
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """What was done about the loader's search path.
+
+    Attributes
+    ----------
+    added : Path or None
+        The driver library that was made visible; None when nothing was changed.
+    note : str
+        Why nothing was changed, or what was added; for :func:`describe_devices`.
+    """
+
+    added: Path | None
+    note: str
+
+
+def intel_library() -> Path | None:
+    """Absolute path of pip's Intel CPU runtime, or None.
+
+    Looked for among the files of the installed distribution, then in ``sys.prefix/lib``.
+    """
+    candidates = []
+    try:
+        files = importlib.metadata.distribution(INTEL_DISTRIBUTION).files or []
+        candidates = [Path(str(f.locate())) for f in files if f.name == INTEL_LIBRARY]
+    except importlib.metadata.PackageNotFoundError:
+        pass
+    candidates.append(Path(sys.prefix) / "lib" / INTEL_LIBRARY)
+    for path in candidates:
+        resolved = path.resolve()
+        if resolved.is_file():
+            return resolved
+    return None
+
+
+def vendor_folders() -> list[Path]:
+    """Folders whose vendor files a loader would read if its search path were left alone."""
+    folders = [SYSTEM_VENDORS, Path(sys.prefix) / "etc" / "OpenCL" / "vendors"]
+    # The loader of pyopencl's wheels reads its own folder; pocl-binary-distribution installs there.
+    spec = importlib.util.find_spec("pyopencl")
+    if spec is not None and spec.origin is not None:
+        folders.append(Path(spec.origin).parent / ".libs")
+    return folders
+
+
+def read_vendor_files(folders: list[Path]) -> dict[str, str]:
+    """Vendor files that name a loadable library: a file name that is free, and the library.
+
+    A bare library name is left to the dynamic linker; a path that does not exist is dropped,
+    as is a library that an earlier file names.
+    """
+    libraries: dict[str, str] = {}
+    for folder in folders:
+        if not folder.is_dir():
+            continue
+        for file in sorted(folder.glob("*.icd")):
+            try:
+                library = file.read_text(encoding="utf-8", errors="surrogateescape").strip()
+            except OSError:
+                continue  # unreadable for us, hence for the loader as well
+            beside = folder / library
+            if library and os.sep not in library and beside.is_file():
+                library = str(beside)
+            missing = os.sep in library and not Path(library).is_file()
+            if not library or missing or library in libraries.values():
+                continue
+            libraries[f"{len(libraries):02d}-{file.name}"] = library
+    return libraries
+
+
+def plan() -> tuple[dict[str, str] | None, Discovery]:
+    """Decide whether the loader needs help.
+
+    Returns
+    -------
+    tuple
+        The vendor files to show (None: leave the environment alone) and the explanation.
+    """
+    if not sys.platform.startswith("linux"):
+        return None, Discovery(None, "drivers are found by the system's own loader")
+    for variable in USER_VARIABLES:
+        if os.environ.get(variable):
+            return None, Discovery(None, f"{variable}={os.environ[variable]!r} is set and obeyed")
+    library = intel_library()
+    if library is None:
+        return None, Discovery(None, f"no {INTEL_LIBRARY} from pip in this environment")
+    if "pyopencl" in sys.modules:
+        note = (
+            f"pyopencl was imported before pyvista_vdi asked for a device, so {library} was not "
+            "added to its search path; import order decides, or set OCL_ICD_VENDORS"
+        )
+        return None, Discovery(None, note)
+    system = read_vendor_files([SYSTEM_VENDORS])
+    if any(Path(entry).name.startswith(INTEL_LIBRARY) for entry in system.values()):
+        return None, Discovery(None, "the system's vendor files name Intel's CPU runtime already")
+
+    files = read_vendor_files(vendor_folders())
+    if str(library) not in files.values():
+        files["zz-pyvista-vdi-intel.icd"] = str(library)
+    return files, Discovery(library, f"added {library} to the loader's search path")
+
+
+@contextlib.contextmanager
+def drivers_visible() -> Iterator[Discovery]:
+    """While inside, the loader sees the system's drivers and pip's; the environment is put back.
+
+    Import pyopencl and list the platforms inside: the loader keeps what it found.
+
+    Yields
+    ------
+    Discovery
+        What was done.
+    """
+    files, discovery = plan()
+    if files is None:
+        yield discovery
+        return
+    with contextlib.ExitStack() as stack:
+        try:
+            # mkdtemp creates with mode 0700: nobody else can slip a library in.
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="pyvista-vdi-icd-"))
+            for name, library in files.items():
+                Path(folder, name).write_text(
+                    library + "\n", encoding="utf-8", errors="surrogateescape"
+                )
+        except OSError as exc:
+            yield Discovery(None, f"no temporary folder for the loader's vendor files: {exc}")
+            return
+        os.environ["OCL_ICD_VENDORS"] = folder
+        try:
+            yield discovery
+        finally:
+            os.environ.pop("OCL_ICD_VENDORS", None)

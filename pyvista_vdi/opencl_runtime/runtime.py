@@ -1,0 +1,483 @@
+"""One device with its context, queues, programs and buffers: what the engine launches through."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.opencl_runtime.arguments import (
+    Argument,
+    Size,
+    as_size,
+    check_host_array,
+    driver_argument,
+    preferred_group,
+)
+from pyvista_vdi.opencl_runtime.buffers import DeviceBuffer, Ledger, bytes_text, shape_of
+from pyvista_vdi.opencl_runtime.devices import Candidate, DeviceInfo, opencl
+from pyvista_vdi.opencl_runtime.profiling import KernelTime, Profile, profiling_wanted, table
+from pyvista_vdi.opencl_runtime.programs import Define, Kernel, ProgramCache
+
+
+class Runtime:
+    """A device ready for work. Made by :func:`~pyvista_vdi.opencl_runtime.get_runtime`.
+
+    Every method may be called from any thread. Commands run in the order in which they are
+    enqueued, one queue for all threads unless :meth:`queue_scope` gives a thread its own.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        The device.
+    context : pyopencl.Context, optional
+        A context to share; one of its own by default.
+
+    Attributes
+    ----------
+    info : DeviceInfo
+        What is known of the device.
+    is_cpu : bool
+        Whether it is the host's processor.
+    preferred_group : tuple of int
+        Suggested work-group size (width, height) for kernels over an image: 64 work items.
+    """
+
+    def __init__(self, candidate: Candidate, context: Any = None) -> None:
+        self.info: DeviceInfo = candidate.info
+        self.is_cpu = candidate.info.kind == "CPU"
+        self._device = candidate.device
+        with self._driver("making a context"):
+            self._context = context or opencl().Context([self._device])
+            self._alignment = max(1, int(self._device.mem_base_addr_align) // 8)
+            self.preferred_group = preferred_group(self._device, self.is_cpu)
+        self._programs = ProgramCache(self._context, self._device)
+        self._ledger = Ledger(candidate.info.full_name)
+        self._local = threading.local()
+        self._queues: list[Any] = []
+        self._queues_lock = threading.RLock()
+        self._profile: Profile | None = None
+        if profiling_wanted():
+            self._profile = Profile()
+            atexit.register(self._print_profile)
+        self._main_queue = self._new_queue()
+
+    def __repr__(self) -> str:
+        return f"<Runtime on {self.info.full_name}>"
+
+    # -- kernels -------------------------------------------------------------------------------
+
+    def kernel(
+        self, path: str | Path, name: str, defines: Mapping[str, Define] | None = None
+    ) -> Kernel:
+        """A kernel function, compiled when first asked for and kept.
+
+        Parameters
+        ----------
+        path : str or pathlib.Path
+            A file of ``pyvista_vdi.opencl`` (``"vdi/raycast.cl"``), or any file on disk as a Path.
+        name : str
+            The kernel function.
+        defines : mapping of str to str, int, float, bool or None, optional
+            ``-D`` names: what changes the code's shape. Floats become exact float32 literals.
+
+        Returns
+        -------
+        Kernel
+            For :meth:`launch`; threads may share it.
+
+        Raises
+        ------
+        KernelBuildError
+            If it cannot be assembled or compiled; carries log, options and source.
+        InvalidArgumentError
+            If a define cannot be written as an option.
+        """
+        return self._programs.kernel(path, name, defines or {})
+
+    def launch(
+        self, kernel: Kernel, global_size: Size, local_size: Size | None, *args: Argument
+    ) -> None:
+        """Enqueue a kernel and return at once.
+
+        Parameters
+        ----------
+        kernel : Kernel
+            From :meth:`kernel`.
+        global_size : int or tuple of int
+            Work items in each dimension; nothing is launched if one is 0.
+        local_size : int or tuple of int or None
+            Work-group size, a divisor of ``global_size`` (see :func:`padded`); None leaves the
+            choice to the driver.
+        *args : DeviceBuffer, LocalMemory, numpy scalar, numpy.ndarray or None
+            In the kernel's order. Numbers carry their type (``np.float32(x)``); a small array is
+            passed by value, as a vector (``float4``) or a structure; None is a null pointer.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If the sizes do not fit each other or the number of arguments is wrong.
+        TypeError
+            If an argument has no device type (a Python number).
+        DeviceMemoryError
+            If the driver lacks memory or resources.
+        DeviceError
+            If the driver refuses for any other reason.
+        """
+        whole = as_size(global_size)
+        group = None if local_size is None else as_size(local_size)
+        if group is not None and (
+            len(group) != len(whole) or any(n % g for n, g in zip(whole, group, strict=True))
+        ):
+            raise InvalidArgumentError(
+                f"kernel {kernel.name!r}: the global size {whole} is no multiple of the "
+                f"work-group size {group} in every dimension; round it up with padded()"
+            )
+        if len(args) != kernel.argument_count:
+            raise InvalidArgumentError(
+                f"kernel {kernel.name!r} of {kernel.path} takes {kernel.argument_count} "
+                f"arguments, {len(args)} were given"
+            )
+        if 0 in whole:
+            return
+
+        with self._driver(f"launching {kernel.name!r} of {kernel.path} on {whole} by {group}"):
+            mine = kernel.object
+            for index, argument in enumerate(args):
+                mine.set_arg(index, driver_argument(kernel, index, argument))
+            event = opencl().enqueue_nd_range_kernel(self._queue, mine, whole, group)
+        self._record(kernel.name, event)
+
+    # -- buffers -------------------------------------------------------------------------------
+
+    def buffer(
+        self,
+        nbytes_or_shape: int | tuple[int, ...],
+        dtype: DTypeLike = np.float32,
+        name: str = "buffer",
+        read_only: bool = False,
+    ) -> DeviceBuffer:
+        """Uninitialised memory on the device, checked against its limits before it is taken.
+
+        Parameters
+        ----------
+        nbytes_or_shape : int or tuple of int
+            An integer is a number of **bytes**, a tuple a shape in elements. Zero is allowed.
+        dtype : dtype_like, default: numpy.float32
+            Element type.
+        name : str, default: "buffer"
+            What it is for; messages say it.
+        read_only : bool, default: False
+            Whether kernels only read it.
+
+        Returns
+        -------
+        DeviceBuffer
+            Release it, use it in a ``with`` block, or drop it.
+
+        Raises
+        ------
+        DeviceMemoryError
+            If it is larger than the device allows per buffer or has left, or the driver fails.
+        InvalidArgumentError
+            If the size is negative or no whole number of elements.
+        """
+        dtype = np.dtype(dtype)
+        shape = shape_of(nbytes_or_shape, dtype)
+        flags = opencl().mem_flags
+        access = flags.READ_ONLY if read_only else flags.READ_WRITE
+        return self._allocate(access, shape, dtype, name, None, writable=True)
+
+    def upload(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
+        """An array's values on the device, for kernels to read.
+
+        A CPU device uses an array that is C-contiguous and aligned for it in place (see
+        :func:`aligned_empty`): do not change the array before the buffer is released. Otherwise
+        the values are copied.
+
+        Parameters
+        ----------
+        array : numpy.ndarray
+            Any shape; made C-contiguous if it is not.
+        name : str, default: "array"
+            What it holds; messages say it.
+
+        Returns
+        -------
+        DeviceBuffer
+            Not writable.
+
+        Raises
+        ------
+        DeviceMemoryError
+            As for :meth:`buffer`.
+        """
+        shape = np.shape(array)
+        array = np.ascontiguousarray(array)
+        flags = opencl().mem_flags
+        in_place = self.is_cpu and array.nbytes > 0 and array.ctypes.data % self._alignment == 0
+        source = flags.USE_HOST_PTR if in_place else flags.COPY_HOST_PTR
+        return self._allocate(
+            flags.READ_ONLY | source, shape, array.dtype, name, array, writable=False
+        )
+
+    def download(
+        self, buffer: DeviceBuffer, out: NDArray[Any] | None = None, count: int | None = None
+    ) -> NDArray[Any]:
+        """Values of a buffer, when all that was enqueued before is done.
+
+        Parameters
+        ----------
+        buffer : DeviceBuffer
+            The source.
+        out : numpy.ndarray, optional
+            C-contiguous target of the buffer's dtype and of as many elements.
+        count : int, optional
+            Only so many elements from the start, as a 1D array.
+
+        Returns
+        -------
+        numpy.ndarray
+            ``out``, or a new array of the buffer's shape.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If ``out`` or ``count`` does not fit.
+        DeviceError
+            If the driver fails, now or in a kernel before.
+        """
+        memory = buffer.memory
+        elements = buffer.nbytes // buffer.dtype.itemsize
+        if count is not None and not 0 <= count <= elements:
+            raise InvalidArgumentError(
+                f"{count} elements were asked of the buffer {buffer.name!r}, which has {elements}"
+            )
+        shape = buffer.shape if count is None else (count,)
+        if out is None:
+            out = np.empty(shape, buffer.dtype)
+        check_host_array(out, buffer, elements if count is None else count)
+        if not out.flags.writeable:
+            raise InvalidArgumentError(f"the target for {buffer.name!r} is not writable")
+        if out.nbytes:
+            with self._driver(f"reading {out.nbytes} bytes of the buffer {buffer.name!r}"):
+                event = opencl().enqueue_copy(self._queue, out, memory, is_blocking=True)
+            self._record("[read]", event)
+        return out
+
+    def write(self, buffer: DeviceBuffer, array: NDArray[Any]) -> None:
+        """Copy an array into a buffer; the array is free to change when this returns.
+
+        Parameters
+        ----------
+        buffer : DeviceBuffer
+            The target, not one from :meth:`upload`.
+        array : numpy.ndarray
+            Of the buffer's dtype and of as many elements.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it does not fit or the buffer is not writable.
+        DeviceError
+            If the driver fails.
+        """
+        memory = self._writable_memory(buffer)
+        array = np.ascontiguousarray(array)
+        check_host_array(array, buffer, buffer.nbytes // buffer.dtype.itemsize)
+        if array.nbytes:
+            with self._driver(f"writing {array.nbytes} bytes to the buffer {buffer.name!r}"):
+                event = opencl().enqueue_copy(self._queue, memory, array, is_blocking=True)
+            self._record("[write]", event)
+
+    def fill(self, buffer: DeviceBuffer, value: int | np.generic) -> None:
+        """Fill a buffer with one byte or one element.
+
+        Parameters
+        ----------
+        buffer : DeviceBuffer
+            The target, not one from :meth:`upload`.
+        value : int or numpy scalar
+            A Python integer (0 to 255) is a byte; a NumPy scalar is the pattern as it is.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If the value is no byte, the pattern does not divide the buffer, or the buffer is not
+            writable.
+        DeviceError
+            If the driver fails.
+        """
+        memory = self._writable_memory(buffer)
+        if isinstance(value, int) and not 0 <= value <= 255:
+            raise InvalidArgumentError(
+                f"{value} is no byte to fill the buffer {buffer.name!r} with; give a NumPy scalar "
+                f"such as np.{buffer.dtype}({value})"
+            )
+        pattern = np.uint8(value) if isinstance(value, int) else value
+        if buffer.nbytes % pattern.nbytes:
+            raise InvalidArgumentError(
+                f"a pattern of {pattern.nbytes} bytes does not divide the buffer "
+                f"{buffer.name!r} of {buffer.nbytes} bytes"
+            )
+        if buffer.nbytes:
+            with self._driver(f"filling the buffer {buffer.name!r}"):
+                event = opencl().enqueue_fill_buffer(self._queue, memory, pattern, 0, buffer.nbytes)
+            self._record("[fill]", event)
+
+    @property
+    def allocated(self) -> int:
+        """Bytes that this runtime's buffers hold now; arrays used in place count nothing."""
+        return self._ledger.allocated
+
+    @property
+    def peak_allocated(self) -> int:
+        """The most bytes that were held at once."""
+        return self._ledger.peak
+
+    def _allocate(
+        self,
+        flags: int,
+        shape: tuple[int, ...],
+        dtype: np.dtype[Any],
+        name: str,
+        host: NDArray[Any] | None,
+        *,
+        writable: bool,
+    ) -> DeviceBuffer:
+        cl = opencl()
+        nbytes = int(np.prod(shape, dtype=object)) * dtype.itemsize
+        in_place = bool(flags & cl.mem_flags.USE_HOST_PTR)
+        taken = 0 if in_place else max(nbytes, dtype.itemsize)  # drivers refuse size 0
+        if in_place:
+            # No memory is taken, but the limit per buffer holds for it as well.
+            self._ledger.check_size(name, nbytes, self.info.max_allocation, self.info.global_memory)
+        self._ledger.take(name, taken, self.info.max_allocation, self.info.global_memory)
+        try:
+            with self._driver(f"allocating {bytes_text(nbytes)} for the buffer {name!r}"):
+                if host is None or nbytes == 0:
+                    flags &= ~cl.mem_flags.COPY_HOST_PTR
+                    memory = cl.Buffer(self._context, flags, size=taken)
+                else:
+                    memory = cl.Buffer(self._context, flags, hostbuf=host)
+        except BaseException:
+            self._ledger.give_back(taken)
+            raise
+
+        def on_release() -> None:
+            self._ledger.give_back(taken)
+            if in_place:
+                self.finish()  # the array may go when the buffer has gone
+
+        return DeviceBuffer(memory, shape, dtype, name, on_release, writable=writable)
+
+    def _writable_memory(self, buffer: DeviceBuffer) -> Any:
+        if not buffer.writable:
+            raise InvalidArgumentError(
+                f"the buffer {buffer.name!r} was uploaded and may share the caller's array; "
+                "make a buffer() to write to"
+            )
+        return buffer.memory
+
+    # -- queues --------------------------------------------------------------------------------
+
+    def finish(self) -> None:
+        """Wait until all that any thread enqueued on this runtime is done.
+
+        Raises
+        ------
+        DeviceError
+            If a kernel failed meanwhile.
+        """
+        with self._queues_lock:
+            queues = list(self._queues)
+        with self._driver("waiting for enqueued work"):
+            for queue in queues:
+                queue.finish()
+
+    @contextlib.contextmanager
+    def queue_scope(self) -> Iterator[None]:
+        """Give the calling thread an in-order command queue of its own inside the ``with`` block.
+
+        What was enqueued before is finished first, and what is enqueued inside is finished at
+        the end, so buffers may cross the borders of the block.
+        """
+        outer = self._queue
+        with self._driver("waiting for enqueued work"):
+            outer.finish()
+        inner = self._new_queue()
+        self._local.queue = inner
+        try:
+            yield
+        finally:
+            self._local.queue = outer if outer is not self._main_queue else None
+            with self._driver("finishing a queue"):
+                inner.finish()
+            with self._queues_lock:
+                self._queues = [queue for queue in self._queues if queue is not inner]
+
+    @property
+    def _queue(self) -> Any:
+        return getattr(self._local, "queue", None) or self._main_queue
+
+    def _new_queue(self) -> Any:
+        cl = opencl()
+        properties = cl.command_queue_properties.PROFILING_ENABLE if self._profile else 0
+        with self._driver("making a command queue"):
+            queue = cl.CommandQueue(self._context, self._device, properties)
+        with self._queues_lock:
+            self._queues.append(queue)
+        return queue
+
+    # -- profiling and errors ------------------------------------------------------------------
+
+    def profile(self) -> list[KernelTime]:
+        """Device time per kernel so far; empty unless ``PYVISTA_VDI_PROFILE`` was set.
+
+        Returns
+        -------
+        list of KernelTime
+            Longest total first.
+        """
+        return self._profile.figures() if self._profile else []
+
+    def _record(self, name: str, event: Any) -> None:
+        if self._profile is not None:
+            self._profile.record(name, event)
+
+    def _print_profile(self) -> None:
+        rows = self.profile()
+        if rows:
+            sys.stderr.write(table(self.info.full_name, rows) + "\n")
+
+    @contextlib.contextmanager
+    def _driver(self, doing: str) -> Iterator[None]:
+        """Turn the driver's errors into the package's, naming what was being done."""
+        cl = opencl()
+        try:
+            yield
+        except cl.Error as exc:
+            codes = cl.status_code
+            short_of_memory = (
+                codes.MEM_OBJECT_ALLOCATION_FAILURE,
+                codes.OUT_OF_RESOURCES,
+                codes.OUT_OF_HOST_MEMORY,
+                codes.INVALID_BUFFER_SIZE,
+            )
+            # An error that pyopencl raises by itself has no code.
+            if getattr(exc, "code", None) in short_of_memory:
+                raise DeviceMemoryError(
+                    f"{self.info.full_name!r} ran out of memory or resources while {doing} "
+                    f"({exc}); it has {bytes_text(self.info.global_memory)}, of which this "
+                    f"process holds {bytes_text(self.allocated)}: use a smaller volume, window "
+                    "size or max_supersegments, or another device"
+                ) from exc
+            raise DeviceError(f"{self.info.full_name!r} failed while {doing}: {exc}") from exc

@@ -1,0 +1,3 @@
+"""The PyVista plugin: plotter component, accessor and reader; the only importer of pyvista."""
+
+from __future__ import annotations

@@ -1,0 +1,249 @@
+"""Classification arguments to tables, through the objects that ``add_volume`` builds them with."""
+
+from __future__ import annotations
+
+import difflib
+import sys
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, MissingDependencyError
+from pyvista_vdi.transfer_function import TransferFunction
+from pyvista_vdi.vtk_pipeline.properties import transfer_function_from_property
+
+
+def transfer_function_from_arguments(
+    scalars: NDArray[Any],
+    *,
+    clim: float | ArrayLike | None = None,
+    n_colors: int = 256,
+    opacity: Any = "linear",
+    cmap: Any = None,
+    flip_scalars: bool = False,
+    log_scale: bool = False,
+    opacity_unit_distance: float | None = None,
+    interpolation: str = "nearest",
+) -> TransferFunction:
+    """Return the transfer function that ``Plotter.add_volume`` would draw with.
+
+    Parameters
+    ----------
+    scalars : numpy.ndarray
+        The volume's values, of any shape; for the default ``clim``.
+    clim, n_colors, opacity, cmap, flip_scalars, log_scale
+        ``add_volume``'s, with its defaults and meaning: see :func:`lookup_table`.
+    opacity_unit_distance : float, optional
+        Model units; ``None`` leaves it to the volume.
+    interpolation : {"nearest", "linear"}
+        How samples are taken between the volume's points.
+
+    Returns
+    -------
+    TransferFunction
+        ``n_colors`` entries. PyVista stores opacities as bytes and cuts them at 0.998; so does
+        this.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If a name is unknown or a value out of range.
+    InvalidVolumeError
+        If every value is NaN and ``clim`` is not given.
+    MissingDependencyError
+        If the colour map is of a package that is not installed.
+    """
+    table = lookup_table(
+        scalars,
+        clim=clim,
+        n_colors=n_colors,
+        opacity=opacity,
+        cmap=cmap,
+        flip_scalars=flip_scalars,
+        log_scale=log_scale,
+    )
+    prop = volume_property(table, opacity_unit_distance, interpolation)
+    function = transfer_function_from_property(prop)
+    return function if opacity_unit_distance is not None else function.replace(unit_distance=None)
+
+
+def lookup_table(
+    scalars: NDArray[Any],
+    *,
+    clim: float | ArrayLike | None = None,
+    n_colors: int = 256,
+    opacity: Any = "linear",
+    cmap: Any = None,
+    flip_scalars: bool = False,
+    log_scale: bool = False,
+    categories: bool | int = False,
+    annotations: dict[float, str] | None = None,
+    theme: Any = None,
+) -> pv.LookupTable:
+    """Return the lookup table that ``Plotter.add_volume`` would build.
+
+    Parameters
+    ----------
+    scalars : numpy.ndarray
+        The values, for the default ``clim`` and for ``categories``.
+    clim : float or (float, float), optional
+        Range; one number means from minus to plus it; all finite values by default.
+    n_colors : int
+        Number of entries.
+    opacity : str or float or array_like
+        A name, one number 0 to 1, an array of other length than ``n_colors`` (0 to 1,
+        interpolated) or of that length (taken as it is, 0 to 255).
+    cmap : str, list, matplotlib colour map or pyvista.LookupTable, optional
+        A lookup table is used as it is, with its own range and opacities; the other arguments
+        then have no effect.
+    flip_scalars : bool
+        Reverse the colour map.
+    log_scale : bool
+        Map values to colours by their logarithm.
+    categories : bool or int
+        Take as many colours as there are different values, or this many.
+    annotations : dict, optional
+        Labels on the scalar bar, by value.
+    theme : pyvista.plotting.themes.Theme, optional
+        Whose default colour map is used; the global one by default.
+
+    Returns
+    -------
+    pyvista.LookupTable
+        As it would stand behind the volume and its scalar bar.
+
+    Raises
+    ------
+    InvalidArgumentError, InvalidVolumeError, MissingDependencyError
+        See :func:`transfer_function_from_arguments`.
+    """
+    if isinstance(cmap, pv.LookupTable):
+        return cmap
+    low, high = _scalar_range(scalars, clim)
+    if log_scale and low <= 0:
+        low = sys.float_info.min
+    if categories:
+        n_colors = len(np.unique(scalars)) if categories is True else int(categories)
+    if not (isinstance(n_colors, int | np.integer) and n_colors >= 1):
+        raise InvalidArgumentError(f"n_colors must be a whole number above 0; got {n_colors!r}")
+    colors = _color_map((theme or pv.global_theme).cmap if cmap is None else cmap)
+    table = pv.LookupTable()
+    table.apply_cmap(colors.reversed() if flip_scalars else colors, int(n_colors))
+    _apply_opacity(table, opacity, int(n_colors))
+    table.scalar_range = (low, high)
+    table.log_scale = bool(log_scale)
+    if isinstance(annotations, dict):
+        table.annotations = annotations
+    return table
+
+
+def volume_property(
+    table: pv.LookupTable, opacity_unit_distance: float | None, interpolation: str = "nearest"
+) -> pv.VolumeProperty:
+    """Return the volume property that ``Plotter.add_volume`` would build, without shading."""
+    if interpolation not in ("nearest", "linear"):
+        raise InvalidArgumentError(
+            f"interpolation must be 'nearest' or 'linear'; got {interpolation!r}"
+        )
+    if opacity_unit_distance is not None and not (
+        np.isfinite(opacity_unit_distance) and opacity_unit_distance > 0
+    ):
+        raise InvalidArgumentError(
+            "opacity_unit_distance must be a positive length in model units; "
+            f"got {opacity_unit_distance!r}"
+        )
+    return pv.VolumeProperty(
+        lookup_table=table,
+        interpolation_type=interpolation,
+        opacity_unit_distance=opacity_unit_distance,
+    )
+
+
+def _scalar_range(scalars: NDArray[Any], clim: float | ArrayLike | None) -> tuple[float, float]:
+    if clim is None:
+        values = np.asarray(scalars)
+        if values.dtype.kind == "f" and np.isnan(values).all():
+            raise InvalidVolumeError("every value is NaN: there is nothing to render")
+        low, high = float(np.nanmin(values)), float(np.nanmax(values))
+        if not (np.isfinite(low) and np.isfinite(high)):
+            raise InvalidArgumentError(
+                f"the values reach from {low} to {high}: give a finite range as clim=(low, high)"
+            )
+        return low, high
+    if isinstance(clim, int | float | np.number):
+        clim = (-float(clim), float(clim))
+    try:
+        low, high = (float(v) for v in clim)  # type: ignore[union-attr, arg-type]
+    except (TypeError, ValueError) as error:
+        raise InvalidArgumentError(
+            f"clim must be one number or a pair (low, high); got {clim!r}"
+        ) from error
+    if not (np.isfinite(low) and np.isfinite(high) and low <= high):
+        raise InvalidArgumentError(
+            f"clim must be two finite numbers, the smaller first; got {(low, high)}"
+        )
+    return low, high
+
+
+def _color_map(cmap: Any) -> Any:
+    try:
+        return pv.plotting.colors.get_cmap_safe(cmap)
+    except ModuleNotFoundError as error:
+        raise MissingDependencyError(str(error)) from error
+    except (TypeError, ValueError) as error:
+        hint = ""
+        if isinstance(cmap, str):
+            import matplotlib as mpl
+
+            near = difflib.get_close_matches(cmap, list(mpl.colormaps), n=3)
+            hint = f": did you mean {' or '.join(map(repr, near))}?" if near else ""
+        raise InvalidArgumentError(
+            f"cmap={cmap!r} is no colour map (a name, a list of colour names, a matplotlib "
+            f"colour map or a pyvista.LookupTable){hint}"
+        ) from error
+
+
+def _apply_opacity(table: pv.LookupTable, opacity: Any, n_colors: int) -> None:
+    if not isinstance(opacity, str | int | float):
+        opacity = _checked_opacities(opacity, n_colors)
+    try:
+        table.apply_opacity(opacity)
+    except (TypeError, ValueError) as error:
+        hint = ""
+        if isinstance(opacity, str):
+            names = _opacity_names(error)
+            near = difflib.get_close_matches(opacity, names, n=1)
+            hint = f": did you mean {near[0]!r}?" if near else f"; known are {', '.join(names)}"
+        raise InvalidArgumentError(
+            f"opacity={opacity!r} cannot be used{hint or f': {error}'}"
+        ) from (error)
+
+
+def _opacity_names(error: Exception) -> list[str]:
+    """Return the names in PyVista's message: it keeps its table inside a function."""
+    _, _, listed = str(error).partition("[")
+    return [name.strip(" '\"") for name in listed.rstrip("]").split(",")] if listed else []
+
+
+def _checked_opacities(opacity: Any, n_colors: int) -> Any:
+    try:
+        values = np.asarray(opacity, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InvalidArgumentError(
+            f"opacity must be a name, a number or an array of numbers; got {opacity!r}"
+        ) from error
+    if values.ndim == 0:
+        return float(values)
+    if values.ndim != 1 or not 1 <= len(values) <= n_colors or not np.isfinite(values).all():
+        raise InvalidArgumentError(
+            f"an opacity array must have 1 to n_colors={n_colors} finite entries; got shape "
+            f"{values.shape}"
+        )
+    if len(values) == n_colors and (values.min() < 0 or values.max() > 255):
+        raise InvalidArgumentError(
+            f"an opacity array as long as n_colors={n_colors} is taken as it is, 0 to 255; got "
+            f"values from {values.min():g} to {values.max():g}"
+        )
+    return list(opacity) if isinstance(opacity, tuple) else opacity

@@ -1,0 +1,150 @@
+"""What the command line and the comparison need of PyVista: a reader, a property, a window."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pyvista_vdi.errors import InvalidVolumeError, MissingDependencyError, UnsupportedError
+from pyvista_vdi.plotting.convert import to_image_data
+
+if TYPE_CHECKING:
+    from pyvista_vdi.vdi import VDI
+    from pyvista_vdi.volume import Volume
+
+
+def read_volume(path: str | os.PathLike[str]) -> Any:
+    """Read a volume by PyVista's readers.
+
+    Parameters
+    ----------
+    path : path-like
+        A file in any format of ``pyvista.read`` that holds a uniform grid (NRRD, MetaImage,
+        NIfTI, .vti, .vtk, TIFF, ...), or a folder of DICOM slices.
+
+    Returns
+    -------
+    pyvista.ImageData
+        The grid with its arrays.
+
+    Raises
+    ------
+    InvalidVolumeError
+        If the file is absent, of an unknown format or cannot be read.
+    UnsupportedError
+        If it holds another kind of data set; the message says how to make a uniform grid of it.
+    """
+    pv = _pyvista()
+    file = Path(path)
+    if not file.exists():
+        raise InvalidVolumeError(f"{file} does not exist: check the volume's path")
+    if file.suffix == ".vdi":
+        raise InvalidVolumeError(
+            f"{file} is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"
+        )
+    try:
+        with pv.vtk_verbosity("off"):
+            if file.is_dir():
+                data = pv.DICOMReader(str(file)).read()
+            else:
+                data = pv.read(file)
+    except Exception as error:  # each format has readers, and exceptions, of its own
+        raise InvalidVolumeError(f"{file} cannot be read as a volume: {error}") from error
+    if not isinstance(data, pv.ImageData):
+        raise UnsupportedError(
+            f"{file} holds a {type(data).__name__}, not a uniform grid: resample it to a "
+            "pyvista.ImageData first"
+        )
+    if data.n_points == 0 or not data.array_names:
+        raise InvalidVolumeError(f"{file} holds no scalars that PyVista could read")
+    return data
+
+
+def add_volume_property(volume: Volume, arguments: Mapping[str, Any]) -> Any:
+    """Return the property that ``Plotter.add_volume`` makes of some arguments.
+
+    Parameters
+    ----------
+    volume : Volume
+        What would be added.
+    arguments : mapping
+        Arguments of ``add_volume``; and ``interpolation``, ``"nearest"`` or ``"linear"``.
+
+    Returns
+    -------
+    vtkVolumeProperty
+        Not connected to any plotter.
+    """
+    pv = _pyvista()
+    arguments = dict(arguments)
+    interpolation = arguments.pop("interpolation", "nearest")
+    # VTK warns that there is no X server while it looks for a window that can do without
+    with pv.vtk_verbosity("off"):
+        plotter = pv.Plotter(off_screen=True)
+    try:
+        grid = to_image_data(volume)
+        actor = plotter.add_volume(grid, show_scalar_bar=False, render=False, **arguments)
+        prop = actor.prop
+    finally:
+        plotter.close()
+    if interpolation == "linear":
+        prop.SetInterpolationTypeToLinear()
+    else:
+        prop.SetInterpolationTypeToNearest()
+    return prop
+
+
+def show(
+    vdi: VDI, window_size: tuple[int, int] | None = None, screenshot: str | None = None
+) -> None:
+    """Open a plotter that shows a VDI from its own view, or write what it shows.
+
+    Parameters
+    ----------
+    vdi : VDI
+        What is shown.
+    window_size : (int, int), optional
+        Width and height of the window in pixels; the VDI's own by default.
+    screenshot : str, optional
+        File to write instead of opening a window.
+    """
+    pv = _pyvista()
+    view, size = vdi.camera, window_size or vdi.window_size
+    with pv.vtk_verbosity("off"):
+        plotter = pv.Plotter(off_screen=screenshot is not None, window_size=list(size))
+    try:
+        plotter.add_vdi(vdi)
+        camera = plotter.camera
+        camera.position, camera.focal_point, camera.up = (
+            view.position,
+            view.focal_point,
+            view.view_up,
+        )
+        camera.SetUseHorizontalViewAngle(view.use_horizontal_view_angle)
+        camera.view_angle = view.view_angle
+        camera.parallel_projection = view.parallel_projection
+        camera.parallel_scale = view.parallel_scale
+        camera.SetWindowCenter(*view.window_center)
+        plotter.renderer.reset_camera_clipping_range()
+        if screenshot is None:
+            plotter.show()
+        else:
+            plotter.screenshot(screenshot)
+    finally:
+        plotter.close()
+
+
+def _pyvista() -> Any:
+    try:
+        import pyvista as pv
+    except ImportError as error:
+        from pyvista_vdi.vtk_pipeline.peers import explain_import_error
+
+        if error.name == "pyvista":
+            raise MissingDependencyError(
+                'PyVista is not installed: install it by pip install "pyvista-vdi[plot]"'
+            ) from error
+        raise explain_import_error(error) from error
+    return pv

@@ -1,0 +1,378 @@
+"""``Plotter.add_vdi``: a VDI in place of a volume, with ``add_volume``'s arguments."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+from vtkmodules.vtkCommonCore import vtkWeakReference
+from vtkmodules.vtkRenderingCore import vtkVolume
+
+from pyvista_vdi.classification import DEFAULTS, Classification, refuse_unknown
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
+from pyvista_vdi.opencl_runtime import get_runtime
+from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
+from pyvista_vdi.plotting.classify import lookup_table, volume_property
+from pyvista_vdi.plotting.progress import progress_callback
+from pyvista_vdi.plotting.volumes import as_image
+from pyvista_vdi.vdi import VDI
+from pyvista_vdi.vtk_pipeline.convert import is_vdi_image, vdi_from_image
+from pyvista_vdi.vtk_pipeline.frame import as_array
+from pyvista_vdi.vtk_pipeline.source import VDISource
+
+#: ``add_volume``'s aliases.
+_ALIASES = {"rng": "clim", "colormap": "cmap", "backface_culling": "culling"}
+
+#: What only a volume can honour, with the defaults: refused by name where a VDI is added.
+_OF_VOLUMES = {
+    **{name: value for name, value in DEFAULTS.items() if name not in ("diffuse", "specular")},
+    "resolution": None,
+    "categories": False,
+    "multi_colors": False,
+    "diffuse": 0.7,
+    "specular": 0.2,
+    "max_supersegments": 20,
+    "sample_distance": None,
+    "tolerance": 0.0,
+    "view_cone": 60.0,
+    "camera": None,
+    "coverage": "bounds",
+}
+
+
+@pv.register_plotter_component("add_vdi")
+class AddVDI:
+    """Adds VDIs to a plotter: ``plotter.add_vdi(volume)``.
+
+    Parameters
+    ----------
+    plotter : pyvista.BasePlotter
+        Held weakly.
+    """
+
+    def __init__(self, plotter: Any) -> None:
+        self._plotter = weakref.ref(plotter)
+        self._actors: list[Any] = []
+
+    def __call__(
+        self,
+        volume: Any,
+        scalars: Any = None,
+        clim: Any = None,
+        resolution: Any = None,
+        opacity: Any = "linear",
+        n_colors: int = 256,
+        cmap: Any = None,
+        flip_scalars: bool = False,
+        reset_camera: bool | None = None,
+        name: str | None = None,
+        ambient: float | None = None,
+        categories: bool | int = False,
+        culling: bool | str = False,
+        multi_colors: bool = False,
+        blending: str = "composite",
+        mapper: None = None,
+        scalar_bar_args: dict[str, Any] | None = None,
+        show_scalar_bar: bool | None = None,
+        annotations: dict[float, str] | None = None,
+        pickable: bool = True,
+        preference: Literal["point", "cell"] = "point",
+        opacity_unit_distance: float | None = None,
+        shade: bool = False,
+        diffuse: float = 0.7,
+        specular: float = 0.2,
+        specular_power: float = 10.0,
+        render: bool | None = True,
+        user_matrix: Any = None,
+        log_scale: bool = False,
+        *,
+        max_supersegments: int = 20,
+        sample_distance: float | None = None,
+        tolerance: float = 0.0,
+        view_cone: float = 60.0,
+        interpolation: Literal["nearest", "linear"] = "nearest",
+        camera: Any = None,
+        coverage: Literal["bounds", "view"] = "bounds",
+        device: Any = None,
+        progress_bar: bool | Callable[[float], object] | None = None,
+        **aliases: Any,
+    ) -> PlotterVDIActor:
+        """Add a volume that turns fluently: its VDI is generated once and raycast each frame.
+
+        All arguments of ``Plotter.add_volume`` are taken, with its names, defaults and meaning;
+        what cannot be honoured is refused by name. The picture is ``add_volume``'s.
+
+        Parameters
+        ----------
+        volume : pyvista.ImageData or numpy.ndarray or Volume or VDI
+            A uniform grid (other grids are refused, with the remedy), a NumPy array as
+            ``add_volume`` takes it, a VDI, or a VDI as ``pyvista.read("x.vdi")`` gives it. With a
+            VDI nothing is generated, and arguments that only a volume can honour are refused.
+        scalars : str or numpy.ndarray, optional
+            Name of an array, or the values, per point or per cell. RGBA is refused.
+        clim : float or (float, float), optional
+            Range of the colour map; all values by default.
+        resolution : (float, float, float), optional
+            Spacing of a NumPy array; 1 by default.
+        opacity : str or float or array_like
+            As in ``add_volume``: an array of length ``n_colors`` is taken as it is, 0 to 255;
+            a shorter one is 0 to 1 and interpolated.
+        n_colors : int
+            Entries of the colour map.
+        cmap : str, list, matplotlib colour map or pyvista.LookupTable, optional
+            The theme's by default.
+        flip_scalars : bool
+            Reverse the colour map.
+        reset_camera, name, culling, pickable, render
+            As in ``add_volume``.
+        ambient, diffuse, specular, specular_power, shade
+            ``shade=True`` is refused; without it the others change nothing, as in ``add_volume``.
+        categories : bool or int
+            As many colours as there are different values, or this many.
+        multi_colors, mapper
+            Accepted as ``False`` and ``None`` only: multi-blocks are added block by block, and a
+            VDI has its own mapper.
+        blending : str
+            ``"composite"`` only.
+        scalar_bar_args, show_scalar_bar, annotations
+            As in ``add_volume``.
+        preference : {"point", "cell"}
+            Which array, where points and cells both have one of that name.
+        opacity_unit_distance : float, optional
+            Model units; the volume's diagonal over its mean number of cells by default.
+        user_matrix : array_like, shape (4, 4), optional
+            Places the actor in the world.
+        log_scale : bool
+            Map values to colours by their logarithm.
+        max_supersegments : int
+            Longest list, 1 to 4096.
+        sample_distance : float, optional
+            Length of a step, model units; half the smallest spacing by default.
+        tolerance : float
+            Error that may be traded for shorter lists.
+        view_cone : float
+            Half angle of the cone of views that must be served, degrees.
+        interpolation : {"nearest", "linear"}
+            Between voxels; ``add_volume`` draws ``"nearest"``.
+        camera : pyvista.Camera or vtkCamera or Camera, optional
+            The generating view; by default the plotter's camera at the first render.
+        coverage : {"bounds", "view"}
+            ``"bounds"``: the VDI covers the whole volume, so that neither panning nor zooming out
+            shows a cut edge. ``"view"``: it covers the window.
+        device : str or int, optional
+            The OpenCL device; by default ``PYVISTA_VDI_DEVICE``, else the best one found.
+        progress_bar : bool or callable, optional
+            By default a bar on a terminal, if generating takes over a second; ``True`` shows it
+            elsewhere, too, ``False`` never; a callable gets the fraction done, and stops the work
+            if it returns ``False``. Ctrl-C stops it as well.
+        **aliases
+            ``rng``, ``colormap`` and ``backface_culling``, as in ``add_volume``.
+
+        Returns
+        -------
+        PlotterVDIActor
+            A ``pyvista.Volume``; ``actor.vdi`` is the current VDI, ``actor.regenerate()`` makes
+            another from the current view. Changes to ``actor.prop`` or to the volume's data make
+            it anew at the next render.
+
+        Raises
+        ------
+        TypeError
+            If a keyword is unknown.
+        InvalidVolumeError, InvalidArgumentError, InvalidCameraError, InvalidVDIError
+            If an argument cannot be used.
+        UnsupportedError
+            If something is asked for that a VDI cannot honour.
+        NoDeviceError, MissingDependencyError
+            If there is no device, or a colour map's package is not installed.
+
+        Examples
+        --------
+        >>> import pyvista as pv
+        >>> import pyvista_vdi
+        >>> plotter = pv.Plotter()
+        >>> actor = plotter.add_vdi(pyvista_vdi.examples.load_brain(), cmap="bone")
+        >>> plotter.show()  # doctest: +SKIP
+        """
+        given = {k: v for k, v in locals().items() if k not in ("self", "aliases")}
+        refuse_unknown(aliases, "add_vdi", (*_ALIASES, *given))
+        for alias, value in aliases.items():
+            given[_ALIASES[alias]] = value
+        plotter = self._plotter()
+        if plotter is None:
+            raise InvalidArgumentError("the plotter of this add_vdi is gone: make another")
+        _refuse(given)
+        get_runtime(device)  # a missing device is said here, not while a frame is drawn
+        if isinstance(volume, VDI) or is_vdi_image(volume):
+            return self._add_made(plotter, given)
+        return self._add_volume(plotter, given)
+
+    def __plotter_close__(self) -> None:
+        """Let go of images and textures, even where the user keeps an actor."""
+        for weak in self._actors:
+            actor = weak.Get()
+            if actor is not None and actor.mapper is not None:
+                actor.mapper.painter.release()
+        self._actors.clear()
+
+    def __plotter_deep_clean__(self) -> None:
+        """Nothing else is held."""
+
+    # -- the two ways ----------------------------------------------------------------------------
+
+    def _add_volume(self, plotter: Any, given: dict[str, Any]) -> PlotterVDIActor:
+        image, array_name = as_image(given["volume"], given["scalars"], given["resolution"])
+        looks = Classification(_changed(given), "add_vdi")
+        source = VDISource()
+        source.SetInputDataObject(image)
+        source.SetScalars(array_name, given["preference"])
+        source.SetMaxSupersegments(given["max_supersegments"])
+        source.SetSampleDistance(given["sample_distance"])
+        source.SetTolerance(given["tolerance"])
+        source.SetViewCone(given["view_cone"])
+        source.SetCoverage(given["coverage"])
+        source.SetDevice(given["device"])
+        source.SetProgressCallback(progress_callback(given["progress_bar"]))
+        volume = source.GetVolume()
+        table = lookup_table(
+            volume.array,
+            **{k: given[k] for k in ("clim", "n_colors", "opacity", "cmap", "flip_scalars")},
+            **{k: given[k] for k in ("log_scale", "categories", "annotations")},
+            theme=plotter._theme,
+        )
+        distance = given["opacity_unit_distance"]
+        prop = volume_property(
+            table,
+            volume.default_unit_distance if distance is None else distance,
+            given["interpolation"],
+        )
+        prop.ambient = prop.ambient if given["ambient"] is None else given["ambient"]
+        prop.diffuse, prop.specular = given["diffuse"], given["specular"]
+        prop.specular_power = given["specular_power"]
+        source.SetVolumeProperty(prop)
+        source.SetMetadata({"classification": looks.describe()})
+        if given["camera"] is not None:
+            source.SetCamera(given["camera"], _matrix(plotter, given["user_matrix"]))
+        return self._add(plotter, given, source, table, prop, volume.name)
+
+    def _add_made(self, plotter: Any, given: dict[str, Any]) -> PlotterVDIActor:
+        extra = [k for k, default in _OF_VOLUMES.items() if not _is_default(given[k], default)]
+        if extra:
+            raise UnsupportedError(
+                f"{', '.join(sorted(extra))} cannot be given with a VDI: its classification, view "
+                "and lists were fixed when it was generated; generate another from the volume"
+            )
+        vdi = given["volume"] if isinstance(given["volume"], VDI) else None
+        vdi = vdi_from_image(given["volume"]) if vdi is None else vdi
+        table = _stored_table(vdi)
+        if table is None:
+            if given["show_scalar_bar"] or given["scalar_bar_args"] or given["annotations"]:
+                raise UnsupportedError(
+                    "this VDI's metadata holds no transfer function, so there is no scalar bar to "
+                    "show: leave out show_scalar_bar, scalar_bar_args and annotations"
+                )
+            given = {**given, "show_scalar_bar": False}
+            table = pv.LookupTable()
+        if given["annotations"]:
+            table.annotations = given["annotations"]
+        title = vdi.metadata.get("scalars") or "Data"
+        return self._add(plotter, given, vdi, table, None, str(title))
+
+    def _add(
+        self,
+        plotter: Any,
+        given: dict[str, Any],
+        shown: VDISource | VDI,
+        table: pv.LookupTable,
+        prop: Any,
+        title: str,
+    ) -> PlotterVDIActor:
+        """Put the actor into the scene as ``add_volume`` does."""
+        mapper = PlotterVDIMapper(theme=plotter._theme)
+        mapper.lookup_table = table
+        mapper.scalar_range = table.scalar_range
+        mapper.SetDevice(given["device"])
+        actor = PlotterVDIActor()
+        if prop is not None:
+            actor.prop = prop
+        if isinstance(shown, VDI):
+            mapper.SetVDI(shown)
+        else:
+            mapper.SetInputConnection(shown.GetOutputPort())
+        actor.mapper = mapper
+        actor.user_matrix = np.eye(4) if given["user_matrix"] is None else given["user_matrix"]
+        weak = vtkWeakReference()
+        weak.Set(actor)
+        self._actors.append(weak)
+        plotter.mapper, plotter.volume = mapper, actor
+        bar = given["show_scalar_bar"]
+        if bar is None:
+            bar = plotter._theme.show_scalar_bar or given["scalar_bar_args"]
+        culling = given["culling"]
+        plotter.add_actor(
+            actor,
+            reset_camera=given["reset_camera"],
+            name=given["name"],
+            culling="backface" if culling is True else culling,
+            pickable=given["pickable"],
+            render=not plotter._first_time if given["render"] is None else given["render"],
+        )
+        if bar:
+            plotter.add_scalar_bar(**{"title": title, **(given["scalar_bar_args"] or {})})
+        plotter.renderer.Modified()
+        return actor
+
+
+# -- refusals --------------------------------------------------------------------------------------
+
+
+def _refuse(given: dict[str, Any]) -> None:
+    """Refuse by name what add_volume takes and a VDI cannot honour."""
+    if given["mapper"] is not None:
+        raise UnsupportedError(
+            f"mapper={given['mapper']!r} chooses among VTK's volume mappers; a VDI has its own: "
+            "leave it out, or use add_volume"
+        )
+    if given["multi_colors"]:
+        raise UnsupportedError(
+            "multi_colors is for multi-block data sets: add the blocks one by one, each with "
+            "its cmap"
+        )
+
+
+def _changed(given: dict[str, Any]) -> dict[str, Any]:
+    """Return the classification arguments that differ from their defaults."""
+    return {k: given[k] for k, default in DEFAULTS.items() if not _is_default(given[k], default)}
+
+
+def _is_default(value: Any, default: Any) -> bool:
+    if value is default:
+        return True
+    return (
+        isinstance(value, str | int | float) and type(value) is type(default) and (value == default)
+    )
+
+
+def _matrix(plotter: Any, user_matrix: Any) -> NDArray[np.float64]:
+    """Return the actor's matrix as it will be in the scene, with the renderer's scale."""
+    stand_in = vtkVolume()
+    stand_in.SetScale(*plotter.renderer.scale)
+    if user_matrix is not None:
+        stand_in.SetUserMatrix(pv.vtkmatrix_from_array(np.asarray(user_matrix, dtype=float)))
+    return as_array(stand_in.GetMatrix())
+
+
+def _stored_table(vdi: VDI) -> pv.LookupTable | None:
+    """Return the colours and opacities that a VDI was made with, if its metadata has them."""
+    stored = vdi.metadata.get("transfer_function")
+    if not isinstance(stored, dict) or not {"colors", "opacities", "scalar_range"} <= set(stored):
+        return None
+    colors = np.column_stack([stored["colors"], stored["opacities"]])
+    table = pv.LookupTable()
+    table.values = np.round(colors * 255).astype(np.uint8)
+    table.scalar_range = tuple(stored["scalar_range"])
+    return table

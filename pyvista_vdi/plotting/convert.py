@@ -1,0 +1,43 @@
+"""Conversion of the engine's volumes to PyVista's."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+    from pyvista_vdi.volume import Volume
+
+
+def to_image_data(volume: Volume, name: str | None = None) -> pv.ImageData:
+    """Return a volume as PyVista's uniform grid.
+
+    Parameters
+    ----------
+    volume : Volume
+        Scalars indexed [z, y, x] with spacing, origin and direction in the model frame.
+    name : str, optional
+        Name of the point array, which becomes the active one; the volume's own by default.
+
+    Returns
+    -------
+    pyvista.ImageData
+        The same grid: dimensions (nx, ny, nz), point data of the volume's type. It may share
+        memory with ``volume.array``.
+    """
+    import pyvista as pv
+
+    grid = pv.ImageData(
+        dimensions=volume.dimensions,
+        spacing=volume.spacing,
+        origin=volume.origin,
+        direction_matrix=np.array(volume.direction),
+    )
+    # x runs fastest in VTK's point order, as it does in a C-ordered [z, y, x] array
+    name = volume.name if name is None else name
+    grid.point_data[name] = volume.array.ravel()
+    grid.set_active_scalars(name)
+    return grid

@@ -1,0 +1,71 @@
+"""A progress bar that appears only where work takes long."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from tqdm import tqdm
+
+#: Work that takes longer than this gets a bar, seconds.
+PATIENCE = 1.0
+
+
+class DelayedBar:
+    """Progress on stderr, shown from one second of work on.
+
+    Parameters
+    ----------
+    always : bool
+        Also where stderr is not a terminal.
+    label : str
+        What is being done.
+    """
+
+    def __init__(self, *, always: bool = False, label: str = "generating a VDI") -> None:
+        self._label = label
+        self._disable = False if always else None  # None: tqdm asks whether it is a terminal
+        self._bar: Any = None
+
+    def __call__(self, fraction: float) -> None:
+        """Show the fraction done, 0 to 1."""
+        if self._bar is not None and fraction < self._bar.n:
+            self.close()  # the work before was given up
+        if self._bar is None:
+            self._bar = tqdm(
+                total=1.0,
+                desc=self._label,
+                delay=PATIENCE,
+                disable=self._disable,
+                file=sys.stderr,
+                leave=False,
+                bar_format="{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}",
+            )
+        self._bar.update(fraction - self._bar.n)
+        if fraction >= 1.0:
+            self.close()
+
+    def close(self) -> None:
+        """Take the bar away."""
+        if self._bar is not None:
+            self._bar.close()
+            self._bar = None
+
+
+def progress_callback(
+    progress_bar: bool | Callable[[float], object] | None,
+) -> Callable[[float], object] | None:
+    """Return what to call with the fraction done.
+
+    Parameters
+    ----------
+    progress_bar : bool or callable, optional
+        ``None``: a bar on a terminal if the work takes over a second; ``True``: also elsewhere;
+        ``False``: none; a callable: that.
+    """
+    if callable(progress_bar):
+        return progress_bar
+    if progress_bar is False:
+        return None
+    return DelayedBar(always=bool(progress_bar))

@@ -1,0 +1,38 @@
+"""``pyvista.read("x.vdi")``: a VDI in its canonical VTK form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pyvista as pv
+
+from pyvista_vdi.io import read
+from pyvista_vdi.vtk_pipeline.convert import vdi_to_image
+
+
+def read_vdi(path: str, **options: Any) -> pv.ImageData:
+    """Read a ``.vdi`` file as PyVista reads any file.
+
+    Parameters
+    ----------
+    path : str
+        The file.
+    **options
+        None are known.
+
+    Returns
+    -------
+    pyvista.ImageData
+        The canonical VTK form, which ``add_vdi``, ``pyvista_vdi.render`` and ``VDIMapper`` take:
+        see :func:`pyvista_vdi.vtk_pipeline.convert.vdi_to_image`.
+
+    Raises
+    ------
+    VDIFileError
+        If it is not a readable VDI file.
+    TypeError
+        If there are options.
+    """
+    if options:
+        raise TypeError(f"reading a .vdi file takes no options; got {', '.join(sorted(options))}")
+    return pv.wrap(vdi_to_image(read(path)))

@@ -1,0 +1,93 @@
+"""What ``add_volume`` takes as a volume, to one uniform grid with named scalars."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, UnsupportedError
+from pyvista_vdi.plotting.convert import to_image_data
+from pyvista_vdi.volume import Volume
+from pyvista_vdi.vtk_pipeline.convert import require_image
+
+#: What ``add_volume`` calls scalars that are given as an array.
+_UNNAMED = "Data"
+
+
+def as_image(volume: Any, scalars: Any, resolution: Any) -> tuple[Any, str | None]:
+    """Return a uniform grid and the name of its scalars.
+
+    Parameters
+    ----------
+    volume : pyvista.ImageData or vtkImageData or numpy.ndarray or Volume
+        The user's own grid is returned where that is possible, so that changes to it are seen.
+    scalars : str or numpy.ndarray, optional
+        Name, or values per point or cell; these go into a shallow copy.
+    resolution : (float, float, float), optional
+        Spacing of a NumPy array.
+
+    Returns
+    -------
+    image : vtkImageData
+        The grid.
+    name : str or None
+        The array; ``None`` for the active scalars.
+
+    Raises
+    ------
+    InvalidVolumeError, InvalidArgumentError, UnsupportedError
+        If it cannot be used; for other grids the message says what to do.
+    """
+    if isinstance(volume, np.ndarray):
+        image = _from_array(volume, resolution)
+    elif isinstance(volume, Volume):
+        image = to_image_data(volume)
+    else:
+        image = require_image(volume)
+    if scalars is None or isinstance(scalars, str):
+        return image, scalars
+    return _with_values(image, np.asarray(scalars)), _UNNAMED
+
+
+def _from_array(array: Any, resolution: Any) -> pv.ImageData:
+    if array.ndim == 4 and array.shape[-1] in (3, 4):
+        raise UnsupportedError(_rgba(array))
+    if array.ndim != 3:
+        raise InvalidVolumeError(
+            f"a NumPy volume is three-dimensional, indexed [x, y, z]; got shape {array.shape}"
+        )
+    image = pv.wrap(array)
+    spacing = (1, 1, 1) if resolution is None else tuple(np.ravel(resolution))
+    if len(spacing) != 3 or not all(np.isfinite(s) and s > 0 for s in spacing):
+        raise InvalidArgumentError(
+            f"resolution must be three positive spacings; got {resolution!r}"
+        )
+    image.spacing = spacing
+    return image
+
+
+def _with_values(image: Any, values: Any) -> pv.ImageData:
+    if values.ndim == 2 and values.shape[1] in (3, 4):
+        raise UnsupportedError(_rgba(values))
+    if not np.issubdtype(values.dtype, np.number) and values.dtype != bool:
+        raise InvalidVolumeError(f"scalars must be numbers; got {values.dtype}")
+    n_points, n_cells = image.GetNumberOfPoints(), image.GetNumberOfCells()
+    if values.ndim != 1 or len(values) not in (n_points, n_cells):
+        raise InvalidVolumeError(
+            f"scalars must have one value per point ({n_points}) or per cell ({n_cells}); "
+            f"got shape {values.shape}"
+        )
+    copy = pv.ImageData()
+    copy.CopyStructure(image)
+    data = copy.point_data if len(values) == n_points else copy.cell_data
+    data.set_array(values, _UNNAMED)
+    return copy
+
+
+def _rgba(array: Any) -> str:
+    return (
+        f"scalars of shape {array.shape} are RGB(A) colours: colours stored in the volume are not "
+        "supported yet, a later release brings them; pass one scalar per point"
+    )

@@ -1,0 +1,234 @@
+"""VDI to image, on a device."""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import rays
+from .blocks import GROUP, block_items
+from .camera import Camera, check_window_size
+from .errors import InvalidArgumentError
+from .opencl_runtime import DeviceBuffer, Runtime, get_runtime
+from .vdi import VDI
+
+#: A ray ends where less transmittance than this is left: no channel loses more than that.
+TRANSMITTANCE_CUTOFF = 1e-6
+#: Far depth over near depth up to which a lens counts as long, and depth is kept relative.
+_LONG_LENS = 2.0
+
+_prepared: weakref.WeakKeyDictionary[VDI, dict[Runtime, PreparedVDI]] = weakref.WeakKeyDictionary()
+_lock = threading.Lock()
+
+
+def render_vdi(
+    vdi: VDI,
+    camera: Camera,
+    window_size: Sequence[int] | None = None,
+    *,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+    device: Any = None,
+) -> NDArray[np.float32]:
+    """Raycast a VDI from any view (paper section 3).
+
+    Parameters
+    ----------
+    vdi : VDI
+        Uploaded once per device and kept as long as the object lives.
+    camera : Camera
+        The new view V_N. Its ``model_transform`` says where the VDI's model frame is now.
+    window_size : (int, int), optional
+        Width and height in pixels; by default the VDI's own.
+    opaque_depth : array_like of float, shape (height, width), optional
+        View depth at which each ray ends, world units, top row first; inf where nothing is opaque.
+    clipping_planes : array_like of float, shape (k, 6), optional
+        Origin and normal of each plane, world coordinates; the normal's side is kept.
+    device : optional
+        See :func:`pyvista_vdi.list_devices`.
+
+    Returns
+    -------
+    numpy.ndarray
+        Premultiplied RGBA, float32 (height, width, 4), top row first.
+
+    Notes
+    -----
+    A ray ends early where its transmittance falls below :data:`TRANSMITTANCE_CUTOFF`, which bounds
+    what any channel can lose.
+    """
+    if not isinstance(vdi, VDI):
+        raise InvalidArgumentError(f"expected a VDI, got {type(vdi).__name__}")
+    camera = Camera.from_any(camera)
+    size = check_window_size(vdi.window_size if window_size is None else window_size)
+    runtime = get_runtime(device)
+    prepared = prepared_vdi(runtime, vdi)
+    with runtime.buffer((size[1], size[0], 4), name="image") as image:
+        prepared.render(camera, size, image, opaque_depth, clipping_planes)
+        return runtime.download(image)
+
+
+def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
+    """Return the VDI on the device, made once and kept as long as the VDI lives."""
+    with _lock:
+        cache = _prepared.setdefault(vdi, {})
+        if runtime not in cache:
+            cache[runtime] = PreparedVDI(runtime, vdi)
+        return cache[runtime]
+
+
+class PreparedVDI:
+    """A VDI on a device, in the form that the raycaster reads.
+
+    Parameters
+    ----------
+    runtime : Runtime
+        The device.
+    vdi : VDI
+        Not kept: the buffers are enough.
+    """
+
+    def __init__(self, runtime: Runtime, vdi: VDI) -> None:
+        self._runtime = runtime
+        self._window = vdi.window_size
+        self._bounds = vdi.bounds
+        self._depth_origin = vdi.depth_origin
+        camera = vdi.camera
+        self._parallel = camera.parallel_projection
+        near, far = rays.depth_range(camera, vdi.bounds)
+        diagonal = float(np.linalg.norm(np.subtract(vdi.bounds[1::2], vdi.bounds[::2])))
+        shrink = np.linalg.norm(camera.model_transform[:3, :3], 2)
+        self._nearest = rays.NEAREST_DEPTH * diagonal * float(shrink)
+        self._shifted = not self._parallel and self._depth_origin > 0 and far <= _LONG_LENS * near
+        self._list_rows = self._list_space(camera)
+        self._long_offsets = vdi.n_supersegments >= 2**32
+        self._upload(vdi)
+
+    @property
+    def defines(self) -> dict[str, str | int | None]:
+        """``-D`` names that fix the kernels' shape for this VDI."""
+        defines: dict[str, str | int | None] = {
+            "OFFSET_T": "ulong" if self._long_offsets else "uint"
+        }
+        if self._parallel:
+            defines["PARALLEL"] = 1
+        if self._shifted:
+            defines["SHIFTED"] = 1
+        return defines
+
+    def render(
+        self,
+        camera: Camera,
+        size: tuple[int, int],
+        image: DeviceBuffer,
+        opaque_depth: ArrayLike | None = None,
+        clipping_planes: ArrayLike | None = None,
+    ) -> None:
+        """Enqueue a frame into ``image``, float32 (H, W, 4) on the device."""
+        width, height = size
+        pixel_rays = rays.pixel_rays(camera, size, self._bounds)
+        coordinates = [pixel_rays.form(row[:3], row[3]) for row in self._list_rows]
+        direction = [pixel_rays.form(axis) for axis in np.eye(3)]
+        planes = rays.box_planes(pixel_rays, self._bounds)
+        planes += self._viewport_planes(coordinates)
+        planes += rays.eye_plane(camera, pixel_rays)
+        planes += rays.user_planes(camera, pixel_rays, clipping_planes)
+        forms = rays.packed([*coordinates, *direction, *planes])
+        ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
+        runtime = self._runtime
+        kernel = runtime.kernel("vdi/raycast.cl", "raycast", self.defines)
+        with (
+            runtime.upload(forms, "rays") as form_buffer,
+            runtime.upload(
+                np.zeros(1, np.float32) if ends is None else ends, "opaque depth"
+            ) as depth,
+        ):
+            runtime.launch(
+                kernel,
+                block_items(width, height),
+                GROUP,
+                self._offsets,
+                self._faces,
+                self._media,
+                np.int32(self._window[0]),
+                np.int32(self._window[1]),
+                np.float32(self._depth_origin),
+                form_buffer,
+                np.int32(len(planes)),
+                np.int32(width),
+                np.int32(height),
+                depth,
+                np.int32(ends is not None),
+                np.float32(TRANSMITTANCE_CUTOFF),
+                image,
+            )
+            runtime.finish()  # the buffers above may be host memory in use
+
+    def _list_space(self, camera: Camera) -> NDArray[np.float64]:
+        """Model frame to homogeneous list coordinates, float64 (4, 4).
+
+        Rows give u and v in pixels from the window's centre, the depth coordinate, and the
+        denominator that all three are divided by (1 in parallel projection).
+        """
+        viewport = camera.viewport_matrix(self._window) @ camera.model_to_view
+        half = np.asarray(self._window, dtype=np.float64) / 2
+        u, v, depth, denominator = viewport
+        if self._parallel or self._shifted:
+            coordinate = depth.copy()
+            coordinate[3] -= self._depth_origin
+        else:
+            coordinate = np.array([0.0, 0.0, 0.0, -1.0])  # -1 / Z
+        return np.stack([half[0] * u, half[1] * v, coordinate, denominator])
+
+    def _viewport_planes(self, coordinates: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+        """Forms that keep what is in V_O's viewport and in front of its eye."""
+        u, v, _, denominator = coordinates
+        wide, high = self._window[0] / 2, self._window[1] / 2
+        sides = [u, -u, v, -v]
+        forms = [s + e * denominator for s, e in zip(sides, (wide, wide, high, high), strict=True)]
+        if not self._parallel:
+            front = denominator.copy()
+            front[0] -= self._nearest
+            forms.append(front)
+        return forms
+
+    def _upload(self, vdi: VDI) -> None:
+        runtime = self._runtime
+        n, (wide, high) = vdi.n_supersegments, vdi.window_size
+        offset_type = np.uint64 if self._long_offsets else np.uint32
+        self._offsets = runtime.upload(vdi.offsets.astype(offset_type), "list offsets")
+        self._faces = runtime.buffer((n, 2), name="supersegment faces")
+        self._media = runtime.buffer((n, 4), name="supersegment media")
+        # Direction of a centre ray per unit of view depth, in the model frame
+        centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
+        kernel = runtime.kernel("vdi/prepare.cl", "prepare_lists", self.defines)
+        with (
+            runtime.upload(vdi.front, "front depths") as front,
+            runtime.upload(vdi.back, "back depths") as back,
+            runtime.upload(vdi.color, "supersegment colours") as color,
+            runtime.upload(vdi.optical_depth, "optical depths") as optical_depth,
+            runtime.upload(centre.astype(np.float32), "centre rays") as directions,
+        ):
+            runtime.launch(
+                kernel,
+                -(-wide * high // GROUP) * GROUP,
+                GROUP,
+                self._offsets,
+                front,
+                back,
+                color,
+                optical_depth,
+                np.float32(self._depth_origin),
+                np.float32(self._nearest),
+                np.int32(wide),
+                np.int32(high),
+                directions,
+                self._faces,
+                self._media,
+            )
+            runtime.finish()  # the buffers above may be host memory in use

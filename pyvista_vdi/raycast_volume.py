@@ -1,0 +1,92 @@
+"""Direct volume rendering on a device: the baseline that a VDI is measured against."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import rays
+from .blocks import GROUP, block_items
+from .camera import Camera, check_window_size
+from .device_volume import DeviceVolume
+from .opencl_runtime import get_runtime
+from .raycast import TRANSMITTANCE_CUTOFF
+from .transfer_function import TransferFunction
+from .volume import Volume
+
+
+def raycast_volume(
+    volume: Volume,
+    camera: Camera,
+    window_size: Sequence[int],
+    transfer_function: TransferFunction,
+    *,
+    sample_distance: float | None = None,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+    early_termination: bool = True,
+    device: Any = None,
+) -> NDArray[np.float32]:
+    """Render a classified volume directly.
+
+    Samples at the midpoints of equal steps, composited front to back by the same kernel code that
+    generates VDIs.
+
+    Parameters
+    ----------
+    volume : Volume
+        The scalars.
+    camera : Camera
+        The view.
+    window_size : (int, int)
+        Width and height in pixels.
+    transfer_function : TransferFunction
+        Scalar to colour and opacity.
+    sample_distance : float, optional
+        Length of a step, model units; half the smallest spacing by default.
+    opaque_depth : array_like of float, shape (height, width), optional
+        View depth at which each ray ends, world units, top row first; inf where nothing is opaque.
+    clipping_planes : array_like of float, shape (k, 6), optional
+        Origin and normal of each plane, world coordinates; the normal's side is kept.
+    early_termination : bool
+        End a ray where less than :data:`~pyvista_vdi.raycast.TRANSMITTANCE_CUTOFF` is left.
+    device : optional
+        See :func:`pyvista_vdi.list_devices`.
+
+    Returns
+    -------
+    numpy.ndarray
+        Premultiplied RGBA, float32 (height, width, 4), top row first.
+    """
+    camera = Camera.from_any(camera)
+    width, height = check_window_size(window_size)
+    runtime = get_runtime(device)
+    medium = DeviceVolume(runtime, volume, transfer_function, sample_distance)
+    forms, pixel_rays, planes = medium.forms(camera, (width, height), clipping_planes)
+    ends = rays.checked_opaque_depth(opaque_depth, (width, height), pixel_rays)
+    kernel = runtime.kernel("vdi/render_volume.cl", "render_volume", medium.defines)
+    with (
+        runtime.upload(forms, "rays") as form_buffer,
+        runtime.upload(np.zeros(1, np.float32) if ends is None else ends, "opaque depth") as depth,
+        runtime.buffer((height, width, 4), name="image") as image,
+    ):
+        runtime.launch(
+            kernel,
+            block_items(width, height),
+            GROUP,
+            *medium.medium_arguments,
+            form_buffer,
+            np.int32(planes),
+            np.float32(medium.sample_distance),
+            np.float32(medium.unit_distance),
+            np.int32(width),
+            np.int32(height),
+            depth,
+            np.int32(ends is not None),
+            np.float32(TRANSMITTANCE_CUTOFF if early_termination else -1.0),
+            image,
+        )
+        return runtime.download(image)

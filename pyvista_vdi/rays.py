@@ -1,0 +1,216 @@
+"""Rays as the kernels take them: affine forms of the pixel, made in float64 (docs/conventions.md).
+
+Along the ray of a pixel every quantity that the kernels need (a coordinate, the distance from a
+clipping plane, a homogeneous denominator) is affine in the pixel's position and in t, the view
+depth of the ray's camera less a reference depth. The six numbers of each such form are computed
+here in float64, so that an eye or an origin far away costs the kernels' float32 nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .camera import Camera, check_window_size
+from .errors import InvalidArgumentError, InvalidCameraError
+
+Floats: TypeAlias = NDArray[np.float64]
+
+#: Depth before which nothing is looked up in perspective, in diagonals of the bounds (DESIGN 3).
+NEAREST_DEPTH = 1e-6
+
+
+@dataclass(frozen=True)
+class PixelRays:
+    """The rays of all pixels of a window, in the model frame.
+
+    ``P(t) = pixel @ origin + t * (pixel @ direction)`` with ``pixel = (1, a, b)``, a and b the
+    offsets of the pixel's centre from the window's, in pixels, and t view depth less
+    ``reference_depth``.
+
+    Attributes
+    ----------
+    origin, direction : numpy.ndarray
+        float64 (3, 3), rows for 1, a and b; model units.
+    reference_depth : float
+        View depth of t = 0, world units.
+    """
+
+    origin: Floats
+    direction: Floats
+    reference_depth: float
+
+    def form(self, normal: ArrayLike, offset: float = 0.0) -> Floats:
+        """Six numbers of the function ``normal . P + offset`` of model points P."""
+        normal = np.asarray(normal, dtype=np.float64)
+        form = np.concatenate([self.origin @ normal, self.direction @ normal])
+        form[0] += offset
+        return form
+
+
+def corners(bounds: Sequence[float]) -> Floats:
+    """Return the eight corners of axis-aligned bounds, float64 (8, 3)."""
+    x, y, z = np.reshape(np.asarray(bounds, dtype=np.float64), (3, 2))
+    return np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(8, 3)
+
+
+def depth_range(camera: Camera, bounds: Sequence[float]) -> tuple[float, float]:
+    """Return the least and the largest view depth of bounds in the model frame; world units."""
+    row = camera.model_to_view[2]
+    # About the bounds' centre, so that an origin far away does not cost the extent its digits
+    box = np.reshape(np.asarray(bounds, dtype=np.float64), (3, 2))
+    centre, half = box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2
+    middle = row[:3] @ centre + row[3]
+    reach = np.abs(row[:3]) @ half
+    return float(middle - reach), float(middle + reach)
+
+
+def reference_depth(camera: Camera, bounds: Sequence[float]) -> float:
+    """Return the view depth about which rays and lists are formed, world units.
+
+    The near depth of the bounds where the eye is outside, 0 where they reach behind it.
+    """
+    near, _ = depth_range(camera, bounds)
+    return near if camera.parallel_projection else max(near, 0.0)
+
+
+def pixel_rays(camera: Camera, window_size: Sequence[int], bounds: Sequence[float]) -> PixelRays:
+    """Return the rays of a camera's window, formed about the near depth of ``bounds``.
+
+    Parameters
+    ----------
+    camera : Camera
+        Its ``model_transform`` says where the model is.
+    window_size : (int, int)
+        Width and height in pixels.
+    bounds : sequence of float, shape (6,)
+        Of the data, model frame.
+
+    Returns
+    -------
+    PixelRays
+        In the model frame.
+    """
+    width, height = check_window_size(window_size)
+    depth = reference_depth(camera, bounds)
+    origin, direction = camera.ray_coefficients((width, height))
+    per_pixel = np.array([[1.0], [2 / width], [2 / height]])  # (u, v) to pixel offsets
+    origin = (origin + depth * direction) * per_pixel
+    direction = direction * per_pixel
+    to_model = inverse_affine(camera.model_to_view)
+    linear = to_model[:3, :3].T
+    origin = origin @ linear
+    origin[0] += to_model[:3, 3]
+    return PixelRays(origin, direction @ linear, depth)
+
+
+def inverse_affine(matrix: Floats) -> Floats:
+    """Return the inverse of an affine float64 (4, 4) matrix."""
+    inverse = np.eye(4)
+    # Columns scaled to one, so that a world of 1e-9 or 1e9 is inverted as well as one of 1
+    scale = np.linalg.norm(matrix[:3, :3], axis=0)
+    inverse[:3, :3] = np.linalg.inv(matrix[:3, :3] / scale) / scale[:, None]
+    inverse[:3, 3] = -inverse[:3, :3] @ matrix[:3, 3]
+    return inverse
+
+
+def eye_plane(camera: Camera, rays: PixelRays) -> list[Floats]:
+    """Return the form that keeps what is in front of the eye: none in parallel projection."""
+    if camera.parallel_projection:
+        return []
+    return [np.array([rays.reference_depth, 0, 0, 1.0, 0, 0])]
+
+
+def box_planes(rays: PixelRays, bounds: Sequence[float]) -> list[Floats]:
+    """Return the six forms that keep what is inside axis-aligned bounds of the model frame."""
+    forms = []
+    for axis in range(3):
+        normal = np.eye(3)[axis]
+        forms.append(rays.form(normal, -bounds[2 * axis]))
+        forms.append(rays.form(-normal, bounds[2 * axis + 1]))
+    return forms
+
+
+def user_planes(camera: Camera, rays: PixelRays, planes: ArrayLike | None) -> list[Floats]:
+    """Return the forms of clipping planes given in world coordinates.
+
+    Parameters
+    ----------
+    camera : Camera
+        Its ``model_transform`` carries them into the model frame.
+    rays : PixelRays
+        Rays in the model frame.
+    planes : array_like of float, shape (k, 6), optional
+        Origin and normal of each; the side that the normal points to is kept.
+
+    Returns
+    -------
+    list of numpy.ndarray
+        One form each.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If the shape is another, a value is not finite or a normal is zero.
+    """
+    if planes is None:
+        return []
+    table = np.asarray(planes, dtype=np.float64)
+    if table.size == 0:
+        return []
+    if table.ndim != 2 or table.shape[1] != 6 or not np.isfinite(table).all():
+        raise InvalidArgumentError(
+            "clipping_planes must be (k, 6) finite numbers, origin and normal of each plane; "
+            f"got shape {table.shape}"
+        )
+    if not table[:, 3:].any(axis=1).all():
+        raise InvalidArgumentError("a clipping plane's normal is zero: give its direction")
+    matrix = camera.model_transform
+    return [
+        rays.form(normal @ matrix[:3, :3], normal @ (matrix[:3, 3] - origin))
+        for origin, normal in ((row[:3], row[3:]) for row in table)
+    ]
+
+
+def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
+    """Return forms as the kernels read them, float32 (n, 6).
+
+    Raises
+    ------
+    InvalidCameraError
+        If one is not finite in float32: the camera or the data are beyond what it can hold.
+    """
+    with np.errstate(over="ignore"):
+        table = np.asarray(forms, dtype=np.float32)
+    if not np.isfinite(table).all():
+        raise InvalidCameraError(
+            "the view cannot be expressed in float32: positions or distances exceed 1e38 model "
+            "units; scale the data and the camera"
+        )
+    return table
+
+
+def checked_opaque_depth(
+    opaque_depth: ArrayLike | None, window_size: tuple[int, int], rays: PixelRays
+) -> NDArray[np.float32] | None:
+    """Return where each pixel's ray ends, as t: float32 (H, W), top row first.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If the shape is not (H, W) or a depth is NaN.
+    """
+    if opaque_depth is None:
+        return None
+    depth = np.asarray(opaque_depth, dtype=np.float64)
+    if depth.shape != window_size[::-1]:
+        raise InvalidArgumentError(
+            f"opaque_depth must have shape (height, width) = {window_size[::-1]}; got {depth.shape}"
+        )
+    if np.isnan(depth).any():
+        raise InvalidArgumentError("opaque_depth holds NaN: use inf where nothing is opaque")
+    return (depth - rays.reference_depth).astype(np.float32)

@@ -1,0 +1,365 @@
+"""From a volume to samples, to an image and to a plain VDI, in float64 (DESIGN section 3)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera, check_window_size
+from ..compositing import Segment, composite, merge
+from ..errors import InvalidArgumentError
+from ..transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
+from ..vdi import VDI
+from ..volume import Volume
+from .rays import HalfSpace, Ray, clip, inside_box, pixel_ray
+
+Array = NDArray[np.float64]
+
+#: How far outside the grid, in points, a position may lie by float64 rounding alone.
+GRID_TOLERANCE = 1e-9
+
+
+class RaySamples(NamedTuple):
+    """The samples of one ray, nearest first; every array has one entry per sample.
+
+    Attributes
+    ----------
+    pixel : tuple of int
+        ``(x, y)``, y = 0 at the bottom.
+    begin, end : numpy.ndarray
+        View depths of V_O between which each step lies, float64 (n,), world units.
+    position : numpy.ndarray
+        Grid coordinates (x, y, z) of the midpoints, in points, float64 (n, 3).
+    length : numpy.ndarray
+        Length of each step, float64 (n,), model units.
+    color : numpy.ndarray
+        Straight RGB, float64 (n, 3).
+    optical_depth : numpy.ndarray
+        tau of each step, float64 (n,).
+    """
+
+    pixel: tuple[int, int]
+    begin: Array
+    end: Array
+    position: Array
+    length: Array
+    color: Array
+    optical_depth: Array
+
+
+def samples(
+    volume: Volume,
+    camera: Camera,
+    window_size: Sequence[int],
+    transfer_function: TransferFunction,
+    sample_distance: float | None = None,
+) -> Iterator[RaySamples]:
+    """Yield the samples of every pixel's ray.
+
+    Samples lie at the midpoints of steps of model length ``sample_distance`` from where the ray
+    enters the grid, the last step being shorter (DESIGN section 3, "From volume to medium"), so
+    that the steps' lengths add up to the ray's length in the grid whatever its directions are.
+    In perspective a ray begins no earlier than at the eye.
+
+    Parameters
+    ----------
+    volume : Volume
+        What to sample; outside its grid nothing is seen.
+    camera : Camera
+        The view; its model transform places the volume.
+    window_size : (int, int)
+        Width and height in pixels.
+    transfer_function : TransferFunction
+        Classification and interpolation.
+    sample_distance : float, optional
+        Model units; half the smallest spacing by default.
+
+    Yields
+    ------
+    RaySamples
+        Bottom row first, from left to right; a ray that misses the grid has no samples.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If ``sample_distance`` is not positive.
+    """
+    width, height = check_window_size(window_size)
+    step = min(volume.spacing) / 2 if sample_distance is None else float(sample_distance)
+    if not (math.isfinite(step) and step > 0):
+        raise InvalidArgumentError(
+            f"sample_distance must be a positive length in model units; got {sample_distance!r}"
+        )
+    to_index = np.linalg.inv(volume.index_to_model)
+    for y, x in itertools.product(range(height), range(width)):
+        ray = pixel_ray(camera, (width, height), x, y)
+        start = to_index[:3, :3] @ ray.origin + to_index[:3, 3]
+        slope = to_index[:3, :3] @ ray.direction
+        per_depth = float(np.linalg.norm(ray.direction))  # model units per unit of view depth
+        edges = _steps(start, slope, volume, camera.parallel_projection, step / per_depth)
+        position = start + slope * ((edges[:-1] + edges[1:]) / 2)[:, None]
+        length = np.diff(edges) * per_depth
+        color, tau = medium_at(volume, transfer_function, position, length)
+        yield RaySamples((x, y), edges[:-1], edges[1:], position, length, color, tau)
+
+
+def volume_image(
+    volume: Volume,
+    camera: Camera,
+    window_size: Sequence[int],
+    transfer_function: TransferFunction,
+    sample_distance: float | None = None,
+) -> Array:
+    """Return the direct volume rendering: all samples composited, nothing ended early.
+
+    Parameters
+    ----------
+    volume, camera, window_size, transfer_function, sample_distance
+        As for :func:`samples`.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 (H, W, 4), premultiplied RGBA, top row first.
+    """
+    width, height = check_window_size(window_size)
+    image = np.zeros((height, width, 4))
+    rays = samples(volume, camera, window_size, transfer_function, sample_distance)
+    for ray in rays:
+        x, y = ray.pixel
+        image[height - 1 - y, x] = composite(ray.color, ray.optical_depth)
+    return image
+
+
+def build_vdi(
+    volume: Volume,
+    camera: Camera,
+    window_size: Sequence[int],
+    transfer_function: TransferFunction,
+    sample_distance: float | None = None,
+    *,
+    max_supersegments: int = 20,
+    weighting: str = "transmittance",
+) -> VDI:
+    """Return a plain VDI: neighbouring samples merged greedily until the budget is kept.
+
+    Every sample that is not transparent begins as a supersegment of its own. While a list is over
+    budget, the two neighbours whose merging displaces the least optical depth become one: with e
+    the extinction times (r, g, b, 1), the cost is the sum of abs(e - mean e) over length, what lies
+    between the two (e = 0) included. Merging sees opacity as well as colour, so black material
+    that changes density is not homogeneous. Rendered at V_O the result equals
+    :func:`volume_image` for any budget, with colours weighted by transmittance.
+
+    Parameters
+    ----------
+    volume, camera, window_size, transfer_function, sample_distance
+        As for :func:`samples`.
+    max_supersegments : int
+        N_S: no list gets longer.
+    weighting : {"transmittance", "optical_depth"}
+        Of the colours; see :func:`pyvista_vdi.compositing.merge`.
+
+    Returns
+    -------
+    VDI
+        With depths relative to the nearest depth of the bounds where the eye is outside them.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If ``max_supersegments`` is not positive.
+    """
+    if max_supersegments < 1:
+        raise InvalidArgumentError(
+            f"max_supersegments must be a whole number of at least 1; got {max_supersegments!r}"
+        )
+    depth_origin = near_depth(volume.bounds, camera)
+    lists = []
+    rays = samples(volume, camera, window_size, transfer_function, sample_distance)
+    for ray in rays:
+        runs = [
+            Segment(float(t0), float(t1), color, float(tau))
+            for t0, t1, color, tau in zip(
+                ray.begin, ray.end, ray.color, ray.optical_depth, strict=True
+            )
+            if tau > 0
+        ]
+        lists.append(_within_budget(runs, max_supersegments, weighting))
+    return _vdi_from(lists, camera, window_size, volume.bounds, depth_origin)
+
+
+def near_depth(bounds: Sequence[float], camera: Camera) -> float:
+    """Return the nearest view depth of axis-aligned bounds, 0 where the eye is not before them."""
+    corners = np.array(list(itertools.product(*np.reshape(bounds, (3, 2)))))
+    matrix = camera.model_to_view
+    near = float((corners @ matrix[2, :3] + matrix[2, 3]).min())
+    return near if near > 0 or camera.parallel_projection else 0.0
+
+
+# -- the medium ------------------------------------------------------------------------------------
+
+
+def medium_at(
+    volume: Volume, transfer_function: TransferFunction, position: Array, length: Array
+) -> tuple[Array, Array]:
+    """Return colour and optical depth of steps whose midpoints have given grid coordinates.
+
+    Parameters
+    ----------
+    volume : Volume
+        What to sample.
+    transfer_function : TransferFunction
+        Classification and interpolation.
+    position : numpy.ndarray
+        Grid coordinates (x, y, z), in points, float64 (n, 3); transparent outside
+        [0, dimensions - 1].
+    length : numpy.ndarray
+        Of each step, float64 (n,), model units.
+
+    Returns
+    -------
+    color : numpy.ndarray
+        Straight RGB, float64 (n, 3).
+    optical_depth : numpy.ndarray
+        float64 (n,): ``-log1p(-a) length / U``; where a is 1, no less than 30.
+    """
+    top = np.array(volume.dimensions) - 1
+    outside = ((position < -GRID_TOLERANCE) | (position > top + GRID_TOLERANCE)).any(axis=1)
+    inside = np.clip(position, 0, top)
+    interpolate = _linear if transfer_function.interpolation == "linear" else _nearest
+    scalar = interpolate(volume.array, inside)
+    color, alpha = classify(transfer_function, scalar)
+
+    unit = transfer_function.unit_distance or volume.default_unit_distance
+    with np.errstate(divide="ignore"):  # log1p(-1): opaque
+        tau = np.abs(-np.log1p(-alpha)) * (length / unit)
+    tau = np.where(alpha == 1, OPAQUE_OPTICAL_DEPTH, tau)
+    return color, np.where(outside | np.isnan(scalar), 0.0, tau)
+
+
+def classify(transfer_function: TransferFunction, scalar: Array) -> tuple[Array, Array]:
+    """Return colour, float64 (n, 3), and opacity, float64 (n,), of scalars; 0 for NaN.
+
+    Both are linear between the table's equidistant nodes and constant beyond its ends.
+    """
+    low, high = transfer_function.scalar_range
+    last = len(transfer_function.opacities) - 1
+    known = np.where(np.isnan(scalar), low, scalar)
+    if low == high:
+        node = np.where(known > high, float(last), 0.0)
+    else:
+        node = np.clip((known - low) / (high - low), 0.0, 1.0) * last
+    floor = np.minimum(np.floor(node), max(last - 1, 0)).astype(np.int64)
+    above = np.minimum(floor + 1, last)
+    share = node - floor
+
+    colors = transfer_function.colors.astype(np.float64)
+    opacities = transfer_function.opacities.astype(np.float64)
+    color = colors[floor] + share[:, None] * (colors[above] - colors[floor])
+    alpha = opacities[floor] + share * (opacities[above] - opacities[floor])
+    nan = np.isnan(scalar)
+    return np.where(nan[:, None], 0.0, color), np.where(nan, 0.0, alpha)
+
+
+def _nearest(array: NDArray[np.generic], position: Array) -> Array:
+    x, y, z = np.floor(position + 0.5).astype(np.int64).T
+    return np.asarray(array[z, y, x], dtype=np.float64)
+
+
+def _linear(array: NDArray[np.generic], position: Array) -> Array:
+    """Trilinear; NaN wherever a corner of the cell is NaN."""
+    top = np.array(array.shape[::-1]) - 1
+    cell = np.minimum(np.floor(position).astype(np.int64), top - 1)
+    share = position - cell
+    total = np.zeros(len(position))
+    for corner in itertools.product((0, 1), repeat=3):
+        weight = np.where(corner, share, 1 - share).prod(axis=1)
+        x, y, z = (cell + corner).T
+        total += weight * np.asarray(array[z, y, x], dtype=np.float64)
+    return total
+
+
+def _steps(start: Array, slope: Array, volume: Volume, parallel: bool, stride: float) -> Array:
+    """Return the view depths where the steps of a ray begin and end; at least one entry.
+
+    ``start + t slope`` are grid coordinates at view depth t, ``stride`` a step's view depth.
+    """
+    nx, ny, nz = volume.dimensions
+    limits = inside_box(Ray(start, slope), (0, nx - 1, 0, ny - 1, 0, nz - 1))
+    if not parallel:
+        limits.append(HalfSpace(0.0, 1.0))
+    span = clip(limits)
+    if span is None:
+        return np.zeros(1)
+    t0, t1 = span
+    # A last step shorter than rounding is none
+    count = max(1, math.ceil((t1 - t0) / stride - 1e-9))
+    return np.append(t0 + np.arange(count) * stride, t1)
+
+
+# -- merging ---------------------------------------------------------------------------------------
+
+
+def _within_budget(runs: list[Segment], budget: int, weighting: str) -> list[Segment]:
+    """Merge neighbours at least cost until there are no more than ``budget``."""
+    merged = list(runs)
+    parts = [[run] for run in runs]  # what each was made of
+    costs = [_merge_cost(a + b) for a, b in itertools.pairwise(parts)]
+    while len(merged) > budget:
+        k = int(np.argmin(costs))
+        merged[k : k + 2] = [merge(merged[k], merged[k + 1], weighting)]
+        parts[k : k + 2] = [parts[k] + parts[k + 1]]
+        del costs[k]
+        for j in (k - 1, k):  # both neighbours' costs have changed
+            if 0 <= j < len(costs):
+                costs[j] = _merge_cost(parts[j] + parts[j + 1])
+    return merged
+
+
+def _merge_cost(parts: list[Segment]) -> float:
+    """Return the optical depth, per colour and in all, that one mean of ``parts`` displaces."""
+    length = np.array([part.back - part.front for part in parts])
+    amount = np.array([part.optical_depth * np.append(part.color, 1.0) for part in parts])
+    whole = parts[-1].back - parts[0].front
+    mean = amount.sum(axis=0) / whole
+    gap = max(0.0, whole - float(length.sum()))
+    return float(np.abs(amount - length[:, None] * mean).sum() + gap * mean.sum())
+
+
+def _vdi_from(
+    lists: list[list[Segment]],
+    camera: Camera,
+    window_size: Sequence[int],
+    bounds: Sequence[float],
+    depth_origin: float,
+) -> VDI:
+    """Store segments, in view depth, as a valid VDI: rounded to float32 and still disjoint."""
+    front, back = [], []
+    for segments in lists:
+        end = np.float32(-np.inf)
+        for segment in segments:
+            begin = max(np.float32(segment.front - depth_origin), end)
+            end = max(
+                np.float32(segment.back - depth_origin), np.nextafter(begin, np.float32(np.inf))
+            )
+            front.append(begin)
+            back.append(end)
+    flat = [segment for segments in lists for segment in segments]
+    return VDI(
+        camera,
+        window_size,
+        np.concatenate(([0], np.cumsum([len(segments) for segments in lists]))).astype(np.uint64),
+        np.array(front, dtype=np.float32),
+        np.array(back, dtype=np.float32),
+        # Means of colours in [0, 1] may round beyond it
+        np.clip(np.array([segment.color for segment in flat]).reshape(-1, 3), 0, 1),
+        np.array([segment.optical_depth for segment in flat]),
+        bounds,
+        depth_origin=depth_origin,
+        metadata={"criterion": "reference: least displaced optical depth"},
+    )

@@ -1,0 +1,340 @@
+"""The exact image of any VDI from any view, in float64 (DESIGN section 3): the oracle.
+
+A VDI's medium is piecewise constant, so nothing is sampled: a ray is cut where it crosses from one
+list to the next, each piece is intersected with every supersegment of its list by a linear scan,
+and what is met is composited front to back.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..camera import Camera, check_window_size
+from ..compositing import composite, optical_depth_over_length
+from ..errors import InvalidArgumentError
+from ..vdi import VDI
+from .rays import HalfSpace, Ray, clip, inside_box, inside_planes, pixel_ray
+
+Array = NDArray[np.float64]
+
+#: Nearest view depth of V_O, in diagonals of the bounds, that a ray is followed to in perspective:
+#: list coordinates are undefined at the eye (DESIGN section 3, "Lengths").
+NEAR_LIMIT = 1e-6
+
+
+class Line(NamedTuple):
+    """A piece of a straight line in the view space of V_O.
+
+    P(t) = origin + t direction for t in [t0, t1]; one unit of t is ``unit_length`` model units.
+    """
+
+    origin: Array
+    direction: Array
+    t0: float
+    t1: float
+    unit_length: float
+
+
+class Lists:
+    """A VDI in float64, with what does not depend on the ray.
+
+    Parameters
+    ----------
+    vdi : VDI
+        What to look at.
+
+    Attributes
+    ----------
+    front, back : numpy.ndarray
+        View depth of the faces in V_O, float64 (n,), world units, depth origin added.
+    length : numpy.ndarray
+        L, float64 (n,): length of each supersegment on its list's centre ray, model units.
+    viewport : numpy.ndarray
+        float64 (4, 4), view space of V_O to (u d, v d, Z, d).
+    """
+
+    def __init__(self, vdi: VDI) -> None:
+        self.vdi = vdi
+        self.viewport = vdi.camera.viewport_matrix(vdi.window_size)
+        self.front = vdi.front.astype(np.float64) + vdi.depth_origin
+        self.back = vdi.back.astype(np.float64) + vdi.depth_origin
+        self.offsets = vdi.offsets.astype(np.int64)
+        scale = np.repeat(centre_ray_scale(vdi).ravel(), np.diff(self.offsets))
+        thickness = vdi.back.astype(np.float64) - vdi.front.astype(np.float64)
+        self.length = thickness * scale
+
+    def displaced(self, shift: Array) -> Lists:
+        """Return a copy with both faces moved outwards by ``shift``, float64 (n,), world units.
+
+        Negative: inwards, but a supersegment never gets thinner than nothing. L stays: it comes
+        from the stored depths themselves; only the crossings are found from rounded ones.
+        """
+        moved = copy.copy(self)
+        moved.front = self.front - shift
+        moved.back = np.maximum(self.back + shift, moved.front)
+        return moved
+
+
+def centre_ray_scale(vdi: VDI) -> Array:
+    """Return the model length of one world unit of view depth along each list's centre ray.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 (H, W), bottom row first; for the identity as model transform
+        ``sqrt(1 + (u_c t_x)^2 + (v_c t_y)^2)``, in parallel projection 1 (DESIGN section 3,
+        "A supersegment is a homogeneous medium").
+    """
+    width, height = vdi.window_size
+    scale = np.empty((height, width))
+    for y in range(height):
+        for x in range(width):
+            ray = pixel_ray(vdi.camera, vdi.window_size, x, y)
+            scale[y, x] = np.linalg.norm(ray.direction)
+    return scale
+
+
+def near_limit(vdi: VDI) -> float:
+    """Return the smallest view depth of V_O that rays are followed to; world units.
+
+    :data:`NEAR_LIMIT` times the diagonal of the bounds, carried into the world by the model
+    transform's largest stretch.
+    """
+    extent = np.subtract(vdi.bounds[1::2], vdi.bounds[::2])
+    stretch = float(np.linalg.norm(vdi.camera.model_transform[:3, :3], ord=2))
+    return NEAR_LIMIT * stretch * float(np.linalg.norm(extent))
+
+
+def render(
+    vdi: VDI,
+    camera: Camera,
+    window_size: Sequence[int] | None = None,
+    *,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+) -> Array:
+    """Return the exact image of a VDI from any view.
+
+    Parameters
+    ----------
+    vdi : VDI
+        What to look at.
+    camera : Camera
+        V_N; its model transform places the VDI's model frame in its world.
+    window_size : (int, int), optional
+        Width and height of the image; the VDI's own by default.
+    opaque_depth : array_like of float, shape (H, W), optional
+        Top row first: view depth of V_N, world units, at which the ray ends.
+    clipping_planes : array_like of float, shape (k, 6), optional
+        Origin and normal of each, world coordinates; the side the normal points to is kept.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 (H, W, 4), premultiplied RGBA, top row first.
+    """
+    width, height = check_window_size(vdi.window_size if window_size is None else window_size)
+    pixels = [(x, height - 1 - row) for row in range(height) for x in range(width)]
+    colors = render_pixels(
+        vdi,
+        camera,
+        (width, height),
+        pixels,
+        opaque_depth=opaque_depth,
+        clipping_planes=clipping_planes,
+    )
+    return colors.reshape(height, width, 4)
+
+
+def render_pixels(
+    vdi: VDI,
+    camera: Camera,
+    window_size: Sequence[int],
+    pixels: Sequence[tuple[int, int]],
+    *,
+    nudge: tuple[float, float] = (0.0, 0.0),
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+) -> Array:
+    """Return the exact colour of some pixels.
+
+    Parameters
+    ----------
+    vdi, camera, window_size, opaque_depth, clipping_planes
+        As for :func:`render`.
+    pixels : sequence of (int, int)
+        ``(x, y)`` of each, y = 0 at the bottom.
+    nudge : (float, float)
+        Moves every ray on the window, in pixels of V_N.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 (len(pixels), 4), premultiplied RGBA.
+    """
+    lists = Lists(vdi)
+    colors = np.zeros((len(pixels), 4))
+    for k, pixel in enumerate(pixels):
+        line = line_of_pixel(
+            vdi,
+            camera,
+            window_size,
+            pixel,
+            nudge=nudge,
+            opaque_depth=opaque_depth,
+            clipping_planes=clipping_planes,
+        )
+        if line is not None:
+            colors[k] = composite_line(lists, line)
+    return colors
+
+
+def line_of_pixel(
+    vdi: VDI,
+    camera: Camera,
+    window_size: Sequence[int],
+    pixel: tuple[int, int],
+    *,
+    nudge: tuple[float, float] = (0.0, 0.0),
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+) -> Line | None:
+    """Return the part of a pixel's ray that may meet the medium; None where there is none.
+
+    A ray begins at the viewer's eye in perspective; in parallel projection, whose eye is
+    infinitely far, it has no beginning: VTK too fits its near plane to what is drawn.
+    """
+    width, height = check_window_size(window_size)
+    x, y = pixel
+    ray = pixel_ray(camera, (width, height), x + nudge[0], y + nudge[1])
+    limits = inside_box(ray, vdi.bounds)
+    limits += inside_planes(ray, camera, clipping_planes)
+    if not camera.parallel_projection:
+        limits.append(HalfSpace(0.0, 1.0))
+    if opaque_depth is not None:
+        depth = np.asarray(opaque_depth, dtype=np.float64)
+        if depth.shape != (height, width):
+            raise InvalidArgumentError(
+                f"opaque_depth must have shape (H, W) = ({height}, {width}); got {depth.shape}"
+            )
+        end = float(depth[height - 1 - y, x])
+        if end < np.inf:
+            limits.append(HalfSpace(end, -1.0))
+
+    origin, direction = _in_view_space(vdi.camera, ray)
+    limits += _inside_frustum(vdi, origin, direction)
+    span = clip(limits)
+    if span is None:
+        return None
+    return Line(origin, direction, *span, float(np.linalg.norm(ray.direction)))
+
+
+def composite_line(lists: Lists, line: Line) -> Array:
+    """Return what the medium along a line looks like from its beginning.
+
+    Parameters
+    ----------
+    lists : Lists
+        The medium.
+    line : Line
+        Where to look, within V_O's half space Z > 0 in perspective; what lies outside its
+        viewport is empty.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 (4,), premultiplied RGBA.
+    """
+    # Homogeneous viewport coordinates (u d, v d, Z, d) are linear in t: h(t) = at + t slope
+    at = lists.viewport @ np.append(line.origin, 1.0)
+    slope = lists.viewport @ np.append(line.direction, 0.0)
+
+    cuts = _list_crossings(at, slope, line.t0, line.t1, lists.vdi.window_size)
+    owner = _list_of(at, slope, (cuts[:-1] + cuts[1:]) / 2, lists.vdi.window_size)
+
+    # Every supersegment of every list that the line passes through, in the order it meets them
+    inside = np.flatnonzero(owner >= 0)
+    begin, end = lists.offsets[owner[inside]], lists.offsets[owner[inside] + 1]
+    count = end - begin
+    piece = np.repeat(inside, count)
+    rank = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    forward = np.repeat(begin, count) + rank
+    backward = np.repeat(end, count) - 1 - rank
+    member = backward if slope[2] < 0 else forward
+
+    # The share of each piece that lies between the two faces
+    depth = at[2] + cuts * slope[2]
+    share = _share_between(depth[piece], depth[piece + 1], lists.front[member], lists.back[member])
+    hit = share > 0
+    member, piece = member[hit], piece[hit]
+    length = share[hit] * (cuts[piece + 1] - cuts[piece]) * line.unit_length
+
+    tau = optical_depth_over_length(lists.vdi.optical_depth[member], length, lists.length[member])
+    return composite(lists.vdi.color[member], tau)
+
+
+def _in_view_space(camera: Camera, ray: Ray) -> tuple[Array, Array]:
+    """Carry a ray from the model frame into the view space of ``camera``; t stays."""
+    matrix = camera.model_to_view
+    return matrix[:3, :3] @ ray.origin + matrix[:3, 3], matrix[:3, :3] @ ray.direction
+
+
+def _inside_frustum(vdi: VDI, origin: Array, direction: Array) -> list[HalfSpace]:
+    """Return the half spaces of V_O's viewport, -d <= u d <= d, and in perspective of Z > 0."""
+    matrix = vdi.camera.viewport_matrix(vdi.window_size)
+    at, slope = matrix @ np.append(origin, 1.0), matrix @ np.append(direction, 0.0)
+    planes = []
+    for axis in (0, 1):
+        for sign in (1.0, -1.0):
+            planes.append(
+                HalfSpace(float(at[3] + sign * at[axis]), float(slope[3] + sign * slope[axis]))
+            )
+    if not vdi.camera.parallel_projection:
+        planes.append(HalfSpace(float(at[2]) - near_limit(vdi), float(slope[2])))
+    return planes
+
+
+def _list_crossings(
+    at: Array, slope: Array, t0: float, t1: float, window_size: tuple[int, int]
+) -> Array:
+    """Return t0, every t between where the line crosses a border between lists, and t1; sorted."""
+    cuts = [np.array([t0, t1])]
+    for axis, edge in enumerate(window_size):
+        border = 2 * np.arange(edge + 1) / edge - 1
+        # u d = border d, with both sides linear in t
+        offset, rise = at[axis] - border * at[3], slope[axis] - border * slope[3]
+        with np.errstate(divide="ignore", invalid="ignore"):  # a border that is never reached
+            t = -offset / rise
+        cuts.append(t[(t > t0) & (t < t1)])
+    return np.unique(np.concatenate(cuts))
+
+
+def _list_of(at: Array, slope: Array, t: Array, window_size: tuple[int, int]) -> NDArray[np.int64]:
+    """Return the list that holds the line at each t; -1 outside the viewport.
+
+    A border belongs to the higher index (DESIGN section 3, "Borders").
+    """
+    width, height = window_size
+    d = at[3] + t * slope[3]
+    x = np.floor(((at[0] + t * slope[0]) / d + 1) / 2 * width)
+    y = np.floor(((at[1] + t * slope[1]) / d + 1) / 2 * height)
+    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    return np.where(inside, y * width + x, -1).astype(np.int64)
+
+
+def _share_between(first: Array, last: Array, front: Array, back: Array) -> Array:
+    """Return the share of a piece from depth ``first`` to ``last`` that lies in [front, back).
+
+    By intervals, never by (face - first) / slope alone: a piece may run across the view direction.
+    """
+    low, high = np.minimum(first, last), np.maximum(first, last)
+    overlap = np.minimum(high, back) - np.maximum(low, front)
+    within = (front <= low) & (low < back)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.clip(overlap / (high - low), 0.0, 1.0)
+    return np.where(high > low, share, within.astype(np.float64))

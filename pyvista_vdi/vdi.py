@@ -1,0 +1,238 @@
+"""The Volumetric Depth Image: its arrays and their rules (DESIGN section 2)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .camera import Camera, check_window_size
+from .errors import InvalidVDIError
+
+if TYPE_CHECKING:
+    import os
+
+
+class VDI:
+    """A view-dependent, piecewise constant stand-in for a classified volume.
+
+    Pixel (x, y) of the generating view V_O, y = 0 at the bottom, owns list ``i = y * W + x``: the
+    supersegments ``offsets[i]:offsets[i + 1]``, sorted by depth and disjoint. Each is a
+    homogeneous medium between two depths. A VDI is valid or cannot be built, and its arrays are
+    read-only.
+
+    Parameters
+    ----------
+    camera : Camera
+        The generating view V_O, with the model transform in it.
+    window_size : (int, int)
+        W and H: lists along each edge of the viewport.
+    offsets : array_like of uint64, shape (W * H + 1,)
+        Where each list begins; the last entry is the number n of supersegments.
+    front, back : array_like of float32, shape (n,)
+        View depth of the two faces less ``depth_origin``, world units; ``front < back``.
+    color : array_like of float32, shape (n, 3)
+        Straight RGB, 0 to 1.
+    optical_depth : array_like of float32, shape (n,)
+        tau >= 0 from front to back along the list's centre ray.
+    bounds : array_like of float, shape (6,)
+        Axis-aligned bounds (x0, x1, y0, y1, z0, z1) of what it was made from, in the model frame;
+        medium outside contributes nothing.
+    depth_origin : float
+        World units, float64; added to every front and back.
+    metadata : mapping, optional
+        What made it; values that JSON can hold.
+
+    Raises
+    ------
+    InvalidVDIError
+        If an element breaks a rule; the message names the element and the rule.
+    """
+
+    camera: Camera
+    window_size: tuple[int, int]
+    offsets: NDArray[np.uint64]
+    front: NDArray[np.float32]
+    back: NDArray[np.float32]
+    color: NDArray[np.float32]
+    optical_depth: NDArray[np.float32]
+    bounds: tuple[float, float, float, float, float, float]
+    depth_origin: float
+    metadata: dict[str, Any]
+
+    def __init__(
+        self,
+        camera: Camera,
+        window_size: Sequence[int],
+        offsets: ArrayLike,
+        front: ArrayLike,
+        back: ArrayLike,
+        color: ArrayLike,
+        optical_depth: ArrayLike,
+        bounds: ArrayLike,
+        *,
+        depth_origin: float = 0.0,
+        metadata: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.camera = Camera.from_any(camera)
+        self.window_size = check_window_size(window_size)
+        self.depth_origin = float(depth_origin)
+        self.metadata = dict(metadata or {})
+        self.offsets = _array("offsets", offsets, np.uint64, ())
+        self.front = _array("front", front, np.float32, ())
+        self.back = _array("back", back, np.float32, ())
+        self.color = _array("color", color, np.float32, (3,))
+        self.optical_depth = _array("optical_depth", optical_depth, np.float32, ())
+        self.bounds = _checked_bounds(bounds)
+        self._check_lists()
+        self._check_media()
+
+    # -- what is in it ---------------------------------------------------------------------------
+
+    @property
+    def n_supersegments(self) -> int:
+        """Number of supersegments in all lists."""
+        return len(self.front)
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Supersegments per list, int64 (H, W), bottom row first."""
+        width, height = self.window_size
+        counts: NDArray[np.int64] = np.diff(self.offsets.astype(np.int64))
+        return counts.reshape(height, width)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays in memory."""
+        arrays = (self.offsets, self.front, self.back, self.color, self.optical_depth)
+        return sum(array.nbytes for array in arrays)
+
+    def list_at(self, x: int, y: int) -> slice:
+        """Return the supersegments of pixel (x, y), y = 0 at the bottom, as a slice."""
+        width, height = self.window_size
+        if not (0 <= x < width and 0 <= y < height):
+            raise IndexError(f"pixel ({x}, {y}) is outside the window of {width} x {height}")
+        i = y * width + x
+        return slice(int(self.offsets[i]), int(self.offsets[i + 1]))
+
+    def equals(self, other: VDI) -> bool:
+        """Whether all arrays, the view and the bounds are the same to the last bit."""
+        names = ("offsets", "front", "back", "color", "optical_depth")
+        return (
+            self.camera == other.camera
+            and self.window_size == other.window_size
+            and self.bounds == other.bounds
+            and self.depth_origin == other.depth_origin
+            and all(np.array_equal(getattr(self, n), getattr(other, n)) for n in names)
+        )
+
+    # -- files -----------------------------------------------------------------------------------
+
+    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a file that :func:`pyvista_vdi.read` opens; see :func:`pyvista_vdi.io.write`."""
+        from .io import write  # the file format's libraries are loaded only where a file is made
+
+        return write(self, path, **options)
+
+    def __repr__(self) -> str:
+        width, height = self.window_size
+        occupied = int(np.count_nonzero(np.diff(self.offsets)))
+        return (
+            f"VDI({width} x {height} lists, {occupied} not empty, "
+            f"{self.n_supersegments} supersegments, {self.nbytes / 2**20:.1f} MiB)"
+        )
+
+    # -- rules -----------------------------------------------------------------------------------
+
+    def _check_lists(self) -> None:
+        width, height = self.window_size
+        n_lists, n = width * height, len(self.front)
+        if len(self.offsets) != n_lists + 1:
+            raise InvalidVDIError(
+                f"offsets must have W * H + 1 = {n_lists + 1} entries for {width} x {height} "
+                f"lists; got {len(self.offsets)}"
+            )
+        if self.offsets[0] != 0:
+            raise InvalidVDIError(f"offsets[0] must be 0; got {self.offsets[0]}")
+        falls = self.offsets[1:] < self.offsets[:-1]
+        if falls.any():
+            i = int(np.argmax(falls))
+            raise InvalidVDIError(
+                f"offsets must not decrease; offsets[{i}] = {self.offsets[i]} is followed by "
+                f"{self.offsets[i + 1]}"
+            )
+        for name in ("front", "back", "color", "optical_depth"):
+            if len(getattr(self, name)) != n or self.offsets[-1] != n:
+                raise InvalidVDIError(
+                    f"offsets[-1] = {self.offsets[-1]} supersegments, but front has {n} and "
+                    f"{name} has {len(getattr(self, name))} entries"
+                )
+
+    def _check_media(self) -> None:
+        if not math.isfinite(self.depth_origin):
+            raise InvalidVDIError(f"depth_origin must be finite; got {self.depth_origin}")
+        # Written so that NaN fails each test
+        self._require(np.isfinite(self.front) & np.isfinite(self.back), "front and back finite")
+        self._require(self.front < self.back, "front < back")
+        color = self.color
+        inside = (color >= 0) & (color <= 1)
+        self._require(inside[:, 0] & inside[:, 1] & inside[:, 2], "0 <= color <= 1")
+        self._require(
+            (self.optical_depth >= 0) & np.isfinite(self.optical_depth),
+            "optical_depth >= 0 and finite",
+        )
+        if not self.camera.parallel_projection and len(self.front):
+            # Exact comparison: depth in front of the eye is front + depth_origin > 0
+            self._require(
+                self.front >= np.float64(-self.depth_origin), "in front of the eye (depth >= 0)"
+            )
+        if len(self.front) > 1:
+            sorted_ = np.ones(len(self.front), dtype=bool)
+            sorted_[1:] = self.back[:-1] <= self.front[1:]
+            starts = self.offsets[:-1].astype(np.int64)
+            sorted_[starts[starts < len(sorted_)]] = True  # a list's first has none before it
+            self._require(sorted_, "sorted within its list and not overlapping")
+
+    def _require(self, good: NDArray[np.bool_], rule: str) -> None:
+        if good.all():
+            return
+        k = int(np.argmin(good))
+        i = int(np.searchsorted(self.offsets, k, side="right")) - 1
+        width = self.window_size[0]
+        raise InvalidVDIError(
+            f"supersegment {k} (list {i}: pixel x={i % width}, y={i // width}) breaks the rule "
+            f"'{rule}': front {self.front[k]}, back {self.back[k]}, color {self.color[k]}, "
+            f"optical_depth {self.optical_depth[k]}, depth_origin {self.depth_origin}"
+        )
+
+
+def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> NDArray[Any]:
+    array = np.asarray(values)
+    if array.size and array.dtype.kind not in "uif":
+        raise InvalidVDIError(f"{name} must be numbers; got {array.dtype}")
+    counts = dtype is np.uint64 and array.size > 0
+    if counts and (array.dtype.kind == "f" or array.min() < 0):
+        raise InvalidVDIError(f"{name} must be whole numbers >= 0; got {array.dtype}")
+    array = np.ascontiguousarray(array, dtype=dtype)
+    if array.size == 0 and item:
+        array = array.reshape((0, *item))
+    if array.ndim != 1 + len(item) or array.shape[1:] != item:
+        wanted = f"(n, {item[0]})" if item else "(n,)"
+        raise InvalidVDIError(f"{name} must have shape {wanted}; got {array.shape}")
+    view = array.view()  # the caller's own array stays writable
+    view.setflags(write=False)
+    return view
+
+
+def _checked_bounds(bounds: ArrayLike) -> tuple[float, float, float, float, float, float]:
+    box = np.asarray(bounds, dtype=np.float64)
+    if box.shape != (6,) or not np.isfinite(box).all() or (box[::2] > box[1::2]).any():
+        raise InvalidVDIError(
+            f"bounds must be six finite numbers x0 <= x1, y0 <= y1, z0 <= z1; got {bounds!r}"
+        )
+    x0, x1, y0, y1, z0, z1 = box.tolist()
+    return x0, x1, y0, y1, z0, z1

@@ -1,0 +1,116 @@
+"""``VDIActor``: a real ``vtkVolume`` whose shader looks up the image of its VDI."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from vtkmodules.vtkRenderingCore import vtkVolume
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.vdi import VDI
+from pyvista_vdi.vtk_pipeline.frame import as_array
+from pyvista_vdi.vtk_pipeline.mapper import VDIMapperMethods
+
+#: The image is premultiplied RGBA of the whole viewport, bottom row first. The sampler is never
+#: set: VTK allows no uniform to be set in the frame that builds the shader, and its default is
+#: texture unit 0, where the mapper puts the image.
+_DECLARATION = "//VTK::Base::Dec\nuniform sampler2D vdiImage;\n"
+
+#: In place of VTK's ray caster. finalizeRayCast keeps picking and window/level.
+_LOOKUP = """
+  vec4 clip = in_projectionMatrix * in_modelViewMatrix * in_volumeMatrix[0]
+            * vec4(ip_vertexPos, 1.0);
+  g_fragColor = texture(vdiImage, clip.xy / clip.w * 0.5 + 0.5);
+  finalizeRayCast();
+"""
+
+
+class VDIActorMethods:
+    """What makes a volume show a VDI; mixed into VTK's and into PyVista's."""
+
+    def _become_vdi_actor(self: Any) -> None:
+        """Install the shader; to be called once, from ``__init__``."""
+        shader = self.GetShaderProperty()
+        shader.AddFragmentShaderReplacement("//VTK::Base::Dec", True, _DECLARATION, False)
+        shader.AddFragmentShaderReplacement("//VTK::CallWorker::Impl", True, _LOOKUP, False)
+
+    def SetMapper(self: Any, mapper: Any) -> None:
+        """Set the mapper, which must be a :class:`VDIMapper` of its own.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is another mapper, or already behind another actor.
+        """
+        if mapper is not None and not isinstance(mapper, VDIMapperMethods):
+            raise InvalidArgumentError(
+                f"a VDIActor needs a VDIMapper; got {type(mapper).__name__}: an ordinary volume "
+                "mapper goes behind a vtkVolume"
+            )
+        if mapper is not None:
+            mapper.painter.set_actor(self)
+        old = self.GetMapper()
+        if isinstance(old, VDIMapperMethods) and old is not mapper:
+            old.painter.leave_actor(self)
+        super().SetMapper(mapper)  # type: ignore[misc]
+
+    @property
+    def vdi(self: Any) -> VDI | None:
+        """The VDI that is shown; ``None`` until the first frame has made it."""
+        mapper = self.GetMapper()
+        return None if mapper is None else mapper.GetVDI()
+
+    def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
+        """Generate the VDI anew, now.
+
+        Parameters
+        ----------
+        camera : vtkCamera or pyvista.Camera or Camera, optional
+            The new generating view; by default the view of the renderer that shows the actor, or
+            the view before if none does.
+        window_size : (int, int), optional
+            Width and height of that view in pixels; by default the renderer's.
+
+        Returns
+        -------
+        VDI
+            What is shown from now on.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If there is no volume to make it from, or no view.
+        VDIError, KeyboardInterrupt
+            Whatever stops the generation; the VDI before stays.
+        """
+        mapper = self.GetMapper()
+        source = None if mapper is None else mapper.GetSource()
+        if source is None:
+            raise InvalidArgumentError(
+                "this actor shows a VDI without its volume, which cannot be generated anew: add "
+                "the volume, or set another VDI (actor.GetMapper().SetVDI(vdi))"
+            )
+        mapper.painter.retry()
+        matrix = as_array(self.GetMatrix())
+        renderer = mapper.painter.renderer()
+        if camera is not None:
+            source.SetCamera(camera, matrix)
+        elif renderer is not None:
+            source.SetCamera(renderer.GetActiveCamera(), matrix)
+        if window_size is not None:
+            source.SetWindowSize(window_size)
+        elif renderer is not None and min(renderer.GetSize()) > 0:
+            source.SetWindowSize(renderer.GetSize())
+        return source.GetVDI()  # type: ignore[no-any-return]
+
+
+class VDIActor(VDIActorMethods, vtkVolume):
+    """Shows a VDI in a VTK scene: ``renderer.AddVolume(actor)``.
+
+    Position, scale, user matrix, visibility and picking are those of a ``vtkVolume``. Its volume
+    property has no effect here: the classification is in the VDI (see
+    ``VDISource.SetVolumeProperty``).
+    """
+
+    def __init__(self) -> None:
+        self._become_vdi_actor()

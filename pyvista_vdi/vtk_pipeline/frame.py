@@ -1,0 +1,258 @@
+"""One frame of a VTK renderer: its camera, its clipping planes and its opaque depth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import VTK_FLOAT, vtkFloatArray
+from vtkmodules.vtkRenderingCore import vtkActor2D, vtkVolume
+from vtkmodules.vtkRenderingOpenGL2 import vtkPixelBufferObject, vtkTextureObject
+
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.coverage import bounds_corners
+
+Matrix = NDArray[np.float64]
+
+_GL_VIEWPORT = 0x0BA2
+_GL_DRAW_FRAMEBUFFER_BINDING = 0x8CA6
+
+#: Near and far planes further outside the bounds than this share of their depth cut nothing.
+_PLANE_SLACK = 1e-9
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What a frame being drawn asks of a VDI.
+
+    Attributes
+    ----------
+    size : (int, int)
+        Width and height of the image in pixels, from OpenGL's viewport: under SSAA it is larger
+        than the window's, in a tiled screenshot it is the tile's.
+    origin : (int, int)
+        The viewport's lower left corner in the framebuffer, pixels.
+    camera : Camera
+        The frame's view; its world is ``to_view @ world``, its model transform includes the
+        actor's matrix.
+    to_view : numpy.ndarray
+        World coordinates to that camera's world (eye at the origin, looking along -z), (4, 4).
+    projection : numpy.ndarray
+        Rows 2 and 3 of the projection matrix: view space to normalised depth and its
+        denominator, (2, 4).
+    """
+
+    size: tuple[int, int]
+    origin: tuple[int, int]
+    camera: Camera
+    to_view: Matrix
+    projection: Matrix
+
+    @classmethod
+    def current(cls, renderer: Any, model_transform: Matrix) -> Frame:
+        """Read the frame that ``renderer`` is drawing."""
+        viewport = [0, 0, 0, 0]
+        renderer.GetRenderWindow().GetState().vtkglGetIntegerv(_GL_VIEWPORT, viewport)
+        x, y, width, height = viewport
+        vtk_camera = renderer.GetActiveCamera()
+        aspect = renderer.GetTiledAspectRatio()
+        # Not GetCompositeProjectionTransformMatrix: that one turns stereo off
+        projection = as_array(vtk_camera.GetProjectionTransformMatrix(aspect, -1, 1))
+        composite = projection @ as_array(vtk_camera.GetModelViewTransformMatrix())
+        to_view, lens = view_of(
+            composite,
+            width / height,
+            eye=np.asarray(vtk_camera.GetPosition()),
+            forward=np.asarray(vtk_camera.GetDirectionOfProjection()),
+        )
+        camera = Camera(
+            (0, 0, 0), (0, 0, -1), (0, 1, 0), model_transform=to_view @ model_transform, **lens
+        )
+        return cls((width, height), (x, y), camera, to_view, projection[2:])
+
+    @property
+    def depth_range(self) -> tuple[float, float]:
+        """View depth of the near and of the far plane, world units."""
+        near, far = self.view_depth(np.array([0.0, 1.0]), background=False)
+        return float(near), float(far)
+
+    def view_depth(self, z: NDArray[Any], *, background: bool = True) -> NDArray[np.float32]:
+        """Convert window depth, 0 to 1, to view depth in world units.
+
+        Parameters
+        ----------
+        z : numpy.ndarray
+            The z-buffer: 0 at the near plane, 1 at the far plane.
+        background : bool
+            Return infinity where z is 1 (nothing was drawn there).
+
+        Notes
+        -----
+        With rows p and q of the projection matrix, normalised depth is
+        n = (p_2 Z' + p_3) / (q_2 Z' + q_3) at view coordinate Z' = -Z, in perspective as well as
+        in parallel projection; solved for Z' in float64.
+        """
+        n = 2.0 * z.astype(np.float64) - 1.0
+        (p2, p3), (q2, q3) = self.projection[:, 2:]
+        depth = -(p3 - n * q3) / (n * q2 - p2)
+        return np.where(z >= 1.0, np.inf, depth) if background else depth
+
+    def clipping_planes(self, planes: Any, bounds: tuple[float, ...]) -> Matrix | None:
+        """Return all planes that cut the VDI, (k, 6), in the camera's world; ``None`` if none do.
+
+        Parameters
+        ----------
+        planes : vtkPlaneCollection or None
+            The mapper's, world coordinates.
+        bounds : tuple of float
+            The VDI's, model frame: the near and far planes count where they cut them, because
+            VTK's own volumes end there.
+        """
+        rows = []
+        inverse_transpose = np.linalg.inv(self.to_view[:3, :3]).T
+        for i in range(planes.GetNumberOfItems() if planes is not None else 0):
+            plane = planes.GetItem(i)
+            origin = self.to_view[:3, :3] @ plane.GetOrigin() + self.to_view[:3, 3]
+            rows.append([*origin, *(inverse_transpose @ plane.GetNormal())])
+        nearest, farthest = self.depths_of(bounds)
+        near, far = self.depth_range
+        slack = _PLANE_SLACK * max(abs(nearest), abs(farthest))
+        if near > nearest + slack:
+            rows.append([0, 0, -near, 0, 0, -1])
+        if far < farthest - slack:
+            rows.append([0, 0, -far, 0, 0, 1])
+        return np.array(rows, dtype=np.float64) if rows else None
+
+    def depths_of(self, bounds: tuple[float, ...]) -> tuple[float, float]:
+        """Return the least and the largest view depth of a box in the model frame."""
+        return _depths(self.camera.model_transform, bounds)
+
+    def sees_opaque_before(self, renderer: Any, actor: Any, bounds: tuple[float, ...]) -> bool:
+        """Whether something opaque may hide a part of the VDI, so that depth must be read.
+
+        Conservative: what has no bounds counts, and so does everything a lower layer drew if
+        its depth was kept.
+        """
+        if renderer.GetPreserveDepthBuffer():
+            return True
+        farthest = self.depths_of(bounds)[1]
+        props = renderer.GetViewProps()
+        for i in range(props.GetNumberOfItems()):
+            prop = props.GetItemAsObject(i)
+            if (
+                prop is actor
+                or not prop.GetVisibility()
+                or isinstance(prop, vtkActor2D | vtkVolume)
+            ):
+                continue
+            if not prop.HasOpaqueGeometry():
+                continue
+            box = prop.GetBounds()
+            if box is None or box[0] > box[1] or _depths(self.to_view, box)[0] < farthest:
+                return True
+        return False
+
+    def opaque_depth(self, renderer: Any) -> NDArray[np.float32]:
+        """Read the depth of what has been drawn, float32 (H, W), top row first, world units."""
+        window = renderer.GetRenderWindow()
+        bound = [0]
+        window.GetState().vtkglGetIntegerv(_GL_DRAW_FRAMEBUFFER_BINDING, bound)
+        if bound[0] == window.GetRenderFramebuffer().GetFBOIndex():
+            z = self._window_depth(window)
+        else:
+            z = self._framebuffer_depth(window)
+        depth = self.view_depth(z).astype(np.float32)
+        return np.ascontiguousarray(depth.reshape(self.size[::-1])[::-1])
+
+    def _window_depth(self, window: Any) -> NDArray[Any]:
+        (x, y), (width, height) = self.origin, self.size
+        values = vtkFloatArray()
+        window.GetZbufferData(x, y, x + width - 1, y + height - 1, values)
+        return vtk_to_numpy(values)  # type: ignore[no-any-return]
+
+    def _framebuffer_depth(self, window: Any) -> NDArray[Any]:
+        """Copy the depth of a render pass's own framebuffer (SSAA, EDL, blur ...)."""
+        width, height = self.size
+        texture = vtkTextureObject()
+        texture.SetContext(window)
+        texture.AllocateDepth(width, height, vtkTextureObject.Float32)
+        samples = window.GetMultiSamples()
+        window.SetMultiSamples(0)  # or the copy resolves the window's framebuffer instead
+        try:
+            texture.CopyFromFrameBuffer(*self.origin, 0, 0, width, height)
+        finally:
+            window.SetMultiSamples(samples)
+        pixels: vtkPixelBufferObject = texture.Download()
+        z = np.empty(width * height, dtype=np.float32)
+        pixels.Download2D(VTK_FLOAT, z, [width, height], 1, [0, 0])
+        pixels.ReleaseMemory()
+        pixels.UnBind()  # it binds itself to be released, and would catch VTK's next glReadPixels
+        texture.ReleaseGraphicsResources(window)
+        return z
+
+
+def view_of(
+    composite: Matrix, aspect: float, *, eye: NDArray[Any], forward: NDArray[Any]
+) -> tuple[Matrix, dict[str, Any]]:
+    """Split a projection matrix into a rigid transform and a lens.
+
+    Whatever VTK put into the matrix (one eye of a stereo pair, a tile of a screenshot, a window
+    centre, an off-axis or explicit projection) is in what is drawn, so the frame's view is taken
+    from the matrix and not from the camera's settings.
+
+    Parameters
+    ----------
+    composite : numpy.ndarray
+        World to normalised device coordinates, (4, 4).
+    aspect : float
+        Width over height of the viewport in pixels.
+    eye, forward : numpy.ndarray
+        The camera's position and direction; used in parallel projection, where the matrix does
+        not tell where depth begins.
+
+    Returns
+    -------
+    to_view : numpy.ndarray
+        World to view coordinates (x right, y up, z backward), (4, 4): rotation and translation,
+        with whatever scale or shear is left in it.
+    lens : dict
+        ``view_angle`` and ``window_center``, or ``parallel_projection`` and ``parallel_scale``,
+        for a :class:`Camera` at the origin that looks along -z.
+    """
+    across, up, denominator = composite[0], composite[1], composite[3]
+    scale = np.linalg.norm(denominator[:3])
+    to_view = np.eye(4)
+    if scale == 0.0:
+        half = 1.0 / np.linalg.norm(up[:3] / denominator[3])
+        to_view[0] = across / denominator[3] * half * aspect
+        to_view[1] = up / denominator[3] * half
+        to_view[2] = [*-forward, forward @ eye]
+        return to_view, {"parallel_projection": True, "parallel_scale": half}
+    depth = denominator / scale  # Z = depth . (x, y, z, 1): unit normal
+    # u Z = across . p = X / t_x - c_x Z, and X has no component along the direction
+    center = [-(row[:3] / scale) @ depth[:3] for row in (across, up)]
+    x = across / scale + center[0] * depth
+    y = up / scale + center[1] * depth
+    half = 1.0 / np.linalg.norm(y[:3])
+    to_view[0] = x * half * aspect
+    to_view[1] = y * half
+    to_view[2] = -depth
+    return to_view, {
+        "view_angle": math.degrees(2 * math.atan(half)),
+        "window_center": center,
+    }
+
+
+def as_array(matrix: Any) -> Matrix:
+    """Return a ``vtkMatrix4x4`` as float64 (4, 4)."""
+    return np.array(matrix.GetData(), dtype=np.float64).reshape(4, 4)
+
+
+def _depths(to_view: Matrix, bounds: tuple[float, ...]) -> tuple[float, float]:
+    corners = bounds_corners(bounds)
+    depth = -(corners @ to_view[2, :3] + to_view[2, 3])
+    return float(depth.min()), float(depth.max())

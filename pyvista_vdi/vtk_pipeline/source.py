@@ -1,0 +1,465 @@
+"""``VDISource``: from a volume in a VTK pipeline to a VDI."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
+from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkWeakReference
+from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkRenderingCore import vtkVolumeProperty
+
+from pyvista_vdi.camera import Camera, check_window_size
+from pyvista_vdi.coverage import bounds_corners, covering_view
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidVolumeError,
+    VDIWarning,
+)
+from pyvista_vdi.generation import check_max_supersegments, generate_vdi
+from pyvista_vdi.vdi import VDI
+from pyvista_vdi.volume import Volume
+from pyvista_vdi.vtk_pipeline.convert import (
+    require_image,
+    scalars_of,
+    vdi_to_image,
+    volume_from_vtk,
+)
+from pyvista_vdi.vtk_pipeline.properties import color_function, transfer_function_from_property
+
+#: What a VDI's window covers.
+COVERAGES = ("bounds", "view")
+
+Progress = Callable[[float], object]
+
+
+class VDISource(VTKPythonAlgorithmBase):
+    """Generate a VDI from the volume at its input.
+
+    One ``vtkImageData`` in; out comes the VDI in its canonical VTK form (see
+    :func:`~pyvista_vdi.vtk_pipeline.convert.vdi_to_image`), or as an object from :meth:`GetVDI`.
+    It executes again only if the volume, the volume property or a setting has changed since.
+
+    Notes
+    -----
+    :meth:`SetCamera` keeps a copy of the view: turning the renderer's camera afterwards does not
+    regenerate. Without a camera, a :class:`VDIMapper` behind it sets the view of its first frame.
+    Settings are checked when they are set. Python's ``Update`` and :meth:`GetVDI` raise what went
+    wrong; an update that VTK asks for writes it to VTK's output window and gives an empty image.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(
+            nInputPorts=1, inputType="vtkImageData", nOutputPorts=1, outputType="vtkImageData"
+        )
+        self._camera: Camera | None = None
+        self._window_size: tuple[int, int] | None = None
+        self._coverage = "view"
+        self._scalars: str | None = None
+        self._preference = "point"
+        self._settings: dict[str, Any] = {
+            "max_supersegments": 20,
+            "sample_distance": None,
+            "tolerance": 0.0,
+            "view_cone": 60.0,
+            "device": None,
+        }
+        self._property: vtkVolumeProperty | None = None
+        self._observed: list[tuple[Any, int]] = []
+        self._progress: Progress | None = None
+        self._metadata: dict[str, Any] = {}
+        self._volume: Volume | None = None
+        self._volume_key: Any = None
+        self._vdi: VDI | None = None
+        self._vdi_key: Any = None
+        self._error: BaseException | None = None
+        self._python_waits = False
+
+    # -- settings --------------------------------------------------------------------------------
+
+    def SetInputDataObject(self, *args: Any) -> None:
+        """Set the volume: a ``vtkImageData`` (optionally after a port number, 0)."""
+        if args and args[-1] is not None:
+            require_image(args[-1])
+        super().SetInputDataObject(*args)
+
+    def SetInputData(self, image: vtkImageData) -> None:
+        """Set the volume."""
+        self.SetInputDataObject(image)
+
+    def SetScalars(self, name: str | None, preference: str = "point") -> None:
+        """Choose the array by name; ``None`` means the active scalars."""
+        if preference not in ("point", "cell"):
+            raise InvalidArgumentError(f"preference must be 'point' or 'cell'; got {preference!r}")
+        self._change("_scalars", name)
+        self._change("_preference", preference)
+
+    def GetScalars(self) -> str | None:
+        """Return the array's name, or ``None`` for the active scalars."""
+        return self._scalars
+
+    def SetCamera(self, camera: Any, model_transform: ArrayLike | None = None) -> None:
+        """Set the generating view V_O.
+
+        Parameters
+        ----------
+        camera : vtkCamera or pyvista.Camera or Camera or None
+            A copy is kept. ``None`` waits for the first frame of a mapper.
+        model_transform : array_like, shape (4, 4), optional
+            Where the volume stands in that view's world: the actor's matrix.
+
+        Raises
+        ------
+        InvalidCameraError, UnsupportedError
+            If it is no camera, or has what the optical model has no place for.
+        """
+        view = None if camera is None else Camera.from_any(camera, model_transform=model_transform)
+        self._change("_camera", view)
+
+    def GetCamera(self) -> Camera | None:
+        """Return the generating view on the screen, before coverage widens it."""
+        return self._camera
+
+    def SetWindowSize(self, *size: Any) -> None:
+        """Set the screen's width and height in pixels, as two numbers or one pair."""
+        pair = size[0] if len(size) == 1 else size
+        self._change("_window_size", None if pair is None else check_window_size(pair))
+
+    def GetWindowSize(self) -> tuple[int, int] | None:
+        """Return the screen's width and height in pixels."""
+        return self._window_size
+
+    def SetCoverage(self, coverage: str) -> None:
+        """Choose what the VDI's window covers.
+
+        Parameters
+        ----------
+        coverage : {"view", "bounds"}
+            ``"view"``: the window as it is. ``"bounds"``: the smallest rectangle of the screen's
+            pixel grid that contains the whole volume; where the eye is inside the volume's
+            bounds, or they reach behind it, a ``VDIWarning`` is given and the window is used.
+        """
+        if coverage not in COVERAGES:
+            raise InvalidArgumentError(f"coverage must be 'bounds' or 'view'; got {coverage!r}")
+        self._change("_coverage", coverage)
+
+    def GetCoverage(self) -> str:
+        """Return what the VDI's window covers."""
+        return self._coverage
+
+    def SetVolumeProperty(self, prop: vtkVolumeProperty | None) -> None:
+        """Set the volume property; later changes to it make the VDI out of date.
+
+        Raises
+        ------
+        UnsupportedError, InvalidArgumentError
+            If it cannot be honoured: see ``transfer_function_from_property``.
+        """
+        if prop is not None:
+            transfer_function_from_property(prop)
+        if prop is not self._property:
+            self._property = prop
+            self._observe_property()
+            self.Modified()
+
+    def GetVolumeProperty(self) -> vtkVolumeProperty | None:
+        """Return the volume property."""
+        return self._property
+
+    def SetMaxSupersegments(self, limit: int) -> None:
+        """Set the longest list, 1 to 4096."""
+        self._set("max_supersegments", check_max_supersegments(limit))
+
+    def GetMaxSupersegments(self) -> int:
+        """Return the longest list."""
+        return self._settings["max_supersegments"]  # type: ignore[no-any-return]
+
+    def SetSampleDistance(self, distance: float | None) -> None:
+        """Set the length of a step, model units; ``None`` is half the smallest spacing."""
+        if distance is not None and not (np.isfinite(distance) and distance > 0):
+            raise InvalidArgumentError(
+                f"sample_distance must be a positive length in model units; got {distance!r}"
+            )
+        self._set("sample_distance", distance)
+
+    def GetSampleDistance(self) -> float | None:
+        """Return the length of a step, model units."""
+        return self._settings["sample_distance"]  # type: ignore[no-any-return]
+
+    def SetTolerance(self, tolerance: float) -> None:
+        """Set the error that may be traded for shorter lists; 0 merges only what is homogeneous."""
+        if not (np.isfinite(tolerance) and tolerance >= 0):
+            raise InvalidArgumentError(f"tolerance must be 0 or above; got {tolerance!r}")
+        self._set("tolerance", tolerance)
+
+    def GetTolerance(self) -> float:
+        """Return the tolerance."""
+        return self._settings["tolerance"]  # type: ignore[no-any-return]
+
+    def SetViewCone(self, degrees: float) -> None:
+        """Set the half angle of the cone of views that must be served, 0 to 90 degrees."""
+        if not 0 <= degrees <= 90:
+            raise InvalidArgumentError(f"view_cone must be 0 to 90 degrees; got {degrees!r}")
+        self._set("view_cone", degrees)
+
+    def GetViewCone(self) -> float:
+        """Return the half angle of the cone of views, degrees."""
+        return self._settings["view_cone"]  # type: ignore[no-any-return]
+
+    def SetDevice(self, device: Any) -> None:
+        """Choose the OpenCL device; ``None`` is the default one."""
+        self._set("device", device)
+
+    def GetDevice(self) -> Any:
+        """Return the device as it was set."""
+        return self._settings["device"]
+
+    def SetProgressCallback(self, progress: Progress | None) -> None:
+        """Set a callable that gets the fraction done; if it returns ``False`` the work stops.
+
+        ``ProgressEvent`` is invoked as well, and ``SetAbortExecute(1)`` in it stops the work.
+        """
+        self._progress = progress
+
+    def SetMetadata(self, metadata: dict[str, Any]) -> None:
+        """Set entries to add to the VDI's metadata."""
+        self._metadata = dict(metadata)
+
+    # -- results ---------------------------------------------------------------------------------
+
+    def Update(self, *args: Any) -> Any:
+        """Bring the output up to date, and raise what went wrong."""
+        self._python_waits = True
+        try:
+            result = super().Update(*args)
+        finally:
+            self._python_waits = False
+        error, self._error = self._error, None
+        if error is not None:
+            self.Modified()  # so that the next update tries again
+            raise error
+        return result
+
+    def GetVDI(self) -> VDI:
+        """Return the VDI, brought up to date.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If camera, window size or volume property are missing.
+        VDIError
+            What generating raises.
+        """
+        self.Update()
+        if self._vdi is None:
+            raise InvalidArgumentError("VDISource has no input: call SetInputDataObject(volume)")
+        return self._vdi
+
+    def GetCurrentVDI(self) -> VDI | None:
+        """Return the VDI made last, whether up to date or not."""
+        return self._vdi
+
+    def GetVolume(self) -> Volume:
+        """Return the volume at the input, read again only if it has changed.
+
+        Raises
+        ------
+        InvalidVolumeError, UnsupportedError
+            If there is none that a VDI can be made from.
+        """
+        if self.GetNumberOfInputConnections(0) == 0:
+            raise InvalidVolumeError("VDISource has no input: call SetInputDataObject(volume)")
+        self.GetInputAlgorithm(0, 0).Update()
+        return self._read(self.GetInputDataObject(0, 0))
+
+    def GetInputBounds(self) -> tuple[float, ...] | None:
+        """Return the volume's bounds, model frame, without making a VDI; ``None`` without input."""
+        image = self._input_grid()
+        return None if image is None else tuple(image.GetBounds())
+
+    # -- the pipeline's requests -----------------------------------------------------------------
+
+    def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Announce the output's extent: one point per list."""
+        width, height = 1, 1
+        grid = self._input_grid()
+        if grid is not None and self._camera is not None and self._window_size is not None:
+            _, (width, height) = self._view(grid, warn=False)
+        information = outputs.GetInformationObject(0)
+        executive = vtkStreamingDemandDrivenPipeline
+        information.Set(executive.WHOLE_EXTENT(), (0, width - 1, 0, height - 1, 0, 0), 6)
+        information.Set(vtkImageData.SPACING(), (1.0, 1.0, 1.0), 3)
+        information.Set(vtkImageData.ORIGIN(), (0.0, 0.0, 0.0), 3)
+        return 1
+
+    def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Ask for the whole volume, whatever part of the VDI is wanted."""
+        information = inputs[0].GetInformationObject(0)
+        executive = vtkStreamingDemandDrivenPipeline
+        if information is not None and information.Has(executive.WHOLE_EXTENT()):
+            whole = information.Get(executive.WHOLE_EXTENT())
+            information.Set(executive.UPDATE_EXTENT(), whole, 6)
+        return 1
+
+    def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Generate, unless nothing that matters has changed."""
+        output = vtkImageData.GetData(outputs, 0)
+        self._error = None
+        self.SetAbortExecute(0)  # an abort is of one execution
+        try:
+            vdi = self._generated(vtkImageData.GetData(inputs[0], 0))
+        except BaseException as error:  # VTK would print it and go on (or exit, on Ctrl-C)
+            self._report(error)
+            output.Initialize()
+            return 1
+        output.ShallowCopy(vdi_to_image(vdi))
+        return 1
+
+    # -- how -------------------------------------------------------------------------------------
+
+    def _generated(self, image: vtkImageData) -> VDI:
+        missing = [
+            f"{what} ({setter})"
+            for what, setter, value in (
+                ("camera", "SetCamera", self._camera),
+                ("window size", "SetWindowSize", self._window_size),
+                ("volume property", "SetVolumeProperty", self._property),
+            )
+            if value is None
+        ]
+        if missing:
+            raise InvalidArgumentError(f"VDISource has no {', no '.join(missing)}")
+        volume = self._read(image)
+        table = transfer_function_from_property(self._property)
+        camera, size = self._view(image, warn=True)
+        key = (self._volume_key, table, camera, size, tuple(self._settings.items()))
+        if self._vdi is None or key != self._vdi_key:
+            self._vdi = generate_vdi(
+                volume,
+                camera,
+                size,
+                table,
+                progress=self._advance,
+                metadata={"scalars": volume.name, **self._metadata},
+                **self._settings,
+            )
+            self._vdi_key = key
+        return self._vdi
+
+    def _read(self, image: vtkImageData) -> Volume:
+        """Return the volume; the same object as long as it is the same (it is on the device)."""
+        array = scalars_of(image, self._scalars, self._preference)
+        direction = image.GetDirectionMatrix()
+        key = (
+            array.GetAddressAsString(""),
+            array.GetMTime(),
+            image.GetExtent(),
+            image.GetSpacing(),
+            image.GetOrigin(),
+            tuple(direction.GetElement(i, j) for i in range(3) for j in range(3)),
+        )
+        if self._volume is None or key != self._volume_key:
+            self._volume = volume_from_vtk(image, self._scalars, self._preference)
+            self._volume_key = key
+        return self._volume
+
+    def _view(self, grid: vtkImageData, *, warn: bool) -> tuple[Camera, tuple[int, int]]:
+        """Return the generating view and its window, after coverage."""
+        assert self._camera is not None
+        assert self._window_size is not None
+        if self._coverage == "bounds":
+            wide = covering_view(self._camera, self._window_size, _corners(grid))
+            if wide is not None:
+                return wide
+            if warn:
+                warnings.warn(
+                    "coverage='bounds' needs the eye outside the volume, with all of it in "
+                    "front: the VDI covers the current view only (coverage='view'); move the "
+                    "camera back and regenerate for the whole volume",
+                    VDIWarning,
+                    stacklevel=2,
+                )
+        return self._camera, self._window_size
+
+    def _input_grid(self) -> vtkImageData | None:
+        """Return the input's geometry, without reading its data."""
+        if self.GetNumberOfInputConnections(0) == 0:
+            return None
+        producer = self.GetInputAlgorithm(0, 0)
+        producer.UpdateInformation()
+        information = self.GetInputInformation(0, 0)
+        executive = vtkStreamingDemandDrivenPipeline
+        grid = vtkImageData()
+        data = self.GetInputDataObject(0, 0)
+        if isinstance(data, vtkImageData) and data.GetNumberOfPoints() > 0:
+            grid.CopyStructure(data)
+            return grid
+        if information is None or not information.Has(executive.WHOLE_EXTENT()):
+            return None
+        grid.SetExtent(information.Get(executive.WHOLE_EXTENT()))
+        for key, put in (
+            (vtkImageData.SPACING(), grid.SetSpacing),
+            (vtkImageData.ORIGIN(), grid.SetOrigin),
+            (vtkImageData.DIRECTION(), grid.SetDirectionMatrix),
+        ):
+            if information.Has(key):
+                put(information.Get(key))
+        return grid
+
+    def _advance(self, fraction: float) -> bool:
+        self.UpdateProgress(fraction)
+        going_on = self._progress is None or self._progress(fraction) is not False
+        return going_on and not self.GetAbortExecute()
+
+    def _report(self, error: BaseException) -> None:
+        self._error = error
+        if not self._python_waits:
+            vtkOutputWindow.GetInstance().DisplayErrorText(f"VDISource: {error}\n")
+
+    def _set(self, name: str, value: Any) -> None:
+        if self._settings[name] != value:
+            self._settings[name] = value
+            self.Modified()
+
+    def _change(self, attribute: str, value: Any) -> None:
+        if getattr(self, attribute) != value:
+            setattr(self, attribute, value)
+            self.Modified()
+
+    def _observe_property(self) -> None:
+        """Let changes to the property or its functions reach this algorithm's time stamp."""
+        for watched, tag in self._observed:
+            watched.RemoveObserver(tag)
+        self._observed = []
+        prop = self._property
+        if prop is None:
+            return
+        weak = vtkWeakReference()  # the property must not keep this algorithm alive
+        weak.Set(self)
+
+        def changed(caller: Any, event: str) -> None:
+            source = weak.Get()
+            if source is None:
+                return
+            if caller is source._property:
+                source._observe_property()  # its functions may be others now
+            source.Modified()
+
+        functions = (color_function(prop), prop.GetScalarOpacity())
+        for watched in (prop, *functions):
+            self._observed.append((watched, watched.AddObserver("ModifiedEvent", changed)))
+
+
+def _corners(grid: vtkImageData) -> NDArray[np.float64]:
+    """Return the corners of the box of points, model frame: tighter than bounds if rotated."""
+    out: list[list[float]] = []
+    for i, j, k in bounds_corners(grid.GetExtent()).astype(int):
+        point = [0.0, 0.0, 0.0]
+        grid.TransformIndexToPhysicalPoint(int(i), int(j), int(k), point)
+        out.append(point)
+    return np.array(out)

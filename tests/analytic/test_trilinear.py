@@ -1,0 +1,185 @@
+"""x y z is reproduced exactly by trilinear interpolation: samples and integrals in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import strategies
+
+from pyvista_vdi import reference
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.compositing import composite
+from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.reference.generate import classify, medium_at
+from pyvista_vdi.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
+from pyvista_vdi.volume import Volume
+
+SHAPE = (5, 6, 7)  # z, y, x
+TOP = np.prod(np.array(SHAPE) - 1.0)
+
+
+def product_volume(dtype="float64", **options):
+    z, y, x = np.meshgrid(*(np.arange(n) for n in SHAPE), indexing="ij")
+    return Volume((x * y * z).astype(dtype), **options)
+
+
+def ramp(max_opacity=0.8, unit_distance=2.0):
+    """Opacity and colour linear in the scalar: two nodes."""
+    return TransferFunction(
+        [[0, 0, 1], [1, 0.5, 0]],
+        [0, max_opacity],
+        (0, TOP),
+        unit_distance=unit_distance,
+        interpolation="linear",
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_samples_of_x_y_z_are_exact(seed):
+    rng = np.random.default_rng(seed)
+    position = rng.uniform(0, np.array(SHAPE[::-1]) - 1, size=(200, 3))
+    length = rng.uniform(0.1, 2, size=200)
+    color, tau = medium_at(product_volume(), ramp(), position, length)
+    share = position.prod(axis=1) / TOP
+    # float32(0.8) is what the table holds
+    opacity = share * float(np.float32(0.8))
+    np.testing.assert_allclose(tau, -np.log(1 - opacity) * length / 2, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(color, np.stack([share, share / 2, 1 - share], axis=1), atol=1e-14)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_reference_image_is_the_formula_s(seed):
+    """With spacing, origin, direction and model transform in between."""
+    rng = np.random.default_rng(seed)
+    volume = product_volume(
+        spacing=rng.uniform(0.3, 1.5, 3),
+        origin=rng.normal(size=3),
+        direction=strategies.random_rotation(rng),
+    )
+    camera = strategies.random_camera(rng, volume.bounds)
+    image = reference.volume_image(volume, camera, (6, 5), ramp(), 0.4)
+    for ray in reference.samples(volume, camera, (6, 5), ramp(), 0.4):
+        x, y = ray.pixel
+        share = ray.position.prod(axis=1) / TOP
+        tau = -np.log(1 - share * float(np.float32(0.8))) * ray.length / 2
+        color = np.stack([share, share / 2, 1 - share], axis=1)
+        np.testing.assert_allclose(image[4 - y, x], composite(color, tau), atol=1e-12)
+        # Steps of the length asked for, the last one shorter, without gaps
+        if len(ray.length):
+            np.testing.assert_allclose(ray.length[:-1], 0.4, rtol=1e-9)
+            assert 0 < ray.length[-1] <= 0.4 * (1 + 1e-9)
+            np.testing.assert_array_equal(ray.end[:-1], ray.begin[1:])
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "int16", "uint16", "int32", "float32", "float64"])
+def test_the_device_samples_x_y_z(runtime, dtype):
+    rng = np.random.default_rng(4)
+    volume = product_volume(dtype, spacing=(0.7, 0.5, 1.1))
+    camera = strategies.camera_around(rng, volume.bounds, np.eye(4))
+    expected = reference.volume_image(volume, camera, (12, 9), ramp())
+    drawn = raycast_volume(volume, camera, (12, 9), ramp(), device=runtime)
+    # Scalars up to 120 with 9 roundings, opacity slopes of 0.8 / 120, about 40 samples in all
+    np.testing.assert_allclose(drawn, expected, rtol=0, atol=5e-6)
+    assert expected.max() > 0.2
+
+
+def test_the_midpoint_rule_converges_with_the_square_of_the_step():
+    """Along the diagonal of x y z the optical depth is an integral that is known.
+
+    With opacity a = (s / S)^3 a_max on the diagonal and sigma = -log1p(-a) / U, the error of
+    the midpoint rule falls by four when the step is halved.
+    """
+    volume = Volume(np.arange(5.0)[:, None, None] * np.arange(5.0)[:, None] * np.arange(5.0))
+    transfer_function = TransferFunction(
+        [[1, 1, 1]] * 2, [0, 0.5], (0, 64), unit_distance=1, interpolation="linear"
+    )
+    camera = Camera(
+        (10, 10, 10), (0, 0, 0), (0, 0, 1), parallel_projection=True, parallel_scale=1e-3
+    )
+    s = (np.arange(20_000) + 0.5) / 20_000
+    whole = np.sqrt(48) * np.mean(-np.log1p(-0.5 * s**3))
+    errors = []
+    for steps in (8, 16, 32):
+        (ray,) = reference.samples(volume, camera, (1, 1), transfer_function, np.sqrt(48) / steps)
+        assert len(ray.length) == steps
+        errors.append(abs(ray.optical_depth.sum() - whole))
+    ratios = np.divide(errors[:-1], errors[1:])
+    assert (ratios > 3.8).all(), errors
+    assert (ratios < 4.2).all(), errors
+
+
+# -- classification --------------------------------------------------------------------------------
+
+
+def test_classification_is_linear_between_nodes_and_constant_beyond():
+    table = TransferFunction([[0, 0, 0], [1, 0, 0.5], [0, 1, 0.5]], [0, 0.5, 0.25], (10, 20))
+    color, opacity = classify(table, np.array([-5.0, 10, 12.5, 15, 17.5, 20, 99, np.nan]))
+    np.testing.assert_array_equal(opacity, [0, 0, 0.25, 0.5, 0.375, 0.25, 0.25, 0])
+    np.testing.assert_array_equal(color[:, 0], [0, 0, 0.5, 1, 0.5, 0, 0, 0])
+
+
+def test_a_range_of_one_scalar_steps_above_it():
+    table = TransferFunction([[0, 0, 0], [1, 1, 1]], [0.25, 0.75], (5, 5))
+    np.testing.assert_array_equal(classify(table, np.array([4.0, 5, 5.1]))[1], [0.25, 0.25, 0.75])
+
+
+def test_one_entry_serves_every_scalar():
+    table = TransferFunction([[0.5, 0, 0]], [0.5], (0, 1))
+    np.testing.assert_array_equal(classify(table, np.array([-1.0, 0, 7]))[1], [0.5] * 3)
+
+
+def test_nearest_takes_the_point_whose_voxel_holds_the_position():
+    volume = Volume(np.arange(8.0).reshape(2, 2, 2))
+    table = TransferFunction([[0, 0, 0], [1, 1, 1]], [0, 0.7], (0, 7), unit_distance=1)
+    position = np.array([[0.49, 0, 0], [0.5, 0, 0], [0, 0.5, 0.5], [1, 1, 1], [1.1, 0, 0]])
+    _, tau = medium_at(volume, table, position, np.ones(5))
+    expected = -np.log1p(-np.array([0, 1, 6, 7]) / 7 * float(np.float32(0.7)))
+    np.testing.assert_allclose(tau, [*expected, 0], atol=1e-15)
+
+
+def test_nan_is_transparent_and_opaque_is_opaque():
+    volume = Volume(np.array([[[np.nan, 1.0]] * 2] * 2))
+    table = TransferFunction([[1, 1, 1]] * 2, [1, 1], (0, 1), unit_distance=1e6)
+    position = np.array([[0.0, 0, 0], [1, 0, 0]])
+    _, tau = medium_at(volume, table, position, np.ones(2))
+    np.testing.assert_array_equal(tau, [0, OPAQUE_OPTICAL_DEPTH])
+    linear = table.replace(interpolation="linear")
+    _, tau = medium_at(volume, linear, np.array([[0.999, 0, 0]]), np.ones(1))
+    np.testing.assert_array_equal(tau, [0])  # one corner of the cell is NaN
+
+
+# -- building --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("weighting", ["transmittance", "optical_depth"])
+@pytest.mark.parametrize("budget", [1, 3, 20])
+def test_a_plain_vdi_keeps_its_budget_and_all_optical_depth(budget, weighting):
+    rng = np.random.default_rng(budget)
+    volume = strategies.random_volume(rng, "float32")
+    transfer_function = strategies.random_transfer_function(rng, volume)
+    camera = strategies.random_camera(rng, volume.bounds)
+    vdi = reference.build_vdi(
+        volume, camera, (8, 6), transfer_function, max_supersegments=budget, weighting=weighting
+    )
+    assert 0 < vdi.counts.max() <= budget
+    for ray in reference.samples(volume, camera, (8, 6), transfer_function):
+        part = vdi.list_at(*ray.pixel)
+        np.testing.assert_allclose(
+            vdi.optical_depth[part].sum(dtype=float), ray.optical_depth.sum(), rtol=1e-6
+        )
+    if weighting == "transmittance":
+        exact = reference.volume_image(volume, camera, (8, 6), transfer_function)
+        # Colours and optical depths are stored in float32; the near limit takes 1e-6 of a diagonal
+        np.testing.assert_allclose(reference.render(vdi, camera), exact, atol=3e-5)
+
+
+def test_merging_sees_opacity_of_black_material():
+    """Three black layers of different density in two supersegments: the denser stays alone."""
+    values = np.array([1, 1, 2, 2, 9, 9], dtype=np.uint8)[::-1, None, None]
+    volume = Volume(np.broadcast_to(values, (6, 2, 2)).copy())
+    table = TransferFunction([[0, 0, 0]] * 2, [0, 0.9], (0, 9), unit_distance=1)
+    camera = Camera(
+        (0.5, 0.5, -5), (0.5, 0.5, 0), (0, 1, 0), parallel_projection=True, parallel_scale=0.1
+    )
+    vdi = reference.build_vdi(volume, camera, (1, 1), table, max_supersegments=2)
+    np.testing.assert_allclose(vdi.back[0], 1.5, atol=1e-6)

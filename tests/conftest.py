@@ -1,0 +1,90 @@
+"""Fixtures of the whole suite: a runtime on every usable OpenCL device, and hypothesis profiles.
+
+Environment
+-----------
+PYVISTA_VDI_TEST_DEVICES
+    Comma separated parts of "platform / device": tests run on the devices that contain one.
+PYVISTA_VDI_REQUIRE_DEVICE
+    "1": having no usable device is a failure, as in CI; otherwise such tests are skipped.
+HYPOTHESIS_PROFILE
+    "default" or "ci"; "ci" where the variable CI is set.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+
+import pytest
+from hypothesis import settings
+
+from pyvista_vdi.errors import MissingDependencyError, NoDeviceError
+from pyvista_vdi.opencl_runtime import DeviceInfo, Runtime, get_runtime, list_devices
+
+# Compiling a kernel inside the first example takes seconds, so no example has a deadline.
+settings.register_profile("default", deadline=None, print_blob=True)
+settings.register_profile("ci", deadline=None, print_blob=True, derandomize=True)
+settings.load_profile(
+    os.environ.get("HYPOTHESIS_PROFILE") or ("ci" if os.environ.get("CI") else "default")
+)
+
+
+def usable_test_devices() -> tuple[list[DeviceInfo], str]:
+    """The devices to test on, and why there are none."""
+    try:
+        infos = list_devices()
+    except MissingDependencyError as exc:
+        return [], str(exc)
+    usable = [info for info in infos if info.usable]
+    wanted = os.environ.get("PYVISTA_VDI_TEST_DEVICES", "")
+    parts = [part.strip().lower() for part in wanted.split(",") if part.strip()]
+    chosen = [i for i in usable if not parts or any(p in i.full_name.lower() for p in parts)]
+    reasons = "; ".join(
+        f"{info.full_name}: {info.reason or 'left out by PYVISTA_VDI_TEST_DEVICES'}"
+        for info in infos
+    )
+    return chosen, f"no usable OpenCL device to test on ({reasons or 'no driver lists one'})"
+
+
+def device_id(info: DeviceInfo) -> str:
+    """Short name of a device's platform, for test ids."""
+    known = {"portable computing language": "pocl", "intel(r) opencl": "intel"}
+    platform = info.platform.lower()
+    short = known.get(platform) or re.sub(r"\W+", "-", platform).strip("-")
+    return short if info.device_index == 0 else f"{short}-{info.device_index}"
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run tests that take ``runtime`` once per usable device."""
+    if "runtime" not in metafunc.fixturenames:
+        return
+    infos, _ = usable_test_devices()
+    ids = [device_id(info) for info in infos]
+    metafunc.parametrize(
+        "runtime", infos or [None], ids=ids or ["no-device"], indirect=True, scope="session"
+    )
+
+
+def no_device(reason: str) -> None:
+    """Fail where a device is required, as in CI; skip elsewhere."""
+    if os.environ.get("PYVISTA_VDI_REQUIRE_DEVICE") == "1":
+        pytest.fail(f"PYVISTA_VDI_REQUIRE_DEVICE=1: {reason}", pytrace=False)
+    pytest.skip(reason)
+
+
+@pytest.fixture(scope="session")
+def runtime(request: pytest.FixtureRequest) -> Runtime:
+    """A runtime on one of the usable devices; tests that take it run on each."""
+    if request.param is None:
+        no_device(usable_test_devices()[1])
+    return get_runtime(request.param)
+
+
+@pytest.fixture(scope="session")
+def default_runtime() -> Runtime:
+    """The runtime that a user gets without naming a device."""
+    try:
+        return get_runtime()
+    except (NoDeviceError, MissingDependencyError) as exc:
+        no_device(str(exc))
+        raise  # not reached: no_device ends the test

@@ -1,0 +1,186 @@
+"""What the wheel, the sdist and an editable install hold, against the repository's own files.
+
+Needs a checkout: the folder that ``PYVISTA_VDI_CHECKOUT`` names, or the one these tests lie in.
+The builds run on a copy of the checkout's files, so that nothing is written into it.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path, PurePosixPath
+
+import pytest
+
+#: Files of the repository that a source distribution has no use for.
+NOT_IN_SDIST = {".gitattributes"}
+
+
+def _find_checkout():
+    named = os.environ.get("PYVISTA_VDI_CHECKOUT")
+    folder = Path(named) if named else Path(__file__).resolve().parents[2]
+    is_checkout = (folder / ".git").exists() and (folder / "pyvista_vdi").is_dir()
+    if named and not is_checkout:
+        pytest.fail(f"PYVISTA_VDI_CHECKOUT names {folder}, which is not a checkout of pyvista-vdi")
+    return folder if is_checkout else None
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    """Return (copy of the checkout's files, their names): what git tracks or would track."""
+    checkout = _find_checkout()
+    if checkout is None:
+        pytest.skip("no checkout at hand: set PYVISTA_VDI_CHECKOUT to one")
+    listing = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"],
+        cwd=checkout,
+        capture_output=True,
+        check=True,
+    )
+    names = {name for name in os.fsdecode(listing.stdout).split("\0") if name}
+    names = {name for name in names if (checkout / name).is_file()}
+    copy = tmp_path_factory.mktemp("source")
+    for name in names:
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(checkout / name, copy / name)
+    return copy, names
+
+
+def _build(source, kind, target):
+    """Build one distribution with the installed setuptools; return its path."""
+    result = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            f"from setuptools import build_meta; print(build_meta.build_{kind}({str(target)!r}))",
+        ],
+        cwd=source,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    return target / result.stdout.split()[-1]
+
+
+@pytest.fixture(scope="module")
+def wheel(source, tmp_path_factory):
+    return _build(source[0], "wheel", tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.fixture(scope="module")
+def wheel_names(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        return set(archive.namelist())
+
+
+def _installed_name(name):
+    """Return where a repository file goes in an installation, or None if it stays behind."""
+    path = PurePosixPath(name)
+    if path.parts[0] == "pyvista_vdi":
+        return name
+    if path.parts[0] == "opencl":
+        return str(PurePosixPath("pyvista_vdi", *path.parts))
+    return None
+
+
+def test_wheel_holds_the_package_and_nothing_else(source, wheel_names):
+    expected = {_installed_name(name) for name in source[1]} - {None}
+    found = {name for name in wheel_names if ".dist-info/" not in name}
+    assert found == expected, (
+        f"missing: {sorted(expected - found)}, superfluous: {sorted(found - expected)}"
+    )
+
+
+def test_wheel_holds_kernels_types_volumes_and_licences(wheel_names):
+    kernels = [name for name in wheel_names if name.endswith(".cl")]
+    for folder in ("common", "vdi"):
+        assert any(name.startswith(f"pyvista_vdi/opencl/{folder}/") for name in kernels), folder
+    assert "pyvista_vdi/py.typed" in wheel_names
+    assert "pyvista_vdi/data/brain_colin27_181x217x181_u8.nrrd" in wheel_names
+    assert "pyvista_vdi/data/rayleigh_taylor_dns_192x192x192_u8.nrrd" in wheel_names
+    assert "pyvista_vdi/data/LICENSE-brain.txt" in wheel_names
+    assert "pyvista_vdi/data/README.md" in wheel_names
+    licences = {name.partition(".dist-info/licenses/")[2] for name in wheel_names} - {""}
+    assert licences == {"LICENSE", "pyvista_vdi/data/LICENSE-brain.txt"}
+
+
+def test_wheel_metadata_and_entry_points(wheel, wheel_names):
+    (info,) = {name.partition("/")[0] for name in wheel_names if ".dist-info/" in name}
+    with zipfile.ZipFile(wheel) as archive:
+        metadata = archive.read(f"{info}/METADATA").decode()
+        entry_points = archive.read(f"{info}/entry_points.txt").decode()
+    from pyvista_vdi._version import __version__
+
+    assert f"\nVersion: {__version__}\n" in metadata
+    assert "\nRequires-Python: >=3.10\n" in metadata
+    for extra in ("cpu", "plot", "test", "docs", "dev"):
+        assert f"\nProvides-Extra: {extra}\n" in metadata
+    required = {
+        re.match(r"[\w.-]+", line.partition(": ")[2])[0].lower()
+        for line in metadata.splitlines()
+        if line.startswith("Requires-Dist: ") and "extra ==" not in line
+    }
+    assert {"numpy", "pyopencl", "scikit-image"} <= required
+    # the engine runs on machines without these
+    assert required.isdisjoint({"vtk", "pyvista", "matplotlib", "intel-opencl-rt"})
+    assert "pyvista-vdi = pyvista_vdi.cli:main" in entry_points
+    assert "[pyvista.plotter_components]\nadd_vdi = pyvista_vdi.plotting.component" in entry_points
+    assert "[pyvista.accessors]\nvdi = pyvista_vdi.plotting.accessor" in entry_points
+    assert "[pyvista.readers]\n.vdi = pyvista_vdi.plotting.reader:read_vdi" in entry_points
+
+
+def test_sdist_holds_the_repository(source, tmp_path):
+    archive = _build(source[0], "sdist", tmp_path)
+    with tarfile.open(archive) as tar:
+        found = {name.partition("/")[2] for name in tar.getnames() if tar.getmember(name).isfile()}
+    generated = {"PKG-INFO", "setup.cfg"}
+    found = {name for name in found if ".egg-info/" not in name} - generated
+    expected = source[1] - NOT_IN_SDIST
+    assert found == expected, (
+        f"missing: {sorted(expected - found)}, superfluous: {sorted(found - expected)}"
+    )
+
+
+def test_editable_install_finds_the_kernels(source, tmp_path):
+    """The package resources of `opencl/`, which stands outside the package, resolve as well."""
+    copy, names = source
+    wheel = _build(copy, "editable", tmp_path)
+    site = tmp_path / "site"
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(site)
+    kernels = sorted(name for name in names if name.endswith(".cl"))
+    assert kernels
+    # The editable finder goes first, so that it is asked although an installed copy may exist.
+    code = f"""
+import importlib.resources, site, sys
+site.addsitedir({str(site)!r})
+sys.meta_path.sort(key=lambda finder: "Editable" not in getattr(finder, "__name__", ""))
+import pyvista_vdi
+folder = importlib.resources.files("pyvista_vdi.opencl")
+for name in {kernels!r}:
+    kernel = folder.joinpath(*name.split("/")[1:])
+    assert kernel.is_file(), kernel
+    assert str(kernel).startswith({str(copy)!r}), kernel
+assert pyvista_vdi.__file__.startswith({str(copy)!r}), pyvista_vdi.__file__
+"""
+    result = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stderr
+
+
+def test_installed_kernels_are_resources():
+    from importlib.resources import files
+
+    kernels = [
+        kernel.name
+        for folder in ("common", "vdi")
+        for kernel in files("pyvista_vdi.opencl").joinpath(folder).iterdir()
+    ]
+    assert any(name.endswith(".cl") for name in kernels), kernels

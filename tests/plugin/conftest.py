@@ -1,0 +1,47 @@
+"""Off-screen OpenGL for the plugin's tests, warnings of VTK as failures, and a look for leaks."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+
+import pytest
+
+if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+    # Read when the first window is made; without it VTK warns about the missing X server
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+import pyvista as pv
+from vtkmodules.vtkCommonCore import vtkObjectBase, vtkStringOutputWindow
+
+
+@pytest.fixture(autouse=True)
+def off_screen(default_runtime, monkeypatch):
+    """Every window off-screen, with PyVista's default theme."""
+    monkeypatch.setattr(pv, "OFF_SCREEN", True)
+
+
+@pytest.fixture(autouse=True)
+def vtk_messages(off_screen):
+    """Fail on anything that VTK writes to its output window."""
+    from vtkmodules.vtkCommonCore import vtkOutputWindow
+
+    window = vtkStringOutputWindow()
+    before = vtkOutputWindow.GetInstance()
+    vtkOutputWindow.SetInstance(window)
+    yield window
+    vtkOutputWindow.SetInstance(before)
+    assert window.GetOutput() == ""
+
+
+@pytest.fixture
+def no_leaks():
+    """Fail if VTK objects that were made in the test outlive it."""
+    gc.collect()
+    before = {id(o) for o in gc.get_objects() if isinstance(o, vtkObjectBase)}
+    yield
+    pv.close_all()
+    gc.collect()
+    after = [o for o in gc.get_objects() if isinstance(o, vtkObjectBase) and id(o) not in before]
+    assert not after, f"{len(after)} VTK objects left: {sorted({type(o).__name__ for o in after})}"

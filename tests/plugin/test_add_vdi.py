@@ -1,0 +1,438 @@
+"""``add_vdi`` in a real plotter: arguments, updates, files, bars, removal and leaks."""
+
+from __future__ import annotations
+
+import gc
+import signal
+import sys
+
+import numpy as np
+import pytest
+import pyvista as pv
+from plugin_scenes import LOOKS, WINDOW, soft_ball
+from vtkmodules.vtkCommonCore import vtkWeakReference
+from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import VDIWarning
+from pyvista_vdi.vtk_pipeline import painter as painter_module
+from pyvista_vdi.vtk_pipeline import source as source_module
+from pyvista_vdi.vtk_pipeline.convert import vdi_to_image
+
+pytestmark = pytest.mark.gl
+
+
+@pytest.fixture
+def plotter():
+    plotter = pv.Plotter(window_size=WINDOW)
+    yield plotter
+    plotter.close()
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Count generations and raycasts."""
+    counted = {"generate": 0, "render": 0}
+
+    def counting(name, function):
+        def call(*arguments, **keywords):
+            counted[name] += 1
+            return function(*arguments, **keywords)
+
+        return call
+
+    monkeypatch.setattr(
+        source_module, "generate_vdi", counting("generate", source_module.generate_vdi)
+    )
+    monkeypatch.setattr(painter_module, "render_vdi", counting("render", painter_module.render_vdi))
+    return counted
+
+
+def shown(plotter):
+    """What the plotter shows now: a screenshot alone draws the first frame only."""
+    if plotter.render_window.GetNeverRendered():
+        plotter.show(auto_close=False)
+    plotter.render()
+    return np.asarray(plotter.screenshot(return_img=True)).astype(int)
+
+
+def small_vdi(volume=None, size=(60, 50), **looks):
+    volume = soft_ball(12) if volume is None else volume
+    camera = pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1))
+    keep = {k: v for k, v in LOOKS.items() if k != "show_scalar_bar"}
+    return pvdi.generate(volume, camera, size, **{**keep, **looks})
+
+
+# -- same arguments, same table --------------------------------------------------------------------
+
+ARGUMENTS = {
+    "defaults": {},
+    "names": {"cmap": "inferno", "opacity": "sigmoid_5", "clim": (20, 200)},
+    "one number": {"clim": 100, "opacity": 0.3, "n_colors": 7},
+    "array of n_colors": {"opacity": np.arange(16) * 9, "n_colors": 16},
+    "short array": {"opacity": [0, 0, 0.02, 0.9, 1.0]},
+    "list of colours": {"cmap": ["red", "lime", "blue"], "flip_scalars": True},
+    "logarithm": {"log_scale": True, "cmap": "bone"},
+    "categories": {"categories": 5},
+    "aliases": {"rng": (10, 90), "colormap": "plasma", "backface_culling": True},
+    "unit distance": {"opacity_unit_distance": 0.77, "opacity": "linear_r"},
+    "values per point": {"scalars": np.linspace(-3, 3, 12**3)},
+    "name": {"scalars": "w"},
+    "cell data": {"scalars": "c"},
+    "lookup table": {"cmap": pv.LookupTable(cmap="cividis", scalar_range=(1, 222))},
+}
+
+
+@pytest.mark.parametrize("arguments", ARGUMENTS.values(), ids=ARGUMENTS.keys())
+def test_arguments_mean_what_they_mean_in_add_volume(plotter, arguments):
+    volume = soft_ball(12)
+    volume["w"] = np.cos(volume["v"])
+    volume.cell_data["c"] = np.arange(volume.n_cells, dtype=float)
+    volume.set_active_scalars("v")
+    theirs = plotter.add_volume(volume, mapper="gpu", **arguments)
+    ours = plotter.add_vdi(volume, **arguments)
+    table = pvdi.vtk_pipeline.transfer_function_from_property(theirs.prop)
+    assert pvdi.vtk_pipeline.transfer_function_from_property(ours.prop) == table
+    source = ours.mapper.GetSource()
+    np.testing.assert_allclose(
+        source.GetVolume().array.ravel(), theirs.mapper.dataset.active_scalars, rtol=1e-6
+    )
+    assert ours.bounds == pytest.approx(theirs.bounds)
+    assert ours.mapper.scalar_range == pytest.approx(theirs.mapper.scalar_range)
+    assert len(plotter.scalar_bars) >= 1
+
+
+def test_numpy_volume_with_resolution(plotter):
+    array = np.random.default_rng(1).random((5, 6, 7))
+    theirs = plotter.add_volume(array, resolution=(1, 2, 3), mapper="gpu")
+    ours = plotter.add_vdi(array, resolution=(1, 2, 3))
+    assert ours.bounds == pytest.approx(theirs.bounds)
+    values = ours.mapper.GetSource().GetVolume().array
+    np.testing.assert_array_equal(values, array.transpose(2, 1, 0))
+
+
+def test_engine_volume(plotter):
+    volume = pvdi.Volume(np.random.default_rng(1).random((5, 6, 7)), (1, 2, 3), (4, 5, 6))
+    actor = plotter.add_vdi(volume)
+    assert actor.bounds == pytest.approx(volume.bounds)
+
+
+def test_user_matrix_name_pickable_and_culling(plotter):
+    matrix = pv.Transform().translate(1, 2, 3).matrix
+    first = plotter.add_vdi(soft_ball(8), name="ball", pickable=False, user_matrix=matrix)
+    assert not first.GetPickable()
+    assert first.bounds[::2] == pytest.approx((0, 1, 2))
+    second = plotter.add_vdi(soft_ball(8), name="ball", culling="front")
+    assert plotter.actors["ball"] is second
+    assert first not in plotter.renderer.actors.values()
+
+
+# -- the view, and when it is made anew ------------------------------------------------------------
+
+
+def test_view_is_the_plotters_camera_at_the_first_render(plotter, calls):
+    actor = plotter.add_vdi(soft_ball(), coverage="view", **LOOKS)
+    assert actor.vdi is None
+    plotter.camera_position = ((9, 1, 1), (0, 0, 0), (0, 0, 1))
+    shown(plotter)
+    assert actor.vdi.camera.position == (9, 1, 1)
+    assert actor.vdi.window_size == WINDOW
+    assert calls == {"generate": 1, "render": 1}
+
+
+def test_camera_moves_never_generate_and_equal_frames_are_kept(plotter, calls):
+    actor = plotter.add_vdi(soft_ball(), **LOOKS)
+    shown(plotter)
+    made = actor.vdi
+    for _ in range(3):
+        plotter.render()
+    assert calls == {"generate": 1, "render": 1}
+    plotter.camera.Azimuth(20)
+    plotter.render()
+    assert calls == {"generate": 1, "render": 2}
+    assert actor.vdi is made
+
+
+def test_given_camera_and_the_scale_of_the_renderer(plotter):
+    plotter.set_scale(zscale=2.0)
+    camera = pv.Camera()
+    camera.position, camera.focal_point, camera.up = (0, 7, 0), (0, 0, 0), (0, 0, 1)
+    actor = plotter.add_vdi(soft_ball(), camera=camera, coverage="view", **LOOKS)
+    shown(plotter)
+    assert actor.vdi.camera.position == (0, 7, 0)
+    np.testing.assert_array_equal(actor.vdi.camera.model_transform, np.diag([1, 1, 2, 1]))
+    assert actor.bounds == pytest.approx((-1, 1, -1, 1, -2, 2))
+
+
+def test_covered_bounds_show_no_cut_edge_when_panned(plotter):
+    actor = plotter.add_vdi(soft_ball(), **LOOKS)
+    plotter.camera_position = ((6, 0, 0), (0, 1.2, 0), (0, 0, 1))  # half of it outside
+    plotter.render()
+    shown(plotter)
+    plotter.camera_position = ((9, 0, 0), (0, 0, 0), (0, 0, 1))
+    ours = shown(plotter)
+    judge = plotter.add_volume(soft_ball(), mapper="gpu", **LOOKS)
+    judge.mapper.SetSampleDistance(0.02)
+    actor.visibility = False
+    difference = np.abs(ours - shown(plotter)).max(axis=-1)
+    # a cut edge would leave half of the ball away: differences of 100 and more
+    assert np.percentile(difference, 99.5) < 12
+
+
+def test_changed_property_and_data_generate_anew(plotter, calls):
+    volume = soft_ball()
+    actor = plotter.add_vdi(volume, **LOOKS)
+    before = shown(plotter)
+    actor.mapper.lookup_table.cmap = "inferno"
+    after = shown(plotter)
+    assert calls["generate"] == 2
+    assert np.abs(after - before).max() > 40
+    volume["v"][:] = 0
+    plotter.render()
+    assert calls["generate"] == 3
+    assert actor.vdi.n_supersegments == 0 or actor.vdi.optical_depth.max() < 1e-3
+    actor.prop.interpolation_type = "linear"
+    plotter.render()
+    assert calls["generate"] == 4
+    volume.Modified()  # nothing that matters
+    plotter.render()
+    assert calls["generate"] == 4
+
+
+def test_regenerate_takes_the_current_view(plotter, calls):
+    actor = plotter.add_vdi(soft_ball(), coverage="view", **LOOKS)
+    shown(plotter)
+    plotter.camera_position = ((0, 9, 1), (0, 0, 0), (0, 0, 1))
+    vdi = actor.regenerate()
+    assert vdi.camera.position == (0, 9, 1)
+    assert actor.vdi is vdi
+    again = actor.regenerate(pvdi.Camera((3, 3, 3), (0, 0, 0), (0, 0, 1)), window_size=(40, 30))
+    assert again.window_size == (40, 30)
+    assert calls["generate"] == 3
+
+
+def test_settings_reach_the_generator(plotter):
+    actor = plotter.add_vdi(
+        soft_ball(), max_supersegments=3, sample_distance=0.1, tolerance=0.01, view_cone=30.0
+    )
+    shown(plotter)
+    made_by = actor.vdi.metadata
+    assert actor.vdi.counts.max() <= 3
+    assert made_by["sample_distance"] == 0.1
+    assert made_by["tolerance"] == 0.01
+    assert made_by["view_cone"] == 30.0
+    assert made_by["scalars"] == "v"
+
+
+# -- without the volume ----------------------------------------------------------------------------
+
+
+def test_vdi_image_and_file_show_the_same(plotter, tmp_path):
+    vdi = small_vdi()
+    vdi.save(tmp_path / "ball.vdi")
+    images = []
+    for thing in (vdi, vdi_to_image(vdi), pv.read(tmp_path / "ball.vdi")):
+        actor = plotter.add_vdi(thing, name="it")
+        plotter.camera_position = ((5, 4, 3), (0, 0, 0), (0, 0, 1))
+        assert actor.vdi.equals(vdi)
+        images.append(shown(plotter))
+    assert np.ptp(images[0].reshape(-1, 3), axis=0).max() > 60
+    for image in images[1:]:
+        np.testing.assert_array_equal(image, images[0])
+
+
+def test_vdi_brings_its_scalar_bar(plotter):
+    vdi = small_vdi(cmap="inferno", clim=(5, 99))
+    actor = plotter.add_vdi(vdi)
+    assert actor.mapper.scalar_range == (5, 99)
+    assert list(plotter.scalar_bars.keys()) == ["v"]
+    assert plotter.add_vdi(vdi, show_scalar_bar=False) is not actor
+
+
+def test_accessor(plotter):
+    volume = soft_ball(12)
+    plotter.camera_position = ((5, 4, 3), (0, 0, 0), (0, 0, 1))
+    vdi = volume.vdi.generate(plotter.camera, (60, 50), cmap="bone", opacity="sigmoid_6")
+    assert vdi.window_size == (60, 50)
+    assert vdi.camera.position == (5, 4, 3)
+    assert vdi.n_supersegments > 0
+
+
+# -- scene -----------------------------------------------------------------------------------------
+
+
+def test_visibility_removal_and_scalar_bar(plotter):
+    actor = plotter.add_vdi(soft_ball(), **{**LOOKS, "show_scalar_bar": None})
+    assert list(plotter.scalar_bars.keys()) == ["v"]
+    plotter.remove_scalar_bar("v")
+    seen = shown(plotter)
+    actor.visibility = False
+    hidden = shown(plotter)
+    assert np.abs(seen - hidden).max() > 40
+    actor.visibility = True
+    np.testing.assert_array_equal(shown(plotter), seen)
+    plotter.remove_actor(actor)
+    np.testing.assert_array_equal(shown(plotter), hidden)
+
+
+def test_copy_shows_the_same_and_leaves_the_original_alone(plotter):
+    actor = plotter.add_vdi(soft_ball(), **LOOKS)
+    before = shown(plotter)
+    twin = actor.copy()
+    plotter.remove_actor(actor)
+    plotter.add_actor(twin, reset_camera=False)
+    np.testing.assert_array_equal(shown(plotter), before)
+    plotter.remove_actor(twin)
+    plotter.add_actor(actor, reset_camera=False)
+    np.testing.assert_array_equal(shown(plotter), before)
+
+
+def test_picking_finds_the_actor(plotter):
+    actor = plotter.add_vdi(soft_ball(), **LOOKS)
+    before = shown(plotter)
+    from vtkmodules.vtkRenderingCore import vtkPropPicker
+
+    picker = vtkPropPicker()
+    picker.Pick(WINDOW[0] / 2, WINDOW[1] / 2, 0, plotter.renderer)
+    assert picker.GetViewProp() is actor
+    np.testing.assert_array_equal(shown(plotter), before)
+
+
+def test_depth_is_read_only_where_something_opaque_can_hide_the_vdi(plotter, monkeypatch):
+    reads = []
+    frame_type = painter_module.Frame
+    read = frame_type.opaque_depth
+    monkeypatch.setattr(
+        frame_type, "opaque_depth", lambda self, r: (reads.append(1), read(self, r))[1]
+    )
+    plotter.add_vdi(soft_ball(), **LOOKS)
+    plotter.add_axes()
+    plotter.add_text("words")
+    plotter.camera_position = ((8, 0, 0), (0, 0, 0), (0, 0, 1))
+    shown(plotter)
+    behind = plotter.add_mesh(pv.Sphere(center=(-4, 0, 0)), reset_camera=False)
+    plotter.add_mesh(pv.Sphere(center=(0, 0, 0)), opacity=0.5, reset_camera=False)
+    shown(plotter)
+    assert reads == []
+    behind.position = (4, 0, 0)
+    plotter.render()
+    assert reads
+
+
+def shaded_frames(plotter, actor):
+    actor.prop.shade = True
+    for _ in range(3):
+        plotter.render()
+
+
+def test_problem_in_a_frame_is_said_once_and_the_last_image_stays(plotter):
+    actor = plotter.add_vdi(soft_ball(), **LOOKS)
+    before = shown(plotter)
+    with pytest.warns(VDIWarning, match="cannot be drawn: UnsupportedError: .*shading") as said:
+        shaded_frames(plotter, actor)
+    assert len(said) == 1
+    np.testing.assert_array_equal(shown(plotter), before)
+    actor.prop.shade = False
+    np.testing.assert_array_equal(shown(plotter), before)
+
+
+def test_progress_reaches_a_callable_that_can_stop_the_work(plotter):
+    fractions = []
+
+    def stop(fraction):
+        fractions.append(fraction)
+        return False
+
+    actor = plotter.add_vdi(soft_ball(), progress_bar=stop, **LOOKS)
+    with pytest.warns(VDIWarning, match="cannot be drawn: Cancelled") as said:
+        shown(plotter)  # three frames
+    assert len(said) == 1
+    assert len(fractions) == 1  # not tried again in each frame
+    assert actor.vdi is None
+    actor.mapper.GetSource().SetProgressCallback(fractions.append)
+    assert actor.regenerate().n_supersegments > 0
+    assert fractions[-1] == 1.0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="raises SIGINT in its own process")
+def test_interrupt_leaves_a_usable_plotter(plotter):
+    def interrupt(fraction):
+        signal.raise_signal(signal.SIGINT)
+
+    actor = plotter.add_vdi(soft_ball(), progress_bar=interrupt, **LOOKS)
+    with pytest.warns(VDIWarning, match="interrupted.*actor.regenerate"):
+        shown(plotter)
+    with pytest.raises(KeyboardInterrupt):
+        actor.regenerate()
+    actor.mapper.GetSource().SetProgressCallback(None)
+    assert actor.regenerate().n_supersegments > 0
+
+
+def test_bar_appears_only_after_a_second(capsys):
+    from pyvista_vdi.plotting.progress import DelayedBar, progress_callback
+
+    bar = DelayedBar(always=True)
+    for fraction in (0.1, 0.6, 0.2, 1.0):  # 0.2: other work began
+        bar(fraction)
+    assert capsys.readouterr().err == ""
+    assert progress_callback(False) is None
+    assert progress_callback(print) is print
+
+
+# -- leaks -----------------------------------------------------------------------------------------
+
+
+def exercise(**options):
+    plotter = pv.Plotter(window_size=WINDOW, **options)
+    actor = plotter.add_vdi(soft_ball(), **{**LOOKS, "show_scalar_bar": True})
+    plotter.add_mesh(pv.Sphere(radius=0.5, center=(0.4, 0.2, 0.5)))
+    plotter.add_volume_clip_plane(actor)
+    shown(plotter)
+    actor.prop.interpolation_type = "linear"
+    plotter.render()
+    return plotter, actor
+
+
+def test_nothing_is_left_after_close(no_leaks):
+    plotter, actor = exercise()
+    alive = {}
+    for thing in (
+        plotter.render_window,
+        plotter.renderer,
+        actor,
+        actor.mapper,
+        actor.mapper.GetSource(),
+        actor.mapper.painter.proxy,
+        actor.prop,
+    ):
+        alive[type(thing).__name__] = weak = vtkWeakReference()
+        weak.Set(thing)
+    del thing, actor
+    plotter.close()
+    del plotter
+    gc.collect()
+    # beyond Python's view: VTK's own counts
+    assert [name for name, weak in alive.items() if weak.Get() is not None] == []
+
+
+def test_nothing_is_left_after_deep_clean(no_leaks):
+    plotter, _ = exercise()
+    plotter.close()
+    plotter.deep_clean()
+
+
+def test_actor_that_outlives_its_plotter_holds_no_image():
+    plotter, actor = exercise()
+    painter = actor.mapper.painter
+    plotter.close()
+    assert not painter._images
+    assert painter._texture is None
+    assert actor.vdi is not None
+
+
+def test_gpu_mapper_goes_with_the_last_reference(no_leaks):
+    _, actor = exercise()
+    assert isinstance(actor.mapper, vtkOpenGLGPUVolumeRayCastMapper)
+    pv.close_all()
+    del actor
+    gc.collect()

@@ -1,0 +1,33 @@
+"""The plugin's example scripts run on their own and write a picture with something in it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from skimage.io import imread
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+pytestmark = pytest.mark.gl
+
+
+@pytest.mark.parametrize("name", ["plotter.py", "pipeline.py"])
+def test_example_writes_a_picture(name, tmp_path):
+    target = tmp_path / "picture.png"
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / name), str(target)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "supersegments" in done.stdout
+    assert "VDIWarning" not in done.stderr
+    image = imread(target)[..., :3]
+    assert image.shape == (480, 640, 3)
+    assert np.ptp(image.reshape(-1, 3).astype(int), axis=0).min() > 100

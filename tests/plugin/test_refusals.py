@@ -1,0 +1,308 @@
+"""Bad input to the plugin: refused where it is given, by name, with values and a remedy."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+import pyvista as pv
+from plugin_scenes import soft_ball, vdi_of_one_list
+from pyvista.plotting.mapper import SmartVolumeMapper
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import errors
+
+pytestmark = pytest.mark.gl
+
+
+@pytest.fixture
+def plotter():
+    plotter = pv.Plotter(window_size=(60, 50))
+    yield plotter
+    plotter.close()
+
+
+VOLUME = soft_ball(8)
+N = VOLUME.n_points
+
+
+def empty_volume():
+    return pv.ImageData()
+
+
+def no_scalars():
+    return pv.ImageData(dimensions=(4, 4, 4))
+
+
+def one_plane():
+    grid = pv.ImageData(dimensions=(4, 4, 1))
+    grid["v"] = np.zeros(16)
+    return grid
+
+
+def all_nan():
+    grid = pv.ImageData(dimensions=(4, 4, 4))
+    grid["v"] = np.full(64, np.nan)
+    return grid
+
+
+def infinite():
+    grid = pv.ImageData(dimensions=(4, 4, 4))
+    grid["v"] = np.r_[np.zeros(63), np.inf]
+    return grid
+
+
+ROWS = {
+    # volumes
+    "no scalars": (no_scalars(), {}, errors.InvalidVolumeError, "no scalars: there is nothing"),
+    "one plane": (one_plane(), {}, errors.InvalidVolumeError, "only one plane.*at least two"),
+    "empty": (empty_volume(), {}, errors.InvalidVolumeError, "the volume is empty"),
+    "all NaN": (all_nan(), {}, errors.InvalidVolumeError, "every value is NaN"),
+    "infinite": (infinite(), {}, errors.InvalidArgumentError, "from 0.0 to inf: give a finite"),
+    "unknown array": (
+        VOLUME,
+        {"scalars": "w"},
+        errors.InvalidVolumeError,
+        r"no array 'w': its arrays are \['v'\]",
+    ),
+    "wrong length": (
+        VOLUME,
+        {"scalars": np.zeros(5)},
+        errors.InvalidVolumeError,
+        r"per point \(512\).*\(5,\)",
+    ),
+    "RGBA": (
+        VOLUME,
+        {"scalars": np.zeros((N, 4), np.uint8)},
+        errors.UnsupportedError,
+        "are RGB.A. colours.*pass one scalar per point",
+    ),
+    "texts": (
+        VOLUME,
+        {"scalars": np.full(N, "a")},
+        errors.InvalidVolumeError,
+        "scalars must be numbers",
+    ),
+    "flat array": (np.zeros((3, 3)), {}, errors.InvalidVolumeError, r"shape \(3, 3\)"),
+    "RGBA array": (np.zeros((3, 3, 3, 4)), {}, errors.UnsupportedError, "RGB.A. colours"),
+    "resolution": (
+        np.zeros((3, 3, 3)),
+        {"resolution": (1, 2)},
+        errors.InvalidArgumentError,
+        r"three positive spacings; got \(1, 2\)",
+    ),
+    "rectilinear": (
+        pv.RectilinearGrid([0.0, 1, 3], [0.0, 1], [0.0, 1]),
+        {},
+        errors.UnsupportedError,
+        "not a uniform grid.*resample",
+    ),
+    "unstructured": (
+        VOLUME.cast_to_unstructured_grid(),
+        {},
+        errors.UnsupportedError,
+        "not a uniform.*resample",
+    ),
+    "blocks": (pv.MultiBlock([VOLUME]), {}, errors.UnsupportedError, "blocks one by one"),
+    "surface": (pv.Sphere(), {}, errors.UnsupportedError, "a surface has no volume"),
+    "a path": ("brain.nrrd", {}, errors.InvalidVolumeError, "pyvista.ImageData; got str"),
+    # classification
+    "cmap": (
+        VOLUME,
+        {"cmap": "viridi"},
+        errors.InvalidArgumentError,
+        "cmap='viridi' is no colour map.*did you mean 'viridis'",
+    ),
+    "cmap type": (VOLUME, {"cmap": 5}, errors.InvalidArgumentError, "cmap=5 is no colour map"),
+    "opacity": (
+        VOLUME,
+        {"opacity": "sigmoit"},
+        errors.InvalidArgumentError,
+        "opacity='sigmoit'.*did you mean 'sigmoid'",
+    ),
+    "opacity above 1": (
+        VOLUME,
+        {"opacity": 1.5},
+        errors.InvalidArgumentError,
+        "opacity=1.5.*between 0 and 1",
+    ),
+    "opacity too long": (
+        VOLUME,
+        {"opacity": np.zeros(300)},
+        errors.InvalidArgumentError,
+        r"n_colors=256.*\(300,\)",
+    ),
+    "opacity beyond a byte": (
+        VOLUME,
+        {"opacity": [0, 300], "n_colors": 2},
+        errors.InvalidArgumentError,
+        "0 to 255; got values from 0 to 300",
+    ),
+    "n_colors": (VOLUME, {"n_colors": 0}, errors.InvalidArgumentError, "n_colors.*got 0"),
+    "clim": (VOLUME, {"clim": (3, 1)}, errors.InvalidArgumentError, r"clim.*got \(3.0, 1.0\)"),
+    "clim of three": (VOLUME, {"clim": (1, 2, 3)}, errors.InvalidArgumentError, "clim must be one"),
+    "unit distance": (
+        VOLUME,
+        {"opacity_unit_distance": -1.0},
+        errors.InvalidArgumentError,
+        "opacity_unit_distance.*got -1.0",
+    ),
+    "preference": (
+        VOLUME,
+        {"preference": "face"},
+        errors.InvalidArgumentError,
+        "preference.*'face'",
+    ),
+    "interpolation": (
+        VOLUME,
+        {"interpolation": "cubic"},
+        errors.InvalidArgumentError,
+        "'nearest' or 'linear'",
+    ),
+    # what a VDI cannot honour
+    "shade": (VOLUME, {"shade": True}, errors.UnsupportedError, "shade=True.*later release"),
+    "blending": (
+        VOLUME,
+        {"blending": "maximum"},
+        errors.UnsupportedError,
+        "blending='maximum'.*composite",
+    ),
+    "mapper": (VOLUME, {"mapper": "gpu"}, errors.UnsupportedError, "mapper='gpu'.*has its own"),
+    "multi_colors": (VOLUME, {"multi_colors": True}, errors.UnsupportedError, "block.* one by one"),
+    # generation
+    "no supersegments": (
+        VOLUME,
+        {"max_supersegments": 0},
+        errors.InvalidArgumentError,
+        "from 1 to 4096; got 0",
+    ),
+    "too many": (
+        VOLUME,
+        {"max_supersegments": 4097},
+        errors.InvalidArgumentError,
+        "1 to 4096; got 4097",
+    ),
+    "half a supersegment": (
+        VOLUME,
+        {"max_supersegments": 1.5},
+        errors.InvalidArgumentError,
+        "whole number.*got 1.5",
+    ),
+    "step": (
+        VOLUME,
+        {"sample_distance": 0.0},
+        errors.InvalidArgumentError,
+        "sample_distance.*got 0.0",
+    ),
+    "tolerance": (VOLUME, {"tolerance": -1}, errors.InvalidArgumentError, "tolerance.*got -1"),
+    "cone": (VOLUME, {"view_cone": 91}, errors.InvalidArgumentError, "view_cone.*got 91"),
+    "coverage": (VOLUME, {"coverage": "all"}, errors.InvalidArgumentError, "coverage.*got 'all'"),
+    "camera": (VOLUME, {"camera": "xy"}, errors.InvalidCameraError, "vtkCamera.*got str"),
+    "device": (
+        VOLUME,
+        {"device": "no such device"},
+        errors.NoDeviceError,
+        "no such device",
+    ),
+    # keywords
+    "unknown keyword": (VOLUME, {"opcity": 1}, TypeError, "'opcity': did you mean 'opacity'"),
+    "scalar": (VOLUME, {"scalar": "v"}, TypeError, "'scalar': did you mean 'scalars'"),
+}
+
+
+@pytest.mark.parametrize(("volume", "arguments", "error", "message"), ROWS.values(), ids=ROWS)
+def test_add_vdi_refuses(plotter, volume, arguments, error, message):
+    with pytest.raises(error, match=re.compile(message, re.DOTALL)):
+        plotter.add_vdi(volume, **arguments)
+    assert not plotter.renderer.actors, "something was added although it was refused"
+    assert not plotter.scalar_bars
+
+
+def test_culling_is_checked_as_add_volume_checks_it(plotter):
+    with pytest.raises(ValueError, match="Culling option"):
+        plotter.add_vdi(VOLUME, culling="sideways")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"cmap": "bone"},
+        {"clim": (0, 1), "opacity": "linear_r"},
+        {"max_supersegments": 5},
+        {"camera": pvdi.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0))},
+        {"scalars": np.zeros(3)},
+    ],
+    ids=lambda a: "+".join(a),
+)
+def test_a_vdi_has_its_classification_already(plotter, arguments):
+    named = ", ".join(sorted(arguments))
+    with pytest.raises(errors.UnsupportedError, match=f"{named} cannot be given with a VDI"):
+        plotter.add_vdi(vdi_of_one_list(), **arguments)
+
+
+def test_a_vdi_without_transfer_function_has_no_scalar_bar(plotter):
+    actor = plotter.add_vdi(vdi_of_one_list())
+    assert not plotter.scalar_bars
+    plotter.remove_actor(actor)
+    with pytest.raises(errors.UnsupportedError, match="no transfer function.*show_scalar_bar"):
+        plotter.add_vdi(vdi_of_one_list(), show_scalar_bar=True)
+
+
+def test_damaged_image_of_a_vdi_is_refused(plotter):
+    image = pv.wrap(pvdi.vtk_pipeline.vdi_to_image(vdi_of_one_list())).copy()
+    image.field_data.remove("front")
+    with pytest.raises(errors.InvalidVDIError, match="lacks its field array 'front'"):
+        plotter.add_vdi(image)
+
+
+def test_actor_of_a_vdi_cannot_be_regenerated(plotter):
+    actor = plotter.add_vdi(vdi_of_one_list())
+    with pytest.raises(errors.InvalidArgumentError, match="without its volume.*add the volume"):
+        actor.regenerate()
+
+
+def test_blending_cropping_and_masks_of_the_mapper(plotter):
+    mapper = plotter.add_vdi(VOLUME).mapper
+    for blend in ("maximum", "minimum", "average", "additive"):
+        with pytest.raises(errors.UnsupportedError, match="only composite blending"):
+            mapper.blend_mode = blend
+    mapper.blend_mode = "composite"
+    with pytest.raises(errors.UnsupportedError, match="use clipping planes"):
+        mapper.SetCropping(1)
+    with pytest.raises(errors.UnsupportedError, match="cannot be masked"):
+        mapper.SetMaskInput(VOLUME)
+
+
+def test_other_mappers_and_shared_mappers(plotter):
+    actor = plotter.add_vdi(VOLUME)
+    with pytest.raises(errors.InvalidArgumentError, match="needs a VDIMapper; got SmartVolume"):
+        actor.mapper = SmartVolumeMapper()
+    with pytest.raises(errors.InvalidArgumentError, match="give each actor its own"):
+        pvdi.VDIActor().SetMapper(actor.mapper)
+
+
+@pytest.mark.parametrize("method", ["accessor", "function"])
+def test_accessor_refuses_other_grids_and_unknown_keywords(method):
+    camera = pvdi.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0))
+
+    def generate(volume, **keywords):
+        if method == "accessor":
+            return volume.vdi.generate(camera, (8, 8), **keywords)
+        return pvdi.generate(volume, camera, (8, 8), **keywords)
+
+    with pytest.raises(errors.UnsupportedError, match="a surface has no volume"):
+        generate(pv.Sphere())
+    with pytest.raises(TypeError, match="did you mean 'cmap'"):
+        generate(VOLUME, colormap="bone")
+
+
+def test_reader_takes_no_options_and_says_what_is_wrong(tmp_path):
+    path = tmp_path / "x.vdi"
+    with pytest.raises((errors.VDIFileError, FileNotFoundError), match=re.escape(path.name)):
+        pv.read(path)
+    path.write_bytes(b"something else entirely")
+    with pytest.raises(errors.VDIFileError, match=re.escape(path.name)):
+        pv.read(path)
+    with pytest.raises(TypeError, match="takes no options; got colour"):
+        pv.read(path, colour=1)

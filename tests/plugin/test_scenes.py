@@ -1,0 +1,315 @@
+"""Whole scenes against VTK's own volume: what users see when they put one in place of the other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista as pv
+from plugin_scenes import (
+    LOOKS,
+    TOLERANCE,
+    WINDOW,
+    add_judge,
+    add_nothing,
+    add_ours,
+    assert_as_vtk,
+    draw,
+    opaque_sphere,
+    soft_ball,
+)
+
+from pyvista_vdi.errors import VDIWarning
+
+pytestmark = pytest.mark.gl
+
+
+def ball_and_sphere(plotter, add):
+    add(plotter, soft_ball())
+    opaque_sphere(plotter)
+
+
+def translucent_plane(plotter):
+    plotter.add_mesh(pv.Plane(direction=(1, 1, 0), i_size=2, j_size=2), color="red", opacity=0.5)
+
+
+def test_ball_alone():
+    assert_as_vtk(lambda plotter, add: add(plotter, soft_ball()))
+
+
+def test_opaque_sphere_half_inside():
+    assert_as_vtk(ball_and_sphere)
+
+
+@pytest.mark.parametrize("place", [(1.5, 1.5, 1.5), (-1.5, -1.5, -1.5)], ids=["before", "behind"])
+def test_opaque_sphere_outside(place):
+    def scene(plotter, add):
+        add(plotter, soft_ball())
+        plotter.add_mesh(pv.Sphere(radius=0.5, center=place), color="w")
+
+    assert_as_vtk(scene)
+
+
+def test_translucent_plane():
+    def scene(plotter, add):
+        ball_and_sphere(plotter, add)
+        translucent_plane(plotter)
+
+    assert_as_vtk(scene)
+
+
+def test_depth_peeling():
+    def scene(plotter, add):
+        plotter.enable_depth_peeling(4)
+        ball_and_sphere(plotter, add)
+        translucent_plane(plotter)
+
+    assert_as_vtk(scene)
+
+
+@pytest.mark.parametrize("samples", [4, 8])
+def test_msaa(samples):
+    def scene(plotter, add):
+        plotter.enable_anti_aliasing("msaa", multi_samples=samples)
+        ball_and_sphere(plotter, add)
+
+    assert_as_vtk(scene)
+
+
+def test_ssaa_draws_what_vtk_leaves_out():
+    """VTK's GPU mapper draws nothing under SSAA on Mesa, so the judge is our own picture."""
+
+    def scene(plotter, add):
+        plotter.enable_anti_aliasing("ssaa")
+        ball_and_sphere(plotter, add)
+
+    smooth = draw(add_ours, scene)
+    plain = draw(add_ours, ball_and_sphere)
+    assert np.abs(smooth - draw(add_nothing, scene)).max() > 40
+    difference = np.abs(smooth - plain).max(axis=-1)
+    # The opaque sphere's rim, 150 pixels, is what anti-aliasing changes
+    assert np.count_nonzero(difference > TOLERANCE) < 250
+    assert np.median(difference) <= 1
+
+
+def test_parallel_projection():
+    def scene(plotter, add):
+        plotter.enable_parallel_projection()
+        ball_and_sphere(plotter, add)
+
+    assert_as_vtk(scene)
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_panned_so_that_a_part_is_outside_the_window(parallel):
+    def scene(plotter, add):
+        if parallel:
+            plotter.enable_parallel_projection()
+        ball_and_sphere(plotter, add)
+        position, focal, up = plotter.camera_position
+        shift = np.array([0.8, -0.8, 0.4])
+        plotter.camera_position = (position + shift, focal + shift, up)
+
+    assert_as_vtk(scene)
+
+
+def test_camera_inside():
+    def scene(plotter, add):
+        add(plotter, soft_ball())
+        plotter.add_mesh(pv.Sphere(radius=0.2, center=(-0.5, 0.1, -0.2)), color="w")
+        plotter.camera_position = ((0.6, 0.3, 0.2), (-1.0, 0.0, -0.2), (0, 0, 1))
+        plotter.renderer.ResetCameraClippingRange()
+
+    with pytest.warns(VDIWarning, match="coverage='bounds' needs the eye outside"):
+        assert_as_vtk(scene)
+
+
+def test_near_and_far_plane_cut_as_they_cut_vtks_volume():
+    def scene(plotter, add):
+        add(plotter, soft_ball())
+        distance = plotter.camera.distance
+        plotter.camera.clipping_range = (distance - 0.2, distance + 0.4)
+
+    assert_as_vtk(scene)
+
+
+def test_clipping_planes():
+    def scene(plotter, add):
+        actor = add(plotter, soft_ball())
+        opaque_sphere(plotter)
+        for origin, normal in (((0.1, 0, 0), (1, 0.5, 0)), ((0, 0, 0.5), (0, 0.2, -1))):
+            if add is not add_nothing:
+                actor.mapper.AddClippingPlane(_plane(origin, normal))
+
+    assert_as_vtk(scene)
+
+
+def _plane(origin, normal):
+    from vtkmodules.vtkCommonDataModel import vtkPlane
+
+    plane = vtkPlane()
+    plane.SetOrigin(*origin)
+    plane.SetNormal(*normal)
+    return plane
+
+
+def test_clip_widget():
+    def scene(plotter, add):
+        actor = add(plotter, soft_ball())
+        if add is not add_nothing:
+            plotter.add_volume_clip_plane(actor, normal="x", interaction_event="always")
+            plotter.clear_plane_widgets()
+
+    assert_as_vtk(scene)
+
+
+@pytest.mark.parametrize("shape", [(1, 2), (2, 1)])
+def test_two_viewports(shape):
+    def scene(plotter, add):
+        ball_and_sphere(plotter, add)
+        plotter.subplot(*(n - 1 for n in shape))
+        add(plotter, soft_ball(20))
+        plotter.add_mesh(pv.Sphere(radius=0.3, center=(0.5, 0.5, 0)), color="k")
+        plotter.camera.azimuth = 40
+
+    assert_as_vtk(scene, shape=shape)
+
+
+def test_linked_viewports_show_one_actor_twice():
+    def scene(plotter, add):
+        actor = add(plotter, soft_ball())
+        plotter.subplot(0, 1)
+        plotter.add_actor(actor)
+        plotter.link_views()
+
+    assert_as_vtk(scene, shape=(1, 2))
+
+
+def test_screenshot_of_twice_the_size():
+    # New pixels lie between the lists' centres, where V_O's lists step; the ball is smooth
+    assert_as_vtk(ball_and_sphere, lambda plotter: plotter.screenshot(return_img=True, scale=2))
+
+
+def test_tiled_picture():
+    def shot(plotter):
+        from vtkmodules.util.numpy_support import vtk_to_numpy
+        from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
+
+        plotter.show(auto_close=False)
+        tiles = vtkWindowToImageFilter()
+        tiles.SetInput(plotter.render_window)
+        tiles.SetScale(2, 2)
+        tiles.ReadFrontBufferOff()
+        tiles.Update()
+        image = tiles.GetOutput()
+        width, height, _ = image.GetDimensions()
+        return vtk_to_numpy(image.GetPointData().GetScalars()).reshape(height, width, 3)[::-1]
+
+    assert_as_vtk(ball_and_sphere, shot)
+
+
+def test_resized_window():
+    def shot(plotter):
+        plotter.show(auto_close=False)
+        plotter.window_size = (160, 300)
+        plotter.render()
+        return plotter.screenshot(return_img=True)
+
+    assert_as_vtk(ball_and_sphere, shot)
+
+
+def test_user_matrix():
+    matrix = pv.Transform().scale(1.0, 0.6, 1.4).rotate_x(30).translate(0.2, 0, 0.1).matrix
+    shear = matrix @ [[1, 0.3, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    assert_as_vtk(lambda plotter, add: add(plotter, soft_ball(), user_matrix=shear))
+
+
+def test_mirroring_user_matrix():
+    mirror = np.diag([-1.0, 1.0, 1.0, 1.0])
+    assert_as_vtk(lambda plotter, add: add(plotter, soft_ball(), user_matrix=mirror))
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_set_scale(when):
+    def scene(plotter, add):
+        if when == "before":
+            plotter.set_scale(zscale=1.7)
+        ball_and_sphere(plotter, add)
+        if when == "after":
+            plotter.show(auto_close=False)
+            plotter.set_scale(xscale=0.7)
+
+    assert_as_vtk(scene)
+
+
+def test_direction_matrix():
+    turned = pv.Transform().rotate_vector((1, 2, 3), 40).matrix[:3, :3]
+    assert_as_vtk(lambda plotter, add: add(plotter, soft_ball(direction=turned)))
+
+
+@pytest.mark.parametrize("eye", ["left", "right"])
+def test_stereo(eye):
+    """VTK's volume shoots stereo rays from the middle eye, so the judge has a moved camera.
+
+    ``vtkCamera`` shears view space about the focal plane by tan(EyeAngle / 2): the same as an eye
+    that far aside, times the distance, and a window centre that brings the focal point back.
+    """
+    sign = -1.0 if eye == "left" else 1.0
+
+    def scene(plotter, add):
+        ball_and_sphere(plotter, add)
+        if add is add_ours:
+            plotter.render_window.StereoRenderOn()  # V_O is the view between the eyes
+            plotter.render_window.SetStereoType(4 if eye == "left" else 5)
+            return
+        camera = plotter.camera
+        slope = sign * np.tan(np.radians(camera.GetEyeAngle() / 2))
+        right = np.cross(camera.direction, camera.up)
+        shift = slope * camera.distance * right / np.linalg.norm(right)
+        half_width = np.tan(np.radians(camera.view_angle / 2)) * WINDOW[0] / WINDOW[1]
+        camera.SetWindowCenter(-slope / half_width, 0)
+        camera.position = np.add(camera.position, shift)
+        camera.focal_point = np.add(camera.focal_point, shift)
+
+    # The sphere is rasterised from two cameras that are equal only mathematically
+    assert_as_vtk(scene, strays=3)
+
+
+def test_two_vdis_and_an_ordinary_volume():
+    def scene(plotter, add):
+        add(plotter, soft_ball(), user_matrix=pv.Transform().translate(-2.2, 0, 0).matrix)
+        add(plotter, soft_ball(16), user_matrix=pv.Transform().translate(2.2, 0, 0).matrix)
+        plotter.add_volume(soft_ball(), mapper="gpu", **LOOKS)
+
+    assert_as_vtk(scene)
+
+
+def test_small_window_and_odd_sizes():
+    assert_as_vtk(ball_and_sphere, window_size=(61, 37))
+
+
+def test_eye_dome_lighting_draws():
+    def scene(plotter, add):
+        ball_and_sphere(plotter, add)
+        plotter.enable_eye_dome_lighting()
+
+    assert np.abs(draw(add_ours, scene) - draw(add_nothing, scene)).max() > 40
+
+
+def test_turned_view_stays_close():
+    """30 degrees from V_O the picture is approximate: the mean says that it is in its place."""
+
+    def turned(plotter):
+        plotter.show(auto_close=False)
+        plotter.camera.Azimuth(30)
+        plotter.camera.Elevation(15)
+        plotter.renderer.ResetCameraClippingRange()
+        plotter.render()
+        return plotter.screenshot(return_img=True)
+
+    ours = draw(add_ours, ball_and_sphere, turned)
+    judge = draw(add_judge, ball_and_sphere, turned)
+    empty = draw(add_nothing, ball_and_sphere, turned)
+    seen = np.abs(judge - empty).max(axis=-1) > 4
+    assert seen.mean() > 0.1
+    assert np.abs(ours - judge)[seen].mean() < 3
+    assert WINDOW[0] == ours.shape[1]

@@ -1,0 +1,340 @@
+"""Generation and direct volume rendering on the device against the float64 reference.
+
+The device works in float32, so a sample's position, scalar, opacity and length are each uncertain
+by a few roundings; :class:`Uncertainty` carries these through the classification sample by sample.
+Nearest-neighbour sampling makes a jump of it where a sample lies within rounding of the middle
+between two points, so bounds are evaluated, not linearised.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import strategies
+
+from pyvista_vdi import reference
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.errors import Cancelled, InvalidArgumentError
+from pyvista_vdi.generate import generate_vdi
+from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.reference.generate import medium_at, near_depth
+from pyvista_vdi.reference.ranges import ROUNDOFF
+from pyvista_vdi.reference.raycast import NEAR_LIMIT
+from pyvista_vdi.reference.rays import pixel_ray
+from pyvista_vdi.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
+from pyvista_vdi.volume import VOXEL_TYPES, Volume
+
+WINDOW = (14, 10)
+
+#: Roundings of a grid coordinate: six coefficients and five multiply-adds in the pixel's position
+#: and in depth, and depth's own four (entry, step number, step length, sum).
+POSITION_ROUNDINGS = 16
+
+#: Roundings of a scalar: trilinear interpolation in three fused stages of two each, and three of
+#: the subtraction, scaling and splitting into node and share that classification does.
+SCALAR_ROUNDINGS = 9
+
+#: Roundings of an interpolated opacity or colour: difference, product, sum.
+TABLE_ROUNDINGS = 3
+
+#: Roundings of a step's optical depth after that: log1p (2, OpenCL C 7.4), length (4), product
+#: and quotient, and its exponential and product in compositing.
+STEP_ROUNDINGS = 12
+
+#: Measured (240 random cases on two platforms: 3e-6): what nearly every pixel stays below.
+TYPICAL = 1e-5
+
+
+class Uncertainty:
+    """What one ray's samples may be in float32.
+
+    Attributes
+    ----------
+    low, high : numpy.ndarray
+        Smallest and largest optical depth of each sample, float64 (n,).
+    color_spread : numpy.ndarray
+        Largest difference between colours of one sample, float64 (n,).
+    depth : float
+        By how much a view depth may be off, world units.
+    """
+
+    def __init__(self, volume, camera, transfer_function, ray):
+        to_index = np.linalg.inv(volume.index_to_model)
+        reach, per_depth, far = _magnitudes(volume, camera, to_index)
+        scalars = np.abs([*transfer_function.scalar_range, *volume.finite_range()]).max()
+        d_position = POSITION_ROUNDINGS * ROUNDOFF * reach
+        d_scalar = SCALAR_ROUNDINGS * ROUNDOFF * scalars
+        self.depth = POSITION_ROUNDINGS * ROUNDOFF * far
+        d_length = self.depth * per_depth
+
+        # The medium at every corner of the box of positions, and at scalars moved either way
+        seen = [(ray.color, ray.optical_depth)]
+        for corner in itertools.product((-1, 1), repeat=3):
+            position = ray.position + d_position * np.array(corner)
+            # An end of the ray may round to either side of the grid's boundary
+            position = np.clip(position, 0, np.array(volume.dimensions) - 1)
+            for shift in (-d_scalar, d_scalar):
+                low, high = transfer_function.scalar_range
+                moved = transfer_function.replace(scalar_range=(low + shift, high + shift))
+                seen.append(medium_at(volume, moved, position, ray.length))
+        colors, taus = (np.array(part) for part in zip(*seen, strict=True))
+        unit = transfer_function.unit_distance or volume.default_unit_distance
+        # d tau / d a = 1 / (1 - a) / U per length, a within its own roundings
+        worst = np.exp(np.minimum(taus.max(axis=0) * unit / np.maximum(ray.length, 1e-300), 40))
+        slack = TABLE_ROUNDINGS * ROUNDOFF * worst * ray.length / unit
+        slack += STEP_ROUNDINGS * ROUNDOFF * taus.max(axis=0)
+        # The entry and exit move, and with them the first and the last step
+        slack += taus.max(axis=0) / np.maximum(ray.length, d_length) * d_length
+        self.low = np.maximum(taus.min(axis=0) - slack, 0)
+        self.high = taus.max(axis=0) + slack
+        self.color_spread = np.ptp(colors, axis=0).max(axis=1) + TABLE_ROUNDINGS * ROUNDOFF
+
+    @property
+    def optical_depth(self):
+        """Smallest and largest sum over the ray, each addition rounded."""
+        grow = 1 + len(self.low) * ROUNDOFF
+        return self.low.sum() / grow, self.high.sum() * grow
+
+    @property
+    def color(self):
+        """Bound on the difference of the composited premultiplied RGBA, per channel.
+
+        A sample's optical depth changes what it covers, by no more than the transmittance before
+        it times the change; its colour counts as far as it is seen.
+        """
+        before = np.exp(-(np.cumsum(self.low) - self.low))
+        seen = before * -np.expm1(-self.high)
+        rounding = (len(self.low) + 4) * ROUNDOFF
+        return float(before @ (self.high - self.low) + seen @ self.color_spread + rounding)
+
+
+def _magnitudes(volume, camera, to_index):
+    """Largest grid coordinate on a window corner's ray where forms are evaluated, the largest
+    model length of a unit of view depth, and the largest view depth relative to the reference."""
+    depths = strategies.view_depths(camera, volume.bounds)
+    reference_depth = near_depth(volume.bounds, camera)
+    reach, per_depth = 0.0, 0.0
+    for x, y in itertools.product((0, WINDOW[0] - 1), (0, WINDOW[1] - 1)):
+        ray = pixel_ray(camera, WINDOW, x, y)
+        for depth in (reference_depth, depths[1]):
+            point = to_index[:3, :3] @ (ray.origin + depth * ray.direction) + to_index[:3, 3]
+            reach = max(reach, float(np.abs(point).max()))
+        per_depth = max(per_depth, float(np.linalg.norm(ray.direction)))
+    return reach, per_depth, depths[1] - reference_depth
+
+
+def cases(seed, dtype, interpolation, **volume_options):
+    rng = np.random.default_rng(seed)
+    volume = strategies.random_volume(rng, dtype, **volume_options)
+    transfer_function = strategies.random_transfer_function(
+        rng, volume, interpolation=interpolation
+    )
+    return volume, strategies.random_camera(rng, volume.bounds), transfer_function
+
+
+def eye_loss(volume, camera, uncertainties):
+    """What lies before V_O's near limit and is not drawn, as optical depth: bound per image."""
+    if camera.parallel_projection or near_depth(volume.bounds, camera) > 0:
+        return 0.0
+    densest = max((u.high.max(initial=0.0) for u in uncertainties), default=0.0)
+    return densest * NEAR_LIMIT * volume.length * 8 / min(volume.spacing)
+
+
+def list_sums(vdi):
+    starts = vdi.offsets[:-1].astype(int)
+    sums = np.zeros(len(starts))
+    np.add.at(
+        sums, np.repeat(np.arange(len(starts)), np.diff(vdi.offsets.astype(int))), vdi.optical_depth
+    )
+    return sums
+
+
+def check_against_reference(runtime, seed, volume, camera, transfer_function, budget):
+    """All the laws of a generated VDI and of the volume's image, on one case."""
+    name = f"seed {seed}, {volume}, {camera}"
+    vdi = generate_vdi(
+        volume, camera, WINDOW, transfer_function, max_supersegments=budget, device=runtime
+    )
+    rays = list(reference.samples(volume, camera, WINDOW, transfer_function))
+    uncertain = [Uncertainty(volume, camera, transfer_function, ray) for ray in rays]
+
+    # The promise
+    assert vdi.counts.max(initial=0) <= budget, name
+    assert vdi.bounds == volume.bounds
+    assert vdi.camera == camera
+
+    # Optical depth is kept
+    for ray, unsure, total in zip(rays, uncertain, list_sums(vdi), strict=True):
+        low, high = unsure.optical_depth
+        assert low - 1e-12 <= total <= high + 1e-12, f"{name}: list {ray.pixel}"
+
+    # Faces lie inside the grid on the centre ray, and nothing that is not transparent is outside
+    for ray, unsure in zip(rays, uncertain, strict=True):
+        part = vdi.list_at(*ray.pixel)
+        front = vdi.front[part].astype(float) + vdi.depth_origin
+        back = vdi.back[part].astype(float) + vdi.depth_origin
+        if len(front):
+            assert len(ray.begin), f"{name}: list {ray.pixel} is not empty but misses the grid"
+            assert front[0] >= ray.begin[0] - unsure.depth, f"{name}: list {ray.pixel}"
+            assert back[-1] <= ray.end[-1] + unsure.depth, f"{name}: list {ray.pixel}"
+        middle = ((ray.begin + ray.end) / 2)[unsure.low > 1e-6]
+        held = (front[:, None] - unsure.depth <= middle) & (middle <= back[:, None] + unsure.depth)
+        assert held.any(axis=0).all(), f"{name}: list {ray.pixel} leaves samples out"
+
+    # The picture from V_O
+    exact = reference.volume_image(volume, camera, WINDOW, transfer_function)
+    bound = np.array([unsure.color for unsure in uncertain]).reshape(WINDOW[::-1])[::-1]
+    drawn = raycast_volume(
+        volume, camera, WINDOW, transfer_function, early_termination=False, device=runtime
+    )
+    assert (np.abs(drawn - exact).max(axis=-1) <= bound).all(), name
+    # Merging by transmittance is exact from V_O: one more rounding per merged sample and channel
+    merged = 2 * bound + eye_loss(volume, camera, uncertain)
+    seen = reference.render(vdi, camera)
+    assert (np.abs(seen - exact).max(axis=-1) <= merged).all(), name
+    # The bound adds up worst cases; measured, all but the jumps between voxels stay below 3e-6
+    assert np.mean(np.abs(drawn - exact).max(axis=-1) <= TYPICAL) >= 0.98, name
+    return exact
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
+@pytest.mark.parametrize("dtype", VOXEL_TYPES)
+def test_every_voxel_type(runtime, dtype, interpolation):
+    drawn = 0.0
+    for number in range(2):
+        seed = [number, VOXEL_TYPES.index(dtype), interpolation == "linear"]
+        case = cases(seed, dtype, interpolation, direction=np.eye(3))
+        drawn += check_against_reference(runtime, seed, *case, budget=(3, 20)[number]).max()
+    assert drawn > 0
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_direction_matrix(runtime, number):
+    seed = [number, 1000]
+    rng = np.random.default_rng(seed)
+    direction = strategies.random_rotation(rng)
+    if number % 2:
+        direction = direction @ np.diag([1, 1, -1])  # mirrored
+    case = cases(seed, None, None, direction=direction)
+    check_against_reference(runtime, seed, *case, budget=(1, 7, 20)[number % 3])
+
+
+@pytest.mark.parametrize("budget", [1, 2, 3, 7, 64])
+def test_the_budget_is_a_promise_and_the_picture_stays(runtime, budget):
+    seed = [budget, 2000]
+    rng = np.random.default_rng(seed)
+    noise = Volume(rng.random((12, 12, 12)).astype(np.float32))
+    transfer_function = strategies.random_transfer_function(rng, noise, interpolation="nearest")
+    camera = strategies.camera_around(rng, noise.bounds, np.eye(4))
+    check_against_reference(runtime, seed, noise, camera, transfer_function, budget)
+
+
+@pytest.mark.parametrize("tolerance", [0.01, 0.3])
+def test_a_tolerance_shortens_lists_and_keeps_optical_depth(runtime, tolerance):
+    volume, camera, transfer_function = cases([3, 3000], "uint8", "linear", direction=np.eye(3))
+    exact, loose = (
+        generate_vdi(volume, camera, WINDOW, transfer_function, tolerance=t, device=runtime)
+        for t in (0.0, tolerance)
+    )
+    assert loose.n_supersegments < exact.n_supersegments
+    # Each sum of float32 is rounded once per sample, at most 1000 of them here
+    np.testing.assert_allclose(list_sums(loose), list_sums(exact), rtol=1000 * ROUNDOFF)
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
+def test_opaque_samples_are_opaque_whatever_the_unit_distance(runtime, interpolation):
+    """a = 1 gets tau >= 30 per step, even where U is a thousand volumes (DESIGN section 3)."""
+    volume = Volume(np.full((5, 5, 5), 200, dtype=np.uint8))
+    transfer_function = TransferFunction(
+        [[0.1, 0.6, 0.3]] * 2, [0.0, 1.0], (0, 200), unit_distance=4e3, interpolation=interpolation
+    )
+    camera = Camera((2, 2, 14), (2, 2, 2), (0, 1, 0), view_angle=10)
+    vdi = generate_vdi(volume, camera, WINDOW, transfer_function, device=runtime)
+    assert (list_sums(vdi) >= OPAQUE_OPTICAL_DEPTH).all()
+    wanted = np.array([0.1, 0.6, 0.3, 1.0])
+    for image in (
+        render_vdi(vdi, camera, device=runtime),
+        raycast_volume(volume, camera, WINDOW, transfer_function, device=runtime),
+        reference.volume_image(volume, camera, WINDOW, transfer_function),
+    ):
+        np.testing.assert_allclose(image - wanted, 0, atol=4 * ROUNDOFF)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
+def test_nan_is_transparent(runtime, dtype, interpolation):
+    seed = [7, 4000]
+    volume, camera, transfer_function = cases(seed, dtype, interpolation, direction=np.eye(3))
+    holes = np.array(volume.array)
+    holes[np.random.default_rng(seed).random(holes.shape) < 0.2] = np.nan
+    with_holes = Volume(holes, volume.spacing, volume.origin)
+    check_against_reference(runtime, seed, with_holes, camera, transfer_function, 20)
+
+
+def test_early_termination_drops_no_more_than_its_cutoff(runtime):
+    rng = np.random.default_rng(5000)
+    volume = strategies.random_volume(rng, "uint8", direction=np.eye(3))
+    dense = TransferFunction(
+        rng.random((8, 3)), np.linspace(0.9, 0.9999, 8), (0, 255), unit_distance=0.3
+    )
+    camera = strategies.camera_around(rng, volume.bounds, np.eye(4))
+    whole, early = (
+        raycast_volume(
+            volume, camera, WINDOW, dense, early_termination=stop, device=runtime
+        ).astype(float)
+        for stop in (False, True)
+    )
+    assert whole[..., 3].max() > 0.999
+    # The stated bound, 1e-6, and one rounding of a value near 1
+    assert np.abs(whole - early).max() <= 1e-6 + ROUNDOFF
+
+
+def test_a_transparent_volume_makes_empty_lists(runtime):
+    volume = Volume(np.arange(27, dtype=np.int16).reshape(3, 3, 3))
+    nothing = TransferFunction([[1, 1, 1]] * 2, [0, 0], (0, 26))
+    camera = Camera((1, 1, 9), (1, 1, 1), (0, 1, 0))
+    vdi = generate_vdi(volume, camera, WINDOW, nothing, device=runtime)
+    assert vdi.n_supersegments == 0
+    assert not raycast_volume(volume, camera, WINDOW, nothing, device=runtime).any()
+
+
+def test_a_view_that_misses_the_volume_is_empty(runtime):
+    volume = Volume(np.full((3, 3, 3), 9, dtype=np.uint8))
+    solid = TransferFunction([[1, 1, 1]], [0.5], (0, 1))
+    away = Camera((1, 1, 9), (1, 1, 20), (0, 1, 0))  # the volume is behind the eye
+    assert generate_vdi(volume, away, WINDOW, solid, device=runtime).n_supersegments == 0
+    assert not raycast_volume(volume, away, WINDOW, solid, device=runtime).any()
+
+
+def test_progress_runs_from_0_to_1_and_can_cancel(runtime):
+    volume, camera, transfer_function = cases([9, 6000], "uint8", "nearest")
+    seen = []
+    generate_vdi(volume, camera, WINDOW, transfer_function, device=runtime, progress=seen.append)
+    assert seen == sorted(seen)
+    assert seen[0] >= 0
+    assert seen[-1] == 1
+    with pytest.raises(Cancelled):
+        generate_vdi(
+            volume, camera, WINDOW, transfer_function, device=runtime, progress=lambda _: False
+        )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"max_supersegments": 0}, "max_supersegments.*got 0"),
+        ({"max_supersegments": 4097}, "max_supersegments.*4096.*got 4097"),
+        ({"max_supersegments": 2.5}, "max_supersegments.*got 2.5"),
+        ({"tolerance": -1.0}, "tolerance.*got -1"),
+        ({"view_cone": 91.0}, "view_cone.*got 91"),
+        ({"sample_distance": 0.0}, "sample_distance.*got 0"),
+        ({"sample_distance": float("nan")}, "sample_distance.*got nan"),
+    ],
+)
+def test_bad_arguments_are_refused_by_name(runtime, arguments, message):
+    volume, camera, transfer_function = cases([9, 7000], "uint8", "nearest")
+    with pytest.raises(InvalidArgumentError, match=message):
+        generate_vdi(volume, camera, WINDOW, transfer_function, device=runtime, **arguments)

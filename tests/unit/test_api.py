@@ -1,0 +1,317 @@
+"""The public functions: what they take, what they refuse, and how the refusal reads."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import api, classification
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidCameraError,
+    InvalidVDIError,
+    InvalidVolumeError,
+    MissingDependencyError,
+    NoDeviceError,
+    UnsupportedError,
+)
+from pyvista_vdi.standard_cases import filling_camera
+
+SIZE = (24, 16)
+
+
+def small_volume(**options):
+    z, y, x = np.mgrid[:9, :8, :7]
+    return pvdi.Volume((x * y + z).astype(np.float32), (1.0, 1.0, 0.5), **options)
+
+
+def ramp(volume, **options):
+    shades = np.linspace(0, 1, 16)
+    colors = np.stack([shades, shades**2, 1 - shades], axis=1)
+    return pvdi.TransferFunction(colors, shades * 0.7, volume.finite_range(), **options)
+
+
+@pytest.fixture(scope="module")
+def volume():
+    return small_volume()
+
+
+@pytest.fixture(scope="module")
+def camera(volume):
+    return filling_camera(volume.bounds, SIZE)
+
+
+# -- what they take --------------------------------------------------------------------------------
+
+
+def test_a_volume_becomes_a_vdi_a_file_and_a_picture(volume, camera, default_runtime, tmp_path):
+    table = ramp(volume)
+    heard = []
+    vdi = api.generate(
+        volume, camera, SIZE, transfer_function=table, max_supersegments=64, progress=heard.append
+    )
+    assert vdi.window_size == SIZE
+    assert heard[-1] == 1
+    assert vdi.metadata["scalars"] == "values"
+    read = api.read(vdi.save(tmp_path / "a.vdi"))
+    assert read.equals(vdi)
+    image = api.render(read, camera)
+    direct = api.render_volume(volume, camera, SIZE, transfer_function=table)
+    assert image.shape == direct.shape == (SIZE[1], SIZE[0], 4)
+    assert image.dtype == direct.dtype == np.float32
+    assert direct.max() > 0.1
+    # Unlimited lists, same step, same rays: only merging and float32 differ (issue 2: 2/255)
+    assert np.abs(image - direct).max() < 2 / 255
+    assert api.render(vdi, camera, (12, 8)).shape == (8, 12, 4)
+
+
+def test_vtk_objects_give_the_same_as_ours(volume, camera, default_runtime):
+    pv = pytest.importorskip("pyvista")
+    grid = pv.ImageData(dimensions=volume.dimensions, spacing=volume.spacing)
+    grid["values"] = volume.array.ravel()
+    view = pv.Camera()
+    view.position, view.focal_point, view.up = camera.position, camera.focal_point, (0, 0, 1)
+    view.view_angle = camera.view_angle
+    arguments = {"cmap": "viridis", "opacity": "sigmoid_5", "clim": (0, 40)}
+    ours = api.generate(volume, camera, SIZE, **arguments)
+    theirs = api.generate(grid, view, SIZE, **arguments)
+    assert theirs.equals(ours)
+    assert ours.metadata["classification"]["cmap"] == "viridis"
+    picture = api.render_volume(grid, view, SIZE, **arguments)
+    assert np.array_equal(picture, api.render_volume(volume, camera, SIZE, **arguments))
+
+
+def test_a_volume_property_stands_in_place_of_arguments(volume, camera, default_runtime):
+    pv = pytest.importorskip("pyvista")
+    from pyvista_vdi.plotting.classify import lookup_table, volume_property
+
+    table = lookup_table(volume.array, cmap="bone", opacity="linear")
+    prop = volume_property(table, volume.default_unit_distance)
+    assert isinstance(prop, pv.VolumeProperty)
+    a = api.render_volume(volume, camera, SIZE, volume_property=prop)
+    b = api.render_volume(volume, camera, SIZE, cmap="bone", opacity="linear")
+    assert np.array_equal(a, b)
+
+
+def test_the_vtk_form_of_a_vdi_is_rendered(volume, camera, default_runtime):
+    pytest.importorskip("vtkmodules")
+    from pyvista_vdi.vtk_pipeline import vdi_to_image
+
+    vdi = api.generate(volume, camera, SIZE, transfer_function=ramp(volume))
+    image = vdi_to_image(vdi)
+    assert np.array_equal(api.render(image, camera), api.render(vdi, camera))
+
+
+def test_scalars_by_value_and_by_name(volume):
+    assert api.as_volume(volume, "values") is volume
+    other = api.as_volume(volume, np.arange(volume.array.size))
+    assert other.array[0, 0, 1] == 1
+    assert other.spacing == volume.spacing
+
+
+def test_estimate_says_bytes(volume):
+    needed = api.estimate(volume, (640, 480), max_supersegments=10)
+    assert needed.volume == volume.array.nbytes
+    assert needed.vdi_worst_case >= 640 * 480 * 10 * 24
+    assert needed.total == needed.volume + needed.vdi_worst_case + needed.working
+
+
+def test_help_shows_every_classification_argument():
+    for function in (api.generate, api.render_volume):
+        parameters = inspect.signature(function).parameters
+        assert {*classification.DEFAULTS, *classification.IN_PLACE} <= set(parameters)
+        assert parameters["diffuse"].default == 0.7
+        assert "classification" not in parameters
+
+
+def test_defaults_are_add_volumes():
+    pv = pytest.importorskip("pyvista")
+    theirs = inspect.signature(pv.Plotter.add_volume).parameters
+    for name, default in classification.DEFAULTS.items():
+        if name != "interpolation":
+            assert theirs[name].default == default, name
+
+
+def test_the_engine_works_without_vtk_and_pyvista(default_runtime):
+    code = """
+import sys
+sys.modules.update(dict.fromkeys(("pyvista", "vtk", "vtkmodules", "matplotlib")))
+import numpy as np, pyvista_vdi as pvdi
+volume = pvdi.Volume(np.arange(60.0).reshape(3, 4, 5))
+camera = pvdi.Camera((2, 2, 20), (2, 2, 1), (0, 1, 0))
+table = pvdi.TransferFunction([(0, 0, 0), (1, 1, 1)], [0, 1], (0, 60))
+vdi = pvdi.generate(volume, camera, (8, 8), transfer_function=table)
+assert pvdi.render(vdi, camera).max() > 0
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+# -- what they refuse ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "suggestion"),
+    [
+        ("colormap", "did you mean 'cmap'"),
+        ("rng", "did you mean 'clim'"),
+        ("opcity", "did you mean 'opacity'"),
+        ("max_supersegment", "did you mean 'max_supersegments'"),
+        ("qqqq", "known are scalars, preference"),
+    ],
+)
+def test_an_unknown_keyword_is_a_type_error(name, suggestion, volume, camera):
+    with pytest.raises(
+        TypeError, match=rf"generate\(\) got an unexpected .*{name!r}: {suggestion}"
+    ):
+        api.generate(volume, camera, SIZE, **{name: 1})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"shade": True}, UnsupportedError, "shade=True: lighting is not supported yet, a later"),
+        ({"blending": "maximum"}, UnsupportedError, "blending='maximum' is not supported"),
+        ({"interpolation": "cubic"}, InvalidArgumentError, "must be 'nearest' or 'linear'"),
+        ({"preference": "row"}, InvalidArgumentError, "preference must be 'point' or 'cell'"),
+        ({"transfer_function": "bone"}, InvalidArgumentError, "must be a pyvista_vdi.TransferF"),
+        ({"volume_property": 3, "transfer_function": 4}, InvalidArgumentError, "both given"),
+        ({"volume_property": 3, "cmap": "bone"}, InvalidArgumentError, "in place of cmap: leave"),
+        (
+            {"transfer_function": 4, "clim": (0, 1), "opacity": "linear"},
+            InvalidArgumentError,
+            "transfer_function stands in place of clim, opacity: leave out either",
+        ),
+        ({"scalars": "density"}, InvalidVolumeError, "no array 'density': its only one is 'value"),
+        ({"scalars": [1, 2]}, InvalidVolumeError, "one value per point, 504; got 2"),
+    ],
+)
+@pytest.mark.parametrize("function", [api.generate, api.render_volume])
+def test_arguments_that_are_refused_by_name(function, arguments, error, message, volume, camera):
+    with pytest.raises(error, match=message):
+        function(volume, camera, SIZE, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"cmap": "viridys"}, "cmap='viridys'.*did you mean 'viridis'"),
+        ({"opacity": "sigmoid_99x"}, "opacity='sigmoid_99x'"),
+        ({"clim": (2, 1)}, "clim must be two finite numbers, the smaller first"),
+        ({"n_colors": 0}, "n_colors must be a whole number above 0; got 0"),
+    ],
+)
+def test_names_and_values_that_add_volume_would_not_take(arguments, message, volume, camera):
+    pytest.importorskip("pyvista")
+    with pytest.raises(InvalidArgumentError, match=message):
+        api.generate(volume, camera, SIZE, **arguments)
+
+
+def test_names_need_the_plot_extra(volume, camera, monkeypatch):
+    monkeypatch.setattr(classification, "find_spec", lambda name: None)
+    with pytest.raises(
+        MissingDependencyError,
+        match=r'not installed: install it by pip install "pyvista-vdi\[plot\]", or pass '
+        r"transfer_function=",
+    ):
+        api.generate(volume, camera, SIZE, cmap="bone")
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (np.zeros((4, 4, 4)), r"got a NumPy array of shape \(4, 4, 4\).*pyvista_vdi.Volume\(array"),
+        ("knee.nrrd", "expected a pyvista.ImageData.*got the path 'knee.nrrd'"),
+        (None, "got NoneType"),
+    ],
+)
+def test_what_is_no_volume(given, message, camera):
+    for function in (api.generate, api.render_volume):
+        with pytest.raises(InvalidVolumeError, match=message):
+            function(given, camera, SIZE)
+    with pytest.raises(InvalidVolumeError, match=message):
+        api.estimate(given, SIZE)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("knee.vdi", r"got the path 'knee.vdi': read it by pyvista_vdi.read\(path\)"),
+        (None, "expected a VDI or its VTK form"),
+    ],
+)
+def test_what_is_no_vdi(given, message, camera):
+    with pytest.raises(InvalidVDIError, match=message):
+        api.render(given, camera)
+
+
+def test_a_vtk_image_that_is_no_vdi(camera):
+    pv = pytest.importorskip("pyvista")
+    with pytest.raises(InvalidVDIError, match="is not a VDI"):
+        api.render(pv.ImageData(dimensions=(2, 2, 1)), camera)
+
+
+def test_volumes_without_something_to_render(camera):
+    pv = pytest.importorskip("pyvista")
+    empty, bare = pv.ImageData(dimensions=(0, 0, 0)), pv.ImageData(dimensions=(4, 4, 4))
+    plane = pv.ImageData(dimensions=(4, 4, 1))
+    plane["a"] = np.zeros(16)
+    for grid, message in (
+        (empty, "the volume is empty"),
+        (bare, "the volume has no scalars"),
+        (plane, "only one plane of points"),
+    ):
+        with pytest.raises(InvalidVolumeError, match=message):
+            api.generate(grid, camera, SIZE)
+    with pytest.raises(UnsupportedError, match="not a uniform grid.*voxelise it"):
+        api.generate(pv.Sphere(), camera, SIZE)
+
+
+def test_all_nan(camera):
+    volume = pvdi.Volume(np.full((3, 3, 3), np.nan))
+    with pytest.raises(InvalidVolumeError, match="every value"):
+        api.generate(volume, camera, SIZE, cmap="bone")
+
+
+@pytest.mark.parametrize("count", [0, -1, 4097, 2.5, "many", None])
+def test_the_limit_of_supersegments(count, volume, camera):
+    with pytest.raises(InvalidArgumentError, match="max_supersegments must be .* 1 to 4096; got"):
+        api.generate(volume, camera, SIZE, transfer_function=ramp(volume), max_supersegments=count)
+    with pytest.raises(InvalidArgumentError, match="max_supersegments must be .* 1 to 4096; got"):
+        api.estimate(volume, SIZE, max_supersegments=count)
+
+
+@pytest.mark.parametrize(
+    ("size", "message"),
+    [
+        ((0, 16), "window_size must be between 1 and 65536 pixels along each edge; got 0 x 16"),
+        ((1, 10**9), "between 1 and 65536"),
+        ((1.5, 2), "two whole numbers of pixels"),
+        (7, "two whole numbers of pixels"),
+    ],
+)
+def test_window_sizes(size, message, volume, camera, default_runtime):
+    table = ramp(volume)
+    with pytest.raises(InvalidArgumentError, match=message):
+        api.generate(volume, camera, size, transfer_function=table)
+    with pytest.raises(InvalidArgumentError, match=message):
+        api.render_volume(volume, camera, size, transfer_function=table)
+    with pytest.raises(InvalidArgumentError, match=message):
+        api.estimate(volume, size)
+
+
+def test_cameras_that_see_nothing(volume):
+    with pytest.raises(InvalidCameraError, match="position and focal point are the same point"):
+        api.generate(volume, pvdi.Camera((1, 2, 3), (1, 2, 3), (0, 0, 1)), SIZE)
+    with pytest.raises(InvalidCameraError, match="expected a pyvista_vdi.Camera, a vtkCamera"):
+        api.generate(volume, "xy", SIZE)
+
+
+def test_a_device_that_is_absent(volume, camera, default_runtime):
+    with pytest.raises(NoDeviceError, match="no such device|no .*device") as caught:
+        api.generate(volume, camera, SIZE, transfer_function=ramp(volume), device="no such device")
+    assert default_runtime.info.name in str(caught.value)  # the message lists what exists

@@ -1,0 +1,397 @@
+"""The command line: what each verb does, and that every mistake is one clear line."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import cli, io
+from pyvista_vdi.cli import parser
+from pyvista_vdi.standard_cases import filling_camera
+
+VERBS = ("devices", "generate", "render", "view", "info", "compare")
+
+
+@pytest.fixture(autouse=True)
+def _no_debug(monkeypatch):
+    monkeypatch.delenv(cli.DEBUG_VARIABLE, raising=False)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a volume, a transfer function, a camera and a VDI."""
+    path = tmp_path_factory.mktemp("cli")
+    import nrrd
+
+    z, y, x = np.mgrid[:12, :10, :8]
+    nrrd.write(str(path / "v.nrrd"), (x * y + z).astype(np.uint8), index_order="C")
+    table = pvdi.TransferFunction([(0, 0, 0.2), (1, 0.5, 0)], [0, 0.5], (0, 74))
+    (path / "tf.json").write_text(json.dumps(table.to_dict()))
+    camera = filling_camera((0, 7, 0, 9, 0, 11), (24, 16))
+    (path / "camera.json").write_text(json.dumps(camera.to_dict()))
+    vdi = pvdi.VDI(
+        camera,
+        (24, 16),
+        np.minimum(np.arange(24 * 16 + 1), 200),
+        np.full(200, 20.0),
+        np.full(200, 21.0),
+        np.full((200, 3), (1.0, 0.5, 0.0)),
+        np.full(200, 0.7),
+        (0, 7, 0, 9, 0, 11),
+        metadata={"criterion": "none"},
+    )
+    vdi.save(path / "a.vdi")
+    return path
+
+
+def run(capsys, *arguments):
+    """Run the command line in this process; return status, output and the error's lines."""
+    status = cli.main([str(a) for a in arguments])
+    captured = capsys.readouterr()
+    return status, captured.out, captured.err
+
+
+def complaint(capsys, *arguments, status=1):
+    """Run what must fail; return the message after checking that it is one line."""
+    found, out, err = run(capsys, *arguments)
+    assert found == status
+    assert out == ""
+    assert err.count("\n") == 1, err
+    prefix = "pyvista-vdi: error: "
+    assert err.startswith(prefix)
+    return err[len(prefix) :].strip()
+
+
+# -- help and mistakes -----------------------------------------------------------------------------
+
+
+def test_help_names_every_verb(capsys):
+    for arguments in ([], ["--help"]):
+        status, out, _ = run(capsys, *arguments)
+        assert status == 0
+        assert all(f"    {verb} " in out for verb in VERBS)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_each_verb_explains_itself_with_an_example(verb, capsys):
+    status, out, _ = run(capsys, verb, "--help")
+    assert status == 0
+    assert f"Example:\n  pyvista-vdi {verb}" in out
+
+
+def test_the_examples_of_the_help_parse():
+    for _, _, example, _ in parser._VERBS.values():
+        assert parser.parse(example.split()[1:]) is not None
+
+
+def test_version(capsys):
+    assert run(capsys, "--version")[:2] == (0, f"pyvista-vdi {pvdi.__version__}\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["generat"], "there is no verb 'generat': did you mean 'generate'?"),
+        (["zzz"], "there is no verb 'zzz': known are devices, generate, render, view, info, com"),
+        (["info"], "the following arguments are required: FILE; see pyvista-vdi info --help"),
+        (["info", "a", "b"], "info takes no argument 'b'; see pyvista-vdi info --help"),
+        (
+            ["generate", "a", "-o", "b", "--cmpa=bone"],
+            "no argument '--cmpa=bone': did you mean '--cm",
+        ),
+        (["generate", "-o", "b"], "one of the arguments VOLUME --example is required"),
+        (["generate", "a", "--example", "b", "-o", "c"], "not allowed with argument"),
+        (["generate", "a", "-o", "b", "--size", "12"], "a size is WIDTHxHEIGHT, like 1280x720"),
+        (["generate", "a", "-o", "b", "--size", "0x3"], "between 1 and 65536 pixels .* got 0 x 3"),
+        (["generate", "a", "-o", "b", "--opacity", "0,x"], "numbers with commas .* got '0,x'"),
+        (["generate", "a", "-o", "b", "--tf", "hard"], "invalid choice: 'hard'"),
+        (["generate", "a", "-o", "b", "--position", "1", "2"], "expected 3 arguments"),
+        (["compare", "a", "--angles", "0;5"], "got '0;5'"),
+        (["compare", "a", "--repeats", "0"], "a whole number above 0; got '0'"),
+        (["render", "a", "-o", "b", "--background", "pinkish"], "'pinkish' is no colour"),
+        (["render", "a", "-o", "b", "--background", "0,0,2"], "R,G,B from 0 to 1"),
+    ],
+)
+def test_mistakes_in_the_arguments(arguments, message, capsys):
+    import re
+
+    assert re.search(message.replace("?", r"\?"), complaint(capsys, *arguments, status=2))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["info", "none.vdi"], "none.vdi cannot be read: No such file or directory"),
+        (["info", "v.nrrd"], "is not a VDI file"),
+        (["render", "a.vdi", "-o", "a.gif"], "the name must end in .png"),
+        (["render", "a.vdi", "-o", "no/a.png"], "no does not exist; create it"),
+        (["render", "none.vdi", "-o", "a.png"], "none.vdi cannot be read"),
+        (["render", "a.vdi", "-o", "a.png", "--camera-json", "x.json"], "x.json cannot be read"),
+        (["render", "a.vdi", "-o", "a.png", "--camera-json", "v.nrrd"], "is no camera in JSON"),
+        (["render", "a.vdi", "-o", "a.png", "--camera-json", "tf.json"], "unknown entries"),
+        (["render", "a.vdi", "-o", "a.png", "--view-angle", "180"], "between 0 and 180 degrees"),
+        (["generate", "v.nrrd", "-o", "b.png"], "the name must end in .vdi, for instance 'b.vdi'"),
+        (["generate", "v.nrrd", "-o", "no/b.vdi"], "the folder .*no does not exist; create it"),
+        (["generate", "--example", "nothing", "-o", "b.vdi"], "no example volume is called 'noth"),
+        (
+            [
+                "generate",
+                "v.nrrd",
+                "-o",
+                "b.vdi",
+                "--transfer-function",
+                "tf.json",
+                "--cmap",
+                "bone",
+            ],
+            "transfer_function stands in place of cmap",
+        ),
+        (
+            ["generate", "v.nrrd", "-o", "b.vdi", "--transfer-function", "camera.json"],
+            "is no transfer function in JSON",
+        ),
+        (["compare", "v.nrrd", "--out", "v.nrrd"], "the folder v.nrrd cannot be made"),
+    ],
+)
+def test_mistakes_that_the_work_finds(arguments, message, folder, capsys, monkeypatch):
+    import re
+
+    monkeypatch.chdir(folder)
+    before = sorted(folder.iterdir())
+    assert re.search(message, complaint(capsys, *arguments))
+    assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["none.nrrd"], "none.nrrd cannot be read .*No such file"),
+        (["none.vti"], "none.vti does not exist: check the volume's path"),
+        (["a.vdi"], "a.vdi is a VDI, not a volume"),
+        (["camera.json"], "camera.json cannot be read as a volume"),
+        (["v.nrrd", "--scalars", "density"], "no array 'density'"),
+        (["v.nrrd", "--cmap", "viridys"], "cmap='viridys' .*did you mean 'viridis'"),
+        (["v.nrrd", "--max-supersegments", "0"], "max_supersegments must be .* 1 to 4096; got 0"),
+        (["v.nrrd", "--max-supersegments", "4097"], "from 1 to 4096; got 4097"),
+        (["v.nrrd", "--elevation", "80"], "elevation must lie between -90 and 90"),
+        (["v.nrrd", "--position", "1", "1", "1", "--focal-point", "1", "1", "1"], "the same point"),
+    ],
+)
+def test_mistakes_that_need_pyvista_to_be_found(arguments, message, folder, capsys, monkeypatch):
+    import re
+
+    pytest.importorskip("pyvista")
+    monkeypatch.chdir(folder)
+    before = sorted(folder.iterdir())
+    status = cli.main(["generate", *arguments, "-o", "b.vdi"])
+    last = capsys.readouterr().err.splitlines()[-1]  # the memory needed may have been said before
+    assert status == 1
+    assert re.search(f"pyvista-vdi: error: .*{message}", last)
+    assert sorted(folder.iterdir()) == before
+
+
+def test_a_device_that_is_absent(folder, capsys, default_runtime):
+    message = complaint(
+        capsys, "render", folder / "a.vdi", "-o", folder / "x.png", "--device", "no such"
+    )
+    assert default_runtime.info.name in message  # it lists what exists
+
+
+def test_debug_lets_the_traceback_through(monkeypatch):
+    monkeypatch.setenv(cli.DEBUG_VARIABLE, "1")
+    with pytest.raises(pvdi.VDIFileError):
+        cli.main(["info", "none.vdi"])
+
+
+def test_memory_is_named(folder, capsys, monkeypatch):
+    def too_much(*_, **__):
+        raise MemoryError("Unable to allocate 96.0 GiB")
+
+    monkeypatch.setattr("pyvista_vdi.cli.render.render_vdi", too_much)
+    message = complaint(capsys, "render", folder / "a.vdi", "-o", folder / "x.png")
+    assert message.startswith("not enough memory (Unable to allocate 96.0 GiB): lower --size")
+
+
+def test_an_interrupt_is_one_line_and_leaves_nothing(folder, capsys, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pyvista_vdi.cli.render.render_vdi", interrupted)
+    before = sorted(folder.iterdir())
+    message = complaint(capsys, "render", folder / "a.vdi", "-o", folder / "x.png", status=130)
+    assert message == "interrupted; nothing was left half done"
+    assert sorted(folder.iterdir()) == before
+
+
+# -- verbs -----------------------------------------------------------------------------------------
+
+
+def test_info(folder, capsys):
+    status, out, _ = run(capsys, "info", folder / "a.vdi")
+    assert status == 0
+    lines = dict(line.split("  ", 1) for line in out.splitlines())
+    assert lines["lists"].strip() == "24 x 16"
+    assert lines["supersegments"].strip() == "200, 0.52 per list"
+    assert lines["criterion"].strip() == '"none"'
+
+
+def test_info_as_json(folder, capsys):
+    status, out, _ = run(capsys, "info", folder / "a.vdi", "--json")
+    assert status == 0
+    about = json.loads(out)
+    assert about["n_supersegments"] == 200
+    assert pvdi.Camera.from_dict(about["camera"]) == io.read(folder / "a.vdi").camera
+
+
+def test_devices(capsys, default_runtime):
+    status, out, _ = run(capsys, "devices")
+    assert status == 0
+    assert default_runtime.info.name in out
+    status, out, _ = run(capsys, "devices", "--json")
+    assert status == 0
+    assert default_runtime.info.name in [device["name"] for device in json.loads(out)]
+
+
+def test_devices_fails_where_none_is_usable(capsys, monkeypatch):
+    monkeypatch.setattr(pvdi.opencl_runtime, "list_devices", list)
+    monkeypatch.setattr(pvdi.opencl_runtime, "describe_devices", lambda: "No device.")
+    assert run(capsys, "devices")[:2] == (1, "No device.\n")
+
+
+def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_path):
+    target = tmp_path / "b.vdi"
+    options = ["--size", "20x12", "--max-supersegments", "7", "--compression", "lz4"]
+    status, out, err = run(
+        capsys,
+        *("generate", folder / "v.nrrd", "-o", target),
+        *("--transfer-function", folder / "tf.json", "--azimuth", "30", *options),
+    )
+    assert status == 0
+    assert "20 x 12 lists" in out
+    assert "up to" in err
+    vdi = io.read(target)
+    assert vdi.window_size == (20, 12)
+    assert vdi.counts.max() <= 7
+    assert vdi.camera == filling_camera(vdi.bounds, (20, 12), azimuth=30)
+
+    picture = tmp_path / "b.png"
+    status, out, _ = run(capsys, "render", target, "-o", picture, "--size", "30x10")
+    assert (status, out) == (0, f"{picture}: 30 x 10\n")
+    from PIL import Image
+
+    with Image.open(picture) as image:
+        assert (image.mode, image.size) == ("RGBA", (30, 10))
+        expected = io.to_bytes(pvdi.render(vdi, vdi.camera, (30, 10)))
+        assert np.array_equal(np.asarray(image), expected)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["b.png", "b.vdi"]
+
+
+def test_render_over_a_background(folder, capsys, default_runtime, tmp_path):
+    from PIL import Image
+
+    for text, corner in (("white", 255), ("#ff0000", (255, 0, 0)), ("0,0,0.2", (0, 0, 51))):
+        picture = tmp_path / "a.png"
+        assert run(capsys, "render", folder / "a.vdi", "-o", picture, "--background", text)[0] == 0
+        with Image.open(picture) as image:
+            assert image.mode == "RGB"
+            assert (np.asarray(image)[0, 0] == corner).all()
+
+
+def test_camera_options(folder):
+    from pyvista_vdi.cli.inputs import camera
+
+    default = pvdi.Camera((0, -10, 0), (0, 0, 0), (0, 0, 1))
+
+    def view(*options):
+        return camera(parser.parse(["render", "a", "-o", "b", *options]), default)
+
+    assert view() == default
+    assert view("--azimuth", "30", "--elevation", "-5") == default.azimuth(30).elevation(-5)
+    moved = view("--position", "-1", "-2.5", "3", "--view-angle", "20")
+    assert (moved.position, moved.view_angle) == ((-1, -2.5, 3), 20)
+    parallel = view("--parallel-scale", "4")
+    assert (parallel.parallel_projection, parallel.parallel_scale) == (True, 4)
+    stored = pvdi.Camera.from_dict(json.loads((folder / "camera.json").read_text()))
+    assert view("--camera-json", str(folder / "camera.json")) == stored
+
+
+def test_standard_transfer_functions_and_their_changes():
+    from pyvista_vdi.cli.inputs import classification
+
+    def arguments(*options):
+        return classification(parser.parse(["generate", "a", "-o", "b.vdi", *options]))
+
+    assert arguments() == {}
+    assert arguments("--tf", "steep") == {"cmap": "viridis", "opacity": "sigmoid_10"}
+    assert arguments("--tf", "soft", "--opacity", "0,0.5,1", "--clim", "-1", "2.5") == {
+        "cmap": "bone",
+        "opacity": [0, 0.5, 1],
+        "clim": [-1, 2.5],
+    }
+    assert arguments("--log-scale", "--n-colors", "9") == {"log_scale": True, "n_colors": 9}
+
+
+# -- processes -------------------------------------------------------------------------------------
+
+
+def test_help_loads_nothing_slow():
+    code = (
+        "import sys; from pyvista_vdi.cli import main\n"
+        "assert main(['--help']) == 0 and main(['generate', '--help']) == 0\n"
+        "heavy = {'vtk', 'vtkmodules', 'pyvista', 'pyopencl', 'scipy', 'skimage', 'matplotlib'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
+
+
+def test_the_module_is_the_command():
+    result = subprocess.run(
+        [sys.executable, "-m", "pyvista_vdi", "generat"], capture_output=True, text=True
+    )
+    assert result.returncode == 2
+    assert result.stderr.startswith("pyvista-vdi: error: there is no verb 'generat'")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
+def test_ctrl_c_while_generating(folder, default_runtime, tmp_path):
+    """The interrupt comes when the target is being written: what was there stays."""
+    target = tmp_path / "b.vdi"
+    target.write_bytes(b"old")
+    code = (
+        "import sys, time\n"
+        "from pyvista_vdi.cli import main\n"
+        "from pyvista_vdi.io import writer\n"
+        "def slow(stream, *_):\n"
+        "    stream.write(b'half'); print('writing', flush=True); time.sleep(60)\n"
+        "writer.write_chunks = slow\n"
+        "sys.exit(main(sys.argv[1:]))\n"
+    )
+    process = subprocess.Popen(
+        [
+            *(sys.executable, "-c", code, "generate", str(folder / "v.nrrd"), "-o", str(target)),
+            *("--size", "16x16", "--transfer-function", str(folder / "tf.json")),
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout.readline() == "writing\n"
+        time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert err.splitlines()[-1] == "pyvista-vdi: error: interrupted; nothing was left half done"
+    assert "Traceback" not in err
+    assert target.read_bytes() == b"old"
+    assert [path.name for path in tmp_path.iterdir()] == ["b.vdi"]

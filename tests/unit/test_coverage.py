@@ -1,0 +1,122 @@
+"""The window of a generating view that covers a volume: on the screen's own pixel grid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.coverage import bounds_corners, covering_view
+from pyvista_vdi.errors import InvalidArgumentError
+
+BOX = bounds_corners((-1, 1, -2, 2, -0.5, 0.5))
+
+
+def pixels(camera, size, points):
+    """Pixel coordinates in a window, from the lower left corner: an independent projection."""
+    points = np.column_stack([points, np.ones(len(points))])
+    x, y, z, _ = camera.view_matrix @ camera.model_transform @ points.T
+    half_width, half_height = camera.half_extent(size)
+    depth = np.ones_like(z) if camera.parallel_projection else z
+    u = x / (depth * half_width) - camera.window_center[0]
+    v = y / (depth * half_height) - camera.window_center[1]
+    return np.stack([(u + 1) / 2 * size[0], (v + 1) / 2 * size[1]], axis=1)
+
+
+coordinate = st.floats(-1, 1)
+cameras = st.builds(
+    lambda direction, up, distance, angle, scale, parallel, horizontal, center: Camera(
+        np.array(direction) / np.linalg.norm(direction) * distance,
+        (0.3, -0.2, 0.1),
+        np.cross(direction, (*up, 1.3)) + 1e-3,
+        view_angle=angle,
+        parallel_projection=parallel,
+        parallel_scale=scale,
+        use_horizontal_view_angle=horizontal,
+        window_center=center,
+    ),
+    st.tuples(coordinate, coordinate, coordinate).filter(lambda d: np.linalg.norm(d) > 0.2),
+    st.tuples(coordinate, coordinate),
+    st.floats(4, 40),
+    st.floats(2, 90),
+    st.floats(0.3, 20),
+    st.booleans(),
+    st.booleans(),
+    st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8)),
+)
+sizes = st.tuples(st.integers(8, 900), st.integers(8, 900))
+
+
+@given(cameras, sizes)
+def test_pixels_are_the_screens_and_the_volume_is_inside(camera, size):
+    wide, lists = covering_view(camera, size, BOX, max_lists_per_pixel=1e6)
+    # An arbitrary point moves by a whole number of pixels between the two windows
+    points = np.vstack([BOX, [[0.1, 0.2, 0.3], [5.0, -3.0, 0.2]]])[:9]
+    screen, ours = pixels(camera, size, points), pixels(wide, lists, points)
+    shift = screen - ours
+    # float64 rounding of coordinates in pixels, up to ~1e5 here, and of the angle's tangent
+    slack = 1e-9 * (1 + np.abs(screen).max() + max(lists))
+    np.testing.assert_allclose(shift, np.broadcast_to(np.round(shift[0]), shift.shape), atol=slack)
+    assert (ours[:8] >= -1e-5).all()
+    assert (ours[:8] <= np.asarray(lists) + 1e-5).all()
+    # ... and no row or column of lists is to spare
+    assert (ours[:8].min(axis=0) < 1 + slack).all()
+    assert (ours[:8].max(axis=0) > np.asarray(lists) - 1 - slack).all()
+    # eye and direction are the same
+    assert wide.position == camera.position
+    np.testing.assert_array_equal(wide.axes, camera.axes)
+
+
+@given(cameras, sizes, st.floats(0.05, 2.0))
+def test_the_limit_holds_and_lists_stay_square(camera, size, limit):
+    wide, lists = covering_view(camera, size, BOX, max_lists_per_pixel=limit)
+    most = limit * size[0] * size[1]
+    assert lists[0] * lists[1] <= most or 1 in lists
+    half_width, half_height = wide.half_extent(lists)
+    assert half_width / lists[0] == pytest.approx(half_height / lists[1], rel=1e-12)
+    ours = pixels(wide, lists, BOX)
+    assert (ours >= -1e-5).all()
+    assert (ours <= np.asarray(lists) + 1e-5).all()
+
+
+def test_model_transform_counts():
+    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
+    moved = np.diag([2.0, 1.0, 1.0, 1.0])
+    moved[0, 3] = 3.0
+    _, plain = covering_view(camera, (400, 400), BOX)
+    wide, lists = covering_view(camera.replace(model_transform=moved), (400, 400), BOX)
+    assert lists[0] > 1.9 * plain[0]
+    assert lists[1] == plain[1]
+    assert wide.window_center[0] > 0
+
+
+@pytest.mark.parametrize(
+    "position",
+    [(0.1, 0.2, 0.3), (0.0, 0.0, 0.5005), (0.9, 1.5, 4.0)],
+    ids=["inside", "on the face", "the box reaches behind the eye"],
+)
+def test_nothing_covers_what_is_behind_the_eye(position):
+    focal = np.add(position, (1, 0, 0)) if position[2] == 4.0 else (0.0, 0.0, -3.0)
+    assert covering_view(Camera(position, focal, (0, 1, 0)), (100, 100), BOX) is None
+
+
+def test_parallel_projection_covers_what_is_beside_the_eye():
+    camera = Camera(
+        (0, 0, 0.1), (0, 0, -1), (0, 1, 0), parallel_projection=True, parallel_scale=1.0
+    )
+    _, lists = covering_view(camera, (100, 100), BOX)
+    assert lists == (100, 200)
+
+
+def test_a_volume_smaller_than_a_pixel_gets_one_list():
+    camera = Camera((0.0, 0.0, 1e6), (0.1, 0.1, 0), (0, 1, 0))
+    _, lists = covering_view(camera, (101, 101), BOX)
+    assert lists == (1, 1)
+
+
+def test_a_limit_of_nothing_is_refused():
+    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
+    with pytest.raises(InvalidArgumentError, match="max_lists_per_pixel must be positive; got 0"):
+        covering_view(camera, (100, 100), BOX, max_lists_per_pixel=0)

@@ -1,0 +1,157 @@
+"""The shipped volumes, and the errors for those that are not there."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import sys
+from importlib import resources
+
+import numpy as np
+import pytest
+from real_data import require_data
+
+from pyvista_vdi import examples
+from pyvista_vdi.errors import (
+    DataNotFoundError,
+    InvalidArgumentError,
+    InvalidVolumeError,
+    MissingDependencyError,
+)
+
+SHIPPED = sorted(name for name, example in examples.VOLUMES.items() if example.shipped)
+
+
+def test_two_volumes_are_shipped_and_small():
+    assert SHIPPED == ["brain", "rayleigh_taylor"]
+    assert sum(examples.path(name).stat().st_size for name in SHIPPED) < 6_000_000
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_checksum_is_the_one_in_the_provenance(name):
+    file = examples.path(name)
+    readme = (resources.files("pyvista_vdi.data") / "README.md").read_text(encoding="utf-8")
+    section = readme.partition(f"## {file.name}")[2].partition("\n## ")[0]
+    stated = re.search(r"sha256 \| `([0-9a-f]{64})`", section)
+    assert stated, f"README.md states no checksum of {file.name}"
+    assert hashlib.sha256(file.read_bytes()).hexdigest() == stated.group(1)
+    assert "| terms |" in section
+    assert "| source |" in section
+
+
+def test_brain_as_volume():
+    volume = examples.load_brain(as_volume=True)
+    assert volume.array.shape == (181, 217, 181)
+    assert volume.array.dtype == np.uint8
+    assert volume.spacing == (1.0, 1.0, 1.0)
+    assert volume.name == "intensity"
+    assert (volume.array.min(), volume.array.max()) == (0, 133)
+
+
+def test_rayleigh_taylor_as_volume():
+    volume = examples.load_rayleigh_taylor(as_volume=True)
+    assert volume.array.shape == (192, 192, 192)
+    assert volume.name == "concentration"
+    assert (volume.array.min(), volume.array.max()) == (0, 255)
+    # the two fluids meet along z: the ends of that axis differ, those of x and y do not
+    means = [[np.take(volume.array, end, axis).mean() for end in (0, -1)] for axis in range(3)]
+    z, y, x = (abs(first - last) for first, last in means)
+    assert z > 200, means
+    assert max(x, y) < 10, means
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_same_grid_as_pyvista_reads(name):
+    _compare_with_pyvista(name)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("name", sorted(set(examples.VOLUMES) - set(SHIPPED)))
+def test_other_volumes_read_as_pyvista_reads(name):
+    require_data(name)
+    _compare_with_pyvista(name)
+
+
+def _compare_with_pyvista(name):
+    pyvista = pytest.importorskip("pyvista")
+    expected = pyvista.read(examples.path(name))
+    grid = examples.load_data(name)
+    assert isinstance(grid, pyvista.ImageData)
+    assert grid.dimensions == expected.dimensions
+    assert grid.spacing == expected.spacing
+    assert grid.origin == expected.origin
+    assert np.array_equal(grid.direction_matrix, expected.direction_matrix)
+    assert grid.active_scalars_name == examples.VOLUMES[name].quantity
+    assert grid.active_scalars.dtype == expected.active_scalars.dtype
+    assert np.array_equal(grid.active_scalars, expected.active_scalars)
+
+
+def test_unknown_name_lists_the_known_ones():
+    with pytest.raises(InvalidArgumentError, match=r"'brian'.*aneurism.*brain"):
+        examples.load_data("brian")
+
+
+def test_absent_without_the_variable(monkeypatch):
+    monkeypatch.delenv(examples.DATA_VARIABLE, raising=False)
+    with pytest.raises(DataNotFoundError, match=r"PYVISTA_VDI_DATA is not set.*aneurism_256_u8"):
+        examples.load_data("aneurism")
+    assert examples.available() == tuple(SHIPPED)
+
+
+def test_without_the_variable_the_current_folder_is_not_searched(monkeypatch, tmp_path):
+    (tmp_path / examples.VOLUMES["aneurism"].file_name).write_bytes(b"")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(examples.DATA_VARIABLE, "")
+    assert "aneurism" not in examples.available()
+
+
+def test_absent_from_the_folder(monkeypatch, tmp_path):
+    monkeypatch.setenv(examples.DATA_VARIABLE, str(tmp_path))
+    with pytest.raises(FileNotFoundError, match=re.escape(str(tmp_path)) + r".*aneurism_256_u8"):
+        examples.load_data("aneurism")
+
+
+def test_unreadable_file_is_named(monkeypatch, tmp_path):
+    broken = tmp_path / examples.VOLUMES["aneurism"].file_name
+    broken.write_bytes(b"NRRD0004\ntype: uint8\n")
+    monkeypatch.setenv(examples.DATA_VARIABLE, str(tmp_path))
+    with pytest.raises(InvalidVolumeError, match=re.escape(str(broken))):
+        examples.load_data("aneurism", as_volume=True)
+
+
+def test_truncated_file_is_named(monkeypatch, tmp_path):
+    whole = examples.path("brain").read_bytes()
+    broken = tmp_path / examples.VOLUMES["aneurism"].file_name
+    broken.write_bytes(whole[: len(whole) // 2])
+    monkeypatch.setenv(examples.DATA_VARIABLE, str(tmp_path))
+    with pytest.raises(InvalidVolumeError, match=re.escape(str(broken))):
+        examples.load_data("aneurism", as_volume=True)
+
+
+def test_oblique_axes_and_anisotropy(monkeypatch, tmp_path):
+    nrrd = pytest.importorskip("nrrd")
+    # z, y, x = 2, 3, 4; x and y turned by 30 degrees, spacings 0.5, 2 and 3
+    array = np.arange(24, dtype=np.int16).reshape(2, 3, 4)
+    cos, sin = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    direction = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
+    spacing = np.array([0.5, 2.0, 3.0])
+    header = {
+        "space dimension": 3,
+        "space directions": direction.T * spacing[:, None],
+        "space origin": [10.0, 20.0, 30.0],
+    }
+    file = tmp_path / examples.VOLUMES["aneurism"].file_name
+    nrrd.write(str(file), array, header, index_order="C")
+    monkeypatch.setenv(examples.DATA_VARIABLE, str(tmp_path))
+    volume = examples.load_data("aneurism", as_volume=True)
+    assert np.array_equal(volume.array, array)
+    # one rounding each for the square, the sum and the root
+    np.testing.assert_allclose(volume.spacing, spacing, rtol=4 * np.finfo(float).eps)
+    np.testing.assert_allclose(volume.direction, direction, rtol=8 * np.finfo(float).eps)
+    assert volume.origin == (10.0, 20.0, 30.0)
+
+
+def test_without_pyvista_the_way_out_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    with pytest.raises(MissingDependencyError, match=r"as_volume=True.*pyvista-vdi\[plot\]"):
+        examples.load_brain()

@@ -1,0 +1,203 @@
+"""Memory on a device: transfers, limits, accounting."""
+
+from __future__ import annotations
+
+import gc
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pyvista_vdi import opencl_runtime as ocl
+from pyvista_vdi.errors import (
+    DeviceError,
+    DeviceMemoryError,
+    InvalidArgumentError,
+)
+from pyvista_vdi.opencl_runtime import devices
+from pyvista_vdi.opencl_runtime.buffers import Ledger, bytes_text
+
+# -- buffers -----------------------------------------------------------------------------------
+
+DTYPES = ["u1", "i1", "u2", "i2", "u4", "i4", "u8", "f4", "f8"]
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("aligned", [True, False])
+def test_upload_and_download(runtime, dtype, aligned):
+    rng = np.random.default_rng(7)
+    values = rng.integers(0, 120, (5, 3, 4)).astype(dtype)
+    array = ocl.aligned_empty((5, 3, 4), dtype) if aligned else np.empty_like(values)[::-1]
+    array[...] = values
+    with runtime.upload(array, name="values") as buffer:
+        back = runtime.download(buffer)
+        assert (back.dtype, back.shape) == (np.dtype(dtype), (5, 3, 4))
+        np.testing.assert_array_equal(back, values)
+        np.testing.assert_array_equal(runtime.download(buffer, count=7), values.ravel()[:7])
+        with pytest.raises(InvalidArgumentError, match="'values' was uploaded"):
+            runtime.write(buffer, values)
+        with pytest.raises(InvalidArgumentError, match="'values' was uploaded"):
+            runtime.fill(buffer, 0)
+
+
+def test_aligned_arrays_are_used_in_place_on_a_cpu(runtime):
+    array = ocl.aligned_empty(1000, np.float32)
+    assert array.ctypes.data % 4096 == 0
+    array[...] = 1
+    before = runtime.allocated
+    with runtime.upload(array) as buffer:
+        assert runtime.allocated - before == (0 if runtime.is_cpu else 4000)
+        del array
+        gc.collect()
+        assert np.all(runtime.download(buffer) == 1)
+    assert runtime.allocated == before
+
+
+def test_write_fill_and_download_into(runtime):
+    out = np.empty((2, 3), np.int32)
+    with runtime.buffer((2, 3), np.int32, name="six") as buffer:
+        runtime.write(buffer, np.arange(6, dtype=np.int32).reshape(2, 3)[:, ::-1])
+        assert runtime.download(buffer, out=out) is out
+        np.testing.assert_array_equal(out, [[2, 1, 0], [5, 4, 3]])
+        runtime.fill(buffer, 255)
+        assert np.all(runtime.download(buffer) == -1)
+        runtime.fill(buffer, np.int32(-5))
+        assert np.all(runtime.download(buffer) == -5)
+        for bad in (np.zeros(6, np.float32), np.zeros(5, np.int32)):
+            with pytest.raises(InvalidArgumentError, match="'six' exchanges 6 C-contiguous"):
+                runtime.write(buffer, bad)
+            with pytest.raises(InvalidArgumentError, match="'six'"):
+                runtime.download(buffer, out=bad)
+        with pytest.raises(InvalidArgumentError, match="'six'"):
+            runtime.download(buffer, out=np.zeros((3, 2), np.int32).T[::-1])
+        with pytest.raises(InvalidArgumentError, match="256 is no byte"):
+            runtime.fill(buffer, 256)
+        with pytest.raises(InvalidArgumentError, match="does not divide"):
+            runtime.fill(buffer, np.zeros((), "f8")[()].astype("c16"))
+        with pytest.raises(InvalidArgumentError, match="7 elements were asked"):
+            runtime.download(buffer, count=7)
+
+
+def test_sizes_are_bytes_or_shapes(runtime):
+    with runtime.buffer(12, np.float32) as buffer:
+        assert (buffer.shape, buffer.nbytes) == ((3,), 12)
+    for wrong in (13, -4, (3, -1)):
+        with pytest.raises(InvalidArgumentError):
+            runtime.buffer(wrong, np.float32)
+
+
+def test_empty_buffers(runtime):
+    empty = np.empty((0, 4), np.float32)
+    with runtime.buffer((0, 4)) as a, runtime.upload(empty) as b:
+        assert a.nbytes == b.nbytes == 0
+        runtime.write(a, empty)
+        runtime.fill(a, 0)
+        assert runtime.download(a).shape == runtime.download(b).shape == (0, 4)
+
+
+def test_accounting_follows_release_and_garbage_collection(runtime):
+    gc.collect()
+    before = runtime.allocated
+    kept = runtime.buffer((1000,), np.float64)
+    dropped = runtime.buffer((500,), np.float64)
+    assert runtime.allocated == before + 12000
+    assert runtime.peak_allocated >= before + 12000
+    del dropped
+    gc.collect()
+    assert runtime.allocated == before + 8000
+    kept.release()
+    kept.release()
+    assert kept.released
+    assert runtime.allocated == before
+
+
+@pytest.fixture
+def small(runtime, monkeypatch):
+    """The runtime, with 1 MiB per buffer and 2 MiB beyond what is allocated now."""
+    gc.collect()
+    info = replace(runtime.info, max_allocation=2**20, global_memory=runtime.allocated + 2 * 2**20)
+    monkeypatch.setattr(runtime, "info", info)
+    return runtime
+
+
+def test_too_large_a_buffer_is_refused_before_it_is_taken(small):
+    before = small.allocated
+    with pytest.raises(
+        DeviceMemoryError, match=r"'colours' needs 1.50 MiB \(1572864 bytes\).*1.00 MiB.*per buffer"
+    ) as caught:
+        small.buffer(3 * 2**19, name="colours")
+    assert isinstance(caught.value, MemoryError)
+    assert "max_supersegments" in str(caught.value)
+    for array in (np.zeros(2**19), ocl.aligned_empty(2**19, np.float64)):
+        with pytest.raises(DeviceMemoryError, match="'volume' needs 4.00 MiB"):
+            small.upload(array, name="volume")
+    assert small.allocated == before
+
+
+def test_too_much_in_all_is_refused_before_it_is_taken(small):
+    before = small.allocated
+    with small.buffer(2**20, name="one"), small.buffer(2**20 - 4, name="two"):
+        with pytest.raises(DeviceMemoryError, match=r"'three' needs .* are in use already"):
+            small.buffer(8, name="three")
+        with small.buffer(4, name="the rest"):
+            assert small.allocated == before + 2**21
+    assert small.allocated == before
+
+
+def test_drivers_refusal_of_a_buffer_is_a_memory_error(runtime, monkeypatch):
+    without_limits = replace(runtime.info, max_allocation=2**62, global_memory=2**62)
+    monkeypatch.setattr(runtime, "info", without_limits)
+    before = runtime.allocated
+    with pytest.raises(
+        DeviceMemoryError, match="ran out of memory or resources while alloc.*'vast'"
+    ):
+        runtime.buffer(2**61, name="vast")
+    assert runtime.allocated == before
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        ("MEM_OBJECT_ALLOCATION_FAILURE", DeviceMemoryError),
+        ("OUT_OF_RESOURCES", DeviceMemoryError),
+        ("OUT_OF_HOST_MEMORY", DeviceMemoryError),
+        ("INVALID_ARG_SIZE", DeviceError),
+        ("DEVICE_NOT_AVAILABLE", DeviceError),
+        (None, DeviceError),
+    ],
+)
+def test_driver_errors_keep_their_cause_and_kind(runtime, code, expected):
+    class DriverError(devices.opencl().Error):
+        pass
+
+    if code is not None:
+        DriverError.code = getattr(devices.opencl().status_code, code)
+    driver_error = DriverError("as the driver says")
+    wanted = pytest.raises(expected, match="while stirring.*as the driver says")
+    with wanted as caught, runtime._driver("stirring"):
+        raise driver_error
+    assert type(caught.value) is expected
+    assert caught.value.__cause__ is driver_error
+
+
+def test_ledger_is_safe_between_threads():
+    ledger = Ledger("d")
+
+    def work() -> None:
+        for _ in range(2000):
+            ledger.take("b", 3, 10, 10**9)
+            ledger.give_back(3)
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert ledger.allocated == 0
+    assert 3 <= ledger.peak <= 12
+
+
+def test_bytes_are_written_for_people():
+    assert bytes_text(12) == "12 bytes"
+    assert bytes_text(3 * 2**29) == "1.50 GiB (1610612736 bytes)"

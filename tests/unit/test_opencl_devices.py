@@ -1,0 +1,280 @@
+"""Finding OpenCL drivers, probing devices, and choosing one."""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fresh_python import run_python
+
+from pyvista_vdi import opencl_runtime as ocl
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    NoDeviceError,
+)
+from pyvista_vdi.opencl_runtime import choice, devices, icd
+
+
+def fake(platform: str, name: str, kind: str, index: tuple[int, int], **more) -> ocl.DeviceInfo:
+    fields = {
+        "name": name,
+        "platform": platform,
+        "vendor": "V",
+        "version": "OpenCL 3.0",
+        "driver": "1",
+        "kind": kind,
+        "compute_units": 4,
+        "global_memory": 2**33,
+        "max_allocation": 2**31,
+        "has_fp64": True,
+        "usable": True,
+        "reason": "",
+        "platform_index": index[0],
+        "device_index": index[1],
+    }
+    return ocl.DeviceInfo(**{**fields, **more})
+
+
+POCL = fake(
+    "Portable Computing Language", "pthread-Intel(R) Xeon(R)", "CPU", (0, 0), version="3.0 PoCL"
+)
+INTEL = fake("Intel(R) OpenCL", "Intel(R) Xeon(R)", "CPU", (1, 0))
+IGPU = fake("Intel(R) OpenCL Graphics", "Iris", "GPU", (2, 0), unified_memory=True)
+NV_A = fake("NVIDIA CUDA", "H200", "GPU", (3, 0), compute_units=132)
+NV_B = fake("NVIDIA CUDA", "T4", "GPU", (3, 1), compute_units=40)
+FPGA = fake("Intel(R) FPGA Emulation", "Emulator", "accelerator", (4, 0), compute_units=99)
+ALL = devices.with_selectors([POCL, INTEL, IGPU, NV_A, NV_B, FPGA])
+
+
+# -- choosing ----------------------------------------------------------------------------------
+
+
+def test_preference_is_gpu_then_intel_cpu_then_other_cpu_then_accelerator():
+    order = [info.name for info in sorted(ALL, key=devices.preference)]
+    assert order == ["H200", "T4", "Iris", "Intel(R) Xeon(R)", POCL.name, "Emulator"]
+
+
+def test_default_leaves_out_what_failed_the_probe():
+    broken = [replace(i, usable=False, reason="x") if i.kind == "GPU" else i for i in ALL]
+    best = choice.default_device(broken)
+    assert best is not None
+    assert best.platform == "Intel(R) OpenCL"
+    assert choice.default_device([replace(i, usable=False) for i in ALL]) is None
+
+
+@pytest.mark.parametrize(
+    ("selector", "name"),
+    [
+        ("0:0", POCL.name),
+        (" 3 : 1 ", "T4"),
+        ("t4", "T4"),
+        ("NVIDIA CUDA / H200", "H200"),
+        ("cuda:1", "T4"),
+        ("pocl", POCL.name),  # only the version says so
+        ("intel(r) opencl:0", INTEL.name),
+        ("fpga", "Emulator"),
+        ("Intel(R) Xeon(R)", INTEL.name),  # the exact name beats PoCL's, which contains it
+    ],
+)
+def test_selector_means_one_device(selector, name):
+    assert devices.select(ALL, selector, "device=").name == name
+
+
+def test_every_device_is_selected_by_its_own_selector():
+    for info in ALL:
+        assert devices.select(ALL, info.selector, "device=") is info
+    twins = devices.with_selectors([INTEL, replace(INTEL, platform_index=2)])
+    assert [info.selector for info in twins] == ["1:0", "2:0"]
+
+
+def test_absent_device_lists_what_exists():
+    with pytest.raises(NoDeviceError, match=r"device='radeon'.*H200 \(GPU, selected by 'nvidia"):
+        devices.select(ALL, "radeon", "device=")
+    with pytest.raises(NoDeviceError, match=r"no device at all; install a CPU runtime"):
+        devices.select([], "radeon", "device=")
+
+
+def test_ambiguous_device_lists_the_matches():
+    with pytest.raises(NoDeviceError, match=r"'nvidia' means 2 devices.*H200.*T4") as caught:
+        devices.select(ALL, "nvidia", "PYVISTA_VDI_DEVICE=")
+    assert "Iris" not in str(caught.value)
+
+
+def test_named_device_that_fails_its_probe_is_an_error(runtime, monkeypatch):
+    broken = replace(runtime.info, usable=False, reason="it gave 3, not 4")
+    monkeypatch.setitem(choice._probed, runtime.info.index, (broken, None))
+    with pytest.raises(NoDeviceError, match="not usable: it gave 3, not 4"):
+        ocl.get_runtime(runtime.info.selector)
+
+
+def test_environment_names_the_device(runtime, monkeypatch):
+    monkeypatch.setenv("PYVISTA_VDI_DEVICE", runtime.info.selector)
+    assert ocl.get_runtime() is runtime
+    assert f"Default: {runtime.info.full_name}, because" in ocl.describe_devices()
+    monkeypatch.setenv("PYVISTA_VDI_DEVICE", "no such thing")
+    with pytest.raises(NoDeviceError, match=r"PYVISTA_VDI_DEVICE='no such thing'.*there is"):
+        ocl.get_runtime()
+    assert "No default: PYVISTA_VDI_DEVICE='no such thing'" in ocl.describe_devices()
+
+
+def test_every_form_of_device_gives_the_same_runtime(runtime):
+    assert ocl.get_runtime(runtime) is runtime
+    assert ocl.get_runtime(runtime.info) is runtime
+    assert ocl.get_runtime(runtime._device) is runtime
+    shared = ocl.get_runtime(runtime._context)
+    assert shared._context is runtime._context
+    assert ocl.get_runtime(runtime._context) is shared
+    with pytest.raises(InvalidArgumentError, match="device=3 of type int"):
+        ocl.get_runtime(3)
+    with pytest.raises(NoDeviceError, match="does not exist in this process"):
+        ocl.get_runtime(replace(runtime.info, name="another"))
+
+
+def test_description_marks_the_default_and_explains_the_others(runtime, monkeypatch):
+    monkeypatch.delenv("PYVISTA_VDI_DEVICE", raising=False)
+    best = choice.default_device(ocl.list_devices())
+    assert best is not None
+    text = ocl.describe_devices()
+    assert f"* [{best.platform_index}:{best.device_index}] {best.full_name}" in text
+    broken = replace(best, usable=False, reason="the probe kernel's fma is wrong")
+    monkeypatch.setitem(choice._probed, best.index, (broken, None))
+    assert "not used: the probe kernel's fma is wrong" in ocl.describe_devices()
+
+
+@pytest.mark.parametrize("where", ["expm1", "log1p", "exp", "fma", "local memory", "atomic"])
+def test_probe_notices_wrong_numbers(where):
+    x = np.linspace(0.01, 0.99, 64, dtype=np.float32)
+    wide = x.astype(np.float64)
+    square = (x * x).astype(np.float64)
+    values = np.stack([np.expm1(-wide), np.log1p(-wide), np.exp(-wide), wide * wide - square], 1)
+    values = values.astype(np.float32)
+    sums = np.arange(64, dtype=np.uint32).reshape(2, 32).sum(axis=1)
+    total = np.array([64 * 65 // 2], np.uint32)
+    assert choice._check_probe(x, values, sums, total) == ""
+    if where == "local memory":
+        sums[1] += 1
+    elif where == "atomic":
+        total[0] -= 1
+    else:
+        values[7, ["expm1", "log1p", "exp", "fma"].index(where)] *= 1.00001
+    assert where in choice._check_probe(x, values, sums, total)
+
+
+# -- finding drivers ---------------------------------------------------------------------------
+
+
+def test_import_touches_no_environment_and_loads_no_driver():
+    code = (
+        "import os, sys; before = dict(os.environ)\n"
+        "import pyvista_vdi.opencl_runtime\n"
+        "assert 'pyopencl' not in sys.modules\n"
+        "assert dict(os.environ) == before"
+    )
+    done = run_python(code)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_listing_devices_puts_the_environment_back():
+    code = (
+        "import os; before = dict(os.environ)\n"
+        "from pyvista_vdi.opencl_runtime import list_devices; list_devices()\n"
+        "changed = set(os.environ.items()) ^ set(before.items())\n"
+        "print(sorted(name for name, _ in changed if 'OCL' in name))"
+    )
+    done = run_python(code)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "[]"
+
+
+def test_no_device_says_what_was_found_and_the_remedy(tmp_path):
+    code = (
+        "from pyvista_vdi.errors import NoDeviceError\n"
+        "from pyvista_vdi.opencl_runtime import get_runtime, list_devices, describe_devices\n"
+        "assert list_devices() == []\n"
+        "print(describe_devices())\n"
+        "try:\n    get_runtime()\nexcept NoDeviceError as exc:\n    print('caught', exc)\n"
+    )
+    done = run_python(code, OCL_ICD_VENDORS=str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    described, message = done.stdout.split("caught ")
+    for text in (described, message):
+        assert "no usable OpenCL device" in text
+        assert 'pip install "pyvista-vdi[cpu]"' in text
+        assert "pocl-opencl-icd" in text
+        assert f"OCL_ICD_VENDORS={str(tmp_path)!r} is set and obeyed" in text
+
+
+def test_named_device_absent_end_to_end(runtime):
+    with pytest.raises(NoDeviceError, match="there is no such OpenCL device") as caught:
+        ocl.get_runtime("quantum")
+    assert runtime.info.full_name in str(caught.value)
+
+
+@pytest.fixture
+def vendors(tmp_path, monkeypatch):
+    """A system folder with one driver, a pip driver, and pyopencl not yet imported."""
+    system = tmp_path / "system"
+    system.mkdir()
+    (system / "pocl.icd").write_text("libpocl.so.2\n")
+    (system / "gone.icd").write_text(str(tmp_path / "gone.so"))
+    library = tmp_path / "libintelocl.so"
+    library.touch()
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setattr(icd, "SYSTEM_VENDORS", system)
+    monkeypatch.setattr(icd, "vendor_folders", lambda: [system])
+    monkeypatch.setattr(icd, "intel_library", lambda: library)
+    monkeypatch.delitem(sys.modules, "pyopencl", raising=False)
+    for name in icd.USER_VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+    return system, library
+
+
+def test_pip_driver_is_shown_beside_the_system_ones(vendors):
+    _, library = vendors
+    with icd.drivers_visible() as discovery:
+        folder = Path(os.environ["OCL_ICD_VENDORS"])
+        assert folder.stat().st_mode & 0o777 == 0o700
+        shown = sorted(file.read_text().strip() for file in folder.glob("*.icd"))
+        assert shown == sorted(["libpocl.so.2", str(library)])
+        assert discovery.added == library
+    assert "OCL_ICD_VENDORS" not in os.environ
+    assert not folder.exists()
+
+
+def test_environment_is_put_back_when_listing_fails(vendors):
+    with pytest.raises(ZeroDivisionError), icd.drivers_visible():
+        raise ZeroDivisionError
+    assert "OCL_ICD_VENDORS" not in os.environ
+
+
+@pytest.mark.parametrize(
+    ("case", "note"),
+    [
+        ("user", "is set and obeyed"),
+        ("imported", "pyopencl was imported before"),
+        ("system", "the system's vendor files name Intel's CPU runtime already"),
+        ("absent", "no libintelocl.so from pip"),
+        ("windows", "the system's own loader"),
+    ],
+)
+def test_search_path_is_left_alone(vendors, monkeypatch, case, note):
+    system, library = vendors
+    if case == "user":
+        monkeypatch.setenv("OCL_ICD_VENDORS", "/somewhere")
+    elif case == "imported":
+        monkeypatch.setitem(sys.modules, "pyopencl", object())
+    elif case == "system":
+        (system / "intel.icd").write_text(str(library))
+    elif case == "absent":
+        monkeypatch.setattr(icd, "intel_library", lambda: None)
+    else:
+        monkeypatch.setattr(sys, "platform", "win32")
+    before = dict(os.environ)
+    with icd.drivers_visible() as discovery:
+        assert dict(os.environ) == before
+    assert discovery.added is None
+    assert note in discovery.note

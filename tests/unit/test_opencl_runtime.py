@@ -1,0 +1,309 @@
+"""The OpenCL runtime: kernel sources, programs, launches, queues, profiling."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+from fresh_python import run_python
+
+from pyvista_vdi import opencl_runtime as ocl
+from pyvista_vdi.errors import (
+    DeviceError,
+    InvalidArgumentError,
+    KernelBuildError,
+)
+from pyvista_vdi.opencl_runtime import devices, profiling, programs, sources
+from pyvista_vdi.opencl_runtime.runtime import Runtime
+
+# -- sources -----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def texts(monkeypatch):
+    """Kernel files in memory in place of the package's."""
+    files: dict[str, str] = {}
+
+    def read(path: str) -> str:
+        if path not in files:
+            raise FileNotFoundError(path)
+        return files[path]
+
+    monkeypatch.setattr(sources, "read_resource", read)
+    sources._expand_resource.cache_clear()
+    yield files
+    sources._expand_resource.cache_clear()
+
+
+def test_includes_are_expanded_once_with_line_marks(texts):
+    texts["vdi/main.cl"] = '#include "common/a.cl"\n#include "common/b.cl"\nint main_c;\n'
+    texts["common/a.cl"] = "int a;\n"
+    texts["common/b.cl"] = '  #  include "common/a.cl"\nint b;'
+    assert sources.expand("vdi/main.cl").splitlines() == [
+        '#line 1 "vdi/main.cl"',
+        '#line 1 "common/a.cl"',
+        "int a;",
+        '#line 2 "vdi/main.cl"',
+        '#line 1 "common/b.cl"',
+        '#line 2 "common/b.cl"',
+        "int b;",
+        '#line 3 "vdi/main.cl"',
+        "int main_c;",
+    ]
+
+
+def test_a_file_that_includes_itself_ends(texts):
+    texts["a.cl"] = '#include "b.cl"\nint a;'
+    texts["b.cl"] = '#include "a.cl"\nint b;'
+    assert sources.expand("a.cl").count("int a;") == 1
+
+
+def test_missing_and_conditional_includes_name_the_place(texts):
+    texts["a.cl"] = '\n#include "nowhere.cl"\n'
+    with pytest.raises(KernelBuildError, match=r'a\.cl:2: #include "nowhere.cl": no such file'):
+        sources.expand("a.cl")
+    texts["c.cl"] = '#ifdef X\n#include "d.cl"\n#endif\n'
+    with pytest.raises(KernelBuildError, match=r"c\.cl:2: .* stands inside #if"):
+        sources.expand("c.cl")
+    with pytest.raises(KernelBuildError, match="no kernel file 'z.cl'"):
+        sources.expand("z.cl")
+
+
+@pytest.mark.parametrize("path", ["../setup.py", "/etc/passwd", "", "common"])
+def test_resources_outside_the_package_are_not_read(path):
+    with pytest.raises(FileNotFoundError):
+        sources.read_resource(path)
+
+
+# -- programs ----------------------------------------------------------------------------------
+
+SCALE = """\
+#include "common/probe.cl"
+__kernel void scale(__global float *x, const float factor, const uint n)
+{
+    const uint i = get_global_id(0);
+    if (i < n)
+        x[i] = x[i] * factor + ADD;
+}
+__kernel void spread(__global const float *x, __global float *y, const float4 v, __local float *t)
+{
+    t[get_local_id(0)] = x ? x[get_global_id(0)] : v.w;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    y[get_global_id(0)] = t[get_local_size(0) - 1 - get_local_id(0)];
+}
+"""
+
+
+@pytest.fixture
+def scale_file(tmp_path):
+    path = tmp_path / "with a space" / "scale.cl"
+    path.parent.mkdir()
+    path.write_text(SCALE)
+    return path
+
+
+def test_build_error_names_file_and_line(runtime, texts, tmp_path):
+    texts["common/good.cl"] = "int good(int a);\n" * 7
+    texts["vdi/bad.cl"] = (
+        '#include "common/good.cl"\n\n__kernel void bad()\n{\n    missing_it();\n}\n'
+    )
+    with pytest.raises(KernelBuildError) as caught:
+        runtime.kernel("vdi/bad.cl", "bad", {"N": 3})
+    error = caught.value
+    assert "vdi/bad.cl:5" in error.log
+    assert "missing_it" in str(error)
+    assert runtime.info.name in str(error)
+    assert "-DN=3" in error.options
+    assert '#line 2 "vdi/bad.cl"' in error.source
+    assert error.__cause__ is not None
+
+
+def test_build_error_inside_an_include_names_the_include(runtime, texts):
+    texts["common/wrong.cl"] = "\nfloat wrong(void) { return missing_name; }\n"
+    texts["vdi/outer.cl"] = '// head\n#include "common/wrong.cl"\n__kernel void k() {}\n'
+    with pytest.raises(KernelBuildError, match=r"common/wrong\.cl:2"):
+        runtime.kernel("vdi/outer.cl", "k")
+
+
+def test_failed_builds_leave_no_files(runtime, texts, monkeypatch, tmp_path):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    texts["vdi/bad.cl"] = "__kernel void bad() { not_there(); }"
+    with pytest.raises(KernelBuildError):
+        runtime.kernel("vdi/bad.cl", "bad")
+    assert not list(tmp_path.glob("*.cl"))
+
+
+def test_unknown_kernel_lists_those_there_are(runtime):
+    with pytest.raises(KernelBuildError, match="has no kernel 'nix'.*it has: probe"):
+        runtime.kernel("common/probe.cl", "nix")
+
+
+def test_long_logs_are_trimmed():
+    text = programs._trimmed("\n".join(f"line {i}" for i in range(100)))
+    assert text.endswith("... 70 more lines in the error's .log")
+
+
+def test_programs_are_built_once_per_source_and_defines(runtime, scale_file, monkeypatch):
+    built = []
+    build = programs.build
+    monkeypatch.setattr(programs, "build", lambda *a: built.append(a[4]) or build(*a))
+    first = runtime.kernel(scale_file, "scale", {"ADD": 0.25})
+    assert runtime.kernel(scale_file, "scale", {"ADD": 0.25}) is first
+    assert runtime.kernel(scale_file, "scale", {"ADD": 0.5}) is not first
+    runtime.kernel(scale_file, "spread", {"ADD": 0.5})
+    assert len(built) == 2
+    scale_file.write_text(SCALE + "\n// edited\n")
+    assert runtime.kernel(scale_file, "scale", {"ADD": 0.25}) is not first
+
+
+def test_define_options():
+    assert programs.define_options({"B": True, "A": -2, "F": 1.5, "T": "ushort", "E": None}) == (
+        "-DA=(-2)",
+        "-DB=1",
+        "-DE",
+        "-DF=(0x1.8000000000000p+0f)",
+        "-DT=ushort",
+    )
+    for defines in ({"1A": 1}, {"A": "unsigned char"}, {"A": ""}, {"A B": 1}, {"A": "x;y"}):
+        with pytest.raises(InvalidArgumentError):
+            programs.define_options(defines)
+
+
+def test_float_defines_are_exact(runtime, scale_file):
+    add = np.float32(0.1)
+    kernel = runtime.kernel(scale_file, "scale", {"ADD": add})
+    with runtime.buffer((1,), np.float32) as x:
+        runtime.fill(x, 0)
+        runtime.launch(kernel, 1, None, x, np.float32(1), np.uint32(1))
+        assert runtime.download(x)[0] == add
+
+
+def test_threads_may_launch_the_same_kernel(runtime, scale_file):
+    kernel = runtime.kernel(scale_file, "scale", {"ADD": 0})
+    start = threading.Barrier(4)
+    wrong: list[object] = []
+
+    def work(factor: int) -> None:
+        try:
+            data = np.full(100, factor, np.float32)
+            with runtime.buffer(data.shape, data.dtype) as x:
+                start.wait()
+                for _ in range(200):
+                    runtime.write(x, data)
+                    runtime.launch(kernel, 100, None, x, np.float32(factor), np.uint32(100))
+                    result = runtime.download(x)
+                    if not np.all(result == factor * factor):
+                        wrong.append((factor, result))
+        except Exception as exc:  # an assertion in a thread would be lost
+            wrong.append(exc)
+
+    threads = [threading.Thread(target=work, args=(factor,)) for factor in (2, 3, 5, 7)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert wrong == []
+
+
+def test_every_kind_of_argument(runtime, scale_file):
+    kernel = runtime.kernel(scale_file, "spread", {"ADD": 0})
+    data = np.arange(8, dtype=np.float32)
+    vector = np.array([1, 2, 3, 4], np.float32)
+    with runtime.upload(data) as x, runtime.buffer(x.shape) as y:
+        runtime.launch(kernel, 8, 4, x, y, vector, ocl.LocalMemory(16))
+        np.testing.assert_array_equal(runtime.download(y), [3, 2, 1, 0, 7, 6, 5, 4])
+        runtime.launch(kernel, (8,), (4,), None, y, vector, ocl.LocalMemory(16))
+        np.testing.assert_array_equal(runtime.download(y), np.full(8, 4))
+
+
+def test_bad_launches_name_the_kernel(runtime, scale_file):
+    kernel = runtime.kernel(scale_file, "scale", {"ADD": 0})
+    with runtime.buffer((8,), name="eight") as x:
+        good = (x, np.float32(1), np.uint32(8))
+        with pytest.raises(InvalidArgumentError, match="'scale' of .*takes 3 arguments, 1 were"):
+            runtime.launch(kernel, 8, None, x)
+        with pytest.raises(TypeError, match="argument 1 of kernel 'scale' is 1.0 of type float"):
+            runtime.launch(kernel, 8, None, x, 1.0, np.uint32(8))
+        with pytest.raises(InvalidArgumentError, match=r"\(8,\) is no multiple of .*\(3,\)"):
+            runtime.launch(kernel, 8, 3, *good)
+        with pytest.raises(InvalidArgumentError, match="no multiple"):
+            runtime.launch(kernel, (8, 1), 8, *good)
+        with pytest.raises(DeviceError, match="failed while launching 'scale'.*2097152") as caught:
+            runtime.launch(kernel, 2**21, 2**21, *good)
+        assert caught.value.__cause__ is not None
+        with pytest.raises(DeviceError, match="argument 1|SIZE"):
+            runtime.launch(kernel, 8, None, x, np.float64(1), np.uint32(8))
+        runtime.launch(kernel, (0,), None, *good)  # nothing to do is no error
+    with pytest.raises(DeviceError, match="'eight' was used after its release"):
+        runtime.launch(kernel, 8, None, *good)
+
+
+def test_padded():
+    assert ocl.padded((1280, 721), (16, 4)) == (1280, 724)
+    assert ocl.padded(0, 64) == (0,)
+
+
+def test_preferred_group_is_allowed(runtime):
+    width, height = runtime.preferred_group
+    assert width * height <= runtime._device.max_work_group_size
+
+
+# -- queues and profiling ----------------------------------------------------------------------
+
+
+def test_queue_scope_gives_a_thread_its_own_queue(runtime, scale_file):
+    kernel = runtime.kernel(scale_file, "scale", {"ADD": 1})
+    outer = runtime._queue
+    with runtime.buffer((4,)) as x:
+        runtime.fill(x, 0)
+        with runtime.queue_scope():
+            assert runtime._queue is not outer
+            with runtime.queue_scope():
+                runtime.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
+            runtime.launch(kernel, 4, None, x, np.float32(2), np.uint32(4))
+            assert len(runtime._queues) == 2
+        assert runtime._queue is outer
+        assert len(runtime._queues) == 1
+        assert np.all(runtime.download(x) == 3)
+
+
+def test_profile_counts_calls_and_sums_times(runtime, scale_file, monkeypatch):
+    monkeypatch.setattr("atexit.register", lambda function: None)
+    monkeypatch.setattr(profiling, "PENDING_LIMIT", 3)
+    monkeypatch.setenv("PYVISTA_VDI_PROFILE", "1")
+    profiled = Runtime(devices.Candidate(runtime.info, runtime._device))
+    kernel = profiled.kernel(scale_file, "scale", {"ADD": 1})
+    with profiled.buffer((4,)) as x:
+        profiled.fill(x, 0)
+        for _ in range(7):
+            profiled.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
+        profiled.download(x)
+    rows = {row.name: row for row in profiled.profile()}
+    assert {name: row.calls for name, row in rows.items()} == {"scale": 7, "[fill]": 1, "[read]": 1}
+    assert rows["scale"].total_ms >= 0
+    assert rows["scale"].mean_ms == pytest.approx(rows["scale"].total_ms / 7)
+    assert sum(row.share for row in rows.values()) == pytest.approx(1)
+    assert runtime.profile() == []
+
+
+def test_profile_table_is_printed_at_exit(runtime):
+    code = (
+        "from pyvista_vdi.opencl_runtime import get_runtime\n"
+        f"get_runtime({runtime.info.selector!r})"
+    )
+    done = run_python(code, PYVISTA_VDI_PROFILE="1")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
+    lines = [line.split() for line in done.stderr.splitlines()]
+    head = lines.index(["kernel", "calls", "total", "ms", "mean", "ms", "share"])
+    assert ["probe", "1"] in [line[:2] for line in lines[head + 1 :]]
+    assert run_python(code, PYVISTA_VDI_PROFILE="0").stderr == ""
+
+
+def test_no_rounding_option_is_left_out_or_invented(runtime):
+    cl = devices.opencl()
+    offered = runtime._device.single_fp_config & cl.device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT
+    options = runtime._programs._base_options
+    assert ("-cl-fp32-correctly-rounded-divide-sqrt" in options) == bool(offered)
+    assert not any("relaxed" in option or "unsafe" in option for option in options)

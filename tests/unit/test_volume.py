@@ -1,0 +1,128 @@
+"""The volume: which arrays it takes, its grid, and what it refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import strategies
+from hypothesis import given
+from strategies import GENERATORS
+
+from pyvista_vdi.errors import InvalidVolumeError
+from pyvista_vdi.volume import VOXEL_TYPES, Volume
+
+
+@pytest.mark.parametrize("dtype", VOXEL_TYPES)
+def test_supported_types_are_taken_as_they_are(dtype):
+    array = np.zeros((2, 3, 4), dtype=dtype)
+    volume = Volume(array)
+    assert np.shares_memory(volume.array, array)
+    assert volume.array.dtype == dtype
+    assert volume.dimensions == (4, 3, 2)
+    assert repr(volume) == f"Volume(4 x 3 x 2 {dtype}, spacing=(1.0, 1.0, 1.0))"
+
+
+@pytest.mark.parametrize(
+    ("given_type", "held"),
+    [("bool", "uint8"), ("float16", "float32"), ("int64", "float64"), ("uint64", "float64"),
+     (">i2", "int16"), (">f8", "float64"), ("<f4", "float32")],
+)  # fmt: skip
+def test_other_types_are_widened_without_loss(given_type, held):
+    array = (np.arange(27).reshape(3, 3, 3) % 2).astype(given_type)
+    volume = Volume(array)
+    assert volume.array.dtype == np.dtype(held)
+    assert volume.array.dtype.isnative
+    np.testing.assert_array_equal(volume.array, array)
+
+
+def test_arrays_that_are_not_contiguous_are_copied():
+    array = np.arange(60, dtype=np.uint8).reshape(3, 4, 5)
+    volume = Volume(array.transpose(2, 1, 0))
+    assert volume.array.flags.c_contiguous
+    assert volume.dimensions == (3, 4, 5)
+    np.testing.assert_array_equal(volume.array, array.T)
+
+
+def test_whole_numbers_beyond_float64_are_refused():
+    with pytest.raises(InvalidVolumeError, match="hold values up to 9007199254740993"):
+        Volume(np.full((2, 2, 2), 2**53 + 1))
+
+
+@given(GENERATORS)
+def test_the_grid_s_points_are_where_vtk_puts_them(rng):
+    """origin + direction @ (spacing * index), and bounds that just hold all of them."""
+    volume = strategies.random_volume(rng, "uint8", direction=strategies.random_rotation(rng))
+    index = np.stack(np.meshgrid(*(np.arange(n) for n in volume.dimensions)), axis=-1).reshape(
+        -1, 3
+    )
+    points = volume.origin + (volume.direction @ (np.array(volume.spacing) * index).T).T
+    matrix = volume.index_to_model
+    np.testing.assert_allclose(index @ matrix[:3, :3].T + matrix[:3, 3], points, atol=1e-12)
+    low, high = np.reshape(volume.bounds, (3, 2)).T
+    np.testing.assert_allclose(points.min(axis=0), low, atol=1e-12)
+    np.testing.assert_allclose(points.max(axis=0), high, atol=1e-12)
+    assert volume.length == pytest.approx(np.linalg.norm(high - low))
+
+
+def test_length_and_unit_distance_are_pyvista_s():
+    """``Plotter.add_volume`` takes the data set's length over the mean dimension less one."""
+    pv = pytest.importorskip("pyvista")
+    grid = pv.ImageData(dimensions=(4, 6, 9), spacing=(0.5, 1, 2), origin=(1, 2, 3))
+    volume = Volume(np.zeros((9, 6, 4)), (0.5, 1, 2), (1, 2, 3))
+    np.testing.assert_allclose(volume.bounds, grid.bounds)
+    assert volume.length == pytest.approx(grid.length)
+    assert volume.default_unit_distance == pytest.approx(
+        grid.length / (np.mean(grid.dimensions) - 1)
+    )
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "int16", "float32", "float64"])
+def test_finite_range_leaves_nan_out(dtype):
+    array = np.arange(8).reshape(2, 2, 2).astype(dtype)
+    if array.dtype.kind == "f":
+        array[0, 0, 0] = np.nan
+        assert Volume(array).finite_range() == (1, 7)
+    else:
+        assert Volume(array).finite_range() == (0, 7)
+
+
+def test_a_volume_of_nan_is_refused_when_its_range_is_asked():
+    volume = Volume(np.full((2, 2, 2), np.nan), name="density")
+    with pytest.raises(InvalidVolumeError, match="every value of 'density' is NaN"):
+        volume.finite_range()
+
+
+@pytest.mark.parametrize(
+    ("array", "message"),
+    [
+        (np.zeros((3, 3)), r"three-dimensional array; got shape \(3, 3\)$"),
+        (np.zeros((3, 3, 3, 4)), r"got shape \(3, 3, 3, 4\): give one scalar per point"),
+        (np.zeros((0, 3, 3)), r"the volume is empty: its shape is \(0, 3, 3\)"),
+        (np.zeros((1, 3, 3)), "only one plane of points.* at least two points along each axis"),
+        (np.zeros((3, 3, 1)), "only one plane of points"),
+        (np.zeros((2, 2, 2), dtype=complex), "voxels of type complex128 are not supported"),
+        (np.full((2, 2, 2), "a"), "are not supported: convert to one of uint8"),
+        (np.full((2, 2, 2), None), "voxels of type object are not supported"),
+    ],
+)
+def test_arrays_that_are_no_volume_are_refused(array, message):
+    with pytest.raises(InvalidVolumeError, match=message):
+        Volume(array)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"spacing": (1, 0, 1)}, r"spacing must be positive .* got \(1.0, 0.0, 1.0\)"),
+        ({"spacing": (1, 1, -1)}, "flip the array"),
+        ({"spacing": (1, 1)}, "spacing must be three finite numbers"),
+        ({"spacing": "thin"}, "spacing must be three finite numbers; got 'thin'"),
+        ({"origin": (0, 0, np.inf)}, "origin must be three finite numbers"),
+        ({"direction": np.eye(4)}, "direction must be 3 x 3 finite numbers"),
+        ({"direction": np.full((3, 3), np.nan)}, "direction must be 3 x 3 finite numbers"),
+        ({"direction": np.diag([1, 1, 0])}, "cannot be inverted"),
+    ],
+)
+def test_impossible_grids_are_refused(changes, message):
+    with pytest.raises(InvalidVolumeError, match=message):
+        Volume(np.zeros((2, 2, 2)), **changes)
