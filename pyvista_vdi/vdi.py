@@ -102,7 +102,8 @@ class VDI:
     def counts(self) -> NDArray[np.int64]:
         """Supersegments per list, int64 (H, W), bottom row first."""
         width, height = self.window_size
-        counts: NDArray[np.int64] = np.diff(self.offsets.astype(np.int64))
+        starts = self.offsets.astype(np.int64)
+        counts = starts[1:] - starts[:-1]
         return counts.reshape(height, width)
 
     @property

@@ -44,8 +44,10 @@ class Painter:
         self._active = vtkWeakReference()
         self._observed: set[str] = set()
         self._texture: Any = None
-        self._uploaded: Any = None
-        self._images: dict[Any, tuple[NDArray[np.float32] | None, Image]] = {}
+        self._uploaded: int | None = None
+        self._drawn: VDI | None = None
+        self._images: dict[Any, tuple[NDArray[np.float32] | None, Image, int]] = {}
+        self._raycasts = 0
         self._last: Image = np.zeros((1, 1, 4), dtype=np.float32)
         self._warned: set[str] = set()
         self._failed_at: Any = None
@@ -108,9 +110,9 @@ class Painter:
         if renderer is None:
             self._warn("VDIMapper draws only behind a VDIActor: use VDIActor in place of vtkVolume")
             return
-        image, key = self._last, None
+        image, number = self._last, None
         try:
-            image, key = self._paint(mapper, renderer)
+            image, number = self._paint(mapper, renderer)
             self._last = image
         except KeyboardInterrupt:
             self._warn(
@@ -120,14 +122,15 @@ class Painter:
         except Exception as error:  # VTK would swallow it
             self._warn(f"the VDI cannot be drawn: {type(error).__name__}: {error}")
             _log.debug("while drawing a VDI", exc_info=True)
-        self._upload(renderer.GetRenderWindow(), image, key)
+        self._upload(renderer.GetRenderWindow(), image, number)
 
     def end(self) -> None:
         """Let go of the texture unit."""
         if self._texture is not None:
             self._texture.Deactivate()
 
-    def _paint(self, mapper: Any, renderer: Any) -> tuple[Image, Any]:
+    def _paint(self, mapper: Any, renderer: Any) -> tuple[Image, int | None]:
+        """Return the frame's image and its number, by which an upload is known."""
         actor = self._actor.Get()
         model_transform = as_array(actor.GetMatrix())
         frame = Frame.current(renderer, model_transform)
@@ -145,10 +148,13 @@ class Painter:
             depth = frame.opaque_depth(renderer)
             if np.isposinf(depth).all():
                 depth = None
-        key = (id(vdi), frame.camera, frame.size, None if planes is None else planes.tobytes())
+        if vdi is not self._drawn:
+            self._images.clear()
+            self._drawn = vdi
+        key = (frame.camera, frame.size, None if planes is None else planes.tobytes())
         kept = self._images.get(key)
         if kept is not None and _same(kept[0], depth):
-            return kept[1], (key, id(kept[1]))
+            return kept[1], kept[2]
         image = render_vdi(
             vdi,
             frame.camera,
@@ -159,10 +165,11 @@ class Painter:
         )
         image = np.ascontiguousarray(image[::-1])  # a texture's first row is the bottom one
         self._images.pop(key, None)
-        self._images[key] = (depth, image)
+        self._raycasts += 1
+        self._images[key] = (depth, image, self._raycasts)
         while len(self._images) > _KEPT_IMAGES:
             del self._images[next(iter(self._images))]
-        return image, (key, id(image))
+        return image, self._raycasts
 
     def _current_vdi(self, renderer: Any, model_transform: NDArray[np.float64]) -> VDI | None:
         """Bring the input up to date, but do not repeat what failed until something changes."""
@@ -181,7 +188,7 @@ class Painter:
         self._failed_at = None
         return vdi
 
-    def _upload(self, window: Any, image: Image, key: Any) -> None:
+    def _upload(self, window: Any, image: Image, number: int | None) -> None:
         if self._texture is None:
             self._texture = vtkTextureObject()
             self._texture.SetMinificationFilter(vtkTextureObject.Nearest)
@@ -192,10 +199,10 @@ class Painter:
         if texture.GetContext() is not window:
             texture.SetContext(window)
             self._uploaded = None
-        if key is None or key != self._uploaded or texture.GetHandle() == 0:
+        if number is None or number != self._uploaded or texture.GetHandle() == 0:
             height, width = image.shape[:2]
             texture.Create2DFromRaw(width, height, 4, VTK_FLOAT, image)
-            self._uploaded = key
+            self._uploaded = number
         texture.Activate()
         # The sampler of the actor's shader keeps its default, unit 0: see actor.py
         if texture.GetTextureUnit() != 0:

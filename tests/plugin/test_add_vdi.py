@@ -153,6 +153,19 @@ def test_camera_moves_never_generate_and_equal_frames_are_kept(plotter, calls):
     assert actor.vdi is made
 
 
+def test_moving_opaque_geometry_is_seen_without_moving_the_camera(plotter, calls):
+    plotter.add_vdi(soft_ball(), **LOOKS)
+    sphere = plotter.add_mesh(pv.Sphere(radius=0.4), color="w", reset_camera=False)
+    first = shown(plotter)
+    for _ in range(3):  # images are freed and made anew: none may be taken for another
+        sphere.position = (0.6, 0, 0)
+        moved = shown(plotter)
+        assert np.abs(moved - first).max() > 40
+        sphere.position = (0, 0, 0)
+        np.testing.assert_array_equal(shown(plotter), first)
+    assert calls["generate"] == 1
+
+
 def test_given_camera_and_the_scale_of_the_renderer(plotter):
     plotter.set_scale(zscale=2.0)
     camera = pv.Camera()

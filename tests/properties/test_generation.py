@@ -17,7 +17,7 @@ import strategies
 from pyvista_vdi import reference
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
-from pyvista_vdi.generate import generate_vdi
+from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.raycast_volume import raycast_volume
 from pyvista_vdi.reference.generate import medium_at, near_depth
