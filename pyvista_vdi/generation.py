@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ._version import __version__
 from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
-from .device_volume import DeviceVolume
+from .device_volume import DeviceVolume, checked_sample_distance
 from .errors import Cancelled, InvalidArgumentError
 from .opencl_runtime import Runtime, get_runtime
 from .transfer_function import TransferFunction
@@ -30,7 +30,7 @@ _SLICE_BYTES = 96 * 2**20
 #: Merge error that no picture shows: a difference of a thousandth of full opacity over one voxel.
 _INDISTINGUISHABLE = 1e-6
 #: Steps of a ray between two looks at the length of its record.
-_CHUNK_STEPS = 128
+_CHUNK_STEPS = 256
 
 Progress = Callable[[float], object]
 
@@ -98,7 +98,7 @@ def estimate(
     limit = check_max_supersegments(max_supersegments)
     item = min(volume.array.dtype.itemsize, 4)  # float64 is scaled to float32 for the device
     lists = width * height
-    plan = _Slices(width, height, limit)
+    plan = _Slices(width, height, limit, _grain(volume, checked_sample_distance(volume, None)))
     return Estimate(
         volume=volume.array.size * item,
         vdi_worst_case=lists * (limit * 24 + 8) + 8,
@@ -224,15 +224,26 @@ def generate_vdi(
 class _Slices:
     """How many rows of lists are made at a time, and the buffers that this takes."""
 
-    def __init__(self, width: int, height: int, limit: int) -> None:
+    def __init__(self, width: int, height: int, limit: int, grain: int) -> None:
+        self.grain = grain
         # Twice the budget: the records' thresholds then stay well below the final merges' errors
         self.kept = max(2 * limit, limit + 12)
-        self.capacity = self.kept + _CHUNK_STEPS
+        self.capacity = self.kept + -(-_CHUNK_STEPS // grain)
         per_block_row = block_items(width, 4) * self.capacity * _RUN_BYTES
         self.rows = min(height, 4 * max(1, _SLICE_BYTES // per_block_row))
         self.items = block_items(width, self.rows)
         packed_bytes = self.items * (limit * 24 + 8)
         self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + packed_bytes
+
+
+def _grain(volume: Volume, sample_distance: float) -> int:
+    """Steps within a voxel: they are composited before homogeneity is asked about.
+
+    Measured: the error of a VDI changes by less than .003 SSIM either way, generation is a fifth
+    faster (docs/performance.md).
+    """
+    # A hair more, so that half a voxel divides a voxel twice whatever the rounding
+    return int(max(1, min(min(volume.spacing) / sample_distance * (1 + 1e-9), _CHUNK_STEPS)))
 
 
 class _Recorder:
@@ -260,7 +271,7 @@ class _Recorder:
         forms, rays, self._planes = medium.forms(camera, size, None)
         self.depth_origin = rays.reference_depth
         self._most_steps = int(np.ceil(medium.volume.length / medium.sample_distance)) + 1
-        self.slices = _Slices(*size, limit)
+        self.slices = _Slices(*size, limit, _grain(medium.volume, medium.sample_distance))
         items, capacity = self.slices.items, self.slices.capacity
         self._kernels = {
             name: runtime.kernel("vdi/generate.cl", name, medium.defines)
@@ -299,6 +310,7 @@ class _Recorder:
                 np.float32(medium.sample_distance),
                 np.float32(medium.unit_distance),
                 *(np.int32(n) for n in (width, height, first_row, rows, first_step, _CHUNK_STEPS)),
+                np.int32(self.slices.grain),
                 capacity,
                 *self._criterion,
                 self._thresholds,

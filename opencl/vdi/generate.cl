@@ -28,7 +28,8 @@ __kernel void march_lists(
     int width, int height,         // of V_O's window
     int first_row, int rows,
     int first_step, int steps,     // of this chunk
-    int capacity,                  // runs in a record: at least as many as are in it now and `steps` more
+    int grain,                     // steps that are composited before homogeneity is asked about
+    int capacity,                  // runs in a record: at least as many as are in it now and steps / grain more
     float reference_length,        // model units
     float hidden_weight,           // weight of what the view from V_O cannot see, 0 to 1
     __global const float *thresholds, // merge errors up to this are accepted, one per ray
@@ -63,22 +64,31 @@ __kernel void march_lists(
         seen = seen_weight(run, hidden_weight);
         transmittance = run.TRANSMITTANCE - run.TRANSMITTANCE * run.OPACITY;
     }
-    float front = step_face(&march, first_step);
-    for (int k = first_step; k < min(first_step + steps, march.steps); ++k) {
-        const float back = step_face(&march, k + 1);
-        const float4 step = step_medium(&march, &medium, front, back);
-        const float opacity = opacity_of(step.w);
-        if (opacity > 0.0f && back > front) {
-            const float8 sample = (float8)(front, back, step.w, transmittance, step.xyz * opacity, opacity);
-            const float sample_length = (back - front) * per_reference;
-            const float density = step.w / (step.w + sample_length);
-            const float4 sample_feature = (float4)(step.xyz * density, density);
-            transmittance -= transmittance * opacity;
+    const int end = min(first_step + steps, march.steps);
+    float face = step_face(&march, first_step);
+    for (int k = first_step; k < end;) {
+        // A grain: the steps within one voxel, composited without asking
+        float8 sample = (float8)(face, face, 0.0f, transmittance, 0.0f, 0.0f, 0.0f, 0.0f);
+        for (const int grain_end = min(k + grain, end); k < grain_end; ++k) {
+            const float back = step_face(&march, k + 1);
+            const float4 step = step_medium(&march, &medium, face, back);
+            const float opacity = opacity_of(step.w);
+            const float weight = (1.0f - sample.OPACITY) * opacity; // over, front to back
+            sample.TAU += step.w;
+            sample.COLOR += weight * step.xyz;
+            sample.OPACITY += weight;
+            face = back;
+        }
+        sample.BACK = face;
+        if (sample.OPACITY > 0.0f && sample.BACK > sample.FRONT) {
+            const float sample_length = (sample.BACK - sample.FRONT) * per_reference;
+            const float4 sample_feature = run_feature(sample, per_reference);
+            transmittance -= transmittance * sample.OPACITY;
             // Against the run's mean feature so far, which is cheaper to keep than its medium's; a gap ends a run
             const float share = sample_length / (run_length + sample_length);
             const float4 difference = sample_feature - feature;
             const float error = run_length * share * dot(difference, difference) * seen;
-            if (run.BACK == front && error <= threshold) {
+            if (run.BACK == sample.FRONT && error <= threshold) {
                 run = merged_runs(run, sample);
                 feature += share * difference;
                 run_length += sample_length;
@@ -92,7 +102,6 @@ __kernel void march_lists(
                 seen = seen_weight(run, hidden_weight);
             }
         }
-        front = back;
     }
     if (count > 0)
         store_run(record, count - 1, run);

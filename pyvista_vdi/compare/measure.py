@@ -73,7 +73,7 @@ class Settings:
     sample_distance : float, optional
         The accuracy step, model units; half the smallest spacing by default.
     repeats : int
-        Timed frames of each candidate and view.
+        Timed frames of each candidate and view; 0 compares pictures and times nothing.
     vtk : bool
         Whether VTK's mappers take part.
     device : optional
@@ -93,8 +93,8 @@ class Settings:
     name: str = "volume"
 
     def __post_init__(self) -> None:
-        if isinstance(self.repeats, bool) or not 1 <= self.repeats <= 1000:
-            raise InvalidArgumentError(f"repeats must be from 1 to 1000; got {self.repeats!r}")
+        if isinstance(self.repeats, bool) or not 0 <= self.repeats <= 1000:
+            raise InvalidArgumentError(f"repeats must be from 0 to 1000; got {self.repeats!r}")
         if not self.angles or not all(math.isfinite(a) for a in self.angles):
             raise InvalidArgumentError(
                 f"angles must be one or more numbers of degrees; got {self.angles!r}"
@@ -124,7 +124,7 @@ class AngleResult:
     fixed_point_to_gpu : Comparison, optional
         VTK's fixed-point mapper against VTK's GPU mapper.
     seconds : dict of str to Timing
-        Frame times at steps of one voxel, by the keys of :data:`NAMES`.
+        Frame times at steps of one voxel, by the keys of :data:`NAMES`; empty if not timed.
     """
 
     angle: float
@@ -140,8 +140,10 @@ class AngleResult:
         return self.seconds["vdi"].median / min(peers) if peers else None
 
     @property
-    def ratio_to_raycaster(self) -> float:
+    def ratio_to_raycaster(self) -> float | None:
         """VDI's frame time over that of our volume raycaster."""
+        if not self.seconds:
+            return None
         return self.seconds["vdi"].median / self.seconds["raycaster"].median
 
 
@@ -157,8 +159,9 @@ class Report:
         Device, driver, OpenGL, versions.
     sizes : dict of str to int
         Supersegments, lists, and bytes: of the volume, of the VDI in memory, of its dense form.
-    generation_seconds, full_raycast_seconds : Timing
-        Generation, and our volume raycaster at the same step without early termination.
+    generation_seconds, full_raycast_seconds : Timing, optional
+        Generation, and our volume raycaster at the same step without early termination; ``None``
+        where nothing was timed.
     angles : list of AngleResult
         By view.
     """
@@ -166,13 +169,15 @@ class Report:
     case: dict[str, Any]
     system: dict[str, str]
     sizes: dict[str, int]
-    generation_seconds: Timing
-    full_raycast_seconds: Timing
+    generation_seconds: Timing | None
+    full_raycast_seconds: Timing | None
     angles: list[AngleResult] = field(default_factory=list)
 
     @property
-    def generation_ratio(self) -> float:
+    def generation_ratio(self) -> float | None:
         """Generation time over that of the full raycast at the same step."""
+        if self.generation_seconds is None or self.full_raycast_seconds is None:
+            return None
         return self.generation_seconds.median / self.full_raycast_seconds.median
 
     def to_dict(self) -> dict[str, Any]:
@@ -259,14 +264,17 @@ class _Bench:
         """How often the progress is reported."""
         n_angles, n_candidates = len(self._settings.angles), 4 if self._settings.vtk else 2
         repeats = self._settings.repeats
-        return 2 * repeats + n_angles * n_candidates * (1 + 1 + repeats)
+        frames = 1 + repeats if repeats else 0
+        return 2 * repeats + n_angles * n_candidates * (1 + frames)
 
-    def generate(self, done: Callable[[], None]) -> tuple[VDI, Timing, Timing]:
-        """Generate the VDI, in turn with a full raycast at the same step."""
+    def generate(self, done: Callable[[], None]) -> tuple[VDI, Timing | None, Timing | None]:
+        """Generate the VDI, in turn with a full raycast at the same step where that is timed."""
+        size = self._settings.window_size
+        if self._settings.repeats == 0:
+            return self._generated(size), None, None
         self._generated(_WARM_UP_SIZE)
         self._raycast(self.view, _WARM_UP_SIZE, self.step, early_termination=False)
         vdi: list[VDI] = []
-        size = self._settings.window_size
 
         def generate() -> None:
             vdi[:] = [self._generated(size)]
@@ -304,6 +312,8 @@ class _Bench:
         self, vdi: VDI, angle: float, peers: Mapping[str, Any], done: Callable[[], None]
     ) -> dict[str, Timing]:
         """Time frames at steps of one voxel."""
+        if self._settings.repeats == 0:
+            return {}
         camera, size = self.view.azimuth(angle), self._settings.window_size
         frames: dict[str, Callable[[], Any]] = {
             "vdi": lambda: render_vdi(vdi, camera, size, device=self._device),

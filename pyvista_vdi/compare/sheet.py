@@ -56,20 +56,10 @@ def table(report: Report) -> str:
             comparison = getattr(result, attribute)
             if comparison is not None:
                 lines.append(_picture_line(label, result.angle, comparison))
+    if case["repeats"]:
+        lines += _timing_lines(report)
     lines += [
         "",
-        f"Frames, ms (median of {case['repeats']}; steps of one voxel)",
-        "angle  " + "  ".join(f"{NAMES[n]:>22}" for n in _candidates(report)) + "   VDI / VTK",
-    ]
-    for result in report.angles:
-        times = "  ".join(f"{result.seconds[n].median * 1e3:22.1f}" for n in _candidates(report))
-        ratio = result.ratio_to_vtk
-        lines.append(f"{result.angle:5g}  {times}   {'-' if ratio is None else f'{ratio:9.2f}'}")
-    lines += [
-        "VDI / VTK: the VDI's frame time over that of the faster of VTK's two mappers",
-        "",
-        f"Generation {report.generation_seconds.median:.2f} s",
-        f"that is {report.generation_ratio:.2f} x our raycaster, same step, no early termination",
         f"Sizes: volume {_mebibytes(sizes['volume_bytes'])}, VDI "
         f"{_mebibytes(sizes['vdi_bytes'])} in memory ({sizes['supersegments']} supersegments in "
         f"{sizes['occupied_lists']} of {sizes['lists']} lists), dense form "
@@ -77,6 +67,27 @@ def table(report: Report) -> str:
         + (f", file {_mebibytes(sizes['file_bytes'])}" if "file_bytes" in sizes else ""),
     ]
     return "\n".join(lines)
+
+
+def _timing_lines(report: Report) -> list[str]:
+    lines = [
+        "",
+        f"Frames, ms (median of {report.case['repeats']}; steps of one voxel)",
+        "angle  " + "  ".join(f"{NAMES[n]:>22}" for n in _candidates(report)) + "   VDI / VTK",
+    ]
+    for result in report.angles:
+        times = "  ".join(f"{result.seconds[n].median * 1e3:22.1f}" for n in _candidates(report))
+        ratio = result.ratio_to_vtk
+        lines.append(f"{result.angle:5g}  {times}   {'-' if ratio is None else f'{ratio:9.2f}'}")
+    lines.append("VDI / VTK: the VDI's frame time over that of the faster of VTK's two mappers")
+    if report.generation_seconds is not None:
+        ratio = f"{report.generation_ratio:.2f} x our raycaster"
+        lines += [
+            "",
+            f"Generation {report.generation_seconds.median:.2f} s",
+            f"that is {ratio}, same step, no early termination",
+        ]
+    return lines
 
 
 def contact_sheet(report: Report, images: Mapping[float, Images]) -> NDArray[np.uint8]:

@@ -151,10 +151,28 @@ def test_without_vtk(volume, default_runtime):
     assert contact_sheet(report, images).shape[1] == pytest.approx(3 * SIZE[0], abs=12)
 
 
+def test_without_timings(volume, default_runtime):
+    shade = pvdi.TransferFunction([(0, 0, 0), (1, 0.5, 0)], [0, 0.5], volume.finite_range())
+    settings = Settings({"transfer_function": shade}, SIZE, angles=(5,), repeats=0, vtk=False)
+    heard = []
+    report, _, images = measure(volume, settings, heard.append)
+    assert heard[-1] == 1
+    assert report.angles[0].vdi_to_raycaster == compare_images(
+        images[5]["vdi"], images[5]["raycaster"]
+    )
+    state = report.to_dict()
+    assert state["generation_ratio"] is None
+    assert state["angles"][0]["ratio_to_vtk"] is None
+    text = table(report)
+    assert "Frames" not in text
+    assert "Generation" not in text
+    assert "Sizes" in text
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"repeats": 0}, "repeats must be from 1 to 1000; got 0"),
+        ({"repeats": -1}, "repeats must be from 0 to 1000; got -1"),
         ({"angles": ()}, "angles must be one or more numbers"),
         ({"angles": (float("nan"),)}, "angles must be one or more numbers"),
     ],
