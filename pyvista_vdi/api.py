@@ -202,6 +202,7 @@ def render_volume(
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
     early_termination: bool = True,
+    skip_empty: bool = True,
     device: Any = None,
     **classification: Any,
 ) -> NDArray[np.float32]:
@@ -221,6 +222,8 @@ def render_volume(
         As for :func:`render`.
     early_termination : bool
         Stop a ray where what is behind can no longer be seen.
+    skip_empty : bool, default: True
+        Pass by blocks of the volume that are transparent; the picture is the same to the last bit.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     **classification
@@ -258,6 +261,7 @@ def render_volume(
         opaque_depth=opaque_depth,
         clipping_planes=clipping_planes,
         early_termination=early_termination,
+        skip_empty=skip_empty,
         device=device,
     )
 

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import rays
+from .blocks import GROUP
 from .camera import Camera
 from .errors import InvalidArgumentError
-from .opencl_runtime import DeviceBuffer, Runtime
+from .opencl_runtime import DeviceBuffer, Runtime, padded
 from .transfer_function import TransferFunction
 from .volume import Volume
 
@@ -25,7 +26,13 @@ _DEVICE_TYPES = {
     "int16": "short",
     "float32": "float",
 }
-_uploads: weakref.WeakKeyDictionary[Volume, dict[Any, DeviceBuffer]] = weakref.WeakKeyDictionary()
+#: Logarithm to base 2 of the points along each edge of a block that can be skipped.
+_BLOCK_SHIFT = 3
+#: Share of transparent blocks from which on looking for them pays.
+_WORTH_SKIPPING = 0.05
+_uploads: weakref.WeakKeyDictionary[Volume, dict[Any, tuple[DeviceBuffer, DeviceBuffer]]] = (
+    weakref.WeakKeyDictionary()
+)
 _lock = threading.Lock()
 
 
@@ -42,6 +49,8 @@ class DeviceVolume:
         Its table is uploaded each time: a few kilobytes.
     sample_distance : float, optional
         Length of a step, model units; half the smallest spacing by default.
+    skip_empty : bool
+        Pass by blocks that the transfer function makes transparent; the samples stay the same.
 
     Raises
     ------
@@ -57,6 +66,8 @@ class DeviceVolume:
         volume: Volume,
         transfer_function: TransferFunction,
         sample_distance: float | None = None,
+        *,
+        skip_empty: bool = True,
     ) -> None:
         if not isinstance(volume, Volume):
             raise InvalidArgumentError(f"expected a Volume, got {type(volume).__name__}")
@@ -69,23 +80,27 @@ class DeviceVolume:
         self.sample_distance = checked_sample_distance(volume, sample_distance)
         low, high = transfer_function.scalar_range
         native = volume.array.dtype.name in _DEVICE_TYPES
-        volume.finite_range()  # refuses a volume that is NaN throughout
-        self._voxels = _voxel_buffer(runtime, volume, None if native else (low, high))
+        scale = None if native else (low, high)
+        self.defines: dict[str, str | int | None] = {
+            "VOXEL_T": _DEVICE_TYPES.get(volume.array.dtype.name, "float"),
+            "INDEX_T": "ulong" if volume.array.size >= 2**32 else "uint",
+            "BLOCK_SHIFT": _BLOCK_SHIFT,
+        }
+        self._voxels, ranges = _upload(runtime, volume, scale, self.defines)
         self._low, span = (low, high - low) if native else (0.0, 1.0 if high > low else 0.0)
         table = np.column_stack([transfer_function.colors, transfer_function.opacities])
         self._entries = len(table)
         self._per_scalar = _per_scalar(self._entries, span)
         self._table = runtime.upload(np.ascontiguousarray(table), "transfer function")
-        self.defines: dict[str, str | int | None] = {
-            "VOXEL_T": _DEVICE_TYPES.get(volume.array.dtype.name, "float"),
-            "INDEX_T": "ulong" if volume.array.size >= 2**32 else "uint",
-        }
+        self._visible = self._visibility(runtime, ranges, transfer_function)
+        if skip_empty and self._empty_share(runtime) >= _WORTH_SKIPPING:
+            self.defines["SKIP_EMPTY"] = 1
         if transfer_function.interpolation == "nearest":
             self.defines["NEAREST"] = 1
 
     @property
     def medium_arguments(self) -> tuple[Any, ...]:
-        """Arguments ``voxels, size, table, entries, low, per_scalar`` of the kernels."""
+        """Arguments ``voxels`` to ``blocks`` of the kernels that march."""
         return (
             self._voxels,
             np.array([*self.volume.dimensions, 0], dtype=np.int32),
@@ -93,7 +108,37 @@ class DeviceVolume:
             np.int32(self._entries),
             np.float32(self._low),
             np.float32(self._per_scalar),
+            self._visible,
+            np.array([*_blocks(self.volume), 0], dtype=np.int32),
         )
+
+    def _visibility(
+        self, runtime: Runtime, ranges: DeviceBuffer, transfer_function: TransferFunction
+    ) -> DeviceBuffer:
+        """Return which blocks hold anything that is not transparent, uint8 on the device."""
+        n = int(np.prod(_blocks(self.volume)))
+        visible = runtime.buffer((n,), np.uint8, "visible blocks")
+        before = np.zeros(self._entries + 1, np.uint32)
+        np.cumsum(transfer_function.opacities > 0, out=before[1:])
+        kernel = runtime.kernel("grid/volume_blocks.cl", "block_visibility", self.defines)
+        with runtime.upload(before, "visible entries") as visible_before:
+            runtime.launch(
+                kernel,
+                padded(n, GROUP),
+                GROUP,
+                ranges,
+                np.uint32(n),
+                visible_before,
+                np.int32(self._entries),
+                np.float32(self._low),
+                np.float32(self._per_scalar),
+                visible,
+            )
+            runtime.finish()  # the table above may be host memory in use
+        return visible
+
+    def _empty_share(self, runtime: Runtime) -> float:
+        return 1.0 - float(np.mean(runtime.download(self._visible)))
 
     def forms(
         self, camera: Camera, window_size: Sequence[int], clipping_planes: ArrayLike | None
@@ -117,7 +162,7 @@ def checked_sample_distance(volume: Volume, sample_distance: float | None) -> fl
     """Return the length of a step in model units; half the smallest spacing by default."""
     if sample_distance is None:
         return min(volume.spacing) / 2
-    step = float(sample_distance)
+    step = as_float(sample_distance)
     # Beyond 2^24 steps across the bounds, float32 cannot number them
     least = volume.length / 2**24
     if not (np.isfinite(step) and step >= least):
@@ -125,7 +170,16 @@ def checked_sample_distance(volume: Volume, sample_distance: float | None) -> fl
             f"sample_distance must be a length of at least {least:.3g} model units "
             f"(2^-24 of the volume's diagonal); got {sample_distance!r}"
         )
-    return step
+    # No ray is longer than the diagonal; float32 may not hold how much longer the step is
+    return min(step, 2 * volume.length)
+
+
+def as_float(value: Any) -> float:
+    """Return ``value`` as a float, NaN where it is no number: range checks then refuse it."""
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        return float("nan")
 
 
 def _per_scalar(entries: int, span: float) -> float:
@@ -136,18 +190,51 @@ def _per_scalar(entries: int, span: float) -> float:
     return min((entries - 1) / span, largest) if span > 0 else largest
 
 
-def _voxel_buffer(
-    runtime: Runtime, volume: Volume, scale: tuple[float, float] | None
-) -> DeviceBuffer:
+def _blocks(volume: Volume) -> tuple[int, int, int]:
+    """Blocks along x, y and z that cover the cells of the grid."""
+    x, y, z = (-(-(points - 1) // 2**_BLOCK_SHIFT) for points in volume.dimensions)
+    return x, y, z
+
+
+def _upload(
+    runtime: Runtime,
+    volume: Volume,
+    scale: tuple[float, float] | None,
+    defines: dict[str, str | int | None],
+) -> tuple[DeviceBuffer, DeviceBuffer]:
+    """Return voxels and the scalar range of each block, made once per device and scaling."""
     with _lock:
         cache = _uploads.setdefault(volume, {})
         for other in [key for key in cache if key[0] is runtime and key[1] != scale]:
             del cache[other]  # one copy per device: the last classification's
         key = (runtime, scale)
         if key not in cache:
+            volume.finite_range()  # refuses a volume that is NaN throughout
             array = volume.array if scale is None else _scaled(volume.array, *scale)
-            cache[key] = runtime.upload(array, f"volume {volume.name!r}")
+            voxels = runtime.upload(array, f"volume {volume.name!r}")
+            cache[key] = (voxels, _block_ranges(runtime, volume, voxels, defines))
         return cache[key]
+
+
+def _block_ranges(
+    runtime: Runtime,
+    volume: Volume,
+    voxels: DeviceBuffer,
+    defines: dict[str, str | int | None],
+) -> DeviceBuffer:
+    blocks = _blocks(volume)
+    n = int(np.prod(blocks))
+    ranges = runtime.buffer((n, 2), name="ranges of blocks")
+    runtime.launch(
+        runtime.kernel("grid/volume_blocks.cl", "block_ranges", defines),
+        padded(n, GROUP),
+        GROUP,
+        voxels,
+        np.array([*volume.dimensions, 0], dtype=np.int32),
+        np.array([*blocks, 0], dtype=np.int32),
+        ranges,
+    )
+    return ranges
 
 
 def _scaled(array: NDArray[Any], low: float, high: float) -> NDArray[np.float32]:

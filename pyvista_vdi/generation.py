@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ._version import __version__
 from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
-from .device_volume import DeviceVolume, checked_sample_distance
+from .device_volume import DeviceVolume, as_float
 from .errors import Cancelled, InvalidArgumentError
 from .opencl_runtime import Runtime, get_runtime
 from .transfer_function import TransferFunction
@@ -30,7 +30,9 @@ _SLICE_BYTES = 96 * 2**20
 #: Merge error that no picture shows: a difference of a thousandth of full opacity over one voxel.
 _INDISTINGUISHABLE = 1e-6
 #: Steps of a ray between two looks at the length of its record.
-_CHUNK_STEPS = 256
+_CHUNK_STEPS = 128
+#: The same at first: short, so that rays which cannot keep every detail learn it soon.
+_FIRST_CHUNK_STEPS = 64
 
 Progress = Callable[[float], object]
 
@@ -98,7 +100,7 @@ def estimate(
     limit = check_max_supersegments(max_supersegments)
     item = min(volume.array.dtype.itemsize, 4)  # float64 is scaled to float32 for the device
     lists = width * height
-    plan = _Slices(width, height, limit, _grain(volume, checked_sample_distance(volume, None)))
+    plan = _Slices(width, height, limit)
     return Estimate(
         volume=volume.array.size * item,
         vdi_worst_case=lists * (limit * 24 + 8) + 8,
@@ -224,11 +226,10 @@ def generate_vdi(
 class _Slices:
     """How many rows of lists are made at a time, and the buffers that this takes."""
 
-    def __init__(self, width: int, height: int, limit: int, grain: int) -> None:
-        self.grain = grain
+    def __init__(self, width: int, height: int, limit: int) -> None:
         # Twice the budget: the records' thresholds then stay well below the final merges' errors
         self.kept = max(2 * limit, limit + 12)
-        self.capacity = self.kept + -(-_CHUNK_STEPS // grain)
+        self.capacity = self.kept + _CHUNK_STEPS
         per_block_row = block_items(width, 4) * self.capacity * _RUN_BYTES
         self.rows = min(height, 4 * max(1, _SLICE_BYTES // per_block_row))
         self.items = block_items(width, self.rows)
@@ -236,14 +237,22 @@ class _Slices:
         self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + packed_bytes
 
 
-def _grain(volume: Volume, sample_distance: float) -> int:
-    """Steps within a voxel: they are composited before homogeneity is asked about.
+def _steps_per_voxel(volume: Volume, sample_distance: float) -> int:
+    """Steps that a ray whose record has been full composites before it asks about homogeneity.
 
-    Measured: the error of a VDI changes by less than .003 SSIM either way, generation is a fifth
-    faster (docs/performance.md).
+    Measured: such a VDI's SSIM changes by less than .003 either way, and generation is up to a
+    fifth faster (docs/performance.md). Rays that keep every detail are asked at every step.
     """
     # A hair more, so that half a voxel divides a voxel twice whatever the rounding
     return int(max(1, min(min(volume.spacing) / sample_distance * (1 + 1e-9), _CHUNK_STEPS)))
+
+
+def _chunks(steps: int) -> Iterator[tuple[int, int]]:
+    """First step and number of steps of each chunk that a march of ``steps`` steps is cut into."""
+    first, length = 0, _FIRST_CHUNK_STEPS
+    while first < steps:
+        yield first, length
+        first, length = first + length, _CHUNK_STEPS
 
 
 class _Recorder:
@@ -263,7 +272,8 @@ class _Recorder:
         self._medium = medium
         self._size = size
         self._limit = limit
-        self._threshold = np.float32(max(tolerance**2, _INDISTINGUISHABLE))
+        # Differences stay below 1e18, whose square float32 still holds
+        self._threshold = np.float32(max(min(tolerance, 1e18) ** 2, _INDISTINGUISHABLE))
         self._criterion = (
             np.float32(min(medium.volume.spacing)),  # reference length: a voxel
             np.float32(hidden_weight),
@@ -271,7 +281,8 @@ class _Recorder:
         forms, rays, self._planes = medium.forms(camera, size, None)
         self.depth_origin = rays.reference_depth
         self._most_steps = int(np.ceil(medium.volume.length / medium.sample_distance)) + 1
-        self.slices = _Slices(*size, limit, _grain(medium.volume, medium.sample_distance))
+        self.slices = _Slices(*size, limit)
+        self._grain = _steps_per_voxel(medium.volume, medium.sample_distance)
         items, capacity = self.slices.items, self.slices.capacity
         self._kernels = {
             name: runtime.kernel("vdi/generate.cl", name, medium.defines)
@@ -300,7 +311,7 @@ class _Recorder:
         runtime.fill(self._counts, np.uint32(0))
         runtime.fill(self._thresholds, self._threshold)
         capacity = np.int32(self.slices.capacity)
-        for first_step in range(0, self._most_steps, _CHUNK_STEPS):
+        for first_step, steps in _chunks(self._most_steps):
             self._launch(
                 "march_lists",
                 items,
@@ -309,15 +320,16 @@ class _Recorder:
                 np.int32(self._planes),
                 np.float32(medium.sample_distance),
                 np.float32(medium.unit_distance),
-                *(np.int32(n) for n in (width, height, first_row, rows, first_step, _CHUNK_STEPS)),
-                np.int32(self.slices.grain),
+                *(np.int32(n) for n in (width, height, first_row, rows, first_step, steps)),
+                np.int32(self._grain),
+                self._threshold,
                 capacity,
                 *self._criterion,
                 self._thresholds,
                 self._records,
                 self._counts,
             )
-            last = first_step + _CHUNK_STEPS >= self._most_steps
+            last = first_step + steps >= self._most_steps
             self._launch(
                 "shorten_lists",
                 items,
@@ -368,13 +380,14 @@ class _Recorder:
 
 
 def _check_criterion(tolerance: float, view_cone: float) -> tuple[float, float]:
-    if not (np.isfinite(tolerance) and tolerance >= 0):
+    difference, angle = as_float(tolerance), as_float(view_cone)
+    if not (np.isfinite(difference) and difference >= 0):
         raise InvalidArgumentError(f"tolerance must be a number >= 0; got {tolerance!r}")
-    if not 0 <= view_cone <= 90:
+    if not 0 <= angle <= 90:
         raise InvalidArgumentError(
             f"view_cone must be an angle between 0 and 90 degrees; got {view_cone!r}"
         )
-    return float(tolerance), float(1 - np.cos(np.radians(view_cone)))
+    return difference, float(1 - np.cos(np.radians(angle)))
 
 
 def _report(progress: Progress | None, fraction: float) -> None:

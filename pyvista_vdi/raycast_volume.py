@@ -28,6 +28,7 @@ def raycast_volume(
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
     early_termination: bool = True,
+    skip_empty: bool = True,
     device: Any = None,
 ) -> NDArray[np.float32]:
     """Render a classified volume directly.
@@ -53,6 +54,8 @@ def raycast_volume(
         Origin and normal of each plane, world coordinates; the normal's side is kept.
     early_termination : bool
         End a ray where less than :data:`~pyvista_vdi.raycast.TRANSMITTANCE_CUTOFF` is left.
+    skip_empty : bool
+        Pass by blocks that are transparent; the picture is the same to the last bit.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
 
@@ -64,7 +67,9 @@ def raycast_volume(
     camera = Camera.from_any(camera)
     width, height = check_window_size(window_size)
     runtime = get_runtime(device)
-    medium = DeviceVolume(runtime, volume, transfer_function, sample_distance)
+    medium = DeviceVolume(
+        runtime, volume, transfer_function, sample_distance, skip_empty=skip_empty
+    )
     forms, pixel_rays, planes = medium.forms(camera, (width, height), clipping_planes)
     ends = rays.checked_opaque_depth(opaque_depth, (width, height), pixel_rays)
     kernel = runtime.kernel("vdi/render_volume.cl", "render_volume", medium.defines)

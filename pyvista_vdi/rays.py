@@ -159,20 +159,21 @@ def user_planes(camera: Camera, rays: PixelRays, planes: ArrayLike | None) -> li
     """
     if planes is None:
         return []
-    table = np.asarray(planes, dtype=np.float64)
+    wanted = "clipping_planes must be (k, 6) finite numbers, origin and normal of each plane"
+    table = _numbers(planes, wanted)
     if table.size == 0:
         return []
     if table.ndim != 2 or table.shape[1] != 6 or not np.isfinite(table).all():
-        raise InvalidArgumentError(
-            "clipping_planes must be (k, 6) finite numbers, origin and normal of each plane; "
-            f"got shape {table.shape}"
-        )
+        raise InvalidArgumentError(f"{wanted}; got shape {table.shape}")
     if not table[:, 3:].any(axis=1).all():
         raise InvalidArgumentError("a clipping plane's normal is zero: give its direction")
+    # Unit normals, scaled first: a form of one that float32 cannot hold would clip nothing
+    normals = table[:, 3:] / np.abs(table[:, 3:]).max(axis=1, keepdims=True)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     matrix = camera.model_transform
     return [
         rays.form(normal @ matrix[:3, :3], normal @ (matrix[:3, 3] - origin))
-        for origin, normal in ((row[:3], row[3:]) for row in table)
+        for origin, normal in zip(table[:, :3], normals, strict=True)
     ]
 
 
@@ -206,11 +207,19 @@ def checked_opaque_depth(
     """
     if opaque_depth is None:
         return None
-    depth = np.asarray(opaque_depth, dtype=np.float64)
+    wanted = f"opaque_depth must have shape (height, width) = {window_size[::-1]}"
+    depth = _numbers(opaque_depth, wanted)
     if depth.shape != window_size[::-1]:
-        raise InvalidArgumentError(
-            f"opaque_depth must have shape (height, width) = {window_size[::-1]}; got {depth.shape}"
-        )
+        raise InvalidArgumentError(f"{wanted}; got {depth.shape}")
     if np.isnan(depth).any():
         raise InvalidArgumentError("opaque_depth holds NaN: use inf where nothing is opaque")
-    return (depth - rays.reference_depth).astype(np.float32)
+    with np.errstate(over="ignore"):  # beyond float32 is as good as never
+        return (depth - rays.reference_depth).astype(np.float32)
+
+
+def _numbers(values: ArrayLike, wanted: str) -> Floats:
+    """Return values as float64; what is ragged or no number is refused with what is wanted."""
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidArgumentError(f"{wanted}; got {values!r}") from error

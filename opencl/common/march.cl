@@ -5,6 +5,7 @@
 #include "common/rays.cl"
 #include "common/classification.cl"
 #include "common/volume_sampling.cl"
+#include "common/empty_blocks.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 typedef struct {
@@ -13,12 +14,16 @@ typedef struct {
     __global const float4 *table; // transfer function
     int entries;
     float low, per_scalar;        // scalar to table position
+    __global const uchar *visible; // whether a block holds anything that is not transparent
+    int4 blocks;                  // along x, y, z
 } Medium;
 
 typedef struct {
     float3 start, slope; // position in index space at t = 0 and per unit of t
+    float3 inverse;      // 1 / slope
     float t0, t1;        // where the ray is inside everything it is clipped to
     float step;          // t of one full step
+    float per_step;      // 1 / step
     float units;         // opacity unit distances per unit of t
     int steps;
 } March;
@@ -44,7 +49,9 @@ inline bool begin_march(March *march, __global const float *forms, int planes, f
     march->slope = (float3)(form_slope(forms, a, b), form_slope(forms + FORM_SIZE, a, b),
                             form_slope(forms + 2 * FORM_SIZE, a, b));
     const float speed = length(model_direction(forms, a, b)); // model units per unit of t
+    march->inverse = 1.0f / march->slope;
     march->step = sample_distance / speed;
+    march->per_step = 1.0f / march->step;
     march->units = speed / unit_distance;
     march->steps = (int)ceil((march->t1 - march->t0) / march->step);
     return true;
@@ -53,6 +60,31 @@ inline bool begin_march(March *march, __global const float *forms, int planes, f
 inline float step_face(const March *march, int k)
 {
     return fmin(fma((float)k, march->step, march->t0), march->t1);
+}
+
+// Steps from step k on whose midpoints lie in the same transparent block, in whole groups of `group` steps, so that the
+// others are grouped as if none had been passed by; 0 where there is something to look at. Skipping decides what is looked
+// at and changes no sample. -D SKIP_EMPTY, or every step is looked at.
+inline int empty_steps(const March *march, const Medium *medium, int k, int end, int group)
+{
+#ifdef SKIP_EMPTY
+    const float t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
+    const float3 position = march->start + t * march->slope;
+    const int3 block = clamp(convert_int3(position) >> BLOCK_SHIFT, (int3)(0), medium->blocks.xyz - 1);
+    if (medium->visible[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x])
+        return 0;
+    // Where the ray leaves the block: past the face ahead on each axis, or never
+    const float3 lower = convert_float3(block << BLOCK_SHIFT);
+    const float3 crossing = ((march->slope > 0.0f ? lower + (float)BLOCK : lower) - march->start) * march->inverse;
+    const float leaves = fmin(march->slope.x != 0.0f ? crossing.x : INFINITY,
+                              fmin(march->slope.y != 0.0f ? crossing.y : INFINITY,
+                                   march->slope.z != 0.0f ? crossing.z : INFINITY));
+    // Steps with their midpoint before that, less a hundredth of a step for the rounding of positions
+    const int passed = (int)fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f) + 1;
+    return max(min(passed, end) - k, 0) / group * group;
+#else
+    return 0;
+#endif
 }
 
 // Colour (rgb) and optical depth (w) of the step between two faces.

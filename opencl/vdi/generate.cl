@@ -1,6 +1,6 @@
 // Volume to lists of supersegments, one march per ray (paper section 2; DESIGN section 3 "Merging", "Budget").
 //
-// -D VOXEL_T, INDEX_T, NEAREST: see common/volume_sampling.cl
+// -D VOXEL_T, INDEX_T, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 //
 // A ray's march is cut into chunks of equally many steps. march_lists takes the steps of one chunk and appends what is not
 // homogeneous with the run before; make_room_in_lists then shortens the records that have grown too long, and raises the
@@ -21,6 +21,8 @@ __kernel void march_lists(
     __global const float4 *table,  // transfer function, `entries` (R, G, B, opacity)
     int entries,
     float low, float per_scalar,   // scalar to table position
+    __global const uchar *visible, // blocks that are not transparent, see grid/volume_blocks.cl
+    int4 blocks,                   // along x, y, z
     __global const float *forms,   // see begin_march
     int planes,
     float sample_distance,         // model units
@@ -28,8 +30,9 @@ __kernel void march_lists(
     int width, int height,         // of V_O's window
     int first_row, int rows,
     int first_step, int steps,     // of this chunk
-    int grain,                     // steps that are composited before homogeneity is asked about
-    int capacity,                  // runs in a record: at least as many as are in it now and steps / grain more
+    int grain,                     // steps in a voxel
+    float finest,                  // threshold of rays whose record has never been full
+    int capacity,                  // runs in a record: at least as many as are in it now and `steps` more
     float reference_length,        // model units
     float hidden_weight,           // weight of what the view from V_O cannot see, 0 to 1
     __global const float *thresholds, // merge errors up to this are accepted, one per ray
@@ -46,7 +49,7 @@ __kernel void march_lists(
     March march;
     if (!begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, INFINITY))
         return;
-    const Medium medium = {voxels, size, table, entries, low, per_scalar};
+    const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks};
     const float per_reference = march.units * unit_distance / reference_length;
     const float threshold = thresholds[item];
     __global float *record = records + record_start(item, capacity, RUN_WORDS);
@@ -64,12 +67,19 @@ __kernel void march_lists(
         seen = seen_weight(run, hidden_weight);
         transmittance = run.TRANSMITTANCE - run.TRANSMITTANCE * run.OPACITY;
     }
+    // A ray that cannot keep every detail asks about homogeneity once in a voxel only
+    const int group = threshold > finest ? grain : 1;
     const int end = min(first_step + steps, march.steps);
-    float face = step_face(&march, first_step);
-    for (int k = first_step; k < end;) {
-        // A grain: the steps within one voxel, composited without asking
+    int k = first_step;
+    while (k < end) {
+        const int empty = empty_steps(&march, &medium, k, end, group);
+        k += empty;
+        if (empty > 0)
+            continue;
+        // The steps of a group are composited without asking
+        float face = step_face(&march, k);
         float8 sample = (float8)(face, face, 0.0f, transmittance, 0.0f, 0.0f, 0.0f, 0.0f);
-        for (const int grain_end = min(k + grain, end); k < grain_end; ++k) {
+        for (const int group_end = min(k + group, end); k < group_end; ++k) {
             const float back = step_face(&march, k + 1);
             const float4 step = step_medium(&march, &medium, face, back);
             const float opacity = opacity_of(step.w);

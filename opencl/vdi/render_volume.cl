@@ -1,6 +1,6 @@
 // Direct volume rendering: the baseline that a VDI is measured against, by the same march as generation.
 //
-// -D VOXEL_T, INDEX_T, NEAREST: see common/volume_sampling.cl
+// -D VOXEL_T, INDEX_T, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 #include "common/march.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -10,6 +10,8 @@ __kernel void render_volume(
     __global const float4 *table,
     int entries,
     float low, float per_scalar,
+    __global const uchar *visible, // blocks that are not transparent, see grid/volume_blocks.cl
+    int4 blocks,                   // along x, y, z
     __global const float *forms,          // see begin_march
     int planes,
     float sample_distance,                // model units
@@ -32,15 +34,18 @@ __kernel void render_volume(
     float transmittance = 1.0f;
     March march;
     if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, t_end)) {
-        const Medium medium = {voxels, size, table, entries, low, per_scalar};
-        float front = step_face(&march, 0);
-        for (int k = 0; k < march.steps && transmittance > transmittance_cutoff; ++k) {
-            const float back = step_face(&march, k + 1);
-            const float4 step = step_medium(&march, &medium, front, back);
+        const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks};
+        int k = 0;
+        while (k < march.steps && transmittance > transmittance_cutoff) {
+            const int empty = empty_steps(&march, &medium, k, march.steps, 1);
+            k += empty;
+            if (empty > 0)
+                continue;
+            const float4 step = step_medium(&march, &medium, step_face(&march, k), step_face(&march, k + 1));
             const float weight = transmittance * opacity_of(step.w); // over, front to back
             color += weight * step.xyz;
             transmittance -= weight;
-            front = back;
+            ++k;
         }
     }
     image[place] = (float4)(color, 1.0f - transmittance);

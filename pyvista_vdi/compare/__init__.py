@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
+from .bounds import Check, judge_pictures, judge_times
 from .measure import AngleResult, Report, Settings, Timing, measure
 from .sheet import contact_sheet, table
 
-__all__ = ["AngleResult", "Report", "Settings", "Timing", "contact_sheet", "measure", "table"]
+__all__ = [
+    "AngleResult",
+    "Check",
+    "Report",
+    "Settings",
+    "Timing",
+    "contact_sheet",
+    "judge_pictures",
+    "judge_times",
+    "measure",
+    "table",
+]

@@ -348,6 +348,7 @@ class _Bench:
             self._table,
             sample_distance=step,
             early_termination=early_termination,
+            skip_empty=False,  # the plain baseline that the paper compares with
             device=self._device,
         )
 

@@ -81,11 +81,11 @@ def _timing_lines(report: Report) -> list[str]:
         lines.append(f"{result.angle:5g}  {times}   {'-' if ratio is None else f'{ratio:9.2f}'}")
     lines.append("VDI / VTK: the VDI's frame time over that of the faster of VTK's two mappers")
     if report.generation_seconds is not None:
-        ratio = f"{report.generation_ratio:.2f} x our raycaster"
+        against = f"{report.generation_ratio:.2f} x our raycaster"
         lines += [
             "",
             f"Generation {report.generation_seconds.median:.2f} s",
-            f"that is {ratio}, same step, no early termination",
+            f"that is {against}, same step, no early termination",
         ]
     return lines
 

@@ -1,0 +1,176 @@
+"""Every standard case: volumes x transfer functions x interpolation, measured and judged.
+
+What is measured is ``pyvista_vdi.compare``'s; what must be reached, ``pyvista_vdi.compare.bounds``.
+See README.md in this folder for how to run it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from dataclasses import asdict, dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from standard_report import write_plot, write_tables  # beside this file
+from tqdm import tqdm
+
+from pyvista_vdi import examples
+from pyvista_vdi.compare import Report, Settings, judge_pictures, judge_times, measure
+from pyvista_vdi.compare.bounds import FRAME_RATIO_ANGLE
+from pyvista_vdi.errors import VDIError
+from pyvista_vdi.io import whole_file
+from pyvista_vdi.standard_cases import ANGLES, TRANSFER_FUNCTIONS, WINDOW_SIZE
+
+INTERPOLATIONS = ("nearest", "linear")
+
+#: Volumes for which one transfer function has to do, because of their size.
+SOFT_ONLY = ("allen_mouse_brain",)
+
+
+@dataclass(frozen=True, order=True)
+class Case:
+    """One volume, how it looks and how it is sampled."""
+
+    interpolation: str
+    volume: str
+    transfer_function: str
+
+    @property
+    def key(self) -> str:
+        """The case's name in the results."""
+        return "/".join((self.volume, self.transfer_function, self.interpolation))
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure what is missing, and write the tables and the plot anew."""
+    options = parsed(arguments)
+    if not os.environ.get("VTK_DEFAULT_OPENGL_WINDOW") and not os.environ.get("DISPLAY"):
+        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
+    width, height = options.size
+    options.out.mkdir(parents=True, exist_ok=True)
+    target = options.out / f"standard_{width}x{height}.json"
+    results = json.loads(target.read_text()) if target.exists() else new_results(options)
+    if results["max_supersegments"] != options.max_supersegments:
+        sys.exit(
+            f"{target} holds results for {results['max_supersegments']} supersegments, not "
+            f"{options.max_supersegments}: choose another --out"
+        )
+    part = "timings" if options.timings else "accuracy"
+    for case in tqdm(chosen(options), unit="case", disable=options.tables_only):
+        entry = results["cases"].setdefault(case.key, {"case": vars(case)})
+        if options.tables_only or (part in entry and not options.redo):
+            continue
+        try:
+            entry[part] = measured(case, options)
+        except VDIError as error:  # such as a volume too large for the device: named in the table
+            entry[part] = {"error": f"{type(error).__name__}: {error}"}
+        save(results, target)
+    results["cases"] = {k: v for k, v in results["cases"].items() if len(v) > 1}
+    write_tables(results, target.with_suffix(".md"))
+    write_plot(results, target.with_suffix(".png"))
+    print(f"Written: {target}, and .md and .png beside it")
+    return 0
+
+
+def parsed(arguments: list[str] | None) -> argparse.Namespace:
+    """Return the options."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
+    parser.add_argument("--volumes", nargs="+", choices=sorted(examples.VOLUMES), metavar="NAME")
+    parser.add_argument("--tf", nargs="+", choices=TRANSFER_FUNCTIONS, default=TRANSFER_FUNCTIONS)
+    parser.add_argument(
+        "--interpolation", nargs="+", choices=INTERPOLATIONS, default=INTERPOLATIONS
+    )
+    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
+    parser.add_argument("--timings", action="store_true", help="measure times, not pictures")
+    parser.add_argument("--repeats", type=int, default=5, help="timed runs of each kind")
+    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
+    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
+    parser.add_argument("--tables-only", action="store_true", help="write tables and plot anew")
+    return parser.parse_args(arguments)
+
+
+def window_size(text: str) -> tuple[int, int]:
+    """Parse ``1280x720``."""
+    try:
+        width, height = (int(n) for n in text.split("x"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT; got {text!r}") from None
+    return width, height
+
+
+def chosen(options: argparse.Namespace) -> list[Case]:
+    """Return the cases to be measured whose volume is at hand; name those that are not."""
+    at_hand = examples.available()
+    wanted = options.volumes or sorted(examples.VOLUMES)
+    absent = [name for name in wanted if name not in at_hand]
+    if absent:
+        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
+    combinations = product(options.interpolation, [v for v in wanted if v in at_hand], options.tf)
+    return [
+        Case(interpolation, volume, look)
+        for interpolation, volume, look in combinations
+        if look == "soft" or volume not in SOFT_ONLY
+    ]
+
+
+def new_results(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the file's contents before anything was measured."""
+    return {
+        "window_size": list(options.size),
+        "max_supersegments": options.max_supersegments,
+        "cases": {},
+    }
+
+
+def measured(case: Case, options: argparse.Namespace) -> dict[str, Any]:
+    """Measure one case, and hold it against its bounds."""
+    looks = {**TRANSFER_FUNCTIONS[case.transfer_function], "interpolation": case.interpolation}
+    settings = Settings(
+        classification=looks,
+        window_size=tuple(options.size),
+        angles=(FRAME_RATIO_ANGLE,) if options.timings else ANGLES,
+        max_supersegments=options.max_supersegments,
+        repeats=options.repeats if options.timings else 0,
+        device=options.device,
+        name=case.key,
+    )
+    volume = examples.load_data(case.volume, as_volume=True)
+    report, _, _ = measure(volume, settings)
+    held = (
+        judge_times(report, case.volume)
+        if options.timings
+        else judge_pictures(report, case.volume, case.transfer_function)
+    )
+    checks = [{**asdict(check), "passed": check.passed} for check in held]
+    return {**condensed(report), "checks": checks}
+
+
+def condensed(report: Report) -> dict[str, Any]:
+    """Return a report without what the case and the file's head already say."""
+    described = report.to_dict()
+    kept = ("dimensions", "spacing", "dtype", "sample_distance", "timing_sample_distance")
+    return {
+        "volume": {name: described["case"][name] for name in kept},
+        "system": described["system"],
+        "sizes": described["sizes"],
+        "generation_seconds": described["generation_seconds"],
+        "full_raycast_seconds": described["full_raycast_seconds"],
+        "generation_ratio": described["generation_ratio"],
+        "angles": described["angles"],
+    }
+
+
+def save(results: dict[str, Any], target: Path) -> None:
+    """Write the file; a run that is stopped meanwhile leaves the old one."""
+    with whole_file(target) as stream:
+        stream.write(json.dumps(results, indent=1).encode() + b"\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,67 @@
+"""Launching one function of a kernel file: NumPy in, NumPy out."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+HERE = Path(__file__).parent
+GROUP = 64
+
+
+class Output:
+    """An argument that a kernel writes: starts as ``values`` and is returned."""
+
+    def __init__(self, values):
+        self.values = np.ascontiguousarray(values)
+
+
+class Caller:
+    """Launches the kernels beside this file on one device."""
+
+    def __init__(self, runtime):
+        self._runtime = runtime
+
+    #: An argument that starts as an array and is returned.
+    out = Output
+
+    @staticmethod
+    def empty(*shape, dtype=np.float32):
+        """An argument to be written: starts as bytes of 0xA5, so that what is left out shows."""
+        values = np.empty(shape, dtype)
+        values.view(np.uint8)[...] = 0xA5
+        return Output(values)
+
+    def __call__(self, file, kernel, items, *arguments, by_value=(), **defines):
+        """What the kernel wrote: its outputs in order, alone where there is one.
+
+        The kernel's first parameter is ``items``. Arrays are uploaded but for those whose place
+        is in ``by_value`` (vectors).
+        """
+        function = self._runtime.kernel(HERE / file, kernel, defines)
+        with ExitStack() as stack:
+            given, written = [], []
+            for place, argument in enumerate(arguments):
+                if isinstance(argument, Output):
+                    values = argument.values
+                    buffer = stack.enter_context(self._runtime.buffer(values.shape, values.dtype))
+                    self._runtime.write(buffer, values)
+                    written.append(buffer)
+                    given.append(buffer)
+                elif isinstance(argument, np.ndarray) and place not in by_value:
+                    given.append(stack.enter_context(self._runtime.upload(argument)))
+                else:
+                    given.append(argument)
+            padded = -(-items // GROUP) * GROUP
+            self._runtime.launch(function, padded, GROUP, np.int32(items), *given)
+            results = [self._runtime.download(buffer) for buffer in written]
+        return results[0] if len(results) == 1 else results
+
+
+@pytest.fixture
+def call(runtime):
+    """A :class:`Caller` on each device."""
+    return Caller(runtime)

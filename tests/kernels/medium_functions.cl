@@ -1,0 +1,26 @@
+// Entry points to opencl/common/classification.cl, one work-item per case.
+#include "common/classification.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+__kernel void classified(int count, __global const float *scalars, __global const float4 *table, int entries, float low,
+                         float per_scalar, __global float4 *results)
+{
+    const int i = get_global_id(0);
+    if (i < count)
+        results[i] = classify(scalars[i], table, entries, low, per_scalar);
+}
+
+__kernel void step_optical_depths(int count, __global const float *opacities, __global const float *units,
+                                  __global float *results)
+{
+    const int i = get_global_id(0);
+    if (i < count)
+        results[i] = step_optical_depth(opacities[i], units[i]);
+}
+
+__kernel void opacities(int count, __global const float *optical_depths, __global float *results)
+{
+    const int i = get_global_id(0);
+    if (i < count)
+        results[i] = opacity_of(optical_depths[i]);
+}

@@ -1,0 +1,69 @@
+// Entry points to opencl/vdi/runs.cl, one work-item per case or record.
+#include "vdi/runs.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+__kernel void merged(int count, __global const float8 *a, __global const float8 *b, __global float8 *results)
+{
+    const int i = get_global_id(0);
+    if (i < count)
+        results[i] = merged_runs(a[i], b[i]);
+}
+
+__kernel void features(int count, __global const float8 *runs, float per_reference, __global float4 *results)
+{
+    const int i = get_global_id(0);
+    if (i < count)
+        results[i] = run_feature(runs[i], per_reference);
+}
+
+__kernel void merge_errors(int count, __global const float8 *a, __global const float8 *b, float per_reference,
+                           float hidden_weight, __global float *results)
+{
+    const int i = get_global_id(0);
+    if (i < count)
+        results[i] = merge_error(a[i], run_feature(a[i], per_reference), b[i], run_feature(b[i], per_reference),
+                                 per_reference, hidden_weight);
+}
+
+// Runs from (record, k) order to the records' own layout, and back.
+__kernel void stored(int count, __global const float8 *runs, int capacity, __global float *records, __global float8 *back)
+{
+    const int i = get_global_id(0);
+    if (i >= count)
+        return;
+    __global float *record = records + record_start((uint)i, capacity, RUN_WORDS);
+    for (int k = 0; k < capacity; ++k)
+        store_run(record, k, runs[(size_t)i * capacity + k]);
+    for (int k = 0; k < capacity; ++k)
+        back[(size_t)i * capacity + k] = load_run(record, k);
+}
+
+#define WITHIN 0
+#define ROOM 1
+#define LIMIT 2
+
+// Shorten record i by one of three ways; `runs` are in (record, k) order, before and after.
+__kernel void shortened(int count, int way, int limit, int capacity, float per_reference, float hidden_weight,
+                        __global float8 *runs, __global int *lengths, __global float *thresholds,
+                        __global float *records, __global float *all_errors)
+{
+    const int i = get_global_id(0);
+    if (i >= count)
+        return;
+    __global float *record = records + record_start((uint)i, capacity, RUN_WORDS);
+    __global float *errors = all_errors + record_start((uint)i, capacity, 1);
+    int n = lengths[i];
+    for (int k = 0; k < n; ++k)
+        store_run(record, k, runs[(size_t)i * capacity + k]);
+    float threshold = thresholds[i];
+    if (way == WITHIN)
+        n = merge_within(record, n, threshold, per_reference, hidden_weight);
+    else if (way == ROOM)
+        n = make_room(record, errors, n, limit, &threshold, per_reference, hidden_weight);
+    else
+        n = merge_to_limit(record, errors, n, limit, per_reference, hidden_weight);
+    thresholds[i] = threshold;
+    lengths[i] = n;
+    for (int k = 0; k < n; ++k)
+        runs[(size_t)i * capacity + k] = load_run(record, k);
+}

@@ -1,0 +1,15 @@
+// Entry point to opencl/common/volume_sampling.cl, one work-item per sample.
+//
+// -D VOXEL_T, INDEX_T, NEAREST: see common/volume_sampling.cl
+#include "common/volume_sampling.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+__kernel void samples(int count, __global const VOXEL_T *voxels, int4 size, __global const float *positions,
+                      __global float *results)
+{
+    const int i = get_global_id(0);
+    if (i >= count)
+        return;
+    const float3 at = vload3(i, positions);
+    results[i] = sample_volume(voxels, size, at.x, at.y, at.z);
+}

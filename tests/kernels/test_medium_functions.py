@@ -1,0 +1,120 @@
+"""opencl/common/classification.cl against float64 (DESIGN section 3, "From volume to medium")."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pyvista_vdi.device_volume import _per_scalar
+from pyvista_vdi.transfer_function import OPAQUE_OPTICAL_DEPTH
+
+EPS = 2.0**-24  # unit roundoff of float32
+FILE = "medium_functions.cl"
+
+
+def classified(call, scalars, table, low, high):
+    scalars = np.asarray(scalars, np.float32)
+    per_scalar = np.float32(_per_scalar(len(table), float(high) - float(low)))
+    return call(
+        FILE, "classified", len(scalars), scalars, np.asarray(table, np.float32),
+        np.int32(len(table)), np.float32(low), per_scalar, call.empty(len(scalars), 4),
+    )  # fmt: skip
+
+
+def random_table(rng, entries):
+    return rng.random((entries, 4)).astype(np.float32)
+
+
+@pytest.mark.parametrize("entries", [2, 3, 256, 4096])
+@pytest.mark.parametrize("span", [(0.0, 255.0), (-1000.0, 3095.0), (0.25, 0.75), (-1e-20, 1e20)])
+def test_linear_between_entries_and_clamped_outside(call, entries, span):
+    rng = np.random.default_rng(entries)
+    low, high = np.float32(span)
+    wide = float(high) - float(low)
+    table = random_table(rng, entries)
+    scalars = np.concatenate(
+        [
+            low + wide * rng.uniform(-0.5, 1.5, 4000),
+            [low, high, low - wide, high + 1e3 * wide],
+            low + wide * np.arange(entries) / (entries - 1),
+        ]
+    ).astype(np.float32)
+    found = classified(call, scalars, table, low, high)
+
+    nodes = np.linspace(float(low), float(high), entries)
+    exact = np.stack([np.interp(scalars.astype(np.float64), nodes, c) for c in table.T], axis=1)
+    # The position carries the rounding of a difference, of per_scalar and of a product, relative
+    # to at most entries - 1; entries differ by 1 at most; the interpolation rounds three times
+    bound = 4 * EPS * (entries - 1) + 4 * EPS
+    assert np.abs(found - exact).max() <= bound
+    assert (found >= 0).all()
+    assert (found <= 1 + 2 * EPS).all()
+
+
+def test_ends_are_the_end_entries_to_the_last_bit(call):
+    table = random_table(np.random.default_rng(5), 7)
+    found = classified(call, [-3e38, -np.inf, 2.0, 3.0, 3e38, np.inf], table, 2.0, 3.0)
+    np.testing.assert_array_equal(found[:3], np.broadcast_to(table[0], (3, 4)))
+    # mix(x, y, 1) is x + (y - x), a rounding of the difference and one of the sum
+    assert np.abs(found[3:] - table[-1]).max() <= 2 * EPS
+
+
+def test_nan_is_transparent(call):
+    table = np.ones((4, 4), np.float32)
+    for low, high in ((0.0, 1.0), (0.5, 0.5)):
+        found = classified(call, [np.nan, -np.nan, 0.5], table, low, high)
+        np.testing.assert_array_equal(found, [[0] * 4, [0] * 4, [1] * 4])
+
+
+def test_a_range_of_one_scalar_is_a_step(call):
+    """At or below it the first entry, above it the last: TransferFunction's rule."""
+    table = random_table(np.random.default_rng(6), 256)
+    for at in (0.0, 7.0, -1e6, 3e-5):
+        near = np.float32(at)
+        above = np.nextafter(near, np.float32(np.inf)) if at else np.float32(1e-30)
+        below = np.nextafter(near, np.float32(-np.inf))
+        found = classified(call, [-1e30, below, near, above, 1e30], table, near, near)
+        np.testing.assert_array_equal(found[:3], np.broadcast_to(table[0], (3, 4)))
+        assert np.abs(found[3:] - table[-1]).max() <= 2 * EPS
+
+
+@pytest.mark.parametrize("span", [(0.0, 1.0), (0.5, 0.5)])
+def test_one_entry_is_constant(call, span):
+    table = np.float32([[0.25, 0.5, 0.75, 0.125]])
+    found = classified(call, [-np.inf, -1e30, 0, 0.5, 1, 1e30, np.inf], table, *span)
+    np.testing.assert_array_equal(found, np.broadcast_to(table, (7, 4)))
+
+
+def test_step_optical_depth(call):
+    """-log1p(-a) units, and at least 30 where the sample is opaque."""
+    rng = np.random.default_rng(7)
+    below_one = 1 - 2.0**-24
+    opacities = np.concatenate(
+        [[0, 1e-30, 1e-7, 0.5, below_one], rng.random(500), 10.0 ** -rng.uniform(0, 12, 500)]
+    ).astype(np.float32)
+    opacities = np.minimum(opacities, np.float32(below_one))
+    units = (10.0 ** rng.uniform(-4, 3, len(opacities))).astype(np.float32)
+    found = call(FILE, "step_optical_depths", len(units), opacities, units, call.empty(len(units)))
+    exact = -np.log1p(-opacities.astype(np.float64)) * units
+    # OpenCL's log1p is within 2 ulp (4 EPS, relative up to 4 EPS), the product rounds once
+    assert (np.abs(found - exact) <= 6 * EPS * exact).all()
+    assert found[0] == 0
+    assert found[4] == pytest.approx(24 * np.log(2) * units[4], rel=6 * EPS)
+
+
+def test_an_opaque_sample_is_opaque_whatever_the_step(call):
+    units = np.float32([0, 1e-30, 1e-3, 1, 30, 31, 1e6])
+    found = call(FILE, "step_optical_depths", 7, np.ones(7, np.float32), units, call.empty(7))
+    np.testing.assert_array_equal(found, np.maximum(np.float32(OPAQUE_OPTICAL_DEPTH), units))
+
+
+def test_opacity_of_optical_depth(call):
+    rng = np.random.default_rng(8)
+    tau = np.concatenate([10.0 ** rng.uniform(-12, 3, 4000), [0, 1e-12, 1, 17, 30, 1e3, np.inf]])
+    tau = tau.astype(np.float32)
+    found = call(FILE, "opacities", len(tau), tau, call.empty(len(tau)))
+    exact = -np.expm1(-tau.astype(np.float64))
+    # OpenCL's expm1 is within 3 ulp: 6 EPS relative. exp and a difference would lose all of it
+    assert (np.abs(found - exact) <= 6 * EPS * exact).all()
+    assert (found <= 1).all()
+    np.testing.assert_array_equal(found[-1], 1)

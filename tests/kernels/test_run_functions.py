@@ -1,0 +1,453 @@
+"""opencl/vdi/runs.cl: runs, what merging two costs, and the three ways of shortening a record.
+
+The reference is float64 and written from DESIGN section 3 ("Merging samples into a
+supersegment") and the head of the kernel file: a run is a homogeneous medium of straight colour c
+and optical depth tau over a length; it looks like (c f, f) per reference length l with
+f = tau / (tau + l); merging costs what the sum of squares about the mean, along the ray, grows by.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pyvista_vdi import compositing
+from pyvista_vdi.compositing import Segment
+
+EPS = 2.0**-24  # unit roundoff of float32
+FILE = "run_functions.cl"
+FRONT, BACK, TAU, TRANSMITTANCE = range(4)
+COLOR, OPACITY = slice(4, 7), 7
+LANES = 16
+WITHIN, ROOM, LIMIT = range(3)
+
+
+# -- float64 reference -----------------------------------------------------------------------------
+
+
+def as_runs(segments):
+    """Segments of one ray as the kernels hold them: float32 (n, 8)."""
+    before = np.concatenate([[0.0], np.cumsum([s.optical_depth for s in segments])])
+    runs = np.empty((len(segments), 8))
+    for run, s, tau in zip(runs, segments, before[:-1], strict=True):
+        alpha = compositing.opacity(s.optical_depth)
+        run[:4] = s.front, s.back, s.optical_depth, np.exp(-tau)
+        run[COLOR], run[OPACITY] = s.color * alpha, alpha
+    return runs.astype(np.float32)
+
+
+def random_segments(rng, n, *, gaps=0.3, thickest=3.0):
+    """n neighbours of unlike media; some touch, some are apart."""
+    apart = np.where(rng.random(n) < gaps, rng.uniform(0.1, 2, n), 0)
+    ends = np.cumsum(np.stack([apart, rng.uniform(0.2, 2, n)], axis=1).ravel()).reshape(n, 2)
+    ends = ends.astype(np.float32)
+    ends[1:, 0] = np.where(apart[1:] == 0, ends[:-1, 1], ends[1:, 0])
+    return [
+        Segment(float(front), float(back), rng.random(3), thickest * 10 ** -rng.uniform(0, 3))
+        for front, back in ends
+    ]
+
+
+def feature(segment, per_reference):
+    """Opacity-weighted colour and opacity of one reference length of the medium."""
+    length = (segment.back - segment.front) * per_reference
+    saturation = segment.optical_depth / (segment.optical_depth + length)
+    return saturation * np.append(segment.color, 1.0)
+
+
+def merging_cost(near, far, transmittance, per_reference, hidden_weight):
+    """Sum of squares about their mean of two media and the nothing between them, as it is seen."""
+    lengths = per_reference * np.array(
+        [near.back - near.front, far.back - far.front, far.front - near.back]
+    )
+    features = np.array([feature(near, per_reference), feature(far, per_reference), np.zeros(4)])
+    mean = lengths @ features / lengths.sum()
+    seen = hidden_weight + (1 - hidden_weight) * transmittance
+    return seen * (lengths @ ((features - mean) ** 2).sum(axis=1))
+
+
+def greedy(segments, limit, per_reference, hidden_weight):
+    """Merge, least cost first. Returns segments and the least relative distance of a choice."""
+    segments, margin = list(segments), np.inf
+    while len(segments) > limit:
+        before = np.exp(-np.cumsum([0.0, *(s.optical_depth for s in segments)]))
+        costs = np.array(
+            [
+                merging_cost(a, b, t, per_reference, hidden_weight)
+                for a, b, t in zip(segments[:-1], segments[1:], before, strict=False)
+            ]
+        )
+        k = int(np.argmin(costs))
+        if len(costs) > 1:
+            second = np.partition(costs, 1)[1]
+            margin = min(margin, (second - costs[k]) / second)
+        segments[k : k + 2] = [compositing.merge(segments[k], segments[k + 1])]
+    return segments, margin
+
+
+# -- launching -------------------------------------------------------------------------------------
+
+
+def shortened(call, way, records, limit, *, per_reference=1.0, hidden_weight=0.5, threshold=1e-6):
+    """Records (float32 (n, 8) each) shortened on the device, and the thresholds they ended with."""
+    capacity = max(len(r) for r in records)
+    runs = np.full((len(records), capacity, 8), np.nan, np.float32)
+    for target, record in zip(runs, records, strict=True):
+        target[: len(record)] = record
+    n, blocks = len(records), -(-len(records) // LANES)
+    lengths = np.array([len(r) for r in records], np.int32)
+    thresholds = np.full(n, threshold, np.float32)
+    runs, lengths, thresholds, *_ = call(
+        FILE, "shortened", n, np.int32(way), np.int32(limit), np.int32(capacity),
+        np.float32(per_reference), np.float32(hidden_weight), call.out(runs), call.out(lengths),
+        call.out(thresholds), call.empty(blocks * LANES * capacity * 8),
+        call.empty(blocks * LANES * capacity),
+    )  # fmt: skip
+    return [r[:k] for r, k in zip(runs, lengths, strict=True)], thresholds
+
+
+def check_shortened(before, after):
+    """Each run that is left is a whole number of neighbours, composited; none is missing."""
+    starts = np.searchsorted(before[:, FRONT], after[:, FRONT])
+    np.testing.assert_array_equal(before[starts, FRONT], after[:, FRONT])
+    assert starts[0] == 0
+    ends = np.append(starts[1:], len(before))
+    assert (ends > starts).all()
+    np.testing.assert_array_equal(after[:, BACK], before[ends - 1, BACK])
+    np.testing.assert_array_equal(after[:, TRANSMITTANCE], before[starts, TRANSMITTANCE])
+    for run, first, last in zip(after.astype(np.float64), starts, ends, strict=True):
+        members = before[first:last].astype(np.float64)
+        tau = members[:, TAU].sum()
+        n = len(members)
+        assert abs(run[TAU] - tau) <= n * EPS * tau
+        color = members[:, COLOR] / members[:, OPACITY, None]
+        exact = compositing.composite(color, members[:, TAU])
+        # Each opacity was rounded once and each merge rounds twice, of numbers up to 1
+        assert np.abs(run[4:] - exact).max() <= 4 * n * EPS
+
+
+def disjoint(record):
+    return (record[:, FRONT] < record[:, BACK]).all() and (
+        record[:-1, BACK] <= record[1:, FRONT]
+    ).all()
+
+
+# -- two runs --------------------------------------------------------------------------------------
+
+
+def pairs(seed, n=2000):
+    rng = np.random.default_rng(seed)
+    segments = [random_segments(rng, 2, gaps=0.5, thickest=rng.uniform(0.1, 20)) for _ in range(n)]
+    runs = np.array([as_runs(pair) for pair in segments])
+    # The transmittance in front of the first is anything
+    runs[:, 0, TRANSMITTANCE] = rng.random(n)
+    return segments, np.ascontiguousarray(runs[:, 0]), np.ascontiguousarray(runs[:, 1])
+
+
+def test_merged_runs_follow_the_colour_law(call):
+    segments, a, b = pairs(41)
+    found = call(FILE, "merged", len(a), a, b, call.empty(len(a), 8))
+    np.testing.assert_array_equal(found[:, TAU], a[:, TAU] + b[:, TAU])
+    np.testing.assert_array_equal(found[:, FRONT], a[:, FRONT])
+    np.testing.assert_array_equal(found[:, BACK], b[:, BACK])
+    np.testing.assert_array_equal(found[:, TRANSMITTANCE], a[:, TRANSMITTANCE])
+    for run, (near, far) in zip(found.astype(np.float64), segments, strict=True):
+        whole = compositing.merge(near, far)
+        # Rounded: both runs' colours and opacities, 1 - opacity, a product and a sum
+        alpha = compositing.opacity(whole.optical_depth)
+        assert run[OPACITY] == pytest.approx(alpha, abs=4 * EPS, rel=4 * EPS)
+        color = run[COLOR] / run[OPACITY]
+        np.testing.assert_allclose(color, whole.color, rtol=0, atol=10 * EPS)
+
+
+def test_a_run_of_many_samples_stays_exact(call):
+    """A thousand merges in a row: what V_O sees stays what compositing gives."""
+    rng = np.random.default_rng(42)
+    n = 1000
+    segments = [Segment(k, k + 1, rng.random(3), 10 ** -rng.uniform(1, 6)) for k in range(n)]
+    record = as_runs(segments)
+    (run,), _ = shortened(call, WITHIN, [record], 1, threshold=3e38)
+    assert len(run) == 1
+    check_shortened(record, run)
+
+
+def test_features_are_those_of_the_medium(call):
+    """Of any part of a medium the feature is the same, and it is bounded by the colour and 1."""
+    segments, a, _ = pairs(43)
+    for per_reference in (1e-3, 1.0, 1e3):
+        found = call(FILE, "features", len(a), a, np.float32(per_reference), call.empty(len(a), 4))
+        exact = np.array([feature(near, per_reference) for near, _ in segments])
+        # Length, sum, density, its quotient and product, the inputs: a dozen roundings; a length
+        # is a difference of depths up to 6 that were rounded to float32 beforehand
+        np.testing.assert_allclose(found, exact, rtol=12 * EPS)
+
+
+# -- what merging costs ----------------------------------------------------------------------------
+
+
+def errors(call, a, b, per_reference=1.0, hidden_weight=0.5):
+    return call(
+        FILE, "merge_errors", len(a), a, b, np.float32(per_reference), np.float32(hidden_weight),
+        call.empty(len(a)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("per_reference", [0.02, 1.0, 50.0])
+@pytest.mark.parametrize("hidden_weight", [0.0, 0.5, 1.0])
+def test_merge_error_is_the_growth_of_the_sum_of_squares(call, per_reference, hidden_weight):
+    segments, a, b = pairs(44)
+    found = errors(call, a, b, per_reference, hidden_weight)
+    exact = np.array(
+        [
+            merging_cost(near, far, float(run[TRANSMITTANCE]), per_reference, hidden_weight)
+            for (near, far), run in zip(segments, a, strict=True)
+        ]
+    )
+    # Features of up to 2 in length, 12 EPS off each, are subtracted before they are squared:
+    # d(x^2) = 2 x dx, with lengths of up to 2 and gaps of up to 2; the rest is relative
+    bound = 64 * EPS * np.sqrt(exact * 4 * per_reference) * 2 + 16 * EPS * exact + 1e-12
+    assert (np.abs(found - exact) <= bound).all()
+    if hidden_weight > 0:
+        unlike = exact > 1e-6
+        assert unlike.mean() > 0.5
+        assert (found[unlike] > 0).all()
+    assert (found >= 0).all()
+
+
+def test_merging_parts_of_one_medium_costs_nothing(call):
+    rng = np.random.default_rng(45)
+    wholes = [
+        Segment(0.0, float(length), rng.random(3), float(tau))
+        for length, tau in zip(
+            rng.uniform(0.1, 10, 500), 10 ** rng.uniform(-6, 1, 500), strict=True
+        )
+    ]
+    halves = [compositing.split(s, s.back / 2) for s in wholes]
+    uneven = [compositing.split(s, s.back * rng.uniform(0.01, 0.99)) for s in wholes]
+    for cut, factor in ((halves, 0.0), (uneven, 1.0)):
+        runs = np.array([as_runs(pair) for pair in cut])
+        runs[:, :, TRANSMITTANCE] = 1
+        a, b = (np.ascontiguousarray(runs[:, i]) for i in (0, 1))
+        if factor == 0:
+            # The same numbers to the last bit but for the place
+            b[:, [TAU, 4, 5, 6, OPACITY]] = a[:, [TAU, 4, 5, 6, OPACITY]]
+        found = errors(call, a, b)
+        length = runs[:, 1, BACK] - runs[:, 0, FRONT]
+        # Features differ by their rounding: 24 EPS of at most 2, squared, over a quarter length.
+        # Halves: only their lengths can differ, by the rounding of the far end less the middle
+        assert (found <= (48 * EPS) ** 2 * length / 4).all()
+
+
+def mirrored(a, b):
+    """The same media in the opposite order, behind the same transmittance."""
+    first, second = b.copy(), a.copy()
+    first[:, FRONT], first[:, BACK] = -b[:, BACK], -b[:, FRONT]
+    second[:, FRONT], second[:, BACK] = -a[:, BACK], -a[:, FRONT]
+    first[:, TRANSMITTANCE] = a[:, TRANSMITTANCE]
+    return first, second
+
+
+def test_merge_error_is_the_same_from_either_side(call):
+    """Which of two media comes first does not matter, only how much of them is seen."""
+    _, a, b = pairs(46)
+    forth, back = errors(call, a, b), errors(call, *mirrored(a, b))
+    np.testing.assert_allclose(forth, back, rtol=32 * EPS, atol=1e-12)
+
+
+def test_merge_error_sees_opacity_as_well_as_colour(call):
+    black = Segment(0, 1, np.zeros(3), 0.1), Segment(1, 2, np.zeros(3), 2.0)
+    colors = Segment(0, 1, np.array([1.0, 0, 0]), 1.0), Segment(1, 2, np.array([0, 0, 1.0]), 1.0)
+    gap = Segment(0, 1, np.ones(3), 1.0), Segment(1.5, 2.5, np.ones(3), 1.0)
+    for pair in (black, colors, gap):
+        runs = as_runs(pair)
+        assert errors(call, runs[:1], runs[1:])[0] > 0.01
+
+
+def test_what_is_hidden_costs_its_weight_and_no_less(call):
+    _, a, b = pairs(47, 50)
+    seen, hidden = a.copy(), a.copy()
+    seen[:, TRANSMITTANCE], hidden[:, TRANSMITTANCE] = 1, 0
+    for weight in (0.0, 0.25, 1.0):
+        ratio = errors(call, hidden, b, 1.0, weight) / errors(call, seen, b, 1.0, weight)
+        np.testing.assert_allclose(ratio, weight, rtol=4 * EPS)
+
+
+def extreme_records():
+    """Finite inputs that overflow, underflow or tie."""
+    rng = np.random.default_rng(48)
+    n = 40
+    faces = np.arange(n, dtype=np.float32)
+
+    def record(front, back, tau, transmittance=1.0, color=0.5):
+        runs = np.empty((n, 8), np.float32)
+        tau = np.broadcast_to(np.float64(tau), n)
+        runs[:, FRONT], runs[:, BACK], runs[:, TAU] = front, back, tau
+        alpha = np.maximum(-np.expm1(-tau), np.finfo(np.float32).tiny)
+        runs[:, TRANSMITTANCE] = transmittance
+        runs[:, COLOR], runs[:, OPACITY] = color * alpha[:, None], alpha
+        return runs
+
+    tiny, huge = 1e-44, 3e38 / n
+    return {
+        "all equal": record(faces, faces + 1, 0.1),
+        "all equal, apart": record(faces, faces + 0.5, 0.1),
+        "opaque": record(faces, faces + 1, 30.0),
+        "opaque, unlike": record(faces, faces + 1, 30.0, 0.0, rng.random((n, 3))),
+        "denormal optical depth": record(faces, faces + 1, tiny),
+        "huge optical depth": record(faces, faces + 1, huge),
+        "mixed optical depth": record(faces, faces + 1, np.where(np.arange(n) % 2, tiny, huge)),
+        "denormal lengths": record(faces * 1e-44, (faces + 1) * 1e-44, 1.0),
+        "huge lengths": record(faces * 5e36, faces * 5e36 + 4e36, rng.random(n)),
+        "huge gaps": record(faces * 5e36, faces * 5e36 + 1e30, rng.random(n)),
+        "far away": record(1e6 + faces, 1e6 + faces + 1, rng.random(n)),
+        "denormal transmittance": record(faces, faces + 1, rng.random(n), tiny),
+        "black": record(faces, faces + 1, rng.random(n), 1.0, 0.0),
+    }
+
+
+EXTREMES = extreme_records()
+
+
+@pytest.mark.extremes
+@pytest.mark.parametrize("hidden_weight", [0.0, 0.5])
+def test_the_error_is_finite_whatever_the_runs(call, hidden_weight):
+    """Or there would be no least error, and shortening would not end."""
+    for per_reference in (1e-30, 1.0, 1e30):
+        for name, record in EXTREMES.items():
+            a, b = record[:-1].copy(), record[1:].copy()
+            assert np.isfinite(errors(call, a, b, per_reference, hidden_weight)).all(), name
+
+
+# -- the layout of records -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("items", "capacity"), [(1, 1), (16, 3), (17, 5), (100, 7)])
+def test_records_do_not_share_words(call, items, capacity):
+    rng = np.random.default_rng(51)
+    runs = rng.random((items, capacity, 8)).astype(np.float32)
+    blocks = -(-items // LANES)
+    records, back = call(
+        FILE, "stored", items, runs, np.int32(capacity),
+        call.empty(blocks * capacity * 8 * LANES), call.empty(items, capacity, 8),
+    )  # fmt: skip
+    np.testing.assert_array_equal(back, runs)
+    # Component by component, 16 rays side by side
+    layout = records.reshape(blocks, capacity, 8, LANES).transpose(0, 3, 1, 2)
+    np.testing.assert_array_equal(layout.reshape(-1, capacity, 8)[:items], runs)
+
+
+# -- shortening ------------------------------------------------------------------------------------
+
+
+def random_records(seed, n, most, least=1):
+    rng = np.random.default_rng(seed)
+    return [random_segments(rng, int(k)) for k in rng.integers(least, most + 1, n)]
+
+
+@pytest.mark.parametrize("threshold", [1e-6, 1e-3, 0.1, 1e30])
+def test_merge_within(call, threshold):
+    segments = random_records(61, 64, 40)
+    records = [as_runs(s) for s in segments]
+    found, _ = shortened(call, WITHIN, records, 1, threshold=threshold)
+    for before, after in zip(records, found, strict=True):
+        check_shortened(before, after)
+        assert disjoint(after)
+        if threshold == 1e30:
+            assert len(after) == 1
+    left = sum(map(len, found)) / sum(map(len, records))
+    # Unlike media: next to nothing at a millionth, something at a tenth
+    assert {1e-6: left > 0.99, 1e-3: left < 0.99, 0.1: left < 0.8}.get(threshold, True), left
+
+
+def test_merge_within_takes_what_is_homogeneous_and_no_more(call):
+    """Three media in ten parts each: three runs are left, cut where the media change."""
+    media = [(np.array([1.0, 0, 0]), 0.5), (np.array([0, 1.0, 0]), 0.5), (np.zeros(3), 3.0)]
+    parts = [
+        Segment(float(10 * m + k), float(10 * m + k + 1), color, tau)
+        for m, (color, tau) in enumerate(media)
+        for k in range(10)
+    ]
+    (after,), _ = shortened(call, WITHIN, [as_runs(parts)], 1, threshold=1e-6, hidden_weight=1.0)
+    np.testing.assert_array_equal(after[:, [FRONT, BACK]], [[0, 10], [10, 20], [20, 30]])
+
+
+@pytest.mark.parametrize("limit", [1, 2, 20, 39])
+def test_make_room(call, limit):
+    segments = random_records(62, 64, 100)
+    records = [as_runs(s) for s in segments]
+    found, thresholds = shortened(call, ROOM, records, limit)
+    for before, after, threshold in zip(records, found, thresholds, strict=True):
+        assert 1 <= len(after) <= limit
+        check_shortened(before, after)
+        assert disjoint(after)
+        if len(before) <= limit:
+            np.testing.assert_array_equal(after, before)
+            assert threshold == np.float32(1e-6)
+        else:
+            steps = np.log(threshold / np.float32(1e-6)) / np.log(4)
+            assert steps == pytest.approx(round(steps), abs=1e-3)  # raised, by factors of 4
+            assert steps >= 0
+    # It merges only as far as it must: on the whole a good part of the room stays in use
+    if limit >= 20:
+        long = [len(a) for a, b in zip(found, records, strict=True) if len(b) > limit]
+        assert np.mean(long) > limit / 4
+
+
+@pytest.mark.parametrize("hidden_weight", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("limit", [1, 2, 5, 20])
+def test_merge_to_limit_is_greedy(call, limit, hidden_weight):
+    segments = random_records(63, 48, 45)
+    records = [as_runs(s) for s in segments]
+    found, _ = shortened(
+        call, LIMIT, records, limit, per_reference=0.7, hidden_weight=hidden_weight
+    )
+    clear = 0
+    for given, before, after in zip(segments, records, found, strict=True):
+        assert len(after) == min(limit, len(before))
+        check_shortened(before, after)
+        assert disjoint(after)
+        expected, margin = greedy(given, limit, 0.7, hidden_weight)
+        # Two errors that agree to some 64 EPS over what they are made of may go either way
+        if margin > 1e-3:
+            clear += 1
+            np.testing.assert_array_equal(after[:, FRONT], np.float32([s.front for s in expected]))
+            np.testing.assert_array_equal(after[:, BACK], np.float32([s.back for s in expected]))
+    assert clear > len(records) / 2, clear
+
+
+def test_merge_to_limit_keeps_what_differs_most(call):
+    """A thin bright layer in a long homogeneous medium survives down to three runs."""
+    grey, red = np.full(3, 0.5), np.array([1.0, 0, 0])
+    parts = [
+        Segment(float(k), float(k + 1), red if k == 30 else grey, 2.0 if k == 30 else 0.01)
+        for k in range(60)
+    ]
+    (after,), _ = shortened(call, LIMIT, [as_runs(parts)], 3)
+    np.testing.assert_array_equal(after[:, [FRONT, BACK]], [[0, 30], [30, 31], [31, 60]])
+
+
+@pytest.mark.extremes
+@pytest.mark.parametrize("way", [WITHIN, ROOM, LIMIT], ids=["within", "room", "limit"])
+@pytest.mark.parametrize("limit", [1, 7, 39])
+def test_any_finite_record_is_shortened(call, way, limit):
+    """It ends (pytest's timeout says so), within the limit, in order, with the ends it had."""
+    for per_reference in (1e-30, 1.0, 1e30):
+        found, _ = shortened(
+            call, way, list(EXTREMES.values()), limit, per_reference=per_reference,
+            hidden_weight=0.25,
+        )  # fmt: skip
+        for (name, before), after in zip(EXTREMES.items(), found, strict=True):
+            assert len(after) >= 1, name
+            if way != WITHIN:
+                assert len(after) <= limit, name
+            if way == LIMIT:
+                assert len(after) == limit, name
+            # Only places and optical depths: what is denormal may be taken for zero
+            starts = np.searchsorted(before[:, FRONT], after[:, FRONT])
+            np.testing.assert_array_equal(after[:, FRONT], before[starts, FRONT], name)
+            assert starts[0] == 0, name
+            assert (np.diff(starts) > 0).all(), name
+            ends = np.append(starts[1:], len(before)) - 1
+            np.testing.assert_array_equal(after[:, BACK], before[ends, BACK], name)
+            total, tau = before[:, TAU].sum(dtype=float), after[:, TAU].sum(dtype=float)
+            assert tau == pytest.approx(total, rel=len(before) * EPS, abs=1e-37), name

@@ -1,0 +1,370 @@
+"""What the engine refuses, in which words, and that nothing stays behind."""
+
+from __future__ import annotations
+
+import gc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pyvista_vdi import VDI, Camera, TransferFunction, Volume, generation
+from pyvista_vdi.errors import (
+    Cancelled,
+    DeviceMemoryError,
+    InvalidArgumentError,
+    InvalidCameraError,
+    InvalidVolumeError,
+)
+from pyvista_vdi.generation import estimate, generate_vdi
+from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.raycast_volume import raycast_volume
+
+WINDOW = (12, 9)
+CAMERA = Camera((3.5, 3.5, 30), (3.5, 3.5, 3.5), (0, 1, 0))
+TURNED = CAMERA.azimuth(20)
+
+
+def some_volume(points=8, dtype=np.float32):
+    rng = np.random.default_rng(1)
+    return Volume((rng.random((points,) * 3) * 100).astype(dtype))
+
+
+VOLUME = some_volume()
+TRANSFER = TransferFunction(np.eye(3), [0.0, 0.3, 0.6], (0, 100), interpolation="linear")
+
+
+@pytest.fixture
+def make(runtime):
+    """``generate_vdi`` of a small scene, with some arguments changed."""
+
+    def generate(volume=VOLUME, camera=CAMERA, window_size=WINDOW, transfer=TRANSFER, **options):
+        return generate_vdi(volume, camera, window_size, transfer, device=runtime, **options)
+
+    return generate
+
+
+@pytest.fixture
+def draw(runtime):
+    """``raycast_volume`` of the same scene, with some arguments changed."""
+
+    def render(volume=VOLUME, camera=CAMERA, window_size=WINDOW, transfer=TRANSFER, **options):
+        return raycast_volume(volume, camera, window_size, transfer, device=runtime, **options)
+
+    return render
+
+
+@pytest.fixture
+def view(runtime, make):
+    """``render_vdi`` of its VDI from another view, with some arguments changed."""
+    vdi = make()
+
+    def render(camera=TURNED, window_size=None, **options):
+        return render_vdi(vdi, camera, window_size, device=runtime, **options)
+
+    return render
+
+
+# -- arguments -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("wrong", [0, -1, 4097, 2.5, "many", None, np.nan, np.inf, [20]])
+def test_max_supersegments(make, wrong):
+    message = "max_supersegments must be a whole number from 1 to 4096; got "
+    with pytest.raises(InvalidArgumentError, match=message) as caught:
+        make(max_supersegments=wrong)
+    assert str(caught.value).endswith(repr(wrong))
+    with pytest.raises(InvalidArgumentError, match=message):
+        estimate(VOLUME, WINDOW, max_supersegments=wrong)
+
+
+@pytest.mark.parametrize("right", [1, 4096, np.int64(3), 7.0])
+def test_max_supersegments_at_its_limits(make, right):
+    vdi = make(max_supersegments=right)
+    assert 0 < vdi.counts.max() <= right
+
+
+@pytest.mark.parametrize("wrong", [-1e-9, np.nan, np.inf, "little", None, [0.1, 0.2]])
+def test_tolerance(make, wrong):
+    with pytest.raises(InvalidArgumentError, match="tolerance must be a number >= 0; got "):
+        make(tolerance=wrong)
+
+
+@pytest.mark.parametrize("huge", [1.0, 1e18, 1e30, 1e300])
+def test_any_tolerance_leaves_one_supersegment_at_least(make, huge):
+    """One where nothing transparent lies between: all of the medium is in the lists still."""
+    vdi = make(tolerance=huge)
+    whole = make(max_supersegments=1)
+    np.testing.assert_array_equal(vdi.counts > 0, whole.counts > 0)
+    # Merging adds optical depths, one rounding each
+    assert vdi.optical_depth.sum() == pytest.approx(whole.optical_depth.sum(), rel=1e-5)
+    assert vdi.metadata["tolerance"] == huge
+
+
+@pytest.mark.parametrize("wrong", [-1, 90.5, np.nan, "wide", None])
+def test_view_cone(make, wrong):
+    message = "view_cone must be an angle between 0 and 90 degrees; got "
+    with pytest.raises(InvalidArgumentError, match=message):
+        make(view_cone=wrong)
+
+
+@pytest.mark.parametrize("right", [0, 90, 45.5])
+def test_view_cone_at_its_limits(make, right):
+    assert make(view_cone=right).metadata["view_cone"] == right
+
+
+@pytest.mark.parametrize("wrong", [0, -0.5, np.nan, np.inf, 1e-9, "small", [1]])
+def test_sample_distance(make, draw, wrong):
+    message = r"sample_distance must be a length of at least 7\.\d+e-07 model units.*got "
+    for function in (make, draw):
+        with pytest.raises(InvalidArgumentError, match=message) as caught:
+            function(sample_distance=wrong)
+        assert str(caught.value).endswith(repr(wrong))
+
+
+def test_a_step_longer_than_every_ray_is_one_step(make, draw):
+    images = [draw(sample_distance=step) for step in (1e3, 1e30, 1e300)]
+    assert images[0][..., 3].max() > 0
+    for image in images[1:]:
+        np.testing.assert_array_equal(image, images[0])
+    assert make(sample_distance=1e300).counts.max() == 1
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ((0, 9), "between 1 and 65536 pixels along each edge; got 0 x 9"),
+        ((12, -1), "between 1 and 65536 pixels along each edge; got 12 x -1"),
+        ((65537, 9), "between 1 and 65536 pixels along each edge; got 65537 x 9"),
+        ((12.5, 9), r"two whole numbers of pixels; got \(12.5, 9\)"),
+        ((np.nan, 9), "two whole numbers of pixels; got"),
+        ((12, 9, 1), r"two whole numbers of pixels; got \(12, 9, 1\)"),
+        (12, "two whole numbers of pixels; got 12"),
+        ("ab", "two whole numbers of pixels; got 'ab'"),
+    ],
+)
+def test_window_size(make, draw, view, wrong, message):
+    for function in (make, draw, view):
+        with pytest.raises(InvalidArgumentError, match=f"window_size must be .*{message}"):
+            function(window_size=wrong)
+    with pytest.raises(InvalidArgumentError, match=message):
+        estimate(VOLUME, wrong)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_volume_of_nan(make, draw, dtype):
+    volume = Volume(np.full((4, 4, 4), np.nan, dtype), name="density")
+    for function in (make, draw):
+        for _ in range(2):  # nothing of the first is remembered as good
+            with pytest.raises(InvalidVolumeError, match="every value of 'density' is NaN"):
+                function(volume=volume)
+
+
+def test_one_finite_value_is_enough(make, draw):
+    array = np.full((4, 4, 4), np.nan, np.float32)
+    array[2, 2, 2] = 50
+    nearest = TRANSFER.replace(interpolation="nearest")
+    camera = Camera((1.5, 1.5, 12), (1.5, 1.5, 1.5), (0, 1, 0))
+    image = draw(Volume(array), camera, transfer=nearest)
+    assert np.isfinite(image).all()
+    assert image[..., 3].max() > 0
+    assert make(Volume(array), camera, transfer=nearest).n_supersegments > 0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"volume": np.ones((4, 4, 4))}, "expected a Volume, got ndarray"),
+        ({"transfer": "bone"}, "expected a TransferFunction, got str"),
+        ({"transfer": None}, "expected a TransferFunction, got NoneType"),
+    ],
+)
+def test_other_types(make, draw, change, message):
+    for function in (make, draw):
+        with pytest.raises(InvalidArgumentError, match=message):
+            function(**change)
+
+
+def test_other_types_of_vdi_and_camera(runtime, make, view):
+    with pytest.raises(InvalidArgumentError, match="expected a VDI, got str"):
+        render_vdi("knee.vdi", CAMERA, device=runtime)
+    for function in (make, view):
+        with pytest.raises(InvalidCameraError):
+            function(camera=(0, 0, 1))
+
+
+@pytest.mark.parametrize(
+    ("depth", "message"),
+    [
+        (np.ones(WINDOW), r"shape \(height, width\) = \(9, 12\); got \(12, 9\)"),
+        (np.ones((9, 12, 1)), r"got \(9, 12, 1\)"),
+        (np.full((9, 12), np.nan), "opaque_depth holds NaN: use inf where nothing is opaque"),
+        (1.0, r"got \(\)"),
+        ("near", "opaque_depth must have shape.*'near'"),
+    ],
+)
+def test_opaque_depth(draw, view, depth, message):
+    for function in (draw, view):
+        with pytest.raises(InvalidArgumentError, match=message):
+            function(opaque_depth=depth)
+
+
+@pytest.mark.parametrize(
+    ("planes", "message"),
+    [
+        ([1, 0, 0, 0, 0, 1], r"clipping_planes must be \(k, 6\) finite.*got shape \(6,\)"),
+        (np.ones((2, 4)), r"clipping_planes must be \(k, 6\) finite.*got shape \(2, 4\)"),
+        ([[0, 0, 0, 0, np.nan, 1]], r"clipping_planes must be \(k, 6\) finite"),
+        ([[0, 0, 0, 0, 0, 0]], "a clipping plane's normal is zero: give its direction"),
+        ([[0, 0, 0, 0, 0, 1], [2]], r"clipping_planes must be \(k, 6\) finite"),
+    ],
+)
+def test_clipping_planes(draw, view, planes, message):
+    for function in (draw, view):
+        with pytest.raises(InvalidArgumentError, match=message):
+            function(clipping_planes=planes)
+
+
+def test_a_clipping_planes_normal_may_have_any_length(draw, view):
+    for function in (draw, view):
+        unit = function(clipping_planes=[[3.5, 0, 0, 1, 0, 0]])
+        assert 0 < np.count_nonzero(unit[..., 3]) < unit[..., 3].size
+        for length in (1e-300, 1e-45, 1e50):
+            same = function(clipping_planes=[[3.5, 0, 0, length, 0, 0]])
+            np.testing.assert_array_equal(same, unit)
+
+
+# -- memory ----------------------------------------------------------------------------------------
+
+
+def limited(runtime, monkeypatch, *, buffer=2**40, total=2**40):
+    """Let the runtime believe in less memory: per buffer, and beyond what it holds now."""
+    gc.collect()
+    info = replace(runtime.info, max_allocation=buffer, global_memory=runtime.allocated + total)
+    monkeypatch.setattr(runtime, "info", info)
+
+
+def test_a_volume_too_large_is_named(runtime, make, draw, monkeypatch):
+    volume = Volume(np.ones((64, 64, 64), np.float32), name="density")
+    limited(runtime, monkeypatch, buffer=2**19)
+    before = runtime.allocated
+    for function in (make, draw):
+        with pytest.raises(DeviceMemoryError, match="volume 'density'.* needs 1.00 MiB"):
+            function(volume=volume)
+    gc.collect()
+    assert runtime.allocated == before
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_working_memory_too_small_is_named(runtime, make, monkeypatch, share):
+    """Wherever the memory ends, the message names a buffer and a remedy, and all is given back."""
+    make()  # the volume is on the device
+    working = estimate(VOLUME, WINDOW).working
+    gc.collect()
+    before = runtime.allocated
+    limited(runtime, monkeypatch, total=int(share * 0.8 * working))
+    buffers = "recorded runs|merge errors|merge thresholds|list lengths|front depths|back depths"
+    with pytest.raises(DeviceMemoryError, match=f"the buffer '({buffers})' needs") as caught:
+        make()
+    assert "max_supersegments" in str(caught.value)
+    del caught
+    gc.collect()
+    assert runtime.allocated == before
+
+
+def test_a_window_beyond_memory_is_refused_before_anything_is_drawn(
+    runtime, make, draw, view, monkeypatch
+):
+    view()
+    limited(runtime, monkeypatch, buffer=2**30, total=2**31)
+    before, peak = runtime.allocated, runtime.peak_allocated
+    started = []
+    monkeypatch.setattr(type(runtime), "launch", lambda *args: started.append(args))
+    message = "'image' needs 64.00 GiB.*allows 1.00 GiB.*per buffer.*window size"
+    with pytest.raises(DeviceMemoryError, match=message):
+        view(window_size=(65536, 65536))
+    assert not started
+    assert runtime.peak_allocated <= max(peak, before + 2**20)
+    monkeypatch.undo()
+    limited(runtime, monkeypatch, buffer=2**30, total=2**31)
+    with pytest.raises(DeviceMemoryError, match=message):
+        draw(window_size=(65536, 65536))
+    # Four rows of lists at the very least are made at a time
+    with pytest.raises(DeviceMemoryError, match="'recorded runs' needs .* GiB"):
+        make(window_size=(65536, 65536), max_supersegments=4096)
+    gc.collect()
+    assert runtime.allocated == before
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.float32, np.float64])
+@pytest.mark.parametrize(("window", "limit"), [((64, 48), 20), ((37, 5), 1), ((16, 16), 300)])
+def test_the_estimate_bounds_what_is_taken(runtime, make, monkeypatch, dtype, window, limit):
+    volume = some_volume(24, dtype)
+    stated = estimate(volume, window, max_supersegments=limit)
+    gc.collect()
+    before = runtime.allocated
+    monkeypatch.setattr(runtime._ledger, "peak", before)
+    camera = Camera((11.5, 11.5, 90), (11.5, 11.5, 11.5), (0, 1, 0))
+    vdi = make(volume, camera, window, max_supersegments=limit)
+    taken = runtime.peak_allocated - before
+    # Beside it only what is small: forms, table, and 9 bytes for each block of 8 x 8 x 8 points
+    assert taken <= stated.volume + stated.working + 2**14
+    assert taken >= stated.working / 4
+    assert vdi.nbytes <= stated.vdi_worst_case
+    assert stated.total == stated.volume + stated.vdi_worst_case + stated.working
+
+
+# -- giving up -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def sliced(monkeypatch):
+    """Slices of four rows, so that a small window takes several."""
+    monkeypatch.setattr(generation, "_SLICE_BYTES", 1)
+
+
+def test_progress_goes_from_nothing_to_all(make, sliced):
+    fractions = []
+    make(progress=fractions.append)
+    assert fractions == [0.0, 4 / 9, 8 / 9, 1.0]
+
+
+@pytest.mark.parametrize("answer", [None, 0, "", True])
+def test_only_false_cancels(make, answer):
+    assert isinstance(make(progress=lambda fraction: answer), VDI)
+
+
+@pytest.mark.parametrize(("last", "percent"), [(1, "0%"), (2, "44%"), (4, "100%")])
+def test_cancelling(runtime, make, sliced, last, percent):
+    make()
+    gc.collect()
+    before, calls = runtime.allocated, []
+
+    def progress(fraction):
+        calls.append(fraction)
+        return len(calls) < last
+
+    with pytest.raises(Cancelled, match=f"generation was cancelled at {percent}"):
+        make(progress=progress)
+    assert len(calls) == last
+    gc.collect()
+    assert runtime.allocated == before
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
+@pytest.mark.parametrize("at", [0.0, 4 / 9, 1.0])
+def test_an_interrupt_leaves_nothing_allocated(runtime, make, sliced, at, error):
+    kept = make()
+    gc.collect()
+    before = runtime.allocated
+
+    def progress(fraction):
+        if fraction == at:
+            raise error("by the user")
+
+    with pytest.raises(error, match="by the user"):
+        make(progress=progress)
+    gc.collect()
+    assert runtime.allocated == before
+    # And the device is as good as before
+    assert make().equals(kept)

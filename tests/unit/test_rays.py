@@ -1,0 +1,354 @@
+"""Rays as the kernels take them, against direct float64 geometry."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from strategies import camera_around, random_bounds, random_transform, world_corners
+
+from pyvista_vdi import Camera, rays
+from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
+
+EPS64 = np.finfo(np.float64).eps
+SEEDS = range(12)
+WINDOW = (40, 30)
+
+
+def scene(seed):
+    rng = np.random.default_rng(seed)
+    bounds = random_bounds(rng)
+    return rng, bounds, camera_around(rng, bounds, random_transform(rng))
+
+
+def direct_depths(camera, points):
+    """View depth of model points: along the direction of projection, from the eye."""
+    forward = np.subtract(camera.focal_point, camera.position)
+    forward = forward / np.linalg.norm(forward)
+    world = points @ camera.model_transform[:3, :3].T
+    return (world + (camera.model_transform[:3, 3] - camera.position)) @ forward
+
+
+def direct_pixels(camera, window, points):
+    """Pixel offsets from the window's centre and view depth of model points (DESIGN section 3)."""
+    width, height = window
+    forward = np.subtract(camera.focal_point, camera.position)
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross(forward, camera.view_up)
+    right = right / np.linalg.norm(right)
+    up = np.cross(right, forward)
+    world = points @ camera.model_transform[:3, :3].T
+    world = world + (camera.model_transform[:3, 3] - camera.position)
+    x, y, z = world @ right, world @ up, world @ forward
+    if camera.parallel_projection:
+        half = camera.parallel_scale * np.array([width / height, 1])
+        x, y = x / half[0], y / half[1]
+    else:
+        tangent = np.tan(np.radians(camera.view_angle) / 2)
+        if camera.use_horizontal_view_angle:
+            half = tangent * np.array([1, height / width])
+        else:
+            half = tangent * np.array([width / height, 1])
+        x, y = x / (z * half[0]), y / (z * half[1])
+    u, v = x - camera.window_center[0], y - camera.window_center[1]
+    return u * width / 2, v * height / 2, z
+
+
+def points_on_rays(made, a, b, depth):
+    """P(t) as PixelRays documents it."""
+    pixel = np.column_stack([np.ones_like(a), a, b])
+    t = (depth - made.reference_depth)[:, None]
+    return pixel @ made.origin + t * (pixel @ made.direction)
+
+
+# -- depths ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_depth_range_is_that_of_the_corners(seed):
+    _, bounds, camera = scene(seed)
+    depths = direct_depths(camera, rays.corners(bounds))
+    # A dozen operations on numbers no larger than the corners' distance from the eye
+    scale = np.abs(world_corners(bounds, camera.model_transform) - camera.position).max()
+    low, high = rays.depth_range(camera, bounds)
+    assert low == pytest.approx(depths.min(), abs=64 * EPS64 * scale)
+    assert high == pytest.approx(depths.max(), abs=64 * EPS64 * scale)
+
+
+def test_corners_are_all_eight():
+    corners = rays.corners((0, 1, 2, 3, 4, 5))
+    assert {tuple(c) for c in corners} == set(itertools.product((0, 1), (2, 3), (4, 5)))
+
+
+@pytest.mark.parametrize(
+    ("distance", "parallel", "expected"),
+    [
+        (10, False, 9),  # in front: the near depth
+        (1, False, 0),  # on the near face
+        (0.5, False, 0),  # the eye inside
+        (-10, False, 0),  # behind the eye: nothing is seen
+        (10, True, 9),
+        (0.5, True, -0.5),  # parallel rays begin anywhere
+        (-10, True, -11),
+    ],
+)
+def test_reference_depth(distance, parallel, expected):
+    camera = Camera(
+        (0, 0, -distance), (0, 0, 1 - distance), (0, 1, 0), parallel_projection=parallel
+    )
+    assert rays.reference_depth(camera, (-1, 1, -1, 1, -1, 1)) == pytest.approx(expected, abs=1e-15)
+
+
+# -- rays ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_rays_pass_through_what_the_pixel_shows(seed):
+    rng, bounds, camera = scene(seed)
+    low, high = np.reshape(bounds, (3, 2)).T
+    points = low + rng.random((200, 3)) * (high - low)
+    a, b, depth = direct_pixels(camera, WINDOW, points)
+    made = rays.pixel_rays(camera, WINDOW, bounds)
+    assert made.reference_depth == rays.reference_depth(camera, bounds)
+    # A few dozen float64 operations; the inverse of the model transform has a condition of at
+    # most some 30 here (scales between 1/2 and 2, a shear of 1/2)
+    scale = np.abs(points).max() + np.abs(depth).max()
+    np.testing.assert_allclose(
+        points_on_rays(made, a, b, depth), points, rtol=0, atol=1e4 * EPS64 * scale
+    )
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_form_is_the_affine_function_along_the_ray(seed):
+    rng, bounds, camera = scene(seed)
+    made = rays.pixel_rays(camera, WINDOW, bounds)
+    normal, offset = rng.normal(size=3), rng.normal()
+    form = made.form(normal, offset)
+    a, b, t = rng.normal(size=(3, 50)) * 10
+    values = form[0] + a * form[1] + b * form[2] + t * (form[3] + a * form[4] + b * form[5])
+    at = points_on_rays(made, a, b, t + made.reference_depth)
+    scale = np.abs(made.origin).sum() * 20 + np.abs(made.direction).sum() * 400
+    np.testing.assert_allclose(values, at @ normal + offset, rtol=0, atol=64 * EPS64 * scale)
+
+
+def in_float32(form, a, b, t):
+    """The form as the kernels evaluate it."""
+    c = rays.packed([form])[0]
+    a, b, t = (np.float32(v) for v in (a, b, t))
+    return (c[0] + a * c[1] + b * c[2]) + t * (c[3] + a * c[4] + b * c[5])
+
+
+@pytest.mark.extremes
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize("extent", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("far", ["eye", "data", "both"])
+def test_a_far_eye_or_origin_costs_float32_nothing(far, extent, parallel):
+    """The eye 1e7 extents away, through a long lens; or the data there, the eye beside them."""
+    rng = np.random.default_rng(3)
+    away = 1e7 * extent
+    centre = np.array([away, -away, away]) * (far != "eye")
+    bounds = np.ravel([centre - extent / 2, centre + extent / 2], order="F")
+    towards = np.array([0.6, 0.64, 0.48])
+    distance = 3 * extent if far == "data" else away
+    camera = Camera(
+        centre + towards * distance,
+        centre,
+        (0, 0, 1),
+        view_angle=2 * np.degrees(np.arctan(extent / distance)),
+        parallel_projection=parallel,
+        parallel_scale=extent,
+    )
+    made = rays.pixel_rays(camera, WINDOW, bounds)
+    low, high = np.reshape(bounds, (3, 2)).T
+    points = low + rng.random((300, 3)) * (high - low)
+    a, b, depth = direct_pixels(camera, WINDOW, points)
+    # float64 itself knows a point 1e7 extents away to 2e-9 of an extent, and the difference of two
+    # such numbers to twice that; the camera's axes turn it by a few EPS64, again of 1e7 extents
+    slack = 64 * EPS64 * 1e7 * extent
+    np.testing.assert_allclose(points_on_rays(made, a, b, depth), points, rtol=0, atol=slack)
+    # Relative to the bounds, float32 has ten roundings of numbers of a few extents
+    t = depth - made.reference_depth
+    for axis in range(3):
+        found = in_float32(made.form(np.eye(3)[axis], -low[axis]), a, b, t)
+        error = np.abs(found - (points - low)[:, axis])
+        assert error.max() <= 64 * 2.0**-24 * extent + slack
+
+
+# -- matrices --------------------------------------------------------------------------------------
+
+
+@pytest.mark.extremes
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("exponents", [(-9, -9, -9), (9, 9, 9), (-9, 0, 9), (9, -9, 3)])
+def test_inverse_affine_of_any_scale(seed, exponents):
+    """Turned, sheared and mirrored axes of lengths 1e-9 to 1e9."""
+    rng = np.random.default_rng(seed)
+    matrix = random_transform(rng, rng.choice(["rigid", "mirror", "shear"]))
+    matrix[:3, :3] *= 10.0 ** np.array(exponents)
+    matrix[:3, 3] = rng.normal(size=3) * 10.0 ** rng.integers(-9, 9)
+    inverse = rays.inverse_affine(matrix)
+    # Points of the unit cube of the matrix's own frame, there and back, to a few dozen roundings:
+    # of the axes' lengths, and of the translation as each axis' row of the inverse scales it
+    points = rng.random((50, 3))
+    there = points @ matrix[:3, :3].T + matrix[:3, 3]
+    back = there @ inverse[:3, :3].T + inverse[:3, 3]
+    moved = np.abs(inverse[:3, :3]) @ (np.abs(there).max(axis=0) + np.abs(matrix[:3, 3]))
+    assert (np.abs(back - points) <= 64 * EPS64 * (moved + 1)).all()
+    np.testing.assert_array_equal(inverse[3], [0, 0, 0, 1])
+    # Exact entries where rounding plays no part
+    exact = np.linalg.inv(matrix[:3, :3] / 10.0 ** np.array(exponents))
+    exact = exact / 10.0 ** np.array(exponents)[:, None]
+    row = np.abs(exact).max(axis=1, keepdims=True)
+    assert (np.abs(inverse[:3, :3] - exact) <= 1e3 * EPS64 * row).all()
+
+
+# -- planes ----------------------------------------------------------------------------------------
+
+
+def value_at(form, a, b, t):
+    return form[0] + a * form[1] + b * form[2] + t * (form[3] + a * form[4] + b * form[5])
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_user_planes_are_in_world_coordinates(seed):
+    rng, bounds, camera = scene(seed)
+    made = rays.pixel_rays(camera, WINDOW, bounds)
+    low, high = np.reshape(bounds, (3, 2)).T
+    points = low + rng.random((200, 3)) * (high - low)
+    a, b, depth = direct_pixels(camera, WINDOW, points)
+    world = points @ camera.model_transform[:3, :3].T + camera.model_transform[:3, 3]
+    planes = np.column_stack([world[:5] + rng.normal(size=(5, 3)) * 0.1, rng.normal(size=(5, 3))])
+    forms = rays.user_planes(camera, made, planes)
+    assert len(forms) == 5
+    kept = set()
+    for plane, form in zip(planes, forms, strict=True):
+        distance = (world - plane[:3]) @ plane[3:] / np.linalg.norm(plane[3:])
+        found = value_at(form, a, b, depth - made.reference_depth)
+        clear = np.abs(distance) > 1e-9
+        np.testing.assert_array_equal(found[clear] > 0, distance[clear] > 0)
+        kept |= set((distance > 0).tolist())
+    assert kept == {True, False}
+
+
+@pytest.mark.parametrize("length", [1e-300, 1e-45, 1e-20, 1.0, 1e20, 1e50, 1e300])
+def test_a_normal_gives_a_direction_only(length):
+    """However long it is, the plane clips: in float32, too."""
+    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
+    bounds = (-1, 1, -1, 1, -1, 1)
+    made = rays.pixel_rays(camera, WINDOW, bounds)
+    planes = [[0, 0, 0.25, 0, 0, length], [0.5, 0, 0, -0.6 * length, 0.8 * length, 0]]
+    forms = rays.packed(rays.user_planes(camera, made, planes))
+    exact = [made.form((0, 0, 1), -0.25), made.form((-0.6, 0.8, 0), 0.3)]
+    # A form may be multiplied by any positive number
+    for form, same in zip(forms.astype(float), exact, strict=True):
+        ratio = np.abs(form).max() / np.abs(same).max()
+        assert ratio > 0
+        np.testing.assert_allclose(form / ratio, same, rtol=1e-6, atol=1e-6)
+
+
+def test_no_planes():
+    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
+    made = rays.pixel_rays(camera, WINDOW, (-1, 1, -1, 1, -1, 1))
+    for none in (None, [], np.empty((0, 6))):
+        assert rays.user_planes(camera, made, none) == []
+
+
+@pytest.mark.parametrize(
+    ("planes", "message"),
+    [
+        ([[0, 0, 0, 0, 0, 0]], "clipping plane's normal is zero"),
+        ([[0, 0, 0, 0, 0, 1], [1, 2, 3, 0, 0, 0]], "clipping plane's normal is zero"),
+        ([0, 0, 0, 0, 0, 1], r"clipping_planes must be \(k, 6\).*got shape \(6,\)"),
+        ([[0, 0, 0, 1]], r"clipping_planes must be \(k, 6\).*got shape \(1, 4\)"),
+        ([[[0, 0, 0, 0, 0, 1]]], r"clipping_planes must be \(k, 6\).*got shape \(1, 1, 6\)"),
+        ([[0, 0, np.nan, 0, 0, 1]], r"clipping_planes must be \(k, 6\) finite"),
+        ([[0, 0, 0, 0, 0, np.inf]], r"clipping_planes must be \(k, 6\) finite"),
+        ([[0, 0, 0, 0, 0, 1], [1, 2]], r"clipping_planes must be \(k, 6\)"),
+        ("x < 0", r"clipping_planes must be \(k, 6\).*'x < 0'"),
+    ],
+)
+def test_bad_planes_are_refused(planes, message):
+    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
+    made = rays.pixel_rays(camera, WINDOW, (-1, 1, -1, 1, -1, 1))
+    with pytest.raises(InvalidArgumentError, match=message):
+        rays.user_planes(camera, made, planes)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_box_planes_keep_what_is_inside(seed):
+    rng, bounds, camera = scene(seed)
+    made = rays.pixel_rays(camera, WINDOW, bounds)
+    low, high = np.reshape(bounds, (3, 2)).T
+    points = low + rng.uniform(-0.5, 1.5, (400, 3)) * (high - low)
+    points = points[direct_depths(camera, points) > 0.05]
+    a, b, depth = direct_pixels(camera, WINDOW, points)
+    forms = rays.box_planes(made, bounds)
+    assert len(forms) == 6
+    values = np.array([value_at(f, a, b, depth - made.reference_depth) for f in forms])
+    np.testing.assert_array_equal(
+        (values >= 0).all(axis=0), ((points >= low) & (points <= high)).all(axis=1)
+    )
+
+
+def test_eye_plane_is_where_depth_is_zero():
+    bounds = (-1, 1, -1, 1, -1, 1)
+    for distance in (10.0, 0.5):
+        camera = Camera((0, 0, distance), (0, 0, distance - 1), (0, 1, 0))
+        made = rays.pixel_rays(camera, WINDOW, bounds)
+        (form,) = rays.eye_plane(camera, made)
+        for depth in (-1.0, 0.25, 3.0):
+            assert value_at(form, 3.5, -2.5, depth - made.reference_depth) == pytest.approx(depth)
+        parallel = camera.replace(parallel_projection=True)
+        assert rays.eye_plane(parallel, rays.pixel_rays(parallel, WINDOW, bounds)) == []
+
+
+# -- what float32 cannot hold ----------------------------------------------------------------------
+
+
+def test_a_view_beyond_float32_is_refused():
+    camera = Camera((0, 0, 1e40), (0, 0, 0), (0, 1, 0))
+    made = rays.pixel_rays(camera, WINDOW, (-1e39, 1e39, -1, 1, -1, 1))
+    with pytest.raises(InvalidCameraError, match="cannot be expressed in float32.*scale the data"):
+        rays.packed([made.form((1, 0, 0), 1e39)])
+
+
+def test_opaque_depth_is_relative_to_the_reference():
+    camera = Camera((0, 0, 1e7), (0, 0, 0), (0, 1, 0), view_angle=1e-5)
+    made = rays.pixel_rays(camera, (2, 2), (-1, 1, -1, 1, -1, 1))
+    depth = np.array([[1e7 - 1, 1e7 + 0.125], [np.inf, -np.inf]])
+    found = rays.checked_opaque_depth(depth, (2, 2), made)
+    # The difference is made in float64, which knows 1e7 to 2e-9
+    np.testing.assert_allclose(found, [[0, 1.125], [np.inf, -np.inf]], atol=1e-7)
+    assert found.dtype == np.float32
+    assert rays.checked_opaque_depth(None, (2, 2), made) is None
+
+
+def test_opaque_depth_beyond_float32_is_far_away():
+    """VTK and others mark "nothing" by the largest number of their own type."""
+    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
+    made = rays.pixel_rays(camera, (1, 1), (-1, 1, -1, 1, -1, 1))
+    found = rays.checked_opaque_depth([[np.finfo(np.float64).max]], (1, 1), made)
+    assert found[0, 0] == np.inf
+
+
+@pytest.mark.parametrize(
+    ("depth", "message"),
+    [
+        (
+            np.ones((3, 4)),
+            r"opaque_depth must have shape \(height, width\) = \(2, 4\); got \(3, 4\)",
+        ),
+        (np.ones((4, 2)), r"got \(4, 2\)"),
+        (np.ones((2, 4, 1)), r"got \(2, 4, 1\)"),
+        (5.0, r"got \(\)"),
+        (np.full((2, 4), np.nan), "opaque_depth holds NaN: use inf"),
+        ([[1, 2], [3]], r"opaque_depth must have shape \(height, width\) = \(2, 4\)"),
+        ("far", r"opaque_depth must have shape \(height, width\) = \(2, 4\).*'far'"),
+    ],
+)
+def test_bad_opaque_depths_are_refused(depth, message):
+    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
+    made = rays.pixel_rays(camera, (4, 2), (-1, 1, -1, 1, -1, 1))
+    with pytest.raises(InvalidArgumentError, match=message):
+        rays.checked_opaque_depth(depth, (4, 2), made)
