@@ -147,7 +147,7 @@ install() {
 # The tests must see the installed package: they are copied away from it, with pytest's settings.
 copy_tests() {
     mkdir -p "$work/tests-only"
-    cp -r "$work/source/tests" "$work/source/pyproject.toml" "$work/tests-only/"
+    cp -r "$work/source/tests" "$work/source/examples" "$work/source/pyproject.toml" "$work/tests-only/"
 }
 
 check_installed_copy() {

@@ -5,6 +5,33 @@
 
 Map of the files
 ----------------
+Shared functions:
+
+``common/rays.cl``
+    Affine forms along the ray of a pixel, clipping to planes, pixels in blocks of 4 x 4.
+``common/volume_sampling.cl``
+    Samples of a uniform grid, nearest or trilinear.
+``common/classification.cl``
+    Transfer function, extinction, opacity of an optical depth.
+``common/empty_blocks.cl``
+    Size of the blocks by which marches skip what is transparent.
+``common/march.cl``
+    The steps along a ray of a volume: generation and direct volume rendering share them.
+``common/lists.cl``
+    Which supersegment of a list a ray meets first (paper, Algorithm 1).
+
+Entry points:
+
 ``common/probe.cl``
     ``probe``: the kernel that a device must run correctly before it is used.
+``vdi/generate.cl``, with ``vdi/runs.cl``
+    ``march_lists``, ``shorten_lists``, ``pack_lists``: volume to lists of supersegments.
+``vdi/prepare.cl``
+    ``prepare_lists``: a VDI's arrays to what the raycaster reads.
+``vdi/raycast.cl``
+    ``raycast``: VDI to image from any view (paper, section 3).
+``vdi/render_volume.cl``
+    ``render_volume``: direct volume rendering, the baseline.
+``grid/volume_blocks.cl``
+    ``block_ranges``, ``block_visibility``: blocks of a volume that are transparent.
 """

@@ -15,6 +15,7 @@ from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
 from .device_volume import DeviceVolume, as_float
 from .errors import Cancelled, InvalidArgumentError
+from .host_memory import require_host_memory
 from .opencl_runtime import Runtime, get_runtime
 from .transfer_function import TransferFunction
 from .vdi import VDI
@@ -177,6 +178,7 @@ def generate_vdi(
     width, height = check_window_size(window_size)
     limit = check_max_supersegments(max_supersegments)
     tolerance, hidden_weight = _check_criterion(tolerance, view_cone)
+    _require_room((), (width, height))
     runtime = get_runtime(device)
     medium = DeviceVolume(runtime, volume, transfer_function, sample_distance)
     recorder = _Recorder(runtime, medium, camera, (width, height), limit, tolerance, hidden_weight)
@@ -187,6 +189,7 @@ def generate_vdi(
             rows = min(recorder.slices.rows, height - first_row)
             recorder.march(first_row, rows)
             parts.append(recorder.packed(rows))
+            _require_room(parts, (width, height))
     _report(progress, 1.0)
 
     lengths, front, back, color, optical_depth = (
@@ -388,6 +391,16 @@ def _check_criterion(tolerance: float, view_cone: float) -> tuple[float, float]:
             f"view_cone must be an angle between 0 and 90 degrees; got {view_cone!r}"
         )
     return difference, float(1 - np.cos(np.radians(angle)))
+
+
+def _require_room(parts: Sequence[tuple[NDArray[Any], ...]], size: tuple[int, int]) -> None:
+    """Refuse to go on where the host cannot hold the VDI: its arrays, and the slices they join."""
+    made = sum(array.nbytes for part in parts for array in part)
+    require_host_memory(
+        2 * made + 8 * size[0] * size[1],
+        f"a VDI of {size[0]} x {size[1]} lists",
+        "lower the window size or max_supersegments, or raise tolerance",
+    )
 
 
 def _report(progress: Progress | None, fraction: float) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .bounds import Check, judge_pictures, judge_times
+from .bounds import Check, judge_times, judge_vdi, judge_vtk
 from .measure import AngleResult, Report, Settings, Timing, measure
 from .sheet import contact_sheet, table
 
@@ -13,8 +13,9 @@ __all__ = [
     "Settings",
     "Timing",
     "contact_sheet",
-    "judge_pictures",
     "judge_times",
+    "judge_vdi",
+    "judge_vtk",
     "measure",
     "table",
 ]

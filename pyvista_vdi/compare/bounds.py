@@ -39,6 +39,11 @@ SSIM_OF_BINARY_SOLID: MappingProxyType[float, float] = MappingProxyType({5.0: 0.
 #: How far mean brightness from a new view may be from the raycaster's, as a share of it.
 BRIGHTNESS_TOLERANCE = 0.02
 
+#: Steps to a voxel at which two raycasters with samples at different places agree. Nearest
+#: sampling of a volume with hard edges needs them: `aneurism` comes to 36.5 dB of VTK's GPU mapper
+#: at 2, to 41.6 at 4 and to 47.3 at 8, and each is as far from itself at half the steps.
+CONVERGED_STEPS = 8
+
 #: Our raycaster against VTK's GPU mapper with the soft transfer function.
 SSIM_TO_VTK = 0.99
 PSNR_TO_VTK = 38.0  # dB
@@ -90,8 +95,8 @@ class Check:
         return f"{self.name}: {self.value:.6g} {self.sense} {self.bound:.6g} {verdict}"
 
 
-def judge_pictures(report: Report, volume: str, transfer_function: str) -> list[Check]:
-    """Hold a report's pictures against the bounds of its standard case.
+def judge_vdi(report: Report, volume: str, transfer_function: str) -> list[Check]:
+    """Hold the VDI's pictures, against our volume raycaster's, to the bounds of a standard case.
 
     Parameters
     ----------
@@ -110,15 +115,26 @@ def judge_pictures(report: Report, volume: str, transfer_function: str) -> list[
     return [
         check
         for result in report.angles
-        for check in (
-            *_vdi_checks(result, volume, transfer_function),
-            *_vtk_checks(result, transfer_function),
-        )
+        for check in _vdi_checks(result, volume, transfer_function)
     ]
 
 
+def judge_vtk(report: Report, transfer_function: str) -> list[Check]:
+    """Hold our volume raycaster to its bounds against VTK's GPU mapper, at every angle measured.
+
+    They are meant for converged steps: :data:`CONVERGED_STEPS` a voxel where half a voxel is not
+    enough. Arguments as for :func:`judge_vdi`.
+
+    Returns
+    -------
+    list of Check
+        The bounds that apply; none where VTK took no part.
+    """
+    return [c for result in report.angles for c in _vtk_checks(result, transfer_function)]
+
+
 def judge_times(report: Report, volume: str) -> list[Check]:
-    """Hold a report's times against the bounds; arguments as for :func:`judge_pictures`.
+    """Hold a report's times to the bounds; arguments as for :func:`judge_vdi`.
 
     Returns
     -------

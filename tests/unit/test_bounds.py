@@ -6,7 +6,15 @@ import math
 
 import pytest
 
-from pyvista_vdi.compare import AngleResult, Check, Report, Timing, judge_pictures, judge_times
+from pyvista_vdi.compare import (
+    AngleResult,
+    Check,
+    Report,
+    Timing,
+    judge_times,
+    judge_vdi,
+    judge_vtk,
+)
 from pyvista_vdi.metrics import Comparison
 from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS
 
@@ -48,39 +56,39 @@ def missed(checks):
 )
 def test_ssim_from_a_new_view(volume, look, angle, bound):
     name = f"SSIM at {angle} degrees"
-    assert missed(judge_pictures(report(view(angle, found(bound))), volume, look)) == []
+    assert missed(judge_vdi(report(view(angle, found(bound))), volume, look)) == []
     below = report(view(angle, found(bound - 1e-6)))
-    assert missed(judge_pictures(below, volume, look)) == [name]
+    assert missed(judge_vdi(below, volume, look)) == [name]
 
 
 @pytest.mark.parametrize("brightness", [0.9799, 1.0201])
 def test_brightness(brightness):
-    checks = judge_pictures(report(view(5, found(brightness=brightness))), "brain", "soft")
+    checks = judge_vdi(report(view(5, found(brightness=brightness))), "brain", "soft")
     assert missed(checks) == ["brightness error at 5 degrees"]
 
 
 def test_the_generating_view_has_its_own_bounds():
-    checks = judge_pictures(report(view(0, found(0.998, worst=2.1))), "brain", "soft")
+    checks = judge_vdi(report(view(0, found(0.998, worst=2.1))), "brain", "soft")
     assert missed(checks) == ["SSIM at V_O", "worst pixel at V_O"]
-    assert missed(judge_pictures(report(view(0, found(0.9991, worst=2))), "brain", "soft")) == []
+    assert missed(judge_vdi(report(view(0, found(0.9991, worst=2))), "brain", "soft")) == []
 
 
 def test_other_angles_have_no_bound():
-    assert judge_pictures(report(view(60, found(0.1))), "brain", "soft") == []
+    assert judge_vdi(report(view(60, found(0.1))), "brain", "soft") == []
 
 
 def test_soft_is_held_against_vtk_itself():
     far = view(0, ours=found(0.989, 37.9), theirs=found(0.5, 10))
-    checks = judge_pictures(report(far), "brain", "soft")
+    checks = judge_vtk(report(far), "soft")
     assert missed(checks) == ["SSIM to VTK at 0 degrees", "PSNR to VTK at 0 degrees"]
 
 
 def test_the_others_are_held_against_what_vtk_differs():
     # 1.5 times the root mean square is 3.52 dB less
     near = view(0, ours=found(0.986, 36.5), theirs=found(0.99, 40))
-    assert missed(judge_pictures(report(near), "brain", "steep")) == []
+    assert missed(judge_vtk(report(near), "steep")) == []
     far = view(0, ours=found(0.984, 36.4), theirs=found(0.99, 40))
-    checks = judge_pictures(report(far), "brain", "steep")
+    checks = judge_vtk(report(far), "steep")
     assert missed(checks) == ["1 - SSIM to VTK at 0 degrees", "RMS to VTK at 0 degrees"]
 
 
@@ -111,4 +119,4 @@ def test_without_timings_there_is_nothing_to_judge():
 
 def test_every_standard_transfer_function_has_bounds():
     for look in TRANSFER_FUNCTIONS:
-        assert len(judge_pictures(report(view(0), view(5), view(30)), "brain", look)) == 6
+        assert len(judge_vdi(report(view(0), view(5), view(30)), "brain", look)) == 6

@@ -290,6 +290,7 @@ def test_a_window_beyond_memory_is_refused_before_anything_is_drawn(
     with pytest.raises(DeviceMemoryError, match=message):
         draw(window_size=(65536, 65536))
     # Four rows of lists at the very least are made at a time
+    monkeypatch.setattr("pyvista_vdi.host_memory.physical_memory", lambda: 2**60)
     with pytest.raises(DeviceMemoryError, match="'recorded runs' needs .* GiB"):
         make(window_size=(65536, 65536), max_supersegments=4096)
     gc.collect()
@@ -368,3 +369,19 @@ def test_an_interrupt_leaves_nothing_allocated(runtime, make, sliced, at, error)
     assert runtime.allocated == before
     # And the device is as good as before
     assert make().equals(kept)
+
+
+def test_a_window_whose_lists_the_host_cannot_hold_is_refused_before_any_work(make, monkeypatch):
+    monkeypatch.setattr("pyvista_vdi.host_memory.physical_memory", lambda: 2**30)
+    with pytest.raises(
+        DeviceMemoryError, match=r"65536 x 65536 lists needs 32\.00 GiB.* has 1\.00"
+    ):
+        make(window_size=(65536, 65536))
+
+
+def test_a_vdi_that_outgrows_the_host_is_given_up_with_the_remedy(make, monkeypatch):
+    # Room for the offsets of its lists and nothing more
+    room = 8 * WINDOW[0] * WINDOW[1]
+    monkeypatch.setattr("pyvista_vdi.host_memory.physical_memory", lambda: room)
+    with pytest.raises(DeviceMemoryError, match=r"12 x 9 lists .* lower the window size"):
+        make()

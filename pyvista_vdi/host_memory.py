@@ -1,0 +1,59 @@
+"""How much memory the host has, so that what cannot fit is refused before it is taken."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from .errors import DeviceMemoryError
+
+
+def physical_memory() -> int | None:
+    """Return the host's memory in bytes, or None where the system does not say."""
+    if sys.platform == "win32":
+        return _windows_memory()
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return None
+
+
+def require_host_memory(nbytes: int, what: str, remedy: str) -> None:
+    """Refuse what the host cannot hold.
+
+    Parameters
+    ----------
+    nbytes : int
+        Bytes that would be taken.
+    what : str
+        What needs them, and how large it is.
+    remedy : str
+        What the caller can do.
+
+    Raises
+    ------
+    DeviceMemoryError
+        If the host has less memory in all.
+    """
+    available = physical_memory()
+    if available is not None and nbytes > available:
+        raise DeviceMemoryError(
+            f"{what} needs {nbytes / 2**30:.2f} GiB on the host, which has "
+            f"{available / 2**30:.2f} GiB: {remedy}"
+        )
+
+
+def _windows_memory() -> int | None:
+    import ctypes
+
+    class _Status(ctypes.Structure):
+        _fields_ = (
+            ("dwLength", ctypes.c_ulong),
+            ("dwMemoryLoad", ctypes.c_ulong),
+            ("ullTotalPhys", ctypes.c_ulonglong),
+            ("rest", ctypes.c_ulonglong * 6),
+        )
+
+    status = _Status(dwLength=ctypes.sizeof(_Status))
+    kernel = getattr(ctypes, "windll").kernel32  # noqa: B009 (unknown to type checkers elsewhere)
+    return int(status.ullTotalPhys) if kernel.GlobalMemoryStatusEx(ctypes.byref(status)) else None
