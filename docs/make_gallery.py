@@ -21,8 +21,8 @@ TARGET = DOCS / "images"
 
 #: Largest width of a picture, pixels, and of a file, bytes.
 WIDTH = 480
-SHEET_WIDTH = 1120
-LARGEST_FILE = 100_000
+SHEET_WIDTH = 1280
+LARGEST_FILE = 100 * 1024
 
 COMPARISON = ("brain", "steep", "320x180")
 

@@ -176,27 +176,27 @@ class VDI:
     def _check_media(self) -> None:
         if not math.isfinite(self.depth_origin):
             raise InvalidVDIError(f"depth_origin must be finite; got {self.depth_origin}")
-        # Written so that NaN fails each test
-        self._require(np.isfinite(self.front) & np.isfinite(self.back), "front and back finite")
-        self._require(self.front < self.back, "front < back")
-        color = self.color
-        inside = (color >= 0) & (color <= 1)
-        self._require(inside[:, 0] & inside[:, 1] & inside[:, 2], "0 <= color <= 1")
-        self._require(
-            (self.optical_depth >= 0) & np.isfinite(self.optical_depth),
-            "optical_depth >= 0 and finite",
-        )
-        if not self.camera.parallel_projection and len(self.front):
-            # Exact comparison: depth in front of the eye is front + depth_origin > 0
-            self._require(
-                self.front >= np.float64(-self.depth_origin), "in front of the eye (depth >= 0)"
-            )
-        if len(self.front) > 1:
-            sorted_ = np.ones(len(self.front), dtype=bool)
-            sorted_[1:] = self.back[:-1] <= self.front[1:]
-            starts = self.offsets[:-1].astype(np.int64)
-            sorted_[starts[starts < len(sorted_)]] = True  # a list's first has none before it
-            self._require(sorted_, "sorted within its list and not overlapping")
+        if len(self.front) == 0:
+            return
+        front, back, color, tau = self.front, self.back, self.color, self.optical_depth
+        # Extremes need no array in between. Comparisons are written so that NaN fails each
+        if not (-np.inf < front.min() and back.max() < np.inf):
+            self._require(np.isfinite(front) & np.isfinite(back), "front and back finite")
+        self._require(front < back, "front < back")
+        if not (color.min() >= 0 and color.max() <= 1):
+            inside = (color >= 0) & (color <= 1)
+            self._require(inside[:, 0] & inside[:, 1] & inside[:, 2], "0 <= color <= 1")
+        if not (tau.min() >= 0 and tau.max() < np.inf):
+            self._require((tau >= 0) & np.isfinite(tau), "optical_depth >= 0 and finite")
+        # Exact comparison: depth in front of the eye is front + depth_origin > 0
+        nearest = np.float64(-self.depth_origin)
+        if not self.camera.parallel_projection and not front.min() >= nearest:
+            self._require(front >= nearest, "in front of the eye (depth >= 0)")
+        ordered = np.ones(len(front), dtype=bool)
+        np.less_equal(back[:-1], front[1:], out=ordered[1:])
+        starts = self.offsets[:-1]
+        ordered[starts[starts < np.uint64(len(front))]] = True  # none is before a list's first
+        self._require(ordered, "sorted within its list and not overlapping")
 
     def _require(self, good: NDArray[np.bool_], rule: str) -> None:
         if good.all():
