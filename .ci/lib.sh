@@ -170,6 +170,7 @@ PYTHON
 }
 
 check_opencl_implementations() {
+    cd "$work" # not the checkout, which Python would import from
     "$work/venv/bin/pyvista-vdi" devices
     PYVISTA_VDI_MIN_PLATFORMS=${PYVISTA_VDI_MIN_PLATFORMS:-2} "$work/venv/bin/python" - <<'PYTHON'
 import os
