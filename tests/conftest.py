@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import os
 import re
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -88,3 +89,12 @@ def default_runtime() -> Runtime:
     except (NoDeviceError, MissingDependencyError) as exc:
         no_device(str(exc))
         raise  # not reached: no_device ends the test
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _outside_the_checkout(tmp_path_factory):
+    """Work in a folder of its own: from a checkout, a new Python would import the sources there."""
+    before = Path.cwd()
+    os.chdir(tmp_path_factory.mktemp("work"))
+    yield
+    os.chdir(before)
