@@ -17,8 +17,12 @@ Shared functions:
     Size of the blocks by which marches skip what is transparent.
 ``common/march.cl``
     The steps along a ray of a volume: generation and direct volume rendering share them.
+``common/list_space.cl``
+    V_O's list space: coordinates of a ray in it, and its depth coordinate.
 ``common/lists.cl``
     Which supersegment of a list a ray meets first (paper, Algorithm 1).
+``common/occupancy.cl``
+    Tiles and slabs of the occupancy grid.
 
 Entry points:
 
@@ -32,6 +36,8 @@ Entry points:
     ``raycast``: VDI to image from any view (paper, section 3).
 ``vdi/render_volume.cl``
     ``render_volume``: direct volume rendering, the baseline.
+``grid/occupancy.cl``
+    ``count_supersegments``, ``occupied_slabs``: the occupancy grid of a VDI (paper, section 4).
 ``grid/volume_blocks.cl``
     ``block_ranges``, ``block_visibility``: blocks of a volume that are transparent.
 """

@@ -145,6 +145,7 @@ def render(
     *,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    skip_empty: bool = True,
     device: Any = None,
 ) -> NDArray[np.float32]:
     """Raycast a VDI from a new view.
@@ -163,6 +164,8 @@ def render(
     clipping_planes : array_like of float, shape (k, 6), optional
         Origin and normal of each plane, world coordinates; the side that the normal points to
         is kept, as with VTK's mappers.
+    skip_empty : bool, default: True
+        Pass by space without supersegments; the picture is the same to the last bit.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
 
@@ -188,6 +191,7 @@ def render(
         window_size,
         opaque_depth=opaque_depth,
         clipping_planes=clipping_planes,
+        skip_empty=skip_empty,
         device=device,
     )
 

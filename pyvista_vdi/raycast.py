@@ -14,6 +14,7 @@ from . import rays
 from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
 from .errors import InvalidArgumentError
+from .occupancy import OccupancyGrid
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime
 from .vdi import VDI
 
@@ -22,7 +23,7 @@ TRANSMITTANCE_CUTOFF = 1e-6
 #: Far depth over near depth up to which a lens counts as long, and depth is kept relative.
 _LONG_LENS = 2.0
 
-_prepared: weakref.WeakKeyDictionary[VDI, dict[Runtime, PreparedVDI]] = weakref.WeakKeyDictionary()
+_prepared: weakref.WeakKeyDictionary[VDI, dict[Runtime, _Preparation]] = weakref.WeakKeyDictionary()
 _lock = threading.Lock()
 
 
@@ -33,6 +34,7 @@ def render_vdi(
     *,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    skip_empty: bool = True,
     device: Any = None,
 ) -> NDArray[np.float32]:
     """Raycast a VDI from any view (paper section 3).
@@ -49,6 +51,9 @@ def render_vdi(
         View depth at which each ray ends, world units, top row first; inf where nothing is opaque.
     clipping_planes : array_like of float, shape (k, 6), optional
         Origin and normal of each plane, world coordinates; the normal's side is kept.
+    skip_empty : bool
+        Pass by what the occupancy grid says is empty, where the VDI has enough of it to gain by
+        that. The picture is the same to the last bit.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
 
@@ -69,17 +74,26 @@ def render_vdi(
     runtime = get_runtime(device)
     prepared = prepared_vdi(runtime, vdi)
     with runtime.buffer((size[1], size[0], 4), name="image") as image:
-        prepared.render(camera, size, image, opaque_depth, clipping_planes)
+        prepared.render(camera, size, image, opaque_depth, clipping_planes, skip_empty=skip_empty)
         return runtime.download(image)
+
+
+class _Preparation:
+    """The place of a prepared VDI: whoever comes first makes it, others wait for that one only."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.prepared: PreparedVDI | None = None
 
 
 def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
     """Return the VDI on the device, made once and kept as long as the VDI lives."""
     with _lock:
-        cache = _prepared.setdefault(vdi, {})
-        if runtime not in cache:
-            cache[runtime] = PreparedVDI(runtime, vdi)
-        return cache[runtime]
+        place = _prepared.setdefault(vdi, {}).setdefault(runtime, _Preparation())
+    with place.lock:
+        if place.prepared is None:
+            place.prepared = PreparedVDI(runtime, vdi)
+        return place.prepared
 
 
 class PreparedVDI:
@@ -91,6 +105,11 @@ class PreparedVDI:
         The device.
     vdi : VDI
         Not kept: the buffers are enough.
+
+    Attributes
+    ----------
+    occupancy : OccupancyGrid
+        Where there is nothing to see.
     """
 
     def __init__(self, runtime: Runtime, vdi: VDI) -> None:
@@ -128,8 +147,10 @@ class PreparedVDI:
         image: DeviceBuffer,
         opaque_depth: ArrayLike | None = None,
         clipping_planes: ArrayLike | None = None,
+        *,
+        skip_empty: bool = True,
     ) -> None:
-        """Enqueue a frame into ``image``, float32 (H, W, 4) on the device."""
+        """Draw a frame into ``image``, float32 (H, W, 4) on the device."""
         width, height = size
         pixel_rays = rays.pixel_rays(camera, size, self._bounds)
         coordinates = [pixel_rays.form(row[:3], row[3]) for row in self._list_rows]
@@ -141,7 +162,10 @@ class PreparedVDI:
         forms = rays.packed([*coordinates, *direction, *planes])
         ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
         runtime = self._runtime
-        kernel = runtime.kernel("vdi/raycast.cl", "raycast", self.defines)
+        defines = self.defines
+        if skip_empty and self.occupancy.worthwhile:
+            defines["SKIP_EMPTY"] = 1
+        kernel = runtime.kernel("vdi/raycast.cl", "raycast", defines)
         with (
             runtime.upload(forms, "rays") as form_buffer,
             runtime.upload(
@@ -165,6 +189,9 @@ class PreparedVDI:
                 depth,
                 np.int32(ends is not None),
                 np.float32(TRANSMITTANCE_CUTOFF),
+                self.occupancy.masks,
+                np.float32(self.occupancy.first_depth),
+                np.float32(self.occupancy.slabs_per_depth),
                 image,
             )
             runtime.finish()  # the buffers above may be host memory in use
@@ -230,5 +257,14 @@ class PreparedVDI:
                 directions,
                 self._faces,
                 self._media,
+            )
+            self.occupancy = OccupancyGrid(
+                runtime,
+                vdi,
+                self._offsets,
+                front,
+                back,
+                nearest=self._nearest,
+                long_offsets=self._long_offsets,
             )
             runtime.finish()  # the buffers above may be host memory in use

@@ -1,24 +1,7 @@
 // A VDI's arrays to what the raycaster reads: faces in list space and extinction in place of optical depth.
-//
-// The depth coordinate z grows with depth and is projective, so that straight rays stay straight (DESIGN section 3):
-//
-//     -D PARALLEL      z = Z - Z_ref             1/Z is not needed
-//     -D SHIFTED       z = (Z - Z_ref) / Z       long lens: what cancels in Z - Z_ref was taken out in float64 by the host
-//     otherwise        z = -1 / Z                the same relative precision at every depth
-//
-// with Z view depth from V_O in world units and Z_ref the VDI's depth origin; the arrays hold Z - Z_ref.
+// The arrays hold offsets, see common/list_space.cl, whose -D names hold here.
+#include "common/list_space.cl"
 #pragma OPENCL FP_CONTRACT OFF
-
-inline float depth_coordinate(float offset, float depth_origin)
-{
-#if defined(PARALLEL)
-    return offset;
-#elif defined(SHIFTED)
-    return offset / (offset + depth_origin);
-#else
-    return -1.0f / (offset + depth_origin);
-#endif
-}
 
 // One work-item per list.
 __kernel void prepare_lists(

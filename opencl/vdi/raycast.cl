@@ -1,51 +1,23 @@
 // VDI to image from any view: the paper's raycaster (section 3).
 //
-// In V_O's list space lists and supersegments are axis-aligned boxes and rays stay straight: a ray steps from list to list
-// (Amanatides and Woo), finds the first supersegment of each by the index found in the last one, and composites, front to
-// back, the length that it crosses of each (DESIGN section 3 "Lengths", "A supersegment is a homogeneous medium").
+// A ray steps from list to list (Amanatides and Woo), finds the first supersegment of each by the index found in the last
+// one, and composites, front to back, the length that it crosses of each (DESIGN section 3 "Lengths", "A supersegment is a
+// homogeneous medium").
 //
 // -D OFFSET_T           type of an offset into the supersegments: uint or ulong
-// -D PARALLEL, SHIFTED  the depth coordinate, see vdi/prepare.cl
+// -D PARALLEL, SHIFTED  the depth coordinate, see common/list_space.cl
+// -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
 //
-// List coordinates are pixels of V_O's window from its centre; r runs along the ray over an interval of length 1 and is 0
-// at the end that is deeper in V_O, where the interpolated 1/Z is smallest and its rounding matters most.
-#include "common/rays.cl"
+// r runs along the ray over an interval of length 1 and is 0 at the end that is deeper in V_O, where the interpolated 1/Z is
+// smallest and its rounding matters most.
+#include "common/list_space.cl"
 #include "common/lists.cl"
 #include "common/classification.cl"
+#include "common/occupancy.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#define U_FORM 0
-#define V_FORM 1
-#define DEPTH_FORM 2
-#define DENOMINATOR_FORM 3
-#define MODEL_FORM 4
-#define PLANE_FORMS 7
-
-// Homogeneous list coordinates at t, divided out: (u, v, depth coordinate).
-inline float3 list_point(__global const float *forms, float a, float b, float t)
-{
-    const float u = fma(t, form_slope(forms + U_FORM * FORM_SIZE, a, b), form_value(forms + U_FORM * FORM_SIZE, a, b));
-    const float v = fma(t, form_slope(forms + V_FORM * FORM_SIZE, a, b), form_value(forms + V_FORM * FORM_SIZE, a, b));
-    const float z = fma(t, form_slope(forms + DEPTH_FORM * FORM_SIZE, a, b),
-                        form_value(forms + DEPTH_FORM * FORM_SIZE, a, b));
-#ifdef PARALLEL
-    return (float3)(u, v, z);
-#else
-    const float d = fma(t, form_slope(forms + DENOMINATOR_FORM * FORM_SIZE, a, b),
-                        form_value(forms + DENOMINATOR_FORM * FORM_SIZE, a, b));
-    return (float3)(u, v, z) / d;
-#endif
-}
-
-// 1 / Z of a depth coordinate; `z_ref` is the VDI's depth origin. Not used in parallel projection.
-inline float reciprocal_depth(float z, float z_ref)
-{
-#ifdef SHIFTED
-    return (1.0f - z) / z_ref;
-#else
-    return -z;
-#endif
-}
+// A ray that crosses fewer lists than this is not worth a look at the grid: at V_O it stays in one.
+#define FEW_LISTS 2.0f
 
 __kernel void raycast(
     __global const OFFSET_T *offsets,   // lists_wide * lists_high + 1
@@ -59,6 +31,9 @@ __kernel void raycast(
     __global const float *opaque_depth, // t at which each pixel's ray ends, top row first, if has_opaque_depth
     int has_opaque_depth,
     float transmittance_cutoff,         // the ray ends where less than this is left
+    __global const ulong *masks,        // occupied slabs of each tile of lists, if SKIP_EMPTY
+    float first_depth,                  // where slab 0 begins, view depth less depth_origin
+    float slabs_per_depth,
     __global float4 *image)             // premultiplied RGBA, top row first
 {
     const int2 pixel = block_pixel((uint)get_global_id(0), width);
@@ -85,10 +60,7 @@ __kernel void raycast(
     const float r_end = r_begin + 1.0f;
 
     // Model length per unit of r, but for the division by w(r_a) w(r_b) in perspective
-    const float3 direction = (float3)(form_slope(forms + MODEL_FORM * FORM_SIZE, a, b),
-                                      form_slope(forms + (MODEL_FORM + 1) * FORM_SIZE, a, b),
-                                      form_slope(forms + (MODEL_FORM + 2) * FORM_SIZE, a, b));
-    float scale = (t1 - t0) * length(direction);
+    float scale = (t1 - t0) * model_speed(forms, a, b);
 #ifndef PARALLEL
     scale *= reciprocal_depth(start.z, depth_origin) * reciprocal_depth(end.z, depth_origin);
 #endif
@@ -105,16 +77,72 @@ __kernel void raycast(
     const int step_j = along.y > 0.0f ? 1 : -1;
     const float border_i = along.x > 0.0f ? 1.0f : 0.0f; // from a list's lower border to the one ahead
     const float border_j = along.y > 0.0f ? 1.0f : 0.0f;
+// Where the ray leaves column i, or row j, of lists: from the border's number, never accumulated
+#define CROSSING_U(i) (((float)(i) + border_i - half_wide - deep.x) * inverse_u)
+#define CROSSING_V(j) (((float)(j) + border_j - half_high - deep.y) * inverse_v)
 
     float3 color = (float3)(0.0f);
     float transmittance = 1.0f;
     float r = r_begin;
     float z = start.z;
     int passed = 0; // supersegments passed in the list before: the first guess in the next
+#ifdef SKIP_EMPTY
+    const int tiles_wide = (lists_wide + TILE - 1) >> TILE_SHIFT;
+    bool enters_tile = fabs(along.x) + fabs(along.y) > FEW_LISTS;
+#endif
     while (true) {
+#ifdef SKIP_EMPTY
+        // Pass by tiles, and parts of tiles, whose slabs ahead are empty. Written with selects, and in a loop of its own, so
+        // that the lanes of a vector meet again behind it.
+        bool leaves_lists = false;
+        while (enters_tile) {
+            enters_tile = false;
+            const int edge_i = along.x > 0.0f ? i | (TILE - 1) : i & ~(TILE - 1);
+            const int edge_j = along.y > 0.0f ? j | (TILE - 1) : j & ~(TILE - 1);
+            const ulong mask = masks[(j >> TILE_SHIFT) * tiles_wide + (i >> TILE_SHIFT)];
+            const int slab = slab_of(depth_offset(z, depth_origin), first_depth, slabs_per_depth);
+            const ulong ahead = mask & (away ? slabs_from(slab) : slabs_to(slab));
+            const int nearest = away ? (int)popcount((ahead & -ahead) - 1) : SLABS - 1 - (int)clz(ahead);
+            if (ahead == 0 || nearest != slab) {
+                // Up to here nothing is met: the tile's border, or the face of the next occupied slab
+                float r_until = fmin(along.x != 0.0f ? CROSSING_U(edge_i) : INFINITY,
+                                     along.y != 0.0f ? CROSSING_V(edge_j) : INFINITY);
+                if (ahead != 0 && along.z != 0.0f) {
+                    const float face = first_depth + (float)(away ? nearest : nearest + 1) / slabs_per_depth;
+                    r_until = fmin(r_until, (depth_coordinate(face, depth_origin) - deep.z) * inverse_z);
+                }
+                // The list that steps from list to list would have reached, by the crossings of its borders: where r_until
+                // lies by its coordinates, one back or one on where rounding has it otherwise
+                int column = (int)floor(fma(r_until, along.x, deep.x) + half_wide);
+                int row = (int)floor(fma(r_until, along.y, deep.y) + half_high);
+                column = along.x > 0.0f ? clamp(column, i, edge_i + 1) : clamp(column, edge_i - 1, i);
+                row = along.y > 0.0f ? clamp(row, j, edge_j + 1) : clamp(row, edge_j - 1, j);
+                column = column != i && CROSSING_U(column - step_i) > r_until ? column - step_i
+                       : CROSSING_U(column) <= r_until                        ? column + step_i
+                                                                              : column;
+                row = row != j && CROSSING_V(row - step_j) > r_until ? row - step_j
+                    : CROSSING_V(row) <= r_until                     ? row + step_j
+                                                                     : row;
+                column = along.x != 0.0f ? column : i;
+                row = along.y != 0.0f ? row : j;
+                r = column != i ? fmax(r, CROSSING_U(column - step_i)) : r;
+                r = row != j ? fmax(r, CROSSING_V(row - step_j)) : r;
+                z = column != i || row != j ? fma(r, along.z, deep.z) : z;
+                enters_tile = (((i ^ column) | (j ^ row)) >> TILE_SHIFT) != 0;
+                i = column;
+                j = row;
+                leaves_lists = r_until >= r_end || i < 0 || i >= lists_wide || j < 0 || j >= lists_high;
+                enters_tile = enters_tile && !leaves_lists;
+            }
+        }
+        if (leaves_lists)
+            break;
+        const int last_i = i;
+        const int last_j = j;
+#endif
         // The ray crosses list (i, j) from r to r_next
-        const float r_u = along.x != 0.0f ? ((float)i + border_i - half_wide - deep.x) * inverse_u : INFINITY;
-        const float r_v = along.y != 0.0f ? ((float)j + border_j - half_high - deep.y) * inverse_v : INFINITY;
+        const float r_u = along.x != 0.0f ? CROSSING_U(i) : INFINITY;
+        const float r_v = along.y != 0.0f ? CROSSING_V(j) : INFINITY;
         const float r_next = fmax(r, fmin(r_end, fmin(r_u, r_v)));
         const float z_next = fma(r_next, along.z, deep.z);
 
@@ -166,6 +194,9 @@ __kernel void raycast(
             if (j < 0 || j >= lists_high)
                 break;
         }
+#ifdef SKIP_EMPTY
+        enters_tile = (((i ^ last_i) | (j ^ last_j)) >> TILE_SHIFT) != 0;
+#endif
     }
     image[place] = (float4)(color, 1.0f - transmittance);
 }

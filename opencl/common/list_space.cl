@@ -1,0 +1,74 @@
+// V_O's list space, in which lists and supersegments are axis-aligned boxes and rays stay straight (DESIGN section 3).
+//
+// u and v are pixels of V_O's window from its centre. The depth coordinate z grows with depth and is projective:
+//
+//     -D PARALLEL      z = Z - Z_ref             1/Z is not needed
+//     -D SHIFTED       z = (Z - Z_ref) / Z       long lens: what cancels in Z - Z_ref was taken out in float64 by the host
+//     otherwise        z = -1 / Z                the same relative precision at every depth
+//
+// with Z view depth from V_O in world units and Z_ref the VDI's depth origin. An "offset" is Z - Z_ref.
+#include "common/rays.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+#define U_FORM 0
+#define V_FORM 1
+#define DEPTH_FORM 2
+#define DENOMINATOR_FORM 3
+#define MODEL_FORM 4
+#define PLANE_FORMS 7
+
+inline float depth_coordinate(float offset, float depth_origin)
+{
+#if defined(PARALLEL)
+    return offset;
+#elif defined(SHIFTED)
+    return offset / (offset + depth_origin);
+#else
+    return -1.0f / (offset + depth_origin);
+#endif
+}
+
+inline float depth_offset(float z, float depth_origin)
+{
+#if defined(PARALLEL)
+    return z;
+#elif defined(SHIFTED)
+    return z * depth_origin / (1.0f - z);
+#else
+    return -1.0f / z - depth_origin;
+#endif
+}
+
+// 1 / Z of a depth coordinate. Not used in parallel projection.
+inline float reciprocal_depth(float z, float depth_origin)
+{
+#ifdef SHIFTED
+    return (1.0f - z) / depth_origin;
+#else
+    return -z;
+#endif
+}
+
+// Homogeneous list coordinates at t, divided out: (u, v, depth coordinate).
+inline float3 list_point(__global const float *forms, float a, float b, float t)
+{
+    const float u = fma(t, form_slope(forms + U_FORM * FORM_SIZE, a, b), form_value(forms + U_FORM * FORM_SIZE, a, b));
+    const float v = fma(t, form_slope(forms + V_FORM * FORM_SIZE, a, b), form_value(forms + V_FORM * FORM_SIZE, a, b));
+    const float z = fma(t, form_slope(forms + DEPTH_FORM * FORM_SIZE, a, b),
+                        form_value(forms + DEPTH_FORM * FORM_SIZE, a, b));
+#ifdef PARALLEL
+    return (float3)(u, v, z);
+#else
+    const float d = fma(t, form_slope(forms + DENOMINATOR_FORM * FORM_SIZE, a, b),
+                        form_value(forms + DENOMINATOR_FORM * FORM_SIZE, a, b));
+    return (float3)(u, v, z) / d;
+#endif
+}
+
+// Model length per unit of t along the ray.
+inline float model_speed(__global const float *forms, float a, float b)
+{
+    return length((float3)(form_slope(forms + MODEL_FORM * FORM_SIZE, a, b),
+                           form_slope(forms + (MODEL_FORM + 1) * FORM_SIZE, a, b),
+                           form_slope(forms + (MODEL_FORM + 2) * FORM_SIZE, a, b)));
+}

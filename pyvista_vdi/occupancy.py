@@ -1,0 +1,134 @@
+"""The occupancy grid of a VDI: where there is nothing to see (paper section 4)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import rays
+from .blocks import GROUP
+from .opencl_runtime import DeviceBuffer, Runtime
+from .vdi import VDI
+
+#: Lists along each edge of a tile, and slabs of depth: those of ``opencl/common/occupancy.cl``.
+TILE = 16
+SLABS = 64
+
+#: Share of the cells within the volume's bounds above which skipping costs more than it saves.
+#: Measured: it gains below .6 and loses above 1 (docs/performance.md).
+_WORTHWHILE = 0.8
+
+
+class OccupancyGrid:
+    """How many supersegments reach into each cell: tiles of 16 x 16 lists by 64 slabs of depth.
+
+    A supersegment that spans several slabs counts in each. The slabs are equal in view depth and
+    span the depth range of the VDI's bounds. Built on the device, from the VDI's arrays alone, so
+    that a file need not carry it.
+
+    Parameters
+    ----------
+    runtime : Runtime
+        The device.
+    vdi : VDI
+        Not kept.
+    offsets, front, back : DeviceBuffer
+        The VDI's arrays on the device; offsets uint32, or uint64 if ``long_offsets``.
+    nearest : float
+        Least view depth that is in front of V_O's eye, world units.
+    long_offsets : bool
+        Type of the offsets.
+
+    Attributes
+    ----------
+    tiles : (int, int)
+        Tiles along the width and the height.
+    first_depth : float
+        Where slab 0 begins: view depth less the VDI's depth origin, world units.
+    slabs_per_depth : float
+        Slabs per world unit.
+    counts : DeviceBuffer
+        uint32 (tiles high, tiles wide, slabs).
+    masks : DeviceBuffer
+        uint64 per tile: bit s is set where slab s is occupied.
+    occupied : float
+        Occupied cells over cells within the volume's bounds; above 1 if borders are crossed.
+    """
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        vdi: VDI,
+        offsets: DeviceBuffer,
+        front: DeviceBuffer,
+        back: DeviceBuffer,
+        *,
+        nearest: float,
+        long_offsets: bool,
+    ) -> None:
+        width, height = vdi.window_size
+        wide, high = self.tiles = (-(-width // TILE), -(-height // TILE))
+        near, far = rays.depth_range(vdi.camera, vdi.bounds)
+        if not vdi.camera.parallel_projection:
+            near = max(near, nearest)
+        self.first_depth = near - vdi.depth_origin
+        # Bounds without depth, or behind the eye: everything is in slab 0
+        self.slabs_per_depth = SLABS / (far - near) if far > near else 1.0
+        self.counts = runtime.buffer((high, wide, SLABS), np.uint32, "occupancy counts")
+        self.masks = runtime.buffer((high, wide), np.uint64, "occupancy masks")
+        defines = {"OFFSET_T": "ulong" if long_offsets else "uint"}
+        runtime.fill(self.counts, np.uint32(0))
+        runtime.launch(
+            runtime.kernel("grid/occupancy.cl", "count_supersegments", defines),
+            -(-width * height // GROUP) * GROUP,
+            GROUP,
+            offsets,
+            front,
+            back,
+            np.int32(width),
+            np.int32(height),
+            np.int32(wide),
+            np.float32(self.first_depth),
+            np.float32(self.slabs_per_depth),
+            self.counts,
+        )
+        runtime.launch(
+            runtime.kernel("grid/occupancy.cl", "occupied_slabs", defines),
+            -(-wide * high // GROUP) * GROUP,
+            GROUP,
+            self.counts,
+            np.uint32(wide * high),
+            self.masks,
+        )
+        masks = runtime.download(self.masks)
+        cells = _share_in_bounds(vdi, near, far) * masks.size * SLABS
+        self.occupied = float(np.unpackbits(masks.view(np.uint8)).sum() / max(cells, 1.0))
+
+    @property
+    def worthwhile(self) -> bool:
+        """Whether enough is empty for skipping to gain time."""
+        return self.occupied < _WORTHWHILE
+
+
+def _share_in_bounds(vdi: VDI, near: float, far: float) -> float:
+    """Return the share of all cells that lies within the bounds, by the rays of tile centres."""
+    width, height = vdi.window_size
+    pixel_rays = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds)
+    a, b = np.meshgrid(_tile_centres(width), _tile_centres(height))
+    pixels = np.stack([np.ones_like(a), a, b], axis=-1)
+    first = np.full(a.shape, near - pixel_rays.reference_depth)
+    last = np.full(a.shape, far - pixel_rays.reference_depth)
+    for form in rays.box_planes(pixel_rays, vdi.bounds):
+        value, slope = pixels @ form[:3], pixels @ form[3:]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            crossing = -value / slope
+        first = np.where(slope > 0, np.maximum(first, crossing), first)
+        last = np.where(slope < 0, np.minimum(last, crossing), last)
+    depth = far - near
+    return float(np.maximum(last - first, 0).mean() / depth) if depth > 0 else 0.0
+
+
+def _tile_centres(lists: int) -> NDArray[np.float64]:
+    """Return the tiles' centres along an edge of that many lists, pixels from its middle."""
+    starts = np.arange(0, lists, TILE)
+    return (starts + np.minimum(starts + TILE, lists)) / 2 - lists / 2
