@@ -19,6 +19,8 @@ Shared functions:
     The steps along a ray of a volume: generation and direct volume rendering share them.
 ``common/list_space.cl``
     V_O's list space: coordinates of a ray in it, and its depth coordinate.
+``common/list_ray.cl``
+    The ray of a pixel in list space, clipped; model lengths along it.
 ``common/lists.cl``
     Which supersegment of a list a ray meets first (paper, Algorithm 1).
 ``common/occupancy.cl``
@@ -34,6 +36,8 @@ Entry points:
     ``prepare_lists``: a VDI's arrays to what the raycaster reads.
 ``vdi/raycast.cl``
     ``raycast``: VDI to image from any view (paper, section 3).
+``vdi/preview.cl``
+    ``preview``: VDI to image by a given number of samples per ray (paper, section 5).
 ``vdi/render_volume.cl``
     ``render_volume``: direct volume rendering, the baseline.
 ``grid/occupancy.cl``

@@ -146,6 +146,7 @@ def render(
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
     skip_empty: bool = True,
+    preview_samples: int | None = None,
     device: Any = None,
 ) -> NDArray[np.float32]:
     """Raycast a VDI from a new view.
@@ -166,6 +167,10 @@ def render(
         is kept, as with VTK's mappers.
     skip_empty : bool, default: True
         Pass by space without supersegments; the picture is the same to the last bit.
+    preview_samples : int, optional
+        An approximation (paper section 5): look the VDI up at so many points of each ray instead
+        of intersecting its supersegments. A smaller ``window_size`` is the better one: see
+        docs/performance.md, "Previews".
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
 
@@ -192,6 +197,7 @@ def render(
         opaque_depth=opaque_depth,
         clipping_planes=clipping_planes,
         skip_empty=skip_empty,
+        preview_samples=preview_samples,
         device=device,
     )
 

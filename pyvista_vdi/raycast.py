@@ -20,6 +20,8 @@ from .vdi import VDI
 
 #: A ray ends where less transmittance than this is left: no channel loses more than that.
 TRANSMITTANCE_CUTOFF = 1e-6
+#: Most samples of a ray in a preview: each has a half, and float32 counts halves up to 2^24.
+MAX_PREVIEW_SAMPLES = 2**23
 #: Far depth over near depth up to which a lens counts as long, and depth is kept relative.
 _LONG_LENS = 2.0
 
@@ -35,6 +37,7 @@ def render_vdi(
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
     skip_empty: bool = True,
+    preview_samples: int | None = None,
     device: Any = None,
 ) -> NDArray[np.float32]:
     """Raycast a VDI from any view (paper section 3).
@@ -54,6 +57,9 @@ def render_vdi(
     skip_empty : bool
         Pass by what the occupancy grid says is empty, where the VDI has enough of it to gain by
         that. The picture is the same to the last bit.
+    preview_samples : int, optional
+        Look the VDI up at so many points of each ray instead of intersecting its supersegments
+        (paper section 5): an approximation. Fewer pixels are the better one (docs/performance.md).
     device : optional
         See :func:`pyvista_vdi.list_devices`.
 
@@ -71,11 +77,34 @@ def render_vdi(
         raise InvalidArgumentError(f"expected a VDI, got {type(vdi).__name__}")
     camera = Camera.from_any(camera)
     size = check_window_size(vdi.window_size if window_size is None else window_size)
+    samples = None if preview_samples is None else check_preview_samples(preview_samples)
     runtime = get_runtime(device)
     prepared = prepared_vdi(runtime, vdi)
     with runtime.buffer((size[1], size[0], 4), name="image") as image:
-        prepared.render(camera, size, image, opaque_depth, clipping_planes, skip_empty=skip_empty)
+        prepared.render(
+            camera,
+            size,
+            image,
+            opaque_depth,
+            clipping_planes,
+            skip_empty=skip_empty,
+            preview_samples=samples,
+        )
         return runtime.download(image)
+
+
+def check_preview_samples(samples: int) -> int:
+    """Return a number of samples per ray as an int between 1 and :data:`MAX_PREVIEW_SAMPLES`."""
+    try:
+        number = int(samples)
+    except (TypeError, ValueError, OverflowError):
+        number = 0
+    if number != samples or not 1 <= number <= MAX_PREVIEW_SAMPLES:
+        raise InvalidArgumentError(
+            f"preview_samples must be a whole number from 1 to {MAX_PREVIEW_SAMPLES}; "
+            f"got {samples!r}"
+        )
+    return number
 
 
 class _Preparation:
@@ -149,6 +178,7 @@ class PreparedVDI:
         clipping_planes: ArrayLike | None = None,
         *,
         skip_empty: bool = True,
+        preview_samples: int | None = None,
     ) -> None:
         """Draw a frame into ``image``, float32 (H, W, 4) on the device."""
         width, height = size
@@ -163,9 +193,15 @@ class PreparedVDI:
         ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
         runtime = self._runtime
         defines = self.defines
-        if skip_empty and self.occupancy.worthwhile:
-            defines["SKIP_EMPTY"] = 1
-        kernel = runtime.kernel("vdi/raycast.cl", "raycast", defines)
+        grid = self.occupancy
+        sampling: tuple[Any, ...] = ()
+        if preview_samples is not None:
+            kernel = runtime.kernel("vdi/preview.cl", "preview", defines)
+            sampling = (grid.counts, np.int32(preview_samples))
+        else:
+            if skip_empty and grid.worthwhile:
+                defines["SKIP_EMPTY"] = 1
+            kernel = runtime.kernel("vdi/raycast.cl", "raycast", defines)
         with (
             runtime.upload(forms, "rays") as form_buffer,
             runtime.upload(
@@ -189,9 +225,10 @@ class PreparedVDI:
                 depth,
                 np.int32(ends is not None),
                 np.float32(TRANSMITTANCE_CUTOFF),
-                self.occupancy.masks,
-                np.float32(self.occupancy.first_depth),
-                np.float32(self.occupancy.slabs_per_depth),
+                grid.masks,
+                np.float32(grid.first_depth),
+                np.float32(grid.slabs_per_depth),
+                *sampling,
                 image,
             )
             runtime.finish()  # the buffers above may be host memory in use

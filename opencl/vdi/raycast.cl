@@ -7,10 +7,7 @@
 // -D OFFSET_T           type of an offset into the supersegments: uint or ulong
 // -D PARALLEL, SHIFTED  the depth coordinate, see common/list_space.cl
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
-//
-// r runs along the ray over an interval of length 1 and is 0 at the end that is deeper in V_O, where the interpolated 1/Z is
-// smallest and its rounding matters most.
-#include "common/list_space.cl"
+#include "common/list_ray.cl"
 #include "common/lists.cl"
 #include "common/classification.cl"
 #include "common/occupancy.cl"
@@ -43,27 +40,17 @@ __kernel void raycast(
     const float b = (float)pixel.y + 0.5f - 0.5f * (float)height;
     const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
 
-    float t0 = -INFINITY;
-    float t1 = has_opaque_depth ? opaque_depth[place] : INFINITY;
-    if (!clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, planes, a, b, &t0, &t1)) {
+    ListRay ray;
+    if (!begin_list_ray(&ray, forms, planes, a, b, has_opaque_depth ? opaque_depth[place] : INFINITY, depth_origin)) {
         image[place] = (float4)(0.0f);
         return;
     }
-
-    // The ray in list space: point(r) = deep + r along, r from r_begin to r_begin + 1
-    const float3 start = list_point(forms, a, b, t0);
-    const float3 end = list_point(forms, a, b, t1);
-    const float3 along = end - start;
-    const bool away = along.z >= 0.0f; // from V_O: depth does not decrease along the ray
-    const float3 deep = away ? end : start;
-    const float r_begin = away ? -1.0f : 0.0f;
+    const float3 start = ray.start;
+    const float3 deep = ray.deep;
+    const float3 along = ray.along;
+    const bool away = ray.away;
+    const float r_begin = ray.r_begin;
     const float r_end = r_begin + 1.0f;
-
-    // Model length per unit of r, but for the division by w(r_a) w(r_b) in perspective
-    float scale = (t1 - t0) * model_speed(forms, a, b);
-#ifndef PARALLEL
-    scale *= reciprocal_depth(start.z, depth_origin) * reciprocal_depth(end.z, depth_origin);
-#endif
 
     // Where planes u = const, v = const and z = const are crossed; a component that does not change crosses none
     const float inverse_u = along.x != 0.0f ? 1.0f / along.x : 0.0f;
@@ -168,11 +155,8 @@ __kernel void raycast(
                 if (away ? leaves < z_next : leaves > z_next)
                     to = clamp((leaves - deep.z) * inverse_z, from, r_next);
                 const float4 medium = media[k];
-                float length_crossed = scale * (to - from);
-#ifndef PARALLEL
-                length_crossed /= reciprocal_depth(fma(from, along.z, deep.z), depth_origin)
-                                * reciprocal_depth(fma(to, along.z, deep.z), depth_origin);
-#endif
+                const float length_crossed = model_length(ray.scale, from, fma(from, along.z, deep.z), to,
+                                                          fma(to, along.z, deep.z), depth_origin);
                 const float weight = transmittance * opacity_of(medium.w * length_crossed); // over, front to back
                 color += weight * medium.xyz;
                 transmittance -= weight;

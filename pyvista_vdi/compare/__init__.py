@@ -5,6 +5,7 @@ from __future__ import annotations
 from .bounds import Check, judge_times, judge_vdi, judge_vtk
 from .measure import AngleResult, Report, Settings, Timing, measure
 from .sheet import contact_sheet, table
+from .system import describe_system
 
 __all__ = [
     "AngleResult",
@@ -13,6 +14,7 @@ __all__ = [
     "Settings",
     "Timing",
     "contact_sheet",
+    "describe_system",
     "judge_times",
     "judge_vdi",
     "judge_vtk",

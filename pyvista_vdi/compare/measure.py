@@ -9,14 +9,12 @@ frame each that is not counted, and the median is reported.
 from __future__ import annotations
 
 import math
-import platform
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
@@ -34,6 +32,7 @@ from ..standard_cases import ANGLES, WINDOW_SIZE, filling_camera
 from ..transfer_function import TransferFunction
 from ..vdi import VDI
 from ..volume import Volume
+from .system import describe_system
 
 #: What takes part, by the keys of :attr:`AngleResult.seconds` and of the pictures.
 NAMES = {
@@ -42,9 +41,6 @@ NAMES = {
     "gpu": "VTK GPU mapper",
     "fixed_point": "VTK fixed-point mapper",
 }
-
-#: Packages whose versions a report names.
-_PACKAGES = ("pyvista-vdi", "numpy", "pyopencl", "vtk", "pyvista")
 
 #: Window in which everything is drawn once before anything is timed, pixels.
 _WARM_UP_SIZE = (64, 36)
@@ -428,25 +424,8 @@ def _case(
 
 
 def _system(settings: Settings, peers: Mapping[str, Any]) -> dict[str, str]:
-    info = get_runtime(settings.device).info
-    described = {
-        "device": info.full_name,
-        "driver": info.driver,
-        "compute units": str(info.compute_units),
-        "python": platform.python_version(),
-        "system": f"{platform.system()} {platform.machine()}",
-    }
-    if peers:
-        described["opengl"] = peers["gpu"].opengl
-    return {**described, **dict(_versions())}
-
-
-def _versions() -> Iterator[tuple[str, str]]:
-    for name in _PACKAGES:
-        try:
-            yield name, version(name)
-        except PackageNotFoundError:
-            continue
+    described = describe_system(settings.device)
+    return {**described, "opengl": peers["gpu"].opengl} if peers else described
 
 
 def _sizes(volume: Volume, vdi: VDI, settings: Settings) -> dict[str, int]:

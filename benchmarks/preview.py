@@ -1,0 +1,311 @@
+"""Ways to give up accuracy for speed, tried on the same frames: what each brings at equal speed.
+
+Writes ``preview_WxH.json`` (every setting tried), ``.md`` (SSIM at equal speed) and ``.png``. The
+default case is the paper's for its Table 2: 1920x1080, 15 supersegments, 30 degrees from V_O.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from skimage.transform import resize
+from standard_table import INTERPOLATIONS, window_size  # beside this file
+from tqdm import tqdm
+
+from pyvista_vdi import examples
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.classification import Classification
+from pyvista_vdi.compare import describe_system
+from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.io import whole_file
+from pyvista_vdi.metrics import compare_images
+from pyvista_vdi.opencl_runtime import get_runtime
+from pyvista_vdi.raycast import prepared_vdi
+from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.vdi import VDI
+
+#: Speeds, as multiples of the full frame's, at which the ways are compared.
+SPEEDS = (2.0, 3.0, 4.0)
+
+#: Shares of the pixels that are drawn, of the lists that are stepped through, samples per ray.
+SHARES = (0.75, 0.6, 0.5, 0.4, 0.33, 0.25, 0.2, 0.15)
+FEWER_LISTS = (2, 3, 4)
+SAMPLES = (1, 2, 4, 8, 16, 32)
+
+LEGEND = (
+    "SSIM against the full frame / against `render_volume`, between the settings tried; speed "
+    "against the full frame with empty space skipped; `-`: not reached."
+)
+
+Image = NDArray[np.float32]
+
+
+def main() -> int:
+    """Measure, and write what was found."""
+    options = parsed()
+    rows = []
+    at_hand = examples.available()
+    for name in tqdm([n for n in options.volumes if n in at_hand], unit="volume"):
+        rows += measured(name, options)
+    absent = [name for name in options.volumes if name not in at_hand]
+    if absent:
+        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
+    width, height = options.size
+    results = {
+        "window_size": [width, height],
+        "angle": options.angle,
+        "max_supersegments": options.max_supersegments,
+        "transfer_function": options.tf,
+        "interpolation": options.interpolation,
+        "system": describe_system(options.device),
+        "rows": rows,
+    }
+    options.out.mkdir(parents=True, exist_ok=True)
+    target = options.out / f"preview_{width}x{height}.json"
+    with whole_file(target) as stream:
+        stream.write(json.dumps(results, indent=1).encode() + b"\n")
+    with whole_file(target.with_suffix(".md")) as stream:
+        stream.write(report(results).encode())
+    write_plot(results, target.with_suffix(".png"))
+    print(f"Written: {target}, and .md and .png beside it")
+    return 0
+
+
+def parsed() -> argparse.Namespace:
+    """Return the options."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--size", type=window_size, default=(1920, 1080), metavar="WxH")
+    parser.add_argument(
+        "--volumes",
+        nargs="+",
+        choices=sorted(examples.VOLUMES),
+        metavar="NAME",
+        default=["brain", "rayleigh_taylor", "aneurism", "heptane", "visible_female_head"],
+    )
+    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
+    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
+    parser.add_argument("--angle", type=float, default=30.0, help="azimuth from V_O, degrees")
+    parser.add_argument("--max-supersegments", type=int, default=15, metavar="N")
+    parser.add_argument("--repeats", type=int, default=5, help="timed frames of each setting")
+    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
+    return parser.parse_args()
+
+
+def measured(name: str, options: argparse.Namespace) -> list[dict[str, Any]]:
+    """Draw one frame of a volume in every way, and hold each picture against the full one."""
+    volume = examples.load_data(name, as_volume=True)
+    looks = {**TRANSFER_FUNCTIONS[options.tf], "interpolation": options.interpolation}
+    table = Classification(looks, "preview").transfer_function(volume)
+    view = filling_camera(volume.bounds, options.size)
+
+    def generated(size: tuple[int, int]) -> VDI:
+        limit = options.max_supersegments
+        return generate_vdi(
+            volume, view, size, table, max_supersegments=limit, device=options.device
+        )
+
+    camera = view.azimuth(options.angle)
+    vdi = generated(options.size)
+    draw = Drawing(camera, options.size, options.device)
+    ways = [("full frame", 1.0, lambda: draw(vdi))]
+    for share in SHARES:
+        ways.append(("fewer pixels", share, pixels(draw, vdi, share)))
+    for samples in SAMPLES:
+        ways.append(("samples per ray", samples, sampled(draw, vdi, samples)))
+    for factor in FEWER_LISTS:
+        width, height = options.size
+        coarse = generated((width // factor, height // factor))
+        ways.append(("coarser VDI", 1 / factor, lambda vdi=coarse: draw(vdi)))
+        thinned = every_list(vdi, factor)
+        ways.append(("several lists at once", 1 / factor, lambda vdi=thinned: draw(vdi)))
+
+    times: list[list[float]] = [[] for _ in ways]
+    pictures = [draw.whole(way()) for _, _, way in ways]  # builds and uploads what is needed
+    for _ in range(options.repeats):
+        for (_, _, way), taken in zip(ways, times, strict=True):
+            begin = time.perf_counter()
+            way()
+            taken.append(time.perf_counter() - begin)
+    reference = raycast_volume(volume, camera, options.size, table, device=options.device)
+    full = statistics.median(times[0])
+    return [
+        {
+            "volume": name,
+            "way": way,
+            "setting": setting,
+            "speed": full / statistics.median(taken),
+            "spread": (max(taken) - min(taken)) / statistics.median(taken),
+            "ssim_to_full": compare_images(picture, pictures[0]).ssim,
+            "ssim_to_volume": compare_images(picture, reference).ssim,
+        }
+        for (way, setting, _), taken, picture in zip(ways, times, pictures, strict=True)
+    ]
+
+
+class Drawing:
+    """Draws VDIs on the device for one view; a frame stays there, as a texture would.
+
+    Parameters
+    ----------
+    camera : Camera
+        The view.
+    size : (int, int)
+        Width and height of the picture, pixels.
+    device : str, optional
+        Where.
+    """
+
+    def __init__(self, camera: Camera, size: tuple[int, int], device: str | None) -> None:
+        self._camera = camera
+        self._size = size
+        self._runtime = get_runtime(device)
+
+    def __call__(
+        self, vdi: VDI, size: tuple[int, int] | None = None, samples: int | None = None
+    ) -> Image:
+        """Draw, in the full size unless another is given."""
+        width, height = size or self._size
+        prepared = prepared_vdi(self._runtime, vdi)
+        with self._runtime.buffer((height, width, 4), name="image") as image:
+            prepared.render(self._camera, (width, height), image, preview_samples=samples)
+            return self._runtime.download(image)
+
+    def whole(self, image: Image) -> Image:
+        """Return an image in the full size, by linear interpolation as the texture unit's."""
+        width, height = self._size
+        if image.shape[:2] == (height, width):
+            return image
+        # Pixel centres keep their places and edges are extended, as GL_LINEAR and CLAMP_TO_EDGE do
+        return resize(image, (height, width, 4), order=1, mode="edge", anti_aliasing=False)
+
+
+def pixels(draw: Drawing, vdi: VDI, share: float) -> Callable[[], Image]:
+    """Return what draws a share of the pixels."""
+    width, height = draw._size
+    edge = math.sqrt(share)
+    size = (round(width * edge), round(height * edge))
+    return lambda: draw(vdi, size)
+
+
+def sampled(draw: Drawing, vdi: VDI, samples: int) -> Callable[[], Image]:
+    """Return what draws the paper's preview."""
+    return lambda: draw(vdi, samples=samples)
+
+
+def every_list(vdi: VDI, factor: int) -> VDI:
+    """Return a VDI of every ``factor``-th list along both edges, each as wide as those left out."""
+    width, height = vdi.window_size
+    wide, high = width // factor, height // factor
+    columns = np.arange(wide) * factor + factor // 2
+    rows = np.arange(high) * factor + factor // 2
+    lists = (rows[:, None] * width + columns).ravel()
+    lengths = np.diff(vdi.offsets)[lists].astype(np.int64)
+    offsets = np.concatenate([[0], np.cumsum(lengths)])
+    kept = np.repeat(vdi.offsets[lists].astype(np.int64) - offsets[:-1], lengths)
+    kept += np.arange(offsets[-1])
+    return VDI(
+        vdi.camera,
+        (wide, high),
+        offsets.astype(np.uint64),
+        vdi.front[kept],
+        vdi.back[kept],
+        vdi.color[kept],
+        vdi.optical_depth[kept],
+        vdi.bounds,
+        depth_origin=vdi.depth_origin,
+    )
+
+
+# -- what was found --------------------------------------------------------------------------------
+
+
+def at_speed(rows: list[dict[str, Any]], speed: float, figure: str) -> float | None:
+    """Return a figure at a speed, between the settings on either side; None if out of reach."""
+    points = sorted((row["speed"], row[figure]) for row in rows)
+    speeds, figures = zip(*points, strict=True)
+    if not speeds[0] <= speed <= speeds[-1]:
+        return None
+    return float(np.interp(math.log(speed), np.log(speeds), figures))
+
+
+def case_of(results: dict[str, Any]) -> str:
+    """Name what all rows have in common."""
+    return ", ".join(
+        [
+            f"{results['max_supersegments']} supersegments",
+            f"{results['angle']:g} degrees",
+            results["transfer_function"],
+            results["interpolation"],
+        ]
+    )
+
+
+def report(results: dict[str, Any]) -> str:
+    """Return the table: a line per volume and way."""
+    width, height = results["window_size"]
+    heads = [f"{speed:g}x" for speed in SPEEDS]
+    lines = [
+        f"# Previews at equal speed, {width}x{height}, {case_of(results)}",
+        "",
+        LEGEND,
+        "",
+        f"| volume | way | {' | '.join(heads)} |",
+        f"|---|---|{'---|' * len(heads)}",
+    ]
+    for volume in dict.fromkeys(row["volume"] for row in results["rows"]):
+        of_volume = [row for row in results["rows"] if row["volume"] == volume]
+        full = next(row for row in of_volume if row["way"] == "full frame")
+        lines.append(f"| {volume} | full frame | {full['ssim_to_volume']:.4f} to the volume |||")
+        for way in dict.fromkeys(row["way"] for row in of_volume if row is not full):
+            chosen = [full, *(row for row in of_volume if row["way"] == way)]
+            cells = []
+            for speed in SPEEDS:
+                pair = [at_speed(chosen, speed, f"ssim_to_{k}") for k in ("full", "volume")]
+                cells.append(" / ".join("-" if v is None else f"{v:.4f}" for v in pair))
+            lines.append(f"| {volume} | {way} | {' | '.join(cells)} |")
+    system = ", ".join(f"{k} {v}" for k, v in results["system"].items())
+    return "\n".join([*lines, "", system, ""])
+
+
+def write_plot(results: dict[str, Any], target: Path) -> None:
+    """Plot SSIM over speed, a panel per volume."""
+    import matplotlib as mpl
+
+    mpl.use("agg")
+    import matplotlib.pyplot as plt
+
+    volumes = list(dict.fromkeys(row["volume"] for row in results["rows"]))
+    figure, axes = plt.subplots(
+        1, len(volumes), figsize=(3.2 * len(volumes), 3.4), sharey=True, squeeze=False
+    )
+    for panel, volume in zip(axes[0], volumes, strict=True):
+        rows = [row for row in results["rows"] if row["volume"] == volume]
+        for way in dict.fromkeys(row["way"] for row in rows[1:]):
+            points = sorted(
+                (row["speed"], row["ssim_to_full"])
+                for row in rows
+                if row["way"] in (way, "full frame")
+            )
+            panel.plot(*zip(*points, strict=True), marker=".", label=way)
+        panel.set(title=volume, xlabel="speed / full frame", xlim=(0.8, 6), ylim=(0.7, 1.0))
+        panel.grid(alpha=0.3)
+    axes[0][0].set_ylabel("SSIM to the full frame")
+    axes[0][-1].legend(fontsize="small")
+    figure.tight_layout()
+    figure.savefig(target, dpi=110)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
