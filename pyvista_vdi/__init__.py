@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         VDIWarning,
     )
     from .generation import Estimate
+    from .lighting import Light, Lights, Shading
     from .metrics import compare_images
     from .opencl_runtime import describe_devices, list_devices
     from .transfer_function import TransferFunction
@@ -61,6 +62,9 @@ _ERRORS = (
 _HOMES = {
     "Camera": "camera",
     "Estimate": "generation",
+    "Light": "lighting",
+    "Lights": "lighting",
+    "Shading": "lighting",
     "TransferFunction": "transfer_function",
     "VDI": "vdi",
     "VDIActor": "vtk_pipeline",

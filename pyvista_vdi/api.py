@@ -53,6 +53,7 @@ def generate(
     sample_distance: float | None = None,
     tolerance: float = 0.0,
     view_cone: float = 60.0,
+    lights: Any = None,
     device: Any = None,
     progress: Callable[[float], object] | None = None,
     **classification: Any,
@@ -78,6 +79,10 @@ def generate(
     view_cone : float
         Half angle in degrees of the cone of new views that must be served: the wider, the more
         of the budget goes to what V_O cannot see.
+    lights : renderer, or sequence of Light, vtkLight or pyvista.Light, optional
+        What a shaded volume is lit by; one headlight by default, which is VTK's. PyVista's
+        plotters have a light kit: pass ``plotter.renderer`` for its lights. They are baked into
+        the colours as they stand at V_O.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     progress : callable, optional
@@ -102,7 +107,7 @@ def generate(
     InvalidVolumeError, InvalidCameraError, InvalidArgumentError
         If an argument cannot be used.
     UnsupportedError
-        If shading or another blending mode is asked for.
+        If another blending mode is asked for, or what else a VDI cannot honour.
     MissingDependencyError
         If a colour map or an opacity is named and PyVista is not installed.
     NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
@@ -132,6 +137,7 @@ def generate(
         sample_distance=sample_distance,
         tolerance=tolerance,
         view_cone=view_cone,
+        lights=lights,
         device=device,
         progress=progress,
         metadata={"classification": looks.describe(), "scalars": volume.name},
@@ -213,6 +219,7 @@ def render_volume(
     clipping_planes: ArrayLike | None = None,
     early_termination: bool = True,
     skip_empty: bool = True,
+    lights: Any = None,
     device: Any = None,
     **classification: Any,
 ) -> NDArray[np.float32]:
@@ -234,6 +241,8 @@ def render_volume(
         Stop a ray where what is behind can no longer be seen.
     skip_empty : bool, default: True
         Pass by blocks of the volume that are transparent; the picture is the same to the last bit.
+    lights : renderer, or sequence of Light, vtkLight or pyvista.Light, optional
+        As for :func:`generate`; lights that move with the camera are those of this view.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     **classification
@@ -251,7 +260,7 @@ def render_volume(
     InvalidVolumeError, InvalidCameraError, InvalidArgumentError
         If an argument cannot be used.
     UnsupportedError
-        If shading or another blending mode is asked for.
+        If another blending mode is asked for, or what else a VDI cannot honour.
     MissingDependencyError
         If a colour map or an opacity is named and PyVista is not installed.
     NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
@@ -272,6 +281,7 @@ def render_volume(
         clipping_planes=clipping_planes,
         early_termination=early_termination,
         skip_empty=skip_empty,
+        lights=lights,
         device=device,
     )
 

@@ -42,9 +42,6 @@ IN_PLACE = ("volume_property", "transfer_function")
 #: Arguments that choose the array and not its looks: they go together with IN_PLACE.
 _CHOOSE_THE_ARRAY = ("scalars", "preference")
 
-#: Arguments that act on shaded volumes only; without ``shade`` they change no pixel in VTK either.
-_LIGHTING = ("ambient", "diffuse", "specular", "specular_power")
-
 #: Names that are not ours, and what is meant: ``add_volume``'s aliases and near misses.
 _MEANT = MappingProxyType(
     {
@@ -80,7 +77,7 @@ class Classification:
     InvalidArgumentError
         If ``transfer_function`` or ``volume_property`` is mixed with arguments that it replaces.
     UnsupportedError
-        If shading, another blending mode or anything else is asked for that is not honoured yet.
+        If another blending mode or anything else is asked for that is not honoured.
     """
 
     def __init__(
@@ -126,7 +123,7 @@ class Classification:
             )
         from .plotting.classify import transfer_function_from_arguments
 
-        left_out = (*_CHOOSE_THE_ARRAY, *_LIGHTING, "shade", "blending")
+        left_out = (*_CHOOSE_THE_ARRAY, "blending")
         arguments = {n: v for n, v in {**DEFAULTS, **self._given}.items() if n not in left_out}
         return transfer_function_from_arguments(volume.array, **arguments)
 
@@ -149,11 +146,6 @@ class Classification:
             )
 
     def _refuse_unsupported(self) -> None:
-        if self._given.get("shade"):
-            raise UnsupportedError(
-                "shade=True: lighting is not supported yet, a later release brings it; "
-                "pass shade=False"
-            )
         blending = self._given.get("blending", "composite")
         if blending != "composite":
             raise UnsupportedError(

@@ -14,7 +14,9 @@ from . import rays
 from .blocks import GROUP
 from .camera import Camera
 from .errors import InvalidArgumentError
+from .lighting import Lights
 from .opencl_runtime import DeviceBuffer, Runtime, padded
+from .shading import gradient_table, lighting_table, shading_defines
 from .transfer_function import TransferFunction
 from .volume import Volume
 
@@ -51,6 +53,8 @@ class DeviceVolume:
         Length of a step, model units; half the smallest spacing by default.
     skip_empty : bool
         Pass by blocks that the transfer function makes transparent; the samples stay the same.
+    lights : Lights, optional
+        What a shaded volume is lit by; one headlight by default.
 
     Raises
     ------
@@ -68,6 +72,7 @@ class DeviceVolume:
         sample_distance: float | None = None,
         *,
         skip_empty: bool = True,
+        lights: Lights | None = None,
     ) -> None:
         if not isinstance(volume, Volume):
             raise InvalidArgumentError(f"expected a Volume, got {type(volume).__name__}")
@@ -97,10 +102,21 @@ class DeviceVolume:
             self.defines["SKIP_EMPTY"] = 1
         if transfer_function.interpolation == "nearest":
             self.defines["NEAREST"] = 1
+        self._runtime = runtime
+        self._shading = transfer_function.shading
+        self._lights = Lights() if lights is None else lights
+        self._lit: tuple[Camera, DeviceBuffer] | None = None
+        self.defines.update(shading_defines(transfer_function, self._lights))
+        self._gradient: tuple[DeviceBuffer, ...] = ()
+        if transfer_function.gradient_opacities is not None:
+            gradient = gradient_table(volume, transfer_function, 1.0 if native else high - low)
+            self._gradient = (runtime.upload(gradient, "gradient opacity"),)
 
-    @property
-    def medium_arguments(self) -> tuple[Any, ...]:
-        """Arguments ``voxels`` to ``blocks`` of the kernels that march."""
+    def medium_arguments(self, camera: Camera) -> tuple[Any, ...]:
+        """Arguments ``voxels`` to ``forms``, without it, of the kernels that march.
+
+        ``camera`` is the view: lights may move with it.
+        """
         return (
             self._voxels,
             np.array([*self.volume.dimensions, 0], dtype=np.int32),
@@ -110,7 +126,18 @@ class DeviceVolume:
             np.float32(self._per_scalar),
             self._visible,
             np.array([*_blocks(self.volume), 0], dtype=np.int32),
+            *self._lighting(camera),
+            *self._gradient,
         )
+
+    def _lighting(self, camera: Camera) -> tuple[DeviceBuffer, ...]:
+        """Return the lights of a view on the device, if they have any part in it."""
+        if "SHADED" not in self.defines or self._shading is None:
+            return ()
+        if self._lit is None or self._lit[0] != camera:
+            table = lighting_table(self.volume, camera, self._shading, self._lights)
+            self._lit = (camera, self._runtime.upload(table, "lights"))
+        return (self._lit[1],)
 
     def _visibility(
         self, runtime: Runtime, ranges: DeviceBuffer, transfer_function: TransferFunction

@@ -16,6 +16,7 @@ from .camera import Camera, check_window_size
 from .device_volume import DeviceVolume, as_float
 from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory
+from .lighting import Lights
 from .opencl_runtime import Runtime, get_runtime
 from .transfer_function import TransferFunction
 from .vdi import VDI
@@ -119,6 +120,7 @@ def generate_vdi(
     sample_distance: float | None = None,
     tolerance: float = 0.0,
     view_cone: float = 60.0,
+    lights: Any = None,
     device: Any = None,
     progress: Progress | None = None,
     metadata: Mapping[str, Any] | None = None,
@@ -152,6 +154,9 @@ def generate_vdi(
     view_cone : float
         Half angle in degrees, 0 to 90, of the cone of views that must be served: what V_O cannot
         see at all counts ``1 - cos(view_cone)`` as much as what it sees when lists are shortened.
+    lights : optional
+        What a shaded volume is lit by; see :meth:`pyvista_vdi.Lights.from_any`. The light is
+        baked into the colours: it stays as it is where V_O has it.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
     progress : callable, optional
@@ -180,7 +185,8 @@ def generate_vdi(
     tolerance, hidden_weight = _check_criterion(tolerance, view_cone)
     _require_room((), (width, height))
     runtime = get_runtime(device)
-    medium = DeviceVolume(runtime, volume, transfer_function, sample_distance)
+    lights = Lights.from_any(lights)
+    medium = DeviceVolume(runtime, volume, transfer_function, sample_distance, lights=lights)
     recorder = _Recorder(runtime, medium, camera, (width, height), limit, tolerance, hidden_weight)
     parts = []
     with recorder:
@@ -212,6 +218,8 @@ def generate_vdi(
         },
         "device": runtime.info.name,
     }
+    if transfer_function.shading is not None:
+        made_by["lights"] = lights.to_dict()
     return VDI(
         camera,
         (width, height),
@@ -273,6 +281,7 @@ class _Recorder:
     ) -> None:
         self._runtime = runtime
         self._medium = medium
+        self._camera = camera
         self._size = size
         self._limit = limit
         # Differences stay below 1e18, whose square float32 still holds
@@ -318,7 +327,7 @@ class _Recorder:
             self._launch(
                 "march_lists",
                 items,
-                *medium.medium_arguments,
+                *medium.medium_arguments(self._camera),
                 self._forms,
                 np.int32(self._planes),
                 np.float32(medium.sample_distance),

@@ -12,6 +12,7 @@ from . import rays
 from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
 from .device_volume import DeviceVolume
+from .lighting import Lights
 from .opencl_runtime import get_runtime
 from .raycast import TRANSMITTANCE_CUTOFF
 from .transfer_function import TransferFunction
@@ -29,6 +30,7 @@ def raycast_volume(
     clipping_planes: ArrayLike | None = None,
     early_termination: bool = True,
     skip_empty: bool = True,
+    lights: Any = None,
     device: Any = None,
 ) -> NDArray[np.float32]:
     """Render a classified volume directly.
@@ -56,6 +58,8 @@ def raycast_volume(
         End a ray where less than :data:`~pyvista_vdi.raycast.TRANSMITTANCE_CUTOFF` is left.
     skip_empty : bool
         Pass by blocks that are transparent; the picture is the same to the last bit.
+    lights : optional
+        What a shaded volume is lit by; see :meth:`pyvista_vdi.Lights.from_any`.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
 
@@ -68,7 +72,12 @@ def raycast_volume(
     width, height = check_window_size(window_size)
     runtime = get_runtime(device)
     medium = DeviceVolume(
-        runtime, volume, transfer_function, sample_distance, skip_empty=skip_empty
+        runtime,
+        volume,
+        transfer_function,
+        sample_distance,
+        skip_empty=skip_empty,
+        lights=Lights.from_any(lights),
     )
     forms, pixel_rays, planes = medium.forms(camera, (width, height), clipping_planes)
     ends = rays.checked_opaque_depth(opaque_depth, (width, height), pixel_rays)
@@ -82,7 +91,7 @@ def raycast_volume(
             kernel,
             block_items(width, height),
             GROUP,
-            *medium.medium_arguments,
+            *medium.medium_arguments(camera),
             form_buffer,
             np.int32(planes),
             np.float32(medium.sample_distance),

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidArgumentError
+from .lighting import Shading
 
 #: Optical depth that a fully opaque sample gets per step: exp(-30) is 1e-13, nothing passes.
 OPAQUE_OPTICAL_DEPTH = 30.0
+
+
+#: What a transfer function has only where a volume asks for it.
+_OPTIONS = ("shading", "gradient_opacities", "gradient_range")
 
 
 class TransferFunction:
@@ -33,6 +39,12 @@ class TransferFunction:
     interpolation : {"nearest", "linear"}
         How samples are taken between the volume's points. ``"nearest"`` is what
         ``Plotter.add_volume`` draws by default (VTK's default volume property).
+    shading : Shading, optional
+        How samples reflect light; without it they have the table's colours.
+    gradient_opacities : array_like of float, shape (n,), optional
+        Factors of a step's opacity, 0 to 1, at n equidistant gradient magnitudes.
+    gradient_range : (float, float), optional
+        Gradient magnitudes of the first and of the last factor, in scalars per mean spacing.
 
     Raises
     ------
@@ -44,6 +56,11 @@ class TransferFunction:
     The extinction at a scalar x is sigma(x) = -log1p(-a(x)) / U (DESIGN section 3): opacity is
     interpolated first and converted then, as VTK does. Where a is 1 the medium is opaque whatever
     U is: every step then has an optical depth of at least :data:`OPAQUE_OPTICAL_DEPTH`.
+
+    A gradient opacity g makes of a step's opacity alpha g alpha, as VTK's GPU mapper does. The
+    magnitude is that of central differences over a voxel each way, times the mean of the three
+    spacings; above a quarter of the volume's scalar range it counts as that, which is where VTK's
+    table ends.
     """
 
     colors: NDArray[np.float32]
@@ -51,6 +68,9 @@ class TransferFunction:
     scalar_range: tuple[float, float]
     unit_distance: float | None
     interpolation: str
+    shading: Shading | None
+    gradient_opacities: NDArray[np.float32] | None
+    gradient_range: tuple[float, float] | None
 
     def __init__(
         self,
@@ -60,6 +80,9 @@ class TransferFunction:
         *,
         unit_distance: float | None = None,
         interpolation: str = "nearest",
+        shading: Shading | None = None,
+        gradient_opacities: ArrayLike | None = None,
+        gradient_range: tuple[float, float] | None = None,
     ) -> None:
         self.colors = _table("colors", colors, (3,))
         self.opacities = _table("opacities", opacities, ())
@@ -85,10 +108,19 @@ class TransferFunction:
                 f"interpolation must be 'nearest' or 'linear'; got {interpolation!r}"
             )
         self.interpolation = interpolation
+        if not isinstance(shading, Shading | None):
+            raise InvalidArgumentError(
+                f"shading must be a pyvista_vdi.Shading; got {type(shading).__name__}"
+            )
+        self.shading = shading
+        self.gradient_opacities, self.gradient_range = _gradient(
+            gradient_opacities, gradient_range
+        )
 
     def replace(self, **changes: Any) -> TransferFunction:
         """Return a copy with some arguments of the constructor changed."""
         names = ("colors", "opacities", "scalar_range", "unit_distance", "interpolation")
+        names += _OPTIONS
         unknown = sorted(set(changes) - set(names))
         if unknown:
             raise InvalidArgumentError(f"a TransferFunction has no {', '.join(unknown)}")
@@ -96,18 +128,26 @@ class TransferFunction:
 
     def to_dict(self) -> dict[str, Any]:
         """Return what can be written to JSON: the whole table and its range."""
-        return {
+        state = {
             "colors": self.colors.tolist(),
             "opacities": self.opacities.tolist(),
             "scalar_range": list(self.scalar_range),
             "unit_distance": self.unit_distance,
             "interpolation": self.interpolation,
         }
+        if self.shading is not None:
+            state["shading"] = asdict(self.shading)
+        if self.gradient_opacities is not None and self.gradient_range is not None:
+            state["gradient_opacities"] = self.gradient_opacities.tolist()
+            state["gradient_range"] = list(self.gradient_range)
+        return state
 
     @classmethod
     def from_dict(cls, state: dict[str, Any]) -> TransferFunction:
         """Return the transfer function that :meth:`to_dict` described."""
         rest = {k: v for k, v in state.items() if k not in ("colors", "opacities", "scalar_range")}
+        if rest.get("shading") is not None:
+            rest["shading"] = Shading(**rest["shading"])
         return cls(state["colors"], state["opacities"], tuple(state["scalar_range"]), **rest)
 
     def __eq__(self, other: object) -> bool:
@@ -118,6 +158,9 @@ class TransferFunction:
             and self.scalar_range == other.scalar_range
             and self.unit_distance == other.unit_distance
             and self.interpolation == other.interpolation
+            and self.shading == other.shading
+            and np.array_equal(self.gradient_opacities, other.gradient_opacities)  # type: ignore[arg-type]
+            and self.gradient_range == other.gradient_range
         )
 
     def __hash__(self) -> int:
@@ -126,8 +169,28 @@ class TransferFunction:
     def __repr__(self) -> str:
         return (
             f"TransferFunction({len(self.opacities)} entries over {self.scalar_range}, "
-            f"unit_distance={self.unit_distance}, interpolation={self.interpolation!r})"
+            f"unit_distance={self.unit_distance}, interpolation={self.interpolation!r}"
+            + ("" if self.shading is None else f", {self.shading}")
+            + ("" if self.gradient_opacities is None else ", with gradient opacity")
+            + ")"
         )
+
+
+def _gradient(
+    opacities: ArrayLike | None, gradient_range: tuple[float, float] | None
+) -> tuple[NDArray[np.float32] | None, tuple[float, float] | None]:
+    if (opacities is None) != (gradient_range is None):
+        raise InvalidArgumentError(
+            "gradient_opacities and gradient_range belong together: give both or neither"
+        )
+    if opacities is None or gradient_range is None:
+        return None, None
+    low, high = (float(v) for v in gradient_range)
+    if not (np.isfinite(low) and np.isfinite(high) and 0 <= low < high):
+        raise InvalidArgumentError(
+            f"gradient_range must be two magnitudes, 0 <= low < high; got {gradient_range!r}"
+        )
+    return _table("gradient_opacities", opacities, ()), (low, high)
 
 
 def _table(name: str, values: ArrayLike, item: tuple[int, ...]) -> NDArray[np.float32]:

@@ -5,6 +5,7 @@
 #include "common/rays.cl"
 #include "common/classification.cl"
 #include "common/volume_sampling.cl"
+#include "common/shading.cl"
 #include "common/empty_blocks.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -16,6 +17,7 @@ typedef struct {
     float low, per_scalar;        // scalar to table position
     __global const uchar *visible; // whether a block holds anything that is not transparent
     int4 blocks;                  // along x, y, z
+    SHADING_FIELDS
 } Medium;
 
 typedef struct {
@@ -96,5 +98,19 @@ inline float4 step_medium(const March *march, const Medium *medium, float front,
     float4 sample = classify(scalar, medium->table, medium->entries, medium->low, medium->per_scalar);
     if (sample.w > 0.0f)
         sample.w = step_optical_depth(sample.w, (back - front) * march->units);
+#if defined(SHADED) || defined(GRADIENT_OPACITY)
+    if (sample.w > 0.0f) {
+        const float x = fma(t, march->slope.x, march->start.x);
+        const float y = fma(t, march->slope.y, march->start.y);
+        const float z = fma(t, march->slope.z, march->start.z);
+        const float3 differences = scalar_differences(medium->voxels, medium->size, x, y, z);
+#ifdef GRADIENT_OPACITY
+        sample.w = scaled_optical_depth(sample.w, gradient_opacity(differences, medium->gradient));
+#endif
+#ifdef SHADED
+        sample.xyz = lit(sample.xyz, differences, x, y, z, medium->lighting);
+#endif
+    }
+#endif
     return sample;
 }

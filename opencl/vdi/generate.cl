@@ -1,6 +1,7 @@
 // Volume to lists of supersegments, one march per ray (paper section 2; DESIGN section 3 "Merging", "Budget").
 //
 // -D VOXEL_T, INDEX_T, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
+// -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl
 //
 // A ray's march is cut into chunks of equally many steps. march_lists takes the steps of one chunk and appends what is not
 // homogeneous with the run before; make_room_in_lists then shortens the records that have grown too long, and raises the
@@ -23,6 +24,7 @@ __kernel void march_lists(
     float low, float per_scalar,   // scalar to table position
     __global const uchar *visible, // blocks that are not transparent, see grid/volume_blocks.cl
     int4 blocks,                   // along x, y, z
+    SHADING_PARAMETERS             // see common/shading.cl
     __global const float *forms,   // see begin_march
     int planes,
     float sample_distance,         // model units
@@ -49,7 +51,7 @@ __kernel void march_lists(
     March march;
     if (!begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, INFINITY))
         return;
-    const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks};
+    const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks SHADING_ARGUMENTS};
     const float per_reference = march.units * unit_distance / reference_length;
     const float threshold = thresholds[item];
     __global float *record = records + record_start(item, capacity, RUN_WORDS);

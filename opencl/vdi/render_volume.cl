@@ -1,6 +1,7 @@
 // Direct volume rendering: the baseline that a VDI is measured against, by the same march as generation.
 //
 // -D VOXEL_T, INDEX_T, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
+// -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl
 #include "common/march.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -12,6 +13,7 @@ __kernel void render_volume(
     float low, float per_scalar,
     __global const uchar *visible, // blocks that are not transparent, see grid/volume_blocks.cl
     int4 blocks,                   // along x, y, z
+    SHADING_PARAMETERS             // see common/shading.cl
     __global const float *forms,          // see begin_march
     int planes,
     float sample_distance,                // model units
@@ -34,7 +36,7 @@ __kernel void render_volume(
     float transmittance = 1.0f;
     March march;
     if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, t_end)) {
-        const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks};
+        const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks SHADING_ARGUMENTS};
         int k = 0;
         while (k < march.steps && transmittance > transmittance_cutoff) {
             const int empty = empty_steps(&march, &medium, k, march.steps, 1);

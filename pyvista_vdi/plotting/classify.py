@@ -26,6 +26,11 @@ def transfer_function_from_arguments(
     log_scale: bool = False,
     opacity_unit_distance: float | None = None,
     interpolation: str = "nearest",
+    shade: bool = False,
+    ambient: float | None = None,
+    diffuse: float = 0.7,
+    specular: float = 0.2,
+    specular_power: float = 10.0,
 ) -> TransferFunction:
     """Return the transfer function that ``Plotter.add_volume`` would draw with.
 
@@ -39,6 +44,10 @@ def transfer_function_from_arguments(
         Model units; ``None`` leaves it to the volume.
     interpolation : {"nearest", "linear"}
         How samples are taken between the volume's points.
+    shade : bool
+        Whether samples reflect light.
+    ambient, diffuse, specular, specular_power
+        How a shaded volume does: see :class:`~pyvista_vdi.Shading`.
 
     Returns
     -------
@@ -65,6 +74,9 @@ def transfer_function_from_arguments(
         log_scale=log_scale,
     )
     prop = volume_property(table, opacity_unit_distance, interpolation)
+    if shade:
+        prop.shade = True
+        light(prop, ambient, diffuse, specular, specular_power)
     function = transfer_function_from_property(prop)
     return function if opacity_unit_distance is not None else function.replace(unit_distance=None)
 
@@ -159,6 +171,19 @@ def volume_property(
         interpolation_type=interpolation,
         opacity_unit_distance=opacity_unit_distance,
     )
+
+
+def light(
+    prop: pv.VolumeProperty,
+    ambient: float | None,
+    diffuse: float,
+    specular: float,
+    specular_power: float,
+) -> None:
+    """Set how a property reflects light; ``None`` leaves its ambient coefficient."""
+    if ambient is not None:
+        prop.ambient = ambient
+    prop.diffuse, prop.specular, prop.specular_power = diffuse, specular, specular_power
 
 
 def _scalar_range(scalars: NDArray[Any], clim: float | ArrayLike | None) -> tuple[float, float]:

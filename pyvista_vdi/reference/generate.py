@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from ..camera import Camera, check_window_size
 from ..compositing import Segment, composite, merge
 from ..errors import InvalidArgumentError
+from ..lighting import Lights
 from ..transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from ..vdi import VDI
 from ..volume import Volume
 from .rays import HalfSpace, Ray, clip, inside_box, pixel_ray
+from .shading import gradient_factors, lit_colors
 
 Array = NDArray[np.float64]
 
@@ -58,6 +60,7 @@ def samples(
     window_size: Sequence[int],
     transfer_function: TransferFunction,
     sample_distance: float | None = None,
+    lights: Lights | None = None,
 ) -> Iterator[RaySamples]:
     """Yield the samples of every pixel's ray.
 
@@ -78,6 +81,8 @@ def samples(
         Classification and interpolation.
     sample_distance : float, optional
         Model units; half the smallest spacing by default.
+    lights : Lights, optional
+        What a shaded volume is lit by; one headlight by default.
 
     Yields
     ------
@@ -104,7 +109,7 @@ def samples(
         edges = _steps(start, slope, volume, camera.parallel_projection, step / per_depth)
         position = start + slope * ((edges[:-1] + edges[1:]) / 2)[:, None]
         length = np.diff(edges) * per_depth
-        color, tau = medium_at(volume, transfer_function, position, length)
+        color, tau = medium_at(volume, transfer_function, position, length, camera, lights)
         yield RaySamples((x, y), edges[:-1], edges[1:], position, length, color, tau)
 
 
@@ -114,12 +119,13 @@ def volume_image(
     window_size: Sequence[int],
     transfer_function: TransferFunction,
     sample_distance: float | None = None,
+    lights: Lights | None = None,
 ) -> Array:
     """Return the direct volume rendering: all samples composited, nothing ended early.
 
     Parameters
     ----------
-    volume, camera, window_size, transfer_function, sample_distance
+    volume, camera, window_size, transfer_function, sample_distance, lights
         As for :func:`samples`.
 
     Returns
@@ -129,7 +135,7 @@ def volume_image(
     """
     width, height = check_window_size(window_size)
     image = np.zeros((height, width, 4))
-    rays = samples(volume, camera, window_size, transfer_function, sample_distance)
+    rays = samples(volume, camera, window_size, transfer_function, sample_distance, lights)
     for ray in rays:
         x, y = ray.pixel
         image[height - 1 - y, x] = composite(ray.color, ray.optical_depth)
@@ -145,6 +151,7 @@ def build_vdi(
     *,
     max_supersegments: int = 20,
     weighting: str = "transmittance",
+    lights: Lights | None = None,
 ) -> VDI:
     """Return a plain VDI: neighbouring samples merged greedily until the budget is kept.
 
@@ -157,7 +164,7 @@ def build_vdi(
 
     Parameters
     ----------
-    volume, camera, window_size, transfer_function, sample_distance
+    volume, camera, window_size, transfer_function, sample_distance, lights
         As for :func:`samples`.
     max_supersegments : int
         N_S: no list gets longer.
@@ -180,7 +187,7 @@ def build_vdi(
         )
     depth_origin = near_depth(volume.bounds, camera)
     lists = []
-    rays = samples(volume, camera, window_size, transfer_function, sample_distance)
+    rays = samples(volume, camera, window_size, transfer_function, sample_distance, lights)
     for ray in rays:
         runs = [
             Segment(float(t0), float(t1), color, float(tau))
@@ -205,7 +212,12 @@ def near_depth(bounds: Sequence[float], camera: Camera) -> float:
 
 
 def medium_at(
-    volume: Volume, transfer_function: TransferFunction, position: Array, length: Array
+    volume: Volume,
+    transfer_function: TransferFunction,
+    position: Array,
+    length: Array,
+    camera: Camera | None = None,
+    lights: Lights | None = None,
 ) -> tuple[Array, Array]:
     """Return colour and optical depth of steps whose midpoints have given grid coordinates.
 
@@ -220,13 +232,23 @@ def medium_at(
         [0, dimensions - 1].
     length : numpy.ndarray
         Of each step, float64 (n,), model units.
+    camera : Camera, optional
+        The view; a shaded volume needs one.
+    lights : Lights, optional
+        What a shaded volume is lit by; one headlight by default.
 
     Returns
     -------
     color : numpy.ndarray
         Straight RGB, float64 (n, 3).
     optical_depth : numpy.ndarray
-        float64 (n,): ``-log1p(-a) length / U``; where a is 1, no less than 30.
+        float64 (n,): ``-log1p(-a) length / U``; where a is 1, no less than 30. A gradient opacity
+        g makes of the opacity alpha of this g alpha.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If the volume is shaded and there is no camera.
     """
     top = np.array(volume.dimensions) - 1
     outside = ((position < -GRID_TOLERANCE) | (position > top + GRID_TOLERANCE)).any(axis=1)
@@ -239,6 +261,18 @@ def medium_at(
     with np.errstate(divide="ignore"):  # log1p(-1): opaque
         tau = np.abs(-np.log1p(-alpha)) * (length / unit)
     tau = np.where(alpha == 1, OPAQUE_OPTICAL_DEPTH, tau)
+
+    if transfer_function.gradient_opacities is not None or transfer_function.shading is not None:
+        differences = _differences(volume.array, inside, interpolate)
+        factor = gradient_factors(volume, transfer_function, differences)
+        tau = np.where(factor < 1, -np.log1p(factor * np.expm1(-tau)), tau)
+        if transfer_function.shading is not None:
+            if camera is None:
+                raise InvalidArgumentError("a shaded volume is seen by a camera: give one")
+            lights = Lights() if lights is None else lights
+            color = lit_colors(
+                volume, camera, transfer_function.shading, lights, inside, differences, color
+            )
     return color, np.where(outside | np.isnan(scalar), 0.0, tau)
 
 
@@ -282,6 +316,24 @@ def _linear(array: NDArray[np.generic], position: Array) -> Array:
         x, y, z = (cell + corner).T
         total += weight * np.asarray(array[z, y, x], dtype=np.float64)
     return total
+
+
+def _differences(
+    array: NDArray[np.generic],
+    position: Array,
+    interpolate: Callable[[NDArray[np.generic], Array], Array],
+) -> Array:
+    """Return differences of the scalar from a voxel behind to a voxel ahead, float64 (n, 3).
+
+    Beyond the grid it is what it is on its border; a difference with NaN is 0.
+    """
+    top = np.array(array.shape[::-1]) - 1
+    columns = []
+    for axis in np.eye(3):
+        ahead, behind = (np.clip(position + s * axis, 0, top) for s in (1, -1))
+        columns.append(interpolate(array, ahead) - interpolate(array, behind))
+    differences = np.stack(columns, axis=1)
+    return np.where(np.isnan(differences), 0.0, differences)
 
 
 def _steps(start: Array, slope: Array, volume: Volume, parallel: bool, stride: float) -> Array:

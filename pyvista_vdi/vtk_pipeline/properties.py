@@ -10,12 +10,16 @@ from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
 from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
+from pyvista_vdi.lighting import Shading
 from pyvista_vdi.transfer_function import TransferFunction
 
 #: Entries of the table where the property's nodes do not lie on a common equidistant grid: the
 #: functions are sampled this often over the union of their ranges, and a step in them becomes a
 #: ramp of one entry's width.
 SAMPLED_ENTRIES = 4096
+
+#: Entries of a gradient opacity's table: VTK's own has as many.
+GRADIENT_ENTRIES = 1024
 
 #: VTK's interpolation types that a VDI can be made with (VTK_NEAREST_..., VTK_LINEAR_...).
 _INTERPOLATION = {0: "nearest", 1: "linear"}
@@ -30,7 +34,8 @@ def transfer_function_from_property(
     ----------
     prop : vtkVolumeProperty or pyvista.VolumeProperty
         Colour and scalar opacity functions of its first component, its scalar opacity unit
-        distance (model units) and its interpolation (nearest or linear) are taken.
+        distance (model units), its interpolation (nearest or linear), its gradient opacity and,
+        if it is shaded, its lighting coefficients are taken.
     n_entries : int
         Longest table. Nodes on a common equidistant grid no longer than this (which is what
         PyVista builds) give exactly that grid; any others are sampled at this many scalars.
@@ -44,8 +49,8 @@ def transfer_function_from_property(
     Raises
     ------
     UnsupportedError
-        If shading, gradient opacity, a label map, a 2D transfer function, dependent components
-        or cubic interpolation is on.
+        If a label map, a 2D transfer function, dependent components or cubic interpolation is
+        on.
     InvalidArgumentError
         If it is no volume property, or its functions have no points.
     """
@@ -68,6 +73,8 @@ def transfer_function_from_property(
         scalar_range,
         unit_distance=prop.GetScalarOpacityUnitDistance(),
         interpolation=_INTERPOLATION[prop.GetInterpolationType()],
+        shading=_shading(prop),
+        **_gradient_opacity(prop),
     )
 
 
@@ -82,10 +89,6 @@ def color_function(prop: vtkVolumeProperty) -> Any:
 
 def _refuse_unsupported(prop: vtkVolumeProperty) -> None:
     reasons = []
-    if prop.GetShade():
-        reasons.append("shading (lighting comes with a later release: ShadeOff())")
-    if _has_gradient_opacity(prop):
-        reasons.append("a gradient opacity function (DisableGradientOpacityOn())")
     if not prop.GetIndependentComponents():
         reasons.append("dependent components such as RGBA (IndependentComponentsOn())")
     if prop.GetTransferFunctionMode() == vtkVolumeProperty.TF_2D:
@@ -104,6 +107,28 @@ def _has_gradient_opacity(prop: vtkVolumeProperty) -> bool:
     if prop.GetDisableGradientOpacity() or not prop.HasGradientOpacity():
         return False
     return any(node[1] != 1.0 for node in _nodes(prop.GetGradientOpacity()))
+
+
+def _shading(prop: vtkVolumeProperty) -> Shading | None:
+    if not prop.GetShade():
+        return None
+    return Shading(
+        prop.GetAmbient(), prop.GetDiffuse(), prop.GetSpecular(), prop.GetSpecularPower()
+    )
+
+
+def _gradient_opacity(prop: vtkVolumeProperty) -> dict[str, Any]:
+    if not _has_gradient_opacity(prop):
+        return {}
+    function = prop.GetGradientOpacity()
+    low = 0.0
+    high = max(float(_nodes(function)[:, 0].max()), np.finfo(np.float32).tiny)
+    grid = np.linspace(low, high, GRADIENT_ENTRIES)
+    opacities = np.array([function.GetValue(x) for x in grid])
+    return {
+        "gradient_opacities": np.clip(opacities, 0, 1),
+        "gradient_range": (low, high),
+    }
 
 
 # -- tables ----------------------------------------------------------------------------------------
