@@ -241,8 +241,7 @@ run_examples() {
     done
 }
 
-# The commands of the README, to the letter, in a clone of their own: the first one whole; of the
-# one that runs the tests, which have run already, the installation and the collection.
+# The commands of the README, to the letter and in full, in a clone of their own.
 run_readme_commands() {
     copy_checkout_to_clone "$work/clone"
     cd "$work/clone"
@@ -257,8 +256,8 @@ run_readme_commands() {
     ls -l out
     rm -rf .venv
     cat "$work/test-command"
-    PYTEST_ADDOPTS="--collect-only -qq" bash -euo pipefail "$work/test-command" >"$work/collected"
-    log "the README's test command collects $(wc -l <"$work/collected") lines of tests"
+    # To the letter and in full: tests that find the installed package elsewhere may not in a checkout
+    bash -euo pipefail "$work/test-command"
 }
 
 copy_checkout_to_clone() {

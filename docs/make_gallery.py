@@ -36,6 +36,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for example in sorted((DOCS.parent / "examples").glob("*.py")):
+            if example.stem == "interactive":
+                run(environment, str(example), str(TARGET / "interactive.gif"))
+                continue
             picture = folder / f"{example.stem}.png"
             run(environment, str(example), str(picture))
             keep(picture, TARGET / picture.name, WIDTH)

@@ -90,6 +90,7 @@ class Camera:
     """
 
     __slots__ = (
+        "_axes",
         "_key",
         "focal_point",
         "model_transform",
@@ -137,6 +138,7 @@ class Camera:
         put(self, "model_transform", _affine(model_transform))
         put(self, "_key", self._make_key())
         self._check()
+        put(self, "_axes", self._make_axes())
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a Camera cannot be changed (tried to set {name!r}): use replace()")
@@ -198,7 +200,7 @@ class Camera:
     @classmethod
     def from_dict(cls, state: Mapping[str, Any]) -> Camera:
         """Return the camera that :meth:`to_dict` described."""
-        names = cls.__slots__[1:]
+        names = cls.__slots__[2:]
         unknown = sorted(set(state) - set(names))
         missing = sorted({"position", "focal_point", "view_up"} - set(state))
         if unknown or missing:
@@ -209,7 +211,7 @@ class Camera:
 
     def to_dict(self) -> dict[str, Any]:
         """Return all arguments of the constructor, as plain numbers and lists (for JSON)."""
-        state: dict[str, Any] = {name: getattr(self, name) for name in self.__slots__[1:]}
+        state: dict[str, Any] = {name: getattr(self, name) for name in self.__slots__[2:]}
         for name in ("position", "focal_point", "view_up", "window_center"):
             state[name] = list(state[name])
         state["model_transform"] = self.model_transform.tolist()
@@ -217,7 +219,7 @@ class Camera:
 
     def replace(self, **changes: Any) -> Camera:
         """Return a copy with some arguments of the constructor changed."""
-        state = {name: getattr(self, name) for name in self.__slots__[1:]}
+        state = {name: getattr(self, name) for name in self.__slots__[2:]}
         unknown = sorted(set(changes) - set(state))
         if unknown:
             raise InvalidCameraError(f"a Camera has no {', '.join(unknown)}")
@@ -234,16 +236,60 @@ class Camera:
         """
         return self._turned(-self.axes[0], degrees)
 
+    def tile(
+        self, window_size: Sequence[int], corner: Sequence[int], tile_size: Sequence[int]
+    ) -> Camera:
+        """Return the view that a rectangle of pixels of a window has.
+
+        A picture of ``tile_size`` by the new view is the part ``picture[row : row + height,
+        column : column + width]`` of this view's picture of ``window_size``: its rays are the
+        same to rounding.
+
+        Parameters
+        ----------
+        window_size : (int, int)
+            Width and height of the whole window in pixels.
+        corner : (int, int)
+            Column and row of the tile's first pixel, from the top left; the tile may reach
+            beyond the window.
+        tile_size : (int, int)
+            Width and height of the tile in pixels.
+
+        Returns
+        -------
+        Camera
+            The same eye and frame with another lens and window centre.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If the sizes or the corner are not two whole numbers of pixels each.
+        """
+        window = np.array(check_window_size(window_size))
+        tile = np.array(check_window_size(tile_size, name="tile_size"))
+        first = np.asarray(corner)
+        if first.shape != (2,) or first.dtype.kind not in "iu":
+            raise InvalidArgumentError(
+                f"corner must be (column, row), two whole numbers of pixels; got {corner!r}"
+            )
+        centre = (2 * first + tile) / window - 1  # (u, v) in the window, v downwards
+        around = np.asarray(self.window_center) + centre * (1, -1)
+        width_share, height_share = tile / window
+        # The angle is that of the edge it is measured along; the other follows from the aspect
+        share = width_share if self.use_horizontal_view_angle else height_share
+        tangent = math.tan(math.radians(self.view_angle) / 2)
+        return self.replace(
+            view_angle=2 * math.degrees(math.atan(tangent * share)),
+            parallel_scale=self.parallel_scale * height_share,
+            window_center=around * window / tile,
+        )
+
     # -- frames ----------------------------------------------------------------------------------
 
     @property
     def axes(self) -> Matrix:
         """Unit vectors right, up and forward in world coordinates, float64 (3, 3), as rows."""
-        forward = np.subtract(self.focal_point, self.position)
-        forward = forward / np.linalg.norm(forward)
-        right = np.cross(forward, _unit(np.asarray(self.view_up)))
-        right /= np.linalg.norm(right)
-        return np.array([right, np.cross(right, forward), forward])
+        return self._axes  # type: ignore[attr-defined, no-any-return]
 
     @property
     def view_matrix(self) -> Matrix:
@@ -368,6 +414,15 @@ class Camera:
         state = self.to_dict()
         state["model_transform"] = self.model_transform.tobytes()
         return tuple(tuple(v) if isinstance(v, list) else v for v in state.values())
+
+    def _make_axes(self) -> Matrix:
+        forward = np.subtract(self.focal_point, self.position)
+        forward = forward / np.linalg.norm(forward)
+        right = np.cross(forward, _unit(np.asarray(self.view_up)))
+        right /= np.linalg.norm(right)
+        axes = np.array([right, np.cross(right, forward), forward])
+        axes.setflags(write=False)
+        return axes
 
     def _check(self) -> None:
         if not self.parallel_projection and not 0 < self.view_angle < 180:

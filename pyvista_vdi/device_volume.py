@@ -15,7 +15,7 @@ from .blocks import GROUP
 from .camera import Camera
 from .errors import InvalidArgumentError
 from .lighting import Lights
-from .opencl_runtime import DeviceBuffer, Runtime, padded
+from .opencl_runtime import DeviceBuffer, Runtime, aligned_empty, padded
 from .shading import gradient_table, lighting_table, shading_defines
 from .transfer_function import TransferFunction
 from .volume import Volume
@@ -32,10 +32,8 @@ _DEVICE_TYPES = {
 _BLOCK_SHIFT = 3
 #: Share of transparent blocks from which on looking for them pays.
 _WORTH_SKIPPING = 0.05
-_uploads: weakref.WeakKeyDictionary[Volume, dict[Any, tuple[DeviceBuffer, DeviceBuffer]]] = (
-    weakref.WeakKeyDictionary()
-)
-_lock = threading.Lock()
+_uploads: weakref.WeakKeyDictionary[Volume, _Uploads] = weakref.WeakKeyDictionary()
+_uploads_lock = threading.Lock()
 
 
 class DeviceVolume:
@@ -185,6 +183,17 @@ class DeviceVolume:
         return rays.packed([*index, *direction, *planes]), pixel_rays, len(planes)
 
 
+class _Uploads:
+    """What is on devices of one volume; its lock lets the thread that uploads it be the only one.
+
+    Voxels and the scalar range of each block, by device and scaling.
+    """
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.made: dict[Any, tuple[DeviceBuffer, DeviceBuffer]] = {}
+
+
 def checked_sample_distance(volume: Volume, sample_distance: float | None) -> float:
     """Return the length of a step in model units; half the smallest spacing by default."""
     if sample_distance is None:
@@ -230,17 +239,20 @@ def _upload(
     defines: dict[str, str | int | None],
 ) -> tuple[DeviceBuffer, DeviceBuffer]:
     """Return voxels and the scalar range of each block, made once per device and scaling."""
-    with _lock:
-        cache = _uploads.setdefault(volume, {})
-        for other in [key for key in cache if key[0] is runtime and key[1] != scale]:
-            del cache[other]  # one copy per device: the last classification's
+    with _uploads_lock:
+        uploads = _uploads.setdefault(volume, _Uploads())
+    with runtime.holding(uploads.lock):
+        made = uploads.made
+        for other in [key for key in made if key[0] is runtime and key[1] != scale]:
+            del made[other]  # one copy per device: the last classification's
         key = (runtime, scale)
-        if key not in cache:
-            volume.finite_range()  # refuses a volume that is NaN throughout
-            array = volume.array if scale is None else _scaled(volume.array, *scale)
+        if key not in made:
+            _require_a_number(runtime, volume)
+            array = volume.array if scale is None else _all_scaled(runtime, volume.array, scale)
             voxels = runtime.upload(array, f"volume {volume.name!r}")
-            cache[key] = (voxels, _block_ranges(runtime, volume, voxels, defines))
-        return cache[key]
+            made[key] = (voxels, _block_ranges(runtime, volume, voxels, defines))
+            runtime.finish()  # a thread with another queue may use them next
+        return made[key]
 
 
 def _block_ranges(
@@ -262,6 +274,28 @@ def _block_ranges(
         ranges,
     )
     return ranges
+
+
+def _require_a_number(runtime: Runtime, volume: Volume) -> None:
+    """Refuse a volume that is NaN throughout; nearly every other is known by its first plane."""
+    if volume.array.dtype.kind != "f":
+        return
+    for plane in volume.array:
+        runtime.give_way()
+        if not np.isnan(plane).all():
+            return
+    volume.finite_range()  # says what is wrong
+
+
+def _all_scaled(
+    runtime: Runtime, array: NDArray[Any], scale: tuple[float, float]
+) -> NDArray[np.float32]:
+    """Scale a volume plane by plane, see :func:`_scaled`."""
+    scaled = aligned_empty(array.shape, np.float32)
+    for plane, target in zip(array, scaled, strict=True):
+        runtime.give_way()
+        target[...] = _scaled(plane, *scale)
+    return scaled
 
 
 def _scaled(array: NDArray[Any], low: float, high: float) -> NDArray[np.float32]:

@@ -17,7 +17,7 @@ from .device_volume import DeviceVolume, as_float
 from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory
 from .lighting import Lights
-from .opencl_runtime import Runtime, get_runtime
+from .opencl_runtime import Runtime, aligned_empty, get_runtime
 from .transfer_function import TransferFunction
 from .vdi import VDI
 from .volume import Volume
@@ -198,9 +198,7 @@ def generate_vdi(
             _require_room(parts, (width, height))
     _report(progress, 1.0)
 
-    lengths, front, back, color, optical_depth = (
-        np.concatenate(arrays) for arrays in zip(*parts, strict=True)
-    )
+    lengths, front, back, color, optical_depth = _joined(runtime, parts)
     made_by = {
         "generator": f"pyvista-vdi {__version__}",
         "criterion": "homogeneity, least-error merging",
@@ -400,6 +398,21 @@ def _check_criterion(tolerance: float, view_cone: float) -> tuple[float, float]:
             f"view_cone must be an angle between 0 and 90 degrees; got {view_cone!r}"
         )
     return difference, float(1 - np.cos(np.radians(angle)))
+
+
+def _joined(runtime: Runtime, parts: list[tuple[NDArray[Any], ...]]) -> list[NDArray[Any]]:
+    """Join the slices' arrays, each kind into one that a CPU device uses in place."""
+    joined = []
+    for arrays in zip(*parts, strict=True):
+        size = sum(len(array) for array in arrays)
+        whole = aligned_empty((size, *arrays[0].shape[1:]), arrays[0].dtype)
+        end = 0
+        for array in arrays:
+            runtime.give_way()
+            first, end = end, end + len(array)
+            whole[first:end] = array
+        joined.append(whole)
+    return joined
 
 
 def _require_room(parts: Sequence[tuple[NDArray[Any], ...]], size: tuple[int, int]) -> None:

@@ -14,6 +14,10 @@ from .vdi import VDI
 TILE = 16
 SLABS = 64
 
+#: By how much supersegments count beyond their faces: roundings of 2**-23 of the depths that the
+#: raycaster looks up. At most 17 add up (docs/conventions.md, "Occupancy grid").
+_ROUNDINGS = 32
+
 #: Share of the cells within the volume's bounds above which skipping costs more than it saves.
 #: Measured: it gains below .6 and loses above 1 (docs/performance.md).
 _WORTHWHILE = 0.8
@@ -36,6 +40,8 @@ class OccupancyGrid:
         The VDI's arrays on the device; offsets uint32, or uint64 if ``long_offsets``.
     nearest : float
         Least view depth that is in front of V_O's eye, world units.
+    shifted : bool
+        Whether the raycaster's depth coordinate is that of a long lens.
     long_offsets : bool
         Type of the offsets.
 
@@ -47,6 +53,9 @@ class OccupancyGrid:
         Where slab 0 begins: view depth less the VDI's depth origin, world units.
     slabs_per_depth : float
         Slabs per world unit.
+    margin : float
+        By which supersegments count beyond their faces, world units: more than the raycaster's
+        depths are rounded by.
     counts : DeviceBuffer
         uint32 (tiles high, tiles wide, slabs).
     masks : DeviceBuffer
@@ -64,6 +73,7 @@ class OccupancyGrid:
         back: DeviceBuffer,
         *,
         nearest: float,
+        shifted: bool,
         long_offsets: bool,
     ) -> None:
         width, height = vdi.window_size
@@ -74,6 +84,7 @@ class OccupancyGrid:
         self.first_depth = near - vdi.depth_origin
         # Bounds without depth, or behind the eye: everything is in slab 0
         self.slabs_per_depth = SLABS / (far - near) if far > near else 1.0
+        self.margin = _ROUNDINGS * 2.0**-23 * _looked_up(vdi, near, far, shifted)
         self.counts = runtime.buffer((high, wide, SLABS), np.uint32, "occupancy counts")
         self.masks = runtime.buffer((high, wide), np.uint64, "occupancy masks")
         defines = {"OFFSET_T": "ulong" if long_offsets else "uint"}
@@ -90,6 +101,7 @@ class OccupancyGrid:
             np.int32(wide),
             np.float32(self.first_depth),
             np.float32(self.slabs_per_depth),
+            np.float32(self.margin),
             self.counts,
         )
         runtime.launch(
@@ -108,6 +120,23 @@ class OccupancyGrid:
     def worthwhile(self) -> bool:
         """Whether enough is empty for skipping to gain time."""
         return self.occupied < _WORTHWHILE
+
+
+def _looked_up(vdi: VDI, near: float, far: float, shifted: bool) -> float:
+    """Return the size of what the raycaster rounds where it looks up a depth, world units.
+
+    That is the offset from the VDI's depth origin, and the depth coordinate times the change of
+    depth with it: 1 in parallel projection, and with view depth Z, Z**2 of -1 / Z and
+    Z**2 / depth_origin of the long lens's (``opencl/common/list_space.cl``).
+    """
+    origin = vdi.depth_origin
+    offset = max(abs(near - origin), abs(far - origin))
+    if vdi.camera.parallel_projection:
+        return offset
+    if shifted:
+        coordinate = max(abs(near - origin) / near, abs(far - origin) / far)
+        return offset + coordinate * far**2 / origin
+    return offset + max(far, 0.0)
 
 
 def _share_in_bounds(vdi: VDI, near: float, far: float) -> float:

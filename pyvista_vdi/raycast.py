@@ -119,7 +119,7 @@ def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
     """Return the VDI on the device, made once and kept as long as the VDI lives."""
     with _lock:
         place = _prepared.setdefault(vdi, {}).setdefault(runtime, _Preparation())
-    with place.lock:
+    with runtime.holding(place.lock):
         if place.prepared is None:
             place.prepared = PreparedVDI(runtime, vdi)
         return place.prepared
@@ -152,7 +152,9 @@ class PreparedVDI:
         diagonal = float(np.linalg.norm(np.subtract(vdi.bounds[1::2], vdi.bounds[::2])))
         shrink = np.linalg.norm(camera.model_transform[:3, :3], 2)
         self._nearest = rays.NEAREST_DEPTH * diagonal * float(shrink)
-        self._shifted = not self._parallel and self._depth_origin > 0 and far <= _LONG_LENS * near
+        # An origin much closer than the data costs the coordinate the digits that it is to save
+        closest = min(near, self._depth_origin)
+        self._shifted = not self._parallel and 0 < far <= _LONG_LENS * closest
         self._list_rows = self._list_space(camera)
         self._long_offsets = vdi.n_supersegments >= 2**32
         self._upload(vdi)
@@ -302,6 +304,7 @@ class PreparedVDI:
                 front,
                 back,
                 nearest=self._nearest,
+                shifted=self._shifted,
                 long_offsets=self._long_offsets,
             )
             runtime.finish()  # the buffers above may be host memory in use

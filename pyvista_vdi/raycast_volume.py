@@ -13,7 +13,7 @@ from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
 from .device_volume import DeviceVolume
 from .lighting import Lights
-from .opencl_runtime import get_runtime
+from .opencl_runtime import Runtime, get_runtime
 from .raycast import TRANSMITTANCE_CUTOFF
 from .transfer_function import TransferFunction
 from .volume import Volume
@@ -69,7 +69,7 @@ def raycast_volume(
         Premultiplied RGBA, float32 (height, width, 4), top row first.
     """
     camera = Camera.from_any(camera)
-    width, height = check_window_size(window_size)
+    size = check_window_size(window_size)
     runtime = get_runtime(device)
     medium = DeviceVolume(
         runtime,
@@ -79,8 +79,31 @@ def raycast_volume(
         skip_empty=skip_empty,
         lights=Lights.from_any(lights),
     )
-    forms, pixel_rays, planes = medium.forms(camera, (width, height), clipping_planes)
-    ends = rays.checked_opaque_depth(opaque_depth, (width, height), pixel_rays)
+    return raycast_medium(
+        runtime,
+        medium,
+        camera,
+        size,
+        opaque_depth=opaque_depth,
+        clipping_planes=clipping_planes,
+        early_termination=early_termination,
+    )
+
+
+def raycast_medium(
+    runtime: Runtime,
+    medium: DeviceVolume,
+    camera: Camera,
+    size: tuple[int, int],
+    *,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+    early_termination: bool = True,
+) -> NDArray[np.float32]:
+    """Render a volume that is on the device already; see :func:`raycast_volume`."""
+    width, height = size
+    forms, pixel_rays, planes = medium.forms(camera, size, clipping_planes)
+    ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
     kernel = runtime.kernel("vdi/render_volume.cl", "render_volume", medium.defines)
     with (
         runtime.upload(forms, "rays") as form_buffer,

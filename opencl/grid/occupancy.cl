@@ -5,10 +5,6 @@
 #include "common/occupancy.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Share of a slab by which supersegments count beyond their faces. The depths that the raycaster looks up are rounded by less
-// than a tenth of this (docs/conventions.md, "Occupancy grid").
-#define SLAB_MARGIN 1e-3f
-
 // One work-item per list. Counts are sums of whole numbers, so that their order changes nothing.
 __kernel void count_supersegments(
     __global const OFFSET_T *offsets, // width * height + 1
@@ -18,6 +14,7 @@ __kernel void count_supersegments(
     int tiles_wide,
     float first_depth,                // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,            // per world unit
+    float margin,                     // by which supersegments count beyond their faces, world units
     __global uint *counts)            // tiles_high, tiles_wide, SLABS; all 0
 {
     const size_t list = get_global_id(0);
@@ -26,7 +23,6 @@ __kernel void count_supersegments(
     const size_t i = (list % (size_t)width) >> TILE_SHIFT;
     const size_t j = (list / (size_t)width) >> TILE_SHIFT;
     __global uint *cells = counts + (j * (size_t)tiles_wide + i) * SLABS;
-    const float margin = SLAB_MARGIN / slabs_per_depth;
     for (OFFSET_T k = offsets[list]; k < offsets[list + 1]; ++k) {
         const int first = slab_of(fronts[k] - margin, first_depth, slabs_per_depth);
         const int last = slab_of(backs[k] + margin, first_depth, slabs_per_depth);

@@ -148,6 +148,27 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="a .vdi file")
     _add_size(parser, None)
     parser.add_argument("--screenshot", metavar="FILE", help="write this .png, open no window")
+    group = parser.add_argument_group("while the view moves")
+    group.add_argument(
+        "--target-fps",
+        type=_rate,
+        metavar="RATE",
+        default=30.0,
+        help="frames per second to keep, by fewer pixels; 0: every frame is full (default: 30)",
+    )
+    group.add_argument(
+        "--regenerate",
+        choices=("auto", "never"),
+        default="auto",
+        help="auto (default): say once that the view is beyond what the VDI was made to serve (a "
+        "file holds no volume to make another from); never: take it as it is",
+    )
+    group.add_argument(
+        "--status",
+        action="store_true",
+        help="show in a corner how it is drawn: pixels, frames per second, angle from the "
+        "generating view",
+    )
 
 
 def _add_compare(parser: argparse.ArgumentParser) -> None:
@@ -335,6 +356,16 @@ def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"expected a whole number above 0; got {text!r}")
     return int(text)
+
+
+def _rate(text: str) -> float:
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = -1.0
+    if not 0 <= rate < float("inf"):
+        raise argparse.ArgumentTypeError(f"expected frames per second, 0 or above; got {text!r}")
+    return rate
 
 
 def _opacity(text: str) -> str | list[float]:

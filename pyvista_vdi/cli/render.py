@@ -29,7 +29,14 @@ def view(options: argparse.Namespace) -> int:
     vdi = read(options.file)
     from ..plotting.cli_support import show
 
-    show(vdi, options.size, screenshot)
+    show(
+        vdi,
+        options.size,
+        screenshot,
+        target_fps=options.target_fps,
+        regenerate=options.regenerate,
+        status=options.status,
+    )
     if screenshot is not None:
         print(f"{options.screenshot}: written")
     return 0

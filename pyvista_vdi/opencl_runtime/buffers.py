@@ -145,6 +145,8 @@ class DeviceBuffer:
         What it holds, for messages.
     writable : bool
         Whether :meth:`Runtime.write` and :meth:`Runtime.fill` may change it.
+    readers : set of int or None
+        Where the memory is a caller's array: the queues that kernels read it on.
     """
 
     def __init__(
@@ -162,6 +164,7 @@ class DeviceBuffer:
         self.nbytes = math.prod(shape) * dtype.itemsize
         self.name = name
         self.writable = writable
+        self.readers: set[int] | None = None
         self._memory = memory
         self._finalizer = weakref.finalize(self, _release, memory, on_release)
         self._finalizer.atexit = False  # the driver frees everything at exit

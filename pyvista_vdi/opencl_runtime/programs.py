@@ -21,6 +21,8 @@ LOG_LINES_SHOWN = 30
 
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*")
 _NOT_IN_OPTIONS = re.compile(r"[\s\"'\\;]")
+#: What several launches with offsets answer otherwise than one launch does.
+_PLACE_OF_GROUP = re.compile(r"\bget_(group_id|num_groups|global_size|global_offset)\b")
 _logger = logging.getLogger(__name__)
 
 # One build at a time in the process: warning filters are global, and not every driver's compiler
@@ -83,11 +85,15 @@ class Kernel:
         The function.
     path : str
         The file that it comes from.
+    divisible : bool
+        Whether several launches with offsets do what one launch does: nothing in the program asks
+        where in the whole its work-group is.
     """
 
     def __init__(self, program: Any, path: str, name: str) -> None:
         self.name = name
         self.path = path
+        self.divisible = True
         self._program = program
         self._local = threading.local()
         self.argument_count = int(self.object.num_args)
@@ -122,6 +128,12 @@ class ProgramCache:
         self._programs: dict[tuple[str, tuple[str, ...]], Any] = {}
         self._base_options = ("-cl-std=CL1.2", *_rounding_options(device))
 
+    def known(self, path: str | Path, name: str, defines: Mapping[str, Define]) -> Kernel | None:
+        """A kernel of the package's files that was compiled before; parameters as for kernel."""
+        if not isinstance(path, str):
+            return None
+        return self._kernels.get((path, name, self._options(defines)))
+
     def kernel(self, path: str | Path, name: str, defines: Mapping[str, Define]) -> Kernel:
         """The kernel, compiled when first asked for.
 
@@ -144,20 +156,23 @@ class ProgramCache:
         KernelBuildError
             If the source cannot be assembled or compiled, or has no such function.
         """
-        options = (*self._base_options, *define_options(defines))
-        if isinstance(path, str):
-            key: tuple[Any, ...] = (path, name, options)
-            kernel = self._kernels.get(key)
-            if kernel is not None:
-                return kernel
+        kernel = self.known(path, name, defines)
+        if kernel is not None:
+            return kernel
+        options = self._options(defines)
         with _build_lock:
             source = sources.expand(path)
             key = (path, name, options) if isinstance(path, str) else (source, name, options)
             kernel = self._kernels.get(key)
             if kernel is None:
                 program = self._program(str(path), source, options)
-                kernel = self._kernels[key] = self._find(program, str(path), name, options)
+                kernel = self._find(program, str(path), name, options)
+                kernel.divisible = _PLACE_OF_GROUP.search(source) is None
+                self._kernels[key] = kernel
             return kernel
+
+    def _options(self, defines: Mapping[str, Define]) -> tuple[str, ...]:
+        return (*self._base_options, *define_options(defines))
 
     def _program(self, path: str, source: str, options: tuple[str, ...]) -> Any:
         key = (source, options)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import math
 import sys
 import threading
-from collections.abc import Iterator, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +28,22 @@ from pyvista_vdi.opencl_runtime.buffers import DeviceBuffer, Ledger, bytes_text,
 from pyvista_vdi.opencl_runtime.devices import Candidate, DeviceInfo, opencl
 from pyvista_vdi.opencl_runtime.profiling import KernelTime, Profile, profiling_wanted, table
 from pyvista_vdi.opencl_runtime.programs import Define, Kernel, ProgramCache
+from pyvista_vdi.opencl_runtime.turns import Turns, Worker
+
+#: Bytes that background work copies at a time: about a millisecond at a host memory's pace.
+_COPY_BYTES = 4 * 2**20
+#: Work-groups for each of the device's compute units in the first piece of a launch.
+_FIRST_GROUPS = 4
+#: Where the driver chooses work-groups, pieces are a multiple of as much of this as divides all.
+_FREE_STEP = 256
 
 
 class Runtime:
     """A device ready for work. Made by :func:`~pyvista_vdi.opencl_runtime.get_runtime`.
 
     Every method may be called from any thread. Commands run in the order in which they are
-    enqueued, one queue for all threads unless :meth:`queue_scope` gives a thread its own.
+    enqueued, one queue for all threads unless :meth:`queue_scope` gives a thread its own. What
+    one queue has written another sees when the first has been finished, see :meth:`finish`.
 
     Parameters
     ----------
@@ -57,12 +68,15 @@ class Runtime:
         self._device = candidate.device
         with self._driver("making a context"):
             self._context = context or opencl().Context([self._device])
+            self._compute_units = int(self._device.max_compute_units)
             self._alignment = max(1, int(self._device.mem_base_addr_align) // 8)
             self.preferred_group = preferred_group(self._device, self.is_cpu)
         self._programs = ProgramCache(self._context, self._device)
         self._ledger = Ledger(candidate.info.full_name)
+        self._turns = Turns()
         self._local = threading.local()
-        self._queues: list[Any] = []
+        self._queues: dict[int, Any] = {}  # those that exist, numbered as they were made
+        self._queues_made = 0
         self._queues_lock = threading.RLock()
         self._profile: Profile | None = None
         if profiling_wanted():
@@ -101,12 +115,19 @@ class Runtime:
         InvalidArgumentError
             If a define cannot be written as an option.
         """
-        return self._programs.kernel(path, name, defines or {})
+        defines = defines or {}
+        found = self._programs.known(path, name, defines)
+        if found is not None:
+            return found
+        if self._turns.worker is None:
+            return self._programs.kernel(path, name, defines)
+        with self._turns.aside():  # compilers take seconds, and not the device
+            return self._programs.kernel(path, name, defines)
 
     def launch(
         self, kernel: Kernel, global_size: Size, local_size: Size | None, *args: Argument
     ) -> None:
-        """Enqueue a kernel and return at once.
+        """Enqueue a kernel and return at once; inside :meth:`background`, run it in pieces.
 
         Parameters
         ----------
@@ -131,6 +152,8 @@ class Runtime:
             If the driver lacks memory or resources.
         DeviceError
             If the driver refuses for any other reason.
+        Cancelled
+            Inside :meth:`background`, if the work is no longer wanted.
         """
         whole = as_size(global_size)
         group = None if local_size is None else as_size(local_size)
@@ -153,8 +176,48 @@ class Runtime:
             mine = kernel.object
             for index, argument in enumerate(args):
                 mine.set_arg(index, driver_argument(kernel, index, argument))
-            event = opencl().enqueue_nd_range_kernel(self._queue, mine, whole, group)
+                if isinstance(argument, DeviceBuffer):
+                    self._note_reader(argument)
+            if self._turns.worker is None:
+                self._enqueue(kernel, whole, group)
+            else:
+                self._run_in_pieces(self._turns.worker, kernel, whole, group)
+
+    def _enqueue(
+        self,
+        kernel: Kernel,
+        size: tuple[int, ...],
+        group: tuple[int, ...] | None,
+        offset: tuple[int, ...] | None = None,
+    ) -> None:
+        event = opencl().enqueue_nd_range_kernel(
+            self._queue, kernel.object, size, group, global_work_offset=offset
+        )
         self._record(kernel.name, event)
+
+    def _run_in_pieces(
+        self, worker: Worker, kernel: Kernel, whole: tuple[int, ...], group: tuple[int, ...] | None
+    ) -> None:
+        """Run a launch as launches of parts of its last dimension, each no longer than allowed."""
+        rows, row_items = whole[-1], math.prod(whole[:-1])
+        step = group[-1] if group is not None else math.gcd(rows, _FREE_STEP)
+        first = step * self._compute_units * _FIRST_GROUPS
+        done = 0
+        while done < rows:
+            seconds = self._turns.checkpoint()
+            left = rows - done
+            items = worker.piece(kernel.name, seconds)
+            fitting = first if items is None else items // row_items
+            if not kernel.divisible:
+                fitting = left
+            # Equal parts, in whole groups: a small rest would run as badly as it would be measured
+            parts = -(-left // max(fitting, step))
+            size = min(left, -(-left // (parts * step)) * step)
+            began = time.perf_counter()
+            self._enqueue(kernel, (*whole[:-1], size), group, (*(0 for _ in whole[1:]), done))
+            self._queue.finish()
+            worker.took(kernel.name, size * row_items, time.perf_counter() - began)
+            done += size
 
     # -- buffers -------------------------------------------------------------------------------
 
@@ -224,10 +287,24 @@ class Runtime:
         array = np.ascontiguousarray(array)
         flags = opencl().mem_flags
         in_place = self.is_cpu and array.nbytes > 0 and array.ctypes.data % self._alignment == 0
+        if self._turns.worker is not None and not in_place and array.nbytes > _COPY_BYTES:
+            return self._upload_in_pieces(array.reshape(shape), name)
         source = flags.USE_HOST_PTR if in_place else flags.COPY_HOST_PTR
         return self._allocate(
             flags.READ_ONLY | source, shape, array.dtype, name, array, writable=False
         )
+
+    def _upload_in_pieces(self, array: NDArray[Any], name: str) -> DeviceBuffer:
+        """As :meth:`upload`; a driver that makes a buffer from an array keeps Python's lock."""
+        read_only = opencl().mem_flags.READ_ONLY
+        buffer = self._allocate(read_only, array.shape, array.dtype, name, None, writable=False)
+        try:
+            with self._driver(f"writing {array.nbytes} bytes to the buffer {name!r}"):
+                self._copy("[write]", buffer.memory, array)
+        except BaseException:
+            buffer.release()
+            raise
+        return buffer
 
     def download(
         self, buffer: DeviceBuffer, out: NDArray[Any] | None = None, count: int | None = None
@@ -269,8 +346,7 @@ class Runtime:
             raise InvalidArgumentError(f"the target for {buffer.name!r} is not writable")
         if out.nbytes:
             with self._driver(f"reading {out.nbytes} bytes of the buffer {buffer.name!r}"):
-                event = opencl().enqueue_copy(self._queue, out, memory, is_blocking=True)
-            self._record("[read]", event)
+                self._copy("[read]", memory, out, to_host=True)
         return out
 
     def write(self, buffer: DeviceBuffer, array: NDArray[Any]) -> None:
@@ -295,8 +371,7 @@ class Runtime:
         check_host_array(array, buffer, buffer.nbytes // buffer.dtype.itemsize)
         if array.nbytes:
             with self._driver(f"writing {array.nbytes} bytes to the buffer {buffer.name!r}"):
-                event = opencl().enqueue_copy(self._queue, memory, array, is_blocking=True)
-            self._record("[write]", event)
+                self._copy("[write]", memory, array)
 
     def fill(self, buffer: DeviceBuffer, value: int | np.generic) -> None:
         """Fill a buffer with one byte or one element.
@@ -331,7 +406,9 @@ class Runtime:
         if buffer.nbytes:
             with self._driver(f"filling the buffer {buffer.name!r}"):
                 event = opencl().enqueue_fill_buffer(self._queue, memory, pattern, 0, buffer.nbytes)
-            self._record("[fill]", event)
+                self._record("[fill]", event)
+                if self._turns.worker is not None:
+                    self._queue.finish()  # nothing of this thread runs when its turn is over
 
     @property
     def allocated(self) -> int:
@@ -372,12 +449,29 @@ class Runtime:
             self._ledger.give_back(taken)
             raise
 
+        readers: set[int] | None = set() if in_place else None
+
         def on_release() -> None:
             self._ledger.give_back(taken)
-            if in_place:
-                self.finish()  # the array may go when the buffer has gone
+            if readers:
+                self._finish(readers)  # the array may go when the buffer has gone
 
-        return DeviceBuffer(memory, shape, dtype, name, on_release, writable=writable)
+        buffer = DeviceBuffer(memory, shape, dtype, name, on_release, writable=writable)
+        buffer.readers = readers
+        return buffer
+
+    def _copy(self, label: str, memory: Any, host: NDArray[Any], *, to_host: bool = False) -> None:
+        """Copy between a buffer and a C-contiguous array; background work in pieces."""
+        data = host.reshape(-1).view(np.uint8)
+        size = data.nbytes if self._turns.worker is None else _COPY_BYTES
+        for start in range(0, data.nbytes, size):
+            self._turns.checkpoint()
+            part = data[start : start + size]
+            if to_host:
+                ends = {"dest": part, "src": memory, "src_offset": start}
+            else:
+                ends = {"dest": memory, "src": part, "dst_offset": start}
+            self._record(label, opencl().enqueue_copy(self._queue, **ends, is_blocking=True))
 
     def _writable_memory(self, buffer: DeviceBuffer) -> Any:
         if not buffer.writable:
@@ -390,18 +484,18 @@ class Runtime:
     # -- queues --------------------------------------------------------------------------------
 
     def finish(self) -> None:
-        """Wait until all that any thread enqueued on this runtime is done.
+        """Wait until all that was enqueued on the calling thread's queue is done.
+
+        Threads outside :meth:`queue_scope` share one. A buffer that a thread with a queue of its
+        own has written may be handed to another thread after this.
 
         Raises
         ------
         DeviceError
             If a kernel failed meanwhile.
         """
-        with self._queues_lock:
-            queues = list(self._queues)
         with self._driver("waiting for enqueued work"):
-            for queue in queues:
-                queue.finish()
+            self._queue.finish()
 
     @contextlib.contextmanager
     def queue_scope(self) -> Iterator[None]:
@@ -410,32 +504,104 @@ class Runtime:
         What was enqueued before is finished first, and what is enqueued inside is finished at
         the end, so buffers may cross the borders of the block.
         """
-        outer = self._queue
-        with self._driver("waiting for enqueued work"):
-            outer.finish()
-        inner = self._new_queue()
-        self._local.queue = inner
+        self.finish()
+        outer, inner = self._queue_number, self._new_queue()
+        self._local.queue_number = inner
         try:
             yield
         finally:
-            self._local.queue = outer if outer is not self._main_queue else None
-            with self._driver("finishing a queue"):
-                inner.finish()
+            self._local.queue_number = outer
+            self._finish({inner})
             with self._queues_lock:
-                self._queues = [queue for queue in self._queues if queue is not inner]
+                del self._queues[inner]
 
     @property
     def _queue(self) -> Any:
-        return getattr(self._local, "queue", None) or self._main_queue
+        return self._queues[self._queue_number]
 
-    def _new_queue(self) -> Any:
+    @property
+    def _queue_number(self) -> int:
+        return getattr(self._local, "queue_number", self._main_queue)
+
+    def _new_queue(self) -> int:
         cl = opencl()
         properties = cl.command_queue_properties.PROFILING_ENABLE if self._profile else 0
         with self._driver("making a command queue"):
             queue = cl.CommandQueue(self._context, self._device, properties)
         with self._queues_lock:
-            self._queues.append(queue)
-        return queue
+            self._queues_made += 1
+            self._queues[self._queues_made] = queue
+            return self._queues_made
+
+    def _note_reader(self, buffer: DeviceBuffer) -> None:
+        """Remember that this thread's queue reads a buffer whose memory is a caller's array."""
+        number = self._queue_number
+        if buffer.readers is not None and number not in buffer.readers:
+            with self._queues_lock:
+                buffer.readers.intersection_update(self._queues)
+                buffer.readers.add(number)
+
+    def _finish(self, numbers: set[int]) -> None:
+        """Finish those of some queues that still exist."""
+        with self._queues_lock:
+            queues = [self._queues[number] for number in numbers if number in self._queues]
+        with self._driver("waiting for enqueued work"):
+            for queue in queues:
+                queue.finish()
+
+    # -- frames and background work --------------------------------------------------------------
+
+    def foreground(self) -> contextlib.AbstractContextManager[None]:
+        """Draw a frame that a person waits for inside the ``with`` block.
+
+        Background work on this device rests meanwhile: put into the block all that must not be
+        disturbed, drawing included. The block begins when the piece of background work in
+        progress is done. If background work could not go on before the last frame, it begins
+        after a turn of it, 0.3 times as long as a recent frame. Blocks of several threads run
+        side by side; inside another, or in background work, a block changes nothing.
+
+        Do not begin one while holding a lock that background work may need.
+        """
+        return self._turns.foreground()
+
+    @contextlib.contextmanager
+    def background(self, cancelled: Callable[[], bool] = lambda: False) -> Iterator[None]:
+        """Work inside the ``with`` block only when no frame is in progress, see `foreground`.
+
+        The calling thread gets a queue of its own. Its launches and copies are cut into pieces
+        that take no longer than a turn; each is finished when the call returns.
+
+        Parameters
+        ----------
+        cancelled : callable
+            Asked between pieces; True ends the work with :class:`Cancelled`. Called often, from
+            the thread itself.
+
+        Raises
+        ------
+        Cancelled
+            From any method that uses the device.
+        """
+        with self.queue_scope(), self._turns.background(cancelled):
+            yield
+
+    def give_way(self) -> None:
+        """Let frames that wait go first; background work on the host calls it now and then.
+
+        Raises
+        ------
+        Cancelled
+            If the background work is no longer wanted.
+        """
+        self._turns.checkpoint()
+
+    def holding(self, lock: threading.Lock) -> contextlib.AbstractContextManager[None]:
+        """Hold a lock under which device work is done.
+
+        Whoever holds it may be waiting for this thread's frame or turn to end, so a thread that
+        finds it taken leaves either until it gets it.
+        """
+        return self._turns.holding(lock)
 
     # -- profiling and errors ------------------------------------------------------------------
 

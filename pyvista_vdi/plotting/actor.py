@@ -48,6 +48,7 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         if self.mapper.painter.input is not None:
             mapper.painter.set_input(self.mapper.painter.input.shared())
         mapper.SetDevice(self.mapper.GetDevice())
+        mapper.painter.take_settings(self.mapper.painter)
         other.SetMapper(mapper)
         if deep and self.prop is not None:
             other.prop = self.prop.copy()

@@ -97,7 +97,10 @@ def add_volume_property(volume: Volume, arguments: Mapping[str, Any]) -> Any:
 
 
 def show(
-    vdi: VDI, window_size: tuple[int, int] | None = None, screenshot: str | None = None
+    vdi: VDI,
+    window_size: tuple[int, int] | None = None,
+    screenshot: str | None = None,
+    **options: Any,
 ) -> None:
     """Open a plotter that shows a VDI from its own view, or write what it shows.
 
@@ -109,13 +112,15 @@ def show(
         Width and height of the window in pixels; the VDI's own by default.
     screenshot : str, optional
         File to write instead of opening a window.
+    **options
+        Keyword arguments of ``add_vdi``.
     """
     pv = _pyvista()
     view, size = vdi.camera, window_size or vdi.window_size
     with pv.vtk_verbosity("off"):
         plotter = pv.Plotter(off_screen=screenshot is not None, window_size=list(size))
     try:
-        plotter.add_vdi(vdi)
+        plotter.add_vdi(vdi, **options)
         camera = plotter.camera
         camera.position, camera.focal_point, camera.up = (
             view.position,

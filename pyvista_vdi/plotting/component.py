@@ -22,6 +22,13 @@ from pyvista_vdi.plotting.volumes import as_image
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.vtk_pipeline.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.frame import as_array
+from pyvista_vdi.vtk_pipeline.interaction import checked_rate
+from pyvista_vdi.vtk_pipeline.regeneration import (
+    REGENERATE_BELOW,
+    Policy,
+    checked_bound,
+    checked_policy,
+)
 from pyvista_vdi.vtk_pipeline.source import VDISource
 
 #: ``add_volume``'s aliases.
@@ -97,14 +104,23 @@ class AddVDI:
         interpolation: Literal["nearest", "linear"] = "nearest",
         camera: Any = None,
         coverage: Literal["bounds", "view"] = "bounds",
+        target_fps: float | None = 30.0,
+        regenerate: Policy = "auto",
+        regenerate_below: float = REGENERATE_BELOW,
+        status: bool = False,
         device: Any = None,
         progress_bar: bool | Callable[[float], object] | None = None,
         **aliases: Any,
     ) -> PlotterVDIActor:
-        """Add a volume that turns fluently: its VDI is generated once and raycast each frame.
+        """Add a volume that turns fluently: frames are raycast from its VDI.
 
         All arguments of ``Plotter.add_volume`` are taken, with its names, defaults and meaning;
         what cannot be honoured is refused by name. The picture is ``add_volume``'s.
+
+        In a window on the screen, frames get fewer pixels while the view moves, as many as
+        ``target_fps`` allows, and all of them as soon as it rests; a view for which the VDI does
+        not do is given one of its own, made in the background while the old one is drawn. What is
+        drawn off-screen, and every screenshot, is full and made in step.
 
         Parameters
         ----------
@@ -163,6 +179,20 @@ class AddVDI:
         coverage : {"bounds", "view"}
             ``"bounds"``: the VDI covers the whole volume, so that neither panning nor zooming out
             shows a cut edge. ``"view"``: it covers the window.
+        target_fps : float, optional
+            Frames per second to be kept while the view moves. ``None``: the interactor's
+            ``DesiredUpdateRate``, as for VTK's own levels of detail; 0: every frame is full.
+        regenerate : {"auto", "never"} or callable
+            When a view gets a VDI of its own. ``"auto"``: where the estimated SSIM of its picture
+            against volume rendering is below ``regenerate_below``; in windows on the screen only,
+            and a VDI without its volume says once that it is seen from where it does not serve.
+            A callable gets ``actor.status`` once per frame and returns whether to regenerate; it
+            is asked off-screen, too, and the VDI is then made before the frame. ``"never"``: only
+            ``actor.regenerate()``. Changed data and transfer functions are always made anew.
+        regenerate_below : float
+            SSIM for ``"auto"``, 0 to 1; while the view moves, twice the error is borne.
+        status : bool
+            Show ``actor.status`` in the upper left corner.
         device : str or int, optional
             The OpenCL device; by default ``PYVISTA_VDI_DEVICE``, else the best one found.
         progress_bar : bool or callable, optional
@@ -176,8 +206,9 @@ class AddVDI:
         -------
         PlotterVDIActor
             A ``pyvista.Volume``; ``actor.vdi`` is the current VDI, ``actor.regenerate()`` makes
-            another from the current view. Changes to ``actor.prop`` or to the volume's data make
-            it anew at the next render.
+            another from the current view, and ``actor.status`` says how it is drawn. Changes to
+            ``actor.prop`` or to the volume's data make it anew: off-screen before the next frame,
+            on the screen behind the next frames.
 
         Raises
         ------
@@ -296,6 +327,9 @@ class AddVDI:
         mapper.lookup_table = table
         mapper.scalar_range = table.scalar_range
         mapper.SetDevice(given["device"])
+        mapper.SetTargetFrameRate(given["target_fps"])
+        mapper.SetRegenerate(given["regenerate"])
+        mapper.SetRegenerateBelow(given["regenerate_below"])
         actor = PlotterVDIActor()
         if prop is not None:
             actor.prop = prop
@@ -323,6 +357,8 @@ class AddVDI:
         )
         if bar:
             plotter.add_scalar_bar(**{"title": title, **(given["scalar_bar_args"] or {})})
+        if given["status"]:
+            actor.show_status(plotter)
         plotter.renderer.Modified()
         return actor
 
@@ -342,6 +378,10 @@ def _refuse(given: dict[str, Any]) -> None:
             "multi_colors is for multi-block data sets: add the blocks one by one, each with "
             "its cmap"
         )
+    if given["target_fps"] is not None:
+        checked_rate("target_fps", given["target_fps"])
+    checked_policy(given["regenerate"])
+    checked_bound(given["regenerate_below"])
 
 
 def _changed(given: dict[str, Any]) -> dict[str, Any]:

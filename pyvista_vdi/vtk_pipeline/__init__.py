@@ -11,12 +11,14 @@ if TYPE_CHECKING:
     from pyvista_vdi.vtk_pipeline.mapper import VDIMapper
     from pyvista_vdi.vtk_pipeline.properties import transfer_function_from_property
     from pyvista_vdi.vtk_pipeline.source import VDISource
+    from pyvista_vdi.vtk_pipeline.status import VDIStatus
 
 #: Public name to module. Loaded when asked for: converters must not load VTK's OpenGL modules.
 _MODULES = {
     "VDIActor": "actor",
     "VDIMapper": "mapper",
     "VDISource": "source",
+    "VDIStatus": "status",
     "transfer_function_from_property": "properties",
     "vdi_from_image": "convert",
     "vdi_to_image": "convert",
@@ -27,6 +29,7 @@ __all__ = [
     "VDIActor",
     "VDIMapper",
     "VDISource",
+    "VDIStatus",
     "transfer_function_from_property",
     "vdi_from_image",
     "vdi_to_image",

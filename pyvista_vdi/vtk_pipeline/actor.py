@@ -10,6 +10,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.vtk_pipeline.frame import as_array
 from pyvista_vdi.vtk_pipeline.mapper import VDIMapperMethods
+from pyvista_vdi.vtk_pipeline.status import VDIStatus
 
 #: The image is premultiplied RGBA of the whole viewport, bottom row first. The sampler is never
 #: set: VTK allows no uniform to be set in the frame that builds the shader, and its default is
@@ -60,6 +61,44 @@ class VDIActorMethods:
         mapper = self.GetMapper()
         return None if mapper is None else mapper.GetVDI()
 
+    @property
+    def status(self: Any) -> VDIStatus:
+        """How the VDI was drawn in the last frame, and what goes on behind it."""
+        mapper = self.GetMapper()
+        if mapper is None:
+            raise InvalidArgumentError("this actor has no mapper, so there is no status of it")
+        return mapper.painter.status()  # type: ignore[no-any-return]
+
+    def show_status(self: Any, renderer: Any = None, corner: str = "upper left") -> Any:
+        """Show :attr:`status` as a text in a corner, written anew in each frame.
+
+        Parameters
+        ----------
+        renderer : vtkRenderer or pyvista.Plotter, optional
+            Where; by default the renderer that shows the actor.
+        corner : {"lower left", "lower right", "upper left", "upper right"}
+            Which corner.
+
+        Returns
+        -------
+        vtkCornerAnnotation
+            The text: it can be styled (``GetTextProperty()``), hidden and removed.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If there is no such corner, or no renderer shows the actor.
+        """
+        mapper = self.GetMapper()
+        if renderer is None and mapper is not None:
+            renderer = mapper.painter.renderer()
+        renderer = getattr(renderer, "renderer", renderer)  # a plotter's active one
+        if mapper is None or renderer is None:
+            raise InvalidArgumentError(
+                "nothing shows this actor yet: add it to a renderer first, or pass the renderer"
+            )
+        return mapper.painter.texts.add(renderer, corner)
+
     def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
         """Generate the VDI anew, now.
 
@@ -90,7 +129,7 @@ class VDIActorMethods:
                 "this actor shows a VDI without its volume, which cannot be generated anew: add "
                 "the volume, or set another VDI (actor.GetMapper().SetVDI(vdi))"
             )
-        mapper.painter.retry()
+        mapper.painter.upkeep.retry()
         matrix = as_array(self.GetMatrix())
         renderer = mapper.painter.renderer()
         if camera is not None:

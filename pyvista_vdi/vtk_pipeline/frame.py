@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -101,6 +101,18 @@ class Frame:
         depth = -(p3 - n * q3) / (n * q2 - p2)
         return np.where(z >= 1.0, np.inf, depth) if background else depth
 
+    def coarser(self, size: tuple[int, int]) -> Frame:
+        """Return the same view with fewer pixels, which fill the viewport just as exactly.
+
+        The centre of pixel i of n lies at (i + 1/2) / n of the viewport's width, where a linearly
+        filtered texture puts it, so nothing is shifted. Where rounding has changed the aspect, the
+        view's x is scaled by as much: the viewport's edges stay, and view depth does.
+        """
+        (width, height), (wide, high) = self.size, size
+        stretch = np.diag([(wide / high) / (width / height), 1.0, 1.0, 1.0])
+        camera = self.camera.replace(model_transform=stretch @ self.camera.model_transform)
+        return replace(self, size=size, camera=camera, to_view=stretch @ self.to_view)
+
     def clipping_planes(self, planes: Any, bounds: tuple[float, ...]) -> Matrix | None:
         """Return all planes that cut the VDI, (k, 6), in the camera's world; ``None`` if none do.
 
@@ -193,6 +205,18 @@ class Frame:
         pixels.UnBind()  # it binds itself to be released, and would catch VTK's next glReadPixels
         texture.ReleaseGraphicsResources(window)
         return z
+
+
+def sampled(depth: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+    """Return the depth nearest to the centre of each pixel of a coarser image, float32 (H, W).
+
+    Depths must not be averaged: between a mesh and what is behind it nothing is.
+    """
+    rows, columns = (
+        ((2 * np.arange(n) + 1) * full) // (2 * n)
+        for n, full in zip(size[::-1], depth.shape, strict=True)
+    )
+    return np.ascontiguousarray(depth[np.ix_(rows, columns)])
 
 
 def view_of(

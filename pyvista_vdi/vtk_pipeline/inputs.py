@@ -64,8 +64,15 @@ class SourceInput(Input):
         if self._tag is not None:
             self.source.RemoveObserver(self._tag)
             self._tag = None
+            self.source.inputs.discard(self)
         if changed is not None:
             self._tag = self.source.AddObserver("ModifiedEvent", changed)
+            self.source.inputs.add(self)
+
+    @property
+    def alone(self) -> bool:
+        """Whether no other mapper draws what the source makes."""
+        return len(self.source.inputs) == 1
 
     def vdi(self) -> VDI | None:
         """Return the VDI, brought up to date."""
@@ -81,6 +88,8 @@ class SourceInput(Input):
 
     def stamp(self) -> Any:
         """Return the newest time stamp of the source, its input and its property."""
+        if self.source.GetNumberOfInputConnections(0) > 0:
+            self.source.GetInputAlgorithm(0, 0).Update()
         stamps = [self.source.GetMTime()]
         data = self.source.GetInputDataObject(0, 0)
         prop = self.source.GetVolumeProperty()

@@ -15,8 +15,13 @@ from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.vtk_pipeline.inputs import Input, SourceInput, input_of, input_of_port
+from pyvista_vdi.vtk_pipeline.interaction import checked_rate
 from pyvista_vdi.vtk_pipeline.painter import Painter
+from pyvista_vdi.vtk_pipeline.regeneration import Policy, checked_bound, checked_policy
 from pyvista_vdi.vtk_pipeline.source import VDISource
+
+#: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.
+COARSEST = 4.0
 
 
 def _on_start(mapper: Any, event: str) -> None:
@@ -35,8 +40,9 @@ class VDIMapperMethods:
     def _become_vdi_mapper(self: Any) -> None:
         """Install proxy and observers; to be called once, from ``__init__``."""
         self._painter = Painter()
-        self.AutoAdjustSampleDistancesOff()  # or VTK draws into a smaller framebuffer
+        super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         self.SetImageSampleDistance(1.0)
+        self.SetMaximumImageSampleDistance(COARSEST)
         super().SetInputDataObject(self._painter.proxy)  # type: ignore[misc]
         # Plain functions: they get the mapper from VTK and hold nothing
         self.AddObserver("VolumeMapperRenderStartEvent", _on_start)
@@ -89,11 +95,108 @@ class VDIMapperMethods:
 
     def SetAutomaticView(self, automatic: bool) -> None:
         """Give a source without camera the view of the first frame (on by default)."""
-        self.painter.automatic_view = bool(automatic)
+        self.painter.upkeep.automatic_view = bool(automatic)
 
     def GetAutomaticView(self) -> bool:
         """Whether a source without camera gets the view of the first frame."""
-        return self.painter.automatic_view
+        return self.painter.upkeep.automatic_view
+
+    # -- while a hand moves ----------------------------------------------------------------------
+
+    # In VTK's GPU mapper the following would draw VTK's own volume into a smaller framebuffer, so
+    # its own switch stays off and these methods, called from Python, keep ours.
+
+    def SetAutoAdjustSampleDistances(self, on: bool) -> None:
+        """Draw previews of fewer pixels while the view moves (on by default).
+
+        Frames in a window whose desired update rate is at least ``GetInteractiveUpdateRate()``
+        are interactive: the window's interactor sets that rate while its style turns, pans or
+        zooms. Frames at rest, screenshots, exports and off-screen windows are always full.
+        """
+        if self._painter is not None:  # PyVista's constructor turns VTK's own switch off
+            self._painter.interaction.adjust = bool(on)
+
+    def GetAutoAdjustSampleDistances(self) -> bool:
+        """Whether previews are drawn."""
+        return self.painter.interaction.adjust
+
+    def AutoAdjustSampleDistancesOn(self) -> None:
+        """Draw previews."""
+        self.SetAutoAdjustSampleDistances(True)
+
+    def AutoAdjustSampleDistancesOff(self) -> None:
+        """Draw every frame in full."""
+        self.SetAutoAdjustSampleDistances(False)
+
+    def SetInteractiveUpdateRate(self, rate: float) -> None:
+        """Set the window's desired update rate from which on a frame is interactive, 1/s.
+
+        1 by default, as in ``vtkSmartVolumeMapper``.
+        """
+        self.painter.interaction.update_rate = checked_rate("the interactive update rate", rate)
+
+    def GetInteractiveUpdateRate(self) -> float:
+        """Return the desired update rate from which on a frame is interactive, 1/s."""
+        return self.painter.interaction.update_rate
+
+    def SetTargetFrameRate(self, rate: float | None) -> None:
+        """Set the frames per second that previews keep.
+
+        ``None``, the default, means the window's desired update rate, which the interactor gives
+        (``SetDesiredUpdateRate``: 15 in VTK, 30 in PyVista); 0 means that no rate is to be kept,
+        so that every frame is full. Several VDIs in a window keep the highest of their targets.
+        """
+        target = None if rate is None else checked_rate("the target frame rate", rate)
+        self.painter.interaction.target = target
+
+    def GetTargetFrameRate(self) -> float | None:
+        """Return the frames per second that previews keep, as it was set."""
+        return self.painter.interaction.target
+
+    def SetRegenerate(self, policy: Policy) -> None:
+        """Choose what decides that a view needs a VDI of its own.
+
+        Parameters
+        ----------
+        policy : {"auto", "never"} or callable
+            ``"auto"`` (the default): an estimate of the view's error, where somebody watches the
+            window. ``"never"``: only ``actor.regenerate()``. A callable gets a
+            :class:`~pyvista_vdi.vtk_pipeline.VDIStatus` once per frame and says whether to
+            regenerate; its ``ssim`` is ``None``, because it is asked in place of the estimate.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is something else.
+        """
+        self.painter.upkeep.regeneration.policy = checked_policy(policy)
+
+    def GetRegenerate(self) -> Policy:
+        """Return what decides that a view needs a VDI of its own."""
+        return self.painter.upkeep.regeneration.policy
+
+    def SetRegenerateBelow(self, ssim: float) -> None:
+        """Set the estimated SSIM below which ``"auto"`` regenerates a view at rest.
+
+        While the view moves, twice the error (1 - SSIM) is borne.
+        """
+        self.painter.upkeep.regeneration.bound = checked_bound(ssim)
+
+    def GetRegenerateBelow(self) -> float:
+        """Return the estimated SSIM below which ``"auto"`` regenerates."""
+        return self.painter.upkeep.regeneration.bound
+
+    def SetInteractiveOffScreen(self, on: bool) -> None:
+        """Treat off-screen windows as if somebody watched them (off by default).
+
+        For server-side rendering, where the window is off-screen and the person in a browser:
+        previews are drawn, and VDIs are made in the background.
+        """
+        self.painter.interaction.off_screen = bool(on)
+
+    def GetInteractiveOffScreen(self) -> bool:
+        """Whether off-screen windows are treated as if somebody watched them."""
+        return self.painter.interaction.off_screen
 
     def _set_input(self: Any, source: Input | None) -> None:
         self.painter.set_input(source)

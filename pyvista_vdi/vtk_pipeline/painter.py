@@ -2,30 +2,93 @@
 
 from __future__ import annotations
 
-import logging
-import warnings
+import time
 import weakref
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.vtkCommonCore import VTK_FLOAT, vtkWeakReference
+from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkCommonDataModel import vtkImageData
-from vtkmodules.vtkRenderingOpenGL2 import vtkTextureObject
 
-from pyvista_vdi.errors import DeviceError, InvalidArgumentError, UnsupportedError, VDIWarning
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.errors import DeviceError, InvalidArgumentError, UnsupportedError
+from pyvista_vdi.opencl_runtime import Runtime, get_runtime
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.vdi import VDI
-from pyvista_vdi.vtk_pipeline.frame import Frame, as_array
+from pyvista_vdi.view_error import angle_from_generating_view
+from pyvista_vdi.vtk_pipeline.frame import Frame, as_array, sampled
 from pyvista_vdi.vtk_pipeline.inputs import Input
+from pyvista_vdi.vtk_pipeline.interaction import Interaction, WindowClock, reduced
+from pyvista_vdi.vtk_pipeline.status import CornerTexts, VDIStatus
+from pyvista_vdi.vtk_pipeline.texture import ImageTexture
+from pyvista_vdi.vtk_pipeline.upkeep import Scene, Upkeep
+from pyvista_vdi.vtk_pipeline.view import View
+from pyvista_vdi.vtk_pipeline.voice import Voice
 
 #: Images kept: two eyes, and two more for other renderers or a picking pass.
 _KEPT_IMAGES = 4
 
-_log = logging.getLogger(__name__)
-
 Image = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Task:
+    """An image to be raycast.
+
+    Attributes
+    ----------
+    frame : Frame
+        The view, and the image's size.
+    planes : numpy.ndarray or None
+        Clipping planes in the frame's world, (k, 6).
+    depth : numpy.ndarray or None
+        View depth at which rays end, float32 (H, W), top row first.
+    full_size : (int, int)
+        Width and height of the viewport in pixels; the image of a preview is smaller.
+    """
+
+    frame: Frame
+    planes: NDArray[np.float64] | None
+    depth: NDArray[np.float32] | None
+    full_size: tuple[int, int]
+
+    @property
+    def key(self) -> Any:
+        """What its image is known by; the quality is in it as the two sizes."""
+        planes = None if self.planes is None else self.planes.tobytes()
+        return (self.frame.camera, self.frame.size, self.full_size, planes)
+
+    @property
+    def preview(self) -> bool:
+        """Whether the image is to have fewer pixels than the viewport."""
+        return self.frame.size != self.full_size
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """An image, premultiplied RGBA, float32 (H, W, 4), bottom row first.
+
+    Attributes
+    ----------
+    image : numpy.ndarray
+        The pixels.
+    task : Task or None
+        What it was raycast for; ``None`` for the empty image before the first.
+    number : int or None
+        By which an upload is known.
+    """
+
+    image: Image
+    task: Task | None = None
+    number: int | None = None
+
+    @property
+    def preview(self) -> bool:
+        """Whether it has fewer pixels than the viewport."""
+        return self.task is not None and self.task.preview
 
 
 class Painter:
@@ -36,21 +99,22 @@ class Painter:
     """
 
     def __init__(self) -> None:
-        self.input: Input | None = None
         self.device: Any = None
-        self.automatic_view = True
+        self.interaction = Interaction()
+        self.texts = CornerTexts()
         self.proxy = make_proxy()
+        self._voice = Voice()
+        self.upkeep = Upkeep(self.interaction, self._voice, self.texts)
         self._actor = vtkWeakReference()
         self._active = vtkWeakReference()
         self._observed: set[str] = set()
-        self._texture: Any = None
-        self._uploaded: int | None = None
-        self._drawn: VDI | None = None
-        self._images: dict[Any, tuple[NDArray[np.float32] | None, Image, int]] = {}
+        self._texture = ImageTexture()
+        self._drawn: Any = weakref.ref(self)  # the VDI whose images are kept: none yet
+        self._generation = 0
+        self._images: dict[Any, Drawn] = {}
         self._raycasts = 0
-        self._last: Image = np.zeros((1, 1, 4), dtype=np.float32)
-        self._warned: set[str] = set()
-        self._failed_at: Any = None
+        self._last = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
+        self._scene: tuple[Camera, weakref.ref[WindowClock]] | None = None
 
     # -- what is drawn ---------------------------------------------------------------------------
 
@@ -69,15 +133,15 @@ class Painter:
         if self._actor.Get() is actor:
             self._actor.Set(None)
 
+    @property
+    def input(self) -> Input | None:
+        """What the VDI comes from."""
+        return self.upkeep.input
+
     def set_input(self, source: Input | None) -> None:
         """Draw another VDI, and show its bounds to VTK at once."""
         bounds = None if source is None else source.bounds()  # refuses what is no VDI
-        if self.input is not None:
-            self.input.watch(None)
-        self.input = source
-        self._failed_at = None
-        if source is not None:
-            source.watch(_refresher(weakref.ref(self)))
+        self.upkeep.set_input(source, _refresher(weakref.ref(self)))
         if bounds is not None:
             place_proxy(self.proxy, bounds)
 
@@ -88,140 +152,167 @@ class Painter:
             place_proxy(self.proxy, bounds)
 
     def release(self) -> None:
-        """Free the texture and the images kept; another frame makes them anew."""
-        if self._texture is not None:
-            window = self._texture.GetContext()
-            if window is not None:
-                self._texture.ReleaseGraphicsResources(window)
-            self._texture = None
-        self._uploaded = None
+        """Free the texture and the images kept, and end what goes on; a frame begins anew."""
+        self.upkeep.close()
+        self._texture.release()
         self._images.clear()
 
-    def retry(self) -> None:
-        """Try again what failed before."""
-        self._failed_at = None
-        self._warned.clear()
+    def take_settings(self, other: Painter) -> None:
+        """Take over what another allows and when it regenerates."""
+        vars(self.interaction).update(vars(other.interaction))
+        self.upkeep.regeneration.policy = other.upkeep.regeneration.policy
+        self.upkeep.regeneration.bound = other.upkeep.regeneration.bound
+
+    def status(self) -> VDIStatus:
+        """Return how the last frame was drawn, and what goes on."""
+        vdi, task, angle, fps = self.upkeep.vdi, self._last.task, None, None
+        if self._scene is not None:
+            camera, weak = self._scene
+            clock = weak()
+            fps = None if clock is None else clock.fps
+            angle = None if vdi is None else angle_from_generating_view(vdi, camera)
+        width, height = (0, 0) if task is None else task.frame.size
+        wide, high = (0, 0) if task is None else task.full_size
+        return VDIStatus(
+            mode="none" if task is None else "preview" if task.preview else "full",
+            samples=width * height,
+            full_samples=wide * high,
+            fps=fps,
+            angle=angle,
+            ssim=self.upkeep.regeneration.ssim(vdi),
+            progress=self.upkeep.regeneration.progress,
+            generation=self._generation,
+            vdi=vdi,
+        )
 
     # -- a frame ---------------------------------------------------------------------------------
+
+    def before_frame(self) -> None:
+        """Take a VDI that was made in the background; between two frames of a window only."""
+        if self.upkeep.collect():
+            # Gone before the frame begins: freeing hundreds of megabytes takes its time
+            self._images.clear()
+
+    def runtime(self) -> Runtime:
+        """Return the device that raycasts."""
+        return get_runtime(self.device)
 
     def begin(self, mapper: Any) -> None:
         """Raycast and upload the image for the frame that has just begun."""
         renderer = self.renderer()
         if renderer is None:
-            self._warn("VDIMapper draws only behind a VDIActor: use VDIActor in place of vtkVolume")
+            self._voice.warn(
+                "VDIMapper draws only behind a VDIActor: use VDIActor in place of vtkVolume"
+            )
             return
-        image, number = self._last, None
         try:
-            image, number = self._paint(mapper, renderer)
-            self._last = image
+            self._last = self._paint(mapper, renderer)
         except KeyboardInterrupt:
-            self._warn(
+            self._voice.warn(
                 "generating the VDI was interrupted: what was shown stays; call "
                 "actor.regenerate() to try again"
             )
         except Exception as error:  # VTK would swallow it
-            self._warn(f"the VDI cannot be drawn: {type(error).__name__}: {error}")
-            _log.debug("while drawing a VDI", exc_info=True)
-        self._upload(renderer.GetRenderWindow(), image, number)
+            self._cannot_draw(error)
+        window, drawn = renderer.GetRenderWindow(), self._last
+        WindowClock.of(window).showed(drawn.preview)
+        try:
+            self._texture.show(window, drawn.image, drawn.number, smooth=drawn.preview)
+        except DeviceError as error:
+            self._cannot_draw(error)
+        self.texts.write(renderer, self.status)
+        self.upkeep.tick(window)
 
     def end(self) -> None:
         """Let go of the texture unit."""
-        if self._texture is not None:
-            self._texture.Deactivate()
+        self._texture.let_go()
 
-    def _paint(self, mapper: Any, renderer: Any) -> tuple[Image, int | None]:
-        """Return the frame's image and its number, by which an upload is known."""
+    def _cannot_draw(self, error: Exception) -> None:
+        self._voice.warn(f"the VDI cannot be drawn: {type(error).__name__}: {error}", error)
+
+    def _paint(self, mapper: Any, renderer: Any) -> Drawn:
+        """Return the frame's image."""
         actor = self._actor.Get()
+        clock = WindowClock.of(renderer.GetRenderWindow())
+        clock.join(self, renderer)
         model_transform = as_array(actor.GetMatrix())
         frame = Frame.current(renderer, model_transform)
-        vdi = self._current_vdi(renderer, model_transform)
+        view = _view_of(renderer, model_transform, frame)
+        self._scene = (view.camera, weakref.ref(clock))
+        only = len(self._renderers()) == 1
+        scene = Scene(renderer, model_transform, view, clock, only)
+        vdi = self.upkeep.current(scene, self.status)
         if vdi is None:
-            return self._last, None
+            return self._last
         place_proxy(self.proxy, vdi.bounds)
         if mapper.GetCropping():
             raise UnsupportedError(
                 "cropping (CroppingOn) is not honoured: use clipping planes (AddClippingPlane)"
             )
-        planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
+        if vdi is not self._drawn():
+            self._images.clear()
+            self._drawn = weakref.ref(vdi)
+            self._generation += 1
         depth = None
         if frame.sees_opaque_before(renderer, actor, vdi.bounds):
             depth = frame.opaque_depth(renderer)
             if np.isposinf(depth).all():
                 depth = None
-        if vdi is not self._drawn:
-            self._images.clear()
-            self._drawn = vdi
-        key = (frame.camera, frame.size, None if planes is None else planes.tobytes())
-        kept = self._images.get(key)
-        if kept is not None and _same(kept[0], depth):
-            return kept[1], kept[2]
+        planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
+        task = Task(frame, planes, depth, frame.size)
+        drawn = self._kept(task)
+        if drawn is not None:
+            return drawn  # however the frame is to be: where it is there, full costs nothing
+        size = self._size(mapper, renderer, clock, frame.size)
+        if size == frame.size:
+            return self._raycast(vdi, task, clock)
+        frame = frame.coarser(size)
+        planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
+        depth = None if depth is None else sampled(depth, size)
+        task = Task(frame, planes, depth, task.full_size)
+        return self._kept(task) or self._raycast(vdi, task, clock)
+
+    def _size(
+        self, mapper: Any, renderer: Any, clock: WindowClock, full: tuple[int, int]
+    ) -> tuple[int, int]:
+        """Return the size of this frame's image: that of the viewport, or less."""
+        floor = min(1.0, 1 / mapper.GetMaximumImageSampleDistance() ** 2)
+        return reduced(full, clock.share(renderer, self.interaction, full[0] * full[1], floor))
+
+    def _kept(self, task: Task) -> Drawn | None:
+        """Return the image of exactly this view, if there is one."""
+        drawn = self._images.get(task.key)
+        if drawn is None or drawn.task is None or not _same(drawn.task.depth, task.depth):
+            return None
+        return drawn
+
+    def _raycast(self, vdi: VDI, task: Task, clock: WindowClock) -> Drawn:
+        """Return the image, and keep it."""
+        before = time.perf_counter()
         image = render_vdi(
             vdi,
-            frame.camera,
-            frame.size,
-            opaque_depth=depth,
-            clipping_planes=planes,
+            task.frame.camera,
+            task.frame.size,
+            opaque_depth=task.depth,
+            clipping_planes=task.planes,
             device=self.device,
         )
+        clock.drawn(task.frame.size, task.full_size, time.perf_counter() - before)
         image = np.ascontiguousarray(image[::-1])  # a texture's first row is the bottom one
-        self._images.pop(key, None)
         self._raycasts += 1
-        self._images[key] = (depth, image, self._raycasts)
+        drawn = Drawn(image, task, self._raycasts)
+        key = task.key
+        self._images.pop(key, None)
+        self._images[key] = drawn
         while len(self._images) > _KEPT_IMAGES:
             del self._images[next(iter(self._images))]
-        return image, self._raycasts
-
-    def _current_vdi(self, renderer: Any, model_transform: NDArray[np.float64]) -> VDI | None:
-        """Bring the input up to date, but do not repeat what failed until something changes."""
-        if self.input is None:
-            return None
-        if self.automatic_view:
-            self.input.set_view_if_missing(renderer, model_transform)
-        stamp = self.input.stamp()
-        if self._failed_at == stamp:
-            return self.input.last()
-        try:
-            vdi = self.input.vdi()
-        except BaseException:
-            self._failed_at = self.input.stamp()
-            raise
-        self._failed_at = None
-        return vdi
-
-    def _upload(self, window: Any, image: Image, number: int | None) -> None:
-        if self._texture is None:
-            self._texture = vtkTextureObject()
-            self._texture.SetMinificationFilter(vtkTextureObject.Nearest)
-            self._texture.SetMagnificationFilter(vtkTextureObject.Nearest)
-            self._texture.SetWrapS(vtkTextureObject.ClampToEdge)
-            self._texture.SetWrapT(vtkTextureObject.ClampToEdge)
-        texture = self._texture
-        if texture.GetContext() is not window:
-            texture.SetContext(window)
-            self._uploaded = None
-        if number is None or number != self._uploaded or texture.GetHandle() == 0:
-            height, width = image.shape[:2]
-            texture.Create2DFromRaw(width, height, 4, VTK_FLOAT, image)
-            self._uploaded = number
-        texture.Activate()
-        # The sampler of the actor's shader keeps its default, unit 0: see actor.py
-        if texture.GetTextureUnit() != 0:
-            unit = texture.GetTextureUnit()
-            texture.Deactivate()
-            self._warn(
-                f"the VDI cannot be drawn: {DeviceError.__name__}: OpenGL gave its image texture "
-                f"unit {unit} in place of 0; another object leaves a texture active"
-            )
+        return drawn
 
     # -- which renderer --------------------------------------------------------------------------
 
     def renderer(self) -> Any:
         """Return the renderer that is drawing the actor; ``None`` if it has none."""
-        actor = self._actor.Get()
-        if actor is None:
-            return None
-        consumers = [actor.GetConsumer(i) for i in range(actor.GetNumberOfConsumers())]
-        renderers = [c for c in consumers if c is not None and c.IsA("vtkRenderer")]
+        renderers = self._renderers()
         if len(renderers) > 1:
             for candidate in renderers:
                 self._watch(candidate)
@@ -233,6 +324,14 @@ class Painter:
             renderers = drawing or renderers
         return renderers[0] if renderers else None
 
+    def _renderers(self) -> list[Any]:
+        """Return all renderers that show the actor."""
+        actor = self._actor.Get()
+        if actor is None:
+            return []
+        consumers = [actor.GetConsumer(i) for i in range(actor.GetNumberOfConsumers())]
+        return [c for c in consumers if c is not None and c.IsA("vtkRenderer")]
+
     def _watch(self, renderer: Any) -> None:
         """From now on, know which renderer is between its StartEvent and EndEvent."""
         address = renderer.GetAddressAsString("")
@@ -242,16 +341,6 @@ class Painter:
         active = self._active  # a VTK weak reference: no cycle through the observer
         renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
         renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
-
-    def _warn(self, message: str) -> None:
-        """Say it once; an exception here would never reach the user."""
-        if message in self._warned:
-            return
-        self._warned.add(message)
-        try:
-            warnings.warn(message, VDIWarning, stacklevel=3)
-        except VDIWarning:  # warnings are errors: the log is what is left
-            _log.error(message)
 
 
 def _refresher(weak: weakref.ref[Painter]) -> Callable[..., None]:
@@ -288,6 +377,18 @@ def _is_viewport(renderer: Any) -> bool:
     viewport = [0, 0, 0, 0]
     renderer.GetRenderWindow().GetState().vtkglGetIntegerv(0x0BA2, viewport)
     return viewport == [x[0], y[0], width[0], height[0]]
+
+
+def _planes(mapper: Any, vdi: VDI, frame: Frame) -> NDArray[np.float64] | None:
+    return frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
+
+
+def _view_of(renderer: Any, model_transform: NDArray[np.float64], frame: Frame) -> View:
+    """Return the renderer's view, between the two eyes of a stereo pair if there are."""
+    try:
+        return View.of(renderer, model_transform)
+    except UnsupportedError:  # a shear, an off-axis projection: drawn all the same
+        return View(frame.camera, frame.size)
 
 
 def _same(a: NDArray[np.float32] | None, b: NDArray[np.float32] | None) -> bool:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import warnings
+import weakref
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,7 @@ from pyvista_vdi.errors import (
     VDIWarning,
 )
 from pyvista_vdi.generation import check_max_supersegments, generate_vdi
+from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.volume import Volume
 from pyvista_vdi.vtk_pipeline.convert import (
@@ -31,11 +34,56 @@ from pyvista_vdi.vtk_pipeline.convert import (
     volume_from_vtk,
 )
 from pyvista_vdi.vtk_pipeline.properties import color_function, transfer_function_from_property
+from pyvista_vdi.vtk_pipeline.view import View
 
 #: What a VDI's window covers.
 COVERAGES = ("bounds", "view")
 
 Progress = Callable[[float], object]
+
+
+@dataclass(frozen=True)
+class Request:
+    """Everything that decides a VDI, read from the pipeline at one moment.
+
+    Attributes
+    ----------
+    volume : Volume
+        The scalars.
+    transfer_function : TransferFunction
+        Their colours and opacities.
+    screen : View
+        The view on the screen.
+    generating : (Camera, (int, int))
+        The generating view V_O and its window, after coverage.
+    settings, metadata : dict
+        Keyword arguments of ``generate_vdi``.
+    content : tuple
+        Equal where what is generated from is equal, the view apart.
+    """
+
+    volume: Volume
+    transfer_function: TransferFunction
+    screen: View
+    generating: tuple[Camera, tuple[int, int]]
+    settings: dict[str, Any]
+    metadata: dict[str, Any]
+    content: Any = field(repr=False)
+
+    @property
+    def key(self) -> Any:
+        """Equal where the VDIs would be equal."""
+        return (self.content, self.generating)
+
+    @property
+    def arguments(self) -> tuple[Volume, Camera, tuple[int, int], TransferFunction]:
+        """The positional arguments of ``generate_vdi``."""
+        return (self.volume, *self.generating, self.transfer_function)
+
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """The keyword arguments of ``generate_vdi``."""
+        return {"metadata": {"scalars": self.volume.name, **self.metadata}, **self.settings}
 
 
 class VDISource(VTKPythonAlgorithmBase):
@@ -76,9 +124,10 @@ class VDISource(VTKPythonAlgorithmBase):
         self._volume: Volume | None = None
         self._volume_key: Any = None
         self._vdi: VDI | None = None
-        self._vdi_key: Any = None
+        self._request: Request | None = None
         self._error: BaseException | None = None
         self._python_waits = False
+        self.inputs: weakref.WeakSet[Any] = weakref.WeakSet()  # mappers' inputs that draw this
 
     # -- settings --------------------------------------------------------------------------------
 
@@ -264,6 +313,36 @@ class VDISource(VTKPythonAlgorithmBase):
         """Return the VDI made last, whether up to date or not."""
         return self._vdi
 
+    def GetCurrentRequest(self) -> Request | None:
+        """Return what the VDI made last was made of."""
+        return self._request
+
+    def MakeRequest(self, view: View | None = None) -> Request:
+        """Return what the next VDI would be made of, from another view if one is given.
+
+        This brings the pipeline before the source up to date, and generates nothing.
+
+        Raises
+        ------
+        VDIError
+            What :meth:`GetVDI` would raise before it generates.
+        """
+        if self.GetNumberOfInputConnections(0) == 0:
+            raise InvalidVolumeError("VDISource has no input: call SetInputDataObject(volume)")
+        self.GetInputAlgorithm(0, 0).Update()
+        return self._make_request(
+            self.GetInputDataObject(0, 0),
+            self._camera if view is None else view.camera,
+            self._window_size if view is None else view.size,
+            warn=False,
+        )
+
+    def TakeVDI(self, vdi: VDI, request: Request) -> None:
+        """Take a VDI that was made of a request elsewhere, as if it had been made here."""
+        self._camera, self._window_size = request.screen.camera, request.screen.size
+        self._vdi, self._request = vdi, request
+        self.Modified()  # the output is another
+
     def GetVolume(self) -> Volume:
         """Return the volume at the input, read again only if it has changed.
 
@@ -289,7 +368,7 @@ class VDISource(VTKPythonAlgorithmBase):
         width, height = 1, 1
         grid = self._input_grid()
         if grid is not None and self._camera is not None and self._window_size is not None:
-            _, (width, height) = self._view(grid, warn=False)
+            _, (width, height) = self._view(grid, self._camera, self._window_size, warn=False)
         information = outputs.GetInformationObject(0)
         executive = vtkStreamingDemandDrivenPipeline
         information.Set(executive.WHOLE_EXTENT(), (0, width - 1, 0, height - 1, 0, 0), 6)
@@ -323,33 +402,44 @@ class VDISource(VTKPythonAlgorithmBase):
     # -- how -------------------------------------------------------------------------------------
 
     def _generated(self, image: vtkImageData) -> VDI:
+        request = self._make_request(image, self._camera, self._window_size, warn=True)
+        if self._vdi is None or self._request is None or request.key != self._request.key:
+            self._vdi = generate_vdi(*request.arguments, progress=self._advance, **request.keywords)
+            self._request = request
+        return self._vdi
+
+    def _make_request(
+        self,
+        image: vtkImageData,
+        camera: Camera | None,
+        window_size: tuple[int, int] | None,
+        *,
+        warn: bool,
+    ) -> Request:
         missing = [
             f"{what} ({setter})"
             for what, setter, value in (
-                ("camera", "SetCamera", self._camera),
-                ("window size", "SetWindowSize", self._window_size),
+                ("camera", "SetCamera", camera),
+                ("window size", "SetWindowSize", window_size),
                 ("volume property", "SetVolumeProperty", self._property),
             )
             if value is None
         ]
         if missing:
             raise InvalidArgumentError(f"VDISource has no {', no '.join(missing)}")
+        assert camera is not None
+        assert window_size is not None
         volume = self._read(image)
         table = transfer_function_from_property(self._property)
-        camera, size = self._view(image, warn=True)
-        key = (self._volume_key, table, camera, size, tuple(self._settings.items()))
-        if self._vdi is None or key != self._vdi_key:
-            self._vdi = generate_vdi(
-                volume,
-                camera,
-                size,
-                table,
-                progress=self._advance,
-                metadata={"scalars": volume.name, **self._metadata},
-                **self._settings,
-            )
-            self._vdi_key = key
-        return self._vdi
+        return Request(
+            volume,
+            table,
+            View(camera, window_size),
+            self._view(image, camera, window_size, warn=warn),
+            dict(self._settings),
+            dict(self._metadata),
+            (self._volume_key, table, tuple(self._settings.items())),
+        )
 
     def _read(self, image: vtkImageData) -> Volume:
         """Return the volume; the same object as long as it is the same (it is on the device)."""
@@ -368,12 +458,12 @@ class VDISource(VTKPythonAlgorithmBase):
             self._volume_key = key
         return self._volume
 
-    def _view(self, grid: vtkImageData, *, warn: bool) -> tuple[Camera, tuple[int, int]]:
+    def _view(
+        self, grid: vtkImageData, camera: Camera, window_size: tuple[int, int], *, warn: bool
+    ) -> tuple[Camera, tuple[int, int]]:
         """Return the generating view and its window, after coverage."""
-        assert self._camera is not None
-        assert self._window_size is not None
         if self._coverage == "bounds":
-            wide = covering_view(self._camera, self._window_size, _corners(grid))
+            wide = covering_view(camera, window_size, _corners(grid))
             if wide is not None:
                 return wide
             if warn:
@@ -384,7 +474,7 @@ class VDISource(VTKPythonAlgorithmBase):
                     VDIWarning,
                     stacklevel=2,
                 )
-        return self._camera, self._window_size
+        return camera, window_size
 
     def _input_grid(self) -> vtkImageData | None:
         """Return the input's geometry, without reading its data."""

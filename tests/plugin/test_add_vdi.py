@@ -439,7 +439,7 @@ def test_actor_that_outlives_its_plotter_holds_no_image():
     painter = actor.mapper.painter
     plotter.close()
     assert not painter._images
-    assert painter._texture is None
+    assert painter._texture._texture is None
     assert actor.vdi is not None
 
 

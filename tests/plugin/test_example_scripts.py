@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from skimage.io import imread
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -31,3 +32,24 @@ def test_example_writes_a_picture(name, tmp_path):
     image = imread(target)[..., :3]
     assert image.shape == (480, 640, 3)
     assert np.ptp(image.reshape(-1, 3).astype(int), axis=0).max() > 100
+
+
+def test_interactive_example_writes_an_animation_with_a_new_vdi(tmp_path):
+    target = tmp_path / "animation.gif"
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / "interactive.py"), str(target)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "VDI no. 2" in done.stdout
+    assert "VDIWarning" not in done.stderr
+    with Image.open(target) as animation:
+        assert animation.size == (320, 240)
+        assert animation.n_frames > 20
+        first = np.asarray(animation.convert("RGB")).astype(int)
+        animation.seek(animation.n_frames - 1)
+        last = np.asarray(animation.convert("RGB")).astype(int)
+    assert np.abs(last - first)[100:].mean() > 5, "nothing has turned"

@@ -106,6 +106,55 @@ def test_half_extent_takes_the_aspect_from_the_window():
     np.testing.assert_allclose(flat.half_extent((200, 100)), (6, 3))
 
 
+@given(rng=GENERATORS)
+def test_a_tile_s_rays_are_those_of_its_pixels(rng):
+    """Window, tile and pixel at random, also beyond the window's border."""
+    camera = any_camera(rng)
+    window, tile = rng.integers(1, 400, size=(2, 2))
+    corner = rng.integers(-50, 400, size=2)
+    pixel = rng.integers(0, tile)
+
+    def ray(view, size, place):
+        u, v = (2 * (place + 0.5) / size - 1) * (1, -1)
+        return np.array([[1, u, v] @ part for part in view.ray_coefficients(size)])
+
+    expected = ray(camera, window, corner + pixel)
+    found = ray(camera.tile(window, corner, tile), tile, pixel)
+    # Absolute in units of half the viewport
+    scale = max(camera.half_extent(window))
+    np.testing.assert_allclose(found, expected, rtol=EXACT, atol=EXACT * scale)
+
+
+def test_the_whole_window_is_a_tile_of_itself():
+    camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), window_center=(0.1, -0.2))
+    whole = camera.tile(WINDOW, (0, 0), WINDOW)
+    assert whole.view_angle == pytest.approx(camera.view_angle)
+    assert whole.window_center == pytest.approx(camera.window_center)
+    assert whole.replace(view_angle=30, window_center=(0.1, -0.2)) == camera
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (((0, 9), (0, 0), (5, 5)), "window_size must be between 1 and"),
+        ((WINDOW, (0, 0), (5, 0)), "tile_size must be between 1 and"),
+        (
+            (WINDOW, (0.5, 0), (5, 5)),
+            r"corner must be \(column, row\), two whole numbers of pixels",
+        ),
+        ((WINDOW, (1, 2, 3), (5, 5)), r"corner must be .*; got \(1, 2, 3\)"),
+    ],
+)
+def test_impossible_tiles_are_refused(arguments, message):
+    with pytest.raises(InvalidArgumentError, match=message):
+        Camera((0, 0, 5), (0, 0, 0), (0, 1, 0)).tile(*arguments)
+
+
+def test_axes_cannot_be_changed():
+    with pytest.raises(ValueError, match="read-only"):
+        Camera((0, 0, 5), (0, 0, 0), (0, 1, 0)).axes[0, 0] = 2
+
+
 # -- VTK -------------------------------------------------------------------------------------------
 
 

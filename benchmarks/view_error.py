@@ -1,0 +1,371 @@
+"""How well a view's estimated error predicts the true one, and what the estimate costs.
+
+The truth is the SSIM of the VDI's whole picture against our volume raycaster's. Views are turned
+about the volume by growing angles, and moved in ways that no angle tells: closer, beyond what V_O's
+viewport showed, with fewer lists than pixels. Two predictors that need no volume are fitted for
+comparison, each tested on volumes that it was not fitted to. Writes ``view_error_WxH.json``,
+``.md`` and ``.png``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from standard_table import INTERPOLATIONS, window_size  # beside this file
+from tqdm import tqdm
+
+from pyvista_vdi import examples
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.classification import Classification
+from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.io import whole_file
+from pyvista_vdi.metrics import compare_images
+from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.transfer_function import TransferFunction
+from pyvista_vdi.vdi import VDI
+from pyvista_vdi.view_error import TILE_SIZE, TILES, ViewErrorEstimator
+from pyvista_vdi.volume import Volume
+
+VOLUMES = ("aneurism", "bonsai", "brain", "heptane", "rayleigh_taylor", "tooth")
+LOOKS = ("soft", "steep")
+
+#: Tiles and their edges in pixels that are tried.
+VARIANTS = ((4, 24), (9, 24), (16, 24), (32, 24), (32, 16), (9, 32), (16, 32))
+DEFAULT = (TILES, TILE_SIZE)
+
+#: What a VDI may be required to reach before it is made anew.
+BOUNDS = (0.99, 0.98, 0.97, 0.95, 0.9)
+
+#: 1 - SSIM below which pictures are called equal: such views tell predictors nothing.
+EQUAL = 1e-5
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class View:
+    """A new view, and the VDI that it is seen by."""
+
+    kind: str  # "turned" or "moved"
+    azimuth: float  # degrees from V_O
+    zoom: float = 1.0  # of the new view
+    own_zoom: float = 1.0  # of V_O: above 1, its viewport cuts the volume off
+    lists: float = 1.0  # along an edge of the VDI's window, over the frame's pixels
+
+    @property
+    def name(self) -> str:
+        """What the tables call it."""
+        changes = [f"{self.azimuth:g}°"]
+        changes += [f"zoom {self.zoom:g}"] if self.zoom != 1 else []
+        changes += [f"V_O zoomed {self.own_zoom:g}"] if self.own_zoom != 1 else []
+        changes += [f"{self.lists:g} lists a pixel"] if self.lists != 1 else []
+        return ", ".join(changes)
+
+
+VIEWS = (
+    *(View("turned", angle) for angle in (0, 5, 10, 20, 30, 45, 60, 90)),
+    View("moved", 0, zoom=2),
+    View("moved", 20, zoom=2),
+    View("moved", 20, zoom=4),
+    View("moved", 0, own_zoom=2.3),
+    View("moved", 20, own_zoom=2.3),
+    View("moved", 0, lists=0.5),
+    View("moved", 20, lists=0.5),
+)
+
+
+def main() -> int:
+    """Measure what is missing, and write what was found."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--size", type=window_size, default=(640, 360), metavar="WxH")
+    parser.add_argument(
+        "--volumes", nargs="+", choices=sorted(examples.VOLUMES), default=VOLUMES, metavar="NAME"
+    )
+    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
+    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
+    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    width, height = options.size
+    target = options.out / f"view_error_{width}x{height}.json"
+    cases: dict[str, Any] = json.loads(target.read_text()) if target.exists() else {}
+    for volume, look in tqdm(list(product(options.volumes, LOOKS)), unit="case"):
+        key = "/".join((volume, look, options.interpolation))
+        if key not in cases or options.redo:
+            cases[key] = list(measured(volume, look, options))
+            with whole_file(target) as stream:
+                stream.write(json.dumps(cases, indent=1).encode() + b"\n")
+    rows = [{"case": key, "volume": key.split("/")[0], **r} for key in cases for r in cases[key]]
+    with whole_file(target.with_suffix(".md")) as stream:
+        stream.write("\n".join([*tables(rows, options.size), ""]).encode())
+    plot(rows, target.with_suffix(".png"))
+    print(f"Written: {target}, and .md and .png beside it")
+    return 0
+
+
+# -- measuring -------------------------------------------------------------------------------------
+
+
+def measured(name: str, look: str, options: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    """Yield what was found in each view of one volume."""
+    volume = examples.load_data(name, as_volume=True)
+    looks = {**TRANSFER_FUNCTIONS[look], "interpolation": options.interpolation}
+    classified = Classification(looks, "view_error").transfer_function(volume)
+    estimators = {
+        (tiles, edge): ViewErrorEstimator(
+            volume, classified, tiles=tiles, tile_size=edge, device=options.device
+        )
+        for tiles, edge in {*VARIANTS, DEFAULT}
+    }
+    vdis: dict[Any, VDI] = {}
+    for view in VIEWS:
+        camera = zoomed(filling_camera(volume.bounds, options.size), view.own_zoom)
+        lists = tuple(round(edge * view.lists) for edge in options.size)
+        if (camera, lists) not in vdis:
+            vdis[camera, lists] = generate_vdi(
+                volume, camera, lists, classified, device=options.device
+            )
+        vdi = vdis[camera, lists]
+        camera = zoomed(camera, view.zoom / view.own_zoom).azimuth(view.azimuth)
+        yield found(view, vdi, volume, classified, camera, estimators, options)
+
+
+def found(
+    view: View,
+    vdi: VDI,
+    volume: Volume,
+    classified: TransferFunction,
+    camera: Camera,
+    estimators: dict[tuple[int, int], ViewErrorEstimator],
+    options: argparse.Namespace,
+) -> dict[str, Any]:
+    """Compare the whole pictures, and estimate the same from tiles."""
+    size, device = options.size, options.device
+    frame, reference = (
+        lambda: render_vdi(vdi, camera, size, device=device),
+        lambda: raycast_volume(volume, camera, size, classified, device=device),
+    )
+    picture = frame()
+    estimates = {
+        variant: estimator.estimate(vdi, camera, size, picture=picture)
+        for variant, estimator in estimators.items()
+    }
+    alone = estimators[DEFAULT]
+    # The candidates take turns; the median of five
+    candidates: dict[str, Callable[[], object]] = {
+        "vdi": frame,
+        "volume": reference,
+        "estimate": lambda: alone.estimate(vdi, camera, size),
+        "estimate with picture": lambda: alone.estimate(vdi, camera, size, picture=picture),
+    }
+    seconds: dict[str, list[float]] = {name: [] for name in candidates}
+    for _ in range(5):
+        for name, candidate in candidates.items():
+            seconds[name].append(timed(candidate))
+    guess = alone.estimate(vdi, camera, size)
+    return {
+        "view": view.name,
+        "kind": view.kind,
+        "ssim": compare_images(picture, reference()).ssim,
+        "angle": guess.angle,
+        "magnification": guess.magnification,
+        "anisotropy": anisotropy(vdi),
+        "estimates": {
+            variant_name(variant): [e.ssim, e.standard_error] for variant, e in estimates.items()
+        },
+        "without_picture": guess.ssim,
+        "seconds": {name: statistics.median(times) for name, times in seconds.items()},
+    }
+
+
+def zoomed(camera: Camera, factor: float) -> Camera:
+    """Return the camera with a longer lens: things look ``factor`` times as large."""
+    tangent = math.tan(math.radians(camera.view_angle) / 2) / factor
+    return camera.replace(view_angle=2 * math.degrees(math.atan(tangent)))
+
+
+def timed(candidate: Callable[[], object]) -> float:
+    """Return the seconds that it takes."""
+    start = time.perf_counter()
+    candidate()
+    return time.perf_counter() - start
+
+
+def anisotropy(vdi: VDI) -> float:
+    """Length of a supersegment over the width of its list, on average by visible opacity."""
+    visible = -np.expm1(-vdi.optical_depth.astype(np.float64))
+    _, half_height = vdi.camera.half_extent(vdi.window_size)
+    middle = vdi.depth_origin + (vdi.front.astype(np.float64) + vdi.back) / 2
+    widths = middle * 2 * half_height / vdi.window_size[1]
+    return float(np.average((vdi.back.astype(np.float64) - vdi.front) / widths, weights=visible))
+
+
+# -- predictors without the volume -----------------------------------------------------------------
+
+
+def predicted(rows: list[dict[str, Any]], features: Callable[[Any], list[float]]) -> NDArray[Any]:
+    """Return 1 - SSIM as a product of powers of features, fitted to the other volumes' rows."""
+    table = np.array([[1.0, *features(row)] for row in rows])
+    losses = np.log(np.maximum([1 - row["ssim"] for row in rows], EQUAL))
+    volumes = np.array([row["volume"] for row in rows])
+    result = np.empty(len(rows))
+    for volume in set(volumes):
+        others = volumes != volume
+        fit, *_ = np.linalg.lstsq(table[others], losses[others], rcond=None)
+        result[~others] = np.exp(table[~others] @ fit)
+    return result
+
+
+def from_nothing(_: Any) -> list[float]:
+    """The same for every view."""
+    return []
+
+
+def from_angle(row: dict[str, Any]) -> list[float]:
+    """Power of the angle."""
+    return [math.log(1 + row["angle"])]
+
+
+def from_view(row: dict[str, Any]) -> list[float]:
+    """Powers of the angle, the magnification and the lists' anisotropy."""
+    return [*from_angle(row), math.log(row["magnification"]), math.log(row["anisotropy"])]
+
+
+PREDICTORS = {
+    "the same for all views": from_nothing,
+    "angle": from_angle,
+    "angle, magnification, anisotropy of lists": from_view,
+}
+
+
+# -- tables and plot -------------------------------------------------------------------------------
+
+
+def tables(rows: list[dict[str, Any]], size: tuple[int, int]) -> Iterator[str]:
+    """Yield the findings as Markdown."""
+    yield f"{size[0]} x {size[1]}; {len({row['case'] for row in rows})} cases, {len(rows)} views."
+    yield "Errors are estimated SSIM less true SSIM, without their sign except for the bias;"
+    yield "*relative* is the mean error over the mean of 1 - SSIM."
+    for kind in ("turned", "moved"):
+        some = telling(rows, kind)
+        true = np.array([row["ssim"] for row in some])
+        spread = f"true SSIM {true.min():.3f} to {true.max():.3f}"
+        yield f"\n**{kind.capitalize()} views** ({len(some)}; {spread})\n"
+        yield "| predictor | mean | 90 % | worst | bias | relative | within 2 standard errors |"
+        yield "|---|---|---|---|---|---|---|"
+        for name in PREDICTORS:
+            yield row_of(name, 1 - predicted(some, PREDICTORS[name]) - true, 1 - true, None)
+        for variant in sorted({*VARIANTS, DEFAULT}):
+            pairs = np.array([row["estimates"][variant_name(variant)] for row in some])
+            held = np.abs(pairs[:, 0] - true) <= 2 * pairs[:, 1]
+            yield row_of(f"{variant_name(variant)} tiles", pairs[:, 0] - true, 1 - true, held)
+    yield "\n**Decisions**: views on the wrong side of a bound, of all whose pictures differ\n"
+    yield from decisions(telling(rows, "turned") + telling(rows, "moved"))
+    yield "\n**Truth and estimate by view** (mean over the cases)\n"
+    yield "| view | true SSIM | least | estimate | from the angle |"
+    yield "|---|---|---|---|---|"
+    some = telling(rows, "turned") + telling(rows, "moved")
+    by_angle = dict(zip(map(id, some), 1 - predicted(some, from_angle), strict=True))
+    for view in dict.fromkeys(row["view"] for row in rows):
+        some = [row for row in rows if row["view"] == view]
+        true = [row["ssim"] for row in some]
+        estimates = [row["estimates"][variant_name(DEFAULT)][0] for row in some]
+        angles = [by_angle.get(id(row), 1.0) for row in some]
+        yield (
+            f"| {view} | {np.mean(true):.4f} | {min(true):.4f} | {np.mean(estimates):.4f} "
+            f"| {np.mean(angles):.4f} |"
+        )
+    yield "\n**Cost** (median over all views; ratios within one run)\n"
+    yield "| | over a volume frame | over a VDI frame | milliseconds |"
+    yield "|---|---|---|---|"
+    for name in ("estimate", "estimate with picture"):
+        seconds = [row["seconds"] for row in rows]
+        cells = [
+            statistics.median(s[name] / s[peer] for s in seconds) for peer in ("volume", "vdi")
+        ]
+        milliseconds = 1e3 * statistics.median(s[name] for s in seconds)
+        yield f"| {name} | {cells[0]:.2f} | {cells[1]:.2f} | {milliseconds:.0f} |"
+
+
+def decisions(rows: list[dict[str, Any]]) -> Iterator[str]:
+    """Yield how often a predictor would regenerate in vain, or not although it is needed."""
+    true = np.array([row["ssim"] for row in rows])
+    predictions = {name: 1 - predicted(rows, features) for name, features in PREDICTORS.items()}
+    tiles = variant_name(DEFAULT)
+    predictions[f"{tiles} tiles"] = np.array([row["estimates"][tiles][0] for row in rows])
+    yield "| SSIM at least | truly below | " + " | ".join(predictions) + " |"
+    yield "|---" * (2 + len(predictions)) + "|"
+    for bound in BOUNDS:
+        wrong = [np.mean((guess < bound) != (true < bound)) for guess in predictions.values()]
+        cells = [f"{bound:g}", f"{np.mean(true < bound):.0%}", *(f"{w:.0%}" for w in wrong)]
+        yield "| " + " | ".join(cells) + " |"
+
+
+def row_of(name: str, errors: NDArray[Any], losses: NDArray[Any], held: Any) -> str:
+    """Return one predictor's row."""
+    size = np.abs(errors)
+    share = "" if held is None else f"{np.mean(held):.0%}"
+    return (
+        f"| {name} | {size.mean():.4f} | {np.quantile(size, 0.9):.4f} | {size.max():.4f} "
+        f"| {errors.mean():+.4f} | {size.mean() / losses.mean():.0%} | {share} |"
+    )
+
+
+def telling(rows: list[dict[str, Any]], kind: str) -> list[dict[str, Any]]:
+    """Return the views of a kind whose pictures differ."""
+    return [row for row in rows if row["kind"] == kind and 1 - row["ssim"] > EQUAL]
+
+
+def variant_name(variant: tuple[int, int]) -> str:
+    """Name tiles and their edge."""
+    return f"{variant[0]} x {variant[1]}²"
+
+
+def plot(rows: list[dict[str, Any]], target: Path) -> None:
+    """Plot estimated over true 1 - SSIM: from tiles, and from the angle."""
+    import matplotlib as mpl
+
+    mpl.use("agg")
+    import matplotlib.pyplot as plt
+
+    figure, panels = plt.subplots(1, 2, figsize=(9, 4.4), sharex=True, sharey=True)
+    some = telling(rows, "turned") + telling(rows, "moved")
+    losses = np.array([1 - row["ssim"] for row in some])
+    tiles = np.array([1 - row["estimates"][variant_name(DEFAULT)][0] for row in some])
+    titles = (f"from {variant_name(DEFAULT)} tiles", "from the angle alone")
+    for axes, guess, title in zip(
+        panels, (tiles, predicted(some, from_angle)), titles, strict=True
+    ):
+        for kind, marker in (("turned", "o"), ("moved", "^")):
+            chosen = np.array([row["kind"] == kind for row in some])
+            axes.scatter(
+                losses[chosen], np.maximum(guess[chosen], EQUAL), 14, marker=marker, label=kind
+            )
+        ends = [losses.min(), losses.max()]
+        axes.plot(ends, ends, color="0.5", linewidth=1)
+        axes.set(xscale="log", yscale="log", title=title, xlabel="true 1 - SSIM")
+        axes.grid(alpha=0.3)
+    panels[0].set_ylabel("predicted 1 - SSIM")
+    panels[0].legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(target, dpi=80)
+    plt.close(figure)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,79 @@
+"""The texture in which the actor's shader looks up a frame's image."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from vtkmodules.vtkCommonCore import VTK_FLOAT
+from vtkmodules.vtkRenderingOpenGL2 import vtkTextureObject
+
+from pyvista_vdi.errors import DeviceError
+
+
+class ImageTexture:
+    """Made with the first image, and again in another window."""
+
+    def __init__(self) -> None:
+        self._texture: Any = None
+        self._uploaded: int | None = None
+
+    def show(
+        self, window: Any, image: NDArray[np.float32], number: int | None, *, smooth: bool
+    ) -> None:
+        """Bind an image for the shader.
+
+        Parameters
+        ----------
+        window : vtkRenderWindow
+            Its context is current.
+        image : numpy.ndarray
+            Premultiplied RGBA, float32 (H, W, 4), bottom row first.
+        number : int, optional
+            The same as last time if the image is; it is not uploaded again then.
+        smooth : bool
+            Interpolate linearly between texels: a full frame's texels are the pixels.
+
+        Raises
+        ------
+        DeviceError
+            If OpenGL binds it where the shader does not look.
+        """
+        if self._texture is None:
+            self._texture = vtkTextureObject()
+            self._texture.SetWrapS(vtkTextureObject.ClampToEdge)
+            self._texture.SetWrapT(vtkTextureObject.ClampToEdge)
+        texture = self._texture
+        if texture.GetContext() is not window:
+            texture.SetContext(window)
+            self._uploaded = None
+        kind = vtkTextureObject.Linear if smooth else vtkTextureObject.Nearest
+        texture.SetMinificationFilter(kind)
+        texture.SetMagnificationFilter(kind)
+        if number is None or number != self._uploaded or texture.GetHandle() == 0:
+            height, width = image.shape[:2]
+            texture.Create2DFromRaw(width, height, 4, VTK_FLOAT, image)
+            self._uploaded = number
+        texture.Activate()
+        # The sampler of the actor's shader keeps its default, unit 0: see actor.py
+        if texture.GetTextureUnit() != 0:
+            unit = texture.GetTextureUnit()
+            texture.Deactivate()
+            raise DeviceError(
+                f"OpenGL gave its image texture unit {unit} in place of 0; another object leaves "
+                "a texture active"
+            )
+
+    def let_go(self) -> None:
+        """Give the texture unit back."""
+        if self._texture is not None:
+            self._texture.Deactivate()
+
+    def release(self) -> None:
+        """Free the texture."""
+        if self._texture is not None:
+            window = self._texture.GetContext()
+            if window is not None:
+                self._texture.ReleaseGraphicsResources(window)
+        self._texture = self._uploaded = None

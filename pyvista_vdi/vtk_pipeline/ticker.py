@@ -1,0 +1,103 @@
+"""A timer of a window's interactor, by which the main thread looks at what goes on behind it."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+from vtkmodules.util.misc import calldata_type
+from vtkmodules.vtkCommonCore import VTK_INT, vtkWeakReference
+
+#: Milliseconds between two looks: a new VDI appears at most two frames of 30 per second late.
+PERIOD = 50
+
+#: Before other observers, whose default priority is 0: see below.
+_PRIORITY = 1.0
+
+
+class Ticker:
+    """Calls something again and again from the event loop, while it runs and no hand moves.
+
+    Worker threads never call VTK. Where an interactor runs no event loop (off-screen), nothing is
+    called, and what was done behind the frames is seen at the next frame.
+
+    Parameters
+    ----------
+    tick : bound method
+        Held weakly.
+
+    Notes
+    -----
+    While a button is held, VTK's styles take all events of the interactor for themselves, and
+    repeat their last motion at *any* timer event: a ``vtkInteractorStyleTrackballCamera`` would
+    turn on and on. So the timer goes when an interaction starts; motion brings frames of its own,
+    and after the last one the ticker is started again. Nor do others get our timer's events: a
+    user's own timer callback counts its steps by them.
+    """
+
+    def __init__(self, tick: Callable[[], None]) -> None:
+        self._tick = weakref.WeakMethod(tick)
+        self._interactor = vtkWeakReference()
+        self._timer = 0
+        self._observers: tuple[int, ...] = ()
+
+    @property
+    def running(self) -> bool:
+        """Whether it ticks."""
+        return self._timer > 0
+
+    def start(self, interactor: Any) -> None:
+        """Tick, if it does not already, in this interactor."""
+        if interactor is not self._interactor.Get() or interactor is None:
+            self.stop()
+        if interactor is None or self.running:
+            return
+        if not self._observers:
+            self._observe(interactor)
+        self._timer = interactor.CreateRepeatingTimer(PERIOD)
+
+    def pause(self) -> None:
+        """Take the timer away."""
+        interactor = self._interactor.Get()
+        if interactor is not None and self.running:
+            interactor.DestroyTimer(self._timer)
+        self._timer = 0
+
+    def stop(self) -> None:
+        """End: nothing is left at the interactor."""
+        self.pause()
+        interactor = self._interactor.Get()
+        if interactor is not None:
+            for observer in self._observers:
+                interactor.RemoveObserver(observer)
+        self._observers = ()
+
+    def _observe(self, interactor: Any) -> None:
+        weak = weakref.ref(self)
+
+        @calldata_type(VTK_INT)  # type: ignore[misc]
+        def on_timer(_caller: Any, _event: str, timer: int) -> None:
+            ticker = weak()
+            if ticker is not None:
+                ticker._on_timer(timer)
+
+        def on_interaction(*_: Any) -> None:
+            ticker = weak()
+            if ticker is not None:
+                ticker.pause()
+
+        ticks = interactor.AddObserver("TimerEvent", on_timer, _PRIORITY)
+        interaction = interactor.AddObserver("StartInteractionEvent", on_interaction)
+        # Or a style that has taken all events would keep it from us
+        interactor.GetCommand(interaction).PassiveObserverOn()
+        self._interactor.Set(interactor)
+        self._observers = (ticks, interaction)
+
+    def _on_timer(self, timer: int) -> None:
+        interactor = self._interactor.Get()
+        if timer == self._timer and interactor is not None and self._observers:
+            interactor.GetCommand(self._observers[0]).SetAbortFlag(1)
+        tick = self._tick()
+        if tick is not None:
+            tick()

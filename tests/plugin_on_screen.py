@@ -1,0 +1,203 @@
+"""A plotter with a window on a real (or virtual) screen, turned by a hand that is simulated.
+
+Run as a script, with DISPLAY set: the platform's own window and interactor, its event loop, its
+timers. It prints what failed and ends with status 1, or prints "all well".
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+import traceback
+import warnings
+
+import numpy as np
+import pyvista as pv
+from plugin_scenes import LOOKS, soft_ball
+from vtkmodules.util.misc import calldata_type
+from vtkmodules.vtkCommonCore import VTK_INT
+
+from pyvista_vdi.frame_rate import FrameRateController
+
+LONG = 60.0
+
+
+class Hand:
+    """Mouse events at an interactor, as a window system sends them."""
+
+    def __init__(self, plotter):
+        self.interactor = plotter.render_window.GetInteractor()
+
+    def send(self, event, x, y):
+        """Invoke an event at a place."""
+        self.interactor.SetEventInformation(x, y, 0, 0, "\0", 0, None)
+        self.interactor.InvokeEvent(event)
+
+    def press(self, x, y):
+        """Press the left button."""
+        self.send("MouseMoveEvent", x, y)
+        self.send("LeftButtonPressEvent", x, y)
+
+    def move(self, x, y):
+        """Move the mouse."""
+        self.send("MouseMoveEvent", x, y)
+
+    def release(self, x, y):
+        """Let go of the button."""
+        self.send("LeftButtonReleaseEvent", x, y)
+
+
+def scene(**options):
+    """A plotter with a ball of two supersegments per list."""
+    plotter = pv.Plotter(off_screen=False, window_size=(241, 203))
+    actor = plotter.add_vdi(soft_ball(), max_supersegments=2, **{**LOOKS, **options})
+    plotter.camera_position = ((6, 0, 0), (0, 0, 0), (0, 0, 1))
+    return plotter, actor
+
+
+def wait(plotter, happened):
+    """Let events and timers be processed, without drawing anything, until something is so."""
+    end = time.monotonic() + LONG
+    while not happened():
+        assert time.monotonic() < end, "it has not happened"
+        plotter.render_window.GetInteractor().ProcessEvents()
+        time.sleep(0.005)
+
+
+def previews_and_screenshots():
+    """A drag draws previews, its end a full frame, and a screenshot in its middle is full."""
+    plotter, actor = scene(regenerate="never")
+    plotter.show(interactive_update=True, auto_close=False)
+    assert plotter.render_window.GetShowWindow()
+    hand = Hand(plotter)
+    hand.press(100, 100)
+    for x in (105, 110, 115):
+        hand.move(x, 100)
+        assert actor.status.mode == "preview", actor.status
+    before = plotter.camera.position
+    shot = np.asarray(plotter.screenshot(return_img=True)).astype(int)
+    assert actor.status.mode == "full", actor.status
+    hand.move(120, 100)
+    assert actor.status.mode == "preview", actor.status
+    hand.move(115, 100)
+    hand.release(115, 100)
+    assert actor.status.mode == "full", actor.status
+    np.testing.assert_allclose(plotter.camera.position, before, atol=1e-6)
+    rest = np.asarray(plotter.screenshot(return_img=True)).astype(int)
+    assert np.abs(rest - shot).max() <= 1, "the screenshot was of a preview"
+    plotter.close()
+
+
+def new_vdi_appears_by_itself():
+    """At rest a VDI is made behind the frames, and shown without a frame being asked for."""
+    plotter, actor = scene(regenerate="auto", regenerate_below=0.9999, status=True)
+    plotter.show(interactive_update=True, auto_close=False)
+    old = actor.vdi
+    hand = Hand(plotter)
+    hand.press(100, 100)
+    for x in (105, 110, 115):
+        hand.move(x, 100)
+    hand.release(115, 100)
+    turned = plotter.camera.position
+    wait(plotter, lambda: actor.status.generation == 2)
+    assert actor.vdi is not old
+    assert actor.status.angle < 1e-6
+    assert plotter.camera.position == turned
+    wait(plotter, lambda: not actor.mapper.painter.upkeep._ticker.running)
+    plotter.close()
+
+
+def held_still_nothing_turns_and_moving_shows_the_new_vdi():
+    """No timer of ours turns the view while a button is held; the next motion shows the new VDI."""
+    plotter, actor = scene(regenerate=lambda status: status.angle > 5)
+    plotter.show(interactive_update=True, auto_close=False)
+    hand = Hand(plotter)
+    plotter.camera.Azimuth(10)
+    plotter.render()
+    assert actor.mapper.painter.upkeep._ticker.running
+    hand.press(100, 100)
+    assert not actor.mapper.painter.upkeep._ticker.running
+    hand.move(95, 100)  # away from the VDI's view
+    held = plotter.camera.position
+    background = actor.mapper.painter.upkeep.regeneration._background
+    wait(plotter, lambda: not background.running)
+    assert plotter.camera.position == held
+    assert actor.status.generation == 1
+    hand.move(94, 100)
+    assert actor.status.generation == 2
+    hand.release(94, 100)
+    wait(plotter, lambda: not actor.mapper.painter.upkeep._ticker.running)
+    plotter.close()
+
+
+def show_blocks_and_the_new_vdi_comes():
+    """The same in the blocking event loop of show(); other timers do not hear of ours."""
+    plotter, actor = scene(regenerate=lambda status: status.angle > 5)
+    seen, others = [], []
+    interactor = plotter.render_window.GetInteractor()
+
+    @calldata_type(VTK_INT)
+    def on_timer(_caller, _event, timer):
+        if timer != mine:
+            others.append(timer)
+        seen.append(actor.status.generation)
+        if len(seen) == 5:
+            plotter.camera.Azimuth(30)
+            plotter.render()
+        if seen[-1] == 2 or len(seen) > 2000:
+            interactor.TerminateApp()
+
+    interactor.AddObserver("TimerEvent", on_timer)
+    mine = plotter.iren.create_timer(20)
+    plotter.show()
+    assert seen[-1] == 2, seen[-1]
+    assert not others
+
+
+def closing_in_the_middle():
+    """Closing while a VDI is made leaves neither thread nor crash."""
+    plotter, actor = scene(sample_distance=0.002, regenerate=lambda status: status.angle > 5)
+    plotter.show(interactive_update=True, auto_close=False)
+    plotter.camera.Azimuth(30)
+    plotter.render()
+    assert actor.status.progress is not None
+    plotter.close()
+    left = [t for t in threading.enumerate() if t.name.startswith("pyvista-vdi")]
+    assert not left, left
+
+
+CASES = (
+    previews_and_screenshots,
+    new_vdi_appears_by_itself,
+    held_still_nothing_turns_and_moving_shows_the_new_vdi,
+    show_blocks_and_the_new_vdi_comes,
+    closing_in_the_middle,
+)
+
+
+def main():
+    """Run all cases, or those that are named."""
+    warnings.simplefilter("error")
+    # Every preview as coarse as it may be, whatever frames take
+    FrameRateController.choose = lambda controller, full: 1
+    failed = 0
+    for case in CASES:
+        if len(sys.argv) > 1 and case.__name__ not in sys.argv[1:]:
+            continue
+        try:
+            case()
+        except Exception as error:
+            failed += 1
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            print(
+                f"{case.__name__}, line {place.lineno}, {place.line}: "
+                f"{type(error).__name__}: {error}",
+                flush=True,
+            )
+    print("all well" if not failed else f"{failed} failed", flush=True)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
