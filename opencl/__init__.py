@@ -10,9 +10,11 @@ Shared functions:
 ``common/rays.cl``
     Affine forms along the ray of a pixel, clipping to planes, pixels in blocks of 4 x 4.
 ``common/volume_sampling.cl``
-    Samples of a uniform grid, nearest or trilinear.
+    Samples of a uniform grid, nearest or trilinear, of scalars or RGBA.
 ``common/classification.cl``
     Transfer function, extinction, opacity of an optical depth.
+``common/shading.cl``
+    Lights, and gradient opacity: what the steps need of the scalar's gradient.
 ``common/empty_blocks.cl``
     Size of the blocks by which marches skip what is transparent.
 ``common/march.cl``

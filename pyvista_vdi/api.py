@@ -383,11 +383,13 @@ def _with_scalars(volume: Volume, scalars: Any) -> Volume:
             )
         return volume
     values = np.asarray(scalars)
-    if values.size != volume.array.size:
+    rgba = values.ndim > 1 and values.shape[-1] == 4 and values.dtype == np.uint8
+    points = volume.scalars.size
+    if values.size != points * (4 if rgba else 1):
         raise InvalidVolumeError(
-            f"scalars must have one value per point, {volume.array.size}; got {values.size}"
+            f"scalars must have one value per point, {points}; got {values.size}"
         )
-    shaped = values.reshape(volume.array.shape)
+    shaped = values.reshape(volume.scalars.shape + (4,) * rgba)
     return Volume(shaped, volume.spacing, volume.origin, volume.direction, name="scalars")
 
 

@@ -114,7 +114,9 @@ class Classification:
         if "volume_property" in self._in_place:
             from .vtk_pipeline.convert import transfer_function_from_property
 
-            return transfer_function_from_property(self._in_place["volume_property"])
+            return transfer_function_from_property(
+                self._in_place["volume_property"], rgba=volume.rgba
+            )
         if find_spec("pyvista") is None:
             raise MissingDependencyError(
                 "colour maps and opacities by name are built by PyVista, which is not installed: "
@@ -125,7 +127,7 @@ class Classification:
 
         left_out = (*_CHOOSE_THE_ARRAY, "blending")
         arguments = {n: v for n, v in {**DEFAULTS, **self._given}.items() if n not in left_out}
-        return transfer_function_from_arguments(volume.array, **arguments)
+        return transfer_function_from_arguments(volume.array, rgba=volume.rgba, **arguments)
 
     def describe(self) -> dict[str, Any]:
         """Return the arguments as given, in values that JSON can hold."""

@@ -89,6 +89,8 @@ class DeviceVolume:
             "INDEX_T": "ulong" if volume.array.size >= 2**32 else "uint",
             "BLOCK_SHIFT": _BLOCK_SHIFT,
         }
+        if volume.rgba:
+            self.defines["RGBA"] = 1
         self._voxels, ranges = _upload(runtime, volume, scale, self.defines)
         self._low, span = (low, high - low) if native else (0.0, 1.0 if high > low else 0.0)
         table = np.column_stack([transfer_function.colors, transfer_function.opacities])
@@ -129,8 +131,8 @@ class DeviceVolume:
         )
 
     def _lighting(self, camera: Camera) -> tuple[DeviceBuffer, ...]:
-        """Return the lights of a view on the device, if they have any part in it."""
-        if "SHADED" not in self.defines or self._shading is None:
+        """Return the lights of a view on the device, if the volume is shaded."""
+        if self._shading is None:
             return ()
         if self._lit is None or self._lit[0] != camera:
             table = lighting_table(self.volume, camera, self._shading, self._lights)

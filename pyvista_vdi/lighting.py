@@ -111,7 +111,8 @@ class Light:
             return light
         if not hasattr(light, "GetTransformedPosition"):
             raise InvalidArgumentError(
-                f"a light must be a Light, a vtkLight or a pyvista.Light; got {type(light).__name__}"
+                "a light must be a Light, a vtkLight or a pyvista.Light; "
+                f"got {type(light).__name__}"
             )
         intensity = light.GetIntensity()
 

@@ -20,12 +20,9 @@ _NO_CONE = -2.0
 
 
 def shading_defines(transfer_function: TransferFunction, lights: Lights) -> dict[str, int]:
-    """Return the ``-D`` names that compile what is asked for, and nothing else.
-
-    A shaded volume without any light is drawn as one without shading, as by VTK.
-    """
+    """Return the ``-D`` names that compile what is asked for, and nothing else."""
     defines = {}
-    if transfer_function.shading is not None and lights.lights:
+    if transfer_function.shading is not None:
         defines["SHADED"] = 1
         if lights.headlight_only:
             defines["HEADLIGHT"] = 1

@@ -15,14 +15,11 @@ from .lighting import Shading
 OPAQUE_OPTICAL_DEPTH = 30.0
 
 
-#: What a transfer function has only where a volume asks for it.
-_OPTIONS = ("shading", "gradient_opacities", "gradient_range")
-
-
 class TransferFunction:
     """Colour and opacity by scalar, piecewise linear between equidistant nodes.
 
     Immutable. Scalars outside ``scalar_range`` take the nearest end's entry; NaN is transparent.
+    An RGBA volume has colours of its own: only the opacities are taken, by its fourth component.
 
     Parameters
     ----------
@@ -113,14 +110,20 @@ class TransferFunction:
                 f"shading must be a pyvista_vdi.Shading; got {type(shading).__name__}"
             )
         self.shading = shading
-        self.gradient_opacities, self.gradient_range = _gradient(
-            gradient_opacities, gradient_range
-        )
+        self.gradient_opacities, self.gradient_range = _gradient(gradient_opacities, gradient_range)
 
     def replace(self, **changes: Any) -> TransferFunction:
         """Return a copy with some arguments of the constructor changed."""
-        names = ("colors", "opacities", "scalar_range", "unit_distance", "interpolation")
-        names += _OPTIONS
+        names: tuple[str, ...] = (
+            "colors",
+            "opacities",
+            "scalar_range",
+            "unit_distance",
+            "interpolation",
+            "shading",
+            "gradient_opacities",
+            "gradient_range",
+        )
         unknown = sorted(set(changes) - set(names))
         if unknown:
             raise InvalidArgumentError(f"a TransferFunction has no {', '.join(unknown)}")

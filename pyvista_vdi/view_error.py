@@ -20,6 +20,7 @@ from . import rays
 from .camera import Camera, check_window_size
 from .device_volume import DeviceVolume, as_float
 from .errors import Cancelled, InvalidArgumentError
+from .lighting import Lights
 from .metrics import SSIM_ARGUMENTS, SSIM_WINDOW, over_background
 from .opencl_runtime import get_runtime
 from .raycast import render_vdi
@@ -157,6 +158,7 @@ def estimate_view_error(
     sample_distance: float | None = None,
     tiles: int = TILES,
     tile_size: int = TILE_SIZE,
+    lights: Any = None,
     device: Any = None,
     **options: Any,
 ) -> ViewError:
@@ -182,6 +184,7 @@ def estimate_view_error(
         sample_distance=sample_distance,
         tiles=tiles,
         tile_size=tile_size,
+        lights=lights,
         device=device,
     )
     return estimator.estimate(vdi, camera, window_size, **options)
@@ -203,6 +206,8 @@ class ViewErrorEstimator:
     tile_size : int
         Edge of a tile in pixels, at least 11. What SSIM compares around a pixel reaches five
         pixels to each side, so a tile of 24 tells the SSIM of 14 x 14 pixels.
+    lights : optional
+        What a shaded volume is lit by in the view that is judged; see :meth:`Lights.from_any`.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
 
@@ -239,12 +244,19 @@ class ViewErrorEstimator:
         sample_distance: float | None = None,
         tiles: int = TILES,
         tile_size: int = TILE_SIZE,
+        lights: Any = None,
         device: Any = None,
     ) -> None:
         self._tiles = _whole("tiles", tiles, 2)
         self._edge = _whole("tile_size", tile_size, SSIM_WINDOW) - 2 * _REACH
         self._runtime = get_runtime(device)
-        self._medium = DeviceVolume(self._runtime, volume, transfer_function, sample_distance)
+        self._medium = DeviceVolume(
+            self._runtime,
+            volume,
+            transfer_function,
+            sample_distance,
+            lights=Lights.from_any(lights),
+        )
 
     def estimate(
         self,

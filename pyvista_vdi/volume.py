@@ -24,7 +24,7 @@ _WIDENED = {"bool": "uint8", "float16": "float32"}
 
 
 class Volume:
-    """Scalars at the points of a uniform grid.
+    """Scalars, or colours with opacity, at the points of a uniform grid.
 
     The grid's model coordinates are ``origin + direction @ (spacing * (x, y, z))`` for the point
     with index ``array[z, y, x]``, as in ``vtkImageData``. The array is not copied where it is
@@ -32,10 +32,10 @@ class Volume:
 
     Parameters
     ----------
-    array : array_like, shape (nz, ny, nx)
-        The scalars; uint8, int8, uint16, int16, uint32, int32, float32 or float64 (bool and
-        float16 are widened; 64-bit integers become float64 when that is exact). At least two
-        points along each axis.
+    array : array_like, shape (nz, ny, nx) or (nz, ny, nx, 4)
+        The scalars: uint8, int8, uint16, int16, uint32, int32, float32 or float64 (bool and
+        float16 are widened; 64-bit integers become float64 when that is exact). Or straight RGBA,
+        uint8, whose fourth component is the scalar. At least two points along each axis.
     spacing : array_like of float, shape (3,)
         Distance between neighbouring points along x, y, z; model units, positive.
     origin : array_like of float, shape (3,)
@@ -48,7 +48,7 @@ class Volume:
     Raises
     ------
     InvalidVolumeError
-        If the array is not three-dimensional, empty, only one point thick or of another type, or
+        If the array has another shape, is empty, only one point thick or of another type, or
         the grid is not finite, positive and invertible.
     """
 
@@ -81,8 +81,18 @@ class Volume:
     @property
     def dimensions(self) -> tuple[int, int, int]:
         """Number of points along x, y and z."""
-        nz, ny, nx = self.array.shape
+        nz, ny, nx = self.array.shape[:3]
         return nx, ny, nz
+
+    @property
+    def rgba(self) -> bool:
+        """Whether every point has a colour of its own; the scalar is the fourth component then."""
+        return self.array.ndim == 4
+
+    @property
+    def scalars(self) -> NDArray[np.generic]:
+        """What opacity depends on, (nz, ny, nx)."""
+        return self.array[..., 3] if self.rgba else self.array
 
     @property
     def index_to_model(self) -> NDArray[np.float64]:
@@ -113,7 +123,7 @@ class Volume:
         return self.length / (float(np.mean(self.dimensions)) - 1)
 
     def finite_range(self) -> tuple[float, float]:
-        """Return the smallest and the largest value, NaN left out.
+        """Return the smallest and the largest scalar, NaN left out.
 
         Raises
         ------
@@ -121,7 +131,7 @@ class Volume:
             If every value is NaN.
         """
         if self.array.dtype.kind != "f":
-            return float(self.array.min()), float(self.array.max())
+            return float(self.scalars.min()), float(self.scalars.max())
         low = float(np.fmin.reduce(self.array, axis=None))
         high = float(np.fmax.reduce(self.array, axis=None))
         if np.isnan(low):
@@ -132,20 +142,26 @@ class Volume:
 
     def __repr__(self) -> str:
         nx, ny, nz = self.dimensions
-        return f"Volume({nx} x {ny} x {nz} {self.array.dtype}, spacing={self.spacing})"
+        kind = "RGBA" if self.rgba else self.array.dtype
+        return f"Volume({nx} x {ny} x {nz} {kind}, spacing={self.spacing})"
 
 
 def _checked_array(array: NDArray[np.generic]) -> NDArray[np.generic]:
-    if array.ndim != 3:
-        hint = ": give one scalar per point, indexed [z, y, x]" if array.ndim == 4 else ""
+    rgba = array.ndim == 4 and array.shape[-1] == 4 and array.dtype == np.uint8
+    if array.ndim != 3 and not rgba:
+        hint = (
+            ": give one scalar per point, indexed [z, y, x], or RGBA as four uint8"
+            if array.ndim == 4
+            else ""
+        )
         raise InvalidVolumeError(
             f"a volume is a three-dimensional array; got shape {array.shape}{hint}"
         )
     if array.size == 0:
         raise InvalidVolumeError(f"the volume is empty: its shape is {array.shape}")
-    if min(array.shape) < 2:
+    if min(array.shape[:3]) < 2:
         raise InvalidVolumeError(
-            f"the volume has only one plane of points: its shape is {array.shape} (z, y, x), "
+            f"the volume has only one plane of points: its shape is {array.shape[:3]} (z, y, x), "
             "and a volume needs at least two points along each axis"
         )
     kind = array.dtype.newbyteorder("=").name

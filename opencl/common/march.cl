@@ -98,17 +98,22 @@ inline float4 step_medium(const March *march, const Medium *medium, float front,
     float4 sample = classify(scalar, medium->table, medium->entries, medium->low, medium->per_scalar);
     if (sample.w > 0.0f)
         sample.w = step_optical_depth(sample.w, (back - front) * march->units);
-#if defined(SHADED) || defined(GRADIENT_OPACITY)
+#if defined(RGBA) || defined(SHADED) || defined(GRADIENT_OPACITY)
     if (sample.w > 0.0f) {
         const float x = fma(t, march->slope.x, march->start.x);
         const float y = fma(t, march->slope.y, march->start.y);
         const float z = fma(t, march->slope.z, march->start.z);
+#ifdef RGBA
+        sample.xyz = sample_color(medium->voxels, medium->size, x, y, z);
+#endif
+#if defined(SHADED) || defined(GRADIENT_OPACITY)
         const float3 differences = scalar_differences(medium->voxels, medium->size, x, y, z);
 #ifdef GRADIENT_OPACITY
         sample.w = scaled_optical_depth(sample.w, gradient_opacity(differences, medium->gradient));
 #endif
 #ifdef SHADED
         sample.xyz = lit(sample.xyz, differences, x, y, z, medium->lighting);
+#endif
 #endif
     }
 #endif

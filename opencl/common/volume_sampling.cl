@@ -2,18 +2,27 @@
 //
 // -D VOXEL_T  type of a voxel: uchar, char, ushort, short or float
 // -D INDEX_T  type of a voxel's address: uint, or ulong where the grid has 2^32 points or more
+// -D RGBA     a voxel is four of them: colours, and the scalar last; otherwise it is the scalar alone
 // -D NEAREST  the nearest point's value (VTK's nearest interpolation); otherwise trilinear
 //
 // Positions are in index space: point (i, j, k) lies at (i, j, k); x is fastest in memory.
 #pragma OPENCL FP_CONTRACT OFF
 
-inline float sample_volume(__global const VOXEL_T *voxels, int4 size, float x, float y, float z)
+#ifdef RGBA
+#define COMPONENTS 4
+#else
+#define COMPONENTS 1
+#endif
+#define SCALAR (COMPONENTS - 1) // which of them classification sees
+
+inline float sample_component(__global const VOXEL_T *voxels, int4 size, float x, float y, float z, int component)
 {
 #ifdef NEAREST
     const int i = clamp((int)floor(x + 0.5f), 0, size.x - 1);
     const int j = clamp((int)floor(y + 0.5f), 0, size.y - 1);
     const int k = clamp((int)floor(z + 0.5f), 0, size.z - 1);
-    return (float)voxels[((INDEX_T)k * (INDEX_T)size.y + (INDEX_T)j) * (INDEX_T)size.x + (INDEX_T)i];
+    const INDEX_T voxel = ((INDEX_T)k * (INDEX_T)size.y + (INDEX_T)j) * (INDEX_T)size.x + (INDEX_T)i;
+    return (float)voxels[voxel * COMPONENTS + component];
 #else
     // Rounding can put a position on the far face a hair outside: clamp the cell, keep the weight in [0, 1]
     const int i = clamp((int)x, 0, size.x - 2);
@@ -22,13 +31,29 @@ inline float sample_volume(__global const VOXEL_T *voxels, int4 size, float x, f
     const float fx = clamp(x - (float)i, 0.0f, 1.0f);
     const float fy = clamp(y - (float)j, 0.0f, 1.0f);
     const float fz = clamp(z - (float)k, 0.0f, 1.0f);
-    const INDEX_T row = (INDEX_T)size.x;
+    const INDEX_T row = (INDEX_T)size.x * COMPONENTS;
     const INDEX_T plane = row * (INDEX_T)size.y;
-    __global const VOXEL_T *v = voxels + ((INDEX_T)k * plane + (INDEX_T)j * row + (INDEX_T)i);
-    const float c00 = mix((float)v[0], (float)v[1], fx);
-    const float c10 = mix((float)v[row], (float)v[row + 1], fx);
-    const float c01 = mix((float)v[plane], (float)v[plane + 1], fx);
-    const float c11 = mix((float)v[plane + row], (float)v[plane + row + 1], fx);
+    __global const VOXEL_T *v =
+        voxels + ((INDEX_T)k * plane + (INDEX_T)j * row + (INDEX_T)i * COMPONENTS + component);
+    const float c00 = mix((float)v[0], (float)v[COMPONENTS], fx);
+    const float c10 = mix((float)v[row], (float)v[row + COMPONENTS], fx);
+    const float c01 = mix((float)v[plane], (float)v[plane + COMPONENTS], fx);
+    const float c11 = mix((float)v[plane + row], (float)v[plane + row + COMPONENTS], fx);
     return mix(mix(c00, c10, fy), mix(c01, c11, fy), fz);
 #endif
 }
+
+inline float sample_volume(__global const VOXEL_T *voxels, int4 size, float x, float y, float z)
+{
+    return sample_component(voxels, size, x, y, z, SCALAR);
+}
+
+#ifdef RGBA
+// Straight colour of a volume of bytes, 0 to 1.
+inline float3 sample_color(__global const VOXEL_T *voxels, int4 size, float x, float y, float z)
+{
+    return (float3)(sample_component(voxels, size, x, y, z, 0), sample_component(voxels, size, x, y, z, 1),
+                    sample_component(voxels, size, x, y, z, 2)) /
+           255.0f;
+}
+#endif

@@ -1,10 +1,11 @@
 // Blocks of a volume that a transfer function makes transparent, so that marches can skip them.
 //
-// -D VOXEL_T, INDEX_T: see common/volume_sampling.cl
+// -D VOXEL_T, INDEX_T, RGBA: see common/volume_sampling.cl
 //
 // Block (i, j, k) covers the index positions from BLOCK i to BLOCK (i + 1) along x, both included, and likewise along y and
 // z: every point that a sample between them reads, whatever the interpolation.
 #include "common/empty_blocks.cl"
+#include "common/volume_sampling.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Least and largest scalar of each block, NaN left out (it is transparent); (INFINITY, -INFINITY) where all is NaN.
@@ -20,9 +21,10 @@ __kernel void block_ranges(__global const VOXEL_T *voxels, int4 size, int4 block
     float largest = -INFINITY;
     for (int z = k; z <= min(k + BLOCK, size.z - 1); ++z)
         for (int y = j; y <= min(j + BLOCK, size.y - 1); ++y) {
-            __global const VOXEL_T *row = voxels + ((INDEX_T)z * (INDEX_T)size.y + (INDEX_T)y) * (INDEX_T)size.x;
+            __global const VOXEL_T *row =
+                voxels + ((INDEX_T)z * (INDEX_T)size.y + (INDEX_T)y) * (INDEX_T)size.x * COMPONENTS;
             for (int x = i; x <= min(i + BLOCK, size.x - 1); ++x) {
-                const float value = (float)row[x];
+                const float value = (float)row[x * COMPONENTS + SCALAR];
                 least = fmin(least, value);
                 largest = fmax(largest, value);
             }

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import difflib
 import sys
+import warnings
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, MissingDependencyError
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidVolumeError,
+    MissingDependencyError,
+    VDIWarning,
+)
 from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.vtk_pipeline.properties import transfer_function_from_property
+from pyvista_vdi.vtk_pipeline.properties import RGBA_OPACITY, transfer_function_from_property
 
 
 def transfer_function_from_arguments(
@@ -31,6 +37,7 @@ def transfer_function_from_arguments(
     diffuse: float = 0.7,
     specular: float = 0.2,
     specular_power: float = 10.0,
+    rgba: bool = False,
 ) -> TransferFunction:
     """Return the transfer function that ``Plotter.add_volume`` would draw with.
 
@@ -48,6 +55,9 @@ def transfer_function_from_arguments(
         Whether samples reflect light.
     ambient, diffuse, specular, specular_power
         How a shaded volume does: see :class:`~pyvista_vdi.Shading`.
+    rgba : bool
+        Whether the values are RGBA: their opacity is then linear over ``clim``, whatever is asked
+        for, as in ``add_volume``.
 
     Returns
     -------
@@ -68,7 +78,7 @@ def transfer_function_from_arguments(
         scalars,
         clim=clim,
         n_colors=n_colors,
-        opacity=opacity,
+        opacity=rgba_opacity(opacity) if rgba else opacity,
         cmap=cmap,
         flip_scalars=flip_scalars,
         log_scale=log_scale,
@@ -77,8 +87,12 @@ def transfer_function_from_arguments(
     if shade:
         prop.shade = True
         light(prop, ambient, diffuse, specular, specular_power)
-    function = transfer_function_from_property(prop)
-    return function if opacity_unit_distance is not None else function.replace(unit_distance=None)
+    if rgba:
+        depend_on_alpha(prop, opacity_unit_distance)
+    function = transfer_function_from_property(prop, rgba=rgba)
+    if rgba or opacity_unit_distance is not None:
+        return function
+    return function.replace(unit_distance=None)
 
 
 def lookup_table(
@@ -171,6 +185,24 @@ def volume_property(
         interpolation_type=interpolation,
         opacity_unit_distance=opacity_unit_distance,
     )
+
+
+def rgba_opacity(opacity: Any) -> str:
+    """Return the opacity that ``add_volume`` gives RGBA scalars; say so where another is given."""
+    if not (isinstance(opacity, str) and opacity == "linear"):
+        warnings.warn("opacity is ignored: RGBA scalars bring theirs", VDIWarning, stacklevel=3)
+    return "linear"
+
+
+def depend_on_alpha(prop: pv.VolumeProperty, opacity_unit_distance: float | None) -> None:
+    """Make a property one of an RGBA volume.
+
+    ``add_volume`` leaves VTK's unit distance of the fourth component, 1, whatever is asked for; an
+    explicit one is honoured here.
+    """
+    prop.independent_components = False
+    if opacity_unit_distance is not None:
+        prop.SetScalarOpacityUnitDistance(RGBA_OPACITY, opacity_unit_distance)
 
 
 def light(

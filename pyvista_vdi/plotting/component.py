@@ -16,13 +16,20 @@ from pyvista_vdi.classification import DEFAULTS, Classification, refuse_unknown
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.opencl_runtime import get_runtime
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
-from pyvista_vdi.plotting.classify import lookup_table, volume_property
+from pyvista_vdi.plotting.classify import (
+    depend_on_alpha,
+    light,
+    lookup_table,
+    rgba_opacity,
+    volume_property,
+)
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.volumes import as_image
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.vtk_pipeline.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.frame import as_array
 from pyvista_vdi.vtk_pipeline.interaction import checked_rate
+from pyvista_vdi.vtk_pipeline.painter import make_proxy_rgba
 from pyvista_vdi.vtk_pipeline.regeneration import (
     REGENERATE_BELOW,
     Policy,
@@ -129,7 +136,7 @@ class AddVDI:
             ``add_volume`` takes it, a VDI, or a VDI as ``pyvista.read("x.vdi")`` gives it. With a
             VDI nothing is generated, and arguments that only a volume can honour are refused.
         scalars : str or numpy.ndarray, optional
-            Name of an array, or the values, per point or per cell. RGBA is refused.
+            Name of an array, or the values, per point or per cell; RGBA as uint8 (n, 4).
         clim : float or (float, float), optional
             Range of the colour map; all values by default.
         resolution : (float, float, float), optional
@@ -146,7 +153,9 @@ class AddVDI:
         reset_camera, name, culling, pickable, render
             As in ``add_volume``.
         ambient, diffuse, specular, specular_power, shade
-            ``shade=True`` is refused; without it the others change nothing, as in ``add_volume``.
+            As in ``add_volume``: without ``shade`` the others change nothing. A shaded VDI is lit
+            by the plotter's lights as they stand in its generating view: lights that follow the
+            camera move in the picture when the VDI is made anew, and other lights make it anew.
         categories : bool or int
             As many colours as there are different values, or this many.
         multi_colors, mapper
@@ -269,6 +278,8 @@ class AddVDI:
         source.SetDevice(given["device"])
         source.SetProgressCallback(progress_callback(given["progress_bar"]))
         volume = source.GetVolume()
+        if volume.rgba:
+            given = {**given, "opacity": rgba_opacity(given["opacity"]), "show_scalar_bar": False}
         table = lookup_table(
             volume.array,
             **{k: given[k] for k in ("clim", "n_colors", "opacity", "cmap", "flip_scalars")},
@@ -281,9 +292,11 @@ class AddVDI:
             volume.default_unit_distance if distance is None else distance,
             given["interpolation"],
         )
-        prop.ambient = prop.ambient if given["ambient"] is None else given["ambient"]
-        prop.diffuse, prop.specular = given["diffuse"], given["specular"]
-        prop.specular_power = given["specular_power"]
+        light(prop, *(given[k] for k in ("ambient", "diffuse", "specular", "specular_power")))
+        prop.shade = bool(given["shade"])
+        if volume.rgba:
+            depend_on_alpha(prop, distance)
+        source.SetLights(plotter.renderer)
         source.SetVolumeProperty(prop)
         source.SetMetadata({"classification": looks.describe()})
         if given["camera"] is not None:
@@ -333,6 +346,8 @@ class AddVDI:
         actor = PlotterVDIActor()
         if prop is not None:
             actor.prop = prop
+            if not prop.independent_components:
+                make_proxy_rgba(mapper.painter.proxy)
         if isinstance(shown, VDI):
             mapper.SetVDI(shown)
         else:

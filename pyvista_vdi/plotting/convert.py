@@ -38,6 +38,6 @@ def to_image_data(volume: Volume, name: str | None = None) -> pv.ImageData:
     )
     # x runs fastest in VTK's point order, as it does in a C-ordered [z, y, x] array
     name = volume.name if name is None else name
-    grid.point_data[name] = volume.array.ravel()
+    grid.point_data[name] = volume.array.reshape((-1, 4) if volume.rgba else -1)
     grid.set_active_scalars(name)
     return grid

@@ -69,12 +69,13 @@ def _from_array(array: Any, resolution: Any) -> pv.ImageData:
 
 
 def _with_values(image: Any, values: Any) -> pv.ImageData:
-    if values.ndim == 2 and values.shape[1] in (3, 4):
+    rgba = values.ndim == 2 and values.shape[1] == 4 and values.dtype == np.uint8
+    if values.ndim == 2 and values.shape[1] in (3, 4) and not rgba:
         raise UnsupportedError(_rgba(values))
     if not np.issubdtype(values.dtype, np.number) and values.dtype != bool:
         raise InvalidVolumeError(f"scalars must be numbers; got {values.dtype}")
     n_points, n_cells = image.GetNumberOfPoints(), image.GetNumberOfCells()
-    if values.ndim != 1 or len(values) not in (n_points, n_cells):
+    if not (values.ndim == 1 or rgba) or len(values) not in (n_points, n_cells):
         raise InvalidVolumeError(
             f"scalars must have one value per point ({n_points}) or per cell ({n_cells}); "
             f"got shape {values.shape}"
@@ -88,6 +89,6 @@ def _with_values(image: Any, values: Any) -> pv.ImageData:
 
 def _rgba(array: Any) -> str:
     return (
-        f"scalars of shape {array.shape} are RGB(A) colours: colours stored in the volume are not "
-        "supported yet, a later release brings them; pass one scalar per point"
+        f"scalars of shape {array.shape} and type {array.dtype} are no RGBA colours: pass uint8 "
+        "of shape (number of points, 4) as scalars= of a grid, or one scalar per point"
     )

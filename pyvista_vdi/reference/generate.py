@@ -254,8 +254,11 @@ def medium_at(
     outside = ((position < -GRID_TOLERANCE) | (position > top + GRID_TOLERANCE)).any(axis=1)
     inside = np.clip(position, 0, top)
     interpolate = _linear if transfer_function.interpolation == "linear" else _nearest
-    scalar = interpolate(volume.array, inside)
+    scalar = interpolate(volume.scalars, inside)
     color, alpha = classify(transfer_function, scalar)
+    if volume.rgba:
+        channels = [interpolate(volume.array[..., c], inside) for c in range(3)]
+        color = np.stack(channels, axis=1) / 255
 
     unit = transfer_function.unit_distance or volume.default_unit_distance
     with np.errstate(divide="ignore"):  # log1p(-1): opaque
@@ -263,7 +266,7 @@ def medium_at(
     tau = np.where(alpha == 1, OPAQUE_OPTICAL_DEPTH, tau)
 
     if transfer_function.gradient_opacities is not None or transfer_function.shading is not None:
-        differences = _differences(volume.array, inside, interpolate)
+        differences = _differences(volume.scalars, inside, interpolate)
         factor = gradient_factors(volume, transfer_function, differences)
         tau = np.where(factor < 1, -np.log1p(factor * np.expm1(-tau)), tau)
         if transfer_function.shading is not None:

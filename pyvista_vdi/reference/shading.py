@@ -54,7 +54,7 @@ def lit_colors(
     volume, camera : Volume and Camera
         Where the samples, the eye and the lights are.
     shading, lights : Shading and Lights
-        What reflects what; without a light the colours stay.
+        What reflects what; without any light everything is black.
     position : numpy.ndarray
         Grid coordinates (x, y, z) in points, float64 (n, 3).
     differences : numpy.ndarray
@@ -62,8 +62,6 @@ def lit_colors(
     color : numpy.ndarray
         From the transfer function, float64 (n, 3).
     """
-    if not lights.lights:
-        return color
     to_model = volume.index_to_model
     to_world = camera.model_transform @ to_model
     if lights.headlight_only:
@@ -121,14 +119,14 @@ def _by_lights(
         reflected = (view * mirrored).sum(axis=1)
         if lights.two_sided and light.positional:
             reflected = np.abs(reflected)
-        highlight = np.where(
-            reflected > 0, np.maximum(reflected, 0) ** shading.specular_power, 0.0
-        )
+        highlight = np.where(reflected > 0, np.maximum(reflected, 0) ** shading.specular_power, 0.0)
         strength = np.where(facing > 0, strength, 0.0)
         diffuse += (strength * facing)[:, None] * np.array(light.diffuse)
         specular += (strength * highlight)[:, None] * np.array(light.specular)
-    return shading.ambient * ambient + shading.diffuse * diffuse * color + (
-        shading.specular * specular
+    return (
+        shading.ambient * ambient
+        + shading.diffuse * diffuse * color
+        + (shading.specular * specular)
     )
 
 

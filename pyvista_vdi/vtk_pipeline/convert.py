@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkDataArray, vtkStringArray
+from vtkmodules.vtkCommonCore import VTK_UNSIGNED_CHAR, vtkDataArray, vtkStringArray
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkFiltersCore import vtkCellDataToPointData
 
@@ -111,7 +111,8 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
     """
     image = require_image(image)
     array = scalars_of(image, scalars, preference)
-    if array.GetNumberOfComponents() != 1:
+    rgba = array.GetNumberOfComponents() == 4 and array.GetDataType() == VTK_UNSIGNED_CHAR
+    if array.GetNumberOfComponents() != 1 and not rgba:
         raise UnsupportedError(_several_components(array))
     dimensions = image.GetDimensions()
     name = array.GetName() or "values"
@@ -127,7 +128,7 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
     image.TransformIndexToPhysicalPoint(extent[0], extent[2], extent[4], first)
     direction = image.GetDirectionMatrix()
     return Volume(
-        _as_numpy(array).reshape(dimensions[::-1]),
+        _as_numpy(array).reshape((*dimensions[::-1], 4) if rgba else dimensions[::-1]),
         image.GetSpacing(),
         first,
         [[direction.GetElement(i, j) for j in range(3)] for i in range(3)],
@@ -185,8 +186,8 @@ def _several_components(array: vtkDataArray) -> str:
     n = array.GetNumberOfComponents()
     if n == 4:
         return (
-            f"the scalars {array.GetName()!r} are RGBA (4 components): colours stored in the "
-            "volume are not supported yet, a later release brings them; pass one scalar per point"
+            f"the scalars {array.GetName()!r} have 4 components, but are not RGBA of type unsigned "
+            "char: convert them, or pass one scalar per point"
         )
     return (
         f"the scalars {array.GetName()!r} have {n} components: a VDI is made from one scalar per "

@@ -117,6 +117,7 @@ class _Job(threading.Thread):
                     request.volume,
                     request.transfer_function,
                     sample_distance=request.settings["sample_distance"],
+                    lights=request.settings["lights"],
                     device=runtime,
                 )
                 self.estimator = (request, estimator)

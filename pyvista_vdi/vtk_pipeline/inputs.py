@@ -90,6 +90,7 @@ class SourceInput(Input):
         """Return the newest time stamp of the source, its input and its property."""
         if self.source.GetNumberOfInputConnections(0) > 0:
             self.source.GetInputAlgorithm(0, 0).Update()
+        self.source.CheckLights()
         stamps = [self.source.GetMTime()]
         data = self.source.GetInputDataObject(0, 0)
         prop = self.source.GetVolumeProperty()

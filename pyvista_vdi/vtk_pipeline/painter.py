@@ -363,6 +363,12 @@ def make_proxy() -> vtkImageData:
     return proxy
 
 
+def make_proxy_rgba(proxy: vtkImageData) -> None:
+    """Give the proxy four components, which VTK asks of a property of dependent ones."""
+    proxy.AllocateScalars(3, 4)  # VTK_UNSIGNED_CHAR
+    proxy.GetPointData().GetScalars().Fill(0)
+
+
 def place_proxy(proxy: vtkImageData, bounds: tuple[float, ...]) -> None:
     """Give the proxy these bounds, model frame."""
     low, high = np.asarray(bounds[::2]), np.asarray(bounds[1::2])

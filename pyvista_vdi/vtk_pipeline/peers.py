@@ -119,6 +119,11 @@ class PeerRenderer:
         self._renderer.AddVolume(self._volume)
 
     @property
+    def renderer(self) -> Any:
+        """The ``vtkRenderer``, whose lights shine on a shaded volume: a headlight by default."""
+        return self._renderer
+
+    @property
     def opengl(self) -> str:
         """OpenGL renderer and version, as the driver reports them."""
         self._window.Render()
@@ -214,7 +219,7 @@ def image_from_volume(volume: Volume) -> Any:
     image.SetOrigin(volume.origin)
     image.SetDirectionMatrix(volume.direction.ravel().tolist())
     # x runs fastest in VTK's point order, as it does in a C-ordered [z, y, x] array
-    scalars = numpy_to_vtk(volume.array.ravel())
+    scalars = numpy_to_vtk(volume.array.reshape((-1, 4) if volume.rgba else -1))
     scalars.SetName(volume.name)
     image.GetPointData().SetScalars(scalars)
     return image

@@ -21,12 +21,16 @@ SAMPLED_ENTRIES = 4096
 #: Entries of a gradient opacity's table: VTK's own has as many.
 GRADIENT_ENTRIES = 1024
 
+#: Component of an RGBA volume that opacity depends on; VTK takes its unit distance, too, while the
+#: functions are the first component's.
+RGBA_OPACITY = 3
+
 #: VTK's interpolation types that a VDI can be made with (VTK_NEAREST_..., VTK_LINEAR_...).
 _INTERPOLATION = {0: "nearest", 1: "linear"}
 
 
 def transfer_function_from_property(
-    prop: Any, *, n_entries: int = SAMPLED_ENTRIES
+    prop: Any, *, n_entries: int = SAMPLED_ENTRIES, rgba: bool = False
 ) -> TransferFunction:
     """Return the transfer function of a volume property.
 
@@ -39,6 +43,9 @@ def transfer_function_from_property(
     n_entries : int
         Longest table. Nodes on a common equidistant grid no longer than this (which is what
         PyVista builds) give exactly that grid; any others are sampled at this many scalars.
+    rgba : bool
+        Whether the volume has colours of its own: the property's components must then be
+        dependent, and its colours have no meaning.
 
     Returns
     -------
@@ -49,8 +56,8 @@ def transfer_function_from_property(
     Raises
     ------
     UnsupportedError
-        If a label map, a 2D transfer function, dependent components or cubic interpolation is
-        on.
+        If a label map, a 2D transfer function or cubic interpolation is on, or the components'
+        dependence does not fit the volume.
     InvalidArgumentError
         If it is no volume property, or its functions have no points.
     """
@@ -58,7 +65,7 @@ def transfer_function_from_property(
         raise InvalidArgumentError(
             f"volume_property must be a vtkVolumeProperty; got {type(prop).__name__}"
         )
-    _refuse_unsupported(prop)
+    _refuse_unsupported(prop, rgba)
     opacity = prop.GetScalarOpacity()
     color = color_function(prop)
     if opacity.GetSize() == 0 or color.GetSize() == 0:
@@ -71,7 +78,7 @@ def transfer_function_from_property(
         np.clip(colors, 0, 1),
         np.clip(opacities, 0, 1),
         scalar_range,
-        unit_distance=prop.GetScalarOpacityUnitDistance(),
+        unit_distance=prop.GetScalarOpacityUnitDistance(RGBA_OPACITY if rgba else 0),
         interpolation=_INTERPOLATION[prop.GetInterpolationType()],
         shading=_shading(prop),
         **_gradient_opacity(prop),
@@ -87,10 +94,12 @@ def color_function(prop: vtkVolumeProperty) -> Any:
     return prop.GetGrayTransferFunction() if grey else prop.GetRGBTransferFunction()
 
 
-def _refuse_unsupported(prop: vtkVolumeProperty) -> None:
+def _refuse_unsupported(prop: vtkVolumeProperty, rgba: bool) -> None:
     reasons = []
-    if not prop.GetIndependentComponents():
-        reasons.append("dependent components such as RGBA (IndependentComponentsOn())")
+    if rgba and prop.GetIndependentComponents():
+        reasons.append("independent components of an RGBA volume (IndependentComponentsOff())")
+    if not rgba and not prop.GetIndependentComponents():
+        reasons.append("dependent components, which are for RGBA (IndependentComponentsOn())")
     if prop.GetTransferFunctionMode() == vtkVolumeProperty.TF_2D:
         reasons.append("a 2D transfer function (SetTransferFunctionModeTo1D())")
     if getattr(prop, "GetNumberOfLabels", lambda: 0)() > 0:
@@ -121,8 +130,7 @@ def _gradient_opacity(prop: vtkVolumeProperty) -> dict[str, Any]:
     if not _has_gradient_opacity(prop):
         return {}
     function = prop.GetGradientOpacity()
-    low = 0.0
-    high = max(float(_nodes(function)[:, 0].max()), np.finfo(np.float32).tiny)
+    low, high = 0.0, max(float(_nodes(function)[:, 0].max()), float(np.finfo(np.float32).tiny))
     grid = np.linspace(low, high, GRADIENT_ENTRIES)
     opacities = np.array([function.GetValue(x) for x in grid])
     return {

@@ -24,6 +24,7 @@ from pyvista_vdi.errors import (
     VDIWarning,
 )
 from pyvista_vdi.generation import check_max_supersegments, generate_vdi
+from pyvista_vdi.lighting import Lights
 from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.volume import Volume
@@ -117,6 +118,8 @@ class VDISource(VTKPythonAlgorithmBase):
             "view_cone": 60.0,
             "device": None,
         }
+        self._lights: Lights | None = None
+        self._lit_by = vtkWeakReference()
         self._property: vtkVolumeProperty | None = None
         self._observed: list[tuple[Any, int]] = []
         self._progress: Progress | None = None
@@ -210,7 +213,7 @@ class VDISource(VTKPythonAlgorithmBase):
             If it cannot be honoured: see ``transfer_function_from_property``.
         """
         if prop is not None:
-            transfer_function_from_property(prop)
+            transfer_function_from_property(prop, rgba=not prop.GetIndependentComponents())
         if prop is not self._property:
             self._property = prop
             self._observe_property()
@@ -219,6 +222,33 @@ class VDISource(VTKPythonAlgorithmBase):
     def GetVolumeProperty(self) -> vtkVolumeProperty | None:
         """Return the volume property."""
         return self._property
+
+    def SetLights(self, lights: Any) -> None:
+        """Set what a shaded volume is lit by.
+
+        Parameters
+        ----------
+        lights : None, vtkRenderer, Lights or iterable of vtkLight, pyvista.Light or Light
+            ``None``, the default, is one headlight. A renderer's lights are looked at whenever
+            the VDI is asked for, and other lights make another VDI; lights that merely follow the
+            camera do not. What is given as a list is copied now.
+        """
+        renderer = lights if hasattr(lights, "GetTwoSidedLighting") else None
+        self._lit_by.Set(renderer)
+        fixed = None if lights is None or renderer is not None else Lights.from_any(lights)
+        self._change("_lights", fixed)
+        self.Modified()
+
+    def GetLights(self) -> Lights:
+        """Return what a shaded volume is lit by, as it is now."""
+        renderer = self._lit_by.Get()
+        return Lights.from_any(self._lights if renderer is None else renderer)
+
+    def CheckLights(self) -> None:
+        """Be out of date if the renderer that lights the volume has other lights by now."""
+        lit = None if self._request is None else self._request.settings["lights"]
+        if lit is not None and lit != self.GetLights():
+            self.Modified()
 
     def SetMaxSupersegments(self, limit: int) -> None:
         """Set the longest list, 1 to 4096."""
@@ -283,6 +313,7 @@ class VDISource(VTKPythonAlgorithmBase):
 
     def Update(self, *args: Any) -> Any:
         """Bring the output up to date, and raise what went wrong."""
+        self.CheckLights()
         self._python_waits = True
         try:
             result = super().Update(*args)
@@ -430,15 +461,16 @@ class VDISource(VTKPythonAlgorithmBase):
         assert camera is not None
         assert window_size is not None
         volume = self._read(image)
-        table = transfer_function_from_property(self._property)
+        table = transfer_function_from_property(self._property, rgba=volume.rgba)
+        settings = {**self._settings, "lights": self.GetLights() if table.shading else None}
         return Request(
             volume,
             table,
             View(camera, window_size),
             self._view(image, camera, window_size, warn=warn),
-            dict(self._settings),
+            settings,
             dict(self._metadata),
-            (self._volume_key, table, tuple(self._settings.items())),
+            (self._volume_key, table, tuple(settings.items())),
         )
 
     def _read(self, image: vtkImageData) -> Volume:
@@ -540,7 +572,9 @@ class VDISource(VTKPythonAlgorithmBase):
                 source._observe_property()  # its functions may be others now
             source.Modified()
 
-        functions = (color_function(prop), prop.GetScalarOpacity())
+        functions = [color_function(prop), prop.GetScalarOpacity()]
+        if prop.HasGradientOpacity():
+            functions.append(prop.GetStoredGradientOpacity())
         for watched in (prop, *functions):
             self._observed.append((watched, watched.AddObserver("ModifiedEvent", changed)))
 

@@ -332,8 +332,8 @@ def test_depth_is_read_only_where_something_opaque_can_hide_the_vdi(plotter, mon
     assert reads
 
 
-def shaded_frames(plotter, actor):
-    actor.prop.shade = True
+def frames_that_fail(plotter, actor):
+    actor.prop.SetTransferFunctionModeTo2D()
     for _ in range(3):
         plotter.render()
 
@@ -341,11 +341,11 @@ def shaded_frames(plotter, actor):
 def test_problem_in_a_frame_is_said_once_and_the_last_image_stays(plotter):
     actor = plotter.add_vdi(soft_ball(), **LOOKS)
     before = shown(plotter)
-    with pytest.warns(VDIWarning, match="cannot be drawn: UnsupportedError: .*shading") as said:
-        shaded_frames(plotter, actor)
+    with pytest.warns(VDIWarning, match="cannot be drawn: UnsupportedError: .*2D transfer") as said:
+        frames_that_fail(plotter, actor)
     assert len(said) == 1
     np.testing.assert_array_equal(shown(plotter), before)
-    actor.prop.shade = False
+    actor.prop.SetTransferFunctionModeTo1D()
     np.testing.assert_array_equal(shown(plotter), before)
 
 

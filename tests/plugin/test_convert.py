@@ -9,7 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from vtkmodules.vtkCommonCore import vtkMath
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
-from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
+from vtkmodules.vtkRenderingCore import (
+    vtkColorTransferFunction,
+    vtkLight,
+    vtkRenderer,
+    vtkVolumeProperty,
+)
 
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.errors import (
@@ -18,6 +23,7 @@ from pyvista_vdi.errors import (
     InvalidVolumeError,
     UnsupportedError,
 )
+from pyvista_vdi.lighting import Light, Lights, Shading
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.vtk_pipeline.convert import vdi_from_image, vdi_to_image, volume_from_vtk
 from pyvista_vdi.vtk_pipeline.properties import transfer_function_from_property
@@ -96,9 +102,9 @@ def test_preference_decides_between_arrays_of_one_name():
             "'v' have 3 components.*pass one component",
         ),
         (
-            lambda g: g.point_data.set_array(np.zeros((g.n_points, 4), np.uint8), "v"),
+            lambda g: g.point_data.set_array(np.zeros((g.n_points, 4), np.uint16), "v"),
             UnsupportedError,
-            "RGBA .* a later release",
+            "'v' have 4 components, but are not RGBA of type unsigned char",
         ),
     ],
     ids=["none", "vectors", "rgba"],
@@ -333,16 +339,97 @@ def gradient(value):
     return function
 
 
+def test_shading_and_gradient_opacity_are_taken():
+    prop = linear_property()
+    prop.SetAmbient(0.3)
+    prop.SetSpecularPower(4)
+    assert transfer_function_from_property(prop).shading is None
+    prop.ShadeOn()
+    prop.SetGradientOpacity(gradient(0.5))
+    function = transfer_function_from_property(prop)
+    assert function.shading == Shading(0.3, prop.GetDiffuse(), prop.GetSpecular(), 4)
+    assert function.gradient_range == (0, 10)
+    factors = function.gradient_opacities
+    np.testing.assert_allclose(factors, np.linspace(1, 0.5, len(factors)), rtol=1e-6)
+    prop.DisableGradientOpacityOn()
+    assert transfer_function_from_property(prop).gradient_opacities is None
+
+
+def test_an_rgba_volume_needs_dependent_components():
+    prop = linear_property()
+    with pytest.raises(UnsupportedError, match="independent components of an RGBA volume"):
+        transfer_function_from_property(prop, rgba=True)
+    prop.IndependentComponentsOff()
+    function = transfer_function_from_property(prop, rgba=True)
+    assert function.opacities.max() > 0
+
+
+def test_rgba_points_share_their_memory():
+    grid = some_grid()
+    grid.point_data.set_array(np.arange(grid.n_points * 4, dtype=np.uint8).reshape(-1, 4), "v")
+    volume = volume_from_vtk(grid)
+    assert volume.rgba
+    assert np.shares_memory(volume.array, grid["v"])
+    np.testing.assert_array_equal(volume.array.reshape(-1, 4), grid["v"])
+
+
+def test_lights_of_a_renderer():
+    renderer = vtkRenderer()
+    assert Lights.from_any(renderer) == Lights()  # the headlight that VTK would make
+    renderer.TwoSidedLightingOff()
+    light = vtkLight()
+    light.SetLightTypeToCameraLight()
+    light.SetPosition(1, 2, 3)
+    light.SetDiffuseColor(1, 0.5, 0)
+    light.SetIntensity(0.5)
+    dark = vtkLight()
+    dark.SwitchOff()
+    renderer.AddLight(light)
+    renderer.AddLight(dark)
+    lights = Lights.from_any(renderer)
+    assert not lights.two_sided
+    (found,) = lights.lights
+    assert (found.kind, found.position, found.diffuse) == ("camera", (1, 2, 3), (0.5, 0.25, 0))
+
+
+def test_camera_lights_stand_where_vtk_puts_them():
+    renderer = vtkRenderer()
+    camera = renderer.GetActiveCamera()
+    camera.SetPosition(3, -4, 9)
+    camera.SetFocalPoint(1, 1, 2)
+    camera.SetViewUp(0.1, 0.2, 1)
+    light = vtkLight()
+    light.SetLightTypeToCameraLight()
+    light.SetPosition(0.3, -1.5, 0.8)
+    light.SetFocalPoint(0.1, 0.2, -0.3)
+    renderer.AddLight(light)
+    renderer.UpdateLightsGeometryToFollowCamera()
+    position, direction = Light.from_any(light).in_world(Camera.from_any(camera))
+    travel = np.subtract(light.GetTransformedFocalPoint(), light.GetTransformedPosition())
+    np.testing.assert_allclose(position, light.GetTransformedPosition(), rtol=1e-12)
+    np.testing.assert_allclose(direction, travel / np.linalg.norm(travel), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("lights", "message"),
+    [
+        (3, "renderer whose lights are meant; got int"),
+        ([3], "a light must be a Light, a vtkLight or a pyvista.Light; got int"),
+    ],
+)
+def test_what_is_no_light_is_refused_by_name(lights, message):
+    with pytest.raises(InvalidArgumentError, match=message):
+        Lights.from_any(lights)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda p: p.ShadeOn(), r"shading .*ShadeOff\(\)"),
-        (lambda p: p.SetGradientOpacity(gradient(0.5)), "gradient opacity"),
-        (lambda p: p.IndependentComponentsOff(), "dependent components such as RGBA"),
+        (lambda p: p.IndependentComponentsOff(), "dependent components, which are for RGBA"),
         (lambda p: p.SetTransferFunctionModeTo2D(), "2D transfer function"),
         (lambda p: p.SetLabelScalarOpacity(1, gradient(0.5)), "label map"),
     ],
-    ids=["shade", "gradient", "rgba", "2d", "labels"],
+    ids=["rgba", "2d", "labels"],
 )
 def test_properties_that_cannot_be_honoured_are_refused_by_name(change, message):
     prop = linear_property()

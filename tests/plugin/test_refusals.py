@@ -74,9 +74,9 @@ ROWS = {
     ),
     "RGBA": (
         VOLUME,
-        {"scalars": np.zeros((N, 4), np.uint8)},
+        {"scalars": np.zeros((N, 4), np.uint16)},
         errors.UnsupportedError,
-        "are RGB.A. colours.*pass one scalar per point",
+        "no RGBA colours.*or one scalar per point",
     ),
     "texts": (
         VOLUME,
@@ -85,7 +85,7 @@ ROWS = {
         "scalars must be numbers",
     ),
     "flat array": (np.zeros((3, 3)), {}, errors.InvalidVolumeError, r"shape \(3, 3\)"),
-    "RGBA array": (np.zeros((3, 3, 3, 4)), {}, errors.UnsupportedError, "RGB.A. colours"),
+    "RGBA array": (np.zeros((3, 3, 3, 4)), {}, errors.UnsupportedError, "no RGBA colours"),
     "resolution": (
         np.zeros((3, 3, 3)),
         {"resolution": (1, 2)},
@@ -161,7 +161,6 @@ ROWS = {
         "'nearest' or 'linear'",
     ),
     # what a VDI cannot honour
-    "shade": (VOLUME, {"shade": True}, errors.UnsupportedError, "shade=True.*later release"),
     "blending": (
         VOLUME,
         {"blending": "maximum"},

@@ -313,3 +313,67 @@ def test_turned_view_stays_close():
     assert seen.mean() > 0.1
     assert np.abs(ours - judge)[seen].mean() < 3
     assert WINDOW[0] == ours.shape[1]
+
+
+@pytest.mark.parametrize("lighting", ["light kit", "three lights", "none"])
+def test_shaded_by_the_plotter_s_lights(lighting):
+    def scene(plotter, add):
+        add(plotter, soft_ball(), shade=True, ambient=0.2, specular=0.5, specular_power=15)
+        opaque_sphere(plotter)
+
+    assert_as_vtk(scene, lighting=lighting)
+
+
+def test_shaded_by_a_lamp_that_was_added_later():
+    """The lights are read when the VDI is made, not when it is added."""
+
+    def scene(plotter, add):
+        add(plotter, soft_ball(), shade=True)
+        plotter.remove_all_lights()
+        lamp = pv.Light(position=(4, -3, 2), color="orange", positional=True, cone_angle=35)
+        plotter.add_light(lamp)
+
+    assert_as_vtk(scene, lighting="none")
+
+
+def test_other_lights_make_another_vdi():
+    plotter = pv.Plotter(window_size=WINDOW, lighting="none")
+    plotter.add_light(pv.Light(position=(1, 2, 9), light_type="scene light"))
+    actor = add_ours(plotter, soft_ball(), shade=True)
+    plotter.show(auto_close=False)
+    before = actor.vdi
+    plotter.renderer.lights[0].intensity = 0.3
+    plotter.render()
+    dimmed = actor.vdi
+    assert dimmed.color.max() < 0.7 * before.color.max()
+    plotter.camera.Azimuth(20)
+    plotter.render()
+    assert actor.vdi is dimmed
+    plotter.close()
+
+
+@pytest.mark.parametrize("shade", [False, True])
+def test_rgba_scalars(shade):
+    def coloured_ball():
+        ball = soft_ball()
+        x, y, z = (ball.points.T + 1) / 2 * 255
+        alpha = ball["v"] / ball["v"].max() * 255  # VTK looks a narrower range up wrongly
+        ball["v"] = np.column_stack([x, y, z, alpha]).astype(np.uint8)
+        return ball
+
+    def scene(plotter, add):
+        actor = add(plotter, coloured_ball(), shade=shade)
+        if add is add_judge:  # add_volume leaves it at 1
+            actor.prop.SetScalarOpacityUnitDistance(3, LOOKS["opacity_unit_distance"])
+
+    assert_as_vtk(scene)
+
+
+def test_rgba_scalars_have_an_opacity_of_their_own():
+    ball = soft_ball()
+    colors = np.zeros((ball.n_points, 4), np.uint8)
+    plotter = pv.Plotter()
+    with pytest.warns(VDIWarning, match="RGBA scalars bring theirs"):
+        plotter.add_vdi(ball, scalars=colors, opacity="sigmoid")
+    assert not plotter.scalar_bars
+    plotter.close()

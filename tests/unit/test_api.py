@@ -174,7 +174,6 @@ def test_an_unknown_keyword_is_a_type_error(name, suggestion, volume, camera):
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        ({"shade": True}, UnsupportedError, "shade=True: lighting is not supported yet, a later"),
         ({"blending": "maximum"}, UnsupportedError, "blending='maximum' is not supported"),
         ({"interpolation": "cubic"}, InvalidArgumentError, "must be 'nearest' or 'linear'"),
         ({"preference": "row"}, InvalidArgumentError, "preference must be 'point' or 'cell'"),
