@@ -102,7 +102,7 @@ def test_passing_by_transparent_blocks_changes_no_bit(runtime, monkeypatch, inte
 
 def _without_skipping(device_volume):
     class LooksAtEverything(device_volume):
-        def __init__(self, *arguments):
-            super().__init__(*arguments, skip_empty=False)
+        def __init__(self, *arguments, **keywords):
+            super().__init__(*arguments, skip_empty=False, **keywords)
 
     return LooksAtEverything

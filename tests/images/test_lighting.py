@@ -11,8 +11,8 @@ from pyvista_vdi.volume import Volume
 
 WINDOW = (480, 270)
 
-#: The issue's bound. Measured on these cases with Mesa's llvmpipe: 0.9984 at V_O, 0.9832 at
-#: 10 degrees, where a VDI of the unshaded brain has 0.985 as well: a list is two voxels wide here.
+#: The issue's bound. Measured on these cases with Mesa's llvmpipe: at least 0.9987 at V_O, and at 10
+#: degrees 0.9831, where a VDI of the unshaded brain has 0.985: a list is two voxels wide here.
 SSIM_TO_VTK = 0.98
 
 GRADIENT = ((0.0, 0.0), (20.0, 1.0))
@@ -32,13 +32,14 @@ CASES = {
 def the_property(volume, case):
     from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
 
-    from pyvista_vdi.plotting.classify import lookup_table, volume_property
+    from pyvista_vdi.plotting.classify import depend_on_alpha, lookup_table, volume_property
 
     table = lookup_table(volume.array, **TRANSFER_FUNCTIONS["soft"])
     prop = volume_property(table, volume.default_unit_distance, "linear")
     prop.shade = case.get("shade", False)
     prop.diffuse, prop.specular, prop.specular_power = 0.7, 0.2, 10.0
-    prop.independent_components = not volume.rgba
+    if volume.rgba:
+        depend_on_alpha(prop, volume.default_unit_distance)
     if "gradient" in case:
         function = vtkPiecewiseFunction()
         for node in case["gradient"]:
@@ -64,9 +65,14 @@ def put_lights(renderer, kind):
 
 
 def coloured(volume):
-    """The same opacities under colours that change with the place."""
+    """The scalars as opacities, under colours that change with the place.
+
+    They span all bytes: VTK looks the opacities of a narrower range up elsewhere
+    (docs/conventions.md).
+    """
+    alpha = np.round(volume.array / volume.array.max() * 255.0)
     z, y, x = np.meshgrid(*(np.linspace(0, 255, n) for n in volume.array.shape), indexing="ij")
-    colors = np.stack([x, y, z, volume.array], axis=-1).astype(np.uint8)
+    colors = np.stack([x, y, z, alpha], axis=-1).astype(np.uint8)
     return Volume(colors, volume.spacing, volume.origin, volume.direction)
 
 
@@ -101,6 +107,6 @@ def test_pictures_are_those_of_vtk(name, default_runtime):
         k: compare_images(np.clip(image[..., :3], 0, 1), theirs).ssim
         for k, (image, theirs) in own.items()
     }
-    print(name, found)
     assert min(found.values()) >= SSIM_TO_VTK, found
-    assert found["raycaster"] >= 0.995, found
+    # VTK samples half a step further on, in a framebuffer of bytes
+    assert found["raycaster"] >= 0.998, found

@@ -35,7 +35,7 @@ def marched(
     offsets = np.column_stack([x + 0.5 - window[0] / 2, y + 0.5 - window[1] / 2])
     n, capacity = len(offsets), int(volume.length / medium.sample_distance) + 4
     results = call(
-        FILE, "marches", n, *medium.medium_arguments, forms, np.int32(n_planes),
+        FILE, "marches", n, *medium.medium_arguments(camera), forms, np.int32(n_planes),
         offsets.astype(np.float32), np.float32(medium.sample_distance),
         np.float32(medium.unit_distance), np.float32(t_end), np.int32(group), np.int32(capacity),
         call.empty(n, 4), call.empty(n, dtype=np.int32), call.empty(n, capacity),

@@ -14,7 +14,7 @@ from pyvista_vdi.raycast_volume import raycast_volume
 WINDOW = (7, 6)
 
 #: Largest difference from the reference, of 1: float32 against float64, see test_lighting.py.
-TOLERANCE = 1e-4
+TOLERANCE = 1e-5
 
 
 def rgba_volume(rng, **options):

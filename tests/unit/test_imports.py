@@ -34,6 +34,7 @@ CORE = {
     "camera",
     "compositing",
     "errors",
+    "lighting",
     "transfer_function",
     "vdi",
     "volume",
