@@ -75,8 +75,8 @@ def generator(runtime):
     assert not threads()
 
 
-@pytest.fixture(autouse=True)
-def _many_slices(monkeypatch):
+@pytest.fixture
+def many_slices(monkeypatch):
     """Four rows of lists at a time, so that these small VDIs are made of several slices."""
     monkeypatch.setattr(generation, "_SLICE_BYTES", 1)
 
@@ -105,7 +105,7 @@ class Gate:
 
 
 @pytest.fixture
-def gate(monkeypatch):
+def gate(many_slices, monkeypatch):
     made = Gate(monkeypatch)
     yield made
     made.open()
@@ -114,6 +114,7 @@ def gate(monkeypatch):
 # -- what is made ----------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("many_slices")
 @pytest.mark.parametrize("dtype", ["f4", "u1", "f8"])
 @pytest.mark.parametrize("parallel", [False, True])
 def test_the_same_bytes(runtime, generator, dtype, parallel):
@@ -139,6 +140,7 @@ def test_the_same_bytes(runtime, generator, dtype, parallel):
     np.testing.assert_array_equal(*images)
 
 
+@pytest.mark.usefixtures("many_slices")
 def test_pieces_of_any_size_give_the_same_bytes(runtime, generator, monkeypatch):
     expected = make(runtime)
     for items in (1, 700):
@@ -395,6 +397,7 @@ def test_arguments_are_refused_at_once(runtime, generator):
 # -- frames meanwhile ------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("many_slices")
 def test_frames_meanwhile_are_the_same_to_the_last_bit(runtime, generator):
     old = make(runtime)
     views = [CAMERA.azimuth(angle) for angle in (0, 15, 170)]
@@ -403,7 +406,7 @@ def test_frames_meanwhile_are_the_same_to_the_last_bit(runtime, generator):
     frames = 0
     for turn in range(5):
         start(generator, CAMERA.azimuth(40 + turn))
-        while generator.running:
+        while generator.running or frames <= turn:
             with runtime.foreground():
                 for view, image in zip(views, before, strict=True):
                     np.testing.assert_array_equal(render_vdi(old, view, device=runtime), image)
@@ -411,7 +414,7 @@ def test_frames_meanwhile_are_the_same_to_the_last_bit(runtime, generator):
             np.testing.assert_array_equal(volume_now, volume_before)
             frames += 1
         assert generator.take().equals(make(runtime, CAMERA.azimuth(40 + turn)))
-    assert frames >= 5
+    assert frames >= 5  # many more, unless the machine is busy
 
 
 def test_a_volume_that_both_threads_need_first(runtime, generator):
@@ -421,7 +424,8 @@ def test_a_volume_that_both_threads_need_first(runtime, generator):
         transfer = TRANSFER.replace(scalar_range=(0, 1))
         camera = Camera((20, 20, 130), (20, 20, 20), (0, 1, 0))
         generator.start(volume, camera, WINDOW, transfer)
-        while generator.running:
+        image = None
+        while generator.running or image is None:
             with runtime.foreground():
                 image = raycast_volume(volume, camera, WINDOW, transfer, device=runtime)
         vdi = generator.take()
@@ -479,15 +483,13 @@ def resident_bytes():
     return pages * resource.getpagesize()
 
 
-#: How much RAM many regenerations may add, bytes. Measured for 200 on two platforms: 8 and 26 MiB,
-#: the allocator's; each of these VDIs takes 3 MiB on the host and as much on the device, so one in
-#: ten that stayed would show.
-RAM_TOLERANCE = 60 * 2**20
+#: How much RAM many regenerations may add, bytes. Measured on two platforms: 0 to 4 MiB for 8, 20
+#: and 200, and up to 30 MiB where the allocator's pools had not filled before. Each of these VDIs
+#: takes 4 MiB on the host and as much on the device: of 200, one in forty that stayed would show.
+RAM_TOLERANCE = 40 * 2**20
 
 
-@pytest.mark.parametrize(
-    "times", [20, pytest.param(200, marks=pytest.mark.slow, id="200-in-a-row")]
-)
+@pytest.mark.parametrize("times", [8, pytest.param(200, marks=pytest.mark.slow, id="200-in-a-row")])
 def test_many_regenerations_leave_nothing(runtime, generator, times):
     """Frames of the old VDI meanwhile, and each new one takes its place."""
     window = (160, 120)
@@ -514,7 +516,8 @@ def test_many_regenerations_leave_nothing(runtime, generator, times):
         assert threading.active_count() <= others + 1
     vdi = regenerate(vdi, 0)
     gc.collect()
-    assert runtime.allocated == allocated
+    # Whether an array is used in place depends on where the allocator puts it
+    assert abs(runtime.allocated - allocated) <= vdi.offsets.nbytes
     assert len(runtime._queues) == 1
     generator.cancel(wait=True)
     assert threading.active_count() == others

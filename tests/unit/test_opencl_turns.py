@@ -111,9 +111,10 @@ def test_frames_without_pause_leave_a_turn_each(monkeypatch):
     frames = 0
     thread = InThread(work)
     wait(begun)
-    while not done.is_set():
+    while not done.is_set() and frames < 10_000:
         with each.foreground():
             frames += 1
+    assert done.is_set(), "background work does not get on"
     thread.value()
     assert frames_before == list(range(1, 21))
 
