@@ -1,4 +1,4 @@
-"""The verb ``generate``: a volume becomes a .vdi file."""
+"""The verb ``generate``: a volume becomes a file that holds a VDI."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..io import checked_target
 from ..plotting.progress import DelayedBar
 from ..standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
 from ..volume import Volume
-from .inputs import camera, classification, has_own_place, read_volume
+from .inputs import camera, classification, file_options, has_own_place, read_volume
 
 
 def generate(options: argparse.Namespace) -> int:
@@ -50,7 +50,7 @@ def generate(options: argparse.Namespace) -> int:
     finally:
         bar.close()
     seconds = time.perf_counter() - start
-    vdi.save(target, compression=options.compression, level=options.level)
+    vdi.save(target, **file_options(options))
     print(
         f"{options.output}: {vdi.n_supersegments} supersegments in {options.size[0]} x "
         f"{options.size[1]} lists, {target.stat().st_size / 2**20:.1f} MiB, {seconds:.1f} s"

@@ -88,6 +88,23 @@ def camera(options: argparse.Namespace, default: Camera) -> Camera:
     return view.elevation(options.elevation) if options.elevation else view
 
 
+def given_camera(options: argparse.Namespace) -> Camera | None:
+    """Return the view in the file that ``--camera-json`` names, if it was given."""
+    if options.camera_json is None:
+        return None
+    return _from_json(options.camera_json, Camera.from_dict, "camera")
+
+
+def file_options(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the arguments of ``VDI.save`` that the options stand for."""
+    given: dict[str, Any] = {"level": options.level}
+    if options.compression is not None:
+        given["compression"] = options.compression
+    if options.standard_channels:
+        given["exact"] = False
+    return given
+
+
 def has_own_place(options: argparse.Namespace) -> bool:
     """Whether the options say where the eye is, instead of turning the default view."""
     names = ("camera_json", "position", "focal_point", "view_up", "parallel_scale")

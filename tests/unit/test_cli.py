@@ -17,7 +17,7 @@ from pyvista_vdi import cli, io
 from pyvista_vdi.cli import parser
 from pyvista_vdi.standard_cases import filling_camera
 
-VERBS = ("devices", "generate", "render", "view", "info", "compare")
+VERBS = ("devices", "generate", "render", "view", "info", "compare", "convert")
 
 
 @pytest.fixture(autouse=True)
