@@ -36,9 +36,10 @@ def convert(options: argparse.Namespace) -> int:
     from .inputs import file_options, given_camera
 
     target = checked_target(options.output)
+    file_arguments = file_options(options)
     foreign = {"camera": given_camera(options), "thickness": options.thickness}
     vdi = read(options.file, **{name: v for name, v in foreign.items() if v is not None})
-    vdi.save(target, **file_options(options))
+    vdi.save(target, **file_arguments)
     print(
         f"{options.output}: {vdi.n_supersegments} supersegments in {vdi.window_size[0]} x "
         f"{vdi.window_size[1]} lists, {_mebibytes(target.stat().st_size)}"

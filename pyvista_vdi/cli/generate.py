@@ -20,6 +20,7 @@ from .inputs import camera, classification, file_options, has_own_place, read_vo
 def generate(options: argparse.Namespace) -> int:
     """Generate a VDI and write it."""
     target = checked_target(options.output)
+    file_arguments = file_options(options)
     arguments = classification(options)
     Classification(arguments, "generate")  # refused before the volume is read
     volume = read_volume(options)
@@ -50,7 +51,7 @@ def generate(options: argparse.Namespace) -> int:
     finally:
         bar.close()
     seconds = time.perf_counter() - start
-    vdi.save(target, **file_options(options))
+    vdi.save(target, **file_arguments)
     print(
         f"{options.output}: {vdi.n_supersegments} supersegments in {options.size[0]} x "
         f"{options.size[1]} lists, {target.stat().st_size / 2**20:.1f} MiB, {seconds:.1f} s"

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from ..api import as_volume
 from ..camera import Camera
 from ..errors import InvalidArgumentError, VDIError
+from ..io import check_write_options
 from ..standard_cases import TRANSFER_FUNCTIONS
 from ..transfer_function import TransferFunction
 from ..volume import Volume
@@ -96,12 +97,13 @@ def given_camera(options: argparse.Namespace) -> Camera | None:
 
 
 def file_options(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments of ``VDI.save`` that the options stand for."""
+    """Return the arguments of ``VDI.save`` that the options stand for; refused now, not later."""
     given: dict[str, Any] = {"level": options.level}
     if options.compression is not None:
         given["compression"] = options.compression
     if options.standard_channels:
         given["exact"] = False
+    check_write_options(options.output, given)
     return given
 
 

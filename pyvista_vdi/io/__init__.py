@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .files import SUFFIXES, checked_target, read, read_info, write
+from .files import SUFFIXES, check_write_options, checked_target, read, read_info, write
 from .layout import FORMAT_VERSION, SUFFIX
 from .png import checked_png_target, to_bytes, write_png
 from .reader import FileInfo
@@ -14,6 +14,7 @@ __all__ = [
     "SUFFIXES",
     "FileInfo",
     "check_writable",
+    "check_write_options",
     "checked_png_target",
     "checked_target",
     "read",

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..compositing import opacity
-from ..errors import InvalidArgumentError, InvalidCameraError, VDIError, VDIFileError, VDIWarning
+from ..errors import InvalidCameraError, VDIError, VDIFileError, VDIWarning
 from ..vdi import VDI
 from .description import describe, from_json, number, to_json
 from .exr_layout import DeepImage, OtherFormError, matrix_attribute, read_image, write_image
@@ -82,16 +82,11 @@ def write(
     ------
     VDIFileError
         If the target cannot be written, or the metadata hold what JSON cannot.
-    InvalidArgumentError
-        If the compression or its level is unknown.
+
+    See Also
+    --------
+    pyvista_vdi.io.write : checks the options first.
     """
-    if compression not in COMPRESSIONS:
-        raise InvalidArgumentError(
-            f"compression of an .exr file must be one of {', '.join(COMPRESSIONS)}; "
-            f"got {compression!r}"
-        )
-    if isinstance(level, bool) or not isinstance(level, int) or not 1 <= level <= 9:
-        raise InvalidArgumentError(f"level must be a whole number from 1 to 9; got {level!r}")
     offset = _depth_offset(vdi)
     names = [*_STANDARD, *(("tau", *_COLOR_BITS) if exact else ())]
     if exact and offset != 0:
@@ -202,8 +197,9 @@ def _encoded(vdi: VDI, part: slice, offset: float, exact: bool) -> dict[str, NDA
 def _depth(relative: NDArray[np.float32], offset: float) -> NDArray[np.float32]:
     if offset == 0:
         return relative
-    # The nearest may come out as -0.0 or a rounding below 0
-    return np.maximum(relative.astype(np.float64) + offset, 0).astype(np.float32)
+    # The nearest may come out as -0.0 or a rounding below 0, the farthest beyond float32
+    with np.errstate(over="ignore"):
+        return np.maximum(relative.astype(np.float64) + offset, 0).astype(np.float32)
 
 
 # -- what a reader computes from the standard channels, exactly as IEEE 754 says -------------------
@@ -214,7 +210,8 @@ def _relative(depth: NDArray[np.float32], offset: float) -> NDArray[np.float32]:
     if offset == 0:
         return depth
     relative = depth.astype(np.float64) - offset
-    return np.where(np.abs(relative) < _SMALLEST, 0, relative).astype(np.float32)
+    with np.errstate(over="ignore"):
+        return np.where(np.abs(relative) < _SMALLEST, 0, relative).astype(np.float32)
 
 
 def _straight(color: NDArray[np.float32], alpha: NDArray[np.float32]) -> NDArray[np.float32]:

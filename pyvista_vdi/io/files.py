@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ..errors import InvalidArgumentError, VDIFileError
 from ..vdi import VDI
 from . import exr, layout, reader, writer
+from .chunks import CODECS
 from .reader import FileInfo
 from .whole_file import check_writable, with_suffix
 
@@ -49,10 +51,9 @@ def write(vdi: VDI, path: str | os.PathLike[str], **options: Any) -> Path:
     read : reads it again.
     """
     target = checked_target(path)
+    check_write_options(target, options)
     if _is_exr(target):
-        _check_options("written", target, options, ("compression", "level", "exact"))
         return exr.write(vdi, target, **options)
-    _check_options("written", target, options, ("compression", "level"))
     return writer.write(vdi, target, **options)
 
 
@@ -80,9 +81,9 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
         If an option is unknown.
     """
     if _is_exr(path):
-        _check_options("read", path, options, ("camera", "thickness"))
+        _check_names("read", path, options, ("camera", "thickness"))
         return exr.read(path, **options)
-    _check_options("read", path, options, ())
+    _check_names("read", path, options, ())
     return reader.read(path)
 
 
@@ -132,11 +133,28 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
     return check_writable(with_suffix(target, SUFFIXES, "a VDI"))
 
 
+def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]) -> None:
+    """Raise InvalidArgumentError now if :func:`write` would refuse an option for this file."""
+    names: tuple[str, ...] = ("compression", "level")
+    compressions: tuple[str, ...] = (*CODECS, "none")
+    if _is_exr(path):
+        names, compressions = (*names, "exact"), exr.COMPRESSIONS
+    _check_names("written", path, options, names)
+    compression, level = options.get("compression", compressions[0]), options.get("level", 1)
+    if compression not in compressions:
+        raise InvalidArgumentError(
+            f"compression of {path} must be one of {', '.join(compressions[:-1])} and "
+            f"{compressions[-1]}; got {compression!r}"
+        )
+    if isinstance(level, bool) or not isinstance(level, int) or not 1 <= level <= 9:
+        raise InvalidArgumentError(f"level must be a whole number from 1 to 9; got {level!r}")
+
+
 def _is_exr(path: Any) -> bool:
     return str(path).lower().endswith(exr.SUFFIX)
 
 
-def _check_options(what: str, path: Any, options: dict[str, Any], known: tuple[str, ...]) -> None:
+def _check_names(what: str, path: Any, options: Mapping[str, Any], known: tuple[str, ...]) -> None:
     unknown = sorted(set(options) - set(known))
     if unknown:
         raise InvalidArgumentError(

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidArgumentError
 from ..vdi import VDI
-from .chunks import CHUNK_ROWS, CODECS, write_chunks
+from .chunks import CHUNK_ROWS, write_chunks
 from .description import describe, to_json
 from .layout import DESCRIPTION, Layout, layouts
 from .whole_file import whole_file
@@ -51,19 +50,11 @@ def write(
     ------
     VDIFileError
         If the target cannot be written, or the metadata hold what JSON cannot.
-    InvalidArgumentError
-        If the compression or its level is unknown.
 
     See Also
     --------
-    read : reads it again.
+    pyvista_vdi.io.write : checks the options first.
     """
-    if compression not in (*CODECS, "none"):
-        raise InvalidArgumentError(
-            f"compression must be one of {', '.join(CODECS)} and none; got {compression!r}"
-        )
-    if isinstance(level, bool) or not isinstance(level, int) or not 1 <= level <= 9:
-        raise InvalidArgumentError(f"level must be a whole number from 1 to 9; got {level!r}")
     counts = _smallest(np.diff(vdi.offsets))
     arrays = layouts(
         vdi.window_size, vdi.n_supersegments, counts.dtype, filtered=compression != "none"

@@ -199,7 +199,7 @@ def test_the_standards_channels_are_everybodys(file):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"compression": "zstd"}, r"an \.exr file must be one of zips, none; got 'zstd'"),
+        ({"compression": "zstd"}, r"of .*a\.exr must be one of zips and none; got 'zstd'"),
         ({"level": 0}, "level must be a whole number from 1 to 9; got 0"),
         ({"color": "half"}, "options compression, level, exact; got color"),
     ],
@@ -758,6 +758,12 @@ def test_convert_a_foreign_file(capsys, tmp_path):
     options = ["--thickness", "0.5", "--camera-json", tmp_path / "view.json"]
     assert run(capsys, "convert", path, "-o", target, *options)[0] == 0
     assert pvdi.read(target).camera == VIEW
+
+
+def test_options_of_the_file_are_refused_before_the_work(capsys, tmp_path):
+    arguments = ["generate", "--example", "no such volume", "-o", tmp_path / "a.exr"]
+    status, _, error = run(capsys, *arguments, "--compression", "zstd")
+    assert (status, "must be one of zips and none; got 'zstd'" in error) == (1, True)
 
 
 def test_info_and_render_take_exr(capsys, file, tmp_path, default_runtime):
