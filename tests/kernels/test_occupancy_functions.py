@@ -93,6 +93,18 @@ def test_depth_coordinates_grow_with_depth_and_lead_back(call, runtime, distance
         assert (np.abs(reciprocals * depth - 1) <= rounding).all()
 
 
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize(("distance", "origin"), LENSES)
+def test_the_form_of_the_depth_coordinate_costs_no_digits(runtime, distance, origin, parallel):
+    """The margin is what depths are rounded by: in any form at most what absolute depths are, and
+    a thousandth of a slab where depths are counted from the near depth of the bounds."""
+    prepared, depth_origin = prepared_for(runtime, distance, origin, parallel=parallel)
+    grid = prepared.occupancy
+    assert grid.margin <= 32 * 2.0**-23 * 3 * max(distance + 1, depth_origin)
+    if origin == 1 and distance > 1.5:
+        assert grid.margin * grid.slabs_per_depth < 1e-3
+
+
 @pytest.mark.parametrize("away", [True, False])
 @pytest.mark.parametrize("parallel", [False, True])
 @pytest.mark.parametrize(("distance", "origin"), LENSES)

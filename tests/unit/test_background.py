@@ -14,9 +14,16 @@ import numpy as np
 import pytest
 from fresh_python import run_python
 
-from pyvista_vdi import Camera, TransferFunction, Volume, background, generation
+from pyvista_vdi import (
+    Camera,
+    TransferFunction,
+    Volume,
+    background,
+    device_volume,
+    generation,
+)
 from pyvista_vdi.background import BackgroundGeneration
-from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.opencl_runtime import turns
 from pyvista_vdi.raycast import prepared_vdi, render_vdi
@@ -82,10 +89,11 @@ def many_slices(monkeypatch):
 
 
 class Gate:
-    """Holds a generation in its middle until it is opened."""
+    """Holds a generation in its middle until it is opened; ``cancelled`` are those given up."""
 
     def __init__(self, monkeypatch):
         self.reached, self._open = threading.Event(), threading.Event()
+        self.cancelled = []
         monkeypatch.setattr(background, "generate_vdi", self._gated)
 
     def _gated(self, *arguments, progress, **options):
@@ -95,7 +103,11 @@ class Gate:
                 self.reached.set()
                 self._open.wait(PATIENCE)
 
-        return generate_vdi(*arguments, progress=report, **options)
+        try:
+            return generate_vdi(*arguments, progress=report, **options)
+        except Cancelled as reason:
+            self.cancelled.append(str(reason))
+            raise
 
     def wait(self):
         assert self.reached.wait(PATIENCE)
@@ -265,6 +277,28 @@ def test_a_new_start_replaces_what_is_being_made(runtime, generator, gate):
     assert generator.take() is None
 
 
+def test_what_is_finished_too_late_is_dropped(runtime, monkeypatch):
+    """After its last piece of work nothing stops a generation: it may not pass for the next one."""
+    finished, replaced, calls = threading.Event(), threading.Event(), []
+
+    def render_and_wait(*arguments, **options):
+        render_vdi(*arguments, **options)
+        if not finished.is_set():
+            finished.set()
+            replaced.wait(PATIENCE)
+
+    monkeypatch.setattr(background, "render_vdi", render_and_wait)
+    with BackgroundGeneration(runtime, on_finished=lambda: calls.append(1)) as generator:
+        start(generator, key="old")
+        assert finished.wait(PATIENCE)
+        start(generator, CAMERA.azimuth(10), key="new")
+        replaced.set()
+        vdi = taken(generator)
+        generator.cancel(wait=True)
+    assert vdi.equals(make(runtime, CAMERA.azimuth(10)))
+    assert calls == [1]
+
+
 def test_a_new_start_replaces_what_was_not_taken(runtime, generator):
     start(generator, key=1)
     finish(generator)
@@ -310,6 +344,7 @@ def test_collected_in_the_middle(runtime, gate):
     gate.open()
     thread.join(PATIENCE)
     assert not thread.is_alive()
+    assert len(gate.cancelled) == 1
 
 
 def test_the_interpreter_ends_in_the_middle(runtime):
@@ -417,13 +452,17 @@ def test_frames_meanwhile_are_the_same_to_the_last_bit(runtime, generator):
     assert frames >= 5  # many more, unless the machine is busy
 
 
-def test_a_volume_that_both_threads_need_first(runtime, generator):
+def test_a_volume_that_both_threads_need_first(runtime, generator, monkeypatch):
     """One uploads it, and neither waits for the other's frame or turn for ever."""
-    for seed in range(5):
-        volume = Volume(np.random.default_rng(seed).random((40, 40, 40)))
+    monkeypatch.setattr(runtime._turns, "_turn", lambda: 1e-9)  # over within any piece of work
+    for seed in range(3):
+        volume = Volume(np.random.default_rng(seed).random((100, 100, 100)))
         transfer = TRANSFER.replace(scalar_range=(0, 1))
-        camera = Camera((20, 20, 130), (20, 20, 20), (0, 1, 0))
+        camera = Camera((50, 50, 300), (50, 50, 50), (0, 1, 0))
         generator.start(volume, camera, WINDOW, transfer)
+        uploads = device_volume._uploads
+        while generator.running and not (volume in uploads and uploads[volume].lock.locked()):
+            pass  # the worker comes first, or not at all
         image = None
         while generator.running or image is None:
             with runtime.foreground():
