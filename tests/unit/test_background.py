@@ -522,7 +522,7 @@ def resident_bytes():
     return pages * resource.getpagesize()
 
 
-#: How much RAM many regenerations may add, bytes. Measured on two platforms: 0 to 4 MiB for 8, 20
+#: How much RAM many regenerations may add, bytes. Measured on two platforms: 0 to 4 MiB for 20
 #: and 200, and up to 30 MiB where the allocator's pools had not filled before. Each of these VDIs
 #: takes 4 MiB on the host and as much on the device: of 200, one in forty that stayed would show.
 RAM_TOLERANCE = 40 * 2**20
