@@ -102,7 +102,7 @@ install_system_packages() {
         return 0
     fi
     local package missing=()
-    for package in pocl-opencl-icd libegl1 libgl1-mesa-dri "$@"; do
+    for package in pocl-opencl-icd libegl1 libgl1-mesa-dri xvfb libgl1 "$@"; do
         dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
             missing+=("$package")
     done

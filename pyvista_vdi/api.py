@@ -286,28 +286,40 @@ def render_volume(
     )
 
 
-def read(path: str | os.PathLike[str]) -> VDI:
-    """Read a VDI from a file that :meth:`VDI.save` wrote.
+def read(path: str | os.PathLike[str], **options: Any) -> VDI:
+    """Read a VDI from a file that :meth:`VDI.save` wrote, or from any deep OpenEXR image.
 
     Parameters
     ----------
     path : path-like
-        A ``.vdi`` file.
+        A ``.vdi`` file, or an OpenEXR deep image, whose name ends in ``.exr``.
+    **options
+        For ``.exr`` files of other programs: ``camera``, the view that the image shows, where
+        the file does not say it; ``thickness``, world units, given to samples that have none
+        (surfaces).
 
     Returns
     -------
     VDI
-        The same to the last bit.
+        The same to the last bit if this package wrote the file; what is lost with other programs'
+        files is said in the documentation of files.
 
     Raises
     ------
     VDIFileError
         If the file is absent, foreign, of a newer version, truncated or damaged; the message
         says which.
+    InvalidArgumentError
+        If an option is not one of the file's format.
+
+    Warns
+    -----
+    VDIWarning
+        If an ``.exr`` file of ours was changed by another program, or has colours outside 0 to 1.
     """
     from .io import read as read_file
 
-    return read_file(path)
+    return read_file(path, **options)
 
 
 def estimate(volume: Any, window_size: Sequence[int], *, max_supersegments: int = 20) -> Estimate:

@@ -125,9 +125,9 @@ class OccupancyGrid:
 def _looked_up(vdi: VDI, near: float, far: float, shifted: bool) -> float:
     """Return the size of what the raycaster rounds where it looks up a depth, world units.
 
-    That is the offset from the VDI's depth origin, and the depth coordinate times the change of
-    depth with it: 1 in parallel projection, and with view depth Z, Z**2 of -1 / Z and
-    Z**2 / depth_origin of the long lens's (``opencl/common/list_space.cl``).
+    That is the offset from the VDI's depth origin and, in perspective, the depth coordinate times
+    the change of view depth Z with it: Z**2 for -1 / Z, Z**2 / depth_origin for the long lens's
+    (``opencl/common/list_space.cl``; docs/conventions.md, "Occupancy grid").
     """
     origin = vdi.depth_origin
     offset = max(abs(near - origin), abs(far - origin))
@@ -153,6 +153,7 @@ def _share_in_bounds(vdi: VDI, near: float, far: float) -> float:
             crossing = -value / slope
         first = np.where(slope > 0, np.maximum(first, crossing), first)
         last = np.where(slope < 0, np.minimum(last, crossing), last)
+        last = np.where((slope == 0) & (value < 0), first, last)  # beside the bounds
     depth = far - near
     return float(np.maximum(last - first, 0).mean() / depth) if depth > 0 else 0.0
 

@@ -134,7 +134,10 @@ class VDI:
     # -- files -----------------------------------------------------------------------------------
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a file that :func:`pyvista_vdi.read` opens; see :func:`pyvista_vdi.io.write`."""
+        """Write a ``.vdi`` or ``.exr`` file that :func:`pyvista_vdi.read` opens.
+
+        The options are those of :func:`pyvista_vdi.io.write`.
+        """
         from .io import write  # the file format's libraries are loaded only where a file is made
 
         return write(self, path, **options)

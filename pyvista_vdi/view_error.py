@@ -332,7 +332,7 @@ class ViewErrorEstimator:
         losses = 1.0 - scene.tiles_ssim(cells.corners[chosen], cells.tile_size)
         total, error = _ratio_estimate(losses, chances[chosen], guess[chosen], guess.sum())
         share = cells.area / n / math.prod(edge - 2 * _REACH for edge in size)
-        return ViewError(1.0 - share * total, share * error, *where, len(losses))
+        return ViewError(float(1.0 - share * total), float(share * error), *where, len(losses))
 
 
 class _Scene:

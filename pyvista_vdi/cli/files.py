@@ -1,4 +1,4 @@
-"""The verbs that only report: ``devices`` and ``info``."""
+"""The verbs that report, ``devices`` and ``info``, and ``convert``."""
 
 from __future__ import annotations
 
@@ -21,11 +21,29 @@ def devices(options: argparse.Namespace) -> int:
 
 
 def info(options: argparse.Namespace) -> int:
-    """Print what a .vdi file says about itself."""
+    """Print what a file says about itself."""
     from ..io import FileInfo, read_info
 
     about: FileInfo = read_info(options.file)
     print(json.dumps(_plain(about), indent=1) if options.json else _text(about))
+    return 0
+
+
+def convert(options: argparse.Namespace) -> int:
+    """Read a VDI and write it in the format of another name."""
+    from ..api import read
+    from ..io import checked_target
+    from .inputs import file_options, given_camera
+
+    target = checked_target(options.output)
+    file_arguments = file_options(options)
+    foreign = {"camera": given_camera(options), "thickness": options.thickness}
+    vdi = read(options.file, **{name: v for name, v in foreign.items() if v is not None})
+    vdi.save(target, **file_arguments)
+    print(
+        f"{options.output}: {vdi.n_supersegments} supersegments in {vdi.window_size[0]} x "
+        f"{vdi.window_size[1]} lists, {_mebibytes(target.stat().st_size)}"
+    )
     return 0
 
 

@@ -1,4 +1,4 @@
-"""The verb ``generate``: a volume becomes a .vdi file."""
+"""The verb ``generate``: a volume becomes a file that holds a VDI."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from ..io import checked_target
 from ..plotting.progress import DelayedBar
 from ..standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
 from ..volume import Volume
-from .inputs import camera, classification, has_own_place, read_volume
+from .inputs import camera, classification, file_options, has_own_place, read_volume
 
 
 def generate(options: argparse.Namespace) -> int:
     """Generate a VDI and write it."""
     target = checked_target(options.output)
+    file_arguments = file_options(options)
     arguments = classification(options)
     Classification(arguments, "generate")  # refused before the volume is read
     volume = read_volume(options)
@@ -50,7 +51,7 @@ def generate(options: argparse.Namespace) -> int:
     finally:
         bar.close()
     seconds = time.perf_counter() - start
-    vdi.save(target, compression=options.compression, level=options.level)
+    vdi.save(target, **file_arguments)
     print(
         f"{options.output}: {vdi.n_supersegments} supersegments in {options.size[0]} x "
         f"{options.size[1]} lists, {target.stat().st_size / 2**20:.1f} MiB, {seconds:.1f} s"

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from ..api import as_volume
 from ..camera import Camera
 from ..errors import InvalidArgumentError, VDIError
+from ..io import check_write_options
 from ..standard_cases import TRANSFER_FUNCTIONS
 from ..transfer_function import TransferFunction
 from ..volume import Volume
@@ -86,6 +87,24 @@ def camera(options: argparse.Namespace, default: Camera) -> Camera:
     if options.azimuth:
         view = view.azimuth(options.azimuth)
     return view.elevation(options.elevation) if options.elevation else view
+
+
+def given_camera(options: argparse.Namespace) -> Camera | None:
+    """Return the view in the file that ``--camera-json`` names, if it was given."""
+    if options.camera_json is None:
+        return None
+    return _from_json(options.camera_json, Camera.from_dict, "camera")
+
+
+def file_options(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the arguments of ``VDI.save`` that the options stand for; refused now, not later."""
+    given: dict[str, Any] = {"level": options.level}
+    if options.compression is not None:
+        given["compression"] = options.compression
+    if options.standard_channels:
+        given["exact"] = False
+    check_write_options(options.output, given)
+    return given
 
 
 def has_own_place(options: argparse.Namespace) -> bool:

@@ -16,6 +16,9 @@ from ..standard_cases import ANGLES, ELEVATION, TRANSFER_FUNCTIONS, WINDOW_SIZE
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
 
+_VDI_FILE = "a .vdi file, or an .exr deep image"
+_VDI_TARGET = ".vdi or .exr to write"
+
 
 class UsageError(Exception):
     """A mistake in the arguments; the message says which and what is right."""
@@ -112,25 +115,56 @@ def _add_devices(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_info(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="a .vdi file")
+    parser.add_argument("file", metavar="FILE", help=_VDI_FILE)
     parser.add_argument("--json", action="store_true", help="print JSON, with all metadata")
 
 
 def _add_generate(parser: argparse.ArgumentParser) -> None:
     _add_volume(parser)
-    parser.add_argument("-o", "--output", metavar="FILE", required=True, help=".vdi to write")
+    parser.add_argument("-o", "--output", metavar="FILE", required=True, help=_VDI_TARGET)
     _add_size(parser, WINDOW_SIZE)
     _add_camera(parser, f"the view that the volume fills, {ELEVATION:g} degrees above its middle")
     _add_classification(parser)
     _add_limits(parser)
-    group = parser.add_argument_group("file")
-    group.add_argument("--compression", choices=("zstd", "lz4", "none"), default="zstd")
-    group.add_argument("--level", type=int, default=1, help="1 (fast, default) to 9 (small)")
+    _add_file(parser)
     _add_device(parser)
 
 
+def _add_convert(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help=_VDI_FILE)
+    parser.add_argument("-o", "--output", metavar="FILE", required=True, help=_VDI_TARGET)
+    _add_file(parser)
+    group = parser.add_argument_group("deep images of other programs")
+    group.add_argument(
+        "--camera-json",
+        metavar="FILE",
+        help="the view that the image shows, where it does not say it: Camera.to_dict() as JSON",
+    )
+    group.add_argument(
+        "--thickness",
+        type=float,
+        metavar="LENGTH",
+        help="world units, given to samples that have none (surfaces)",
+    )
+
+
+def _add_file(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("file")
+    group.add_argument(
+        "--compression",
+        choices=("zstd", "lz4", "zips", "none"),
+        help="of .vdi: zstd (default), lz4 or none; of .exr: zips (default) or none",
+    )
+    group.add_argument("--level", type=int, default=1, help="1 (fast, default) to 9 (small)")
+    group.add_argument(
+        "--standard-channels",
+        action="store_true",
+        help="leave out of an .exr what makes it exact: tau, and corrections",
+    )
+
+
 def _add_render(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="a .vdi file")
+    parser.add_argument("file", metavar="FILE", help=_VDI_FILE)
     parser.add_argument("-o", "--output", metavar="FILE", required=True, help=".png to write")
     _add_size(parser, None)
     parser.add_argument(
@@ -145,7 +179,7 @@ def _add_render(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_view(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="a .vdi file")
+    parser.add_argument("file", metavar="FILE", help=_VDI_FILE)
     _add_size(parser, None)
     parser.add_argument("--screenshot", metavar="FILE", help="write this .png, open no window")
     group = parser.add_argument_group("while the view moves")
@@ -219,7 +253,7 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "info": (
         "files",
-        "say what a .vdi file holds, without reading its arrays",
+        "say what a .vdi or .exr file holds",
         "pyvista-vdi info knee.vdi --json",
         _add_info,
     ),
@@ -228,6 +262,12 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
         "render a volume by VTK's mappers, our raycaster and a VDI, and compare them",
         "pyvista-vdi compare --example brain --tf soft --out out",
         _add_compare,
+    ),
+    "convert": (
+        "files",
+        "write a VDI in another format: .vdi or OpenEXR deep image",
+        "pyvista-vdi convert knee.vdi -o knee.exr",
+        _add_convert,
     ),
 }
 

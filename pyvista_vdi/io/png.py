@@ -76,7 +76,7 @@ def write_png(pixels: NDArray[np.uint8], path: str | os.PathLike[str]) -> Path:
     """
     from PIL import Image
 
-    target = with_suffix(Path(path), PNG_SUFFIX, "a picture")
+    target = with_suffix(Path(path), (PNG_SUFFIX,), "a picture")
     with whole_file(target) as stream:
         Image.fromarray(pixels).save(stream, format="png")
     return target
@@ -84,4 +84,4 @@ def write_png(pixels: NDArray[np.uint8], path: str | os.PathLike[str]) -> Path:
 
 def checked_png_target(path: str | os.PathLike[str]) -> Path:
     """Raise VDIFileError now if a picture could not be written there later."""
-    return check_writable(with_suffix(Path(path), PNG_SUFFIX, "a picture"))
+    return check_writable(with_suffix(Path(path), (PNG_SUFFIX,), "a picture"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import struct
 import zipfile
@@ -20,6 +19,7 @@ from ..camera import Camera, check_window_size
 from ..errors import VDIError, VDIFileError
 from ..vdi import VDI
 from .chunks import CHUNK_ROWS, CODECS, DamagedChunkError, check_chunks, read_chunks
+from .description import from_json, number
 from .layout import (
     DESCRIPTION,
     FORMAT_NAME,
@@ -218,7 +218,7 @@ class _OpenFile:
     def _read_description(self) -> dict[str, Any]:
         text = self._read_member(DESCRIPTION, MAX_DESCRIPTION_BYTES)
         try:
-            description = json.loads(text, parse_constant=_no_constant)
+            description = from_json(text)
         except (ValueError, RecursionError) as error:
             self._refuse(f"its description {DESCRIPTION} is no JSON ({error})")
         if not isinstance(description, dict) or description.get("format") != FORMAT_NAME:
@@ -259,8 +259,8 @@ class _OpenFile:
                 camera=Camera.from_dict(d["camera"]),
                 window_size=window_size,
                 n_supersegments=n,
-                bounds=tuple(_number(b) for b in d["bounds"]),
-                depth_origin=_number(d["depth_origin"]),
+                bounds=tuple(number(b) for b in d["bounds"]),
+                depth_origin=number(d["depth_origin"]),
                 metadata=d["metadata"],
                 codec=d["codec"],
                 file_bytes=os.fstat(self._stream.fileno()).st_size,
@@ -354,14 +354,3 @@ class _OpenFile:
 
     def _refuse(self, why: str) -> NoReturn:
         raise VDIFileError(f"{self._path} is damaged: {why}; {_REMEDY}")
-
-
-def _number(value: object) -> float:
-    """Return a JSON number as float; text and truth values are none."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TypeError(f"{value!r} is not a number")
-    return float(value)
-
-
-def _no_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is not a number of JSON")

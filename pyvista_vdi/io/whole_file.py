@@ -78,12 +78,12 @@ def check_writable(path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def with_suffix(target: Path, suffix: str, kind: str) -> Path:
-    """Return the target if its name ends in ``suffix``, and raise VDIFileError otherwise."""
-    if target.suffix.lower() != suffix:
+def with_suffix(target: Path, suffixes: tuple[str, ...], kind: str) -> Path:
+    """Return the target if its name ends in a suffix, and raise VDIFileError otherwise."""
+    if target.suffix.lower() not in suffixes:
         raise VDIFileError(
-            f"{str(target)!r} cannot be written as {kind}: the name must end in {suffix}, "
-            f"for instance {(target.stem or 'name') + suffix!r}"
+            f"{str(target)!r} cannot be written as {kind}: the name must end in "
+            f"{' or '.join(suffixes)}, for instance {(target.stem or 'name') + suffixes[0]!r}"
         )
     return target
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import zipfile
 from collections.abc import Callable, Mapping
@@ -12,20 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._version import __version__
-from ..errors import InvalidArgumentError, VDIFileError
 from ..vdi import VDI
-from .chunks import CHUNK_ROWS, CODECS, write_chunks
-from .layout import (
-    DESCRIPTION,
-    FORMAT_NAME,
-    FORMAT_VERSION,
-    MAX_DESCRIPTION_BYTES,
-    SUFFIX,
-    Layout,
-    layouts,
-)
-from .whole_file import check_writable, whole_file, with_suffix
+from .chunks import CHUNK_ROWS, write_chunks
+from .description import describe, to_json
+from .layout import DESCRIPTION, Layout, layouts
+from .whole_file import whole_file
 
 #: The oldest time that ZIP knows; a real one would make equal VDIs differ.
 _NO_TIME = (1980, 1, 1, 0, 0, 0)
@@ -60,57 +50,23 @@ def write(
     ------
     VDIFileError
         If the target cannot be written, or the metadata hold what JSON cannot.
-    InvalidArgumentError
-        If the compression or its level is unknown.
 
     See Also
     --------
-    read : reads it again.
+    pyvista_vdi.io.write : checks the options first.
     """
-    target = checked_target(path)
-    if compression not in (*CODECS, "none"):
-        raise InvalidArgumentError(
-            f"compression must be one of {', '.join(CODECS)} and none; got {compression!r}"
-        )
-    if isinstance(level, bool) or not isinstance(level, int) or not 1 <= level <= 9:
-        raise InvalidArgumentError(f"level must be a whole number from 1 to 9; got {level!r}")
     counts = _smallest(np.diff(vdi.offsets))
     arrays = layouts(
         vdi.window_size, vdi.n_supersegments, counts.dtype, filtered=compression != "none"
     )
     description = _described(vdi, arrays, compression)
-    with whole_file(target) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
+    with whole_file(path) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(_member(DESCRIPTION), description)
         for name, layout in arrays.items():
             with archive.open(_member(name), "w", force_zip64=True) as member:
                 encoded = _encoder(name, layout, vdi, counts)
                 write_chunks(member, layout.n_rows, compression, level, encoded)
-    return target
-
-
-def checked_target(path: str | os.PathLike[str]) -> Path:
-    """Raise now if a VDI could not be written there later; nothing is left behind.
-
-    Parameters
-    ----------
-    path : path-like
-        The target; its name ends in ``.vdi``.
-
-    Returns
-    -------
-    pathlib.Path
-        The target, links followed.
-
-    Raises
-    ------
-    VDIFileError
-        If the name ends in something else, or the target cannot be written.
-    """
-    try:
-        target = Path(path)
-    except TypeError as error:
-        raise VDIFileError(f"a file's name is a path; got {type(path).__name__}") from error
-    return check_writable(with_suffix(target, SUFFIX, "a VDI"))
+    return Path(os.path.realpath(path))
 
 
 def _member(name: str) -> zipfile.ZipInfo:
@@ -128,40 +84,17 @@ def _smallest(counts: NDArray[Any]) -> NDArray[Any]:
 
 
 def _described(vdi: VDI, arrays: Mapping[str, Layout], codec: str) -> str:
-    description = {
-        "format": FORMAT_NAME,
-        "version": FORMAT_VERSION,
-        "written_by": f"pyvista-vdi {__version__}",
-        "window_size": list(vdi.window_size),
-        "n_supersegments": vdi.n_supersegments,
-        "camera": vdi.camera.to_dict(),
-        "bounds": list(vdi.bounds),
-        "depth_origin": vdi.depth_origin,
-        "codec": codec,
-        "chunk_rows": CHUNK_ROWS,
-        "arrays": {name: layout.to_dict() for name, layout in arrays.items()},
-        "metadata": vdi.metadata,
-    }
-    try:
-        text = json.dumps(description, allow_nan=False, default=_plain_number)
-    except (TypeError, ValueError, RecursionError) as error:
-        raise VDIFileError(
-            f"the VDI's metadata cannot be written: {error}; "
-            "they may hold finite numbers, text, lists and dictionaries with text as keys"
-        ) from error
-    if len(text) > MAX_DESCRIPTION_BYTES:
-        raise VDIFileError(
-            f"the VDI's metadata take {len(text)} bytes as JSON; {MAX_DESCRIPTION_BYTES} are "
-            "allowed: keep large arrays beside the VDI"
-        )
-    return text
-
-
-def _plain_number(value: Any) -> Any:
-    """Return NumPy's numbers and arrays as Python's."""
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    raise TypeError(f"a value of type {type(value).__name__} is not JSON")
+    entries = describe(vdi)
+    metadata = entries.pop("metadata")
+    return to_json(
+        {
+            **entries,
+            "codec": codec,
+            "chunk_rows": CHUNK_ROWS,
+            "arrays": {name: layout.to_dict() for name, layout in arrays.items()},
+            "metadata": metadata,
+        }
+    )
 
 
 def _encoder(

@@ -3,6 +3,12 @@
 #include "common/occupancy.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
+__kernel void constants(int count, __global int *results)
+{
+    results[0] = TILE;
+    results[1] = SLABS;
+}
+
 __kernel void slabs(int count, __global const float *offsets, float first_depth, float slabs_per_depth,
                     __global int *results)
 {

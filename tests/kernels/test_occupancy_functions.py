@@ -61,11 +61,9 @@ def test_sets_of_slabs(call):
         assert int(end[slab]) == sum(1 << s for s in range(slab + 1))
 
 
-def test_constants_are_those_of_the_kernels(runtime):
-    source = runtime.kernel("grid/occupancy.cl", "occupied_slabs", {"OFFSET_T": "uint"})
-    assert source is not None
-    assert TILE == 16
-    assert SLABS == 64
+def test_constants_of_python_are_those_of_the_kernels(call):
+    found = call(FILE, "constants", 1, call.empty(2, dtype=np.int32))
+    assert found.tolist() == [TILE, SLABS]
 
 
 @pytest.mark.parametrize("parallel", [False, True])
@@ -89,9 +87,22 @@ def test_depth_coordinates_grow_with_depth_and_lead_back(call, runtime, distance
     margin = prepared.occupancy.margin
     assert np.abs(found - offsets.astype(np.float64)).max() < margin / 2
     if not parallel:
-        # A face's offset and 1 / Z have each what rounding leaves of the depth
         depth = offsets.astype(np.float64) + depth_origin
-        assert np.abs(1 / reciprocals.astype(np.float64) - depth).max() < margin / 2
+        # Sums and a division of 2.5 units in the last place each way
+        rounding = 8 * 2.0**-23 * (1 + np.abs(offsets) / depth)
+        assert (np.abs(reciprocals * depth - 1) <= rounding).all()
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize(("distance", "origin"), LENSES)
+def test_the_form_of_the_depth_coordinate_costs_no_digits(runtime, distance, origin, parallel):
+    """The margin is what depths are rounded by: in any form at most what absolute depths are, and
+    a thousandth of a slab where depths are counted from the near depth of the bounds."""
+    prepared, depth_origin = prepared_for(runtime, distance, origin, parallel=parallel)
+    grid = prepared.occupancy
+    assert grid.margin <= 32 * 2.0**-23 * 3 * max(distance + 1, depth_origin)
+    if origin == 1 and distance > 1.5:
+        assert grid.margin * grid.slabs_per_depth < 1e-3
 
 
 @pytest.mark.parametrize("away", [True, False])

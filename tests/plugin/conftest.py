@@ -39,9 +39,14 @@ def vtk_messages(off_screen):
 def no_leaks():
     """Fail if VTK objects that were made in the test outlive it."""
     gc.collect()
-    before = {id(o) for o in gc.get_objects() if isinstance(o, vtkObjectBase)}
+
+    def alive():
+        # By type(): isinstance() would ask weak proxies, whose object may be gone
+        return [o for o in gc.get_objects() if issubclass(type(o), vtkObjectBase)]
+
+    before = {id(o) for o in alive()}
     yield
     pv.close_all()
     gc.collect()
-    after = [o for o in gc.get_objects() if isinstance(o, vtkObjectBase) and id(o) not in before]
+    after = [o for o in alive() if id(o) not in before]
     assert not after, f"{len(after)} VTK objects left: {sorted({type(o).__name__ for o in after})}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -44,7 +45,10 @@ def test_interactive_example_writes_an_animation_with_a_new_vdi(tmp_path):
         cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
-    assert "VDI no. 2" in done.stdout
+    # One more where the device is fast enough to make another on the way
+    shown = re.search(r"VDI no\. (\d+)", done.stdout)
+    assert shown is not None, done.stdout
+    assert int(shown[1]) >= 2
     assert "VDIWarning" not in done.stderr
     with Image.open(target) as animation:
         assert animation.size == (320, 240)

@@ -330,6 +330,7 @@ def test_a_style_starts_and_ends_an_interaction(coarsest):
     actor = pvdi.VDIActor()
     mapper = pvdi.VDIMapper()
     mapper.SetVDI(_small_vdi())
+    mapper.SetRegenerate("never")
     mapper.SetInteractiveOffScreen(True)
     actor.SetMapper(mapper)
     renderer, window = vtkRenderer(), vtkRenderWindow()

@@ -182,18 +182,24 @@ def _slabs_of_blobs(rng, window):
     width, height = window
     begin = np.zeros((height, width))
     extent = np.zeros((height, width))
+    sharp = np.zeros((height, width), bool)
     for _ in range(40):
         wide, high = rng.integers(1, [width // 8 + 2, height // 6 + 2])
         x, y = rng.integers(0, [width - wide + 1, height - high + 1])
-        begin[y : y + high, x : x + wide] = rng.uniform(-1, SLABS)
-        extent[y : y + high, x : x + wide] = rng.uniform(0.2, 4)
+        blob = np.s_[y : y + high, x : x + wide]
+        begin[blob] = rng.uniform(-1, SLABS)
+        extent[blob] = rng.uniform(0.2, 4)
+        sharp[blob] = rng.random() < 0.5
     extent[rng.random(extent.shape) < 0.2] = 0
-    ends = begin[..., None] + extent[..., None] * rng.random((height, width, 2))
-    # Near slabs' faces: on them, or up to twice the margin of the grid beside them
-    beside = rng.uniform(-2e-3, 2e-3, ends.shape) * rng.integers(2, size=ends.shape)
-    near_face = np.round(ends) + beside
-    ends = np.where((rng.random(ends.shape) < 0.5) & (extent[..., None] > 0), near_face, ends)
-    return ends.reshape(-1, 2)
+    begin, extent, sharp = (values.reshape(-1, 1) for values in (begin, extent, sharp))
+    ends = begin + extent * rng.random((begin.size, 2))
+    # At any depth, on slabs' faces, or beside them by up to some of the grid's margins
+    beside = rng.uniform(0, 2e-3, ends.shape) * rng.integers(-1, 2, size=ends.shape)
+    ends = np.where(rng.random(ends.shape) < 0.5, np.round(ends) + beside, ends)
+    # A sharp blob fills slabs as far as it can without counting in their neighbours
+    whole = np.floor(begin) + [0, 1] * np.ceil(extent)
+    ends = np.where(sharp, whole + [1, -1] * rng.uniform(0, 2e-3, ends.shape), ends)
+    return np.where(extent > 0, ends, 0)
 
 
 def full_vdi(camera, bounds, window, depth_origin):

@@ -14,9 +14,16 @@ import numpy as np
 import pytest
 from fresh_python import run_python
 
-from pyvista_vdi import Camera, TransferFunction, Volume, background, generation
+from pyvista_vdi import (
+    Camera,
+    TransferFunction,
+    Volume,
+    background,
+    device_volume,
+    generation,
+)
 from pyvista_vdi.background import BackgroundGeneration
-from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.opencl_runtime import turns
 from pyvista_vdi.raycast import prepared_vdi, render_vdi
@@ -75,17 +82,18 @@ def generator(runtime):
     assert not threads()
 
 
-@pytest.fixture(autouse=True)
-def _many_slices(monkeypatch):
+@pytest.fixture
+def many_slices(monkeypatch):
     """Four rows of lists at a time, so that these small VDIs are made of several slices."""
     monkeypatch.setattr(generation, "_SLICE_BYTES", 1)
 
 
 class Gate:
-    """Holds a generation in its middle until it is opened."""
+    """Holds a generation in its middle until it is opened; ``cancelled`` are those given up."""
 
     def __init__(self, monkeypatch):
         self.reached, self._open = threading.Event(), threading.Event()
+        self.cancelled = []
         monkeypatch.setattr(background, "generate_vdi", self._gated)
 
     def _gated(self, *arguments, progress, **options):
@@ -95,7 +103,11 @@ class Gate:
                 self.reached.set()
                 self._open.wait(PATIENCE)
 
-        return generate_vdi(*arguments, progress=report, **options)
+        try:
+            return generate_vdi(*arguments, progress=report, **options)
+        except Cancelled as reason:
+            self.cancelled.append(str(reason))
+            raise
 
     def wait(self):
         assert self.reached.wait(PATIENCE)
@@ -105,7 +117,7 @@ class Gate:
 
 
 @pytest.fixture
-def gate(monkeypatch):
+def gate(many_slices, monkeypatch):
     made = Gate(monkeypatch)
     yield made
     made.open()
@@ -114,6 +126,7 @@ def gate(monkeypatch):
 # -- what is made ----------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("many_slices")
 @pytest.mark.parametrize("dtype", ["f4", "u1", "f8"])
 @pytest.mark.parametrize("parallel", [False, True])
 def test_the_same_bytes(runtime, generator, dtype, parallel):
@@ -139,6 +152,7 @@ def test_the_same_bytes(runtime, generator, dtype, parallel):
     np.testing.assert_array_equal(*images)
 
 
+@pytest.mark.usefixtures("many_slices")
 def test_pieces_of_any_size_give_the_same_bytes(runtime, generator, monkeypatch):
     expected = make(runtime)
     for items in (1, 700):
@@ -263,6 +277,28 @@ def test_a_new_start_replaces_what_is_being_made(runtime, generator, gate):
     assert generator.take() is None
 
 
+def test_what_is_finished_too_late_is_dropped(runtime, monkeypatch):
+    """After its last piece of work nothing stops a generation: it may not pass for the next one."""
+    finished, replaced, calls = threading.Event(), threading.Event(), []
+
+    def render_and_wait(*arguments, **options):
+        render_vdi(*arguments, **options)
+        if not finished.is_set():
+            finished.set()
+            replaced.wait(PATIENCE)
+
+    monkeypatch.setattr(background, "render_vdi", render_and_wait)
+    with BackgroundGeneration(runtime, on_finished=lambda: calls.append(1)) as generator:
+        start(generator, key="old")
+        assert finished.wait(PATIENCE)
+        start(generator, CAMERA.azimuth(10), key="new")
+        replaced.set()
+        vdi = taken(generator)
+        generator.cancel(wait=True)
+    assert vdi.equals(make(runtime, CAMERA.azimuth(10)))
+    assert calls == [1]
+
+
 def test_a_new_start_replaces_what_was_not_taken(runtime, generator):
     start(generator, key=1)
     finish(generator)
@@ -308,6 +344,7 @@ def test_collected_in_the_middle(runtime, gate):
     gate.open()
     thread.join(PATIENCE)
     assert not thread.is_alive()
+    assert len(gate.cancelled) == 1
 
 
 def test_the_interpreter_ends_in_the_middle(runtime):
@@ -395,6 +432,7 @@ def test_arguments_are_refused_at_once(runtime, generator):
 # -- frames meanwhile ------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("many_slices")
 def test_frames_meanwhile_are_the_same_to_the_last_bit(runtime, generator):
     old = make(runtime)
     views = [CAMERA.azimuth(angle) for angle in (0, 15, 170)]
@@ -403,7 +441,7 @@ def test_frames_meanwhile_are_the_same_to_the_last_bit(runtime, generator):
     frames = 0
     for turn in range(5):
         start(generator, CAMERA.azimuth(40 + turn))
-        while generator.running:
+        while generator.running or frames <= turn:
             with runtime.foreground():
                 for view, image in zip(views, before, strict=True):
                     np.testing.assert_array_equal(render_vdi(old, view, device=runtime), image)
@@ -411,17 +449,22 @@ def test_frames_meanwhile_are_the_same_to_the_last_bit(runtime, generator):
             np.testing.assert_array_equal(volume_now, volume_before)
             frames += 1
         assert generator.take().equals(make(runtime, CAMERA.azimuth(40 + turn)))
-    assert frames >= 5
+    assert frames >= 5  # many more, unless the machine is busy
 
 
-def test_a_volume_that_both_threads_need_first(runtime, generator):
+def test_a_volume_that_both_threads_need_first(runtime, generator, monkeypatch):
     """One uploads it, and neither waits for the other's frame or turn for ever."""
-    for seed in range(5):
-        volume = Volume(np.random.default_rng(seed).random((40, 40, 40)))
+    monkeypatch.setattr(runtime._turns, "_turn", lambda: 1e-9)  # over within any piece of work
+    for seed in range(3):
+        volume = Volume(np.random.default_rng(seed).random((100, 100, 100)))
         transfer = TRANSFER.replace(scalar_range=(0, 1))
-        camera = Camera((20, 20, 130), (20, 20, 20), (0, 1, 0))
+        camera = Camera((50, 50, 300), (50, 50, 50), (0, 1, 0))
         generator.start(volume, camera, WINDOW, transfer)
-        while generator.running:
+        uploads = device_volume._uploads
+        while generator.running and not (volume in uploads and uploads[volume].lock.locked()):
+            pass  # the worker comes first, or not at all
+        image = None
+        while generator.running or image is None:
             with runtime.foreground():
                 image = raycast_volume(volume, camera, WINDOW, transfer, device=runtime)
         vdi = generator.take()
@@ -479,15 +522,13 @@ def resident_bytes():
     return pages * resource.getpagesize()
 
 
-#: How much RAM many regenerations may add, bytes. Measured for 200 on two platforms: 8 and 26 MiB,
-#: the allocator's; each of these VDIs takes 3 MiB on the host and as much on the device, so one in
-#: ten that stayed would show.
-RAM_TOLERANCE = 60 * 2**20
+#: How much RAM many regenerations may add, bytes. Measured on two platforms: 0 to 4 MiB for 20
+#: and 200, and up to 30 MiB where the allocator's pools had not filled before. Each of these VDIs
+#: takes 4 MiB on the host and as much on the device: of 200, one in forty that stayed would show.
+RAM_TOLERANCE = 40 * 2**20
 
 
-@pytest.mark.parametrize(
-    "times", [20, pytest.param(200, marks=pytest.mark.slow, id="200-in-a-row")]
-)
+@pytest.mark.parametrize("times", [8, pytest.param(200, marks=pytest.mark.slow, id="200-in-a-row")])
 def test_many_regenerations_leave_nothing(runtime, generator, times):
     """Frames of the old VDI meanwhile, and each new one takes its place."""
     window = (160, 120)
@@ -514,7 +555,8 @@ def test_many_regenerations_leave_nothing(runtime, generator, times):
         assert threading.active_count() <= others + 1
     vdi = regenerate(vdi, 0)
     gc.collect()
-    assert runtime.allocated == allocated
+    # Whether an array is used in place depends on where the allocator puts it
+    assert abs(runtime.allocated - allocated) <= vdi.offsets.nbytes
     assert len(runtime._queues) == 1
     generator.cancel(wait=True)
     assert threading.active_count() == others

@@ -111,9 +111,10 @@ def test_frames_without_pause_leave_a_turn_each(monkeypatch):
     frames = 0
     thread = InThread(work)
     wait(begun)
-    while not done.is_set():
+    while not done.is_set() and frames < 10_000:
         with each.foreground():
             frames += 1
+    assert done.is_set(), "background work does not get on"
     thread.value()
     assert frames_before == list(range(1, 21))
 
@@ -338,6 +339,7 @@ def test_every_use_of_the_device_asks_whether_the_work_is_wanted(runtime, kernel
         unaligned = ocl.aligned_empty(array.size + 1, np.uint32)[1:]
         before = runtime.allocated
         unwanted.set()
+        errors = []  # kept, and with them what their frames hold
         for use in (
             lambda: runtime.launch(kernel, 64, 64, x, np.uint32(64)),
             lambda: runtime.write(x, array),
@@ -345,8 +347,9 @@ def test_every_use_of_the_device_asks_whether_the_work_is_wanted(runtime, kernel
             lambda: runtime.upload(unaligned),
             runtime.give_way,
         ):
-            with pytest.raises(Cancelled):
+            with pytest.raises(Cancelled) as caught:
                 use()
+            errors.append(caught)
         assert runtime.allocated == before
 
 

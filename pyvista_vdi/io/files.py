@@ -1,0 +1,163 @@
+"""The format of a file follows from its name: ``.vdi`` or ``.exr``."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import InvalidArgumentError, VDIFileError
+from ..vdi import VDI
+from . import exr, layout, reader, writer
+from .chunks import CODECS
+from .reader import FileInfo
+from .whole_file import check_writable, with_suffix
+
+#: What the name of a file may end in; the first is our own format.
+SUFFIXES = (layout.SUFFIX, exr.SUFFIX)
+
+
+def write(vdi: VDI, path: str | os.PathLike[str], **options: Any) -> Path:
+    """Write a VDI to a file, as ``.vdi`` or as an OpenEXR deep image.
+
+    The file appears whole or not at all: it is written under a temporary name in the same folder
+    and moved into place, and what was there before stays until then.
+
+    Parameters
+    ----------
+    vdi : VDI
+        What to write.
+    path : path-like
+        The target; its name ends in ``.vdi`` or ``.exr``.
+    **options
+        ``compression`` and ``level`` for both; ``exact`` for ``.exr``. See
+        :func:`pyvista_vdi.io.writer.write` and :func:`pyvista_vdi.io.exr.write`.
+
+    Returns
+    -------
+    pathlib.Path
+        The file, links followed.
+
+    Raises
+    ------
+    VDIFileError
+        If the target cannot be written, or the metadata hold what JSON cannot.
+    InvalidArgumentError
+        If an option is unknown or out of its range.
+
+    See Also
+    --------
+    read : reads it again.
+    """
+    target = checked_target(path)
+    check_write_options(target, options)
+    if _is_exr(target):
+        return exr.write(vdi, target, **options)
+    return writer.write(vdi, target, **options)
+
+
+def read(path: str | os.PathLike[str], **options: Any) -> VDI:
+    """Read a VDI from a ``.vdi`` file or an OpenEXR deep image.
+
+    Parameters
+    ----------
+    path : path-like
+        The file; a name that ends in ``.exr`` makes it an OpenEXR file.
+    **options
+        ``camera`` and ``thickness`` for ``.exr``: see :func:`pyvista_vdi.io.exr.read`.
+
+    Returns
+    -------
+    VDI
+        The same to the last bit as was written by :func:`write`.
+
+    Raises
+    ------
+    VDIFileError
+        If the file is absent, foreign, of a newer version, truncated or damaged; the message
+        says which and what can be done.
+    InvalidArgumentError
+        If an option is unknown.
+    """
+    if _is_exr(path):
+        _check_names("read", path, options, ("camera", "thickness"))
+        return exr.read(path, **options)
+    _check_names("read", path, options, ())
+    return reader.read(path)
+
+
+def read_info(path: str | os.PathLike[str]) -> FileInfo:
+    """Read what a file says about itself; the arrays of a ``.vdi`` file are not touched.
+
+    Parameters
+    ----------
+    path : path-like
+        A ``.vdi`` or ``.exr`` file.
+
+    Returns
+    -------
+    FileInfo
+        View, size, metadata.
+
+    Raises
+    ------
+    VDIFileError
+        As for :func:`read`, except that damaged arrays of a ``.vdi`` file are not noticed.
+    """
+    return exr.read_info(path) if _is_exr(path) else reader.read_info(path)
+
+
+def checked_target(path: str | os.PathLike[str]) -> Path:
+    """Raise now if a VDI could not be written there later; nothing is left behind.
+
+    Parameters
+    ----------
+    path : path-like
+        The target; its name ends in one of :data:`SUFFIXES`.
+
+    Returns
+    -------
+    pathlib.Path
+        The target, links followed.
+
+    Raises
+    ------
+    VDIFileError
+        If the name ends in something else, or the target cannot be written.
+    """
+    try:
+        target = Path(path)
+    except TypeError as error:
+        raise VDIFileError(f"a file's name is a path; got {type(path).__name__}") from error
+    return check_writable(with_suffix(target, SUFFIXES, "a VDI"))
+
+
+def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]) -> None:
+    """Raise InvalidArgumentError now if :func:`write` would refuse an option for this file."""
+    names: tuple[str, ...] = ("compression", "level")
+    compressions: tuple[str, ...] = (*CODECS, "none")
+    if _is_exr(path):
+        names, compressions = (*names, "exact"), exr.COMPRESSIONS
+    _check_names("written", path, options, names)
+    compression, level = options.get("compression", compressions[0]), options.get("level", 1)
+    if compression not in compressions:
+        raise InvalidArgumentError(
+            f"compression of {path} must be one of {', '.join(compressions[:-1])} and "
+            f"{compressions[-1]}; got {compression!r}"
+        )
+    if isinstance(level, bool) or not isinstance(level, int) or not 1 <= level <= 9:
+        raise InvalidArgumentError(f"level must be a whole number from 1 to 9; got {level!r}")
+
+
+def _is_exr(path: Any) -> bool:
+    return str(path).lower().endswith(exr.SUFFIX)
+
+
+def _check_names(what: str, path: Any, options: Mapping[str, Any], known: tuple[str, ...]) -> None:
+    unknown = sorted(set(options) - set(known))
+    if unknown:
+        raise InvalidArgumentError(
+            f"{path} is {what} with the options {', '.join(known) or 'none'}; "
+            f"got {', '.join(unknown)}"
+        )
