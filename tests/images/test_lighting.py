@@ -11,8 +11,8 @@ from pyvista_vdi.volume import Volume
 
 WINDOW = (480, 270)
 
-#: The issue's bound. Measured on these cases with Mesa's llvmpipe: at least 0.9987 at V_O, and at 10
-#: degrees 0.9831, where a VDI of the unshaded brain has 0.985: a list is two voxels wide here.
+#: The issue's bound. Measured on these cases with Mesa's llvmpipe: at least 0.9987 at V_O, and
+#: 0.9831 at 10 degrees, where a VDI of the unshaded brain has 0.985: a list is two voxels wide.
 SSIM_TO_VTK = 0.98
 
 GRADIENT = ((0.0, 0.0), (20.0, 1.0))
