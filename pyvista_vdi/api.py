@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .camera import Camera
 from .classification import DEFAULTS, IN_PLACE, Classification
-from .errors import InvalidVDIError, InvalidVolumeError
+from .errors import InvalidArgumentError, InvalidVDIError, InvalidVolumeError
 from .vdi import VDI
 from .volume import Volume
 
@@ -150,33 +150,40 @@ def render(
     window_size: Sequence[int] | None = None,
     *,
     opaque_depth: ArrayLike | None = None,
-    clipping_planes: ArrayLike | None = None,
+    clipping_planes: Any = None,
+    model_transforms: Sequence[ArrayLike] | None = None,
     skip_empty: bool = True,
     preview_samples: int | None = None,
     device: Any = None,
 ) -> NDArray[np.float32]:
-    """Raycast a VDI from a new view.
+    """Raycast a VDI, or several in one scene, from a new view.
 
     Parameters
     ----------
-    vdi : VDI or vtkImageData
+    vdi : VDI or vtkImageData, or list or tuple of them
         What :func:`generate` or :func:`read` returned, or its VTK form (``pv.read("x.vdi")``).
+        Several are merged by depth along each ray; their order does not matter, to the last bit.
     camera : pyvista.Camera or vtkCamera or Camera
         The new view V_N. Its model transform places the VDI's model frame in the world.
     window_size : (int, int), optional
-        Width and height of the image in pixels; the VDI's own by default.
+        Width and height of the image in pixels; the VDI's own by default. Of several VDIs, it can
+        be left out where all have the same.
     opaque_depth : array_like of float32, shape (H, W), optional
         Depth at which each ray ends: distance from the eye along the view direction, world
         units, top row first; infinity where nothing is opaque.
     clipping_planes : array_like of float, shape (k, 6), optional
         Origin and normal of each plane, world coordinates; the side that the normal points to
-        is kept, as with VTK's mappers.
+        is kept, as with VTK's mappers. They cut all of several VDIs; a list of such arrays, or of
+        ``None``, cuts each by its own.
+    model_transforms : sequence of array_like of float, shape (4, 4), optional
+        Where the model frame of each of several VDIs is; the camera's model transform for all by
+        default.
     skip_empty : bool, default: True
         Pass by space without supersegments; the picture is the same to the last bit.
     preview_samples : int, optional
         An approximation (paper section 5): look the VDI up at so many points of each ray instead
         of intersecting its supersegments. A smaller ``window_size`` is the better one: see
-        docs/performance.md, "Previews".
+        docs/performance.md, "Previews". For a single VDI only.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
 
@@ -193,6 +200,23 @@ def render(
         If there is no device, or it fails.
     """
     view = Camera.from_any(camera)
+    if isinstance(vdi, list | tuple) or model_transforms is not None:
+        if preview_samples is not None:
+            raise InvalidArgumentError(
+                "preview_samples is for a single VDI: give several a smaller window_size"
+            )
+        from .joint import render_vdis
+
+        return render_vdis(
+            [as_vdi(one) for one in vdi] if isinstance(vdi, list | tuple) else [as_vdi(vdi)],
+            view,
+            window_size,
+            model_transforms=model_transforms,
+            opaque_depth=opaque_depth,
+            clipping_planes=clipping_planes,
+            skip_empty=skip_empty,
+            device=device,
+        )
     vdi = as_vdi(vdi)
     from .raycast import render_vdi
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import weakref
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -125,6 +125,33 @@ def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
         return place.prepared
 
 
+class ListView(NamedTuple):
+    """The rays of a frame in a VDI's list space.
+
+    Attributes
+    ----------
+    size : (int, int)
+        Width and height of the image in pixels.
+    forms : numpy.ndarray
+        List coordinates, model direction and the planes to clip to, float32 (n, 6).
+    planes : int
+        How many of the forms are planes; the first six are the bounds.
+    ends : numpy.ndarray
+        t at which each ray ends, float32 (H, W), top row first, if ``has_ends``.
+    has_ends : bool
+        Whether something opaque may end rays.
+    reference_depth : float
+        View depth of t = 0, world units.
+    """
+
+    size: tuple[int, int]
+    forms: NDArray[np.float32]
+    planes: int
+    ends: NDArray[np.float32]
+    has_ends: bool
+    reference_depth: float
+
+
 class PreparedVDI:
     """A VDI on a device, in the form that the raycaster reads.
 
@@ -184,15 +211,7 @@ class PreparedVDI:
     ) -> None:
         """Draw a frame into ``image``, float32 (H, W, 4) on the device."""
         width, height = size
-        pixel_rays = rays.pixel_rays(camera, size, self._bounds)
-        coordinates = [pixel_rays.form(row[:3], row[3]) for row in self._list_rows]
-        direction = [pixel_rays.form(axis) for axis in np.eye(3)]
-        planes = rays.box_planes(pixel_rays, self._bounds)
-        planes += self._viewport_planes(coordinates)
-        planes += rays.eye_plane(camera, pixel_rays)
-        planes += rays.user_planes(camera, pixel_rays, clipping_planes)
-        forms = rays.packed([*coordinates, *direction, *planes])
-        ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
+        view = self.view(camera, size, opaque_depth, clipping_planes)
         runtime = self._runtime
         defines = self.defines
         grid = self.occupancy
@@ -205,35 +224,71 @@ class PreparedVDI:
                 defines["SKIP_EMPTY"] = 1
             kernel = runtime.kernel("vdi/raycast.cl", "raycast", defines)
         with (
-            runtime.upload(forms, "rays") as form_buffer,
-            runtime.upload(
-                np.zeros(1, np.float32) if ends is None else ends, "opaque depth"
-            ) as depth,
+            runtime.upload(view.forms, "rays") as form_buffer,
+            runtime.upload(view.ends, "opaque depth") as depth,
         ):
             runtime.launch(
                 kernel,
                 block_items(width, height),
                 GROUP,
-                self._offsets,
-                self._faces,
-                self._media,
-                np.int32(self._window[0]),
-                np.int32(self._window[1]),
-                np.float32(self._depth_origin),
-                form_buffer,
-                np.int32(len(planes)),
-                np.int32(width),
-                np.int32(height),
-                depth,
-                np.int32(ends is not None),
-                np.float32(TRANSMITTANCE_CUTOFF),
-                grid.masks,
-                np.float32(grid.first_depth),
-                np.float32(grid.slabs_per_depth),
+                *self.walk_arguments(view, form_buffer, depth, TRANSMITTANCE_CUTOFF),
                 *sampling,
                 image,
             )
             runtime.finish()  # the buffers above may be host memory in use
+
+    def view(
+        self,
+        camera: Camera,
+        size: tuple[int, int],
+        opaque_depth: ArrayLike | None,
+        clipping_planes: ArrayLike | None,
+    ) -> ListView:
+        """Return a frame's rays as the kernels take them."""
+        pixel_rays = rays.pixel_rays(camera, size, self._bounds)
+        coordinates = [pixel_rays.form(row[:3], row[3]) for row in self._list_rows]
+        direction = [pixel_rays.form(axis) for axis in np.eye(3)]
+        planes = rays.box_planes(pixel_rays, self._bounds)
+        planes += self._viewport_planes(coordinates)
+        planes += rays.eye_plane(camera, pixel_rays)
+        planes += rays.user_planes(camera, pixel_rays, clipping_planes)
+        forms = rays.packed([*coordinates, *direction, *planes])
+        ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
+        return ListView(
+            size,
+            forms,
+            len(planes),
+            np.zeros(1, np.float32) if ends is None else ends,
+            ends is not None,
+            pixel_rays.reference_depth,
+        )
+
+    def walk_arguments(
+        self, view: ListView, forms: DeviceBuffer, ends: DeviceBuffer, cutoff: float
+    ) -> tuple[Any, ...]:
+        """Return the arguments that every kernel which walks through the lists begins with.
+
+        ``forms`` and ``ends`` are the view's arrays on the device; ``cutoff`` says where a ray
+        ends for want of light.
+        """
+        return (
+            self._offsets,
+            self._faces,
+            self._media,
+            np.int32(self._window[0]),
+            np.int32(self._window[1]),
+            np.float32(self._depth_origin),
+            forms,
+            np.int32(view.planes),
+            np.int32(view.size[0]),
+            np.int32(view.size[1]),
+            ends,
+            np.int32(view.has_ends),
+            np.float32(cutoff),
+            self.occupancy.masks,
+            np.float32(self.occupancy.first_depth),
+            np.float32(self.occupancy.slabs_per_depth),
+        )
 
     def _list_space(self, camera: Camera) -> NDArray[np.float64]:
         """Model frame to homogeneous list coordinates, float64 (4, 4).

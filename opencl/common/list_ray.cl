@@ -11,6 +11,10 @@ typedef struct {
     bool away;     // from V_O: depth does not decrease along the ray
     float r_begin; // 0 or -1; it ends at r_begin + 1
     float scale;   // model length per unit of r, but for the division by w(r_a) w(r_b) in perspective
+#ifdef SEGMENTS
+    float t_deep;  // t where r is 0
+    float t_scale; // t per unit of r, but for the division by w(r) in perspective
+#endif
 } ListRay;
 
 // `forms`: list coordinates, model direction, then `planes` to clip to; the ray ends at `t_end`. Returns false where it
@@ -33,8 +37,28 @@ inline bool begin_list_ray(ListRay *ray, __global const float *forms, int planes
 #ifndef PARALLEL
     ray->scale *= reciprocal_depth(start.z, depth_origin) * reciprocal_depth(end.z, depth_origin);
 #endif
+#ifdef SEGMENTS
+    ray->t_deep = ray->away ? t1 : t0;
+    ray->t_scale = t1 - t0;
+#ifndef PARALLEL
+    ray->t_scale *= reciprocal_depth(ray->away ? start.z : end.z, depth_origin);
+#endif
+#endif
     return true;
 }
+
+#ifdef SEGMENTS
+// t at r, whose depth coordinate is z. With w = 1/Z linear in r and Z linear in t, the share of the ray between r and its
+// deep end is r w_shallow / w(r): small where r is, so that nothing cancels there.
+inline float ray_depth(const ListRay *ray, float r, float z, float depth_origin)
+{
+#ifdef PARALLEL
+    return fma(r, ray->t_scale, ray->t_deep);
+#else
+    return ray->t_deep + r * ray->t_scale / reciprocal_depth(z, depth_origin);
+#endif
+}
+#endif
 
 // Model length from r = from to r = to, whose depth coordinates are z_from and z_to.
 inline float model_length(float scale, float from, float z_from, float to, float z_to, float depth_origin)

@@ -7,11 +7,20 @@
 // -D OFFSET_T           type of an offset into the supersegments: uint or ulong
 // -D PARALLEL, SHIFTED  the depth coordinate, see common/list_space.cl
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
+// -D SEGMENTS           write what each ray crosses into a pool, to be merged with other VDIs by vdi/merge.cl, in place of
+//                       compositing it; for a band of rays
 #include "common/list_ray.cl"
 #include "common/lists.cl"
 #include "common/classification.cl"
 #include "common/occupancy.cl"
+#include "common/segments.cl"
 #pragma OPENCL FP_CONTRACT OFF
+
+#ifdef SEGMENTS
+#define BOX_PLANES 6 // of the VDI's bounds: the first of `forms`' planes
+// More cannot be told from opaque, and a part of it is still a number
+#define MAX_OPTICAL_DEPTH 1e30f
+#endif
 
 // A ray that crosses fewer lists than this is not worth a look at the grid: at V_O it stays in one.
 #define FEW_LISTS 2.0f
@@ -27,22 +36,55 @@ __kernel void raycast(
     int width, int height,              // window of V_N
     __global const float *opaque_depth, // t at which each pixel's ray ends, top row first, if has_opaque_depth
     int has_opaque_depth,
+#ifdef SEGMENTS
+    float optical_depth_cutoff,         // the ray ends behind this much
+#else
     float transmittance_cutoff,         // the ray ends where less than this is left
+#endif
     __global const ulong *masks,        // occupied slabs of each tile of lists, if SKIP_EMPTY
     float first_depth,                  // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,
+#ifdef SEGMENTS
+    uint first_item,                    // work-item of the band's first ray
+    int stream,                         // of this VDI
+    int rays,                           // in the band
+    float depth_shift,                  // this VDI's reference depth less the frame's
+    float margin,                       // pixels; see `contributes`
+    int capacity,                       // slots of a ray
+    __global float *pool,               // see common/segments.cl
+    __global int *ends,                 // (streams, rays): slot behind each stream's last, beyond the capacity if it was full
+    __global uchar *contributes)        // (streams, rays): 1 if a ray meets the VDI, 2 if its neighbours at `margin` pixels
+                                        // meet its bounds, too
+#else
     __global float4 *image)             // premultiplied RGBA, top row first
+#endif
 {
-    const int2 pixel = block_pixel((uint)get_global_id(0), width);
+#ifdef SEGMENTS
+    const int band_ray = (int)get_global_id(0);
+    const uint item = first_item + (uint)band_ray;
+#else
+    const uint item = (uint)get_global_id(0);
+#endif
+    const int2 pixel = block_pixel(item, width);
     if (pixel.x >= width || pixel.y >= height)
         return;
     const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
     const float b = (float)pixel.y + 0.5f - 0.5f * (float)height;
     const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
+#ifdef SEGMENTS
+    const int first_slot = stream > 0 ? ends[(stream - 1) * rays + band_ray] : 0;
+    int slot = first_slot;
+    float t_reached = -INFINITY; // so that rounding puts no segment before the end of another
+    float absorbed = 0.0f;       // optical depth
+    ends[stream * rays + band_ray] = slot;
+    contributes[stream * rays + band_ray] = 0;
+#endif
 
     ListRay ray;
     if (!begin_list_ray(&ray, forms, planes, a, b, has_opaque_depth ? opaque_depth[place] : INFINITY, depth_origin)) {
+#ifndef SEGMENTS
         image[place] = (float4)(0.0f);
+#endif
         return;
     }
     const float3 start = ray.start;
@@ -68,8 +110,10 @@ __kernel void raycast(
 #define CROSSING_U(i) (((float)(i) + border_i - half_wide - deep.x) * inverse_u)
 #define CROSSING_V(j) (((float)(j) + border_j - half_high - deep.y) * inverse_v)
 
+#ifndef SEGMENTS
     float3 color = (float3)(0.0f);
     float transmittance = 1.0f;
+#endif
     float r = r_begin;
     float z = start.z;
     int passed = 0; // supersegments passed in the list before: the first guess in the next
@@ -157,16 +201,42 @@ __kernel void raycast(
                 const float4 medium = media[k];
                 const float length_crossed = model_length(ray.scale, from, fma(from, along.z, deep.z), to,
                                                           fma(to, along.z, deep.z), depth_origin);
+#ifdef SEGMENTS
+                const float optical_depth = fmin(medium.w * length_crossed, MAX_OPTICAL_DEPTH);
+                const float t_from = ray_depth(&ray, from, fma(from, along.z, deep.z), depth_origin) + depth_shift;
+                const float t_to = ray_depth(&ray, to, fma(to, along.z, deep.z), depth_origin) + depth_shift;
+                if (optical_depth > 0.0f) {
+                    const float begins = fmax(t_from, t_reached);
+                    t_reached = fmax(t_to, begins);
+                    if (slot < capacity) {
+                        __global float *segment = pool + segment_place(band_ray, slot, capacity, 0);
+                        segment[SEGMENT_FROM * RAY_BLOCK] = begins;
+                        segment[SEGMENT_TO * RAY_BLOCK] = t_reached;
+                        segment[SEGMENT_OPTICAL_DEPTH * RAY_BLOCK] = optical_depth;
+                        segment[SEGMENT_COLOR * RAY_BLOCK] = medium.x;
+                        segment[(SEGMENT_COLOR + 1) * RAY_BLOCK] = medium.y;
+                        segment[(SEGMENT_COLOR + 2) * RAY_BLOCK] = medium.z;
+                    }
+                    ++slot;
+                    absorbed += optical_depth;
+                }
+#else
                 const float weight = transmittance * opacity_of(medium.w * length_crossed); // over, front to back
                 color += weight * medium.xyz;
                 transmittance -= weight;
+#endif
                 if (!ends_here)
                     break;
                 passed += away ? 1 : -1;
             }
         }
+#ifdef SEGMENTS
+        if (r_next >= r_end || absorbed > optical_depth_cutoff)
+            break;
+#else
         if (r_next >= r_end || transmittance < transmittance_cutoff)
             break;
+#endif
         r = r_next;
         z = z_next;
         if (r_u <= r_v) {
@@ -182,5 +252,19 @@ __kernel void raycast(
         enters_tile = (((i ^ last_i) | (j ^ last_j)) >> TILE_SHIFT) != 0;
 #endif
     }
+#ifdef SEGMENTS
+    ends[stream * rays + band_ray] = slot;
+    if (slot > first_slot) {
+        bool inside = true;
+        for (int corner = 0; corner < 4; ++corner) {
+            float t0 = -INFINITY;
+            float t1 = INFINITY;
+            inside = clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, BOX_PLANES, a + (corner & 1 ? margin : -margin),
+                                    b + (corner & 2 ? margin : -margin), &t0, &t1) && inside;
+        }
+        contributes[stream * rays + band_ray] = inside ? 2 : 1;
+    }
+#else
     image[place] = (float4)(color, 1.0f - transmittance);
+#endif
 }

@@ -250,6 +250,34 @@ def composite_line(lists: Lists, line: Line) -> Array:
     numpy.ndarray
         float64 (4,), premultiplied RGBA.
     """
+    crossed = crossings(lists, line)
+    tau = optical_depth_over_length(
+        lists.vdi.optical_depth[crossed.member], crossed.length, lists.length[crossed.member]
+    )
+    return composite(lists.vdi.color[crossed.member], tau)
+
+
+class Crossings(NamedTuple):
+    """The supersegments that a line passes through, in the order in which it meets them.
+
+    Attributes
+    ----------
+    member : numpy.ndarray
+        int64 (n,), indices of supersegments; one may be met in several pieces.
+    length : numpy.ndarray
+        float64 (n,), what is crossed of each, model units.
+    begin, end : numpy.ndarray
+        float64 (n,), where, as t of the line.
+    """
+
+    member: NDArray[np.int64]
+    length: Array
+    begin: Array
+    end: Array
+
+
+def crossings(lists: Lists, line: Line) -> Crossings:
+    """Intersect a line with a medium; arguments as for :func:`composite_line`."""
     # Homogeneous viewport coordinates (u d, v d, Z, d) are linear in t: h(t) = at + t slope
     at = lists.viewport @ np.append(line.origin, 1.0)
     slope = lists.viewport @ np.append(line.direction, 0.0)
@@ -271,11 +299,14 @@ def composite_line(lists: Lists, line: Line) -> Array:
     depth = at[2] + cuts * slope[2]
     share = _share_between(depth[piece], depth[piece + 1], lists.front[member], lists.back[member])
     hit = share > 0
-    member, piece = member[hit], piece[hit]
-    length = share[hit] * (cuts[piece + 1] - cuts[piece]) * line.unit_length
-
-    tau = optical_depth_over_length(lists.vdi.optical_depth[member], length, lists.length[member])
-    return composite(lists.vdi.color[member], tau)
+    member, piece, share = member[hit], piece[hit], share[hit]
+    whole = cuts[piece + 1] - cuts[piece]
+    near = lists.back[member] if slope[2] < 0 else lists.front[member]
+    with np.errstate(divide="ignore", invalid="ignore"):  # across the depth: the whole piece
+        before = (near - depth[piece]) / (depth[piece + 1] - depth[piece])
+    before = np.clip(np.where(np.isfinite(before), before, 0.0), 0.0, 1.0 - share)
+    first = cuts[piece] + before * whole
+    return Crossings(member, share * whole * line.unit_length, first, first + share * whole)
 
 
 def _in_view_space(camera: Camera, ray: Ray) -> tuple[Array, Array]:

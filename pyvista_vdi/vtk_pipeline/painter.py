@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, UnsupportedError
@@ -22,6 +23,7 @@ from pyvista_vdi.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.frame import Frame, as_array, sampled
 from pyvista_vdi.vtk_pipeline.inputs import Input
 from pyvista_vdi.vtk_pipeline.interaction import Interaction, WindowClock, reduced
+from pyvista_vdi.vtk_pipeline.overlap import Overlaps, Sight, same_depth
 from pyvista_vdi.vtk_pipeline.status import CornerTexts, VDIStatus
 from pyvista_vdi.vtk_pipeline.texture import ImageTexture
 from pyvista_vdi.vtk_pipeline.upkeep import Scene, Upkeep
@@ -79,16 +81,24 @@ class Drawn:
         What it was raycast for; ``None`` for the empty image before the first.
     number : int or None
         By which an upload is known.
+    joint : bool
+        Whether it is a part of a picture that other actors show the rest of.
     """
 
     image: Image
     task: Task | None = None
     number: int | None = None
+    joint: bool = False
 
     @property
     def preview(self) -> bool:
         """Whether it has fewer pixels than the viewport."""
         return self.task is not None and self.task.preview
+
+    @property
+    def smooth(self) -> bool:
+        """Whether its pixels are interpolated: not where the neighbours are another actor's."""
+        return self.preview and not self.joint
 
 
 class Painter:
@@ -205,19 +215,11 @@ class Painter:
                 "VDIMapper draws only behind a VDIActor: use VDIActor in place of vtkVolume"
             )
             return
-        try:
-            self._last = self._paint(mapper, renderer)
-        except KeyboardInterrupt:
-            self._voice.warn(
-                "generating the VDI was interrupted: what was shown stays; call "
-                "actor.regenerate() to try again"
-            )
-        except Exception as error:  # VTK would swallow it
-            self._cannot_draw(error)
+        self._last = self._guarded(self._paint, mapper, renderer) or self._last
         window, drawn = renderer.GetRenderWindow(), self._last
         WindowClock.of(window).showed(drawn.preview)
         try:
-            self._texture.show(window, drawn.image, drawn.number, smooth=drawn.preview)
+            self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
         except DeviceError as error:
             self._cannot_draw(error)
         self.texts.write(renderer, self.status)
@@ -227,11 +229,52 @@ class Painter:
         """Let go of the texture unit."""
         self._texture.let_go()
 
+    def _guarded(self, draw: Callable[[Any, Any], Any], mapper: Any, renderer: Any) -> Any:
+        """Return what a part of drawing returns, or ``None`` and say what went wrong."""
+        try:
+            return draw(mapper, renderer)
+        except KeyboardInterrupt:
+            self._voice.warn(
+                "generating the VDI was interrupted: what was shown stays; call "
+                "actor.regenerate() to try again"
+            )
+        except Exception as error:  # VTK would swallow it
+            self._cannot_draw(error)
+        return None
+
     def _cannot_draw(self, error: Exception) -> None:
         self._voice.warn(f"the VDI cannot be drawn: {type(error).__name__}: {error}", error)
 
     def _paint(self, mapper: Any, renderer: Any) -> Drawn:
         """Return the frame's image."""
+        sight = self._sight(mapper, renderer)
+        if sight is None:
+            return self._last
+        part = Overlaps.of(sight.clock).part(sight, renderer, _sights)
+        if part is not None:
+            return Drawn(
+                part.image, Task(part.frame, None, None, part.full_size), part.number, joint=True
+            )
+        vdi, frame, clock = sight.vdi, sight.frame, sight.clock
+        depth = None
+        if frame.sees_opaque_before(renderer, sight.actor, vdi.bounds):
+            depth = frame.opaque_depth(renderer)
+            if np.isposinf(depth).all():
+                depth = None
+        task = Task(frame, sight.planes, depth, frame.size)
+        drawn = self._kept(task)
+        if drawn is not None:
+            return drawn  # however the frame is to be: where it is there, full costs nothing
+        size = self.preview_size(mapper, renderer, clock, frame.size)
+        if size == frame.size:
+            return self._raycast(vdi, task, clock)
+        sight = sight.coarser(size)
+        depth = None if depth is None else sampled(depth, size)
+        task = Task(sight.frame, sight.planes, depth, task.full_size)
+        return self._kept(task) or self._raycast(vdi, task, clock)
+
+    def _sight(self, mapper: Any, renderer: Any) -> Sight | None:
+        """Return the VDI as the frame is to show it, brought up to date; ``None`` if none is."""
         actor = self._actor.Get()
         clock = WindowClock.of(renderer.GetRenderWindow())
         clock.join(self, renderer)
@@ -243,7 +286,7 @@ class Painter:
         scene = Scene(renderer, model_transform, view, clock, only)
         vdi = self.upkeep.current(scene, self.status)
         if vdi is None:
-            return self._last
+            return None
         place_proxy(self.proxy, vdi.bounds)
         if mapper.GetCropping():
             raise UnsupportedError(
@@ -253,26 +296,13 @@ class Painter:
             self._images.clear()
             self._drawn = weakref.ref(vdi)
             self._generation += 1
-        depth = None
-        if frame.sees_opaque_before(renderer, actor, vdi.bounds):
-            depth = frame.opaque_depth(renderer)
-            if np.isposinf(depth).all():
-                depth = None
-        planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
-        task = Task(frame, planes, depth, frame.size)
-        drawn = self._kept(task)
-        if drawn is not None:
-            return drawn  # however the frame is to be: where it is there, full costs nothing
-        size = self._size(mapper, renderer, clock, frame.size)
-        if size == frame.size:
-            return self._raycast(vdi, task, clock)
-        frame = frame.coarser(size)
-        planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
-        depth = None if depth is None else sampled(depth, size)
-        task = Task(frame, planes, depth, task.full_size)
-        return self._kept(task) or self._raycast(vdi, task, clock)
+        return Sight(self, mapper, actor, frame, clock, vdi)
 
-    def _size(
+    def beside(self, mapper: Any, renderer: Any) -> Sight | None:
+        """Return the VDI as it is to be seen beside another one; never raises."""
+        return self._guarded(self._sight, mapper, renderer)  # type: ignore[no-any-return]
+
+    def preview_size(
         self, mapper: Any, renderer: Any, clock: WindowClock, full: tuple[int, int]
     ) -> tuple[int, int]:
         """Return the size of this frame's image: that of the viewport, or less."""
@@ -282,7 +312,7 @@ class Painter:
     def _kept(self, task: Task) -> Drawn | None:
         """Return the image of exactly this view, if there is one."""
         drawn = self._images.get(task.key)
-        if drawn is None or drawn.task is None or not _same(drawn.task.depth, task.depth):
+        if drawn is None or drawn.task is None or not same_depth(drawn.task.depth, task.depth):
             return None
         return drawn
 
@@ -385,8 +415,21 @@ def _is_viewport(renderer: Any) -> bool:
     return viewport == [x[0], y[0], width[0], height[0]]
 
 
-def _planes(mapper: Any, vdi: VDI, frame: Frame) -> NDArray[np.float64] | None:
-    return frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
+def _sights(own: Sight, renderer: Any) -> list[Sight]:
+    """Return what the renderer shows of VDIs in this frame, in its order."""
+    sights = []
+    props = renderer.GetViewProps()
+    for i in range(props.GetNumberOfItems()):
+        prop = props.GetItemAsObject(i)
+        if prop is own.actor:
+            sights.append(own)
+            continue
+        mapper = prop.GetMapper() if isinstance(prop, vtkVolume) and prop.GetVisibility() else None
+        painter = getattr(mapper, "painter", None)
+        sight = painter.beside(mapper, renderer) if isinstance(painter, Painter) else None
+        if sight is not None:
+            sights.append(sight)
+    return sights
 
 
 def _view_of(renderer: Any, model_transform: NDArray[np.float64], frame: Frame) -> View:
@@ -395,9 +438,3 @@ def _view_of(renderer: Any, model_transform: NDArray[np.float64], frame: Frame) 
         return View.of(renderer, model_transform)
     except UnsupportedError:  # a shear, an off-axis projection: drawn all the same
         return View(frame.camera, frame.size)
-
-
-def _same(a: NDArray[np.float32] | None, b: NDArray[np.float32] | None) -> bool:
-    if a is None or b is None:
-        return a is b
-    return np.array_equal(a, b)
