@@ -27,6 +27,8 @@ Shared functions:
     Which supersegment of a list a ray meets first (paper, Algorithm 1).
 ``common/occupancy.cl``
     Tiles and slabs of the occupancy grid.
+``common/segments.cl``
+    What rays cross of several VDIs, as segments in a pool.
 
 Entry points:
 
@@ -38,6 +40,8 @@ Entry points:
     ``prepare_lists``: a VDI's arrays to what the raycaster reads.
 ``vdi/raycast.cl``
     ``raycast``: VDI to image from any view (paper, section 3).
+``vdi/merge.cl``
+    ``merge``: what rays cross of several VDIs, to one image.
 ``vdi/preview.cl``
     ``preview``: VDI to image by a given number of samples per ray (paper, section 5).
 ``vdi/render_volume.cl``
