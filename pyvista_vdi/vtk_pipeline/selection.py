@@ -163,7 +163,8 @@ class Selection:
         renderer.SetPass(None)
         self._picking = True
         try:
-            path = renderer.PickProp(x, y)
+            # Not PickProp, which picks from what a picker before has left (seen: VTK 9.7)
+            path = renderer.PickPropFrom(x, y, None)
             seen = self._seen
         finally:
             renderer.SetPass(render_pass)
