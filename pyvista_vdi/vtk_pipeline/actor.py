@@ -94,7 +94,7 @@ class VDIActorMethods:
         x, y : float
             Display coordinates: pixels of the window from its lower left corner, as in VTK's
             events and pickers.
-        renderer : vtkRenderer, optional
+        renderer : vtkRenderer or pyvista.Plotter, optional
             Which one, where renderers overlap; by default the one that shows the actor there.
 
         Returns
@@ -117,12 +117,10 @@ class VDIActorMethods:
             raise InvalidArgumentError(
                 "nothing shows this actor yet: add it to a renderer of a window first"
             )
-        for candidate in shown:
-            if (renderer is None or candidate is renderer) and candidate.IsInViewport(
-                int(x), int(y)
-            ):
-                return mapper.painter.selection.pick(self, candidate, x, y)  # type: ignore[no-any-return]
-        return None
+        if renderer is not None:
+            shown = [r for r in shown if r is getattr(renderer, "renderer", renderer)]
+        there = [r for r in shown if r.IsInViewport(int(x), int(y))]
+        return mapper.painter.selection.pick(self, there[0], x, y) if there else None
 
     def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
         """Generate the VDI anew, now.
