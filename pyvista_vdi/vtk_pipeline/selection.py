@@ -77,7 +77,6 @@ class Selection:
         self._texture = ImageTexture()
         self._drawn: tuple[Any, Hits] | None = None
         self._uploads = 0
-        self._selecting = False
         self._picking = False
         self._seen: Seen | None = None
 
@@ -87,7 +86,6 @@ class Selection:
 
     def enter(self, actor: Any, selector: Any) -> None:
         """Have an actor draw hits, with their depth, in the pass that begins."""
-        self._selecting = True
         show_first_hits(actor, selector.GetCurrentPass())
         keys = actor.GetPropertyKeys()
         if keys is None:
@@ -96,11 +94,11 @@ class Selection:
         keys.Set(vtkOpenGLActor.GLDepthMaskOverride(), 1)
 
     def leave(self, actor: Any) -> None:
-        """Have it draw its image again, in the frame that begins."""
-        if self._selecting:
-            self._selecting = False
-            show_image(actor)
-            actor.GetPropertyKeys().Remove(vtkOpenGLActor.GLDepthMaskOverride())
+        """Have it draw its image, in the frame that begins, whatever was drawn last."""
+        show_image(actor)
+        keys = actor.GetPropertyKeys()
+        if keys is not None:
+            keys.Remove(vtkOpenGLActor.GLDepthMaskOverride())
 
     def show(self, window: Any, selector: Any, seen: Seen | None, device: Any) -> None:
         """Raycast and bind the hits in a selector's area; none if nothing is seen.

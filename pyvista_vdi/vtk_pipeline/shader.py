@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from vtkmodules.vtkCommonCore import reference
 from vtkmodules.vtkRenderingCore import vtkHardwareSelector
 
 _DECLARATION = "//VTK::Base::Dec\nuniform sampler2D vdiImage;\n"
@@ -51,12 +52,16 @@ _CELL = """
 """
 
 
+#: What in VTK's template calls its ray caster.
+_CALL = "//VTK::CallWorker::Impl"
+
+
 def show_image(actor: Any) -> None:
     """Have an actor's shader look its colours up in an image of the viewport."""
-    actor.GetShaderProperty().AddFragmentShaderReplacement(
-        "//VTK::Base::Dec", True, _DECLARATION, False
-    )
-    _cast_rays_by(actor, _LOOKUP)
+    shader = actor.GetShaderProperty()
+    if _replacement(shader) is None:
+        shader.AddFragmentShaderReplacement("//VTK::Base::Dec", True, _DECLARATION, False)
+    _replace(shader, _LOOKUP)
 
 
 def show_first_hits(actor: Any, selection_pass: int) -> None:
@@ -71,10 +76,20 @@ def show_first_hits(actor: Any, selection_pass: int) -> None:
     """
     cells = (vtkHardwareSelector.CELL_ID_LOW24, vtkHardwareSelector.CELL_ID_HIGH24)
     which = _CELL if selection_pass in cells else _PROP
-    _cast_rays_by(actor, _FIRST_HIT + which)
+    _replace(actor.GetShaderProperty(), _FIRST_HIT + which)
 
 
-def _cast_rays_by(actor: Any, text: str) -> None:
-    actor.GetShaderProperty().AddFragmentShaderReplacement(
-        "//VTK::CallWorker::Impl", True, text, False
-    )
+def _replace(shader: Any, text: str) -> None:
+    """Put the text in place, unless it is: a property that is modified has the shader rebuilt."""
+    if _replacement(shader) != text:
+        shader.AddFragmentShaderReplacement(_CALL, True, text, False)
+
+
+def _replacement(shader: Any) -> str | None:
+    """Return what is in place now. Asked of VTK: copies of an actor share its shader."""
+    for i in range(shader.GetNumberOfShaderReplacements()):
+        name, first, text, everywhere = (reference(kind) for kind in ("", False, "", False))
+        shader.GetNthShaderReplacement(i, name, first, text, everywhere)
+        if str(name) == _CALL:
+            return str(text)
+    return None

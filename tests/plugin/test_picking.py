@@ -382,6 +382,36 @@ def test_the_picture_stays(no_leaks):
     scene.plotter.close()
 
 
+def test_copies_in_two_renderers_share_a_shader():
+    """One is picked while the other is drawn: each must find its own text in place."""
+    plotter = pv.Plotter(shape=(1, 2), window_size=WINDOW)
+    actor = plotter.add_vdi(slab())
+    plotter.camera_position = ((0, 0, 8), (0, 0, 0), (0, 1, 0))
+    plotter.subplot(0, 1)
+    twin = actor.copy(deep=False)
+    assert twin.GetShaderProperty() is actor.GetShaderProperty()
+    plotter.add_actor(twin)
+    plotter.camera_position = ((0, 0, -8), (0, 0, 0), (0, 1, 0))
+    plotter.show(auto_close=False)
+    before = plotter.screenshot(return_img=True)
+    for _ in range(2):
+        assert actor.pick(60, 100).position[2] == pytest.approx(0.5, abs=1e-12)
+        assert twin.pick(180, 100).position[2] == pytest.approx(-0.5, abs=1e-12)
+        assert np.array_equal(plotter.screenshot(return_img=True), before)
+    plotter.close()
+
+
+def test_another_mapper_after_a_pick():
+    scene = Scene(slab()).show()
+    before = scene.plotter.screenshot(return_img=True)
+    assert scene.vdi.pick(*CENTRE) is not None
+    mapper = pvdi.VDIMapper()
+    mapper.SetVDI(slab())
+    scene.vdi.SetMapper(mapper)
+    assert np.array_equal(scene.plotter.screenshot(return_img=True), before)
+    scene.plotter.close()
+
+
 # -- PyVista and VTK ----------------------------------------------------------------------------
 
 
