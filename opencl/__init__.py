@@ -39,7 +39,8 @@ Entry points:
 ``vdi/prepare.cl``
     ``prepare_lists``: a VDI's arrays to what the raycaster reads.
 ``vdi/raycast.cl``
-    ``raycast``: VDI to image from any view (paper, section 3).
+    ``raycast``: VDI to image from any view (paper, section 3), to the depth of the first hit, or to
+    what is merged with other VDIs.
 ``vdi/merge.cl``
     ``merge``: what rays cross of several VDIs, to one image.
 ``vdi/preview.cl``

@@ -9,6 +9,7 @@
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
 // -D SEGMENTS           write what each ray crosses into a pool, to be merged with other VDIs by vdi/merge.cl, in place of
 //                       compositing it; for a band of rays
+// -D FIRST_HIT          in place of a picture, where each ray enters the first supersegment that reaches an opacity
 #include "common/list_ray.cl"
 #include "common/lists.cl"
 #include "common/classification.cl"
@@ -44,7 +45,7 @@ __kernel void raycast(
     __global const ulong *masks,        // occupied slabs of each tile of lists, if SKIP_EMPTY
     float first_depth,                  // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,
-#ifdef SEGMENTS
+#if defined(SEGMENTS)
     uint first_item,                    // work-item of the band's first ray
     int stream,                         // of this VDI
     int rays,                           // in the band
@@ -55,8 +56,17 @@ __kernel void raycast(
     __global int *ends,                 // (streams, rays): slot behind each stream's last, beyond the capacity if it was full
     __global uchar *contributes)        // (streams, rays): 1 if a ray meets the VDI, 2 if its neighbours at `margin` pixels
                                         // meet its bounds, too
+#define RAY_IS_DONE (absorbed > optical_depth_cutoff)
+#elif defined(FIRST_HIT)
+    float least_optical_depth,          // a hit has some, and at least this much: by itself, or with all before it
+    int accumulated,                    // whether what is before it counts
+    __global float *image)              // t of the first hit, infinite where there is none, top row first
+#define NOTHING INFINITY
+#define RAY_IS_DONE hit
 #else
     __global float4 *image)             // premultiplied RGBA, top row first
+#define NOTHING (float4)(0.0f)
+#define RAY_IS_DONE (transmittance < transmittance_cutoff)
 #endif
 {
 #ifdef SEGMENTS
@@ -83,7 +93,7 @@ __kernel void raycast(
     ListRay ray;
     if (!begin_list_ray(&ray, forms, planes, a, b, has_opaque_depth ? opaque_depth[place] : INFINITY, depth_origin)) {
 #ifndef SEGMENTS
-        image[place] = (float4)(0.0f);
+        image[place] = NOTHING;
 #endif
         return;
     }
@@ -110,7 +120,11 @@ __kernel void raycast(
 #define CROSSING_U(i) (((float)(i) + border_i - half_wide - deep.x) * inverse_u)
 #define CROSSING_V(j) (((float)(j) + border_j - half_high - deep.y) * inverse_v)
 
-#ifndef SEGMENTS
+#if defined(FIRST_HIT)
+    float met = 0.0f; // optical depth
+    float r_hit = r_begin;
+    bool hit = false;
+#elif !defined(SEGMENTS)
     float3 color = (float3)(0.0f);
     float transmittance = 1.0f;
 #endif
@@ -201,7 +215,7 @@ __kernel void raycast(
                 const float4 medium = media[k];
                 const float length_crossed = model_length(ray.scale, from, fma(from, along.z, deep.z), to,
                                                           fma(to, along.z, deep.z), depth_origin);
-#ifdef SEGMENTS
+#if defined(SEGMENTS)
                 const float optical_depth = fmin(medium.w * length_crossed, MAX_OPTICAL_DEPTH);
                 const float t_from = ray_depth(&ray, from, fma(from, along.z, deep.z), depth_origin) + depth_shift;
                 const float t_to = ray_depth(&ray, to, fma(to, along.z, deep.z), depth_origin) + depth_shift;
@@ -220,6 +234,13 @@ __kernel void raycast(
                     ++slot;
                     absorbed += optical_depth;
                 }
+#elif defined(FIRST_HIT)
+                const float tau = medium.w * length_crossed;
+                met = accumulated ? met + tau : tau;
+                hit = met > 0.0f && met >= least_optical_depth;
+                r_hit = from;
+                if (hit)
+                    break;
 #else
                 const float weight = transmittance * opacity_of(medium.w * length_crossed); // over, front to back
                 color += weight * medium.xyz;
@@ -230,13 +251,8 @@ __kernel void raycast(
                 passed += away ? 1 : -1;
             }
         }
-#ifdef SEGMENTS
-        if (r_next >= r_end || absorbed > optical_depth_cutoff)
+        if (r_next >= r_end || RAY_IS_DONE)
             break;
-#else
-        if (r_next >= r_end || transmittance < transmittance_cutoff)
-            break;
-#endif
         r = r_next;
         z = z_next;
         if (r_u <= r_v) {
@@ -252,7 +268,7 @@ __kernel void raycast(
         enters_tile = (((i ^ last_i) | (j ^ last_j)) >> TILE_SHIFT) != 0;
 #endif
     }
-#ifdef SEGMENTS
+#if defined(SEGMENTS)
     ends[stream * rays + band_ray] = slot;
     if (slot > first_slot) {
         bool inside = true;
@@ -264,6 +280,10 @@ __kernel void raycast(
         }
         contributes[stream * rays + band_ray] = inside ? 2 : 1;
     }
+#elif defined(FIRST_HIT)
+    const float z_hit = fma(r_hit, along.z, deep.z);
+    const float passed_by = model_length(ray.scale, r_begin, start.z, r_hit, z_hit, depth_origin);
+    image[place] = hit ? ray.t_begin + passed_by / model_speed(forms, a, b) : NOTHING;
 #else
     image[place] = (float4)(color, 1.0f - transmittance);
 #endif

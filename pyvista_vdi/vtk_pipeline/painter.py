@@ -24,6 +24,7 @@ from pyvista_vdi.vtk_pipeline.frame import Frame, as_array, sampled
 from pyvista_vdi.vtk_pipeline.inputs import Input
 from pyvista_vdi.vtk_pipeline.interaction import Interaction, WindowClock, reduced
 from pyvista_vdi.vtk_pipeline.overlap import Overlaps, Sight, same_depth
+from pyvista_vdi.vtk_pipeline.selection import Seen, Selection
 from pyvista_vdi.vtk_pipeline.status import CornerTexts, VDIStatus
 from pyvista_vdi.vtk_pipeline.texture import ImageTexture
 from pyvista_vdi.vtk_pipeline.upkeep import Scene, Upkeep
@@ -112,6 +113,7 @@ class Painter:
         self.device: Any = None
         self.interaction = Interaction()
         self.texts = CornerTexts()
+        self.selection = Selection()
         self.proxy = make_proxy()
         self._voice = Voice()
         self.upkeep = Upkeep(self.interaction, self._voice, self.texts)
@@ -165,11 +167,13 @@ class Painter:
         """Free the texture and the images kept, and end what goes on; a frame begins anew."""
         self.upkeep.close()
         self._texture.release()
+        self.selection.release()
         self._images.clear()
 
     def take_settings(self, other: Painter) -> None:
         """Take over what another allows and when it regenerates."""
         vars(self.interaction).update(vars(other.interaction))
+        self.selection.take_settings(other.selection)
         self.upkeep.regeneration.policy = other.upkeep.regeneration.policy
         self.upkeep.regeneration.bound = other.upkeep.regeneration.bound
 
@@ -215,6 +219,10 @@ class Painter:
                 "VDIMapper draws only behind a VDIActor: use VDIActor in place of vtkVolume"
             )
             return
+        if renderer.GetSelector() is not None:
+            self._select(mapper, renderer)
+            return
+        self.selection.leave(self._actor.Get())
         self._last = self._guarded(self._paint, mapper, renderer) or self._last
         window, drawn = renderer.GetRenderWindow(), self._last
         WindowClock.of(window).showed(drawn.preview)
@@ -228,6 +236,7 @@ class Painter:
     def end(self) -> None:
         """Let go of the texture unit."""
         self._texture.let_go()
+        self.selection.let_go()
 
     def _guarded(self, draw: Callable[[Any, Any], Any], mapper: Any, renderer: Any) -> Any:
         """Return what a part of drawing returns, or ``None`` and say what went wrong."""
@@ -282,7 +291,7 @@ class Painter:
         frame = Frame.current(renderer, model_transform)
         view = _view_of(renderer, model_transform, frame)
         self._scene = (view.camera, weakref.ref(clock))
-        only = len(self._renderers()) == 1
+        only = len(self.renderers()) == 1
         scene = Scene(renderer, model_transform, view, clock, only)
         vdi = self.upkeep.current(scene, self.status)
         if vdi is None:
@@ -301,6 +310,25 @@ class Painter:
     def beside(self, mapper: Any, renderer: Any) -> Sight | None:
         """Return the VDI as it is to be seen beside another one; never raises."""
         return self._guarded(self._sight, mapper, renderer)  # type: ignore[no-any-return]
+
+    def _select(self, mapper: Any, renderer: Any) -> None:
+        """Draw what can be picked of what the last frame showed, or the first would show."""
+        actor, selector = self._actor.Get(), renderer.GetSelector()
+        window = renderer.GetRenderWindow()
+        self.selection.enter(actor, selector)
+        seen = None
+        try:
+            if not isinstance(self._drawn(), VDI):
+                self._last = self._paint(mapper, renderer)
+            vdi = self._drawn()
+            if isinstance(vdi, VDI):
+                frame = Frame.current(renderer, as_array(actor.GetMatrix()))
+                planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
+                seen = Seen(vdi, frame, planes)
+            self.selection.show(window, selector, seen, self.device)
+        except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
+            self._voice.warn(f"the VDI cannot be picked: {type(error).__name__}: {error}", error)
+            self.selection.show(window, selector, None, self.device)
 
     def preview_size(
         self, mapper: Any, renderer: Any, clock: WindowClock, full: tuple[int, int]
@@ -342,7 +370,7 @@ class Painter:
 
     def renderer(self) -> Any:
         """Return the renderer that is drawing the actor; ``None`` if it has none."""
-        renderers = self._renderers()
+        renderers = self.renderers()
         if len(renderers) > 1:
             for candidate in renderers:
                 self._watch(candidate)
@@ -354,7 +382,7 @@ class Painter:
             renderers = drawing or renderers
         return renderers[0] if renderers else None
 
-    def _renderers(self) -> list[Any]:
+    def renderers(self) -> list[Any]:
         """Return all renderers that show the actor."""
         actor = self._actor.Get()
         if actor is None:
