@@ -169,7 +169,13 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_render(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help=_VDI_FILE)
+    parser.add_argument(
+        "files",
+        nargs="+",
+        metavar="FILE",
+        help=f"{_VDI_FILE}; several are merged by depth, each where it was generated, and the "
+        "view and the size are those of the first unless they are given",
+    )
     parser.add_argument("-o", "--output", metavar="FILE", required=True, help=".png to write")
     _add_size(parser, None)
     parser.add_argument(

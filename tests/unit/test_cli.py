@@ -297,6 +297,40 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
     assert sorted(path.name for path in tmp_path.iterdir()) == ["b.png", "b.vdi"]
 
 
+def test_render_several(capsys, default_runtime, tmp_path):
+    from PIL import Image
+
+    camera = filling_camera((0, 7, 0, 9, 0, 11), (24, 16))
+    matrix = np.eye(4)
+    matrix[0, 3] = 0.5
+    one, other = (
+        pvdi.VDI(
+            view,
+            (24, 16),
+            np.arange(24 * 16 + 1),
+            np.full(384, front),
+            np.full(384, front + 2),
+            np.full((384, 3), color),
+            np.full(384, 0.7),
+            (0, 7, 0, 9, 0, 11),
+        )
+        for view, front, color in (
+            (camera, 26.0, (1.0, 0.5, 0.0)),
+            (camera.replace(model_transform=matrix), 27.0, (0.0, 0.5, 1.0)),
+        )
+    )
+    files = (tmp_path / "a.vdi", tmp_path / "b.vdi")
+    for vdi, file in zip((one, other), files, strict=True):
+        vdi.save(file)
+    picture = tmp_path / "both.png"
+    assert run(capsys, "render", *files, "-o", picture)[0] == 0
+    transforms = [np.eye(4), matrix]
+    expected = pvdi.render([one, other], one.camera, model_transforms=transforms)
+    with Image.open(picture) as image:
+        assert np.array_equal(np.asarray(image), io.to_bytes(expected))
+    assert not np.array_equal(expected, pvdi.render(one, one.camera))
+
+
 def test_render_over_a_background(folder, capsys, default_runtime, tmp_path):
     from PIL import Image
 
