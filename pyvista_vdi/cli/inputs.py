@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ..ambient_occlusion import AmbientOcclusion
 from ..api import as_volume
 from ..camera import Camera
 from ..errors import InvalidArgumentError, VDIError
@@ -69,6 +70,16 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
             path, TransferFunction.from_dict, "transfer function"
         )
     return given
+
+
+def ambient_occlusion(options: argparse.Namespace) -> AmbientOcclusion | None:
+    """Return the ambient occlusion that the options ask for, if any."""
+    names = ("radius", "strength")
+    given = {n: getattr(options, f"occlusion_{n}") for n in names}
+    given = {n: value for n, value in given.items() if value is not None}
+    if not options.ambient_occlusion and not given:
+        return None
+    return AmbientOcclusion.from_any(AmbientOcclusion(**given))
 
 
 def camera(options: argparse.Namespace, default: Camera) -> Camera:

@@ -125,6 +125,7 @@ def _add_generate(parser: argparse.ArgumentParser) -> None:
     _add_size(parser, WINDOW_SIZE)
     _add_camera(parser, f"the view that the volume fills, {ELEVATION:g} degrees above its middle")
     _add_classification(parser)
+    _add_occlusion(parser)
     _add_limits(parser)
     _add_file(parser)
     _add_device(parser)
@@ -343,6 +344,24 @@ def _add_classification(parser: argparse.ArgumentParser, *, tables: bool = True)
             metavar="FILE",
             help="TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista",
         )
+
+
+def _add_occlusion(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("ambient occlusion", "Either option below turns it on, too.")
+    group.add_argument(
+        "--ambient-occlusion",
+        action="store_true",
+        help="darken what is hidden from the light around it",
+    )
+    group.add_argument(
+        "--occlusion-radius",
+        type=float,
+        metavar="LENGTH",
+        help="how far something hides, model units (default: 0.05 of the bounds' diagonal)",
+    )
+    group.add_argument(
+        "--occlusion-strength", type=float, metavar="S", help="0 to 1 (default: 0.1; 1 is darkest)"
+    )
 
 
 def _add_limits(parser: argparse.ArgumentParser) -> None:
