@@ -273,6 +273,17 @@ def test_blending_cropping_and_masks_of_the_mapper(plotter):
         mapper.SetMaskInput(VOLUME)
 
 
+def test_illumination_of_the_mapper(plotter):
+    mapper = plotter.add_vdi(VOLUME).mapper
+    for setter in (mapper.SetGlobalIlluminationReach, mapper.SetVolumetricScatteringBlending):
+        setter(0)
+        with pytest.raises(errors.UnsupportedError, match="SetAmbientOcclusion"):
+            setter(0.5)
+    mapper.SetComputeNormalFromOpacity(False)
+    with pytest.raises(errors.UnsupportedError, match="gradient of its scalars"):
+        mapper.SetComputeNormalFromOpacity(True)
+
+
 def test_other_mappers_and_shared_mappers(plotter):
     actor = plotter.add_vdi(VOLUME)
     with pytest.raises(errors.InvalidArgumentError, match="needs a VDIMapper; got SmartVolume"):

@@ -55,6 +55,8 @@ LIGHTS = {
     "one-sided": Lights((DIRECTIONAL, BESIDE), two_sided=False),
     "with a headlight": Lights((DIRECTIONAL, BESIDE, Light(diffuse=(0.2, 0.2, 0.2)))),
     "positional": Lights((SPOT, BULB, BESIDE)),
+    "dimmed headlight": Lights((Light(ambient=(0.5, 0, 0.2), diffuse=(1, 0.5, 0), intensity=0.6),)),
+    "positional headlight": Lights((Light(positional=True),)),
     "none": Lights(()),
 }
 
