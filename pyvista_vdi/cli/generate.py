@@ -30,11 +30,11 @@ def generate(options: argparse.Namespace) -> int:
     file_arguments = file_options(options)
     arguments = classification(options)
     Classification(arguments, "generate")  # refused before the volume is read
+    occlusion = ambient_occlusion(options)
     volume = read_volume(options)
     for name in ("scalars", "preference"):  # the array has been chosen
         arguments.pop(name, None)
     view = generating_view(options, volume)
-    occlusion = ambient_occlusion(options)
     needed = estimate(
         volume,
         options.size,

@@ -31,6 +31,11 @@ _CLASSIFICATION = (
     "scalars",
     "preference",
     "interpolation",
+    "shade",
+    "ambient",
+    "diffuse",
+    "specular",
+    "specular_power",
 )
 
 
@@ -74,12 +79,9 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
 
 def ambient_occlusion(options: argparse.Namespace) -> AmbientOcclusion | None:
     """Return the ambient occlusion that the options ask for, if any."""
-    names = ("radius", "strength")
-    given = {n: getattr(options, f"occlusion_{n}") for n in names}
-    given = {n: value for n, value in given.items() if value is not None}
-    if not options.ambient_occlusion and not given:
-        return None
-    return AmbientOcclusion.from_any(AmbientOcclusion(**given))
+    values = {n: getattr(options, f"occlusion_{n}") for n in ("radius", "strength")}
+    given = {n: value for n, value in values.items() if value is not None}
+    return AmbientOcclusion(**given) if options.ambient_occlusion or given else None
 
 
 def camera(options: argparse.Namespace, default: Camera) -> Camera:

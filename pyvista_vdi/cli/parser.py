@@ -338,6 +338,9 @@ def _add_classification(parser: argparse.ArgumentParser, *, tables: bool = True)
     group.add_argument("--scalars", metavar="NAME", help="which array")
     group.add_argument("--preference", choices=("point", "cell"))
     group.add_argument("--interpolation", choices=("nearest", "linear"))
+    group.add_argument("--shade", action="store_true", default=None, help="lit by a headlight")
+    for name in ("--ambient", "--diffuse", "--specular", "--specular-power"):
+        group.add_argument(name, type=float, metavar="X", help="of a shaded volume")
     if tables:
         group.add_argument(
             "--transfer-function",

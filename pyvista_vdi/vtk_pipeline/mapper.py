@@ -275,7 +275,8 @@ class VDIMapperMethods:
 
 def _refuse_blending() -> NoReturn:
     raise UnsupportedError(
-        "a VDI stores what is composited along a ray, so only composite blending is supported"
+        "a VDI stores what is composited along a ray, so only composite blending is supported: "
+        "draw the volume itself by one of VTK's mappers for another"
     )
 
 
