@@ -24,7 +24,7 @@ DIRECTIONS = (12, 4096)
 #: Steps that a radius is cut into at least.
 _LEAST_STEPS = 8
 #: Cells along an axis that are not made coarser, however large the radius is.
-_LEAST_CELLS = 64
+_LEAST_CELLS = 32
 
 
 @dataclass(frozen=True)

@@ -82,8 +82,8 @@ def test_cells_are_an_eighth_of_the_radius_or_a_voxel():
     assert fine.cell == (1, 1, 1)
     assert fine.step == 0.25
     _, far = grid_of((129, 129, 129), 200)
-    assert far.cell == (2, 2, 2)
-    assert far.offsets.shape[1] == 100
+    assert far.cell == (4, 4, 4)
+    assert far.offsets.shape[1] == 50
 
 
 def test_every_voxel_lies_between_nodes_and_every_step_within_the_margin():
