@@ -18,7 +18,7 @@ pytestmark = pytest.mark.gl
 
 
 @pytest.mark.parametrize(
-    "name", ["plotter.py", "pipeline.py", "overlap.py", "picking.py", "files.py"]
+    "name", ["plotter.py", "pipeline.py", "overlap.py", "picking.py", "files.py", "occlusion.py"]
 )
 def test_example_writes_a_picture(name, tmp_path):
     target = tmp_path / "picture.png"
