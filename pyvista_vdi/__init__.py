@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from . import errors, examples
     from .api import estimate, generate, read, render, render_volume
     from .camera import Camera
+    from .cropping import Cropping
     from .errors import (
         Cancelled,
         DeviceError,
@@ -61,6 +62,7 @@ _ERRORS = (
 #: Where each public name lives; loaded when it is first used (PEP 562).
 _HOMES = {
     "Camera": "camera",
+    "Cropping": "cropping",
     "Estimate": "generation",
     "Light": "lighting",
     "Lights": "lighting",

@@ -151,6 +151,8 @@ def render(
     *,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
     skip_empty: bool = True,
     preview_samples: int | None = None,
     device: Any = None,
@@ -171,6 +173,13 @@ def render(
     clipping_planes : array_like of float, shape (k, 6), optional
         Origin and normal of each plane, world coordinates; the side that the normal points to
         is kept, as with VTK's mappers.
+    cropping : Cropping or vtkVolumeMapper or sequence of six numbers or pair, optional
+        Which of 27 regions of the data's own coordinates are drawn, as in ``vtkVolumeMapper``: a
+        :class:`Cropping`, a mapper's, x_low, x_high, y_low, y_high, z_low and z_high of a box, or
+        a pair of those planes and the regions (flags, or ``"fence"``, ``"cross"`` ...).
+    opacity_multiplier : float, default: 1.0
+        Factor of the extinction, 0 or above: 2 is twice as dense. For what is not opaque it is
+        the same as dividing the opacity unit distance by it.
     skip_empty : bool, default: True
         Pass by space without supersegments; the picture is the same to the last bit.
     preview_samples : int, optional
@@ -202,6 +211,8 @@ def render(
         window_size,
         opaque_depth=opaque_depth,
         clipping_planes=clipping_planes,
+        cropping=cropping,
+        opacity_multiplier=opacity_multiplier,
         skip_empty=skip_empty,
         preview_samples=preview_samples,
         device=device,
@@ -217,6 +228,8 @@ def render_volume(
     sample_distance: float | None = None,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
     early_termination: bool = True,
     skip_empty: bool = True,
     lights: Any = None,
@@ -235,7 +248,7 @@ def render_volume(
         Width and height in pixels.
     sample_distance : float, optional
         Length of a step along the ray, model units; half the smallest spacing by default.
-    opaque_depth, clipping_planes
+    opaque_depth, clipping_planes, cropping, opacity_multiplier
         As for :func:`render`.
     early_termination : bool
         Stop a ray where what is behind can no longer be seen.
@@ -279,6 +292,8 @@ def render_volume(
         sample_distance=sample_distance,
         opaque_depth=opaque_depth,
         clipping_planes=clipping_planes,
+        cropping=cropping,
+        opacity_multiplier=opacity_multiplier,
         early_termination=early_termination,
         skip_empty=skip_empty,
         lights=lights,

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import rays
 from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
+from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
 from .occupancy import OccupancyGrid
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime
@@ -36,6 +37,8 @@ def render_vdi(
     *,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
     skip_empty: bool = True,
     preview_samples: int | None = None,
     device: Any = None,
@@ -54,6 +57,10 @@ def render_vdi(
         View depth at which each ray ends, world units, top row first; inf where nothing is opaque.
     clipping_planes : array_like of float, shape (k, 6), optional
         Origin and normal of each plane, world coordinates; the normal's side is kept.
+    cropping : Cropping or what makes one, optional
+        Which regions of the model frame are drawn: see :meth:`pyvista_vdi.Cropping.from_any`.
+    opacity_multiplier : float
+        Factor of every supersegment's extinction, 0 or above.
     skip_empty : bool
         Pass by what the occupancy grid says is empty, where the VDI has enough of it to gain by
         that. The picture is the same to the last bit.
@@ -78,6 +85,8 @@ def render_vdi(
     camera = Camera.from_any(camera)
     size = check_window_size(vdi.window_size if window_size is None else window_size)
     samples = None if preview_samples is None else check_preview_samples(preview_samples)
+    cropping = Cropping.from_any(cropping)
+    multiplier = checked_opacity_multiplier(opacity_multiplier)
     runtime = get_runtime(device)
     prepared = prepared_vdi(runtime, vdi)
     with runtime.buffer((size[1], size[0], 4), name="image") as image:
@@ -87,6 +96,8 @@ def render_vdi(
             image,
             opaque_depth,
             clipping_planes,
+            cropping=cropping,
+            opacity_multiplier=multiplier,
             skip_empty=skip_empty,
             preview_samples=samples,
         )
@@ -179,6 +190,8 @@ class PreparedVDI:
         opaque_depth: ArrayLike | None = None,
         clipping_planes: ArrayLike | None = None,
         *,
+        cropping: Cropping | None = None,
+        opacity_multiplier: float = 1.0,
         skip_empty: bool = True,
         preview_samples: int | None = None,
     ) -> None:
@@ -186,15 +199,18 @@ class PreparedVDI:
         width, height = size
         pixel_rays = rays.pixel_rays(camera, size, self._bounds)
         coordinates = [pixel_rays.form(row[:3], row[3]) for row in self._list_rows]
-        direction = [pixel_rays.form(axis) for axis in np.eye(3)]
+        # Lengths are all that this is for, and a length times m absorbs as m times the extinction
+        direction = [opacity_multiplier * pixel_rays.form(axis) for axis in np.eye(3)]
         planes = rays.box_planes(pixel_rays, self._bounds)
         planes += self._viewport_planes(coordinates)
         planes += rays.eye_plane(camera, pixel_rays)
         planes += rays.user_planes(camera, pixel_rays, clipping_planes)
-        forms = rays.packed([*coordinates, *direction, *planes])
+        cropped = rays.cropped(pixel_rays, cropping, self._bounds)
+        planes += cropped.planes
+        forms = rays.packed([*coordinates, *direction, *planes, *cropped.forms])
         ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
         runtime = self._runtime
-        defines = self.defines
+        defines = {**self.defines, **cropped.defines}
         grid = self.occupancy
         sampling: tuple[Any, ...] = ()
         if preview_samples is not None:
@@ -231,6 +247,7 @@ class PreparedVDI:
                 np.float32(grid.first_depth),
                 np.float32(grid.slabs_per_depth),
                 *sampling,
+                *cropped.arguments,
                 image,
             )
             runtime.finish()  # the buffers above may be host memory in use

@@ -6,6 +6,7 @@
 //
 // -D OFFSET_T           type of an offset into the supersegments: uint or ulong
 // -D PARALLEL, SHIFTED  the depth coordinate, see common/list_space.cl
+// -D CROPPED            only some regions are drawn, see common/cropping.cl
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
 #include "common/list_ray.cl"
 #include "common/lists.cl"
@@ -31,6 +32,7 @@ __kernel void raycast(
     __global const ulong *masks,        // occupied slabs of each tile of lists, if SKIP_EMPTY
     float first_depth,                  // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,
+    CROPPING_PARAMETER                  // regions that are kept
     __global float4 *image)             // premultiplied RGBA, top row first
 {
     const int2 pixel = block_pixel((uint)get_global_id(0), width);
@@ -41,7 +43,8 @@ __kernel void raycast(
     const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
 
     ListRay ray;
-    if (!begin_list_ray(&ray, forms, planes, a, b, has_opaque_depth ? opaque_depth[place] : INFINITY, depth_origin)) {
+    if (!begin_list_ray(&ray, forms, planes, CROPPING_ARGUMENT a, b, has_opaque_depth ? opaque_depth[place] : INFINITY,
+                        depth_origin)) {
         image[place] = (float4)(0.0f);
         return;
     }
@@ -155,8 +158,7 @@ __kernel void raycast(
                 if (away ? leaves < z_next : leaves > z_next)
                     to = clamp((leaves - deep.z) * inverse_z, from, r_next);
                 const float4 medium = media[k];
-                const float length_crossed = model_length(ray.scale, from, fma(from, along.z, deep.z), to,
-                                                          fma(to, along.z, deep.z), depth_origin);
+                const float length_crossed = length_drawn(&ray, from, to, depth_origin);
                 const float weight = transmittance * opacity_of(medium.w * length_crossed); // over, front to back
                 color += weight * medium.xyz;
                 transmittance -= weight;

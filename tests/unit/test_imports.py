@@ -33,6 +33,7 @@ CORE = {
     "_version",
     "camera",
     "compositing",
+    "cropping",
     "errors",
     "lighting",
     "transfer_function",
