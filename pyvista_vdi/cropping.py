@@ -36,7 +36,8 @@ class Cropping:
     ----------
     planes : (float, float, float, float, float, float)
         x_low, x_high, y_low, y_high, z_low, z_high, model units; infinity is allowed. Where a high
-        plane lies below its low one, nothing is between them, as in VTK's GPU mapper.
+        plane lies below its low one, nothing is between them. (VTK's GPU mapper, and a
+        ``VDIMapper`` with it, draws nothing at all then.)
     regions : int or str
         27 flags, or the name of one of VTK's sets: ``"subvolume"`` (the box between the planes,
         the default), ``"fence"``, ``"inverted_fence"``, ``"cross"``, ``"inverted_cross"``.

@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 
+from pyvista_vdi.cropping import checked_opacity_multiplier
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.vtk_pipeline.inputs import Input, SourceInput, input_of, input_of_port
@@ -100,6 +101,29 @@ class VDIMapperMethods:
     def GetAutomaticView(self) -> bool:
         """Whether a source without camera gets the view of the first frame."""
         return self.painter.upkeep.automatic_view
+
+    # -- how it is drawn -------------------------------------------------------------------------
+
+    def SetOpacityMultiplier(self: Any, multiplier: float) -> None:
+        """Multiply the extinction of everything that is drawn; 1 by default.
+
+        It acts on the next frame, without another VDI: 2 is twice as dense, 0 transparent. For
+        what is not opaque it is the same as dividing the volume property's scalar opacity unit
+        distance by it; changing that itself makes the VDI anew.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is no finite number, or below 0.
+        """
+        factor = checked_opacity_multiplier(multiplier)
+        if factor != self.painter.opacity_multiplier:
+            self.painter.opacity_multiplier = factor
+            self.Modified()
+
+    def GetOpacityMultiplier(self) -> float:
+        """Return the factor of the extinction."""
+        return self.painter.opacity_multiplier
 
     # -- while a hand moves ----------------------------------------------------------------------
 
@@ -233,15 +257,6 @@ class VDIMapperMethods:
         """Refuse."""
         _refuse_blending()
 
-    def SetCropping(self, on: int) -> None:
-        """Refuse to crop; ``SetCropping(0)`` is accepted."""
-        if on:
-            self.CroppingOn()
-
-    def CroppingOn(self) -> NoReturn:
-        """Refuse."""
-        raise UnsupportedError("a VDI cannot be cropped: use clipping planes (AddClippingPlane)")
-
     def SetMaskInput(self, mask: Any) -> None:
         """Refuse a mask; ``SetMaskInput(None)`` is accepted."""
         if mask is not None:
@@ -264,7 +279,8 @@ class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
     (``SetInputData``) or a :class:`~pyvista_vdi.VDI` (``SetVDI``). Before each frame it brings
     the input up to date and raycasts it from the frame's view, ending rays at opaque geometry;
     an image is kept as long as view, depth and VDI stay the same. Clipping planes
-    (``AddClippingPlane``) are honoured; other blending modes, cropping and masks are refused.
+    (``AddClippingPlane``), cropping (``SetCropping`` and its regions) and the opacity multiplier
+    act on the next frame without another VDI; other blending modes and masks are refused.
 
     Notes
     -----

@@ -14,6 +14,7 @@ from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkCommonDataModel import vtkImageData
 
 from pyvista_vdi.camera import Camera
+from pyvista_vdi.cropping import Cropping
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, UnsupportedError
 from pyvista_vdi.opencl_runtime import Runtime, get_runtime
 from pyvista_vdi.raycast import render_vdi
@@ -48,18 +49,25 @@ class Task:
         View depth at which rays end, float32 (H, W), top row first.
     full_size : (int, int)
         Width and height of the viewport in pixels; the image of a preview is smaller.
+    cropping : Cropping or None
+        Regions of the model frame that are drawn.
+    opacity_multiplier : float
+        Factor of the extinction.
     """
 
     frame: Frame
     planes: NDArray[np.float64] | None
     depth: NDArray[np.float32] | None
     full_size: tuple[int, int]
+    cropping: Cropping | None = None
+    opacity_multiplier: float = 1.0
 
     @property
     def key(self) -> Any:
         """What its image is known by; the quality is in it as the two sizes."""
         planes = None if self.planes is None else self.planes.tobytes()
-        return (self.frame.camera, self.frame.size, self.full_size, planes)
+        looks = (self.cropping, self.opacity_multiplier)
+        return (self.frame.camera, self.frame.size, self.full_size, planes, looks)
 
     @property
     def preview(self) -> bool:
@@ -100,6 +108,7 @@ class Painter:
 
     def __init__(self) -> None:
         self.device: Any = None
+        self.opacity_multiplier = 1.0
         self.interaction = Interaction()
         self.texts = CornerTexts()
         self.proxy = make_proxy()
@@ -158,7 +167,8 @@ class Painter:
         self._images.clear()
 
     def take_settings(self, other: Painter) -> None:
-        """Take over what another allows and when it regenerates."""
+        """Take over how dense another draws, what it allows and when it regenerates."""
+        self.opacity_multiplier = other.opacity_multiplier
         vars(self.interaction).update(vars(other.interaction))
         self.upkeep.regeneration.policy = other.upkeep.regeneration.policy
         self.upkeep.regeneration.bound = other.upkeep.regeneration.bound
@@ -240,15 +250,16 @@ class Painter:
         view = _view_of(renderer, model_transform, frame)
         self._scene = (view.camera, weakref.ref(clock))
         only = len(self._renderers()) == 1
-        scene = Scene(renderer, model_transform, view, clock, only)
+        looks: dict[str, Any] = {
+            "cropping": Cropping.from_any(mapper),
+            "opacity_multiplier": self.opacity_multiplier,
+        }
+        shown = {"clipping_planes": self._world_planes(mapper, frame), **looks}
+        scene = Scene(renderer, model_transform, view, clock, only, shown)
         vdi = self.upkeep.current(scene, self.status)
         if vdi is None:
             return self._last
         place_proxy(self.proxy, vdi.bounds)
-        if mapper.GetCropping():
-            raise UnsupportedError(
-                "cropping (CroppingOn) is not honoured: use clipping planes (AddClippingPlane)"
-            )
         if vdi is not self._drawn():
             self._images.clear()
             self._drawn = weakref.ref(vdi)
@@ -259,7 +270,7 @@ class Painter:
             if np.isposinf(depth).all():
                 depth = None
         planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
-        task = Task(frame, planes, depth, frame.size)
+        task = Task(frame, planes, depth, frame.size, **looks)
         drawn = self._kept(task)
         if drawn is not None:
             return drawn  # however the frame is to be: where it is there, full costs nothing
@@ -269,8 +280,15 @@ class Painter:
         frame = frame.coarser(size)
         planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
         depth = None if depth is None else sampled(depth, size)
-        task = Task(frame, planes, depth, task.full_size)
+        task = Task(frame, planes, depth, task.full_size, **looks)
         return self._kept(task) or self._raycast(vdi, task, clock)
+
+    def _world_planes(self, mapper: Any, frame: Frame) -> NDArray[np.float64] | None:
+        """Return what cuts the VDI made last, world coordinates: for the estimate of its error."""
+        vdi = self.upkeep.vdi
+        if vdi is None:
+            return None
+        return frame.in_world(frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds))
 
     def _size(
         self, mapper: Any, renderer: Any, clock: WindowClock, full: tuple[int, int]
@@ -295,6 +313,8 @@ class Painter:
             task.frame.size,
             opaque_depth=task.depth,
             clipping_planes=task.planes,
+            cropping=task.cropping,
+            opacity_multiplier=task.opacity_multiplier,
             device=self.device,
         )
         clock.drawn(task.frame.size, task.full_size, time.perf_counter() - before)
@@ -383,10 +403,6 @@ def _is_viewport(renderer: Any) -> bool:
     viewport = [0, 0, 0, 0]
     renderer.GetRenderWindow().GetState().vtkglGetIntegerv(0x0BA2, viewport)
     return viewport == [x[0], y[0], width[0], height[0]]
-
-
-def _planes(mapper: Any, vdi: VDI, frame: Frame) -> NDArray[np.float64] | None:
-    return frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
 
 
 def _view_of(renderer: Any, model_transform: NDArray[np.float64], frame: Frame) -> View:
