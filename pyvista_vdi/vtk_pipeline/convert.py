@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from vtkmodules import vtkCommonDataModel
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import VTK_UNSIGNED_CHAR, vtkDataArray, vtkStringArray
-from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkFiltersCore import vtkCellDataToPointData
 
 from pyvista_vdi.camera import Camera
@@ -22,6 +23,7 @@ from pyvista_vdi.vtk_pipeline.properties import transfer_function_from_property
 __all__ = [
     "is_vdi_image",
     "require_image",
+    "require_image_port",
     "scalars_of",
     "transfer_function_from_property",
     "vdi_from_image",
@@ -46,8 +48,7 @@ _REMEDIES = {
     "vtkRectilinearGrid": _RESAMPLE,
     "vtkStructuredGrid": _RESAMPLE,
     "vtkUnstructuredGrid": _RESAMPLE,
-    "vtkMultiBlockDataSet": "add its blocks one by one",
-    "vtkPartitionedDataSetCollection": "add its blocks one by one",
+    "vtkCompositeDataSet": "add its blocks one by one (vtkExtractBlock, or block by index)",
     "vtkPolyData": "a surface has no volume: voxelise it (pyvista's voxelize_binary_mask)",
 }
 
@@ -71,15 +72,33 @@ def require_image(data: Any) -> vtkImageData:
         raise InvalidVolumeError(
             f"expected a vtkImageData or pyvista.ImageData; got {type(data).__name__}"
         )
+    raise _refusal(type(data))
+
+
+def require_image_port(port: Any) -> None:
+    """Refuse an output port that is known to give something other than a uniform grid.
+
+    Raises
+    ------
+    UnsupportedError
+        As :func:`require_image`. A port that promises no more than a ``vtkDataSet``, say, passes.
+    """
+    information = port.GetProducer().GetOutputPortInformation(port.GetIndex())
+    name = str(information.Get(vtkDataObject.DATA_TYPE_NAME()))
+    promised = getattr(vtkCommonDataModel, name, None)
+    if promised is None or issubclass(promised, vtkImageData) or issubclass(vtkImageData, promised):
+        return
+    raise _refusal(promised)
+
+
+def _refusal(kind: type) -> UnsupportedError:
+    """Return what is to be said of data that are no uniform grid."""
+    named = f"a {kind.__name__} is not a uniform grid"
     for name, remedy in _REMEDIES.items():
-        if data.IsA(name):
-            raise UnsupportedError(
-                f"a {type(data).__name__} is not a uniform grid, which is all that a VDI is made "
-                f"from: {remedy}"
-            )
-    raise UnsupportedError(
-        f"a {type(data).__name__} is not a uniform grid (vtkImageData), which is all that a VDI "
-        "is made from: resample it to one"
+        if issubclass(kind, getattr(vtkCommonDataModel, name)):
+            return UnsupportedError(f"{named}, which is all that a VDI is made from: {remedy}")
+    return UnsupportedError(
+        f"{named} (vtkImageData), which is all that a VDI is made from: resample it to one"
     )
 
 
