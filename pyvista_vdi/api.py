@@ -302,12 +302,13 @@ def render_volume(
 
 
 def read(path: str | os.PathLike[str], **options: Any) -> VDI:
-    """Read a VDI from a file that :meth:`VDI.save` wrote, or from any deep OpenEXR image.
+    """Read a VDI from a file that :meth:`VDI.save` or VTK wrote, or any deep OpenEXR image.
 
     Parameters
     ----------
     path : path-like
-        A ``.vdi`` file, or an OpenEXR deep image, whose name ends in ``.exr``.
+        A ``.vdi`` file, an OpenEXR deep image, whose name ends in ``.exr``, or a VDI's VTK form
+        in one of VTK's image files, ``.vti``.
     **options
         For ``.exr`` files of other programs: ``camera``, the view that the image shows, where
         the file does not say it; ``thickness``, world units, given to samples that have none

@@ -16,8 +16,8 @@ from ..standard_cases import ANGLES, ELEVATION, TRANSFER_FUNCTIONS, WINDOW_SIZE
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
 
-_VDI_FILE = "a .vdi file, or an .exr deep image"
-_VDI_TARGET = ".vdi or .exr to write"
+_VDI_FILE = "a .vdi file, an .exr deep image, or a VDI as .vti"
+_VDI_TARGET = ".vdi, .exr or .vti to write"
 
 
 class UsageError(Exception):
@@ -152,8 +152,9 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("file")
     group.add_argument(
         "--compression",
-        choices=("zstd", "lz4", "zips", "none"),
-        help="of .vdi: zstd (default), lz4 or none; of .exr: zips (default) or none",
+        choices=("zstd", "lz4", "zips", "zlib", "lzma", "none"),
+        help="of .vdi: zstd (default), lz4 or none; of .exr: zips (default) or none; of .vti: lz4 "
+        "(default), zlib, lzma or none",
     )
     group.add_argument("--level", type=int, default=1, help="1 (fast, default) to 9 (small)")
     group.add_argument(
@@ -253,7 +254,7 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "info": (
         "files",
-        "say what a .vdi or .exr file holds",
+        "say what a .vdi, .exr or .vti file holds",
         "pyvista-vdi info knee.vdi --json",
         _add_info,
     ),
@@ -265,7 +266,7 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "convert": (
         "files",
-        "write a VDI in another format: .vdi or OpenEXR deep image",
+        "write a VDI in another format: .vdi, OpenEXR deep image or VTK's .vti",
         "pyvista-vdi convert knee.vdi -o knee.exr",
         _add_convert,
     ),
