@@ -70,6 +70,15 @@ class VDIMapperMethods:
         """Draw a VDI, or its canonical image."""
         self._set_input(None if data is None else input_of(data))
 
+    def GetInputDataObject(self, *args: Any) -> Any:
+        """Return the box of the VDI's bounds that VTK is given in its place, and warn.
+
+        Nothing that draws asks for it by this method; what writes the scene for another renderer
+        does, and gets an empty box.
+        """
+        self.painter.say_not_exported()
+        return super().GetInputDataObject(*args)  # type: ignore[misc]
+
     def SetVDI(self, vdi: VDI) -> None:
         """Draw this VDI."""
         self._set_input(input_of(vdi))

@@ -160,6 +160,14 @@ class Painter:
         if bounds is not None:
             place_proxy(self.proxy, bounds)
 
+    def say_not_exported(self) -> None:
+        """Say once that a scene which is written for another renderer lacks the VDI."""
+        self._voice.warn(
+            "the scene is being exported without its VDI: export_html, export_vtksz and views that "
+            "are rendered in the browser (client-side) get an empty box in its place; use "
+            "screenshots, movies, or server-side rendering"
+        )
+
     def release(self) -> None:
         """Free the texture and the images kept, and end what goes on; a frame begins anew."""
         self.upkeep.close()
