@@ -39,7 +39,7 @@ Entry points:
 ``vdi/prepare.cl``
     ``prepare_lists``: a VDI's arrays to what the raycaster reads.
 ``vdi/raycast.cl``
-    ``raycast``: VDI to image from any view (paper, section 3).
+    ``raycast``: VDI to image from any view (paper, section 3), or to the depth of the first hit.
 ``vdi/preview.cl``
     ``preview``: VDI to image by a given number of samples per ray (paper, section 5).
 ``vdi/render_volume.cl``

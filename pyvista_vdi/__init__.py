@@ -14,7 +14,7 @@ from ._version import __version__
 
 if TYPE_CHECKING:
     from . import errors, examples
-    from .api import estimate, generate, read, render, render_volume
+    from .api import estimate, generate, pick, read, render, render_depth, render_volume
     from .camera import Camera
     from .cropping import Cropping
     from .errors import (
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from .lighting import Light, Lights, Shading
     from .metrics import compare_images
     from .opencl_runtime import describe_devices, list_devices
+    from .picking import Pick
     from .transfer_function import TransferFunction
     from .vdi import VDI
     from .volume import Volume
@@ -66,6 +67,7 @@ _HOMES = {
     "Estimate": "generation",
     "Light": "lighting",
     "Lights": "lighting",
+    "Pick": "picking",
     "Shading": "lighting",
     "TransferFunction": "transfer_function",
     "VDI": "vdi",
@@ -78,8 +80,10 @@ _HOMES = {
     "estimate": "api",
     "generate": "api",
     "list_devices": "opencl_runtime",
+    "pick": "api",
     "read": "api",
     "render": "api",
+    "render_depth": "api",
     "render_volume": "api",
     **dict.fromkeys(_ERRORS, "errors"),
 }

@@ -17,13 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 from .camera import Camera
 from .classification import DEFAULTS, IN_PLACE, Classification
 from .errors import InvalidVDIError, InvalidVolumeError
+from .picking import DEFAULT_OPACITY
 from .vdi import VDI
 from .volume import Volume
 
 if TYPE_CHECKING:
     from .generation import Estimate
+    from .picking import Pick
 
-__all__ = ["estimate", "generate", "read", "render", "render_volume"]
+__all__ = ["estimate", "generate", "pick", "read", "render", "render_depth", "render_volume"]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -216,6 +218,135 @@ def render(
         skip_empty=skip_empty,
         preview_samples=preview_samples,
         device=device,
+    )
+
+
+def render_depth(
+    vdi: Any,
+    camera: Any,
+    window_size: Sequence[int] | None = None,
+    *,
+    opacity_threshold: float = DEFAULT_OPACITY,
+    accumulated: bool = True,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
+    skip_empty: bool = True,
+    device: Any = None,
+) -> NDArray[np.float32]:
+    """Raycast a VDI for where it begins to be seen: :func:`pick` for every pixel of a view.
+
+    Parameters
+    ----------
+    vdi, camera, window_size, opaque_depth, clipping_planes, cropping, opacity_multiplier
+        As for :func:`render`.
+    skip_empty, device
+        As for :func:`render`.
+    opacity_threshold, accumulated
+        What counts as a hit: as for :func:`pick`.
+
+    Returns
+    -------
+    numpy.ndarray
+        View depth of each pixel's hit, float32 (H, W), world units, top row first; infinite where
+        nothing is hit. It can be passed as another :func:`render`'s ``opaque_depth``.
+
+    Raises
+    ------
+    InvalidVDIError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+    NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
+        If there is no device, or it fails.
+    """
+    view = Camera.from_any(camera)
+    vdi = as_vdi(vdi)
+    from .raycast import render_first_hits
+
+    return render_first_hits(
+        vdi,
+        view,
+        window_size,
+        opacity_threshold=opacity_threshold,
+        accumulated=accumulated,
+        opaque_depth=opaque_depth,
+        clipping_planes=clipping_planes,
+        cropping=cropping,
+        opacity_multiplier=opacity_multiplier,
+        skip_empty=skip_empty,
+        device=device,
+    )
+
+
+def pick(
+    vdi: Any,
+    camera: Any,
+    pixel: Sequence[float],
+    window_size: Sequence[int] | None = None,
+    *,
+    opacity_threshold: float = DEFAULT_OPACITY,
+    accumulated: bool = True,
+    opaque_depth: float | None = None,
+    clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
+) -> Pick | None:
+    """Return what a pixel shows of a VDI: the first supersegment that reaches an opacity.
+
+    Parameters
+    ----------
+    vdi : VDI or vtkImageData
+        As for :func:`render`.
+    camera : pyvista.Camera or vtkCamera or Camera
+        The view. Its model transform places the VDI's model frame in the world.
+    pixel : (float, float)
+        x and y in pixels, VTK's display coordinates: whole numbers are pixels' centres and y = 0
+        is the bottom row, so that pixel (x, y) is ``image[height - 1 - y, x]`` of a picture.
+    window_size : (int, int), optional
+        Width and height of the view in pixels; the VDI's own by default.
+    opacity_threshold : float
+        Opacity that the hit has to reach, at least 0 and less than 1; the default is that of
+        VTK's pickers for volumes. With 0, whatever absorbs light at all is hit.
+    accumulated : bool, default: True
+        Compare the opacity of the ray from its beginning, 1 - exp(-(tau_0 + ... + tau_k)): the hit
+        is the first supersegment with which the ray has become as opaque as that. ``False``
+        compares each supersegment's own, 1 - exp(-tau_k) over the length that the ray crosses
+        of it, and looks through haze; but it depends on how finely the lists are cut, and where
+        the ray runs across the lists, it crosses little of each.
+    opaque_depth : float, optional
+        View depth at which the ray ends, world units.
+    clipping_planes, cropping, opacity_multiplier
+        As for :func:`render`.
+
+    Returns
+    -------
+    Pick or None
+        The supersegment, and where the ray enters it; ``None`` where nothing is hit.
+
+    Raises
+    ------
+    InvalidVDIError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+
+    Notes
+    -----
+    A single ray, walked in float64 on the host: no device is needed.
+    """
+    view = Camera.from_any(camera)
+    vdi = as_vdi(vdi)
+    from .picking import pick_vdi
+
+    return pick_vdi(
+        vdi,
+        view,
+        pixel,
+        window_size,
+        opacity_threshold=opacity_threshold,
+        accumulated=accumulated,
+        opaque_depth=opaque_depth,
+        clipping_planes=clipping_planes,
+        cropping=cropping,
+        opacity_multiplier=opacity_multiplier,
     )
 
 

@@ -95,6 +95,32 @@ class Cropping:
         """Whether the i-th region along x, j-th along y and k-th along z is kept."""
         return bool(self.regions >> (i + 3 * j + 9 * k) & 1)
 
+    def parts_of_ray(
+        self, origin: NDArray[np.float64], direction: NDArray[np.float64], first: float, last: float
+    ) -> NDArray[np.float64]:
+        """Return the parts of a ray in kept regions.
+
+        Parameters
+        ----------
+        origin, direction : numpy.ndarray
+            P(t) = origin + t direction, model frame, float64 (3,).
+        first, last : float
+            Between which t to look.
+
+        Returns
+        -------
+        numpy.ndarray
+            First and last t of each part, float64 (k, 2), ascending.
+        """
+        planes = np.maximum.accumulate(np.reshape(np.asarray(self.planes), (3, 2)), axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):  # a plane that is never reached
+            t = ((planes - origin[:, None]) / direction[:, None]).ravel()
+        cuts = np.unique(np.concatenate([[first, last], t[(t > first) & (t < last)]]))
+        middles = origin + (cuts[:-1] + cuts[1:])[:, None] / 2 * direction
+        region = (middles[:, :, None] >= planes).sum(axis=2) @ (1, 3, 9)
+        keeps = (self.regions >> region & 1) == 1
+        return np.stack([cuts[:-1], cuts[1:]], axis=1)[keeps]
+
     def within(self, bounds: Sequence[float]) -> Within:
         """Return what is kept of a box, and how simply that can be said.
 

@@ -14,6 +14,7 @@ typedef struct {
     bool away;     // from V_O: depth does not decrease along the ray
     float r_begin; // 0 or -1; it ends at r_begin + 1
     float scale;   // model length per unit of r, but for the division by w(r_a) w(r_b) in perspective
+    float t_begin; // where it enters, as t
 #ifdef CROPPED
     Kept kept; // parts of it, in r
 #endif
@@ -53,6 +54,7 @@ inline bool begin_list_ray(ListRay *ray, __global const float *forms, int planes
         return false;
     const float3 start = list_point(forms, a, b, t0);
     const float3 end = list_point(forms, a, b, t1);
+    ray->t_begin = t0;
     ray->start = start;
     ray->along = end - start;
     ray->away = ray->along.z >= 0.0f;
@@ -98,4 +100,16 @@ inline float length_drawn(const ListRay *ray, float from, float to, float depth_
     return model_length(ray->scale, from, fma(from, ray->along.z, ray->deep.z), to, fma(to, ray->along.z, ray->deep.z),
                         depth_origin);
 #endif
+}
+
+// Where, from r = from on, the ray is first in what is not cropped away.
+inline float first_drawn(const ListRay *ray, float from)
+{
+#ifdef CROPPED
+    for (int n = 0; n < ray->kept.count; ++n) {
+        if (from < ray->kept.to[n])
+            return fmax(from, ray->kept.from[n]);
+    }
+#endif
+    return from;
 }

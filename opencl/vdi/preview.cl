@@ -151,9 +151,9 @@ __kernel void preview(
     __global const ulong *masks,        // occupied slabs of each tile of lists
     float first_depth,                  // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,
+    CROPPING_PARAMETER                  // regions that are kept
     __global const uint *counts,        // supersegments in each cell: tiles_high, tiles_wide, SLABS
     int samples,                        // per ray
-    CROPPING_PARAMETER                  // regions that are kept
     __global float4 *image)             // premultiplied RGBA, top row first
 {
     const int2 pixel = block_pixel((uint)get_global_id(0), width);

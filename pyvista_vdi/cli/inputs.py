@@ -98,9 +98,8 @@ def given_camera(options: argparse.Namespace) -> Camera | None:
 
 def file_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments of ``VDI.save`` that the options stand for; refused now, not later."""
-    given: dict[str, Any] = {"level": options.level}
-    if options.compression is not None:
-        given["compression"] = options.compression
+    names = ("compression", "level")
+    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if options.standard_channels:
         given["exact"] = False
     check_write_options(options.output, given)

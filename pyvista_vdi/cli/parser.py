@@ -152,11 +152,16 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("file")
     group.add_argument(
         "--compression",
-        choices=("zstd", "lz4", "zips", "zlib", "lzma", "none"),
-        help="of .vdi: zstd (default), lz4 or none; of .exr: zips (default) or none; of .vti: lz4 "
+        choices=("lz4", "zstd", "zips", "zlib", "lzma", "none"),
+        help="of .vdi: lz4 (default), zstd or none; of .exr: zips (default) or none; of .vti: lz4 "
         "(default), zlib, lzma or none",
     )
-    group.add_argument("--level", type=int, default=1, help="1 (fast, default) to 9 (small)")
+    group.add_argument(
+        "--level",
+        type=int,
+        metavar="N",
+        help="1 (fast) to 9 (small); by default 9 for lz4 and 1 for the others",
+    )
     group.add_argument(
         "--standard-channels",
         action="store_true",

@@ -14,6 +14,7 @@ from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 
 from pyvista_vdi.cropping import checked_opacity_multiplier
 from pyvista_vdi.errors import UnsupportedError
+from pyvista_vdi.picking import checked_opacity
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.vtk_pipeline.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.interaction import checked_rate
@@ -230,6 +231,28 @@ class VDIMapperMethods:
     def GetInteractiveOffScreen(self) -> bool:
         """Whether off-screen windows are treated as if somebody watched them."""
         return self.painter.interaction.off_screen
+
+    # -- picking ---------------------------------------------------------------------------------
+
+    def SetPickingOpacity(self, opacity: float) -> None:
+        """Set the opacity that a ray must reach in the VDI to pick it.
+
+        At least 0 and less than 1; 0.05 by default, as in VTK's pickers for volumes. What is
+        compared says ``SetPickingAccumulated``; see :func:`pyvista_vdi.pick`.
+        """
+        self.painter.selection.opacity = checked_opacity(opacity)
+
+    def GetPickingOpacity(self) -> float:
+        """Return the opacity that a ray must reach in the VDI to pick it."""
+        return self.painter.selection.opacity
+
+    def SetPickingAccumulated(self, accumulated: bool) -> None:
+        """Compare the opacity from the ray's beginning (the default), or each supersegment's."""
+        self.painter.selection.accumulated = bool(accumulated)
+
+    def GetPickingAccumulated(self) -> bool:
+        """Whether the opacity from the ray's beginning is compared."""
+        return self.painter.selection.accumulated
 
     def _set_input(self: Any, source: Input | None) -> None:
         self.painter.set_input(source)

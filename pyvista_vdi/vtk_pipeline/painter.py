@@ -23,6 +23,7 @@ from pyvista_vdi.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.frame import Frame, as_array, sampled
 from pyvista_vdi.vtk_pipeline.inputs import Input
 from pyvista_vdi.vtk_pipeline.interaction import Interaction, WindowClock, reduced
+from pyvista_vdi.vtk_pipeline.selection import Seen, Selection
 from pyvista_vdi.vtk_pipeline.status import CornerTexts, VDIStatus
 from pyvista_vdi.vtk_pipeline.texture import ImageTexture
 from pyvista_vdi.vtk_pipeline.upkeep import Scene, Upkeep
@@ -111,6 +112,7 @@ class Painter:
         self.opacity_multiplier = 1.0
         self.interaction = Interaction()
         self.texts = CornerTexts()
+        self.selection = Selection()
         self.proxy = make_proxy()
         self._voice = Voice()
         self.upkeep = Upkeep(self.interaction, self._voice, self.texts)
@@ -172,12 +174,14 @@ class Painter:
         """Free the texture and the images kept, and end what goes on; a frame begins anew."""
         self.upkeep.close()
         self._texture.release()
+        self.selection.release()
         self._images.clear()
 
     def take_settings(self, other: Painter) -> None:
         """Take over how dense another draws, what it allows and when it regenerates."""
         self.opacity_multiplier = other.opacity_multiplier
         vars(self.interaction).update(vars(other.interaction))
+        self.selection.take_settings(other.selection)
         self.upkeep.regeneration.policy = other.upkeep.regeneration.policy
         self.upkeep.regeneration.bound = other.upkeep.regeneration.bound
 
@@ -223,6 +227,10 @@ class Painter:
                 "VDIMapper draws only behind a VDIActor: use VDIActor in place of vtkVolume"
             )
             return
+        if renderer.GetSelector() is not None:
+            self._select(mapper, renderer)
+            return
+        self.selection.leave(self._actor.Get())
         try:
             self._last = self._paint(mapper, renderer)
         except KeyboardInterrupt:
@@ -244,6 +252,7 @@ class Painter:
     def end(self) -> None:
         """Let go of the texture unit."""
         self._texture.let_go()
+        self.selection.let_go()
 
     def _cannot_draw(self, error: Exception) -> None:
         self._voice.warn(f"the VDI cannot be drawn: {type(error).__name__}: {error}", error)
@@ -257,11 +266,8 @@ class Painter:
         frame = Frame.current(renderer, model_transform)
         view = _view_of(renderer, model_transform, frame)
         self._scene = (view.camera, weakref.ref(clock))
-        only = len(self._renderers()) == 1
-        looks: dict[str, Any] = {
-            "cropping": Cropping.from_any(mapper),
-            "opacity_multiplier": self.opacity_multiplier,
-        }
+        only = len(self.renderers()) == 1
+        looks = self._looks(mapper)
         shown = {"clipping_planes": self._world_planes(mapper, frame), **looks}
         scene = Scene(renderer, model_transform, view, clock, only, shown)
         vdi = self.upkeep.current(scene, self.status)
@@ -291,12 +297,38 @@ class Painter:
         task = Task(frame, planes, depth, task.full_size, **looks)
         return self._kept(task) or self._raycast(vdi, task, clock)
 
+    def _looks(self, mapper: Any) -> dict[str, Any]:
+        """Return the cropping and the opacity multiplier, arguments of whatever raycasts."""
+        return {
+            "cropping": Cropping.from_any(mapper),
+            "opacity_multiplier": self.opacity_multiplier,
+        }
+
     def _world_planes(self, mapper: Any, frame: Frame) -> NDArray[np.float64] | None:
         """Return what cuts the VDI made last, world coordinates: for the estimate of its error."""
         vdi = self.upkeep.vdi
         if vdi is None:
             return None
         return frame.in_world(frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds))
+
+    def _select(self, mapper: Any, renderer: Any) -> None:
+        """Draw what can be picked of what the last frame showed, or the first would show."""
+        actor, selector = self._actor.Get(), renderer.GetSelector()
+        window = renderer.GetRenderWindow()
+        self.selection.enter(actor, selector)
+        seen = None
+        try:
+            if not isinstance(self._drawn(), VDI):
+                self._last = self._paint(mapper, renderer)
+            vdi = self._drawn()
+            if isinstance(vdi, VDI):
+                frame = Frame.current(renderer, as_array(actor.GetMatrix()))
+                planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
+                seen = Seen(vdi, frame, planes, self._looks(mapper))
+            self.selection.show(window, selector, seen, self.device)
+        except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
+            self._voice.warn(f"the VDI cannot be picked: {type(error).__name__}: {error}", error)
+            self.selection.show(window, selector, None, self.device)
 
     def _size(
         self, mapper: Any, renderer: Any, clock: WindowClock, full: tuple[int, int]
@@ -340,7 +372,7 @@ class Painter:
 
     def renderer(self) -> Any:
         """Return the renderer that is drawing the actor; ``None`` if it has none."""
-        renderers = self._renderers()
+        renderers = self.renderers()
         if len(renderers) > 1:
             for candidate in renderers:
                 self._watch(candidate)
@@ -352,7 +384,7 @@ class Painter:
             renderers = drawing or renderers
         return renderers[0] if renderers else None
 
-    def _renderers(self) -> list[Any]:
+    def renderers(self) -> list[Any]:
         """Return all renderers that show the actor."""
         actor = self._actor.Get()
         if actor is None:

@@ -294,12 +294,12 @@ def test_accessor_refuses_other_grids_and_unknown_keywords(method):
         generate(VOLUME, colormap="bone")
 
 
-def test_reader_takes_no_options_and_says_what_is_wrong(tmp_path):
+def test_reader_refuses_unknown_options_and_says_what_is_wrong(tmp_path):
     path = tmp_path / "x.vdi"
     with pytest.raises((errors.VDIFileError, FileNotFoundError), match=re.escape(path.name)):
         pv.read(path)
     path.write_bytes(b"something else entirely")
     with pytest.raises(errors.VDIFileError, match=re.escape(path.name)):
         pv.read(path)
-    with pytest.raises(TypeError, match="takes no options; got colour"):
+    with pytest.raises(errors.InvalidArgumentError, match="with the options none; got colour"):
         pv.read(path, colour=1)

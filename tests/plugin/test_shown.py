@@ -242,3 +242,25 @@ def test_nothing_is_left_behind(no_leaks):
     plotter.close()
     del plotter, actor
     gc.collect()
+
+
+def test_picks_are_of_what_is_shown(plotter):
+    """Through what is cropped away, and through what the multiplier has made thin."""
+    actor = plotter.add_vdi(soft_ball(), show_scalar_bar=False)
+    plotter.view_vector((1, 0, 0), viewup=(0, 0, 1))
+    shot(plotter)
+    place = (60, 50)
+    whole = actor.pick(*place)
+    assert whole.position[0] > 0.3
+    crop(actor.mapper, "subvolume", (-0.8, 0.1, -1, 1, -1, 1))
+    plotter.render()
+    # cut within a supersegment: the ray enters it at the plane
+    assert actor.pick(*place).position[0] == pytest.approx(0.1, abs=1e-6)
+    crop(actor.mapper, 0x7FFFFFF & ~0x2000 & ~0x4804812, (-0.5, 0.1, -1, 1, -1, 1))
+    plotter.render()
+    assert actor.pick(*place) is None or actor.pick(*place).position[0] <= -0.5 + 1e-6
+    actor.mapper.CroppingOff()
+    actor.opacity_multiplier = 0.01
+    plotter.render()
+    thin = actor.pick(*place)
+    assert thin is None or thin.position[0] < whole.position[0] - 0.1
