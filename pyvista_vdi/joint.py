@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
+from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime
 from .raycast import TRANSMITTANCE_CUTOFF, ListView, PreparedVDI, prepared_vdi, render_vdi
@@ -51,11 +52,17 @@ class PlacedVDI:
         The new view; its ``model_transform`` says where this VDI's model frame is.
     clipping_planes : array_like of float, shape (k, 6), optional
         That cut this VDI: origin and normal of each, world coordinates.
+    cropping : Cropping, optional
+        Regions of its model frame that are drawn.
+    opacity_multiplier : float
+        Factor of its extinction.
     """
 
     vdi: VDI
     camera: Camera
     clipping_planes: ArrayLike | None = None
+    cropping: Cropping | None = None
+    opacity_multiplier: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -83,6 +90,8 @@ def render_vdis(
     model_transforms: Sequence[ArrayLike] | None = None,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: Any = None,
+    cropping: Sequence[Any] | None = None,
+    opacity_multiplier: float | Sequence[float] = 1.0,
     skip_empty: bool = True,
     device: Any = None,
 ) -> NDArray[np.float32]:
@@ -102,6 +111,10 @@ def render_vdis(
         As for :func:`pyvista_vdi.raycast.render_vdi`; for all of them.
     clipping_planes : optional
         Shape (k, 6), for all of them; or one such array, or ``None``, for each.
+    cropping : sequence, optional
+        What :meth:`pyvista_vdi.Cropping.from_any` takes, or ``None``, for each.
+    opacity_multiplier : float or sequence of float
+        Factor of the extinction, 0 or above: for all of them, or one for each.
     skip_empty : bool
         Pass by what is empty. The picture is the same to the last bit.
     device : optional
@@ -122,6 +135,8 @@ def render_vdis(
     size = _window_size(vdis, window_size)
     cameras = _cameras(camera, model_transforms, len(vdis))
     planes = _planes_of_each(clipping_planes, len(vdis))
+    croppings = _croppings(cropping, len(vdis))
+    multipliers = _multipliers(opacity_multiplier, len(vdis))
     if len(vdis) == 1:
         return render_vdi(
             vdis[0],
@@ -129,10 +144,13 @@ def render_vdis(
             size,
             opaque_depth=opaque_depth,
             clipping_planes=planes[0],
+            cropping=croppings[0],
+            opacity_multiplier=multipliers[0],
             skip_empty=skip_empty,
             device=device,
         )
-    placed = [PlacedVDI(*one) for one in zip(vdis, cameras, planes, strict=True)]
+    each = zip(vdis, cameras, planes, croppings, multipliers, strict=True)
+    placed = [PlacedVDI(*one) for one in each]
     return joint_image(
         placed, size, opaque_depth=opaque_depth, skip_empty=skip_empty, device=device
     ).image
@@ -262,13 +280,20 @@ class _Stream:
         opaque_depth: ArrayLike | None,
         skip_empty: bool,
     ) -> _Stream:
-        view = prepared.view(placed.camera, size, opaque_depth, placed.clipping_planes)
+        view = prepared.view(
+            placed.camera,
+            size,
+            opaque_depth,
+            placed.clipping_planes,
+            placed.cropping,
+            placed.opacity_multiplier,
+        )
         return cls(prepared, view, skip_empty and prepared.occupancy.worthwhile)
 
     @contextlib.contextmanager
     def on(self, runtime: Runtime) -> Iterator[_Walk]:
         """Have the frame's arrays on the device."""
-        defines = {**self.prepared.defines, "SEGMENTS": 1}
+        defines = {**self.prepared.defines, **self.view.defines, "SEGMENTS": 1}
         if self.skip_empty:
             defines["SKIP_EMPTY"] = 1
         with (
@@ -348,7 +373,8 @@ def _canonical_order(placed: Sequence[PlacedVDI]) -> list[int]:
 def _key(placed: PlacedVDI) -> tuple[bytes, ...]:
     planes = placed.clipping_planes
     table = b"" if planes is None else np.asarray(planes, dtype=np.float64).tobytes()
-    return _digest(placed.vdi), placed.camera.model_transform.tobytes(), table
+    looks = repr((placed.cropping, placed.opacity_multiplier)).encode()
+    return _digest(placed.vdi), placed.camera.model_transform.tobytes(), table, looks
 
 
 def _digest(vdi: VDI) -> bytes:
@@ -387,6 +413,28 @@ def _cameras(camera: Camera, transforms: Sequence[ArrayLike] | None, count: int)
             f"got {len(transforms)}"
         )
     return [camera.replace(model_transform=matrix) for matrix in transforms]
+
+
+def _croppings(croppings: Sequence[Any] | None, count: int) -> list[Cropping | None]:
+    if croppings is None:
+        return [None] * count
+    if not isinstance(croppings, list | tuple) or len(croppings) != count:
+        raise InvalidArgumentError(
+            f"cropping must be a list with an entry for each of the {count} VDIs, None where "
+            f"nothing is cropped; got {croppings!r}"
+        )
+    return [Cropping.from_any(one) for one in croppings]
+
+
+def _multipliers(multiplier: float | Sequence[float], count: int) -> list[float]:
+    if not isinstance(multiplier, list | tuple):
+        return [checked_opacity_multiplier(multiplier)] * count
+    if len(multiplier) != count:
+        raise InvalidArgumentError(
+            f"opacity_multiplier must be a number, or one for each of the {count} VDIs; "
+            f"got {multiplier!r}"
+        )
+    return [checked_opacity_multiplier(one) for one in multiplier]
 
 
 def _planes_of_each(planes: Any, count: int) -> list[ArrayLike | None]:

@@ -6,6 +6,7 @@
 //
 // -D OFFSET_T           type of an offset into the supersegments: uint or ulong
 // -D PARALLEL, SHIFTED  the depth coordinate, see common/list_space.cl
+// -D CROPPED            only some regions are drawn, see common/cropping.cl
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
 // -D SEGMENTS           write what each ray crosses into a pool, to be merged with other VDIs by vdi/merge.cl, in place of
 //                       compositing it; for a band of rays
@@ -45,6 +46,7 @@ __kernel void raycast(
     __global const ulong *masks,        // occupied slabs of each tile of lists, if SKIP_EMPTY
     float first_depth,                  // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,
+    CROPPING_PARAMETER                  // regions that are kept
 #if defined(SEGMENTS)
     uint first_item,                    // work-item of the band's first ray
     int stream,                         // of this VDI
@@ -91,7 +93,8 @@ __kernel void raycast(
 #endif
 
     ListRay ray;
-    if (!begin_list_ray(&ray, forms, planes, a, b, has_opaque_depth ? opaque_depth[place] : INFINITY, depth_origin)) {
+    if (!begin_list_ray(&ray, forms, planes, CROPPING_ARGUMENT a, b, has_opaque_depth ? opaque_depth[place] : INFINITY,
+                        depth_origin)) {
 #ifndef SEGMENTS
         image[place] = NOTHING;
 #endif
@@ -213,15 +216,22 @@ __kernel void raycast(
                 if (away ? leaves < z_next : leaves > z_next)
                     to = clamp((leaves - deep.z) * inverse_z, from, r_next);
                 const float4 medium = media[k];
-                const float length_crossed = model_length(ray.scale, from, fma(from, along.z, deep.z), to,
-                                                          fma(to, along.z, deep.z), depth_origin);
 #if defined(SEGMENTS)
-                const float optical_depth = fmin(medium.w * length_crossed, MAX_OPTICAL_DEPTH);
-                const float t_from = ray_depth(&ray, from, fma(from, along.z, deep.z), depth_origin) + depth_shift;
-                const float t_to = ray_depth(&ray, to, fma(to, along.z, deep.z), depth_origin) + depth_shift;
-                if (optical_depth > 0.0f) {
-                    const float begins = fmax(t_from, t_reached);
-                    t_reached = fmax(t_to, begins);
+                // The parts of it that are drawn
+                for (int n = 0; n < drawn_parts(&ray); ++n) {
+                    float r_from = from;
+                    float r_to = to;
+                    cut_to_drawn_part(&ray, n, &r_from, &r_to);
+                    if (!(r_from < r_to))
+                        continue;
+                    const float z_from = fma(r_from, along.z, deep.z);
+                    const float z_to = fma(r_to, along.z, deep.z);
+                    const float length_crossed = model_length(ray.scale, r_from, z_from, r_to, z_to, depth_origin);
+                    const float optical_depth = fmin(medium.w * length_crossed, MAX_OPTICAL_DEPTH);
+                    if (!(optical_depth > 0.0f))
+                        continue;
+                    const float begins = fmax(ray_depth(&ray, r_from, z_from, depth_origin) + depth_shift, t_reached);
+                    t_reached = fmax(ray_depth(&ray, r_to, z_to, depth_origin) + depth_shift, begins);
                     if (slot < capacity) {
                         __global float *segment = pool + segment_place(band_ray, slot, capacity, 0);
                         segment[SEGMENT_FROM * RAY_BLOCK] = begins;
@@ -234,17 +244,20 @@ __kernel void raycast(
                     ++slot;
                     absorbed += optical_depth;
                 }
-#elif defined(FIRST_HIT)
+#else
+                const float length_crossed = length_drawn(&ray, from, to, depth_origin);
+#ifdef FIRST_HIT
                 const float tau = medium.w * length_crossed;
                 met = accumulated ? met + tau : tau;
                 hit = met > 0.0f && met >= least_optical_depth;
-                r_hit = from;
+                r_hit = first_drawn(&ray, from);
                 if (hit)
                     break;
 #else
                 const float weight = transmittance * opacity_of(medium.w * length_crossed); // over, front to back
                 color += weight * medium.xyz;
                 transmittance -= weight;
+#endif
 #endif
                 if (!ends_here)
                     break;

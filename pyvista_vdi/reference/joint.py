@@ -26,7 +26,7 @@ from .ranges import (
     _Move,
     _window_nudges,
 )
-from .raycast import Line, Lists, crossings, line_of_pixel
+from .raycast import Line, Lists, crossings, lines_of_pixel
 
 Array = NDArray[np.float64]
 
@@ -51,10 +51,10 @@ class Segments(NamedTuple):
 
 
 def segments_of(lists: Lists, line: Line) -> Segments:
-    """Return what a line crosses of a medium; t of the line as it is."""
+    """Return what a line crosses of a medium; t is that of the line."""
     crossed = crossings(lists, line)
     tau = optical_depth_over_length(
-        lists.vdi.optical_depth[crossed.member], crossed.length, lists.length[crossed.member]
+        lists.optical_depth[crossed.member], crossed.length, lists.length[crossed.member]
     )
     color = lists.vdi.color[crossed.member].astype(np.float64)
     return Segments(crossed.begin, crossed.end, tau, color)
@@ -66,6 +66,8 @@ def composite_segments(streams: Sequence[Segments]) -> Array:
     With sigma_k the extinction of what covers a piece of length l, its optical depth is
     ``l sum(sigma_k)`` and its colour ``sum(sigma_k c_k) / sum(sigma_k)``.
     """
+    if not streams:
+        return np.zeros(4)
     begin, end, tau = (np.concatenate([s[part] for s in streams]) for part in range(3))
     color = np.concatenate([s.color for s in streams]).reshape(-1, 3)
     cuts = np.unique(np.concatenate([begin, end]))
@@ -87,6 +89,8 @@ def render_joint(
     *,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: Sequence[ArrayLike | None] | None = None,
+    cropping: Sequence[Any] | None = None,
+    opacity_multiplier: Sequence[float] | None = None,
 ) -> Array:
     """Return the exact image of several VDIs in one scene.
 
@@ -100,8 +104,8 @@ def render_joint(
         Width and height of the image.
     opaque_depth : array_like of float, shape (H, W), optional
         As for :func:`pyvista_vdi.reference.render`.
-    clipping_planes : sequence, optional
-        The planes of each VDI, (k, 6), or ``None``.
+    clipping_planes, cropping, opacity_multiplier : sequence, optional
+        Those of each VDI, as for :func:`pyvista_vdi.reference.render`.
 
     Returns
     -------
@@ -109,24 +113,20 @@ def render_joint(
         float64 (H, W, 4), premultiplied RGBA, top row first.
     """
     width, height = window_size
-    media = [Lists(vdi) for vdi in vdis]
+    scene = _Scene(vdis, cameras, window_size, opaque_depth, clipping_planes, cropping)
+    media = [
+        Lists(vdi, m) for vdi, m in zip(vdis, _each(opacity_multiplier, vdis, 1.0), strict=True)
+    ]
     image = np.zeros((height, width, 4))
     for row, x in itertools.product(range(height), range(width)):
-        lines = _lines(
-            vdis,
-            cameras,
-            window_size,
-            (x, height - 1 - row),
-            opaque_depth=opaque_depth,
-            clipping_planes=clipping_planes,
+        rays = scene.rays((x, height - 1 - row))
+        image[row, x] = composite_segments(
+            [
+                segments_of(lists, line)
+                for lists, ray in zip(media, rays, strict=True)
+                for line in ray
+            ]
         )
-        streams = [
-            segments_of(lists, line)
-            for lists, line in zip(media, lines, strict=True)
-            if line is not None
-        ]
-        if streams:
-            image[row, x] = composite_segments(streams)
     return image
 
 
@@ -139,7 +139,10 @@ def render_joint_range(
     *,
     n_random: int = 0,
     seed: int = 0,
-    **ends: Any,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: Sequence[ArrayLike | None] | None = None,
+    cropping: Sequence[Any] | None = None,
+    opacity_multiplier: Sequence[float] | None = None,
 ) -> tuple[Array, Array]:
     """Return the smallest and largest colour over rays moved by their arithmetic's roundings.
 
@@ -149,8 +152,8 @@ def render_joint_range(
 
     Parameters
     ----------
-    vdis, cameras, window_size
-        As for :func:`render_joint`, and so are ``ends``: its other arguments.
+    vdis, cameras, window_size, opaque_depth, clipping_planes, cropping, opacity_multiplier
+        As for :func:`render_joint`.
     pixels : sequence of (int, int)
         ``(x, y)`` of each, y = 0 at the bottom.
     k : float
@@ -166,42 +169,97 @@ def render_joint_range(
         float64 (len(pixels), 4) each, premultiplied RGBA.
     """
     rng = np.random.default_rng(seed)
-    movers = [_Mover(vdi, k * ROUNDOFF) for vdi in vdis]
+    scene = _Scene(vdis, cameras, window_size, opaque_depth, clipping_planes, cropping)
+    movers = [
+        _Mover(Lists(vdi, m), k * ROUNDOFF)
+        for vdi, m in zip(vdis, _each(opacity_multiplier, vdis, 1.0), strict=True)
+    ]
     nudges = _window_nudges(window_size, k)
     low = np.empty((len(pixels), 4))
     high = np.empty((len(pixels), 4))
     for n, pixel in enumerate(pixels):
         seen = []
         for nudge in [(0.0, 0.0), *nudges]:
-            lines = _lines(vdis, cameras, window_size, pixel, nudge=nudge, **ends)
-            seen.append(_seen(m.plain(line) for m, line in zip(movers, lines, strict=True)))
-        lines = _lines(vdis, cameras, window_size, pixel, **ends)
-        depths = [depth for line in lines if line is not None for depth in line[2:4]]
+            rays = scene.rays(pixel, nudge)
+            seen.append(
+                composite_segments(
+                    [
+                        segments_of(m.media[0], line)
+                        for m, ray in zip(movers, rays, strict=True)
+                        for line in ray
+                    ]
+                )
+            )
+        rays = scene.rays(pixel)
+        depths = [depth for ray in rays for line in ray for depth in line[2:4]]
         reach = k * ROUNDOFF * float(np.ptp(depths)) if depths else 0.0
-        for moves in _moves(rng, n_random, movers, lines):
+        for moves in _moves(rng, n_random, movers, rays):
             shift = reach * rng.uniform(-1, 1, size=len(vdis))
-            moved = zip(movers, lines, moves, shift, strict=True)
-            seen.append(_seen(m.moved(line, move, along) for m, line, move, along in moved))
+            moved = [
+                mover.moved(line, move, along)
+                for mover, ray, move, along in zip(movers, rays, moves, shift, strict=True)
+                for line in ray
+            ]
+            seen.append(composite_segments(moved))
         low[n], high[n] = np.min(seen, axis=0), np.max(seen, axis=0)
     return low, high
+
+
+class _Scene(NamedTuple):
+    """What rays through a window meet; each VDI's clipping planes and cropping."""
+
+    vdis: Sequence[VDI]
+    cameras: Sequence[Camera]
+    window_size: tuple[int, int]
+    opaque_depth: ArrayLike | None
+    clipping_planes: Sequence[ArrayLike | None] | None
+    cropping: Sequence[Any] | None
+
+    def rays(
+        self, pixel: tuple[int, int], nudge: tuple[float, float] = (0.0, 0.0)
+    ) -> list[list[Line]]:
+        """Return the parts of a pixel's ray that may meet each VDI."""
+        planes = _each(self.clipping_planes, self.vdis, None)
+        croppings = _each(self.cropping, self.vdis, None)
+        return [
+            lines_of_pixel(
+                vdi,
+                camera,
+                self.window_size,
+                pixel,
+                nudge=nudge,
+                opaque_depth=self.opaque_depth,
+                clipping_planes=cut,
+                cropping=cropped,
+            )
+            for vdi, camera, cut, cropped in zip(
+                self.vdis, self.cameras, planes, croppings, strict=True
+            )
+        ]
+
+
+def _each(values: Sequence[Any] | None, vdis: Sequence[VDI], default: Any) -> Sequence[Any]:
+    return [default] * len(vdis) if values is None else values
+
+
+def _seen(media: Sequence[Lists], rays: Sequence[Sequence[Line]]) -> Array:
+    """Return the colour of a ray, given the parts of it that may meet each medium."""
+    return composite_segments(
+        [segments_of(m, line) for m, ray in zip(media, rays, strict=True) for line in ray]
+    )
 
 
 class _Mover:
     """Moves the rays of one VDI by what rounding allows."""
 
-    def __init__(self, vdi: VDI, size: float) -> None:
-        self.space = _ListSpace(vdi)
+    def __init__(self, lists: Lists, size: float) -> None:
+        self.space = _ListSpace(lists.vdi)
         self.size = size
-        lists = Lists(vdi)
         shift = FACE_ROUNDINGS * ROUNDOFF * self.space.face_sensitivity(lists)
         self.media = {0: lists, 1: lists.displaced(shift), -1: lists.displaced(-shift)}
 
-    def plain(self, line: Line | None) -> Segments | None:
-        return None if line is None else segments_of(self.media[0], line)
-
-    def moved(self, line: Line | None, move: _Move, along: float) -> Segments | None:
-        if line is None:
-            return None
+    def moved(self, line: Line, move: _Move, along: float) -> Segments:
+        """Return what a moved line crosses, shifted along the ray."""
         segments = segments_of(
             self.media[move.faces], self.space.moved(line, move, self.size)
         )  # t from 0 to 1
@@ -210,45 +268,18 @@ class _Mover:
 
 
 def _moves(
-    rng: np.random.Generator, count: int, movers: Sequence[_Mover], lines: Sequence[Line | None]
+    rng: np.random.Generator,
+    count: int,
+    movers: Sequence[_Mover],
+    rays: Sequence[Sequence[Line]],
 ) -> Iterator[list[_Move]]:
     """Yield a move for each VDI: the fixed ones together, then every one at random."""
     for move in _corners():
         yield [move] * len(movers)
     for _ in range(count):
         yield [
-            _Move(np.zeros((2, 3)), 0)
-            if line is None
-            else next(_inside(rng, 1, mover.space, line, mover.size))
-            for mover, line in zip(movers, lines, strict=True)
+            next(_inside(rng, 1, mover.space, ray[0], mover.size))
+            if ray
+            else _Move(np.zeros((2, 3)), 0)
+            for mover, ray in zip(movers, rays, strict=True)
         ]
-
-
-def _lines(
-    vdis: Sequence[VDI],
-    cameras: Sequence[Camera],
-    window_size: tuple[int, int],
-    pixel: tuple[int, int],
-    *,
-    nudge: tuple[float, float] = (0.0, 0.0),
-    opaque_depth: ArrayLike | None = None,
-    clipping_planes: Sequence[ArrayLike | None] | None = None,
-) -> list[Line | None]:
-    planes = [None] * len(vdis) if clipping_planes is None else clipping_planes
-    return [
-        line_of_pixel(
-            vdi,
-            camera,
-            window_size,
-            pixel,
-            nudge=nudge,
-            opaque_depth=opaque_depth,
-            clipping_planes=cut,
-        )
-        for vdi, camera, cut in zip(vdis, cameras, planes, strict=True)
-    ]
-
-
-def _seen(streams: Iterator[Segments | None]) -> Array:
-    met = [segments for segments in streams if segments is not None]
-    return composite_segments(met) if met else np.zeros(4)

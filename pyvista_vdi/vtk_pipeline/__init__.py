@@ -8,6 +8,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pyvista_vdi.vtk_pipeline.actor import VDIActor
     from pyvista_vdi.vtk_pipeline.convert import vdi_from_image, vdi_to_image, volume_from_vtk
+    from pyvista_vdi.vtk_pipeline.dense import (
+        VDIToDenseImage,
+        vdi_from_dense_image,
+        vdi_to_dense_image,
+    )
     from pyvista_vdi.vtk_pipeline.mapper import VDIMapper
     from pyvista_vdi.vtk_pipeline.properties import transfer_function_from_property
     from pyvista_vdi.vtk_pipeline.source import VDISource
@@ -19,8 +24,11 @@ _MODULES = {
     "VDIMapper": "mapper",
     "VDISource": "source",
     "VDIStatus": "status",
+    "VDIToDenseImage": "dense",
     "transfer_function_from_property": "properties",
+    "vdi_from_dense_image": "dense",
     "vdi_from_image": "convert",
+    "vdi_to_dense_image": "dense",
     "vdi_to_image": "convert",
     "volume_from_vtk": "convert",
 }
@@ -30,8 +38,11 @@ __all__ = [
     "VDIMapper",
     "VDISource",
     "VDIStatus",
+    "VDIToDenseImage",
     "transfer_function_from_property",
+    "vdi_from_dense_image",
     "vdi_from_image",
+    "vdi_to_dense_image",
     "vdi_to_image",
     "volume_from_vtk",
 ]

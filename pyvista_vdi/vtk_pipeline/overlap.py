@@ -53,6 +53,8 @@ class Sight:
         Its window's.
     vdi : VDI
         What is seen.
+    looks : dict
+        Its cropping and its opacity multiplier, fields of a :class:`PlacedVDI`.
     """
 
     painter: Any
@@ -61,6 +63,7 @@ class Sight:
     frame: Frame
     clock: WindowClock
     vdi: VDI
+    looks: dict[str, Any]
 
     @property
     def planes(self) -> NDArray[np.float64] | None:
@@ -72,12 +75,13 @@ class Sight:
         """What it looks like, but for what hides it."""
         planes = self.planes
         cut = None if planes is None else planes.tobytes()
-        return (weakref.ref(self.vdi), self.frame.camera, self.frame.size, cut)
+        looks = tuple(self.looks.values())
+        return (weakref.ref(self.vdi), self.frame.camera, self.frame.size, cut, looks)
 
     @property
     def placed(self) -> PlacedVDI:
         """What the raycaster is to draw."""
-        return PlacedVDI(self.vdi, self.frame.camera, self.planes)
+        return PlacedVDI(self.vdi, self.frame.camera, self.planes, **self.looks)
 
     def coarser(self, size: tuple[int, int]) -> Sight:
         """Return the same with fewer pixels."""

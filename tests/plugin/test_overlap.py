@@ -88,6 +88,16 @@ def one_clipped(plotter, actors):
     actors[1].mapper.AddClippingPlane(plane)
 
 
+def one_cropped(plotter, actors):
+    actors[1].mapper.SetCroppingRegionPlanes(-0.5, 0.1, -0.3, 0.4, -0.2, 0.9)
+    actors[1].mapper.SetCroppingRegionFlagsToFence()
+    actors[1].mapper.CroppingOn()
+
+
+def one_denser(plotter, actors):
+    actors[1].mapper.SetOpacityMultiplier(3.0)
+
+
 def parallel(plotter, actors):
     plotter.enable_parallel_projection()
 
@@ -119,6 +129,8 @@ def sheared(plotter, actors):
         nothing_else,
         meshes,
         one_clipped,
+        one_cropped,
+        one_denser,
         parallel,
         eye_in_both,
         anti_aliased,

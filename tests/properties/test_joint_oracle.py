@@ -18,6 +18,7 @@ import strategies
 import pyvista_vdi as pvdi
 from pyvista_vdi import joint, reference
 from pyvista_vdi.camera import Camera
+from pyvista_vdi.cropping import Cropping
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.joint import PlacedVDI, joint_image, render_vdis
 from pyvista_vdi.raycast import render_vdi
@@ -139,6 +140,31 @@ def test_opaque_depth_and_each_vdi_s_own_clipping_planes(runtime, case):
     said, _, seen = failures(vdis, cameras, size, image, f"seed {case}", **ends)
     assert not said, "\n".join(said)
     assert seen
+
+
+@pytest.mark.parametrize("case", range(4))
+def test_each_vdi_s_own_cropping_and_density(runtime, case):
+    rng = np.random.default_rng([case, 16])
+    kind = ("around", "parallel", "near", "inside")[case]
+    vdis, cameras, size = scene(rng, kind, 2)
+    low, high = np.reshape(vdis[0].bounds, (3, 2)).T
+    cuts = low + np.sort(rng.uniform(0.1, 0.9, size=(2, 3)), axis=0) * (high - low)
+    croppings = [
+        Cropping(cuts.T.ravel(), regions) for regions in ("subvolume", "inverted_fence", "cross")
+    ]
+    looks = {
+        "cropping": [croppings[1 + case % 2], (croppings[0], None)[case % 2]],
+        "opacity_multiplier": [1.0, float(rng.uniform(0.2, 3))],
+    }
+    if case >= 2:
+        looks = {name: values[::-1] for name, values in looks.items()}
+    image = draw(runtime, vdis, cameras, size, **looks)
+    said, _, seen = failures(vdis, cameras, size, image, f"seed {case}", **looks)
+    assert not said, "\n".join(said)
+    assert seen
+    turned = {name: values[::-1] for name, values in looks.items()}
+    assert np.array_equal(image, draw(runtime, vdis[::-1], cameras[::-1], size, **turned))
+    assert not np.array_equal(image, draw(runtime, vdis, cameras, size))
 
 
 def test_planes_for_all_are_each_one_s_planes(runtime):
@@ -302,6 +328,10 @@ def test_what_cannot_be_drawn_is_refused(default_runtime):
         pvdi.render([one, one], camera, clipping_planes=[None])
     with pytest.raises(InvalidArgumentError, match="for each of the 2 VDIs"):
         pvdi.render([one, one], camera, clipping_planes=5)
+    with pytest.raises(InvalidArgumentError, match="a list with an entry for each of the 2 VDIs"):
+        pvdi.render([one, one], camera, cropping=(0, 1, 0, 1, 0, 1))
+    with pytest.raises(InvalidArgumentError, match="or one for each of the 2 VDIs"):
+        pvdi.render([one, one], camera, opacity_multiplier=[1.0])
     with pytest.raises(InvalidArgumentError, match="preview_samples is for a single VDI"):
         pvdi.render([one, one], camera, preview_samples=9)
     with pytest.raises(InvalidArgumentError, match="expected VDIs, got str"):
