@@ -8,7 +8,7 @@
 #   WHEEL     a wheel of pyvista-vdi; by default this checkout is installed
 #
 #   PVPYTHON  ParaView's Python (default: pvpython; where it is absent and the system is a Debian,
-#             its packages paraview, python3-paraview and xvfb are installed, as root or by sudo)
+#             its packages are installed, as root or by sudo)
 #   PYTHON    makes the environment; of the same minor version as ParaView's Python (default: the
 #             system's, else the one on the PATH)
 #   EXTRAS    of pyvista-vdi (default: cpu, which brings an OpenCL implementation)
@@ -58,7 +58,7 @@ install_debian_packages() {
     "${as_root[@]}" apt-get update -qq
     # Debian's python3-paraview conflicts with python3-vtk9: never remove what somebody installed
     "${as_root[@]}" apt-get install -y -qq --no-install-recommends --no-remove \
-        paraview python3-paraview xvfb xauth ||
+        paraview python3-paraview python3-venv xvfb xauth ||
         fail "Debian's packages paraview and python3-paraview could not be installed"
 }
 
