@@ -737,8 +737,8 @@ def test_what_fails_is_said_once_and_not_repeated(plotter, monkeypatch):
 def test_what_cannot_be_made_any_more_is_said_and_the_old_stays(plotter):
     actor = watched(plotter)
     before = frame(plotter)
-    actor.prop.SetShade(True)
-    with pytest.warns(VDIWarning, match="cannot be made anew: UnsupportedError: .*shading"):
+    actor.prop.SetTransferFunctionModeTo2D()
+    with pytest.warns(VDIWarning, match="cannot be made anew: UnsupportedError: .*2D transfer"):
         frame(plotter)
     np.testing.assert_array_equal(frame(plotter), before)
 
