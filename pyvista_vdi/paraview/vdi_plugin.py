@@ -277,6 +277,7 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
     def __init__(self) -> None:
         super().__init__()
         self._azimuth = self._elevation = 0.0
+        self._kind = "point"
         self._unit_distance: float | None = None
         self._functions: dict[str, Any] = {}
         self._observers: dict[str, int] = {}
@@ -294,7 +295,8 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
 
     def SetArray(self, index: int, port: int, connection: int, kind: int, name: str) -> None:
         """Choose the array, as ``SetInputArrayToProcess``: kind 0 is at points, 1 at cells."""
-        self.SetScalars(name or None, "cell" if kind == 1 else "point")
+        self._kind = "cell" if kind == 1 else "point"
+        self.SetScalars(name or None, self._kind)
 
     def SetColorFunction(self, function: Any) -> None:
         """Set ParaView's colour transfer function, or ``None`` for the default."""
@@ -350,9 +352,9 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
         functions = vtkSMTransferFunctionManager()
         color = functions.GetColorTransferFunction(name, client.manager)
         opacity = functions.GetOpacityTransferFunction(name, client.manager)
-        if not client.values("ScalarRangeInitialized", color)[0]:
-            data = self.GetInputDataObject(0, 0)
-            low, high = scalars_of(data, self.GetScalars()).GetFiniteRange()
+        data = self.GetInputDataObject(0, 0) if self.GetNumberOfInputConnections(0) else None
+        if data is not None and not client.values("ScalarRangeInitialized", color)[0]:
+            low, high = scalars_of(data, name, self._kind).GetFiniteRange()
             for function in (color, opacity):
                 vtkSMTransferFunctionProxy.RescaleTransferFunction(function, low, high)
         for prop, function in (("ColorFunction", color), ("OpacityFunction", opacity)):
@@ -390,7 +392,7 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
     def _set_looks(self, image: vtkImageData) -> None:
         """Bring the volume property up to date with what is given, and with defaults."""
         prop = self._looks
-        low, high = scalars_of(image, self.GetScalars()).GetFiniteRange()
+        low, high = scalars_of(image, self.GetScalars(), self._kind).GetFiniteRange()
         color, opacity = vtkColorTransferFunction(), vtkPiecewiseFunction()
         for x, share in ((low, 0.0), (high, 1.0)):
             color.AddRGBPoint(x, share, share, share)
@@ -401,7 +403,8 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
         prop.GetScalarOpacity().DeepCopy(self._functions.get("opacity") or opacity)
         distance = self._unit_distance
         if distance is None:
-            distance = volume_from_vtk(image, self.GetScalars()).default_unit_distance
+            volume = volume_from_vtk(image, self.GetScalars(), self._kind)
+            distance = volume.default_unit_distance
         prop.SetScalarOpacityUnitDistance(distance)
         self.SetVolumeProperty(prop)
 

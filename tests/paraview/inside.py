@@ -161,6 +161,9 @@ def settings(folder):
     vdi = vdi_from_image(fetched(source))
     found["grey by default"] = bool((vdi.color[:, :1] == vdi.color).all() and len(vdi.color))
     found["progress"] = len(progress) > 0 and progress[-1] == 1.0
+    made = client.GetOutputDataObject(0).GetMTime()
+    source.UpdatePipeline()
+    found["idle"] = client.GetOutputDataObject(0).GetMTime() == made  # nothing was done again
     found["points before"] = fetched(source).GetNumberOfPoints()
 
     source.SMProxy.InvokeCommand("TakeTransferFunctions")

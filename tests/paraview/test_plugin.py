@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -21,7 +22,7 @@ from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumePrope
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import examples
-from pyvista_vdi.metrics import compare_images
+from pyvista_vdi.metrics import compare_images, over_background
 from pyvista_vdi.standard_cases import filling_camera
 
 pytestmark = pytest.mark.paraview
@@ -64,23 +65,14 @@ def paraview():
     line = f'eval "$({command} paraview --environment)"; exec pvpython "$@"'
     left_out = ("PYTHONPATH", "VTK_DEFAULT_OPENGL_WINDOW", "WAYLAND_DISPLAY")
     environment = {k: v for k, v in os.environ.items() if k not in left_out}
-    script = str(Path(__file__).with_name("inside.py"))
+    inside = Path(__file__).with_name("inside.py")
 
     with virtual_screen() as display:
 
-        def run(case, folder, *more):
+        def run(case, folder, *more, script=inside):
+            arguments = ["--force-offscreen-rendering", script, case, folder, *more]
             done = subprocess.run(
-                [
-                    "sh",
-                    "-c",
-                    line,
-                    "sh",
-                    "--force-offscreen-rendering",
-                    script,
-                    case,
-                    folder,
-                    *more,
-                ],
+                ["sh", "-c", line, "sh", *arguments],
                 env={**environment, "DISPLAY": display},
                 cwd=folder,
                 capture_output=True,
@@ -90,7 +82,7 @@ def paraview():
             )
             said = done.stdout + done.stderr
             assert done.returncode == 0, said
-            assert done.stdout.splitlines()[-1] == "all well", said
+            assert done.stdout.endswith("all well\n"), said
             for trouble in ("Traceback", "ERR|", "WARN|"):
                 assert trouble not in said, said
             return done.stderr
@@ -204,6 +196,7 @@ def test_settings_reach_the_vdi(paraview, tmp_path):
     assert found["grey by default"]
     assert found["progress"]
     assert found["points before"] == 60 * 40
+    assert found["idle"]
     assert found["functions"] == [True, True]
     before, after = found["blue"]
     assert before > 0.1
@@ -235,3 +228,19 @@ def test_paraviews_own_python_bears_our_numpy(paraview, tmp_path):
     gradient, copied = found["results"]
     assert 0 < gradient[0] < gradient[1]
     np.testing.assert_allclose(copied, (37.35310363769531, 276.8288269042969), rtol=1e-6)
+
+
+def test_the_guides_script_runs(paraview, tmp_path, default_runtime):
+    """What docs/guide_paraview.md shows, to the letter."""
+    checkout = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).parents[2])
+    guide = checkout / "docs" / "guide_paraview.md"
+    if not guide.is_file():
+        pytest.skip("no checkout at hand: set PYVISTA_VDI_CHECKOUT to one")
+    shown = re.search(r"```py\n(.*?)```", guide.read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "brain.py").write_text(shown[1] + 'print("all well")\n', encoding="utf-8")
+    paraview("guide", tmp_path, script=tmp_path / "brain.py")
+    vdi = pvdi.read(tmp_path / "brain.vdi")
+    found = screenshot(tmp_path / "brain.png")
+    expected = over_background(pvdi.render(vdi, vdi.camera.azimuth(20)), found[0, 0])
+    assert (np.abs(found - expected).max(axis=2) > BLENDED).mean() <= SHARE_OF_BORDER_PIXELS
+    assert (tmp_path / "brain.pvsm").stat().st_size > 0
