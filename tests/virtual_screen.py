@@ -12,8 +12,11 @@ from collections.abc import Iterator
 def virtual_screen() -> Iterator[str]:
     """Run Xvfb, which Debian and Ubuntu have in the package 'xvfb'; give its display's name."""
     reader, writer = os.pipe()
+    # Without -noreset it begins anew when its last client leaves, and refuses others meanwhile:
+    # ParaView looks whether there is a screen, leaves, and comes back
+    options = ["-screen", "0", "1024x768x24", "-nolisten", "tcp", "-noreset"]
     server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1024x768x24", "-nolisten", "tcp"],
+        ["Xvfb", "-displayfd", str(writer), *options],
         pass_fds=[writer],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
