@@ -15,6 +15,8 @@ Shared functions:
     Transfer function, extinction, opacity of an optical depth.
 ``common/shading.cl``
     Lights, and gradient opacity: what the steps need of the scalar's gradient.
+``common/occlusion.cl``
+    Ambient occlusion at a sample.
 ``common/empty_blocks.cl``
     Size of the blocks by which marches skip what is transparent.
 ``common/march.cl``
@@ -37,7 +39,7 @@ Entry points:
 ``vdi/prepare.cl``
     ``prepare_lists``: a VDI's arrays to what the raycaster reads.
 ``vdi/raycast.cl``
-    ``raycast``: VDI to image from any view (paper, section 3).
+    ``raycast``: VDI to image from any view (paper, section 3), or to the depth of the first hit.
 ``vdi/preview.cl``
     ``preview``: VDI to image by a given number of samples per ray (paper, section 5).
 ``vdi/render_volume.cl``
@@ -46,4 +48,6 @@ Entry points:
     ``count_supersegments``, ``occupied_slabs``: the occupancy grid of a VDI (paper, section 4).
 ``grid/volume_blocks.cl``
     ``block_ranges``, ``block_visibility``: blocks of a volume that are transparent.
+``grid/ambient_occlusion.cl``
+    ``step_opacities``, ``ambient_transmittances``: ambient occlusion on a coarse grid.
 """

@@ -17,13 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 from .camera import Camera
 from .classification import DEFAULTS, IN_PLACE, Classification
 from .errors import InvalidVDIError, InvalidVolumeError
+from .picking import DEFAULT_OPACITY
 from .vdi import VDI
 from .volume import Volume
 
 if TYPE_CHECKING:
     from .generation import Estimate
+    from .picking import Pick
 
-__all__ = ["estimate", "generate", "read", "render", "render_volume"]
+__all__ = ["estimate", "generate", "pick", "read", "render", "render_depth", "render_volume"]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -54,6 +56,7 @@ def generate(
     tolerance: float = 0.0,
     view_cone: float = 60.0,
     lights: Any = None,
+    ambient_occlusion: Any = None,
     device: Any = None,
     progress: Callable[[float], object] | None = None,
     **classification: Any,
@@ -83,6 +86,9 @@ def generate(
         What a shaded volume is lit by; one headlight by default, which is VTK's. PyVista's
         plotters have a light kit: pass ``plotter.renderer`` for its lights. They are baked into
         the colours as they stand at V_O.
+    ambient_occlusion : bool, float or AmbientOcclusion, optional
+        Darken what is hidden from the light around it: ``True``, or the radius up to which
+        something hides, model units. Baked into the colours.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     progress : callable, optional
@@ -138,6 +144,7 @@ def generate(
         tolerance=tolerance,
         view_cone=view_cone,
         lights=lights,
+        ambient_occlusion=ambient_occlusion,
         device=device,
         progress=progress,
         metadata={"classification": looks.describe(), "scalars": volume.name},
@@ -208,6 +215,125 @@ def render(
     )
 
 
+def render_depth(
+    vdi: Any,
+    camera: Any,
+    window_size: Sequence[int] | None = None,
+    *,
+    opacity_threshold: float = DEFAULT_OPACITY,
+    accumulated: bool = True,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+    skip_empty: bool = True,
+    device: Any = None,
+) -> NDArray[np.float32]:
+    """Raycast a VDI for where it begins to be seen: :func:`pick` for every pixel of a view.
+
+    Parameters
+    ----------
+    vdi, camera, window_size, opaque_depth, clipping_planes, skip_empty, device
+        As for :func:`render`.
+    opacity_threshold, accumulated
+        What counts as a hit: as for :func:`pick`.
+
+    Returns
+    -------
+    numpy.ndarray
+        View depth of each pixel's hit, float32 (H, W), world units, top row first; infinite where
+        nothing is hit. It can be passed as another :func:`render`'s ``opaque_depth``.
+
+    Raises
+    ------
+    InvalidVDIError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+    NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
+        If there is no device, or it fails.
+    """
+    view = Camera.from_any(camera)
+    vdi = as_vdi(vdi)
+    from .raycast import render_first_hits
+
+    return render_first_hits(
+        vdi,
+        view,
+        window_size,
+        opacity_threshold=opacity_threshold,
+        accumulated=accumulated,
+        opaque_depth=opaque_depth,
+        clipping_planes=clipping_planes,
+        skip_empty=skip_empty,
+        device=device,
+    )
+
+
+def pick(
+    vdi: Any,
+    camera: Any,
+    pixel: Sequence[float],
+    window_size: Sequence[int] | None = None,
+    *,
+    opacity_threshold: float = DEFAULT_OPACITY,
+    accumulated: bool = True,
+    opaque_depth: float | None = None,
+    clipping_planes: ArrayLike | None = None,
+) -> Pick | None:
+    """Return what a pixel shows of a VDI: the first supersegment that reaches an opacity.
+
+    Parameters
+    ----------
+    vdi : VDI or vtkImageData
+        As for :func:`render`.
+    camera : pyvista.Camera or vtkCamera or Camera
+        The view. Its model transform places the VDI's model frame in the world.
+    pixel : (float, float)
+        x and y in pixels, VTK's display coordinates: whole numbers are pixels' centres and y = 0
+        is the bottom row, so that pixel (x, y) is ``image[height - 1 - y, x]`` of a picture.
+    window_size : (int, int), optional
+        Width and height of the view in pixels; the VDI's own by default.
+    opacity_threshold : float
+        Opacity that the hit has to reach, at least 0 and less than 1; the default is that of
+        VTK's pickers for volumes. With 0, whatever absorbs light at all is hit.
+    accumulated : bool, default: True
+        Compare the opacity of the ray from its beginning, 1 - exp(-(tau_0 + ... + tau_k)): the hit
+        is the first supersegment with which the ray has become as opaque as that. ``False``
+        compares each supersegment's own, 1 - exp(-tau_k) over the length that the ray crosses
+        of it, and looks through haze; but it depends on how finely the lists are cut, and where
+        the ray runs across the lists, it crosses little of each.
+    opaque_depth : float, optional
+        View depth at which the ray ends, world units.
+    clipping_planes : array_like of float, shape (k, 6), optional
+        As for :func:`render`.
+
+    Returns
+    -------
+    Pick or None
+        The supersegment, and where the ray enters it; ``None`` where nothing is hit.
+
+    Raises
+    ------
+    InvalidVDIError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+
+    Notes
+    -----
+    A single ray, walked in float64 on the host: no device is needed.
+    """
+    view = Camera.from_any(camera)
+    vdi = as_vdi(vdi)
+    from .picking import pick_vdi
+
+    return pick_vdi(
+        vdi,
+        view,
+        pixel,
+        window_size,
+        opacity_threshold=opacity_threshold,
+        accumulated=accumulated,
+        opaque_depth=opaque_depth,
+        clipping_planes=clipping_planes,
+    )
+
+
 @_classified
 def render_volume(
     volume: Any,
@@ -220,6 +346,7 @@ def render_volume(
     early_termination: bool = True,
     skip_empty: bool = True,
     lights: Any = None,
+    ambient_occlusion: Any = None,
     device: Any = None,
     **classification: Any,
 ) -> NDArray[np.float32]:
@@ -243,6 +370,8 @@ def render_volume(
         Pass by blocks of the volume that are transparent; the picture is the same to the last bit.
     lights : renderer, or sequence of Light, vtkLight or pyvista.Light, optional
         As for :func:`generate`; lights that move with the camera are those of this view.
+    ambient_occlusion : bool, float or AmbientOcclusion, optional
+        As for :func:`generate`.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     **classification
@@ -282,6 +411,7 @@ def render_volume(
         early_termination=early_termination,
         skip_empty=skip_empty,
         lights=lights,
+        ambient_occlusion=ambient_occlusion,
         device=device,
     )
 
@@ -322,7 +452,13 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
     return read_file(path, **options)
 
 
-def estimate(volume: Any, window_size: Sequence[int], *, max_supersegments: int = 20) -> Estimate:
+def estimate(
+    volume: Any,
+    window_size: Sequence[int],
+    *,
+    max_supersegments: int = 20,
+    ambient_occlusion: Any = None,
+) -> Estimate:
     """Return how much memory generating a VDI takes, before it is taken.
 
     Parameters
@@ -333,6 +469,8 @@ def estimate(volume: Any, window_size: Sequence[int], *, max_supersegments: int 
         Width and height in pixels.
     max_supersegments : int
         Longest list.
+    ambient_occlusion : bool, float or AmbientOcclusion, optional
+        As for :func:`generate`.
 
     Returns
     -------
@@ -346,7 +484,12 @@ def estimate(volume: Any, window_size: Sequence[int], *, max_supersegments: int 
     """
     from .generation import estimate as estimate_bytes
 
-    return estimate_bytes(as_volume(volume), window_size, max_supersegments=max_supersegments)
+    return estimate_bytes(
+        as_volume(volume),
+        window_size,
+        max_supersegments=max_supersegments,
+        ambient_occlusion=ambient_occlusion,
+    )
 
 
 def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Volume:

@@ -16,6 +16,7 @@ from .camera import Camera, check_window_size
 from .errors import InvalidArgumentError
 from .occupancy import OccupancyGrid
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime
+from .picking import DEFAULT_OPACITY, FirstHit
 from .vdi import VDI
 
 #: A ray ends where less transmittance than this is left: no channel loses more than that.
@@ -93,6 +94,53 @@ def render_vdi(
         return runtime.download(image)
 
 
+def render_first_hits(
+    vdi: VDI,
+    camera: Camera,
+    window_size: Sequence[int] | None = None,
+    *,
+    opacity_threshold: float = DEFAULT_OPACITY,
+    accumulated: bool = True,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+    skip_empty: bool = True,
+    device: Any = None,
+) -> NDArray[np.float32]:
+    """Return the view depth at which each pixel's ray first hits something that can be seen.
+
+    Parameters
+    ----------
+    vdi, camera, window_size, opaque_depth, clipping_planes, skip_empty, device
+        As for :func:`render_vdi`.
+    opacity_threshold, accumulated
+        What counts as a hit: see :func:`pyvista_vdi.pick`.
+
+    Returns
+    -------
+    numpy.ndarray
+        float32 (height, width), world units, top row first; infinite where nothing is hit.
+    """
+    if not isinstance(vdi, VDI):
+        raise InvalidArgumentError(f"expected a VDI, got {type(vdi).__name__}")
+    camera = Camera.from_any(camera)
+    size = check_window_size(vdi.window_size if window_size is None else window_size)
+    wanted = FirstHit.of(opacity_threshold, accumulated)
+    runtime = get_runtime(device)
+    prepared = prepared_vdi(runtime, vdi)
+    with runtime.buffer((size[1], size[0]), name="depth of first hits") as image:
+        prepared.render(
+            camera,
+            size,
+            image,
+            opaque_depth,
+            clipping_planes,
+            skip_empty=skip_empty,
+            first_hit=wanted,
+        )
+        t = runtime.download(image)
+    return (t + rays.reference_depth(camera, vdi.bounds)).astype(np.float32)
+
+
 def check_preview_samples(samples: int) -> int:
     """Return a number of samples per ray as an int between 1 and :data:`MAX_PREVIEW_SAMPLES`."""
     try:
@@ -149,9 +197,7 @@ class PreparedVDI:
         camera = vdi.camera
         self._parallel = camera.parallel_projection
         near, far = rays.depth_range(camera, vdi.bounds)
-        diagonal = float(np.linalg.norm(np.subtract(vdi.bounds[1::2], vdi.bounds[::2])))
-        shrink = np.linalg.norm(camera.model_transform[:3, :3], 2)
-        self._nearest = rays.NEAREST_DEPTH * diagonal * float(shrink)
+        self._nearest = rays.nearest_depth(camera, vdi.bounds)
         # An origin much closer than the data costs the coordinate the digits that it is to save
         closest = min(near, self._depth_origin)
         self._shifted = not self._parallel and 0 < far <= _LONG_LENS * closest
@@ -181,8 +227,12 @@ class PreparedVDI:
         *,
         skip_empty: bool = True,
         preview_samples: int | None = None,
+        first_hit: FirstHit | None = None,
     ) -> None:
-        """Draw a frame into ``image``, float32 (H, W, 4) on the device."""
+        """Draw a frame into ``image``, float32 (H, W, 4) on the device.
+
+        With ``first_hit``, t of each ray's first hit in its place, float32 (H, W).
+        """
         width, height = size
         pixel_rays = rays.pixel_rays(camera, size, self._bounds)
         coordinates = [pixel_rays.form(row[:3], row[3]) for row in self._list_rows]
@@ -196,11 +246,14 @@ class PreparedVDI:
         runtime = self._runtime
         defines = self.defines
         grid = self.occupancy
-        sampling: tuple[Any, ...] = ()
+        mode: tuple[Any, ...] = ()
         if preview_samples is not None:
             kernel = runtime.kernel("vdi/preview.cl", "preview", defines)
-            sampling = (grid.counts, np.int32(preview_samples))
+            mode = (grid.counts, np.int32(preview_samples))
         else:
+            if first_hit is not None:
+                defines["FIRST_HIT"] = 1
+                mode = (np.float32(first_hit.optical_depth), np.int32(first_hit.accumulated))
             if skip_empty and grid.worthwhile:
                 defines["SKIP_EMPTY"] = 1
             kernel = runtime.kernel("vdi/raycast.cl", "raycast", defines)
@@ -230,7 +283,7 @@ class PreparedVDI:
                 grid.masks,
                 np.float32(grid.first_depth),
                 np.float32(grid.slabs_per_depth),
-                *sampling,
+                *mode,
                 image,
             )
             runtime.finish()  # the buffers above may be host memory in use

@@ -69,6 +69,16 @@ def depth_range(camera: Camera, bounds: Sequence[float]) -> tuple[float, float]:
     return float(middle - reach), float(middle + reach)
 
 
+def nearest_depth(camera: Camera, bounds: Sequence[float]) -> float:
+    """Return the view depth before which nothing is looked up in perspective, world units.
+
+    :data:`NEAREST_DEPTH` times the diagonal of the bounds, carried into the world by the model
+    transform's largest stretch.
+    """
+    diagonal = float(np.linalg.norm(np.subtract(bounds[1::2], bounds[::2])))
+    return NEAREST_DEPTH * diagonal * float(np.linalg.norm(camera.model_transform[:3, :3], 2))
+
+
 def reference_depth(camera: Camera, bounds: Sequence[float]) -> float:
     """Return the view depth about which rays and lists are formed, world units.
 

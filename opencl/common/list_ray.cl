@@ -11,6 +11,7 @@ typedef struct {
     bool away;     // from V_O: depth does not decrease along the ray
     float r_begin; // 0 or -1; it ends at r_begin + 1
     float scale;   // model length per unit of r, but for the division by w(r_a) w(r_b) in perspective
+    float t_begin; // where it enters, as t
 } ListRay;
 
 // `forms`: list coordinates, model direction, then `planes` to clip to; the ray ends at `t_end`. Returns false where it
@@ -24,6 +25,7 @@ inline bool begin_list_ray(ListRay *ray, __global const float *forms, int planes
         return false;
     const float3 start = list_point(forms, a, b, t0);
     const float3 end = list_point(forms, a, b, t1);
+    ray->t_begin = t0;
     ray->start = start;
     ray->along = end - start;
     ray->away = ray->along.z >= 0.0f;

@@ -7,6 +7,7 @@
 // -D OFFSET_T           type of an offset into the supersegments: uint or ulong
 // -D PARALLEL, SHIFTED  the depth coordinate, see common/list_space.cl
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
+// -D FIRST_HIT          in place of a picture, where each ray enters the first supersegment that reaches an opacity
 #include "common/list_ray.cl"
 #include "common/lists.cl"
 #include "common/classification.cl"
@@ -31,7 +32,17 @@ __kernel void raycast(
     __global const ulong *masks,        // occupied slabs of each tile of lists, if SKIP_EMPTY
     float first_depth,                  // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,
+#ifdef FIRST_HIT
+    float least_optical_depth,          // a hit has some, and at least this much: by itself, or with all before it
+    int accumulated,                    // whether what is before it counts
+    __global float *image)              // t of the first hit, infinite where there is none, top row first
+#define NOTHING INFINITY
+#define RAY_IS_DONE hit
+#else
     __global float4 *image)             // premultiplied RGBA, top row first
+#define NOTHING (float4)(0.0f)
+#define RAY_IS_DONE (transmittance < transmittance_cutoff)
+#endif
 {
     const int2 pixel = block_pixel((uint)get_global_id(0), width);
     if (pixel.x >= width || pixel.y >= height)
@@ -42,7 +53,7 @@ __kernel void raycast(
 
     ListRay ray;
     if (!begin_list_ray(&ray, forms, planes, a, b, has_opaque_depth ? opaque_depth[place] : INFINITY, depth_origin)) {
-        image[place] = (float4)(0.0f);
+        image[place] = NOTHING;
         return;
     }
     const float3 start = ray.start;
@@ -68,8 +79,14 @@ __kernel void raycast(
 #define CROSSING_U(i) (((float)(i) + border_i - half_wide - deep.x) * inverse_u)
 #define CROSSING_V(j) (((float)(j) + border_j - half_high - deep.y) * inverse_v)
 
+#ifdef FIRST_HIT
+    float met = 0.0f; // optical depth
+    float r_hit = r_begin;
+    bool hit = false;
+#else
     float3 color = (float3)(0.0f);
     float transmittance = 1.0f;
+#endif
     float r = r_begin;
     float z = start.z;
     int passed = 0; // supersegments passed in the list before: the first guess in the next
@@ -157,15 +174,24 @@ __kernel void raycast(
                 const float4 medium = media[k];
                 const float length_crossed = model_length(ray.scale, from, fma(from, along.z, deep.z), to,
                                                           fma(to, along.z, deep.z), depth_origin);
+#ifdef FIRST_HIT
+                const float tau = medium.w * length_crossed;
+                met = accumulated ? met + tau : tau;
+                hit = met > 0.0f && met >= least_optical_depth;
+                r_hit = from;
+                if (hit)
+                    break;
+#else
                 const float weight = transmittance * opacity_of(medium.w * length_crossed); // over, front to back
                 color += weight * medium.xyz;
                 transmittance -= weight;
+#endif
                 if (!ends_here)
                     break;
                 passed += away ? 1 : -1;
             }
         }
-        if (r_next >= r_end || transmittance < transmittance_cutoff)
+        if (r_next >= r_end || RAY_IS_DONE)
             break;
         r = r_next;
         z = z_next;
@@ -182,5 +208,11 @@ __kernel void raycast(
         enters_tile = (((i ^ last_i) | (j ^ last_j)) >> TILE_SHIFT) != 0;
 #endif
     }
+#ifdef FIRST_HIT
+    const float z_hit = fma(r_hit, along.z, deep.z);
+    const float passed_by = model_length(ray.scale, r_begin, start.z, r_hit, z_hit, depth_origin);
+    image[place] = hit ? ray.t_begin + passed_by / model_speed(forms, a, b) : NOTHING;
+#else
     image[place] = (float4)(color, 1.0f - transmittance);
+#endif
 }

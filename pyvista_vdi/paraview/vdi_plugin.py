@@ -153,6 +153,17 @@ _SOURCE_XML = """
                       default_values="0" panel_visibility="advanced" />
 <DoubleVectorProperty name="SpecularPower" command="SetSpecularPower" number_of_elements="1"
                       default_values="1" panel_visibility="advanced" />
+<IntVectorProperty name="AmbientOcclusion" command="SetOcclusion" number_of_elements="1"
+                   default_values="0">
+  <BooleanDomain name="bool" />
+  <Documentation>Darken what is hidden from the light around it.</Documentation>
+</IntVectorProperty>
+<DoubleVectorProperty name="AmbientOcclusionRadius" command="SetOcclusionRadius"
+                      number_of_elements="1" default_values="0" panel_visibility="advanced">
+  <DoubleRangeDomain name="range" min="0" />
+  <Documentation>How far around it that is looked for, in the volume's units. 0: the default
+  radius.</Documentation>
+</DoubleVectorProperty>
 <IntVectorProperty name="MaxSupersegments" command="SetMaxSupersegments" number_of_elements="1"
                    default_values="20">
   <IntRangeDomain name="range" min="1" max="4096" />
@@ -278,6 +289,8 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
         super().__init__()
         self._azimuth = self._elevation = 0.0
         self._kind = "point"
+        self._occluded = False
+        self._occlusion_radius = 0.0
         self._unit_distance: float | None = None
         self._functions: dict[str, Any] = {}
         self._observers: dict[str, int] = {}
@@ -333,6 +346,16 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
     def SetSpecularPower(self, power: float) -> None:
         """Set the specular power."""
         self._on_looks("SetSpecularPower", power)
+
+    def SetOcclusion(self, occluded: int) -> None:
+        """Choose whether what is hidden from the light around it is darkened."""
+        self._occluded = bool(occluded)
+        self.SetOcclusionRadius(self._occlusion_radius)
+
+    def SetOcclusionRadius(self, radius: float) -> None:
+        """Set how far around a point that is looked for; 0 is the default radius."""
+        self._occlusion_radius = radius
+        self.SetAmbientOcclusion((radius or True) if self._occluded else None)
 
     def SetStep(self, distance: float) -> None:
         """Set the length of a step along a ray; 0 is the default one."""

@@ -101,6 +101,20 @@ class Frame:
         depth = -(p3 - n * q3) / (n * q2 - p2)
         return np.where(z >= 1.0, np.inf, depth) if background else depth
 
+    def window_depth(self, depth: NDArray[Any]) -> NDArray[np.float32]:
+        """Convert view depth to window depth: what :meth:`view_depth` undoes.
+
+        Parameters
+        ----------
+        depth : numpy.ndarray
+            World units; infinite where there is nothing, and so is the result.
+        """
+        (p2, p3), (q2, q3) = self.projection[:, 2:]
+        there = np.isfinite(depth)
+        z = -np.where(there, depth, 1.0).astype(np.float64)
+        n = (z * p2 + p3) / (z * q2 + q3)
+        return np.where(there, (n + 1.0) / 2.0, np.inf).astype(np.float32)
+
     def coarser(self, size: tuple[int, int]) -> Frame:
         """Return the same view with fewer pixels, which fill the viewport just as exactly.
 

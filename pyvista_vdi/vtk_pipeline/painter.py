@@ -22,6 +22,7 @@ from pyvista_vdi.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.frame import Frame, as_array, sampled
 from pyvista_vdi.vtk_pipeline.inputs import Input
 from pyvista_vdi.vtk_pipeline.interaction import Interaction, WindowClock, reduced
+from pyvista_vdi.vtk_pipeline.selection import Seen, Selection
 from pyvista_vdi.vtk_pipeline.status import CornerTexts, VDIStatus
 from pyvista_vdi.vtk_pipeline.texture import ImageTexture
 from pyvista_vdi.vtk_pipeline.upkeep import Scene, Upkeep
@@ -102,6 +103,7 @@ class Painter:
         self.device: Any = None
         self.interaction = Interaction()
         self.texts = CornerTexts()
+        self.selection = Selection()
         self.proxy = make_proxy()
         self._voice = Voice()
         self.upkeep = Upkeep(self.interaction, self._voice, self.texts)
@@ -155,11 +157,13 @@ class Painter:
         """Free the texture and the images kept, and end what goes on; a frame begins anew."""
         self.upkeep.close()
         self._texture.release()
+        self.selection.release()
         self._images.clear()
 
     def take_settings(self, other: Painter) -> None:
         """Take over what another allows and when it regenerates."""
         vars(self.interaction).update(vars(other.interaction))
+        self.selection.take_settings(other.selection)
         self.upkeep.regeneration.policy = other.upkeep.regeneration.policy
         self.upkeep.regeneration.bound = other.upkeep.regeneration.bound
 
@@ -205,6 +209,10 @@ class Painter:
                 "VDIMapper draws only behind a VDIActor: use VDIActor in place of vtkVolume"
             )
             return
+        if renderer.GetSelector() is not None:
+            self._select(mapper, renderer)
+            return
+        self.selection.leave(self._actor.Get())
         try:
             self._last = self._paint(mapper, renderer)
         except KeyboardInterrupt:
@@ -226,6 +234,7 @@ class Painter:
     def end(self) -> None:
         """Let go of the texture unit."""
         self._texture.let_go()
+        self.selection.let_go()
 
     def _cannot_draw(self, error: Exception) -> None:
         self._voice.warn(f"the VDI cannot be drawn: {type(error).__name__}: {error}", error)
@@ -239,7 +248,7 @@ class Painter:
         frame = Frame.current(renderer, model_transform)
         view = _view_of(renderer, model_transform, frame)
         self._scene = (view.camera, weakref.ref(clock))
-        only = len(self._renderers()) == 1
+        only = len(self.renderers()) == 1
         scene = Scene(renderer, model_transform, view, clock, only)
         vdi = self.upkeep.current(scene, self.status)
         if vdi is None:
@@ -271,6 +280,24 @@ class Painter:
         depth = None if depth is None else sampled(depth, size)
         task = Task(frame, planes, depth, task.full_size)
         return self._kept(task) or self._raycast(vdi, task, clock)
+
+    def _select(self, mapper: Any, renderer: Any) -> None:
+        """Draw what can be picked of what the last frame showed, or the first would show."""
+        actor, selector = self._actor.Get(), renderer.GetSelector()
+        window = renderer.GetRenderWindow()
+        self.selection.enter(actor, selector)
+        seen = None
+        try:
+            if not isinstance(self._drawn(), VDI):
+                self._last = self._paint(mapper, renderer)
+            vdi = self._drawn()
+            if isinstance(vdi, VDI):
+                frame = Frame.current(renderer, as_array(actor.GetMatrix()))
+                seen = Seen(vdi, frame, _planes(mapper, vdi, frame))
+            self.selection.show(window, selector, seen, self.device)
+        except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
+            self._voice.warn(f"the VDI cannot be picked: {type(error).__name__}: {error}", error)
+            self.selection.show(window, selector, None, self.device)
 
     def _size(
         self, mapper: Any, renderer: Any, clock: WindowClock, full: tuple[int, int]
@@ -312,7 +339,7 @@ class Painter:
 
     def renderer(self) -> Any:
         """Return the renderer that is drawing the actor; ``None`` if it has none."""
-        renderers = self._renderers()
+        renderers = self.renderers()
         if len(renderers) > 1:
             for candidate in renderers:
                 self._watch(candidate)
@@ -324,7 +351,7 @@ class Painter:
             renderers = drawing or renderers
         return renderers[0] if renderers else None
 
-    def _renderers(self) -> list[Any]:
+    def renderers(self) -> list[Any]:
         """Return all renderers that show the actor."""
         actor = self._actor.Get()
         if actor is None:

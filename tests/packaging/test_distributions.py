@@ -132,7 +132,9 @@ def test_wheel_metadata_and_entry_points(wheel, wheel_names):
     assert "pyvista-vdi = pyvista_vdi.cli:main" in entry_points
     assert "[pyvista.plotter_components]\nadd_vdi = pyvista_vdi.plotting.component" in entry_points
     assert "[pyvista.accessors]\nvdi = pyvista_vdi.plotting.accessor" in entry_points
-    assert "[pyvista.readers]\n.vdi = pyvista_vdi.plotting.reader:read_vdi" in entry_points
+    for group, function in (("readers", "reader:read_vdi"), ("writers", "writer:write_vdi")):
+        names = [f"{suffix} = pyvista_vdi.plotting.{function}" for suffix in (".exr", ".vdi")]
+        assert "\n".join([f"[pyvista.{group}]", *names]) in entry_points
 
 
 def test_sdist_holds_the_repository(source, tmp_path):

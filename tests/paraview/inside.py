@@ -181,6 +181,8 @@ def settings(folder):
 
     source.MaxSupersegments = 3
     source.Shade = 1
+    source.AmbientOcclusion = 1
+    source.AmbientOcclusionRadius = 9
     source.InterpolationType = "Nearest"
     source.Coverage = "bounds"
     source.View = "Camera"
@@ -192,6 +194,7 @@ def settings(folder):
     source.Azimuth = 90
     source.UpdatePipeline()
     vdi = vdi_from_image(fetched(source))
+    found["metadata"] = vdi.metadata
     found["longest"] = int(vdi.counts.max())
     found["camera"] = vdi.camera.to_dict()
     found["window"] = vdi.window_size

@@ -33,6 +33,7 @@ OWNERS = {
 
 CORE = {
     "_version",
+    "ambient_occlusion",
     "camera",
     "compositing",
     "errors",
