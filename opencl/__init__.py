@@ -15,6 +15,8 @@ Shared functions:
     Transfer function, extinction, opacity of an optical depth.
 ``common/shading.cl``
     Lights, and gradient opacity: what the steps need of the scalar's gradient.
+``common/occlusion.cl``
+    Ambient occlusion at a sample.
 ``common/empty_blocks.cl``
     Size of the blocks by which marches skip what is transparent.
 ``common/march.cl``
@@ -48,4 +50,6 @@ Entry points:
     ``count_supersegments``, ``occupied_slabs``: the occupancy grid of a VDI (paper, section 4).
 ``grid/volume_blocks.cl``
     ``block_ranges``, ``block_visibility``: blocks of a volume that are transparent.
+``grid/ambient_occlusion.cl``
+    ``step_opacities``, ``ambient_transmittances``: ambient occlusion on a coarse grid.
 """

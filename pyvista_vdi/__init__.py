@@ -14,6 +14,7 @@ from ._version import __version__
 
 if TYPE_CHECKING:
     from . import errors, examples
+    from .ambient_occlusion import AmbientOcclusion
     from .api import estimate, generate, pick, read, render, render_depth, render_volume
     from .camera import Camera
     from .cropping import Cropping
@@ -62,6 +63,7 @@ _ERRORS = (
 
 #: Where each public name lives; loaded when it is first used (PEP 562).
 _HOMES = {
+    "AmbientOcclusion": "ambient_occlusion",
     "Camera": "camera",
     "Cropping": "cropping",
     "Estimate": "generation",

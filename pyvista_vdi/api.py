@@ -56,6 +56,7 @@ def generate(
     tolerance: float = 0.0,
     view_cone: float = 60.0,
     lights: Any = None,
+    ambient_occlusion: Any = None,
     device: Any = None,
     progress: Callable[[float], object] | None = None,
     **classification: Any,
@@ -85,6 +86,9 @@ def generate(
         What a shaded volume is lit by; one headlight by default, which is VTK's. PyVista's
         plotters have a light kit: pass ``plotter.renderer`` for its lights. They are baked into
         the colours as they stand at V_O.
+    ambient_occlusion : bool, float or AmbientOcclusion, optional
+        Darken what is hidden from the light around it: ``True``, or the radius up to which
+        something hides, model units. Baked into the colours.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     progress : callable, optional
@@ -140,6 +144,7 @@ def generate(
         tolerance=tolerance,
         view_cone=view_cone,
         lights=lights,
+        ambient_occlusion=ambient_occlusion,
         device=device,
         progress=progress,
         metadata={"classification": looks.describe(), "scalars": volume.name},
@@ -364,6 +369,7 @@ def render_volume(
     early_termination: bool = True,
     skip_empty: bool = True,
     lights: Any = None,
+    ambient_occlusion: Any = None,
     device: Any = None,
     **classification: Any,
 ) -> NDArray[np.float32]:
@@ -387,6 +393,8 @@ def render_volume(
         Pass by blocks of the volume that are transparent; the picture is the same to the last bit.
     lights : renderer, or sequence of Light, vtkLight or pyvista.Light, optional
         As for :func:`generate`; lights that move with the camera are those of this view.
+    ambient_occlusion : bool, float or AmbientOcclusion, optional
+        As for :func:`generate`.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     **classification
@@ -428,6 +436,7 @@ def render_volume(
         early_termination=early_termination,
         skip_empty=skip_empty,
         lights=lights,
+        ambient_occlusion=ambient_occlusion,
         device=device,
     )
 
@@ -469,7 +478,13 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
     return read_file(path, **options)
 
 
-def estimate(volume: Any, window_size: Sequence[int], *, max_supersegments: int = 20) -> Estimate:
+def estimate(
+    volume: Any,
+    window_size: Sequence[int],
+    *,
+    max_supersegments: int = 20,
+    ambient_occlusion: Any = None,
+) -> Estimate:
     """Return how much memory generating a VDI takes, before it is taken.
 
     Parameters
@@ -480,6 +495,8 @@ def estimate(volume: Any, window_size: Sequence[int], *, max_supersegments: int 
         Width and height in pixels.
     max_supersegments : int
         Longest list.
+    ambient_occlusion : bool, float or AmbientOcclusion, optional
+        As for :func:`generate`.
 
     Returns
     -------
@@ -493,7 +510,12 @@ def estimate(volume: Any, window_size: Sequence[int], *, max_supersegments: int 
     """
     from .generation import estimate as estimate_bytes
 
-    return estimate_bytes(as_volume(volume), window_size, max_supersegments=max_supersegments)
+    return estimate_bytes(
+        as_volume(volume),
+        window_size,
+        max_supersegments=max_supersegments,
+        ambient_occlusion=ambient_occlusion,
+    )
 
 
 def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Volume:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import rays
+from .ambient_occlusion import AmbientOcclusion
 from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
 from .cropping import Cropping, checked_opacity_multiplier
@@ -34,6 +35,7 @@ def raycast_volume(
     early_termination: bool = True,
     skip_empty: bool = True,
     lights: Any = None,
+    ambient_occlusion: Any = None,
     device: Any = None,
 ) -> NDArray[np.float32]:
     """Render a classified volume directly.
@@ -67,6 +69,9 @@ def raycast_volume(
         Pass by blocks that are transparent; the picture is the same to the last bit.
     lights : optional
         What a shaded volume is lit by; see :meth:`pyvista_vdi.Lights.from_any`.
+    ambient_occlusion : optional
+        Darken what is hidden from the light around it, see
+        :meth:`pyvista_vdi.AmbientOcclusion.from_any`.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
 
@@ -85,6 +90,7 @@ def raycast_volume(
         sample_distance,
         skip_empty=skip_empty,
         lights=Lights.from_any(lights),
+        ambient_occlusion=AmbientOcclusion.from_any(ambient_occlusion),
     )
     return raycast_medium(
         runtime,

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import rays
+from .ambient_occlusion import AmbientOcclusion
 from .camera import Camera, check_window_size
 from .cropping import Cropping, checked_opacity_multiplier
 from .device_volume import DeviceVolume, as_float
@@ -160,6 +161,7 @@ def estimate_view_error(
     tiles: int = TILES,
     tile_size: int = TILE_SIZE,
     lights: Any = None,
+    ambient_occlusion: Any = None,
     device: Any = None,
     **options: Any,
 ) -> ViewError:
@@ -169,7 +171,9 @@ def estimate_view_error(
     ----------
     vdi : VDI
         What is judged.
-    volume, transfer_function, sample_distance, tiles, tile_size, device
+    volume, transfer_function, sample_distance, tiles, tile_size
+        As for :class:`ViewErrorEstimator`.
+    lights, ambient_occlusion, device
         As for :class:`ViewErrorEstimator`.
     camera, window_size, **options
         As for :meth:`ViewErrorEstimator.estimate`.
@@ -186,6 +190,7 @@ def estimate_view_error(
         tiles=tiles,
         tile_size=tile_size,
         lights=lights,
+        ambient_occlusion=ambient_occlusion,
         device=device,
     )
     return estimator.estimate(vdi, camera, window_size, **options)
@@ -209,6 +214,8 @@ class ViewErrorEstimator:
         pixels to each side, so a tile of 24 tells the SSIM of 14 x 14 pixels.
     lights : optional
         What a shaded volume is lit by in the view that is judged; see :meth:`Lights.from_any`.
+    ambient_occlusion : optional
+        What the VDIs were generated with; see :meth:`AmbientOcclusion.from_any`.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
 
@@ -246,6 +253,7 @@ class ViewErrorEstimator:
         tiles: int = TILES,
         tile_size: int = TILE_SIZE,
         lights: Any = None,
+        ambient_occlusion: Any = None,
         device: Any = None,
     ) -> None:
         self._tiles = _whole("tiles", tiles, 2)
@@ -257,6 +265,7 @@ class ViewErrorEstimator:
             transfer_function,
             sample_distance,
             lights=Lights.from_any(lights),
+            ambient_occlusion=AmbientOcclusion.from_any(ambient_occlusion),
         )
 
     def estimate(

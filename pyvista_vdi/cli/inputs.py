@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ..ambient_occlusion import AmbientOcclusion
 from ..api import as_volume
 from ..camera import Camera
 from ..errors import InvalidArgumentError, VDIError
@@ -30,6 +31,11 @@ _CLASSIFICATION = (
     "scalars",
     "preference",
     "interpolation",
+    "shade",
+    "ambient",
+    "diffuse",
+    "specular",
+    "specular_power",
 )
 
 
@@ -69,6 +75,13 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
             path, TransferFunction.from_dict, "transfer function"
         )
     return given
+
+
+def ambient_occlusion(options: argparse.Namespace) -> AmbientOcclusion | None:
+    """Return the ambient occlusion that the options ask for, if any."""
+    values = {n: getattr(options, f"occlusion_{n}") for n in ("radius", "strength")}
+    given = {n: value for n, value in values.items() if value is not None}
+    return AmbientOcclusion(**given) if options.ambient_occlusion or given else None
 
 
 def camera(options: argparse.Namespace, default: Camera) -> Camera:

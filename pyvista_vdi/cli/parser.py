@@ -125,6 +125,7 @@ def _add_generate(parser: argparse.ArgumentParser) -> None:
     _add_size(parser, WINDOW_SIZE)
     _add_camera(parser, f"the view that the volume fills, {ELEVATION:g} degrees above its middle")
     _add_classification(parser)
+    _add_occlusion(parser)
     _add_limits(parser)
     _add_file(parser)
     _add_device(parser)
@@ -343,12 +344,33 @@ def _add_classification(parser: argparse.ArgumentParser, *, tables: bool = True)
     group.add_argument("--scalars", metavar="NAME", help="which array")
     group.add_argument("--preference", choices=("point", "cell"))
     group.add_argument("--interpolation", choices=("nearest", "linear"))
+    group.add_argument("--shade", action="store_true", default=None, help="lit by a headlight")
+    for name in ("--ambient", "--diffuse", "--specular", "--specular-power"):
+        group.add_argument(name, type=float, metavar="X", help="of a shaded volume")
     if tables:
         group.add_argument(
             "--transfer-function",
             metavar="FILE",
             help="TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista",
         )
+
+
+def _add_occlusion(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("ambient occlusion", "Either option below turns it on, too.")
+    group.add_argument(
+        "--ambient-occlusion",
+        action="store_true",
+        help="darken what is hidden from the light around it",
+    )
+    group.add_argument(
+        "--occlusion-radius",
+        type=float,
+        metavar="LENGTH",
+        help="how far something hides, model units (default: 0.05 of the bounds' diagonal)",
+    )
+    group.add_argument(
+        "--occlusion-strength", type=float, metavar="S", help="0 to 1 (default: 0.1; 1 is darkest)"
+    )
 
 
 def _add_limits(parser: argparse.ArgumentParser) -> None:

@@ -130,6 +130,7 @@ class _Job(threading.Thread):
                     request.transfer_function,
                     sample_distance=request.settings["sample_distance"],
                     lights=request.settings["lights"],
+                    ambient_occlusion=request.settings["ambient_occlusion"],
                     device=runtime,
                 )
                 self.estimator = (request, estimator)

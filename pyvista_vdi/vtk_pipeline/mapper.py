@@ -289,6 +289,28 @@ class VDIMapperMethods:
         """Refuse."""
         _refuse_blending()
 
+    def SetGlobalIlluminationReach(self, reach: float) -> None:
+        """Refuse VTK's shadows along light rays; 0 is accepted."""
+        if reach:
+            _refuse_illumination("SetGlobalIlluminationReach")
+
+    def SetVolumetricScatteringBlending(self, share: float) -> None:
+        """Refuse VTK's volumetric scattering; 0 is accepted."""
+        if share:
+            _refuse_illumination("SetVolumetricScatteringBlending")
+
+    def SetComputeNormalFromOpacity(self, on: bool) -> None:
+        """Refuse normals from opacity; ``SetComputeNormalFromOpacity(0)`` is accepted."""
+        if on:
+            self.ComputeNormalFromOpacityOn()
+
+    def ComputeNormalFromOpacityOn(self) -> NoReturn:
+        """Refuse."""
+        raise UnsupportedError(
+            "a VDI is shaded by the gradient of its scalars, and when it is generated: leave "
+            "ComputeNormalFromOpacity off"
+        )
+
     def SetMaskInput(self, mask: Any) -> None:
         """Refuse a mask; ``SetMaskInput(None)`` is accepted."""
         if mask is not None:
@@ -300,7 +322,15 @@ class VDIMapperMethods:
 
 def _refuse_blending() -> NoReturn:
     raise UnsupportedError(
-        "a VDI stores what is composited along a ray, so only composite blending is supported"
+        "a VDI stores what is composited along a ray, so only composite blending is supported: "
+        "draw the volume itself by one of VTK's mappers for another"
+    )
+
+
+def _refuse_illumination(setter: str) -> NoReturn:
+    raise UnsupportedError(
+        f"{setter} lights a volume while it is drawn, and a VDI is lit when it is generated: use "
+        "ambient_occlusion (VDISource.SetAmbientOcclusion), which darkens what is hidden"
     )
 
 
@@ -312,7 +342,8 @@ class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
     the input up to date and raycasts it from the frame's view, ending rays at opaque geometry;
     an image is kept as long as view, depth and VDI stay the same. Clipping planes
     (``AddClippingPlane``), cropping (``SetCropping`` and its regions) and the opacity multiplier
-    act on the next frame without another VDI; other blending modes and masks are refused.
+    act on the next frame without another VDI; other blending modes, masks and VTK's global
+    illumination are refused.
 
     Notes
     -----

@@ -16,6 +16,7 @@ from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkRenderingCore import vtkVolumeProperty
 
+from pyvista_vdi.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.camera import Camera, check_window_size
 from pyvista_vdi.coverage import bounds_corners, covering_view
 from pyvista_vdi.errors import (
@@ -135,6 +136,7 @@ class VDISource(VTKPythonAlgorithmBase):
             "sample_distance": None,
             "tolerance": 0.0,
             "view_cone": 60.0,
+            "ambient_occlusion": None,
             "device": None,
         }
         self._lights: Lights | None = None
@@ -359,6 +361,26 @@ class VDISource(VTKPythonAlgorithmBase):
     def GetViewCone(self) -> float:
         """Return the half angle of the cone of views, degrees."""
         return self._settings["view_cone"]  # type: ignore[no-any-return]
+
+    def SetAmbientOcclusion(self, occlusion: Any) -> None:
+        """Choose whether what is hidden from the light around it is darkened.
+
+        Parameters
+        ----------
+        occlusion : None, bool, float or AmbientOcclusion
+            ``None`` or ``False``: no, which is the default; ``True``: with the default radius; a
+            number: with this radius, model units.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is none of these, or the radius is not positive.
+        """
+        self._set("ambient_occlusion", AmbientOcclusion.from_any(occlusion))
+
+    def GetAmbientOcclusion(self) -> AmbientOcclusion | None:
+        """Return the ambient occlusion, ``None`` where there is none."""
+        return self._settings["ambient_occlusion"]  # type: ignore[no-any-return]
 
     def SetDevice(self, device: Any) -> None:
         """Choose the OpenCL device; ``None`` is the default one."""

@@ -226,7 +226,12 @@ def test_regenerate_takes_the_current_view(plotter, calls):
 
 def test_settings_reach_the_generator(plotter):
     actor = plotter.add_vdi(
-        soft_ball(), max_supersegments=3, sample_distance=0.1, tolerance=0.01, view_cone=30.0
+        soft_ball(),
+        max_supersegments=3,
+        sample_distance=0.1,
+        tolerance=0.01,
+        view_cone=30.0,
+        ambient_occlusion=0.4,
     )
     shown(plotter)
     made_by = actor.vdi.metadata
@@ -234,6 +239,7 @@ def test_settings_reach_the_generator(plotter):
     assert made_by["sample_distance"] == 0.1
     assert made_by["tolerance"] == 0.01
     assert made_by["view_cone"] == 30.0
+    assert made_by["ambient_occlusion"]["radius"] == 0.4
     assert made_by["scalars"] == "v"
 
 

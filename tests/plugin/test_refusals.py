@@ -167,6 +167,24 @@ ROWS = {
         errors.UnsupportedError,
         "blending='maximum'.*composite",
     ),
+    "minimum": (
+        VOLUME,
+        {"blending": "minimum"},
+        errors.UnsupportedError,
+        "blending='minimum'.*composite.*add_volume",
+    ),
+    "ambient occlusion": (
+        VOLUME,
+        {"ambient_occlusion": "strong"},
+        errors.InvalidArgumentError,
+        "ambient_occlusion must be True, a radius.*got 'strong'",
+    ),
+    "occlusion's radius": (
+        VOLUME,
+        {"ambient_occlusion": 0.0},
+        errors.InvalidArgumentError,
+        "radius of ambient occlusion.*got 0",
+    ),
     "mapper": (VOLUME, {"mapper": "gpu"}, errors.UnsupportedError, "mapper='gpu'.*has its own"),
     "multi_colors": (VOLUME, {"multi_colors": True}, errors.UnsupportedError, "block.* one by one"),
     # generation
@@ -229,6 +247,7 @@ def test_culling_is_checked_as_add_volume_checks_it(plotter):
         {"cmap": "bone"},
         {"clim": (0, 1), "opacity": "linear_r"},
         {"max_supersegments": 5},
+        {"ambient_occlusion": True},
         {"camera": pvdi.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0))},
         {"scalars": np.zeros(3)},
     ],
@@ -269,6 +288,17 @@ def test_blending_and_masks_of_the_mapper(plotter):
     mapper.blend_mode = "composite"
     with pytest.raises(errors.UnsupportedError, match="cannot be masked"):
         mapper.SetMaskInput(VOLUME)
+
+
+def test_illumination_of_the_mapper(plotter):
+    mapper = plotter.add_vdi(VOLUME).mapper
+    for setter in (mapper.SetGlobalIlluminationReach, mapper.SetVolumetricScatteringBlending):
+        setter(0)
+        with pytest.raises(errors.UnsupportedError, match="SetAmbientOcclusion"):
+            setter(0.5)
+    mapper.SetComputeNormalFromOpacity(False)
+    with pytest.raises(errors.UnsupportedError, match="gradient of its scalars"):
+        mapper.SetComputeNormalFromOpacity(True)
 
 
 def test_other_mappers_and_shared_mappers(plotter):

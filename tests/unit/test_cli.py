@@ -161,6 +161,10 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
             ["generate", "v.nrrd", "-o", "b.vdi", "--transfer-function", "camera.json"],
             "is no transfer function in JSON",
         ),
+        (
+            ["generate", "v.nrrd", "-o", "b.vdi", "--occlusion-radius", "0"],
+            "radius of ambient occlusion must be a positive length in model units; got 0",
+        ),
         (["compare", "v.nrrd", "--out", "v.nrrd"], "the folder v.nrrd cannot be made"),
     ],
 )
@@ -272,6 +276,7 @@ def test_devices_fails_where_none_is_usable(capsys, monkeypatch):
 def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_path):
     target = tmp_path / "b.vdi"
     options = ["--size", "20x12", "--max-supersegments", "7", "--compression", "lz4"]
+    options += ["--ambient-occlusion", "--occlusion-strength", "0.4"]
     status, out, err = run(
         capsys,
         *("generate", folder / "v.nrrd", "-o", target),
@@ -283,6 +288,8 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
     vdi = io.read(target)
     assert vdi.window_size == (20, 12)
     assert vdi.counts.max() <= 7
+    occlusion = vdi.metadata["ambient_occlusion"]
+    assert (occlusion["strength"], occlusion["directions"]) == (0.4, 32)
     assert vdi.camera == filling_camera(vdi.bounds, (20, 12), azimuth=30)
 
     picture = tmp_path / "b.png"
@@ -340,6 +347,19 @@ def test_standard_transfer_functions_and_their_changes():
         "clim": [-1, 2.5],
     }
     assert arguments("--log-scale", "--n-colors", "9") == {"log_scale": True, "n_colors": 9}
+    assert arguments("--shade", "--specular-power", "4") == {"shade": True, "specular_power": 4}
+
+
+def test_ambient_occlusion_is_off_unless_asked_for():
+    from pyvista_vdi.cli.inputs import ambient_occlusion
+
+    def occlusion(*options):
+        return ambient_occlusion(parser.parse(["generate", "a", "-o", "b.vdi", *options]))
+
+    assert occlusion() is None
+    assert occlusion("--ambient-occlusion") == pvdi.AmbientOcclusion()
+    assert occlusion("--occlusion-radius", "3") == pvdi.AmbientOcclusion(3)
+    assert occlusion("--occlusion-strength", "0.5") == pvdi.AmbientOcclusion(strength=0.5)
 
 
 # -- processes -------------------------------------------------------------------------------------

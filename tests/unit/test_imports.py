@@ -31,6 +31,7 @@ OWNERS = {
 
 CORE = {
     "_version",
+    "ambient_occlusion",
     "camera",
     "compositing",
     "cropping",
