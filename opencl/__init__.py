@@ -23,6 +23,8 @@ Shared functions:
     The steps along a ray of a volume: generation and direct volume rendering share them.
 ``common/list_space.cl``
     V_O's list space: coordinates of a ray in it, and its depth coordinate.
+``common/cropping.cl``
+    The parts of a ray that cropping keeps.
 ``common/list_ray.cl``
     The ray of a pixel in list space, clipped; model lengths along it.
 ``common/lists.cl``

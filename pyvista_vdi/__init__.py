@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .ambient_occlusion import AmbientOcclusion
     from .api import estimate, generate, pick, read, render, render_depth, render_volume
     from .camera import Camera
+    from .cropping import Cropping
     from .errors import (
         Cancelled,
         DeviceError,
@@ -64,6 +65,7 @@ _ERRORS = (
 _HOMES = {
     "AmbientOcclusion": "ambient_occlusion",
     "Camera": "camera",
+    "Cropping": "cropping",
     "Estimate": "generation",
     "Light": "lighting",
     "Lights": "lighting",

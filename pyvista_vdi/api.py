@@ -158,6 +158,8 @@ def render(
     *,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
     skip_empty: bool = True,
     preview_samples: int | None = None,
     device: Any = None,
@@ -178,6 +180,13 @@ def render(
     clipping_planes : array_like of float, shape (k, 6), optional
         Origin and normal of each plane, world coordinates; the side that the normal points to
         is kept, as with VTK's mappers.
+    cropping : Cropping or vtkVolumeMapper or sequence of six numbers or pair, optional
+        Which of 27 regions of the data's own coordinates are drawn, as in ``vtkVolumeMapper``: a
+        :class:`Cropping`, a mapper's, x_low, x_high, y_low, y_high, z_low and z_high of a box, or
+        a pair of those planes and the regions (flags, or ``"fence"``, ``"cross"`` ...).
+    opacity_multiplier : float, default: 1.0
+        Factor of the extinction, 0 or above: 2 is twice as dense. For what is not opaque it is
+        the same as dividing the opacity unit distance by it.
     skip_empty : bool, default: True
         Pass by space without supersegments; the picture is the same to the last bit.
     preview_samples : int, optional
@@ -209,6 +218,8 @@ def render(
         window_size,
         opaque_depth=opaque_depth,
         clipping_planes=clipping_planes,
+        cropping=cropping,
+        opacity_multiplier=opacity_multiplier,
         skip_empty=skip_empty,
         preview_samples=preview_samples,
         device=device,
@@ -224,6 +235,8 @@ def render_depth(
     accumulated: bool = True,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
     skip_empty: bool = True,
     device: Any = None,
 ) -> NDArray[np.float32]:
@@ -231,7 +244,9 @@ def render_depth(
 
     Parameters
     ----------
-    vdi, camera, window_size, opaque_depth, clipping_planes, skip_empty, device
+    vdi, camera, window_size, opaque_depth, clipping_planes, cropping, opacity_multiplier
+        As for :func:`render`.
+    skip_empty, device
         As for :func:`render`.
     opacity_threshold, accumulated
         What counts as a hit: as for :func:`pick`.
@@ -261,6 +276,8 @@ def render_depth(
         accumulated=accumulated,
         opaque_depth=opaque_depth,
         clipping_planes=clipping_planes,
+        cropping=cropping,
+        opacity_multiplier=opacity_multiplier,
         skip_empty=skip_empty,
         device=device,
     )
@@ -276,6 +293,8 @@ def pick(
     accumulated: bool = True,
     opaque_depth: float | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
 ) -> Pick | None:
     """Return what a pixel shows of a VDI: the first supersegment that reaches an opacity.
 
@@ -301,7 +320,7 @@ def pick(
         the ray runs across the lists, it crosses little of each.
     opaque_depth : float, optional
         View depth at which the ray ends, world units.
-    clipping_planes : array_like of float, shape (k, 6), optional
+    clipping_planes, cropping, opacity_multiplier
         As for :func:`render`.
 
     Returns
@@ -331,6 +350,8 @@ def pick(
         accumulated=accumulated,
         opaque_depth=opaque_depth,
         clipping_planes=clipping_planes,
+        cropping=cropping,
+        opacity_multiplier=opacity_multiplier,
     )
 
 
@@ -343,6 +364,8 @@ def render_volume(
     sample_distance: float | None = None,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
     early_termination: bool = True,
     skip_empty: bool = True,
     lights: Any = None,
@@ -362,7 +385,7 @@ def render_volume(
         Width and height in pixels.
     sample_distance : float, optional
         Length of a step along the ray, model units; half the smallest spacing by default.
-    opaque_depth, clipping_planes
+    opaque_depth, clipping_planes, cropping, opacity_multiplier
         As for :func:`render`.
     early_termination : bool
         Stop a ray where what is behind can no longer be seen.
@@ -408,6 +431,8 @@ def render_volume(
         sample_distance=sample_distance,
         opaque_depth=opaque_depth,
         clipping_planes=clipping_planes,
+        cropping=cropping,
+        opacity_multiplier=opacity_multiplier,
         early_termination=early_termination,
         skip_empty=skip_empty,
         lights=lights,
@@ -417,12 +442,13 @@ def render_volume(
 
 
 def read(path: str | os.PathLike[str], **options: Any) -> VDI:
-    """Read a VDI from a file that :meth:`VDI.save` wrote, or from any deep OpenEXR image.
+    """Read a VDI from a file that :meth:`VDI.save` or VTK wrote, or any deep OpenEXR image.
 
     Parameters
     ----------
     path : path-like
-        A ``.vdi`` file, or an OpenEXR deep image, whose name ends in ``.exr``.
+        A ``.vdi`` file, an OpenEXR deep image, whose name ends in ``.exr``, or a VDI's VTK form
+        in one of VTK's image files, ``.vti``.
     **options
         For ``.exr`` files of other programs: ``camera``, the view that the image shows, where
         the file does not say it; ``thickness``, world units, given to samples that have none

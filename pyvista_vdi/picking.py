@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import rays
 from .camera import Camera, check_window_size
 from .compositing import opacity
+from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
 from .vdi import VDI
 
@@ -129,6 +130,8 @@ def pick_vdi(
     accumulated: bool = True,
     opaque_depth: float | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
 ) -> Pick | None:
     """Return the first supersegment on a pixel's ray that reaches an opacity.
 
@@ -146,7 +149,7 @@ def pick_vdi(
         What counts as a hit: see :func:`pyvista_vdi.pick`.
     opaque_depth : float, optional
         View depth at which the ray ends, world units.
-    clipping_planes : array_like of float, shape (k, 6), optional
+    clipping_planes, cropping, opacity_multiplier
         As for :func:`pyvista_vdi.render`.
 
     Returns
@@ -163,7 +166,9 @@ def pick_vdi(
     span = ray.span(vdi, camera, opaque_depth, clipping_planes)
     if span is None:
         return None
-    met = _media_along(vdi, ray, *span)
+    cropping = Cropping.from_any(cropping)
+    kept = np.array([span]) if cropping is None else ray.parts(cropping, *span)
+    met = _media_along(vdi, ray, *span, kept, checked_opacity_multiplier(opacity_multiplier))
     k = wanted.first(met.optical_depth)
     if k is None:
         return None
@@ -242,6 +247,10 @@ class _Ray:
             slope.append(-1.0)
         return _where_positive(np.array(value), np.array(slope))
 
+    def parts(self, cropping: Cropping, first: float, last: float) -> Floats:
+        """Return first and last t of each part that cropping keeps, (k, 2)."""
+        return cropping.parts_of_ray(self.origin, self.direction, first, last)
+
 
 class _Media(NamedTuple):
     """What a ray crosses, in the order in which it meets it; arrays of equal length."""
@@ -252,8 +261,10 @@ class _Media(NamedTuple):
     optical_depth: Floats  # of the length crossed
 
 
-def _media_along(vdi: VDI, ray: _Ray, first: float, last: float) -> _Media:
-    """Return every supersegment that a ray crosses between two t."""
+def _media_along(
+    vdi: VDI, ray: _Ray, first: float, last: float, kept: Floats, multiplier: float
+) -> _Media:
+    """Return every supersegment that a ray crosses between two t, in the parts that are kept."""
     # Pieces of the ray, each within one list
     cuts = _list_crossings(ray, first, last, vdi.window_size)
     lists = _lists_at(ray, (cuts[:-1] + cuts[1:]) / 2, vdi.window_size)
@@ -277,16 +288,14 @@ def _media_along(vdi: VDI, ray: _Ray, first: float, last: float) -> _Media:
             at_front, at_back = (front - depth) / rises, (back - depth) / rises
         enters = np.maximum(enters, np.minimum(at_front, at_back))
         leaves = np.minimum(leaves, np.maximum(at_front, at_back))
-    crossed = leaves > enters
-    piece, member, enters, leaves = (
-        piece[crossed],
-        member[crossed],
-        enters[crossed],
-        leaves[crossed],
-    )
+    begins = np.maximum(enters[:, None], kept[:, 0])
+    drawn = np.maximum(np.minimum(leaves[:, None], kept[:, 1]) - begins, 0.0)
+    crossed = drawn.sum(axis=1) > 0
+    piece, member, begins, drawn = piece[crossed], member[crossed], begins[crossed], drawn[crossed]
+    enters = begins[np.arange(len(begins)), np.argmax(drawn > 0, axis=1)] if len(begins) else begins
 
     # tau l / L (DESIGN section 3, "A supersegment is a homogeneous medium")
-    length = (leaves - enters) * np.linalg.norm(ray.direction)
+    length = multiplier * drawn.sum(axis=1) * np.linalg.norm(ray.direction)
     thickness = vdi.back[member].astype(np.float64) - vdi.front[member].astype(np.float64)
     whole = thickness * _centre_ray_scale(vdi, lists[piece])
     return _Media(lists[piece], member, enters, vdi.optical_depth[member] * (length / whole))

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import rays
 from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
+from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
 from .occupancy import OccupancyGrid
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime
@@ -37,6 +38,8 @@ def render_vdi(
     *,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
     skip_empty: bool = True,
     preview_samples: int | None = None,
     device: Any = None,
@@ -55,6 +58,10 @@ def render_vdi(
         View depth at which each ray ends, world units, top row first; inf where nothing is opaque.
     clipping_planes : array_like of float, shape (k, 6), optional
         Origin and normal of each plane, world coordinates; the normal's side is kept.
+    cropping : Cropping or what makes one, optional
+        Which regions of the model frame are drawn: see :meth:`pyvista_vdi.Cropping.from_any`.
+    opacity_multiplier : float
+        Factor of every supersegment's extinction, 0 or above.
     skip_empty : bool
         Pass by what the occupancy grid says is empty, where the VDI has enough of it to gain by
         that. The picture is the same to the last bit.
@@ -79,6 +86,8 @@ def render_vdi(
     camera = Camera.from_any(camera)
     size = check_window_size(vdi.window_size if window_size is None else window_size)
     samples = None if preview_samples is None else check_preview_samples(preview_samples)
+    cropping = Cropping.from_any(cropping)
+    multiplier = checked_opacity_multiplier(opacity_multiplier)
     runtime = get_runtime(device)
     prepared = prepared_vdi(runtime, vdi)
     with runtime.buffer((size[1], size[0], 4), name="image") as image:
@@ -88,6 +97,8 @@ def render_vdi(
             image,
             opaque_depth,
             clipping_planes,
+            cropping=cropping,
+            opacity_multiplier=multiplier,
             skip_empty=skip_empty,
             preview_samples=samples,
         )
@@ -103,6 +114,8 @@ def render_first_hits(
     accumulated: bool = True,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
     skip_empty: bool = True,
     device: Any = None,
 ) -> NDArray[np.float32]:
@@ -110,7 +123,9 @@ def render_first_hits(
 
     Parameters
     ----------
-    vdi, camera, window_size, opaque_depth, clipping_planes, skip_empty, device
+    vdi, camera, window_size, opaque_depth, clipping_planes, cropping, opacity_multiplier
+        As for :func:`render_vdi`.
+    skip_empty, device
         As for :func:`render_vdi`.
     opacity_threshold, accumulated
         What counts as a hit: see :func:`pyvista_vdi.pick`.
@@ -125,6 +140,8 @@ def render_first_hits(
     camera = Camera.from_any(camera)
     size = check_window_size(vdi.window_size if window_size is None else window_size)
     wanted = FirstHit.of(opacity_threshold, accumulated)
+    cropping = Cropping.from_any(cropping)
+    multiplier = checked_opacity_multiplier(opacity_multiplier)
     runtime = get_runtime(device)
     prepared = prepared_vdi(runtime, vdi)
     with runtime.buffer((size[1], size[0]), name="depth of first hits") as image:
@@ -134,6 +151,8 @@ def render_first_hits(
             image,
             opaque_depth,
             clipping_planes,
+            cropping=cropping,
+            opacity_multiplier=multiplier,
             skip_empty=skip_empty,
             first_hit=wanted,
         )
@@ -225,6 +244,8 @@ class PreparedVDI:
         opaque_depth: ArrayLike | None = None,
         clipping_planes: ArrayLike | None = None,
         *,
+        cropping: Cropping | None = None,
+        opacity_multiplier: float = 1.0,
         skip_empty: bool = True,
         preview_samples: int | None = None,
         first_hit: FirstHit | None = None,
@@ -236,15 +257,18 @@ class PreparedVDI:
         width, height = size
         pixel_rays = rays.pixel_rays(camera, size, self._bounds)
         coordinates = [pixel_rays.form(row[:3], row[3]) for row in self._list_rows]
-        direction = [pixel_rays.form(axis) for axis in np.eye(3)]
+        # Lengths are all that this is for, and a length times m absorbs as m times the extinction
+        direction = [opacity_multiplier * pixel_rays.form(axis) for axis in np.eye(3)]
         planes = rays.box_planes(pixel_rays, self._bounds)
         planes += self._viewport_planes(coordinates)
         planes += rays.eye_plane(camera, pixel_rays)
         planes += rays.user_planes(camera, pixel_rays, clipping_planes)
-        forms = rays.packed([*coordinates, *direction, *planes])
+        cropped = rays.cropped(pixel_rays, cropping, self._bounds)
+        planes += cropped.planes
+        forms = rays.packed([*coordinates, *direction, *planes, *cropped.forms])
         ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
         runtime = self._runtime
-        defines = self.defines
+        defines = {**self.defines, **cropped.defines}
         grid = self.occupancy
         mode: tuple[Any, ...] = ()
         if preview_samples is not None:
@@ -283,6 +307,7 @@ class PreparedVDI:
                 grid.masks,
                 np.float32(grid.first_depth),
                 np.float32(grid.slabs_per_depth),
+                *cropped.arguments,
                 *mode,
                 image,
             )

@@ -134,7 +134,7 @@ class VDI:
     # -- files -----------------------------------------------------------------------------------
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a ``.vdi`` or ``.exr`` file that :func:`pyvista_vdi.read` opens.
+        """Write a ``.vdi``, ``.exr`` or ``.vti`` file that :func:`pyvista_vdi.read` opens.
 
         The options are those of :func:`pyvista_vdi.io.write`.
         """

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import rays
 from .ambient_occlusion import AmbientOcclusion
 from .camera import Camera, check_window_size
+from .cropping import Cropping, checked_opacity_multiplier
 from .device_volume import DeviceVolume, as_float
 from .errors import Cancelled, InvalidArgumentError
 from .lighting import Lights
@@ -276,6 +277,8 @@ class ViewErrorEstimator:
         picture: ArrayLike | None = None,
         opaque_depth: ArrayLike | None = None,
         clipping_planes: ArrayLike | None = None,
+        cropping: Any = None,
+        opacity_multiplier: float = 1.0,
         background: Sequence[float] = (0.0, 0.0, 0.0),
         pause: Pause | None = None,
     ) -> ViewError:
@@ -296,6 +299,8 @@ class ViewErrorEstimator:
             As for :func:`pyvista_vdi.render`; both pictures end there.
         clipping_planes : array_like of float, shape (k, 6), optional
             As for :func:`pyvista_vdi.render`; both pictures are clipped.
+        cropping, opacity_multiplier
+            As for :func:`pyvista_vdi.render`; both pictures are cropped, and as dense.
         background : (float, float, float)
             RGB that both pictures are blended over before they are compared.
         pause : callable, optional
@@ -323,7 +328,11 @@ class ViewErrorEstimator:
             size,
             _of_window("picture", picture, (*size[::-1], 4)),
             _of_window("opaque_depth", opaque_depth, size[::-1]),
-            clipping_planes,
+            {
+                "clipping_planes": clipping_planes,
+                "cropping": Cropping.from_any(cropping),
+                "opacity_multiplier": checked_opacity_multiplier(opacity_multiplier),
+            },
             background,
             pause,
         )
@@ -355,7 +364,7 @@ class _Scene:
         size: tuple[int, int],
         picture: NDArray[Any] | None,
         opaque_depth: NDArray[Any] | None,
-        clipping_planes: ArrayLike | None,
+        shown: dict[str, Any],
         background: Sequence[float],
         pause: Pause | None,
     ) -> None:
@@ -366,7 +375,7 @@ class _Scene:
         self._size = size
         self._picture = picture
         self._opaque_depth = opaque_depth
-        self._clipping_planes = clipping_planes
+        self._shown = shown  # what both pictures leave out, or show otherwise
         self._background = background
         self._pause = pause
 
@@ -412,7 +421,6 @@ class _Scene:
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """The pixels ``part`` of the window, seen through ``lens``, by VDI and volume."""
         depth = None if self._opaque_depth is None else self._opaque_depth[part]
-        planes = self._clipping_planes
         if self._picture is not None:
             of_vdi = self._picture[part]
         else:
@@ -422,8 +430,8 @@ class _Scene:
                 lens,
                 size,
                 opaque_depth=depth,
-                clipping_planes=planes,
                 device=self._runtime,
+                **self._shown,
             )
         self._wait()
         of_volume = raycast_medium(
@@ -432,7 +440,7 @@ class _Scene:
             lens,
             size,
             opaque_depth=depth,
-            clipping_planes=planes,
+            **self._shown,
         )
         return of_vdi, of_volume
 

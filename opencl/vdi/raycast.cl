@@ -6,6 +6,7 @@
 //
 // -D OFFSET_T           type of an offset into the supersegments: uint or ulong
 // -D PARALLEL, SHIFTED  the depth coordinate, see common/list_space.cl
+// -D CROPPED            only some regions are drawn, see common/cropping.cl
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
 // -D FIRST_HIT          in place of a picture, where each ray enters the first supersegment that reaches an opacity
 #include "common/list_ray.cl"
@@ -32,6 +33,7 @@ __kernel void raycast(
     __global const ulong *masks,        // occupied slabs of each tile of lists, if SKIP_EMPTY
     float first_depth,                  // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,
+    CROPPING_PARAMETER                  // regions that are kept
 #ifdef FIRST_HIT
     float least_optical_depth,          // a hit has some, and at least this much: by itself, or with all before it
     int accumulated,                    // whether what is before it counts
@@ -52,7 +54,8 @@ __kernel void raycast(
     const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
 
     ListRay ray;
-    if (!begin_list_ray(&ray, forms, planes, a, b, has_opaque_depth ? opaque_depth[place] : INFINITY, depth_origin)) {
+    if (!begin_list_ray(&ray, forms, planes, CROPPING_ARGUMENT a, b, has_opaque_depth ? opaque_depth[place] : INFINITY,
+                        depth_origin)) {
         image[place] = NOTHING;
         return;
     }
@@ -172,13 +175,12 @@ __kernel void raycast(
                 if (away ? leaves < z_next : leaves > z_next)
                     to = clamp((leaves - deep.z) * inverse_z, from, r_next);
                 const float4 medium = media[k];
-                const float length_crossed = model_length(ray.scale, from, fma(from, along.z, deep.z), to,
-                                                          fma(to, along.z, deep.z), depth_origin);
+                const float length_crossed = length_drawn(&ray, from, to, depth_origin);
 #ifdef FIRST_HIT
                 const float tau = medium.w * length_crossed;
                 met = accumulated ? met + tau : tau;
                 hit = met > 0.0f && met >= least_optical_depth;
-                r_hit = from;
+                r_hit = first_drawn(&ray, from);
                 if (hit)
                     break;
 #else

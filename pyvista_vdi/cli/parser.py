@@ -16,8 +16,8 @@ from ..standard_cases import ANGLES, ELEVATION, TRANSFER_FUNCTIONS, WINDOW_SIZE
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
 
-_VDI_FILE = "a .vdi file, or an .exr deep image"
-_VDI_TARGET = ".vdi or .exr to write"
+_VDI_FILE = "a .vdi file, an .exr deep image, or a VDI as .vti"
+_VDI_TARGET = ".vdi, .exr or .vti to write"
 
 
 class UsageError(Exception):
@@ -162,8 +162,9 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("file")
     group.add_argument(
         "--compression",
-        choices=("lz4", "zstd", "zips", "none"),
-        help="of .vdi: lz4 (default), zstd or none; of .exr: zips (default) or none",
+        choices=("lz4", "zstd", "zips", "zlib", "lzma", "none"),
+        help="of .vdi: lz4 (default), zstd or none; of .exr: zips (default) or none; of .vti: lz4 "
+        "(default), zlib, lzma or none",
     )
     group.add_argument(
         "--level",
@@ -268,7 +269,7 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "info": (
         "files",
-        "say what a .vdi or .exr file holds",
+        "say what a .vdi, .exr or .vti file holds",
         "pyvista-vdi info knee.vdi --json",
         _add_info,
     ),
@@ -280,7 +281,7 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "convert": (
         "files",
-        "write a VDI in another format: .vdi or OpenEXR deep image",
+        "write a VDI in another format: .vdi, OpenEXR deep image or VTK's .vti",
         "pyvista-vdi convert knee.vdi -o knee.exr",
         _add_convert,
     ),

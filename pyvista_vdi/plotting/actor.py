@@ -49,6 +49,9 @@ class PlotterVDIActor(VDIActorMethods, Volume):
             mapper.painter.set_input(self.mapper.painter.input.shared())
         mapper.SetDevice(self.mapper.GetDevice())
         mapper.painter.take_settings(self.mapper.painter)
+        mapper.SetCropping(self.mapper.GetCropping())
+        mapper.SetCroppingRegionPlanes(self.mapper.GetCroppingRegionPlanes())
+        mapper.SetCroppingRegionFlags(self.mapper.GetCroppingRegionFlags())
         other.SetMapper(mapper)
         if deep and self.prop is not None:
             other.prop = self.prop.copy()

@@ -56,6 +56,19 @@ class VDIActorMethods:
             raise InvalidArgumentError("this actor has no mapper, so there is no status of it")
         return mapper.painter.status()  # type: ignore[no-any-return]
 
+    @property
+    def opacity_multiplier(self: Any) -> float:
+        """Factor of the extinction, 1 by default: see :meth:`VDIMapper.SetOpacityMultiplier`."""
+        mapper = self.GetMapper()
+        return 1.0 if mapper is None else mapper.GetOpacityMultiplier()
+
+    @opacity_multiplier.setter
+    def opacity_multiplier(self: Any, multiplier: float) -> None:
+        mapper = self.GetMapper()
+        if mapper is None:
+            raise InvalidArgumentError("this actor has no mapper whose opacity could be set")
+        mapper.SetOpacityMultiplier(multiplier)
+
     def show_status(self: Any, renderer: Any = None, corner: str = "upper left") -> Any:
         """Show :attr:`status` as a text in a corner, written anew in each frame.
 

@@ -153,6 +153,14 @@ class Frame:
             rows.append([0, 0, -far, 0, 0, 1])
         return np.array(rows, dtype=np.float64) if rows else None
 
+    def in_world(self, planes: Matrix | None) -> Matrix | None:
+        """Return planes of :meth:`clipping_planes` in world coordinates, (k, 6)."""
+        if planes is None:
+            return None
+        origins = np.column_stack([planes[:, :3], np.ones(len(planes))])
+        origins = origins @ np.linalg.inv(self.to_view).T
+        return np.hstack([origins[:, :3], planes[:, 3:] @ self.to_view[:3, :3]])
+
     def depths_of(self, bounds: tuple[float, ...]) -> tuple[float, float]:
         """Return the least and the largest view depth of a box in the model frame."""
         return _depths(self.camera.model_transform, bounds)

@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 
+from pyvista_vdi.cropping import checked_opacity_multiplier
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.picking import checked_opacity
 from pyvista_vdi.vdi import VDI
@@ -70,6 +71,15 @@ class VDIMapperMethods:
         """Draw a VDI, or its canonical image."""
         self._set_input(None if data is None else input_of(data))
 
+    def GetInputDataObject(self, *args: Any) -> Any:
+        """Return the box of the VDI's bounds that VTK is given in its place, and warn.
+
+        Nothing that draws asks for it by this method; what writes the scene for another renderer
+        does, and gets an empty box.
+        """
+        self.painter.say_not_exported()
+        return super().GetInputDataObject(*args)  # type: ignore[misc]
+
     def SetVDI(self, vdi: VDI) -> None:
         """Draw this VDI."""
         self._set_input(input_of(vdi))
@@ -101,6 +111,29 @@ class VDIMapperMethods:
     def GetAutomaticView(self) -> bool:
         """Whether a source without camera gets the view of the first frame."""
         return self.painter.upkeep.automatic_view
+
+    # -- how it is drawn -------------------------------------------------------------------------
+
+    def SetOpacityMultiplier(self: Any, multiplier: float) -> None:
+        """Multiply the extinction of everything that is drawn; 1 by default.
+
+        It acts on the next frame, without another VDI: 2 is twice as dense, 0 transparent. For
+        what is not opaque it is the same as dividing the volume property's scalar opacity unit
+        distance by it; changing that itself makes the VDI anew.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is no finite number, or below 0.
+        """
+        factor = checked_opacity_multiplier(multiplier)
+        if factor != self.painter.opacity_multiplier:
+            self.painter.opacity_multiplier = factor
+            self.Modified()
+
+    def GetOpacityMultiplier(self) -> float:
+        """Return the factor of the extinction."""
+        return self.painter.opacity_multiplier
 
     # -- while a hand moves ----------------------------------------------------------------------
 
@@ -256,15 +289,6 @@ class VDIMapperMethods:
         """Refuse."""
         _refuse_blending()
 
-    def SetCropping(self, on: int) -> None:
-        """Refuse to crop; ``SetCropping(0)`` is accepted."""
-        if on:
-            self.CroppingOn()
-
-    def CroppingOn(self) -> NoReturn:
-        """Refuse."""
-        raise UnsupportedError("a VDI cannot be cropped: use clipping planes (AddClippingPlane)")
-
     def SetGlobalIlluminationReach(self, reach: float) -> None:
         """Refuse VTK's shadows along light rays; 0 is accepted."""
         if reach:
@@ -317,7 +341,8 @@ class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
     (``SetInputData``) or a :class:`~pyvista_vdi.VDI` (``SetVDI``). Before each frame it brings
     the input up to date and raycasts it from the frame's view, ending rays at opaque geometry;
     an image is kept as long as view, depth and VDI stay the same. Clipping planes
-    (``AddClippingPlane``) are honoured; other blending modes, cropping, masks and VTK's global
+    (``AddClippingPlane``), cropping (``SetCropping`` and its regions) and the opacity multiplier
+    act on the next frame without another VDI; other blending modes, masks and VTK's global
     illumination are refused.
 
     Notes

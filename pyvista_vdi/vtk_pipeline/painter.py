@@ -14,6 +14,7 @@ from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkCommonDataModel import vtkImageData
 
 from pyvista_vdi.camera import Camera
+from pyvista_vdi.cropping import Cropping
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, UnsupportedError
 from pyvista_vdi.opencl_runtime import Runtime, get_runtime
 from pyvista_vdi.raycast import render_vdi
@@ -49,18 +50,25 @@ class Task:
         View depth at which rays end, float32 (H, W), top row first.
     full_size : (int, int)
         Width and height of the viewport in pixels; the image of a preview is smaller.
+    cropping : Cropping or None
+        Regions of the model frame that are drawn.
+    opacity_multiplier : float
+        Factor of the extinction.
     """
 
     frame: Frame
     planes: NDArray[np.float64] | None
     depth: NDArray[np.float32] | None
     full_size: tuple[int, int]
+    cropping: Cropping | None = None
+    opacity_multiplier: float = 1.0
 
     @property
     def key(self) -> Any:
         """What its image is known by; the quality is in it as the two sizes."""
         planes = None if self.planes is None else self.planes.tobytes()
-        return (self.frame.camera, self.frame.size, self.full_size, planes)
+        looks = (self.cropping, self.opacity_multiplier)
+        return (self.frame.camera, self.frame.size, self.full_size, planes, looks)
 
     @property
     def preview(self) -> bool:
@@ -101,6 +109,7 @@ class Painter:
 
     def __init__(self) -> None:
         self.device: Any = None
+        self.opacity_multiplier = 1.0
         self.interaction = Interaction()
         self.texts = CornerTexts()
         self.selection = Selection()
@@ -153,6 +162,14 @@ class Painter:
         if bounds is not None:
             place_proxy(self.proxy, bounds)
 
+    def say_not_exported(self) -> None:
+        """Say once that a scene which is written for another renderer lacks the VDI."""
+        self._voice.warn(
+            "the scene is being exported without its VDI: export_html, export_vtksz and views that "
+            "are rendered in the browser (client-side) get an empty box in its place; use "
+            "screenshots, movies, or server-side rendering"
+        )
+
     def release(self) -> None:
         """Free the texture and the images kept, and end what goes on; a frame begins anew."""
         self.upkeep.close()
@@ -161,7 +178,8 @@ class Painter:
         self._images.clear()
 
     def take_settings(self, other: Painter) -> None:
-        """Take over what another allows and when it regenerates."""
+        """Take over how dense another draws, what it allows and when it regenerates."""
+        self.opacity_multiplier = other.opacity_multiplier
         vars(self.interaction).update(vars(other.interaction))
         self.selection.take_settings(other.selection)
         self.upkeep.regeneration.policy = other.upkeep.regeneration.policy
@@ -249,15 +267,13 @@ class Painter:
         view = _view_of(renderer, model_transform, frame)
         self._scene = (view.camera, weakref.ref(clock))
         only = len(self.renderers()) == 1
-        scene = Scene(renderer, model_transform, view, clock, only)
+        looks = self._looks(mapper)
+        shown = {"clipping_planes": self._world_planes(mapper, frame), **looks}
+        scene = Scene(renderer, model_transform, view, clock, only, shown)
         vdi = self.upkeep.current(scene, self.status)
         if vdi is None:
             return self._last
         place_proxy(self.proxy, vdi.bounds)
-        if mapper.GetCropping():
-            raise UnsupportedError(
-                "cropping (CroppingOn) is not honoured: use clipping planes (AddClippingPlane)"
-            )
         if vdi is not self._drawn():
             self._images.clear()
             self._drawn = weakref.ref(vdi)
@@ -268,7 +284,7 @@ class Painter:
             if np.isposinf(depth).all():
                 depth = None
         planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
-        task = Task(frame, planes, depth, frame.size)
+        task = Task(frame, planes, depth, frame.size, **looks)
         drawn = self._kept(task)
         if drawn is not None:
             return drawn  # however the frame is to be: where it is there, full costs nothing
@@ -278,8 +294,22 @@ class Painter:
         frame = frame.coarser(size)
         planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
         depth = None if depth is None else sampled(depth, size)
-        task = Task(frame, planes, depth, task.full_size)
+        task = Task(frame, planes, depth, task.full_size, **looks)
         return self._kept(task) or self._raycast(vdi, task, clock)
+
+    def _looks(self, mapper: Any) -> dict[str, Any]:
+        """Return the cropping and the opacity multiplier, arguments of whatever raycasts."""
+        return {
+            "cropping": Cropping.from_any(mapper),
+            "opacity_multiplier": self.opacity_multiplier,
+        }
+
+    def _world_planes(self, mapper: Any, frame: Frame) -> NDArray[np.float64] | None:
+        """Return what cuts the VDI made last, world coordinates: for the estimate of its error."""
+        vdi = self.upkeep.vdi
+        if vdi is None:
+            return None
+        return frame.in_world(frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds))
 
     def _select(self, mapper: Any, renderer: Any) -> None:
         """Draw what can be picked of what the last frame showed, or the first would show."""
@@ -293,7 +323,8 @@ class Painter:
             vdi = self._drawn()
             if isinstance(vdi, VDI):
                 frame = Frame.current(renderer, as_array(actor.GetMatrix()))
-                seen = Seen(vdi, frame, _planes(mapper, vdi, frame))
+                planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
+                seen = Seen(vdi, frame, planes, self._looks(mapper))
             self.selection.show(window, selector, seen, self.device)
         except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
             self._voice.warn(f"the VDI cannot be picked: {type(error).__name__}: {error}", error)
@@ -322,6 +353,8 @@ class Painter:
             task.frame.size,
             opaque_depth=task.depth,
             clipping_planes=task.planes,
+            cropping=task.cropping,
+            opacity_multiplier=task.opacity_multiplier,
             device=self.device,
         )
         clock.drawn(task.frame.size, task.full_size, time.perf_counter() - before)
@@ -410,10 +443,6 @@ def _is_viewport(renderer: Any) -> bool:
     viewport = [0, 0, 0, 0]
     renderer.GetRenderWindow().GetState().vtkglGetIntegerv(0x0BA2, viewport)
     return viewport == [x[0], y[0], width[0], height[0]]
-
-
-def _planes(mapper: Any, vdi: VDI, frame: Frame) -> NDArray[np.float64] | None:
-    return frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
 
 
 def _view_of(renderer: Any, model_transform: NDArray[np.float64], frame: Frame) -> View:

@@ -40,11 +40,14 @@ class Seen:
         The viewport's view.
     planes : numpy.ndarray or None
         Clipping planes in the frame's world, (k, 6).
+    looks : dict
+        Its cropping and opacity multiplier: arguments of :func:`pyvista_vdi.pick`.
     """
 
     vdi: VDI
     frame: Frame
     planes: NDArray[np.float64] | None
+    looks: dict[str, Any]
 
     def area(self, selected: tuple[int, ...]) -> tuple[int, int, int, int]:
         """Return what of (x0, y0, x1, y1), both ends included, lies in the viewport.
@@ -122,6 +125,7 @@ class Selection:
             seen.frame.camera,
             area,
             planes,
+            tuple(seen.looks.values()),
             self.opacity,
             self.accumulated,
         )
@@ -178,6 +182,7 @@ class Selection:
             opacity_threshold=self.opacity,
             accumulated=self.accumulated,
             clipping_planes=seen.planes,
+            **seen.looks,
         )
         if hit is None:  # at the threshold, by rounding
             return None
@@ -203,6 +208,7 @@ class Selection:
             accumulated=self.accumulated,
             clipping_planes=seen.planes,
             device=device,
+            **seen.looks,
         )
         return frame.window_depth(depth[::-1])
 

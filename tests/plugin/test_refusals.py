@@ -280,14 +280,12 @@ def test_actor_of_a_vdi_cannot_be_regenerated(plotter):
         actor.regenerate()
 
 
-def test_blending_cropping_and_masks_of_the_mapper(plotter):
+def test_blending_and_masks_of_the_mapper(plotter):
     mapper = plotter.add_vdi(VOLUME).mapper
     for blend in ("maximum", "minimum", "average", "additive"):
         with pytest.raises(errors.UnsupportedError, match="only composite blending"):
             mapper.blend_mode = blend
     mapper.blend_mode = "composite"
-    with pytest.raises(errors.UnsupportedError, match="use clipping planes"):
-        mapper.SetCropping(1)
     with pytest.raises(errors.UnsupportedError, match="cannot be masked"):
         mapper.SetMaskInput(VOLUME)
 

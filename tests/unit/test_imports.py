@@ -36,6 +36,7 @@ CORE = {
     "ambient_occlusion",
     "camera",
     "compositing",
+    "cropping",
     "errors",
     "lighting",
     "transfer_function",
