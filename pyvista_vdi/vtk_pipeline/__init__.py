@@ -13,6 +13,8 @@ if TYPE_CHECKING:
         vdi_from_dense_image,
         vdi_to_dense_image,
     )
+    from pyvista_vdi.vtk_pipeline.files import VDIReader, VDIWriter
+    from pyvista_vdi.vtk_pipeline.image import VDIToImage
     from pyvista_vdi.vtk_pipeline.mapper import VDIMapper
     from pyvista_vdi.vtk_pipeline.properties import transfer_function_from_property
     from pyvista_vdi.vtk_pipeline.source import VDISource
@@ -22,9 +24,12 @@ if TYPE_CHECKING:
 _MODULES = {
     "VDIActor": "actor",
     "VDIMapper": "mapper",
+    "VDIReader": "files",
     "VDISource": "source",
     "VDIStatus": "status",
     "VDIToDenseImage": "dense",
+    "VDIToImage": "image",
+    "VDIWriter": "files",
     "transfer_function_from_property": "properties",
     "vdi_from_dense_image": "dense",
     "vdi_from_image": "convert",
@@ -36,9 +41,12 @@ _MODULES = {
 __all__ = [
     "VDIActor",
     "VDIMapper",
+    "VDIReader",
     "VDISource",
     "VDIStatus",
     "VDIToDenseImage",
+    "VDIToImage",
+    "VDIWriter",
     "transfer_function_from_property",
     "vdi_from_dense_image",
     "vdi_from_image",

@@ -41,19 +41,21 @@ class Estimation:
         """Whether an estimate is being made."""
         return self._job is not None and not self._job.done.is_set()
 
-    def start(self, vdi: VDI, request: Request, view: View, shown: dict[str, Any]) -> None:
+    def start(
+        self, vdi: VDI, request: Request, view: View, shown: dict[str, Any] | None = None
+    ) -> None:
         """Begin another, in place of the one before.
 
         Parameters
         ----------
         vdi, request, view
             What is judged, what it was made of, and where it is seen from.
-        shown : dict
+        shown : dict, optional
             Clipping planes, cropping and opacity multiplier of the picture: keyword arguments of
             :meth:`ViewErrorEstimator.estimate`.
         """
         self.cancel()
-        self._job = _Job(vdi, request, view, shown, self._estimator)
+        self._job = _Job(vdi, request, view, shown or {}, self._estimator)
         self._job.start()
 
     def take(self) -> Estimate | None:

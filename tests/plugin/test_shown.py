@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-
 import numpy as np
 import pytest
 import pyvista as pv
@@ -231,17 +229,6 @@ def test_vtk_s_mapper_agrees_on_the_presets():
         crop(mapper, name)
         assert pvdi.Cropping.from_any(mapper) == pvdi.Cropping(PLANES, flags)
         mapper.CroppingOff()
-
-
-def test_nothing_is_left_behind(no_leaks):
-    plotter = pv.Plotter(window_size=(60, 50), off_screen=True)
-    actor = plotter.add_vdi(soft_ball(), show_scalar_bar=False)
-    crop(actor.mapper, "cross")
-    actor.opacity_multiplier = 2.0
-    shot(plotter)
-    plotter.close()
-    del plotter, actor
-    gc.collect()
 
 
 def test_picks_are_of_what_is_shown(plotter):
