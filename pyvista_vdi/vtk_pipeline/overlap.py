@@ -83,22 +83,6 @@ class Sight:
         """Return the same with fewer pixels."""
         return self if size == self.frame.size else replace(self, frame=self.frame.coarser(size))
 
-    def rectangle(self) -> NDArray[np.float64] | None:
-        """Return what the bounds cover of the viewport, pixels, rows (low, high) by (x, y).
-
-        All of it if they reach behind the eye; ``None`` if none of it.
-        """
-        camera, size = self.frame.camera, np.asarray(self.frame.size, dtype=np.float64)
-        corners = np.column_stack([bounds_corners(self.vdi.bounds), np.ones(8)])
-        u, v, _, w = camera.viewport_matrix(self.frame.size) @ (camera.model_to_view @ corners.T)
-        if not camera.parallel_projection and w.min() <= 0:
-            return None if w.max() <= 0 else np.stack([0 * size, size])
-        places = (np.stack([u, v]) / w + 1) / 2 * size[:, None]
-        low, high = places.min(axis=1), places.max(axis=1)
-        if (high < 0).any() or (low > size).any():
-            return None
-        return np.stack([low, high])
-
 
 @dataclass(frozen=True)
 class Part:
@@ -156,8 +140,6 @@ class Overlaps:
 
     def __init__(self) -> None:
         self._kept: dict[Any, _Picture] = {}
-        self._pass: Any = None
-        self._waiting: dict[int, tuple[Any, _Group]] = {}
 
     @classmethod
     def of(cls, clock: WindowClock) -> Overlaps:
@@ -182,13 +164,14 @@ class Overlaps:
             Gives all VDIs that the renderer shows, ``own`` among them, in its order; given
             ``own`` and the renderer. Called once for all of them, as long as each is drawn once.
         """
-        now = (own.clock.number, renderer.GetAddressAsString(""))
-        if now != self._pass:
-            self._pass = now
-            self._waiting.clear()
-        key, group = self._waiting.pop(id(own.painter), (None, None))
+        # Where the frame's VDIs have been looked at already; once each, for a frame may have passes
+        groups = own.clock.of_frame.setdefault(("overlaps", renderer.GetAddressAsString("")), {})
+        key, group = groups.pop(id(own.painter), (None, None))
         if group is None or key != own.key:
-            group = self._look(own, others(own, renderer))
+            for members in _overlapping(others(own, renderer)):
+                together = _Group(members)
+                groups.update({id(sight.painter): (sight.key, together) for sight in members})
+            _, group = groups.pop(id(own.painter), (None, _Group([own])))
         if len(group.sights) == 1:
             return None
         if group.picture is None:
@@ -196,23 +179,6 @@ class Overlaps:
         assert group.picture is not None
         index = next(i for i, s in enumerate(group.sights) if s.painter is own.painter)
         return group.picture.part(index, own.coarser(group.size), own.frame.size)
-
-    def forget(self) -> None:
-        """Free the pictures."""
-        self._kept.clear()
-        self._waiting.clear()
-
-    def _look(self, own: Sight, sights: Sequence[Sight]) -> _Group:
-        """Divide the frame's VDIs into groups, and return the one with ``own``."""
-        mine = _Group([own])
-        for members in _overlapping(sights):
-            group = _Group(members)
-            for sight in members:
-                if sight.painter is own.painter:
-                    mine = group
-                else:
-                    self._waiting[id(sight.painter)] = (sight.key, group)
-        return mine
 
     def _draw(self, group: _Group, renderer: Any) -> None:
         """Give a group its picture: one that is kept, or a new one."""
@@ -287,12 +253,29 @@ def _raycast(
     return joint
 
 
+def rectangle(frame: Frame, bounds: tuple[float, ...]) -> NDArray[np.float64] | None:
+    """Return what bounds cover of the viewport, pixels, float64 rows (low, high) by (x, y).
+
+    All of it if they reach behind the eye; ``None`` if none of it.
+    """
+    camera, size = frame.camera, np.asarray(frame.size, dtype=np.float64)
+    corners = np.column_stack([bounds_corners(bounds), np.ones(8)])
+    u, v, _, w = camera.viewport_matrix(frame.size) @ (camera.model_to_view @ corners.T)
+    if not camera.parallel_projection and w.min() <= 0:
+        return None if w.max() <= 0 else np.stack([0 * size, size])
+    places = (np.stack([u, v]) / w + 1) / 2 * size[:, None]
+    low, high = places.min(axis=1), places.max(axis=1)
+    if (high < 0).any() or (low > size).any():
+        return None
+    return np.stack([low, high])
+
+
 def _overlapping(sights: Sequence[Sight]) -> list[list[Sight]]:
     """Divide VDIs into groups whose rectangles on the screen overlap, directly or by others."""
-    rectangles = [sight.rectangle() for sight in sights]
+    rectangles = [rectangle(sight.frame, sight.vdi.bounds) for sight in sights]
     groups: list[set[int]] = []
-    for i, rectangle in enumerate(rectangles):
-        touched = [g for g in groups if any(_touch(rectangle, rectangles[j]) for j in g)]
+    for i, own in enumerate(rectangles):
+        touched = [g for g in groups if any(_touch(own, rectangles[j]) for j in g)]
         groups = [g for g in groups if g not in touched]
         groups.append({i}.union(*touched))
     return [[sights[i] for i in sorted(group)] for group in groups]

@@ -23,7 +23,7 @@ from pyvista_vdi.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.frame import Frame, as_array, sampled
 from pyvista_vdi.vtk_pipeline.inputs import Input
 from pyvista_vdi.vtk_pipeline.interaction import Interaction, WindowClock, reduced
-from pyvista_vdi.vtk_pipeline.overlap import Overlaps, Sight, same_depth
+from pyvista_vdi.vtk_pipeline.overlap import Overlaps, Sight, rectangle, same_depth
 from pyvista_vdi.vtk_pipeline.selection import Seen, Selection
 from pyvista_vdi.vtk_pipeline.status import CornerTexts, VDIStatus
 from pyvista_vdi.vtk_pipeline.texture import ImageTexture
@@ -308,8 +308,20 @@ class Painter:
         return Sight(self, mapper, actor, frame, clock, vdi)
 
     def beside(self, mapper: Any, renderer: Any) -> Sight | None:
-        """Return the VDI as it is to be seen beside another one; never raises."""
-        return self._guarded(self._sight, mapper, renderer)  # type: ignore[no-any-return]
+        """Return the VDI as it is to be seen beside another one; ``None`` if it is not.
+
+        Never raises. What is out of the picture is not brought up to date.
+        """
+        return self._guarded(self._sight_in_picture, mapper, renderer)  # type: ignore[no-any-return]
+
+    def _sight_in_picture(self, mapper: Any, renderer: Any) -> Sight | None:
+        actor = self._actor.Get()
+        bounds = None if self.input is None else self.input.bounds()
+        if actor is None or bounds is None:
+            return None
+        if rectangle(Frame.current(renderer, as_array(actor.GetMatrix())), bounds) is None:
+            return None
+        return self._sight(mapper, renderer)
 
     def _select(self, mapper: Any, renderer: Any) -> None:
         """Draw what can be picked of what the last frame showed, or the first would show."""

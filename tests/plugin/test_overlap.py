@@ -362,3 +362,15 @@ def test_what_cannot_be_drawn_leaves_the_other(raycasts):
 def test_nothing_is_left(raycasts):
     draw((0, 1), meshes)
     assert raycasts == [2]
+
+
+@pytest.mark.usefixtures("no_leaks")
+def test_what_is_out_of_the_picture_is_not_generated(raycasts):
+    plotter = new_plotter()
+    add_ball(plotter, 0)
+    away = add_ball(plotter, 1, place=(60.0, 60.0, 0.0))
+    plotter.camera_position = CAMERA
+    plotter.show(auto_close=False)
+    assert raycasts == []
+    assert away.vdi is None
+    plotter.close()
