@@ -149,6 +149,15 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_paraview(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--environment",
+        action="store_true",
+        help="print, for a shell's eval, the variables that make ParaView find this package and "
+        "load the plugin",
+    )
+
+
 def _add_file(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("file")
     group.add_argument(
@@ -280,6 +289,12 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
         "write a VDI in another format: .vdi or OpenEXR deep image",
         "pyvista-vdi convert knee.vdi -o knee.exr",
         _add_convert,
+    ),
+    "paraview": (
+        "paraview",
+        "print the path of the plugin for ParaView",
+        "pyvista-vdi paraview --environment",
+        _add_paraview,
     ),
 }
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pyvista_vdi.vtk_pipeline.actor import VDIActor
     from pyvista_vdi.vtk_pipeline.convert import vdi_from_image, vdi_to_image, volume_from_vtk
+    from pyvista_vdi.vtk_pipeline.files import VDIReader, VDIWriter
+    from pyvista_vdi.vtk_pipeline.image import VDIToImage
     from pyvista_vdi.vtk_pipeline.mapper import VDIMapper
     from pyvista_vdi.vtk_pipeline.properties import transfer_function_from_property
     from pyvista_vdi.vtk_pipeline.source import VDISource
@@ -17,8 +19,11 @@ if TYPE_CHECKING:
 _MODULES = {
     "VDIActor": "actor",
     "VDIMapper": "mapper",
+    "VDIReader": "files",
     "VDISource": "source",
     "VDIStatus": "status",
+    "VDIToImage": "image",
+    "VDIWriter": "files",
     "transfer_function_from_property": "properties",
     "vdi_from_image": "convert",
     "vdi_to_image": "convert",
@@ -28,8 +33,11 @@ _MODULES = {
 __all__ = [
     "VDIActor",
     "VDIMapper",
+    "VDIReader",
     "VDISource",
     "VDIStatus",
+    "VDIToImage",
+    "VDIWriter",
     "transfer_function_from_property",
     "vdi_from_image",
     "vdi_to_image",

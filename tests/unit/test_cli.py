@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from pyvista_vdi import cli, io
 from pyvista_vdi.cli import parser
 from pyvista_vdi.standard_cases import filling_camera
 
-VERBS = ("devices", "generate", "render", "view", "info", "compare", "convert")
+VERBS = ("devices", "generate", "render", "view", "info", "compare", "convert", "paraview")
 
 
 @pytest.fixture(autouse=True)
@@ -452,3 +453,51 @@ def test_ctrl_c_while_generating(folder, default_runtime, tmp_path):
     assert "Traceback" not in err
     assert target.read_bytes() == b"old"
     assert [path.name for path in tmp_path.iterdir()] == ["b.vdi"]
+
+
+# -- paraview --------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def plain_installation(tmp_path, monkeypatch):
+    """An environment that holds the package and no VTK, in a folder that a shell must quote."""
+    from pyvista_vdi.cli import paraview
+
+    package = tmp_path / "a folder" / "pyvista_vdi"
+    (package / "opencl").mkdir(parents=True)
+    (package / "opencl" / "__init__.py").touch()
+    monkeypatch.setattr(paraview, "_PACKAGE", package)
+    monkeypatch.setattr(paraview, "PLUGIN", package / "paraview" / "vdi_plugin.py")
+    monkeypatch.setattr(paraview.sysconfig, "get_path", lambda name: str(package.parent))
+    return package
+
+
+def test_paraview_prints_the_plugins_path(capsys):
+    status, out, _ = run(capsys, "paraview")
+    assert status == 0
+    assert Path(out.strip()).is_file()
+
+
+def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
+    status, out, _ = run(capsys, "paraview", "--environment")
+    assert status == 0
+    shown = subprocess.run(
+        ["sh", "-c", f'{out}echo "$PYTHONPATH"; echo "$PV_PLUGIN_PATH"'],
+        env={"PYTHONPATH": "/before"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    site = plain_installation.parent
+    assert shown.stdout.splitlines() == [f"{site}:/before", f"{site}/pyvista_vdi/paraview"]
+
+
+def test_paraview_is_not_shown_a_second_vtk(plain_installation, capsys):
+    (plain_installation.parent / "vtkmodules").mkdir()
+    message = complaint(capsys, "paraview", "--environment")
+    assert "holds a VTK of its own" in message
+
+
+def test_paraview_is_not_shown_half_a_package(plain_installation, capsys):
+    (plain_installation / "opencl" / "__init__.py").unlink()
+    assert "is an editable installation" in complaint(capsys, "paraview", "--environment")
