@@ -242,8 +242,8 @@ def report(results: dict[str, Any]) -> Iterator[str]:
         f"{width} x {height} lists and pixels, `{results['interpolation']}`, steps of half the "
         f"smallest spacing, {n} cases (volume and transfer function). *{EQUALLY_MANY}*: as many "
         f"supersegments as `{GIVES}` has with that budget, within {SLACK:.0%}, by another N_S and "
-        "tolerance; *supersegments*: over those, the mean. *best*: in how many cases no other "
-        "criterion has a higher SSIM, by angle."
+        f"tolerance, or as many as N_S {MOST} gives where that is fewer; *supersegments*: over "
+        "those, the mean. *best*: in how many cases no other criterion has a higher SSIM, by angle."
     )
     for way in (EQUALLY_MANY, EQUAL_BUDGET):
         yield from ("", f"**Mean SSIM, {way}**", "")
@@ -260,7 +260,7 @@ def report(results: dict[str, Any]) -> Iterator[str]:
                 share = mean(r["share"] for r in mine)
                 cells = [str(budget), criterion, f"{share:.2f}", *ssim, best, f"{least:.4f}"]
                 yield "| " + " | ".join(cells) + " |"
-    yield from ("", f"**SSIM, {EQUALLY_MANY}**; bold: the best of the four", "")
+    yield from ("", f"**SSIM, {EQUALLY_MANY}**; bold: the best", "")
     yield f"| case | N_S | criterion | with N_S, tolerance | MiB | {heads} |"
     yield "|---|---|---|---|---|" + "---|" * len(angles)
     for case in results["cases"]:
