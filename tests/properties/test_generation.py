@@ -304,6 +304,35 @@ def test_a_tolerance_is_kept_by_every_criterion(runtime, criterion):
 
 
 @pytest.mark.parametrize("criterion", CRITERIA[1:])
+@pytest.mark.parametrize("budget", [7, 600])
+def test_a_ray_may_have_more_runs_than_are_recorded(runtime, criterion, budget):
+    """900 unlike voxels along each ray: some are merged before the cut, none is lost."""
+    rng = np.random.default_rng(2700)
+    volume = Volume(rng.random((3, 3, 900)).astype(np.float32))
+    looks = TransferFunction(np.eye(3), (0.2, 0.6, 0.9), (0.0, 1.0), unit_distance=100.0)
+    camera = Camera((-900, 1, 1), (450, 1, 1), (0, 0, 1), view_angle=0.1)
+    merged, cut = (
+        generate_vdi(
+            volume,
+            camera,
+            WINDOW,
+            looks,
+            max_supersegments=budget,
+            criterion=name,
+            device=runtime,
+        )
+        for name in (CRITERIA[0], criterion)
+    )
+    assert cut.counts.max() <= budget
+    np.testing.assert_array_equal(cut.counts > 0, merged.counts > 0)
+    # Each sum of float32 is rounded once per sample, 1800 of them, and once per cut
+    np.testing.assert_allclose(list_sums(cut), list_sums(merged), rtol=2400 * ROUNDOFF)
+    seen = [reference.render(vdi, camera) for vdi in (cut, merged)]
+    assert seen[0][..., 3].max() > 0.9
+    assert np.abs(seen[0] - seen[1]).max() <= 2400 * ROUNDOFF
+
+
+@pytest.mark.parametrize("criterion", CRITERIA[1:])
 def test_what_is_homogeneous_needs_no_cut(runtime, criterion):
     """A medium that is the same throughout stays one supersegment, whatever would cut it."""
     volume = Volume(np.full((6, 6, 6), 0.5, np.float32))
