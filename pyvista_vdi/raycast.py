@@ -14,6 +14,7 @@ from . import rays
 from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
 from .errors import InvalidArgumentError
+from .numerics import compensation
 from .occupancy import OccupancyGrid
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime
 from .vdi import VDI
@@ -149,12 +150,14 @@ class PreparedVDI:
         camera = vdi.camera
         self._parallel = camera.parallel_projection
         near, far = rays.depth_range(camera, vdi.bounds)
-        diagonal = float(np.linalg.norm(np.subtract(vdi.bounds[1::2], vdi.bounds[::2])))
-        shrink = np.linalg.norm(camera.model_transform[:3, :3], 2)
-        self._nearest = rays.NEAREST_DEPTH * diagonal * float(shrink)
+        rays.check_list_space(camera, vdi.bounds)
+        self._nearest = rays.nearest_depth(camera, vdi.bounds)
         # An origin much closer than the data costs the coordinate the digits that it is to save
         closest = min(near, self._depth_origin)
         self._shifted = not self._parallel and 0 < far <= _LONG_LENS * closest
+        # A ray that steps from list to list meets about as many supersegments as it crosses borders
+        crossed = sum(vdi.window_size) + int(vdi.counts.max(initial=0))
+        self._compensation = compensation(crossed)
         self._list_rows = self._list_space(camera)
         self._long_offsets = vdi.n_supersegments >= 2**32
         self._upload(vdi)
@@ -198,9 +201,11 @@ class PreparedVDI:
         grid = self.occupancy
         sampling: tuple[Any, ...] = ()
         if preview_samples is not None:
+            defines.update(compensation(preview_samples))
             kernel = runtime.kernel("vdi/preview.cl", "preview", defines)
             sampling = (grid.counts, np.int32(preview_samples))
         else:
+            defines.update(self._compensation)
             if skip_empty and grid.worthwhile:
                 defines["SKIP_EMPTY"] = 1
             kernel = runtime.kernel("vdi/raycast.cl", "raycast", defines)

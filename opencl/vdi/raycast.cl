@@ -6,11 +6,13 @@
 //
 // -D OFFSET_T           type of an offset into the supersegments: uint or ulong
 // -D PARALLEL, SHIFTED  the depth coordinate, see common/list_space.cl
+// -D COMPENSATED        see common/over.cl
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
 #include "common/list_ray.cl"
 #include "common/lists.cl"
 #include "common/classification.cl"
 #include "common/occupancy.cl"
+#include "common/over.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // A ray that crosses fewer lists than this is not worth a look at the grid: at V_O it stays in one.
@@ -70,6 +72,7 @@ __kernel void raycast(
 
     float3 color = (float3)(0.0f);
     float transmittance = 1.0f;
+    float4 rest = (float4)(0.0f);
     float r = r_begin;
     float z = start.z;
     int passed = 0; // supersegments passed in the list before: the first guess in the next
@@ -158,8 +161,7 @@ __kernel void raycast(
                 const float length_crossed = model_length(ray.scale, from, fma(from, along.z, deep.z), to,
                                                           fma(to, along.z, deep.z), depth_origin);
                 const float weight = transmittance * opacity_of(medium.w * length_crossed); // over, front to back
-                color += weight * medium.xyz;
-                transmittance -= weight;
+                composite_over(&color, &transmittance, &rest, weight, medium.xyz);
                 if (!ends_here)
                     break;
                 passed += away ? 1 : -1;
@@ -182,5 +184,5 @@ __kernel void raycast(
         enters_tile = (((i ^ last_i) | (j ^ last_j)) >> TILE_SHIFT) != 0;
 #endif
     }
-    image[place] = (float4)(color, 1.0f - transmittance);
+    image[place] = composited(color, transmittance, rest);
 }

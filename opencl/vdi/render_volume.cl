@@ -2,7 +2,9 @@
 //
 // -D VOXEL_T, INDEX_T, RGBA, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl
+// -D COMPENSATED: see common/over.cl
 #include "common/march.cl"
+#include "common/over.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 __kernel void render_volume(
@@ -34,6 +36,7 @@ __kernel void render_volume(
 
     float3 color = (float3)(0.0f);
     float transmittance = 1.0f;
+    float4 rest = (float4)(0.0f);
     March march;
     if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, t_end)) {
         const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks SHADING_ARGUMENTS};
@@ -45,10 +48,9 @@ __kernel void render_volume(
                 continue;
             const float4 step = step_medium(&march, &medium, step_face(&march, k), step_face(&march, k + 1));
             const float weight = transmittance * opacity_of(step.w); // over, front to back
-            color += weight * step.xyz;
-            transmittance -= weight;
+            composite_over(&color, &transmittance, &rest, weight, step.xyz);
             ++k;
         }
     }
-    image[place] = (float4)(color, 1.0f - transmittance);
+    image[place] = composited(color, transmittance, rest);
 }

@@ -35,6 +35,7 @@ CORE = {
     "compositing",
     "errors",
     "lighting",
+    "numerics",
     "transfer_function",
     "vdi",
     "volume",
