@@ -193,7 +193,9 @@ def test_rays_across_thousands_of_lists(runtime, worst, lists):
 
 
 @pytest.mark.parametrize("opacity", [1e-6, 0.01, 0.5, 0.9])
-@pytest.mark.parametrize("steps", [1000, 8000, 10_000, pytest.param(MOST_STEPS, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "steps", [1000, 8000, 10_000, pytest.param(MOST_STEPS, marks=pytest.mark.slow)]
+)
 def test_very_many_steps_through_a_constant_volume(runtime, worst, steps, opacity):
     """Closed form: the opacity of a slab is what the table says, however it is cut."""
     volume = Volume(np.full((3, 3, 3), 0.5, np.float32))
