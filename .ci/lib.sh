@@ -10,6 +10,8 @@ export VTK_DEFAULT_OPENGL_WINDOW=${VTK_DEFAULT_OPENGL_WINDOW:-vtkEGLRenderWindow
 export PYVISTA_OFF_SCREEN=true
 # A machine without an OpenCL device fails the tests that need one instead of skipping them
 export PYVISTA_VDI_REQUIRE_DEVICE=1
+# The tests refuse to run on the sources of a checkout
+export PYVISTA_VDI_REQUIRE_INSTALLED=1
 # Tests of the distributions compare them with the files of the checkout
 export PYVISTA_VDI_CHECKOUT=$checkout
 # git reads a checkout that somebody else owns, as in a container
@@ -200,6 +202,15 @@ run_tests() {
     ((result == 0 || (result == 5 && $# > 0)))
 }
 
+# The plugin in a real ParaView; tools/ installs one where there is none.
+run_paraview_tests() {
+    # PYTHON is the tests' interpreter, ParaView has its own
+    env -u PYTHON bash "$work/source/tools/install_paraview.sh" \
+        "$work/paraview" "$(compgen -G "$work/dist/*.whl")"
+    export PYVISTA_VDI_PARAVIEW=$work/paraview PYVISTA_VDI_REQUIRE_PARAVIEW=1
+    run_tests -m paraview
+}
+
 check_lint() {
     cd "$work/source"
     "$work/venv/bin/ruff" check --no-cache .
@@ -224,7 +235,9 @@ run_documented_code() {
     cp "$work/source/README.md" "$work/documented/docs/readme.md"
     cd "$work/documented"
     "$work/venv/bin/python" -m pytest -p no:cacheprovider -q docs
-    "$work/venv/bin/python" -m pytest -p no:cacheprovider -q --doctest-modules --pyargs pyvista_vdi
+    # ParaView's plugin can be imported only in ParaView
+    "$work/venv/bin/python" -m pytest -p no:cacheprovider -q --doctest-modules \
+        --ignore-glob='/*/pyvista_vdi/paraview/*' --pyargs pyvista_vdi
 }
 
 run_examples() {

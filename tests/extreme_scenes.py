@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 import strategies
-from oracle_range import explain
+from oracle import explain
 from sampling_uncertainty import Uncertainty
 
 from pyvista_vdi import reference

@@ -44,6 +44,7 @@ class Runtime:
     Every method may be called from any thread. Commands run in the order in which they are
     enqueued, one queue for all threads unless :meth:`queue_scope` gives a thread its own. What
     one queue has written another sees when the first has been finished, see :meth:`finish`.
+    Threads must have ended before the interpreter does: drivers do not survive use at exit.
 
     Parameters
     ----------

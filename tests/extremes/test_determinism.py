@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import strategies
 from extreme_scenes import BOUND, TURNS, field_volume, transfer, turned, view
-from oracle_range import explain, total
+from oracle import explain, total
 
 from pyvista_vdi import generation, occupancy, raycast, raycast_volume
 from pyvista_vdi.generation import generate_vdi

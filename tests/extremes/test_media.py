@@ -24,6 +24,7 @@ from pyvista_vdi.camera import Camera
 from pyvista_vdi.compositing import composite
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.joint import render_vdis
 from pyvista_vdi.numerics import MANY_MEDIA, MOST_STEPS, VERY_MANY_MEDIA
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.raycast_volume import raycast_volume
@@ -190,6 +191,17 @@ def test_rays_across_thousands_of_lists(runtime, worst, lists):
     error = np.abs(image[0, 0] - exact).max()
     worst(f"{lists} lists", error)
     assert error <= (lists + 14) * 2.0**-25 if lists < MANY_MEDIA else 20 * 2.0**-24
+
+
+def test_several_vdis_of_nearly_transparent_supersegments(runtime, worst):
+    """Their segments are merged and summed up in another kernel."""
+    vdis = [crowded(3000, 2e-8), crowded(2999, 2e-8)]
+    image = render_vdis(vdis, EYE, (1, 1), device=runtime)[0, 0]
+    exact = -np.expm1(-5999 * np.float64(np.float32(2e-8))) * np.array([0.2, 0.5, 0.8, 1.0])
+    error = np.abs(image - exact).max()
+    worst("5999 supersegments", error)
+    # A piece of one may be as short as a rounding of its ends, and its share of tau is as uncertain
+    assert error <= 2e-6
 
 
 @pytest.mark.parametrize("opacity", [1e-6, 0.01, 0.5, 0.9])

@@ -1,11 +1,8 @@
 """The device's raycaster against the float64 oracle: random VDIs, random views, every platform.
 
 Every channel of every pixel lies within 2e-5 of the oracle's range over the ray moved by the
-roundings of list coordinates (DESIGN section 3, "Borders"; the number of roundings is derived in
-``pyvista_vdi.reference.ranges``). 2e-5 is 336 unit roundoffs of float32: a ray here composites up
-to about 100 supersegments, each with three roundings that reach the image, and the raycaster may
-drop what lies behind a transmittance of 1e-6. The share of pixels that the unmoved ray does not
-explain is reported, and bounded by 2 % over all views together.
+roundings of list coordinates (tests/oracle.py says why 2e-5). The share of pixels that
+the unmoved ray does not explain is reported, and bounded by 2 % over all views together.
 """
 
 from __future__ import annotations
@@ -15,7 +12,7 @@ import functools
 import numpy as np
 import pytest
 import strategies
-from oracle_range import explain, total
+from oracle import explain, total
 
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.raycast import render_vdi

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 
 import numpy as np
@@ -272,10 +273,21 @@ __kernel void group_numbers(__global uint *x)
 }
 """
 
+CHASE = """\
+__kernel void chase(__global const uint *next, __global uint *end, const uint steps)
+{
+    uint at = get_global_id(0);
+    for (uint step = 0; step < steps; ++step)
+        at = next[at];
+    end[get_global_id(0)] = at;
+}
+"""
+
 
 @pytest.fixture
 def kernels(tmp_path):
     (tmp_path / "index.cl").write_text(INDEX)
+    (tmp_path / "chase.cl").write_text(CHASE)
     (tmp_path / "group.cl").write_text(GROUP_SUM)
     return tmp_path
 
@@ -375,13 +387,23 @@ def frame(runtime):
 # -- queues ----------------------------------------------------------------------------------------
 
 
-def test_memory_in_place_knows_the_queues_that_read_it(runtime, kernels):
-    kernel = runtime.kernel(kernels / "index.cl", "index")
+def ring():
+    """Memory that a CPU uses in place: each element names the next of a ring of 64."""
     array = ocl.aligned_empty(64, np.uint32)
-    array[...] = 0
-    finished = []
-    with runtime.upload(array) as shared, runtime.buffer((64,), np.uint32) as own:
-        launch = (kernel, 64, 64, shared, np.uint32(64))
+    array[...] = (np.arange(64) + 1) % 64
+    return array
+
+
+def test_memory_in_place_knows_the_queues_that_read_it(runtime, kernels, monkeypatch):
+    kernel = runtime.kernel(kernels / "chase.cl", "chase")
+    finish, finished = runtime._finish, []
+
+    def noted(numbers):
+        finished.append(set(numbers))
+        finish(numbers)  # a kernel that still runs when its memory is freed corrupts the heap
+
+    with runtime.upload(ring()) as shared, runtime.buffer((64,), np.uint32) as own:
+        launch = (kernel, 64, 64, shared, own, np.uint32(1))
         assert own.readers is None
         assert shared.readers == (set() if runtime.is_cpu else None)
         if not runtime.is_cpu:
@@ -392,10 +414,25 @@ def test_memory_in_place_knows_the_queues_that_read_it(runtime, kernels):
             assert shared.readers == {inner}
         runtime.launch(*launch)
         assert shared.readers == {runtime._main_queue}  # the other queue is gone
-        runtime._finish, finish = (lambda numbers: finished.append(set(numbers))), runtime._finish
+        monkeypatch.setattr(runtime, "_finish", noted)
         shared.release()
-        runtime._finish = finish
     assert finished == [{runtime._main_queue}]
+
+
+@pytest.mark.parametrize("own_queue", [False, True])
+def test_memory_in_place_is_free_when_its_buffer_is_released(runtime, kernels, own_queue):
+    """Whatever thread releases it, and whichever queue reads it."""
+    kernel = runtime.kernel(kernels / "chase.cl", "chase")
+    array, steps = ring(), 2**20  # tens of milliseconds: the kernel runs when release() is called
+    with (
+        runtime.buffer((64,), np.uint32) as end,
+        runtime.queue_scope() if own_queue else contextlib.nullcontext(),
+    ):
+        shared = runtime.upload(array)
+        runtime.launch(kernel, 64, 64, shared, end, np.uint32(steps))
+        InThread(shared.release).value()
+        array[...] = 0  # in place of freeing it, which would crash some time later, or not
+        np.testing.assert_array_equal(runtime.download(end), (np.arange(64) + steps) % 64)
 
 
 def test_a_thread_waits_for_its_own_queue_only(runtime, monkeypatch):

@@ -1,4 +1,11 @@
-"""Images of the device's raycaster against the float64 oracle's range (DESIGN section 3)."""
+"""A device's picture against the float64 oracle's range over the moved ray.
+
+Every channel of every pixel lies within 2e-5 of the range over the ray moved by the roundings of
+list coordinates (DESIGN section 3, "Borders"; the number of roundings is derived in
+``pyvista_vdi.reference.ranges``). 2e-5 is 336 unit roundoffs of float32: a ray in these tests
+composites up to about 100 supersegments, each with three roundings that reach the image, and the
+raycaster may drop what lies behind a transmittance of 1e-6.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +15,7 @@ import numpy as np
 
 from pyvista_vdi import reference
 
-#: Largest difference per channel: 336 unit roundoffs of float32. A ray of the tests composites up
-#: to about 100 supersegments, each with three roundings that reach the image, and the raycaster
-#: may drop what lies behind a transmittance of 1e-6.
+#: Largest difference per channel; see above.
 TOLERANCE = 2e-5
 
 #: Moved rays tried in turn for a pixel beyond the fixed set: where a ray runs along a border in
