@@ -29,6 +29,8 @@ Shared functions:
     The ray of a pixel in list space, clipped; model lengths along it.
 ``common/lists.cl``
     Which supersegment of a list a ray meets first (paper, Algorithm 1).
+``common/over.cl``
+    Compositing front to back, with or without carrying what is rounded off.
 ``common/occupancy.cl``
     Tiles and slabs of the occupancy grid.
 ``common/segments.cl``

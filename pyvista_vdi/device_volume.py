@@ -17,6 +17,13 @@ from .camera import Camera
 from .device_occlusion import ambient_transmittances
 from .errors import InvalidArgumentError
 from .lighting import Lights
+from .numerics import (
+    LARGEST_VOXEL,
+    MOST_STEPS,
+    compensation,
+    held_unit_distance,
+    scalars_suit_float32,
+)
 from .opencl_runtime import DeviceBuffer, Runtime, aligned_empty, padded
 from .shading import gradient_table, lighting_table, shading_defines
 from .transfer_function import TransferFunction
@@ -34,6 +41,8 @@ _DEVICE_TYPES = {
 _BLOCK_SHIFT = 3
 #: Share of transparent blocks from which on looking for them pays.
 _WORTH_SKIPPING = 0.05
+#: Where scaled voxels end, in ranges of the transfer function.
+_BEYOND = 2.0**60
 _uploads: weakref.WeakKeyDictionary[Volume, _Uploads] = weakref.WeakKeyDictionary()
 _uploads_lock = threading.Lock()
 
@@ -84,18 +93,14 @@ class DeviceVolume:
                 f"expected a TransferFunction, got {type(transfer_function).__name__}"
             )
         self.volume = volume
-        self.unit_distance = transfer_function.unit_distance or volume.default_unit_distance
         self.sample_distance = checked_sample_distance(volume, sample_distance)
+        self.unit_distance = held_unit_distance(
+            transfer_function.unit_distance or volume.default_unit_distance, self.sample_distance
+        )
         low, high = transfer_function.scalar_range
-        native = volume.array.dtype.name in _DEVICE_TYPES
+        native = _reads_natively(runtime, volume, transfer_function)
         scale = None if native else (low, high)
-        self.defines: dict[str, str | int | None] = {
-            "VOXEL_T": _DEVICE_TYPES.get(volume.array.dtype.name, "float"),
-            "INDEX_T": "ulong" if volume.array.size >= 2**32 else "uint",
-            "BLOCK_SHIFT": _BLOCK_SHIFT,
-        }
-        if volume.rgba:
-            self.defines["RGBA"] = 1
+        self.defines = _voxel_defines(volume, native)
         self._voxels, ranges = _upload(runtime, volume, scale, self.defines)
         self._low, span = (low, high - low) if native else (0.0, 1.0 if high > low else 0.0)
         table = np.column_stack([transfer_function.colors, transfer_function.opacities])
@@ -125,6 +130,7 @@ class DeviceVolume:
             )
             shading["OCCLUSION"] = 1
         self.defines.update(shading)
+        self.defines.update(compensation(volume.length / self.sample_distance))
 
     def medium_arguments(self, camera: Camera) -> tuple[Any, ...]:
         """Arguments ``voxels`` to ``forms``, without it, of the kernels that march.
@@ -243,6 +249,47 @@ class DeviceVolume:
         return rays.packed([*index, *direction, *planes]), pixel_rays, len(planes)
 
 
+def _voxel_defines(volume: Volume, native: bool) -> dict[str, str | int | None]:
+    """Return the ``-D`` names by which kernels find and read a voxel."""
+    defines: dict[str, str | int | None] = {
+        "VOXEL_T": _DEVICE_TYPES[volume.array.dtype.name] if native else "float",
+        "INDEX_T": "ulong" if volume.array.size >= 2**32 else "uint",
+        "BLOCK_SHIFT": _BLOCK_SHIFT,
+    }
+    if volume.rgba:
+        defines["RGBA"] = 1
+    return defines
+
+
+def _reads_natively(runtime: Runtime, volume: Volume, transfer_function: TransferFunction) -> bool:
+    """Whether kernels read the voxels as they are, or scaled to the transfer function's range."""
+    dtype = volume.array.dtype
+    if dtype.name not in _DEVICE_TYPES:
+        return False
+    if volume.rgba:  # a byte is exact, and colours have no such range
+        return True
+    low, high = transfer_function.scalar_range
+    if not scalars_suit_float32(low, high, dtype, transfer_function.interpolation):
+        return False
+    return dtype.kind != "f" or not _too_large(runtime, volume)
+
+
+def _too_large(runtime: Runtime, volume: Volume) -> bool:
+    """Whether differences of a float32 volume's finite voxels may overflow; found once."""
+    uploads = _uploads_of(volume)
+    if uploads.too_large is None:
+        _, ranges = _upload(runtime, volume, None, _voxel_defines(volume, True))
+        ends = runtime.download(ranges)
+        largest = np.abs(ends).max(initial=0.0, where=np.isfinite(ends))
+        uploads.too_large = bool(largest > LARGEST_VOXEL)
+    return uploads.too_large
+
+
+def _uploads_of(volume: Volume) -> _Uploads:
+    with _uploads_lock:
+        return _uploads.setdefault(volume, _Uploads())
+
+
 class _Uploads:
     """What is on devices of one volume; its lock lets the thread that uploads it be the only one.
 
@@ -253,25 +300,21 @@ class _Uploads:
     def __init__(self) -> None:
         self.lock = threading.Lock()
         self.made: dict[Any, tuple[DeviceBuffer, DeviceBuffer]] = {}
+        #: Whether float32 cannot hold the voxels' differences; None before anyone has asked.
+        self.too_large: bool | None = None
         self.occlusions: dict[Runtime, tuple[Any, DeviceBuffer]] = {}
-
-
-def _uploads_of(volume: Volume) -> _Uploads:
-    with _uploads_lock:
-        return _uploads.setdefault(volume, _Uploads())
 
 
 def checked_sample_distance(volume: Volume, sample_distance: float | None) -> float:
     """Return the length of a step in model units; half the smallest spacing by default."""
+    least = volume.length / MOST_STEPS
     if sample_distance is None:
-        return min(volume.spacing) / 2
+        return max(min(volume.spacing) / 2, least)
     step = as_float(sample_distance)
-    # Beyond 2^24 steps across the bounds, float32 cannot number them
-    least = volume.length / 2**24
     if not (np.isfinite(step) and step >= least):
         raise InvalidArgumentError(
             f"sample_distance must be a length of at least {least:.3g} model units "
-            f"(2^-24 of the volume's diagonal); got {sample_distance!r}"
+            f"(2^-19 of the volume's diagonal); got {sample_distance!r}"
         )
     # No ray is longer than the diagonal; float32 may not hold how much longer the step is
     return min(step, 2 * volume.length)
@@ -371,9 +414,14 @@ def _scaled(array: NDArray[Any], low: float, high: float) -> NDArray[np.float32]
     of its place in the range everything that the table can tell apart is.
     """
     if high > low:
-        with np.errstate(over="ignore", invalid="ignore"):
-            return ((array.astype(np.float64) - low) / (high - low)).astype(np.float32)
-    scaled = (array > low).astype(np.float32)  # at or below the single scalar, or above it
+        scaled = (array.astype(np.float64) - low) / (high - low)
+        # Beyond any table anyway: their differences and the squares of these stay finite. An
+        # infinite voxel stays one
+        finite = np.clip(scaled, -_BEYOND, _BEYOND)
+        return np.where(np.isinf(array), scaled, finite).astype(np.float32)
+    above = (array > np.float64(low)).astype(
+        np.float32
+    )  # at or below the single scalar, or above it
     if array.dtype.kind == "f":
-        scaled[np.isnan(array)] = np.nan
-    return scaled
+        above[np.isnan(array)] = np.nan
+    return above

@@ -19,6 +19,7 @@ from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory
 from .lighting import Lights
 from .opencl_runtime import Runtime, aligned_empty, get_runtime
+from .rays import check_list_space
 from .transfer_function import TransferFunction
 from .vdi import VDI
 from .volume import Volume
@@ -360,6 +361,7 @@ class _Recorder:
             np.float32(min(medium.volume.spacing)),  # reference length: a voxel
             np.float32(hidden_weight),
         )
+        check_list_space(camera, medium.volume.bounds)
         forms, rays, self._planes = medium.forms(camera, size, None)
         self.depth_origin = rays.reference_depth
         self._most_steps = int(np.ceil(medium.volume.length / medium.sample_distance)) + 1

@@ -22,6 +22,7 @@ from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
 from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
+from .numerics import compensation
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime
 from .raycast import TRANSMITTANCE_CUTOFF, ListView, PreparedVDI, prepared_vdi, render_vdi
 from .vdi import VDI
@@ -203,7 +204,9 @@ def joint_image(
         numbers = stack.enter_context(runtime.upload(streams_of, "order of the VDIs"))
         nearest = min(stream.view.reference_depth for stream in streams)
         shifts = [np.float32(stream.view.reference_depth - nearest) for stream in streams]
-        merge = runtime.kernel("vdi/merge.cl", "merge", {"STREAMS": len(streams)})
+        media = sum(prepared_vdi(runtime, one.vdi).media for one in placed)
+        defines: dict[str, str | int | None] = {"STREAMS": len(streams), **compensation(media)}
+        merge = runtime.kernel("vdi/merge.cl", "merge", defines)
         slots = max(_slots.get(one.vdi, _FIRST_SLOTS) for one in placed)
         most = 1
         left = [_Band(0, block_items(width, height))]

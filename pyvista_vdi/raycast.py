@@ -15,6 +15,7 @@ from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
 from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
+from .numerics import compensation
 from .occupancy import OccupancyGrid
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime
 from .picking import DEFAULT_OPACITY, FirstHit
@@ -237,6 +238,8 @@ class PreparedVDI:
     ----------
     occupancy : OccupancyGrid
         Where there is nothing to see.
+    media : int
+        About how many supersegments a ray may meet.
     """
 
     def __init__(self, runtime: Runtime, vdi: VDI) -> None:
@@ -247,10 +250,13 @@ class PreparedVDI:
         camera = vdi.camera
         self._parallel = camera.parallel_projection
         near, far = rays.depth_range(camera, vdi.bounds)
+        rays.check_list_space(camera, vdi.bounds)
         self._nearest = rays.nearest_depth(camera, vdi.bounds)
         # An origin much closer than the data costs the coordinate the digits that it is to save
         closest = min(near, self._depth_origin)
         self._shifted = not self._parallel and 0 < far <= _LONG_LENS * closest
+        # A ray that steps from list to list meets about as many as it crosses borders
+        self.media = sum(vdi.window_size) + int(vdi.counts.max(initial=0))
         self._list_rows = self._list_space(camera)
         self._long_offsets = vdi.n_supersegments >= 2**32
         self._upload(vdi)
@@ -292,10 +298,13 @@ class PreparedVDI:
         grid = self.occupancy
         mode: tuple[Any, ...] = ()
         if preview_samples is not None:
+            defines.update(compensation(preview_samples))
             kernel = runtime.kernel("vdi/preview.cl", "preview", defines)
             mode = (grid.counts, np.int32(preview_samples))
         else:
-            if first_hit is not None:
+            if first_hit is None:
+                defines.update(compensation(self.media))
+            else:
                 defines["FIRST_HIT"] = 1
                 mode = (np.float32(first_hit.optical_depth), np.int32(first_hit.accumulated))
             if skip_empty and grid.worthwhile:

@@ -24,6 +24,9 @@ Floats: TypeAlias = NDArray[np.float64]
 #: Depth before which nothing is looked up in perspective, in diagonals of the bounds (DESIGN 3).
 NEAREST_DEPTH = 1e-6
 
+#: Lengths times reciprocal depths beyond which, or below whose reciprocal, float32 loses digits.
+LARGEST_PRODUCT = 1e36
+
 
 @dataclass(frozen=True)
 class PixelRays:
@@ -87,6 +90,28 @@ def reference_depth(camera: Camera, bounds: Sequence[float]) -> float:
     """
     near, _ = depth_range(camera, bounds)
     return near if camera.parallel_projection else max(near, 0.0)
+
+
+def check_list_space(camera: Camera, bounds: Sequence[float]) -> None:
+    """Refuse a generating view whose lists float32 cannot express.
+
+    Raises
+    ------
+    InvalidCameraError
+        If lengths times reciprocal depths leave the range of float32 (docs/numerics.md).
+    """
+    near, far = (1.0, 1.0) if camera.parallel_projection else depth_range(camera, bounds)
+    near = max(near, 0.0 if camera.parallel_projection else nearest_depth(camera, bounds))
+    diagonal = float(np.linalg.norm(np.subtract(bounds[1::2], bounds[::2])))
+    if not (0 < near <= far and diagonal > 0):
+        return  # nothing is seen
+    products = (1 / near / near, 1 / far / far, diagonal / near / far, diagonal)
+    if min(products) < 1 / LARGEST_PRODUCT or max(products) > LARGEST_PRODUCT:
+        raise InvalidCameraError(
+            f"view depths from {near:.3g} to {far:.3g} world units, of bounds that are "
+            f"{diagonal:.3g} model units across, are beyond float32: scale the spacing (or the "
+            "actor's matrix), and the camera with it, towards 1"
+        )
 
 
 def pixel_rays(camera: Camera, window_size: Sequence[int], bounds: Sequence[float]) -> PixelRays:

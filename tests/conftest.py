@@ -14,12 +14,14 @@ HYPOTHESIS_PROFILE
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import signal
 import sysconfig
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -114,6 +116,38 @@ def _outside_the_checkout(tmp_path_factory):
     os.chdir(tmp_path_factory.mktemp("work"))
     yield
     os.chdir(before)
+
+
+#: Buffers that hold what the engine returns: images, and the arrays of a VDI.
+OUTPUTS = {"image", "front depths", "back depths", "supersegment colours", "optical depths"}
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _every_output_is_finite():
+    """No test may see a NaN or an infinity in an image or a VDI without failing.
+
+    All of them leave a device by one method. Nothing that the package accepts leads to one.
+    """
+    download = Runtime.download
+
+    @functools.wraps(download)
+    def checked(self, buffer, *args, **kwargs):
+        values = download(self, buffer, *args, **kwargs)
+        if buffer.name in OUTPUTS and not np.isfinite(values).all():
+            places = np.argwhere(~np.isfinite(values))
+            raise NotFiniteError(
+                f"{len(places)} of {values.size} values of {buffer.name!r} are not finite, "
+                f"the first at {tuple(places[0].tolist())}"
+            )
+        return values
+
+    Runtime.download = checked
+    yield
+    Runtime.download = download
+
+
+class NotFiniteError(AssertionError):
+    """An image or a VDI held a NaN or an infinity."""
 
 
 @pytest.fixture(scope="session", autouse=True)

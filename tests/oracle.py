@@ -32,33 +32,36 @@ class Comparison(NamedTuple):
     drawn: int  # where the oracle sees something
     moved: int  # beyond TOLERANCE of the unmoved ray
     failures: list[str]
+    worst: float  # largest difference from the oracle, or from its range where a ray was moved
 
 
-def explain(vdi, camera, size, image, *, name, escalation=ESCALATION, **ends):
+def explain(vdi, camera, size, image, *, name, escalation=ESCALATION, tolerance=TOLERANCE, **ends):
     """Compare an image with the oracle; say which pixels no ray within rounding explains."""
     exact = reference.render(vdi, camera, size, **ends)
     assert image.shape == exact.shape
     assert image.dtype == np.float32
     # Written so that NaN is a difference
-    differs = ~(np.abs(image - exact).max(axis=-1) <= TOLERANCE)
+    error = np.abs(image - exact).max(axis=-1)
+    differs = ~(error <= tolerance)
+    worst = float(error[~differs].max(initial=0.0))
     rows, columns = np.nonzero(differs)
     pixels = [(int(x), size[1] - 1 - int(row)) for row, x in zip(rows, columns, strict=True)]
-    drawn = image[differs].astype(np.float64)
+    low = high = drawn = image[differs].astype(np.float64)
     for n_random, most in zip(escalation, MAX_PIXELS, strict=False):
-        if len(pixels) > most:
+        if not pixels or len(pixels) > most:
             break
         low, high = reference.render_range(vdi, camera, size, pixels, n_random=n_random, **ends)
-        outside = ~((drawn >= low - TOLERANCE) & (drawn <= high + TOLERANCE)).all(axis=1)
+        beyond = np.maximum(low - drawn, drawn - high).max(axis=1)
+        outside = ~(beyond <= tolerance)
+        worst = max(worst, float(beyond[~outside].max(initial=0.0)))
         pixels = [p for p, out in zip(pixels, outside, strict=True) if out]
         drawn, low, high = drawn[outside], low[outside], high[outside]
-        if not pixels:
-            break
     failures = [
         f"{name}: pixel {p} drawn {d}, oracle between {a} and {b}"
         for p, d, a, b in zip(pixels, drawn, low, high, strict=True)
     ]
-    drawn_pixels = int((exact[..., 3] > TOLERANCE).sum())
-    return Comparison(differs.size, drawn_pixels, int(differs.sum()), failures)
+    drawn_pixels = int((exact[..., 3] > tolerance).sum())
+    return Comparison(differs.size, drawn_pixels, int(differs.sum()), failures, worst)
 
 
 def total(comparisons):
@@ -68,4 +71,5 @@ def total(comparisons):
         sum(part.drawn for part in parts),
         sum(part.moved for part in parts),
         [failure for part in parts for failure in part.failures],
+        max((part.worst for part in parts), default=0.0),
     )

@@ -3,6 +3,7 @@
 // -D VOXEL_T, INDEX_T, RGBA, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl; OCCLUSION: see common/occlusion.cl
 // -D CRITERION: see vdi/criteria.cl; without it lists are shortened at least error
+// -D COMPENSATED: see common/over.cl
 //
 // A ray's march is cut into chunks of equally many steps. march_lists takes the steps of one chunk and appends what is not
 // homogeneous with the run before; make_room_in_lists then shortens the records that have grown too long, and raises the
@@ -62,6 +63,9 @@ __kernel void march_lists(
     int count = (int)*length_of_list;
     float8 run = (float8)(-INFINITY);
     float4 feature = (float4)(0.0f);
+#if defined(COMPENSATED) && COMPENSATED > 1
+    float8 rest = (float8)(0.0f); // what the growing run's sums have rounded off in this chunk
+#endif
     float run_length = 0.0f, seen = 1.0f;
     float transmittance = 1.0f;
     if (count > 0) {
@@ -103,7 +107,11 @@ __kernel void march_lists(
             const float4 difference = sample_feature - feature;
             const float error = run_length * share * dot(difference, difference) * seen;
             if (run.BACK == sample.FRONT && error <= threshold) {
+#if defined(COMPENSATED) && COMPENSATED > 1
+                run = merged_runs_with_rest(run, sample, &rest);
+#else
                 run = merged_runs(run, sample);
+#endif
                 feature += share * difference;
                 run_length += sample_length;
             } else {
@@ -111,6 +119,9 @@ __kernel void march_lists(
                     store_run(record, count - 1, run);
                 ++count;
                 run = sample;
+#if defined(COMPENSATED) && COMPENSATED > 1
+                rest = (float8)(0.0f);
+#endif
                 feature = sample_feature;
                 run_length = sample_length;
                 seen = seen_weight(run, hidden_weight);

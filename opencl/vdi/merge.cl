@@ -4,9 +4,11 @@
 // their extinctions add and the colour is the mean by extinction (docs/conventions.md, "Several VDIs"). Streams are walked
 // together from boundary to boundary. The sums are formed in the order of the streams.
 //
-// -D STREAMS   how many VDIs
+// -D STREAMS      how many VDIs
+// -D COMPENSATED  see common/over.cl
 #include "common/rays.cl"
 #include "common/classification.cl"
+#include "common/over.cl"
 #include "common/segments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -58,6 +60,7 @@ __kernel void merge(
     }
     float3 color = (float3)(0.0f);
     float transmittance = 1.0f;
+    float4 rest = (float4)(0.0f);
     float reached = -INFINITY;
     while (transmittance >= transmittance_cutoff) {
         // The next piece that no segment begins or ends in
@@ -97,10 +100,9 @@ __kernel void merge(
         }
         if (optical_depth > 0.0f) {
             const float weight = transmittance * opacity_of(optical_depth); // over, front to back
-            color += weight * (covering == 1 ? single : weighted / optical_depth);
-            transmittance -= weight;
+            composite_over(&color, &transmittance, &rest, weight, covering == 1 ? single : weighted / optical_depth);
         }
         reached = end;
     }
-    image[place] = (float4)(color, 1.0f - transmittance);
+    image[place] = composited(color, transmittance, rest);
 }

@@ -35,6 +35,8 @@ __kernel void prepare_lists(
         const float z1 = depth_coordinate(fmax(back, nearest - depth_origin), depth_origin);
 #endif
         faces[k] = (float2)(z0, z1);
-        media[k] = (float4)(vload3(k, colors), optical_depths[k] / ((back - front) * per_depth));
+        // Finite however thin: nothing or everything of such a supersegment is crossed
+        const float length = fmax((back - front) * per_depth, FLT_MIN);
+        media[k] = (float4)(vload3(k, colors), fmin(optical_depths[k] / length, FLT_MAX));
     }
 }

@@ -4,11 +4,12 @@
 // lies the same integral of (supersegments in the cell) along the ray. No supersegment is intersected; a sample finds its list
 // and its supersegment by the same search as the raycaster's, and stands for the length of non-empty cells around it.
 //
-// -D OFFSET_T, PARALLEL, SHIFTED, CROPPED   as in vdi/raycast.cl
+// -D OFFSET_T, PARALLEL, SHIFTED, CROPPED, COMPENSATED   as in vdi/raycast.cl
 #include "common/list_ray.cl"
 #include "common/lists.cl"
 #include "common/classification.cl"
 #include "common/occupancy.cl"
+#include "common/over.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // What a ray crosses of a cell.
@@ -182,6 +183,7 @@ __kernel void preview(
     const float half_part = weight / (2.0f * (float)samples);
     float3 color = (float3)(0.0f);
     float transmittance = 1.0f;
+    float4 rest = (float4)(0.0f);
     float4 medium = (float4)(0.0f);
     float weight_before = 0.0f, length_before = 0.0f; // of the cells passed
     float part_begins = 0.0f;                         // length
@@ -215,8 +217,7 @@ __kernel void preview(
             } else {
                 const float ends = length_before + share * (more ? crossing.length : 0.0f);
                 const float part = transmittance * opacity_of(medium.w * (ends - part_begins)); // over, front to back
-                color += part * medium.xyz;
-                transmittance -= part;
+                composite_over(&color, &transmittance, &rest, part, medium.xyz);
                 part_begins = ends;
             }
             ++halves;
@@ -226,5 +227,5 @@ __kernel void preview(
         weight_before = weight_until;
         length_before += crossing.length;
     }
-    image[place] = (float4)(color, 1.0f - transmittance);
+    image[place] = composited(color, transmittance, rest);
 }

@@ -6,6 +6,7 @@
 //
 // -D OFFSET_T           type of an offset into the supersegments: uint or ulong
 // -D PARALLEL, SHIFTED  the depth coordinate, see common/list_space.cl
+// -D COMPENSATED        see common/over.cl
 // -D CROPPED            only some regions are drawn, see common/cropping.cl
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
 // -D SEGMENTS           write what each ray crosses into a pool, to be merged with other VDIs by vdi/merge.cl, in place of
@@ -15,6 +16,7 @@
 #include "common/lists.cl"
 #include "common/classification.cl"
 #include "common/occupancy.cl"
+#include "common/over.cl"
 #include "common/segments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -130,6 +132,7 @@ __kernel void raycast(
 #elif !defined(SEGMENTS)
     float3 color = (float3)(0.0f);
     float transmittance = 1.0f;
+    float4 rest = (float4)(0.0f);
 #endif
     float r = r_begin;
     float z = start.z;
@@ -255,8 +258,7 @@ __kernel void raycast(
                     break;
 #else
                 const float weight = transmittance * opacity_of(medium.w * length_crossed); // over, front to back
-                color += weight * medium.xyz;
-                transmittance -= weight;
+                composite_over(&color, &transmittance, &rest, weight, medium.xyz);
 #endif
 #endif
                 if (!ends_here)
@@ -298,6 +300,6 @@ __kernel void raycast(
     const float passed_by = model_length(ray.scale, r_begin, start.z, r_hit, z_hit, depth_origin);
     image[place] = hit ? ray.t_begin + passed_by / model_speed(forms, a, b) : NOTHING;
 #else
-    image[place] = (float4)(color, 1.0f - transmittance);
+    image[place] = composited(color, transmittance, rest);
 #endif
 }

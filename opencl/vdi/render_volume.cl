@@ -2,10 +2,12 @@
 //
 // -D VOXEL_T, INDEX_T, RGBA, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl; OCCLUSION: see common/occlusion.cl
+// -D COMPENSATED: see common/over.cl
 // -D CROPPED: see common/cropping.cl
 // -D OPACITY_MULTIPLIER: optical depths are multiplied
 #include "common/march.cl"
 #include "common/cropping.cl"
+#include "common/over.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 #ifdef OPACITY_MULTIPLIER
@@ -70,6 +72,7 @@ __kernel void render_volume(
 
     float3 color = (float3)(0.0f);
     float transmittance = 1.0f;
+    float4 rest = (float4)(0.0f);
     March march;
     if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, t_end)) {
         const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks SHADING_ARGUMENTS};
@@ -90,10 +93,9 @@ __kernel void render_volume(
             step.w *= opacity_multiplier;
 #endif
             const float weight = transmittance * opacity_of(step.w); // over, front to back
-            color += weight * step.xyz;
-            transmittance -= weight;
+            composite_over(&color, &transmittance, &rest, weight, step.xyz);
             ++k;
         }
     }
-    image[place] = (float4)(color, 1.0f - transmittance);
+    image[place] = composited(color, transmittance, rest);
 }

@@ -39,6 +39,23 @@ inline float8 merged_runs(float8 a, float8 b)
     return run;
 }
 
+#if defined(COMPENSATED) && COMPENSATED > 1
+// The same, where very many samples become one run: `rest` carries what the sums have rounded off so far (Kahan), see
+// common/over.cl.
+inline float8 merged_runs_with_rest(float8 a, float8 b, float8 *rest)
+{
+    const float through = 1.0f - a.OPACITY;
+    const float8 term =
+        (float8)(0.0f, 0.0f, b.TAU, 0.0f, through * b.COLOR, through * b.OPACITY) - *rest;
+    float8 run = a + term;
+    *rest = (run - a) - term;
+    run.FRONT = a.FRONT;
+    run.BACK = b.BACK;
+    run.TRANSMITTANCE = a.TRANSMITTANCE;
+    return run;
+}
+#endif
+
 // How much an error in a run counts: by what of it the eye of V_O sees, but never less than `hidden_weight`.
 inline float seen_weight(float8 run, float hidden_weight)
 {

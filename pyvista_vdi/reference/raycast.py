@@ -98,10 +98,13 @@ def centre_ray_scale(vdi: VDI) -> Array:
     """
     width, height = vdi.window_size
     scale = np.empty((height, width))
+    _, direction = vdi.camera.ray_coefficients(vdi.window_size)
+    to_model = np.linalg.inv(vdi.camera.model_to_view)[:3, :3]
+    constant, along_u, along_v = direction @ to_model.T
+    u = (2 * np.arange(width) + 1) / width - 1
     for y in range(height):
-        for x in range(width):
-            ray = pixel_ray(vdi.camera, vdi.window_size, x, y)
-            scale[y, x] = np.linalg.norm(ray.direction)
+        v = (2 * y + 1) / height - 1
+        scale[y] = np.linalg.norm(constant + np.outer(u, along_u) + v * along_v, axis=1)
     return scale
 
 

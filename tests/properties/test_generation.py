@@ -1,7 +1,8 @@
 """Generation and direct volume rendering on the device against the float64 reference.
 
 The device works in float32, so a sample's position, scalar, opacity and length are each uncertain
-by a few roundings; :class:`Uncertainty` carries these through the classification sample by sample.
+by a few roundings; ``sampling_uncertainty`` carries these through the classification sample by
+sample.
 Nearest-neighbour sampling makes a jump of it where a sample lies within rounding of the middle
 between two points, so bounds are evaluated, not linearised.
 """
@@ -13,6 +14,7 @@ import itertools
 import numpy as np
 import pytest
 import strategies
+from sampling_uncertainty import Uncertainty
 
 from pyvista_vdi import reference
 from pyvista_vdi.camera import Camera
@@ -20,110 +22,16 @@ from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.generation import CRITERIA, generate_vdi
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.reference.generate import medium_at, near_depth
+from pyvista_vdi.reference.generate import near_depth
 from pyvista_vdi.reference.ranges import ROUNDOFF
 from pyvista_vdi.reference.raycast import NEAR_LIMIT
-from pyvista_vdi.reference.rays import pixel_ray
 from pyvista_vdi.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.volume import VOXEL_TYPES, Volume
 
 WINDOW = (14, 10)
 
-#: Roundings of a grid coordinate: six coefficients and five multiply-adds in the pixel's position
-#: and in depth, and depth's own four (entry, step number, step length, sum).
-POSITION_ROUNDINGS = 16
-
-#: Roundings of a scalar: trilinear interpolation in three fused stages of two each, and three of
-#: the subtraction, scaling and splitting into node and share that classification does.
-SCALAR_ROUNDINGS = 9
-
-#: Roundings of an interpolated opacity or colour: difference, product, sum.
-TABLE_ROUNDINGS = 3
-
-#: Roundings of a step's optical depth after that: log1p (2, OpenCL C 7.4), length (4), product
-#: and quotient, and its exponential and product in compositing.
-STEP_ROUNDINGS = 12
-
 #: Measured (240 random cases on two platforms: 3e-6): what nearly every pixel stays below.
 TYPICAL = 1e-5
-
-
-class Uncertainty:
-    """What one ray's samples may be in float32.
-
-    Attributes
-    ----------
-    low, high : numpy.ndarray
-        Smallest and largest optical depth of each sample, float64 (n,).
-    color_spread : numpy.ndarray
-        Largest difference between colours of one sample, float64 (n,).
-    depth : float
-        By how much a view depth may be off, world units.
-    """
-
-    def __init__(self, volume, camera, transfer_function, ray):
-        to_index = np.linalg.inv(volume.index_to_model)
-        reach, per_depth, far = _magnitudes(volume, camera, to_index)
-        scalars = np.abs([*transfer_function.scalar_range, *volume.finite_range()]).max()
-        d_position = POSITION_ROUNDINGS * ROUNDOFF * reach
-        d_scalar = SCALAR_ROUNDINGS * ROUNDOFF * scalars
-        self.depth = POSITION_ROUNDINGS * ROUNDOFF * far
-        d_length = self.depth * per_depth
-
-        # The medium at every corner of the box of positions, and at scalars moved either way
-        seen = [(ray.color, ray.optical_depth)]
-        for corner in itertools.product((-1, 1), repeat=3):
-            position = ray.position + d_position * np.array(corner)
-            # An end of the ray may round to either side of the grid's boundary
-            position = np.clip(position, 0, np.array(volume.dimensions) - 1)
-            for shift in (-d_scalar, d_scalar):
-                low, high = transfer_function.scalar_range
-                moved = transfer_function.replace(scalar_range=(low + shift, high + shift))
-                seen.append(medium_at(volume, moved, position, ray.length))
-        colors, taus = (np.array(part) for part in zip(*seen, strict=True))
-        unit = transfer_function.unit_distance or volume.default_unit_distance
-        # d tau / d a = 1 / (1 - a) / U per length, a within its own roundings
-        worst = np.exp(np.minimum(taus.max(axis=0) * unit / np.maximum(ray.length, 1e-300), 40))
-        slack = TABLE_ROUNDINGS * ROUNDOFF * worst * ray.length / unit
-        slack += STEP_ROUNDINGS * ROUNDOFF * taus.max(axis=0)
-        # The entry and exit move, and with them the first and the last step
-        slack += taus.max(axis=0) / np.maximum(ray.length, d_length) * d_length
-        self.low = np.maximum(taus.min(axis=0) - slack, 0)
-        self.high = taus.max(axis=0) + slack
-        self.color_spread = np.ptp(colors, axis=0).max(axis=1) + TABLE_ROUNDINGS * ROUNDOFF
-
-    @property
-    def optical_depth(self):
-        """Smallest and largest sum over the ray, each addition rounded."""
-        grow = 1 + len(self.low) * ROUNDOFF
-        return self.low.sum() / grow, self.high.sum() * grow
-
-    @property
-    def color(self):
-        """Bound on the difference of the composited premultiplied RGBA, per channel.
-
-        A sample's optical depth changes what it covers, by no more than the transmittance before
-        it times the change; its colour counts as far as it is seen.
-        """
-        before = np.exp(-(np.cumsum(self.low) - self.low))
-        seen = before * -np.expm1(-self.high)
-        rounding = (len(self.low) + 4) * ROUNDOFF
-        return float(before @ (self.high - self.low) + seen @ self.color_spread + rounding)
-
-
-def _magnitudes(volume, camera, to_index):
-    """Largest grid coordinate on a window corner's ray where forms are evaluated, the largest
-    model length of a unit of view depth, and the largest view depth relative to the reference."""
-    depths = strategies.view_depths(camera, volume.bounds)
-    reference_depth = near_depth(volume.bounds, camera)
-    reach, per_depth = 0.0, 0.0
-    for x, y in itertools.product((0, WINDOW[0] - 1), (0, WINDOW[1] - 1)):
-        ray = pixel_ray(camera, WINDOW, x, y)
-        for depth in (reference_depth, depths[1]):
-            point = to_index[:3, :3] @ (ray.origin + depth * ray.direction) + to_index[:3, 3]
-            reach = max(reach, float(np.abs(point).max()))
-        per_depth = max(per_depth, float(np.linalg.norm(ray.direction)))
-    return reach, per_depth, depths[1] - reference_depth
 
 
 def cases(seed, dtype, interpolation, **volume_options):
@@ -167,7 +75,7 @@ def check_against_reference(
         device=runtime,
     )
     rays = list(reference.samples(volume, camera, WINDOW, transfer_function))
-    uncertain = [Uncertainty(volume, camera, transfer_function, ray) for ray in rays]
+    uncertain = [Uncertainty(volume, camera, WINDOW, transfer_function, ray) for ray in rays]
 
     # The promise
     assert vdi.counts.max(initial=0) <= budget, name

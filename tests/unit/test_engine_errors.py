@@ -115,7 +115,7 @@ def test_view_cone_at_its_limits(make, right):
 
 @pytest.mark.parametrize("wrong", [0, -0.5, np.nan, np.inf, 1e-9, "small", [1]])
 def test_sample_distance(make, draw, wrong):
-    message = r"sample_distance must be a length of at least 7\.\d+e-07 model units.*got "
+    message = r"sample_distance must be a length of at least 2\.\d+e-05 model units.*got "
     for function in (make, draw):
         with pytest.raises(InvalidArgumentError, match=message) as caught:
             function(sample_distance=wrong)

@@ -39,6 +39,7 @@ CORE = {
     "cropping",
     "errors",
     "lighting",
+    "numerics",
     "transfer_function",
     "vdi",
     "volume",

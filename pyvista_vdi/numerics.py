@@ -1,0 +1,60 @@
+"""What float32 holds, and from where on another arithmetic takes over (docs/numerics.md)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+#: Media on a ray from which on opacity is summed up from 0, and from which on sums carry what
+#: each addition rounds off. Counted down from 1, transmittance loses up to 2^-25 in each addition:
+#: 3e-5 in 1024. Counted up, an opacity of 1/8 loses as much in 8192.
+MANY_MEDIA, VERY_MANY_MEDIA = 1024, 8192
+
+#: Most steps across a volume. Where samples of a homogeneous medium become one supersegment, a sum
+#: is rounded once in 128 steps: 2^19 / 128 roundings of 2^-25 change an opacity by 5e-5 at most.
+MOST_STEPS = 2**19
+
+#: Most times its transfer function's range that a scalar may be, when the kernels read it as it
+#: is: interpolation rounds it 9 times (3 stages of 3), by 2^-24 of its size, 3.4e-5 of the range
+#: in all. A nearest point's scalar is rounded once.
+_MOST_RANGES = {"linear": 64.0, "nearest": 576.0}
+
+#: Scalar ranges, and sizes of scalars, that leave their differences' products normal numbers.
+_SMALLEST_RANGE, _LARGEST_SCALAR = 2.0**-100, 2.0**100
+
+#: Largest magnitude of voxels whose differences float32 holds.
+LARGEST_VOXEL = 2.0**126
+
+#: Optical depths of one step, through any opacity of at least 2^-24, whose sums float32 holds.
+_LARGEST_STEP = 2.0**96
+
+
+def scalars_suit_float32(low: float, high: float, dtype: DTypeLike, interpolation: str) -> bool:
+    """Whether kernels may read voxels as they are, for a transfer function over low..high.
+
+    Otherwise they are taken relative to the range, on the host in float64.
+    """
+    floats = np.dtype(dtype).kind == "f"
+    if low == high:  # only whether a scalar is above counts
+        with np.errstate(over="ignore"):
+            exact = float(np.float32(low)) == low
+        return not floats or (exact and abs(low) >= _SMALLEST_RANGE)
+    largest, span = max(abs(low), abs(high)), high - low
+    if floats and not (span >= _SMALLEST_RANGE and largest <= _LARGEST_SCALAR):
+        return False
+    return largest <= _MOST_RANGES[interpolation] * span
+
+
+def compensation(media: float) -> dict[str, int]:
+    """Return the ``-D COMPENSATED`` of kernels whose rays may meet so many media, if any."""
+    if media <= MANY_MEDIA:
+        return {}
+    return {"COMPENSATED": 1 if media <= VERY_MANY_MEDIA else 2}
+
+
+def held_unit_distance(unit_distance: float, sample_distance: float) -> float:
+    """Return an opacity unit distance by which no step's optical depth leaves float32.
+
+    What is denser is as opaque, and what is thinner is as transparent.
+    """
+    return min(max(unit_distance, sample_distance / _LARGEST_STEP), sample_distance * _LARGEST_STEP)

@@ -1,0 +1,39 @@
+"""That the suite would notice an output that is not finite."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from extreme_scenes import WINDOW, field_volume, transfer, view
+
+from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.raycast import render_vdi
+
+pytestmark = pytest.mark.extremes
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_an_image_that_is_not_finite_fails_whatever_test_drew_it(runtime, value):
+    with runtime.buffer((3, 4, 4), name="image") as image:
+        values = np.zeros((3, 4, 4), np.float32)
+        values[1, 2, 3] = value
+        runtime.write(image, values)
+        with pytest.raises(AssertionError, match=r"1 of 48 values of 'image' .* at \(1, 2, 3\)"):
+            runtime.download(image)
+
+
+def test_images_and_vdis_pass_through_it(runtime, monkeypatch):
+    """The names that are looked for are those that the engine gives."""
+    seen = set()
+    download = type(runtime).download
+
+    def noting(self, buffer, *args, **kwargs):
+        seen.add(buffer.name)
+        return download(self, buffer, *args, **kwargs)
+
+    monkeypatch.setattr(type(runtime), "download", noting)
+    volume = field_volume()
+    vdi = generate_vdi(volume, view(volume), WINDOW, transfer(), device=runtime)
+    render_vdi(vdi, view(volume), device=runtime)
+    expected = {"image", "front depths", "back depths", "supersegment colours", "optical depths"}
+    assert expected <= seen

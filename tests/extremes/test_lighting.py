@@ -1,0 +1,166 @@
+"""Shading, gradient opacity and RGBA at the extremes of worlds and of scalars."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from extreme_scenes import FIELD, check_scene, field_volume, transfer, turned, view
+
+from pyvista_vdi import Light, Lights, Shading
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.volume import Volume
+
+pytestmark = pytest.mark.extremes
+
+SHINY = Shading(0.2, 0.6, 0.5, 30.0)
+LOOKS = {
+    "shaded": {"shading": SHINY},
+    "gradient": {"gradient_opacities": [0.0, 0.1, 0.8, 1.0], "gradient_range": (0.02, 0.25)},
+}
+LOOKS["both"] = {**LOOKS["shaded"], **LOOKS["gradient"]}
+
+
+def scaled_look(look, scale):
+    """The same look of scalars that are ``scale`` times as large."""
+    options = dict(LOOKS[look])
+    if "gradient_range" in options:
+        options["gradient_range"] = tuple(scale * end for end in options["gradient_range"])
+    return options
+
+
+def lamps(volume):
+    """A spotlight, a camera light and a scene light at the volume's own scale."""
+    centre = np.reshape(volume.bounds, (3, 2)).mean(axis=1)
+    reach = volume.length
+    return Lights(
+        (
+            Light(
+                "scene",
+                centre + reach * np.array([1, 2, 3]),
+                centre,
+                positional=True,
+                cone_angle=60,
+                attenuation=(1, 0.1 / reach, 0.01 / reach**2),
+                diffuse=(0.5, 0.4, 0.3),
+            ),
+            Light("camera", (1, 0.5, 0.2), (0, 0, 0), diffuse=(0.3, 0.5, 0.2)),
+            Light("scene", centre + reach, centre, diffuse=(0.2, 0.2, 0.4)),
+        )
+    )
+
+
+def check(runtime, worst, volume, function, lights=None, **options):
+    camera = view(volume, zoom=options.pop("zoom", False))
+    views = turned(camera, volume, (0, 8))
+    check_scene(runtime, worst, volume, function, camera, views, lights=lights, **options)
+
+
+WORLDS = [(1e-9, 0), (1e9, 0), (1, 1e7), (1e-9, 1e7), (1e9, 1e7)]
+QUICK = {(1e-9, 1e7), (1e9, 1e7)}
+
+
+@pytest.mark.parametrize("look", LOOKS)
+@pytest.mark.parametrize("lit_by", ["headlight", "lamps"])
+@pytest.mark.parametrize(
+    ("scale", "offset"),
+    [pytest.param(*w, marks=() if w in QUICK else pytest.mark.slow) for w in WORLDS],
+)
+def test_worlds(runtime, worst, scale, offset, lit_by, look):
+    if look == "gradient" and lit_by == "lamps":
+        pytest.skip("lights do nothing without shading")
+    volume = field_volume(scale, offset)
+    function = transfer(unit_distance=scale, **LOOKS[look])
+    check(runtime, worst, volume, function, None if lit_by == "headlight" else lamps(volume))
+
+
+@pytest.mark.parametrize("look", LOOKS)
+@pytest.mark.parametrize("spacing", [(1, 1, 1000), (1000, 1, 1), (1, 0.001, 1)], ids=str)
+def test_anisotropy(runtime, worst, spacing, look):
+    """Normals are transformed as normals: those of a needle or of a plate."""
+    volume = field_volume(spacing)
+    function = transfer(unit_distance=5 * min(spacing), **LOOKS[look])
+    # Positions are uncertain by 16 roundings of some thousand voxels (docs/numerics.md), where a
+    # table of gradient opacities or a highlight changes by half in a voxel: measured 2.6e-4
+    check(runtime, worst, volume, function, zoom=True, least_drawn=1, bound=5e-4)
+
+
+SCALES = (1e-45, 1e-40, 1e-30, 1e-24, 1e-20, 1e20, 1e30, 3e38)
+
+
+@pytest.mark.parametrize("look", LOOKS)
+@pytest.mark.parametrize(
+    "scale",
+    [
+        s if s in (1e-40, 1e-24, 3e38) else pytest.param(s, marks=pytest.mark.slow)
+        for s in SCALES[1:]
+    ],
+)
+def test_gradients_from_denormal_to_huge(runtime, worst, scale, look):
+    """Gradients whose squares float32 does not hold: densities in kg/m3, or counts of atoms."""
+    volume = Volume((FIELD * scale).astype(np.float32))
+    function = transfer(0, scale, **scaled_look(look, scale))
+    check(runtime, worst, volume, function, lamps(volume))
+
+
+@pytest.mark.parametrize("attenuation", [(0, 0, 1), (0, 0, 1e30), (1e-38, 0, 0)], ids=str)
+def test_a_light_inside_the_volume(runtime, worst, attenuation):
+    """Strengths from nothing to beyond float32, at a sample's very place."""
+    volume = field_volume()
+    centre = np.reshape(volume.bounds, (3, 2)).mean(axis=1)
+    bulb = Light(
+        "scene", centre, centre + 1, positional=True, attenuation=attenuation, cone_angle=180,
+        diffuse=(1, 0, 0.5), specular=(0, 1, 0),
+    )  # fmt: skip
+    # Two-sided: a sample whose normal is across the light jumps from none to all of it
+    check(runtime, worst, volume, transfer(shading=SHINY), Lights((bulb,)))
+
+
+@pytest.mark.parametrize("look", ["plain", *LOOKS])
+@pytest.mark.parametrize(
+    ("scale", "offset"), [(1e-9, 1e7), pytest.param(1e9, 1e7, marks=pytest.mark.slow)]
+)
+def test_rgba(runtime, worst, scale, offset, look):
+    colors = [FIELD, 1 - FIELD, np.roll(FIELD, 3), FIELD]
+    rgba = np.round(np.stack(colors, axis=-1) * 255).astype(np.uint8)
+    own = field_volume(scale, offset)
+    volume = Volume(rgba, own.spacing, own.origin)
+    options = {} if look == "plain" else scaled_look(look, 255)
+    check(runtime, worst, volume, transfer(0, 255, unit_distance=scale, **options))
+
+
+def test_rgba_of_one_opacity(runtime, worst):
+    """A table over a single scalar, or over less than one: colours stay the bytes that they are."""
+    rgba = np.full((4, 4, 4, 4), 200, np.uint8)
+    rgba[..., 0] = np.arange(64).reshape(4, 4, 4) * 4
+    for low, high in ((199.0, 199.0), (199.9, 200.1)):
+        function = transfer(low, high, unit_distance=2.0)
+        check(runtime, worst, Volume(rgba), function)
+
+
+@pytest.mark.parametrize("power", [0.0, 1e-3, 1e3, 1e6])
+def test_highlights(runtime, worst, power):
+    """From everywhere to a point: a cosine's rounding is raised to the power with it."""
+    volume = field_volume()
+    shading = Shading(0.1, 0.5, 1.0, power)
+    # pow(c, p) of a cosine within 8 roundings: p 8 2^-24 of it, and no cosine is that near to 1
+    bound = 5e-5 if power <= 1e3 else 8 * power * 2.0**-24
+    check(runtime, worst, volume, transfer(shading=shading), bound=bound)
+
+
+@pytest.mark.parametrize(
+    ("parallel", "two_sided"), list(itertools.product([False, True], repeat=2))
+)
+def test_an_eye_in_the_shaded_volume(runtime, worst, parallel, two_sided):
+    volume = field_volume()
+    centre = np.reshape(volume.bounds, (3, 2)).mean(axis=1)
+    camera = Camera(
+        centre, centre + np.array([0, 0.1, 1]), (0, 1, 0), view_angle=90,
+        parallel_projection=parallel, parallel_scale=4.0,
+    )  # fmt: skip
+    function = transfer(shading=SHINY)
+    lights = Lights(two_sided=two_sided)
+    check_scene(
+        runtime, worst, volume, function, camera, [camera, camera.azimuth(20)], lights=lights
+    )

@@ -1,0 +1,240 @@
+"""Opacity, extinction and transfer functions; rounding that accumulates along a ray."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from extreme_scenes import (
+    BOUND,
+    FIELD,
+    WINDOW,
+    check_scene,
+    check_views,
+    field_volume,
+    slabs_vdi,
+    transfer,
+    turned,
+    view,
+)
+
+from pyvista_vdi import reference
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.compositing import composite
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.joint import render_vdis
+from pyvista_vdi.numerics import MANY_MEDIA, MOST_STEPS, VERY_MANY_MEDIA
+from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.transfer_function import TransferFunction
+from pyvista_vdi.volume import Volume
+
+pytestmark = pytest.mark.extremes
+
+UNITS = (1e-8, 1e-4, 1.0, 1e4, 1e8)
+OPACITIES = (1e-7, 0.5, 1 - 2.0**-24, 1.0)
+QUICK = {(1e-8, 1e-7), (1e-8, 1.0), (1.0, 1 - 2.0**-24), (1e8, 0.5), (1.0, 1e-7)}
+
+
+@pytest.mark.parametrize(
+    ("unit", "opacity"),
+    [
+        pytest.param(*case, marks=() if case in QUICK else pytest.mark.slow)
+        for case in itertools.product(UNITS, OPACITIES)
+    ],
+)
+def test_unit_distance_and_opacity(runtime, worst, unit, opacity):
+    """Unit distances per extent, and extinctions with them; opacities from hardly any to all."""
+    volume = field_volume()
+    function = transfer(unit_distance=unit * volume.length, opacity=opacity)
+    camera = view(volume)
+    # Even what is nearly nothing is there to a few digits: below 2^-25 alpha alone would be 0
+    drawn = 0 if opacity / unit < 1e-6 or unit > 1 else 3
+    bound = None if opacity / unit > 10 else BOUND  # what is opaque at once shows each rounding
+    check_scene(
+        runtime,
+        worst,
+        volume,
+        function,
+        camera,
+        turned(camera, volume, (0, 25, 180)),
+        bound=bound,
+        least_drawn=drawn,
+    )
+
+
+@pytest.mark.parametrize("unit", [1e-300, 1e-45, 1e-30, 1e30, 1e300])
+def test_unit_distances_beyond_float32(runtime, unit):
+    """As opaque, or as transparent, as those that it holds."""
+    volume = field_volume()
+    camera = view(volume)
+    held = 1e-20 if unit < 1 else 1e20
+    images = [
+        render_vdi(
+            generate_vdi(volume, camera, WINDOW, transfer(unit_distance=u), device=runtime),
+            camera,
+            device=runtime,
+        )
+        for u in (unit, held)
+    ]
+    np.testing.assert_allclose(*images, atol=1e-6)
+    assert images[0][..., 3].max() == (1.0 if unit < 1 else pytest.approx(0.0, abs=1e-6))
+
+
+@pytest.mark.parametrize("optical_depth", [1e-7, 1.0, 30.0, 1e6, 3e38])
+def test_optical_depth_of_one_supersegment(runtime, worst, optical_depth):
+    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=16)
+    bounds = (-1, 1, -1, 1, -1, 1)
+    vdi = slabs_vdi(camera, [[9.3, 10.4]], optical_depth, window=(3, 3), bounds=bounds)
+    views = [camera, camera.azimuth(40), camera.azimuth(90), camera.azimuth(180)]
+    check_views(runtime, worst, vdi, views)
+
+
+# -- transfer functions ----------------------------------------------------------------------------
+
+
+def table(kind):
+    """A table of 33 opacities over 0..1 and what to draw with it."""
+    opacities = np.zeros(33)
+    if kind == "one entry":
+        opacities[17] = 0.9
+    elif kind == "step at a bin edge":
+        opacities[17:] = 0.7
+    elif kind == "all one":
+        opacities[:] = 1.0
+    shares = np.linspace(0, 1, 33)
+    colors = np.stack([shares, 1 - shares, 0.5 + 0 * shares], axis=1)
+    return lambda interpolation: TransferFunction(
+        colors, opacities, (0, 1), unit_distance=1.0, interpolation=interpolation
+    )
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
+@pytest.mark.parametrize("kind", ["one entry", "step at a bin edge", "all zero", "all one"])
+def test_transfer_functions(runtime, worst, kind, interpolation):
+    # Whole multiples of a bin: nearest samples lie exactly on its edges
+    field = np.round(FIELD * 32) / 32 if interpolation == "nearest" else FIELD
+    volume = Volume(field.astype(np.float32))
+    camera = view(volume)
+    function = table(kind)(interpolation)
+    if kind == "all zero":
+        assert not raycast_volume(volume, camera, WINDOW, function, device=runtime).any()
+        assert generate_vdi(volume, camera, WINDOW, function, device=runtime).n_supersegments == 0
+        return
+    views = turned(camera, volume, (0, 25, 180))
+    check_scene(runtime, worst, volume, function, camera, views, bound=None)
+
+
+# -- accumulated rounding --------------------------------------------------------------------------
+
+EYE = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=10)
+BOUNDS = (-1, 1, -1, 1, -1, 1)
+
+
+def crowded(n, optical_depth, camera=EYE, window=(1, 1)):
+    """A VDI of lists of n touching supersegments, from depth 9 to 11."""
+    ends = np.linspace(0, 2, n + 1, dtype=np.float32)
+    faces = np.stack([ends[:-1], ends[1:]], axis=1)
+    return slabs_vdi(camera, faces, optical_depth, window=window, bounds=BOUNDS, depth_origin=9.0)
+
+
+@pytest.mark.parametrize("optical_depth", [2e-8, 2.6e-8, 1e-6, 1e-5, 2e-4])
+@pytest.mark.parametrize("n", [4096, pytest.param(100_000, marks=pytest.mark.slow)])
+def test_thousands_of_nearly_transparent_supersegments(runtime, worst, n, optical_depth):
+    """Up to 8192, what is faint keeps its digits; beyond, sums are as exact as one addition.
+
+    Each crossing's optical depth has some 10 roundings of its own, which change it by less than
+    the opacity is large.
+    """
+    vdi = crowded(n, optical_depth)
+    exact = reference.render(vdi, EYE)[0, 0]
+    image = render_vdi(vdi, EYE, device=runtime)[0, 0]
+    error = np.abs(image - exact).max()
+    worst(f"{n} supersegments", error)
+    # An addition to an opacity A rounds by A 2^-24, and so do transmittance and what it weights
+    assert error <= (14 + (2 * n * exact[3] if n <= VERY_MANY_MEDIA else 0)) * 2.0**-24
+    assert error <= 2e-6
+
+
+@pytest.mark.parametrize("border", [MANY_MEDIA, VERY_MANY_MEDIA])
+def test_sums_at_the_border_of_their_choice(runtime, worst, border):
+    """As many media as are summed up one way, and one more: both are within their bounds."""
+    n = border - 2  # and a window of 1 x 1
+    for optical_depth in (2e-8, 1e-6, 1e-4):
+        errors = []
+        for count in (n, n + 1):
+            vdi = crowded(count, optical_depth)
+            exact = reference.render(vdi, EYE)[0, 0]
+            image = render_vdi(vdi, EYE, device=runtime)[0, 0]
+            errors.append(np.abs(image - exact).max())
+        worst(f"{n} supersegments", errors[0])
+        worst(f"{n + 1} supersegments", errors[1])
+        assert max(errors) <= BOUND
+        # Half a unit in the last place of 1 per supersegment; and what a crossing is rounded by
+        assert border != MANY_MEDIA or errors[0] <= (n + 14) * 2.0**-25
+        assert errors[1] <= (14 + (2 * n * exact[3] if border == MANY_MEDIA else 0)) * 2.0**-24
+
+
+@pytest.mark.parametrize("lists", [960, 2048, 8192])
+def test_rays_across_thousands_of_lists(runtime, worst, lists):
+    """A faint medium seen from the side: as many crossings as the window is wide."""
+    camera = EYE.replace(parallel_projection=True, parallel_scale=3 / lists)
+    vdi = slabs_vdi(camera, [[0.0, 2.0]], 2e-4, window=(lists, 3), bounds=BOUNDS, depth_origin=9.0)
+    beside = Camera(
+        (10, 0, 0), (0, 0, 0), (0, 1, 0), parallel_projection=True, parallel_scale=1 / lists
+    )
+    image = render_vdi(vdi, beside, (1, 1), device=runtime)
+    # Two model units of a medium whose optical depth is 2e-4 in two units
+    exact = -np.expm1(-2e-4) * np.array([0.2, 0.5, 0.8, 1.0])
+    error = np.abs(image[0, 0] - exact).max()
+    worst(f"{lists} lists", error)
+    assert error <= (lists + 14) * 2.0**-25 if lists < MANY_MEDIA else 20 * 2.0**-24
+
+
+def test_several_vdis_of_nearly_transparent_supersegments(runtime, worst):
+    """Their segments are merged and summed up in another kernel."""
+    vdis = [crowded(3000, 2e-8), crowded(2999, 2e-8)]
+    image = render_vdis(vdis, EYE, (1, 1), device=runtime)[0, 0]
+    exact = -np.expm1(-5999 * np.float64(np.float32(2e-8))) * np.array([0.2, 0.5, 0.8, 1.0])
+    error = np.abs(image - exact).max()
+    worst("5999 supersegments", error)
+    # A piece of one may be as short as a rounding of its ends, and its share of tau is as uncertain
+    assert error <= 2e-6
+
+
+@pytest.mark.parametrize("opacity", [1e-6, 0.01, 0.5, 0.9])
+@pytest.mark.parametrize(
+    "steps", [1000, 8000, 10_000, pytest.param(MOST_STEPS, marks=pytest.mark.slow)]
+)
+def test_very_many_steps_through_a_constant_volume(runtime, worst, steps, opacity):
+    """Closed form: the opacity of a slab is what the table says, however it is cut."""
+    volume = Volume(np.full((3, 3, 3), 0.5, np.float32))
+    camera = Camera((1, 1, 10), (1, 1, 1), (0, 1, 0), view_angle=5)
+    color = np.float32(0.7)
+    function = TransferFunction(
+        [[color] * 3] * 2, [opacity] * 2, (0, 1), unit_distance=2.0, interpolation="linear"
+    )
+    step = max(2.0 / steps, volume.length / MOST_STEPS)
+    exact = float(np.float32(opacity)) * np.array([color, color, color, 1.0])
+    image = raycast_volume(volume, camera, (1, 1), function, sample_distance=step, device=runtime)
+    worst("volume", np.abs(image - exact).max())
+    vdi = generate_vdi(volume, camera, (1, 1), function, sample_distance=step, device=runtime)
+    seen = composite(vdi.color, vdi.optical_depth)
+    worst("VDI", np.abs(seen - exact).max())
+    assert np.abs(image - exact).max() <= BOUND
+    assert np.abs(seen - exact).max() <= BOUND
+
+
+def test_more_steps_than_float32_sums_up_are_refused(runtime):
+    volume = field_volume()
+    with pytest.raises(InvalidArgumentError, match=r"at least .*2\^-19 of the volume"):
+        generate_vdi(
+            volume,
+            view(volume),
+            WINDOW,
+            transfer(),
+            sample_distance=volume.length / MOST_STEPS * 0.99,
+            device=runtime,
+        )

@@ -1,0 +1,173 @@
+"""VDIs: budgets, windows, and lists that only another program would make."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from extreme_scenes import WINDOW, check_views, field_volume, slabs_vdi, transfer, turned, view
+
+from pyvista_vdi import reference
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.vdi import VDI
+from pyvista_vdi.volume import Volume
+
+pytestmark = pytest.mark.extremes
+
+EYE = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=16)
+BOUNDS = (-1, 1, -1, 1, -1, 1)
+AROUND = [EYE, EYE.azimuth(30), EYE.azimuth(90), EYE.azimuth(180), EYE.elevation(90 - 1e-3)]
+
+
+@pytest.mark.parametrize("budget", [1, 2, 255, 4096])
+def test_budgets(runtime, worst, budget):
+    """N_S from one to the most; noise whose every sample would be a supersegment of its own."""
+    points = 12 if budget < 100 else 512
+    volume = Volume(np.random.default_rng(budget).random((points, 8, 8)).astype(np.float32))
+    camera = view(volume, 0.5, 0.3, zoom=True)
+    window = WINDOW if budget < 100 else (3, 1)
+    step = 0.5 if budget < 4096 else 0.1
+    scene = (volume, camera, window, transfer(unit_distance=30.0, interpolation="nearest"))
+    vdi = generate_vdi(*scene, max_supersegments=budget, sample_distance=step, device=runtime)
+    assert 0 < vdi.counts.max() <= budget
+    # Nearest samples of noise: at most a supersegment a voxel crossed
+    assert vdi.counts.max() == budget or budget == 4096
+    views = [camera, camera.azimuth(5), camera.azimuth(180)]
+    check_views(runtime, worst, vdi, views, size=window, least_drawn=1)
+
+
+def test_4096_supersegments_in_every_list(runtime, worst):
+    """From views of all sides; a list is full, and nothing of it is dropped.
+
+    None is thinner than 80 units in the last place of its depth: how much of a thinner one a ray
+    crosses is a matter of the rounding of each single face.
+    """
+    rng = np.random.default_rng(1)
+    grid = np.linspace(0, 2, 4097)
+    ends = np.stack([grid[:-1], grid[1:]], axis=1) + rng.uniform(0, 1, (4096, 2)) * [2e-4, -2e-4]
+    color = rng.random((len(ends), 3))
+    vdi = slabs_vdi(
+        EYE, ends, rng.uniform(0, 2e-3, len(ends)), window=(3, 2), bounds=BOUNDS,
+        depth_origin=9.0, color=color,
+    )  # fmt: skip
+    check_views(runtime, worst, vdi, AROUND, size=(5, 3))
+
+
+@pytest.mark.parametrize("window", [(1, 1), (1, 7), (7, 1)], ids=str)
+def test_one_list_and_one_row(runtime, worst, window):
+    vdi = slabs_vdi(EYE, [[9.2, 9.9], [9.9, 10.6]], [0.5, 1.0], window=window, bounds=BOUNDS)
+    check_views(runtime, worst, vdi, AROUND, size=(5, 4), least_drawn=1)
+
+
+def test_empty_vdis(runtime):
+    vdi = slabs_vdi(EYE, np.empty((0, 2)), [], window=(4, 3), bounds=BOUNDS, color=np.empty((0, 3)))
+    for camera in AROUND:
+        assert not render_vdi(vdi, camera, (5, 4), device=runtime).any()
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_touching_supersegments_leave_no_gap(runtime, worst, parallel):
+    """A hundred that touch are one: where each ends the next begins, to the last bit."""
+    camera = EYE.replace(parallel_projection=parallel)
+    ends = np.linspace(0, 2, 101, dtype=np.float32)
+    vdi = slabs_vdi(
+        camera, np.stack([ends[:-1], ends[1:]], axis=1), 0.02, window=(4, 3), bounds=BOUNDS,
+        depth_origin=9.0,
+    )  # fmt: skip
+    one = slabs_vdi(camera, [[0, 2]], 2.0, window=(4, 3), bounds=BOUNDS, depth_origin=9.0)
+    for new in AROUND:
+        check_views(runtime, worst, vdi, [new])
+        images = [render_vdi(each, new, WINDOW, device=runtime) for each in (vdi, one)]
+        # Thicknesses are those of stored depths, each rounded by 2^-23: 1e-5 of a fiftieth
+        np.testing.assert_allclose(*images, atol=2e-5)
+
+
+@pytest.mark.parametrize("origin", [9.0, 0.0])
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize(
+    "optical_depth",
+    [
+        1.0,
+        3e38,
+        pytest.param(1e-6, marks=pytest.mark.slow),
+        pytest.param(1e6, marks=pytest.mark.slow),
+    ],
+)
+def test_supersegments_one_ulp_thick(runtime, worst, optical_depth, origin, parallel):
+    """From a denormal number thick: within what rounding of its faces makes of it, and finite."""
+    camera = EYE.replace(parallel_projection=parallel)
+    for depth in (0.0, 1e-40, 0.5, 1.5):
+        front = np.float32(9.0 - origin + depth)
+        back = np.nextafter(front, np.float32(99))
+        vdi = VDI(
+            camera, (3, 3), np.arange(10), [front] * 9, [back] * 9, [[0.3, 0.5, 0.7]] * 9,
+            [optical_depth] * 9, BOUNDS, depth_origin=origin,
+        )  # fmt: skip
+        check_views(runtime, worst, vdi, AROUND, size=(3, 3), least_drawn=0)
+
+
+def test_faces_beyond_everything(runtime, worst):
+    """Depths as large as float32 holds: what is in the bounds counts."""
+    faces = [[0.0, 0.5], [0.5, 3e38]]
+    vdi = slabs_vdi(EYE, faces, [1.0, 3e38], window=(3, 3), bounds=BOUNDS, depth_origin=9.0)
+    check_views(runtime, worst, vdi, AROUND, size=(3, 3))
+    camera = EYE.replace(parallel_projection=True)
+    faces = [[-3e38, -1e38], [-1e38, 0.5], [0.5, 3e38]]
+    vdi = slabs_vdi(camera, faces, [1.0, 3e38, 3e38], window=(3, 3), bounds=BOUNDS)
+    check_views(runtime, worst, vdi, AROUND, size=(3, 3), least_drawn=0)
+
+
+def large_vdi(width, height):
+    """One supersegment in every 16th list, its depth and colour those of its place."""
+    lists = np.arange(0, width * height, 16)
+    n = len(lists)
+    counts = np.zeros(width * height, np.uint64)
+    counts[lists] = 1
+    x, y = lists % width / width, lists // width / height
+    front = (0.3 + x + 0.3 * y).astype(np.float32)
+    return VDI(
+        Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=11.4),
+        (width, height),
+        np.concatenate([[0], np.cumsum(counts)]).astype(np.uint64),
+        front,
+        front + np.float32(0.2),
+        np.stack([x, y, np.full(n, 0.5)], axis=1).astype(np.float32),
+        np.full(n, 2.0, np.float32),
+        (-2.5, 2.5, -1.5, 1.5, -1, 1),
+        depth_origin=9.0,
+    )
+
+
+@pytest.mark.slow
+def test_8192_by_4320_lists(runtime, worst):
+    """From V_O all of them against the list itself; turned, through a small window."""
+    width, height = 8192, 4320
+    vdi = large_vdi(width, height)
+    image = render_vdi(vdi, vdi.camera, device=runtime)[::-1]
+    drawn = image.reshape(-1, 4)[::16]
+    x, y = np.divmod(np.arange(0, width * height, 16), width)[::-1]
+    expected = -np.expm1(-2.0) * np.stack([x / width, y / height, 0 * x + 0.5], axis=1)
+    error = np.abs(drawn[:, :3] - expected).max()
+    worst("8192 x 4320 from V_O", error)
+    assert error <= 2e-5
+    assert not image.reshape(-1, 4)[8::16].any()
+    # The oracle looks at every list of a row: a few pixels
+    for camera in (vdi.camera.azimuth(0.3), vdi.camera.azimuth(60)):
+        size = (3, 2)
+        image = render_vdi(vdi, camera, size, device=runtime)
+        pixels = [(x, size[1] - 1 - row) for row in range(size[1]) for x in range(size[0])]
+        low, high = reference.render_range(vdi, camera, size, pixels)
+        drawn = image.reshape(-1, 4)
+        assert drawn[:, 3].max() > 0
+        worst("8192 x 4320 turned", np.maximum(low - drawn, drawn - high).max())
+        assert ((drawn >= low - 2e-5) & (drawn <= high + 2e-5)).all()
+
+
+def test_a_generated_vdi_in_every_list_state(runtime, worst):
+    """Seen from everywhere, a VDI whose lists go from empty to full."""
+    volume = field_volume()
+    vdi = generate_vdi(
+        volume, view(volume), WINDOW, transfer(opacity=0.9), max_supersegments=3, device=runtime
+    )
+    check_views(runtime, worst, vdi, turned(view(volume), volume))

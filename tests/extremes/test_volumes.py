@@ -1,0 +1,249 @@
+"""Volumes: the smallest, the largest, every voxel type's extremes, scalars far from zero."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from extreme_scenes import (
+    BOUND,
+    FIELD,
+    WINDOW,
+    check_scene,
+    check_views,
+    derived_bound,
+    field_volume,
+    transfer,
+    turned,
+    view,
+)
+
+from pyvista_vdi import reference
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.device_volume import DeviceVolume
+from pyvista_vdi.errors import DeviceMemoryError, InvalidVolumeError
+from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.numerics import scalars_suit_float32
+from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.shading import GRADIENT_SHARE
+from pyvista_vdi.transfer_function import TransferFunction
+from pyvista_vdi.volume import Volume
+
+pytestmark = pytest.mark.extremes
+
+
+def check(runtime, worst, volume, function, views=(0, 90), **options):
+    camera = view(volume)
+    return check_scene(
+        runtime, worst, volume, function, camera, turned(camera, volume, views), **options
+    )
+
+
+# -- sizes -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "shape", [(2, 2, 2), (2, 9, 9), (9, 2, 9), (9, 9, 2), (2, 2, 300)], ids=str
+)
+def test_the_smallest_volumes(runtime, worst, shape):
+    """One cell, one cell thick along each axis, a row of cells."""
+    field = np.random.default_rng(shape).random(shape).astype(np.float32)
+    volume = Volume(field)
+    camera = view(volume, zoom=True)
+    views = turned(camera, volume, (0, 8), zoom=True)
+    check_scene(runtime, worst, volume, transfer(), camera, views)
+
+
+@pytest.mark.parametrize("shape", [(1, 5, 5), (5, 1, 5), (5, 5, 1), (1, 1, 9), (1, 1, 1)], ids=str)
+def test_one_plane_of_points_is_refused(shape):
+    with pytest.raises(InvalidVolumeError, match="at least two points along each axis"):
+        Volume(np.zeros(shape, np.uint8))
+
+
+def checkerboard(dtype, low, high):
+    """Nyquist: neighbours differ by the whole range."""
+    return np.where(np.indices(FIELD.shape).sum(axis=0) % 2, low, high).astype(dtype)
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
+@pytest.mark.parametrize("kind", ["constant", "checkerboard"])
+def test_constant_and_checkerboard(runtime, worst, kind, interpolation):
+    array = checkerboard(np.float32, 0, 1) if kind == "checkerboard" else np.full((5, 6, 7), 0.6)
+    volume = Volume(array.astype(np.float32))
+    function = transfer(interpolation=interpolation)
+    # A nearest sample within rounding of a face between voxels may take either's value
+    bound = None if kind == "checkerboard" and interpolation == "nearest" else BOUND
+    check(runtime, worst, volume, function, bound=bound)
+
+
+# -- scalars ---------------------------------------------------------------------------------------
+
+SCALARS = {
+    "int16 negative": ((FIELD - 1) * 30000, "int16", -30000, -100),
+    "int16 full range": ((FIELD - 0.5) * 65535, "int16", -32768, 32767),
+    "uint16 full range": (FIELD * 65535, "uint16", 0, 65535),
+    "int8": ((FIELD - 0.5) * 255, "int8", -128, 127),
+    "int32 full range": ((FIELD - 0.5) * 4.2e9, "int32", -(2**31), 2**31 - 1),
+    "uint32 full range": (FIELD * 4.2e9, "uint32", 0, 2**32 - 1),
+    "uint16 narrow": (60000 + FIELD * 100, "uint16", 60000, 60100),
+    "uint16 between values": (60000 + FIELD * 100, "uint16", 60000.3, 60002.7),
+    "float32 smallest": (FIELD * 1e-40, "float32", 0, 1e-40),
+    "float32 one denormal": (FIELD * 1.4e-44, "float32", 0, 1.4e-44),
+    "float32 small": (FIELD * 1e-30, "float32", 0, 1e-30),
+    "float32 largest": (FIELD * 3e38, "float32", 0, 3e38),
+    "float32 both ends": ((FIELD - 0.5) * 6.7e38, "float32", -3.35e38, 3.35e38),
+    "float32 far from zero": (1e5 + FIELD, "float32", 1e5, 1e5 + 1),
+    "float32 a Kelvin": (300 + FIELD * 0.02, "float32", 300.001, 300.019),
+    "float64 far from zero": (1e9 + FIELD, "float64", 1e9, 1e9 + 1),
+    "float64 smallest": (FIELD * 1e-300, "float64", 0, 1e-300),
+    "float64 largest": (FIELD * 1e300, "float64", 0, 1e300),
+}
+
+
+@pytest.mark.parametrize("name", SCALARS)
+def test_scalars(runtime, worst, name):
+    """Every type's whole range, and ranges that float32 has few digits for."""
+    values, dtype, low, high = SCALARS[name]
+    volume = Volume(np.round(values).astype(dtype) if dtype[0] in "ui" else values.astype(dtype))
+    check(runtime, worst, volume, transfer(low, high))
+
+
+def outlying(dtype, value):
+    array = FIELD.astype(dtype)
+    array.ravel()[::11] = value
+    return Volume(array)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
+@pytest.mark.parametrize(
+    "value", [np.nan, np.inf, -np.inf, -3.4e38, 3.4e38, 1e300, -1e300], ids=str
+)
+def test_voxels_that_are_not_numbers_or_no_data(runtime, worst, value, interpolation, dtype):
+    """NaN is transparent, infinite is the end of the table; and so is what marks missing data."""
+    if abs(value) == 1e300 and dtype == "float32":
+        pytest.skip("float32 holds no 1e300")
+    array = FIELD.astype(dtype)
+    # Few, so that linear sampling, where NaN spreads to its cells, leaves something
+    array[2:4, 3:5, 5:7] = value
+    volume = Volume(array)
+    bound = None if interpolation == "nearest" else BOUND
+    function = transfer(interpolation=interpolation)
+    camera = view(volume)
+    if np.isinf(value) and interpolation == "linear":
+        # Between a finite and an infinite voxel there is no value; either way it is finite colour
+        assert np.isfinite(raycast_volume(volume, camera, WINDOW, function, device=runtime)).all()
+        vdi = generate_vdi(volume, camera, WINDOW, function, device=runtime)
+        assert np.isfinite(render_vdi(vdi, camera.azimuth(90), device=runtime)).all()
+        return
+    if bound is None and not np.isfinite(value):
+        bound = BOUND
+    check(runtime, worst, volume, function, bound=bound)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64", "uint8", "int32"])
+@pytest.mark.parametrize("at", [0.1, 0.0, 7.0])
+def test_a_range_of_one_scalar(runtime, worst, at, dtype):
+    """At or below it the first entry holds, above it the last: also where float32 rounds it."""
+    array = np.array([np.nextafter(np.float32(at), -9), at, np.nextafter(np.float32(at), 9)])
+    if np.dtype(dtype).kind != "f":
+        array = np.array([0, 5, 9])
+    cube = np.broadcast_to(array[:, None, None], (3, 3, 3)).astype(dtype)
+    function = TransferFunction(
+        [[1, 0, 0], [0, 1, 0]], [0.2, 0.6], (at, at), unit_distance=1.0, interpolation="nearest"
+    )
+    check(runtime, worst, Volume(cube), function)
+
+
+@pytest.mark.parametrize(("factor", "suits"), [(0.999, True), (1.001, False)])
+@pytest.mark.parametrize(("interpolation", "most"), [("linear", 64), ("nearest", 576)])
+def test_scalars_at_the_border_of_being_taken_relative(
+    runtime, worst, interpolation, most, factor, suits
+):
+    """As they are, or relative to the range on the host: within the bound on both sides."""
+    high = most * factor
+    low = high - 1.0
+    assert scalars_suit_float32(low, high, np.float32, interpolation) is suits
+    volume = Volume((low + FIELD).astype(np.float32))
+    function = transfer(low, high, interpolation=interpolation)
+    medium = DeviceVolume(runtime, volume, function)
+    assert (medium._low == 0.0) is not suits
+    check(runtime, worst, volume, function, bound=BOUND if interpolation == "linear" else None)
+
+
+# -- very many voxels ------------------------------------------------------------------------------
+
+
+def far_corner(planes, dtype=np.uint8):
+    """A volume of 1024 x 1024 points a plane whose last two planes are not transparent."""
+    array = np.zeros((planes, 1024, 1024), dtype)
+    array[-2:, 400:600, 400:600] = 200
+    return Volume(array)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "planes", [1024, 2**11 + 8, 2**12 + 8], ids=["1024 cubed", "over 2^31", "over 2^32"]
+)
+@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
+def test_very_many_voxels(runtime, worst, planes, interpolation):
+    """Addresses beyond 31 and 32 bits: what is there must be seen, and nothing else."""
+    volume = far_corner(planes)
+    function = TransferFunction(
+        [[0.2, 0.5, 0.8]] * 2, [0, 0.6], (0, 200), unit_distance=2.0, interpolation=interpolation
+    )
+    centre = np.array([500.3, 500.2, planes - 1.5])
+    camera = Camera(centre + np.array([900, 700, 3000]), centre, (0, 1, 0), view_angle=4)
+    try:
+        image = raycast_volume(volume, camera, WINDOW, function, device=runtime)
+    except DeviceMemoryError as error:
+        pytest.skip(str(error))
+    # The same corner alone, with the planes before it left out
+    start = planes - 8
+    part = Volume(volume.array[start:], origin=(0, 0, start))
+    exact = reference.volume_image(part, camera, WINDOW, function)
+    assert exact[..., 3].max() > 0.3
+    error = np.abs(image - exact).max()
+    worst(f"{planes} planes", error)
+    # Rays are formed about the bounds' near depth, up to 4096 voxels away
+    assert error <= max(BOUND, derived_bound(volume, camera, (3, 3), function, None, None))
+    vdi = generate_vdi(volume, camera, WINDOW, function, device=runtime)
+    check_views(runtime, worst, vdi, [camera, camera.azimuth(3)])
+    # Two voxels of medium up to 4096 from where depths are counted: each face is rounded twice
+    seen = render_vdi(vdi, camera, device=runtime)
+    assert np.abs(seen - image).max() <= max(BOUND, 4 * 2.0**-24 * planes)
+
+
+def test_what_one_allocation_does_not_hold_is_refused(runtime, monkeypatch):
+    """Until volumes are split into bricks: the buffer, both sizes, and a remedy."""
+    volume = Volume(np.zeros((256, 64, 64), np.uint8), name="density")
+    monkeypatch.setattr(runtime, "info", replace(runtime.info, max_allocation=2**19))
+    with pytest.raises(
+        DeviceMemoryError,
+        match=r"'density'.* needs 1\.00 MiB .*512\.00 KiB .*per buffer.*use a smaller volume",
+    ):
+        generate_vdi(volume, view(volume), WINDOW, transfer(0, 255), device=runtime)
+
+
+def test_gradients_see_scalars_taken_relative(runtime, worst):
+    """Gradient opacity in scalars, where voxels are scaled because they are far from zero."""
+    volume = Volume((1e4 + FIELD).astype(np.float32))
+    function = transfer(
+        1e4,
+        1e4 + 1,
+        gradient_opacities=[0.0, 0.2, 0.9],
+        gradient_range=(0.0, GRADIENT_SHARE),
+    )
+    check(runtime, worst, volume, function)
+
+
+def test_a_volume_beyond_float32_is_found_once(runtime, monkeypatch):
+    from pyvista_vdi import device_volume
+
+    volume = Volume(((FIELD - 0.5) * 6e38).astype(np.float32))
+    assert device_volume._too_large(runtime, volume)
+    monkeypatch.setattr(device_volume, "_upload", None)
+    assert device_volume._too_large(runtime, volume)
+    assert not device_volume._uploads_of(field_volume()).too_large
