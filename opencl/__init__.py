@@ -29,6 +29,8 @@ Shared functions:
     The ray of a pixel in list space, clipped; model lengths along it.
 ``common/lists.cl``
     Which supersegment of a list a ray meets first (paper, Algorithm 1).
+``common/supersegments.cl``
+    How a list's supersegments are read: as they were made, or packed.
 ``common/occupancy.cl``
     Tiles and slabs of the occupancy grid.
 ``common/segments.cl``
