@@ -261,6 +261,11 @@ class PreparedVDI:
         self._upload(vdi)
 
     @property
+    def list_bytes(self) -> int:
+        """Bytes of the lists on the device: offsets and supersegments."""
+        return sum(buffer.nbytes for buffer in (self._offsets, *self._lists))
+
+    @property
     def defines(self) -> dict[str, str | int | None]:
         """``-D`` names that fix the kernels' shape for this VDI."""
         defines: dict[str, str | int | None] = {

@@ -39,6 +39,7 @@ CORE = {
     "cropping",
     "errors",
     "lighting",
+    "precision",
     "transfer_function",
     "vdi",
     "volume",
