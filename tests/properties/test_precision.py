@@ -112,7 +112,7 @@ def test_the_8_byte_form_is_within_its_bounds(rng):
     for name in ("front", "back"):
         error = np.abs(getattr(form, name).astype(float) - getattr(vdi, name))
         assert (error <= (0.5 + in_list) * quantum + packed.step).all()
-    # A code is the list's extent / 16383, rounded up to whole steps of at most 2^-23 of all depths, nearly
+    # A code is the list's extent / 16383, rounded up to whole steps; those follow from all depths
     if vdi.n_supersegments:
         farthest = max(-float(vdi.front.min()), float(vdi.back.max()))
         assert packed.step <= max(farthest * 2 / (2**24 - 2**15), 2.0**-126)
