@@ -31,6 +31,8 @@ Shared functions:
     Which supersegment of a list a ray meets first (paper, Algorithm 1).
 ``common/over.cl``
     Compositing front to back, with or without carrying what is rounded off.
+``common/supersegments.cl``
+    How a list's supersegments are read: as they were made, or packed.
 ``common/occupancy.cl``
     Tiles and slabs of the occupancy grid.
 ``common/segments.cl``

@@ -19,6 +19,7 @@ from .numerics import compensation
 from .occupancy import OccupancyGrid
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime
 from .picking import DEFAULT_OPACITY, FirstHit
+from .precision import Packed8, Packed16
 from .vdi import VDI
 
 #: A ray ends where less transmittance than this is left: no channel loses more than that.
@@ -27,6 +28,8 @@ TRANSMITTANCE_CUTOFF = 1e-6
 MAX_PREVIEW_SAMPLES = 2**23
 #: Far depth over near depth up to which a lens counts as long, and depth is kept relative.
 _LONG_LENS = 2.0
+#: Pairs of words before the supersegments of an 8-byte list: that of ``common/supersegments.cl``.
+_LIST_HEADER = 2
 
 _prepared: weakref.WeakKeyDictionary[VDI, dict[Runtime, _Preparation]] = weakref.WeakKeyDictionary()
 _lock = threading.Lock()
@@ -258,8 +261,15 @@ class PreparedVDI:
         # A ray that steps from list to list meets about as many as it crosses borders
         self.media = sum(vdi.window_size) + int(vdi.counts.max(initial=0))
         self._list_rows = self._list_space(camera)
-        self._long_offsets = vdi.n_supersegments >= 2**32
+        self._packed = {Packed16: 16, Packed8: 8}.get(type(vdi.packing), 0)
+        headers = _LIST_HEADER * int(np.count_nonzero(vdi.counts)) if self._packed == 8 else 0
+        self._long_offsets = vdi.n_supersegments + headers >= 2**32
         self._upload(vdi)
+
+    @property
+    def list_bytes(self) -> int:
+        """Bytes of the lists on the device: offsets and supersegments."""
+        return sum(buffer.nbytes for buffer in (self._offsets, *self._lists))
 
     @property
     def defines(self) -> dict[str, str | int | None]:
@@ -271,6 +281,8 @@ class PreparedVDI:
             defines["PARALLEL"] = 1
         if self._shifted:
             defines["SHIFTED"] = 1
+        if self._packed:
+            defines["PACKED"] = self._packed
         return defines
 
     def render(
@@ -367,8 +379,7 @@ class PreparedVDI:
         """
         return (
             self._offsets,
-            self._faces,
-            self._media,
+            *self._lists,
             np.int32(self._window[0]),
             np.int32(self._window[1]),
             np.float32(self._depth_origin),
@@ -414,27 +425,63 @@ class PreparedVDI:
         return forms
 
     def _upload(self, vdi: VDI) -> None:
+        """Bring the lists to the device, exact or packed, and build the occupancy grid."""
         runtime = self._runtime
-        n, (wide, high) = vdi.n_supersegments, vdi.window_size
         offset_type = np.uint64 if self._long_offsets else np.uint32
-        self._offsets = runtime.upload(vdi.offsets.astype(offset_type), "list offsets")
-        self._faces = runtime.buffer((n, 2), name="supersegment faces")
-        self._media = runtime.buffer((n, 4), name="supersegment media")
-        # Direction of a centre ray per unit of view depth, in the model frame
-        centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
-        kernel = runtime.kernel("vdi/prepare.cl", "prepare_lists", self.defines)
         with (
             runtime.upload(vdi.front, "front depths") as front,
             runtime.upload(vdi.back, "back depths") as back,
-            runtime.upload(vdi.color, "supersegment colours") as color,
+        ):
+            offsets = runtime.upload(vdi.offsets.astype(offset_type), "list offsets")
+            self.occupancy = OccupancyGrid(
+                runtime,
+                vdi,
+                offsets,
+                front,
+                back,
+                nearest=self._nearest,
+                shifted=self._shifted,
+                long_offsets=self._long_offsets,
+            )
+            if isinstance(vdi.packing, Packed8):
+                runtime.finish()
+                offsets.release()
+                self._offsets, self._lists = self._packed_lists(vdi, vdi.packing, offset_type)
+            else:
+                self._offsets, self._lists = (
+                    offsets,
+                    self._prepared_lists(vdi, offsets, front, back),
+                )
+            runtime.finish()  # the buffers above may be host memory in use
+
+    def _prepared_lists(
+        self, vdi: VDI, offsets: DeviceBuffer, front: DeviceBuffer, back: DeviceBuffer
+    ) -> tuple[DeviceBuffer, ...]:
+        """Return the supersegments with depth coordinates and extinctions, 24 or 16 bytes each."""
+        runtime = self._runtime
+        n, (wide, high) = vdi.n_supersegments, vdi.window_size
+        packed = isinstance(vdi.packing, Packed16)
+        colors = vdi.packing.color if isinstance(vdi.packing, Packed16) else vdi.color
+        lists: tuple[DeviceBuffer, ...]
+        if packed:
+            lists = (runtime.buffer((n, 4), np.uint32, "supersegments"),)
+        else:
+            lists = (
+                runtime.buffer((n, 2), name="supersegment faces"),
+                runtime.buffer((n, 4), name="supersegment media"),
+            )
+        # Direction of a centre ray per unit of view depth, in the model frame
+        centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
+        with (
+            runtime.upload(colors, "supersegment colours") as color,
             runtime.upload(vdi.optical_depth, "optical depths") as optical_depth,
             runtime.upload(centre.astype(np.float32), "centre rays") as directions,
         ):
             runtime.launch(
-                kernel,
+                runtime.kernel("vdi/prepare.cl", "prepare_lists", self.defines),
                 -(-wide * high // GROUP) * GROUP,
                 GROUP,
-                self._offsets,
+                offsets,
                 front,
                 back,
                 color,
@@ -444,17 +491,44 @@ class PreparedVDI:
                 np.int32(wide),
                 np.int32(high),
                 directions,
-                self._faces,
-                self._media,
-            )
-            self.occupancy = OccupancyGrid(
-                runtime,
-                vdi,
-                self._offsets,
-                front,
-                back,
-                nearest=self._nearest,
-                shifted=self._shifted,
-                long_offsets=self._long_offsets,
+                *lists,
             )
             runtime.finish()  # the buffers above may be host memory in use
+        return (*lists, self._constants(1.0)) if packed else lists
+
+    def _packed_lists(
+        self, vdi: VDI, packing: Packed8, offset_type: type[np.unsignedinteger[Any]]
+    ) -> tuple[DeviceBuffer, tuple[DeviceBuffer, ...]]:
+        """Return offsets, and lists of 8-byte supersegments that begin with their headers."""
+        runtime = self._runtime
+        counts = vdi.counts.reshape(-1)
+        occupied = np.flatnonzero(counts)
+        headers = np.zeros(len(counts) + 1, np.uint64)
+        headers[1:] = np.cumsum(counts > 0) * _LIST_HEADER
+        first = (vdi.offsets + headers)[:-1][occupied].astype(np.int64)
+        words = np.empty((vdi.n_supersegments + len(occupied) * _LIST_HEADER, 2), np.uint32)
+        words[first, 0] = packing.origins[occupied].view(np.uint32)
+        words[first, 1] = packing.strides[occupied]
+        words[first + 1, 0] = self._per_code(vdi, packing, occupied).view(np.uint32)
+        words[first + 1, 1] = 0
+        own = np.repeat(np.arange(1, len(occupied) + 1) * _LIST_HEADER, counts[occupied])
+        words[np.arange(vdi.n_supersegments) + own] = packing.words
+        return (
+            runtime.upload((vdi.offsets + headers).astype(offset_type), "list offsets"),
+            (runtime.upload(words, "supersegments"), self._constants(packing.step)),
+        )
+
+    def _per_code(
+        self, vdi: VDI, packing: Packed8, lists: NDArray[np.int64]
+    ) -> NDArray[np.float32]:
+        """Return 1 over the model length of a code of depth along each list's centre ray."""
+        wide, high = vdi.window_size
+        centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
+        a, b = lists % wide + 0.5 - wide / 2, lists // wide + 0.5 - high / 2
+        direction = centre[0] + a[:, np.newaxis] * centre[1] + b[:, np.newaxis] * centre[2]
+        lengths = np.linalg.norm(direction, axis=1) * packing.strides[lists] * packing.step
+        return (1 / lengths).astype(np.float32)
+
+    def _constants(self, step: float) -> DeviceBuffer:
+        constants = np.array([step, self._nearest - self._depth_origin], np.float32)
+        return self._runtime.upload(constants, "constants of depths")

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .camera import Camera, check_window_size
 from .errors import InvalidVDIError
+from .precision import Packing, check_precision, packing_of
 
 if TYPE_CHECKING:
     import os
@@ -63,6 +64,8 @@ class VDI:
     bounds: tuple[float, float, float, float, float, float]
     depth_origin: float
     metadata: dict[str, Any]
+    #: The packed form of the arrays, not public; ``None`` where they are exact.
+    packing: Packing | None
 
     def __init__(
         self,
@@ -88,6 +91,7 @@ class VDI:
         self.color = _array("color", color, np.float32, (3,))
         self.optical_depth = _array("optical_depth", optical_depth, np.float32, ())
         self.bounds = _checked_bounds(bounds)
+        self.packing = None
         self._check_lists()
         self._check_media()
 
@@ -108,9 +112,15 @@ class VDI:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all arrays in memory."""
+        """Bytes of all arrays in memory, with those of the packed form where there is one."""
         arrays = (self.offsets, self.front, self.back, self.color, self.optical_depth)
-        return sum(array.nbytes for array in arrays)
+        packed = 0 if self.packing is None else self.packing.nbytes
+        return sum(array.nbytes for array in arrays) + packed
+
+    @property
+    def precision(self) -> str:
+        """What a supersegment takes on a device and in a file: see :meth:`with_precision`."""
+        return "exact" if self.packing is None else self.packing.precision
 
     def list_at(self, x: int, y: int) -> slice:
         """Return the supersegments of pixel (x, y), y = 0 at the bottom, as a slice."""
@@ -130,6 +140,55 @@ class VDI:
             and self.depth_origin == other.depth_origin
             and all(np.array_equal(getattr(self, n), getattr(other, n)) for n in names)
         )
+
+    # -- precision -------------------------------------------------------------------------------
+
+    def with_precision(self, precision: str) -> VDI:
+        """Return the VDI with supersegments of fewer bytes, on devices and in ``.vdi`` files.
+
+        Its arrays, float32 as ever, hold what the packed form gives back, so that whatever reads
+        them sees what is drawn. docs/conventions.md ("Packed supersegments") has the bounds.
+
+        Parameters
+        ----------
+        precision : {"exact", "16-byte", "8-byte"}
+            ``"exact"``: 24 bytes, whatever float32 holds; from a packed VDI, its values.
+            ``"16-byte"``: colours in steps of 1/2047, blue of 1/1023; all else exact.
+            ``"8-byte"``: depths in 14 bits of the list's extent, optical depth with 8 significant
+            bits, colours in steps of 1/255.
+
+        Returns
+        -------
+        VDI
+            Itself where it has that precision.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If there is no such precision, or a list is too long for 8 bytes (above 16383).
+        """
+        if check_precision(precision) == self.precision:
+            return self
+        if precision == "exact":
+            return self._with_media(None, {})
+        packing = packing_of(self, precision)
+        return self._with_media(packing, packing.media(self.counts.reshape(-1)))
+
+    def _with_media(self, packing: Packing | None, media: Mapping[str, Any]) -> VDI:
+        vdi = VDI(
+            self.camera,
+            self.window_size,
+            self.offsets,
+            media.get("front", self.front),
+            media.get("back", self.back),
+            media.get("color", self.color),
+            media.get("optical_depth", self.optical_depth),
+            self.bounds,
+            depth_origin=self.depth_origin,
+            metadata=self.metadata,
+        )
+        vdi.packing = packing
+        return vdi
 
     # -- files -----------------------------------------------------------------------------------
 

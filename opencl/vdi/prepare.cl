@@ -1,5 +1,7 @@
 // A VDI's arrays to what the raycaster reads: faces in list space and extinction in place of optical depth.
 // The arrays hold offsets, see common/list_space.cl, whose -D names hold here.
+//
+// -D PACKED=16   both in one array, see common/supersegments.cl; the form of 8 bytes is made by the host
 #include "common/list_space.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -8,14 +10,22 @@ __kernel void prepare_lists(
     __global const OFFSET_T *offsets,     // width * height + 1
     __global const float *fronts,         // view depth less depth_origin
     __global const float *backs,
+#ifdef PACKED
+    __global const uint *colors,          // 11, 11 and 10 bits
+#else
     __global const float *colors,         // straight RGB, 3 per supersegment
+#endif
     __global const float *optical_depths,
     float depth_origin,                   // world units
     float nearest,                        // least view depth that is in front of the eye, world units
     int width, int height,
     __global const float *centre_ray,     // 9: model-frame direction of the ray of pixel offsets (a, b), rows 1, a, b
+#ifdef PACKED
+    __global uint4 *supersegments)
+#else
     __global float2 *faces,
     __global float4 *media)               // straight RGB, extinction per model length
+#endif
 {
     const size_t list = get_global_id(0);
     if (list >= (size_t)width * (size_t)height)
@@ -34,9 +44,14 @@ __kernel void prepare_lists(
         const float z0 = depth_coordinate(fmax(front, nearest - depth_origin), depth_origin);
         const float z1 = depth_coordinate(fmax(back, nearest - depth_origin), depth_origin);
 #endif
-        faces[k] = (float2)(z0, z1);
         // Finite however thin: nothing or everything of such a supersegment is crossed
         const float length = fmax((back - front) * per_depth, FLT_MIN);
-        media[k] = (float4)(vload3(k, colors), fmin(optical_depths[k] / length, FLT_MAX));
+        const float extinction = fmin(optical_depths[k] / length, FLT_MAX);
+#ifdef PACKED
+        supersegments[k] = (uint4)(as_uint(z0), as_uint(z1), as_uint(extinction), colors[k]);
+#else
+        faces[k] = (float2)(z0, z1);
+        media[k] = (float4)(vload3(k, colors), extinction);
+#endif
     }
 }

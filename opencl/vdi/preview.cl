@@ -4,7 +4,7 @@
 // lies the same integral of (supersegments in the cell) along the ray. No supersegment is intersected; a sample finds its list
 // and its supersegment by the same search as the raycaster's, and stands for the length of non-empty cells around it.
 //
-// -D OFFSET_T, PARALLEL, SHIFTED, CROPPED, COMPENSATED   as in vdi/raycast.cl
+// -D OFFSET_T, PARALLEL, SHIFTED, PACKED, CROPPED, COMPENSATED   as in vdi/raycast.cl
 #include "common/list_ray.cl"
 #include "common/lists.cl"
 #include "common/classification.cl"
@@ -139,8 +139,7 @@ inline float r_at(const Crossing *crossing, float share, float depth_origin)
 
 __kernel void preview(
     __global const OFFSET_T *offsets,   // lists_wide * lists_high + 1
-    __global const float2 *faces,       // depth coordinates of front and back
-    __global const float4 *media,       // straight RGB, extinction per model length
+    SUPERSEGMENTS_PARAMETERS            // see common/supersegments.cl
     int lists_wide, int lists_high,     // window of V_O
     float depth_origin,                 // world units
     __global const float *forms,        // list coordinates, model direction, then `planes` to clip to
@@ -203,12 +202,13 @@ __kernel void preview(
                 const int j = clamp((int)floor(fma(r, ray.along.y, ray.deep.y) + cells.half_high), 0, lists_high - 1);
                 const size_t list = (size_t)j * (size_t)lists_wide + (size_t)i;
                 const OFFSET_T begin = offsets[list];
-                const int count = (int)(offsets[list + 1] - begin);
+                const int count = LIST_LENGTH(begin, offsets[list + 1]);
                 medium = (float4)(0.0f);
                 if (count > 0) {
-                    guess = count_passing(faces + begin, count, z, true, guess);
-                    if (guess < count && faces[begin + (OFFSET_T)guess].x <= z)
-                        medium = media[begin + (OFFSET_T)guess];
+                    BEGIN_LIST(begin)
+                    guess = count_passing(LIST(begin), count, z, true, guess);
+                    if (guess < count && front_of(LIST(begin), guess) <= z)
+                        medium = MEDIUM(begin + (OFFSET_T)guess);
                 }
 #ifdef CROPPED
                 if (!is_kept(&ray.kept, r))

@@ -7,6 +7,7 @@
 // -D OFFSET_T           type of an offset into the supersegments: uint or ulong
 // -D PARALLEL, SHIFTED  the depth coordinate, see common/list_space.cl
 // -D COMPENSATED        see common/over.cl
+// -D PACKED             the form of the supersegments, see common/supersegments.cl
 // -D CROPPED            only some regions are drawn, see common/cropping.cl
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
 // -D SEGMENTS           write what each ray crosses into a pool, to be merged with other VDIs by vdi/merge.cl, in place of
@@ -31,8 +32,7 @@
 
 __kernel void raycast(
     __global const OFFSET_T *offsets,   // lists_wide * lists_high + 1
-    __global const float2 *faces,       // depth coordinates of front and back
-    __global const float4 *media,       // straight RGB, extinction per model length
+    SUPERSEGMENTS_PARAMETERS            // see common/supersegments.cl
     int lists_wide, int lists_high,     // window of V_O
     float depth_origin,                 // world units
     __global const float *forms,        // list coordinates, model direction, then `planes` to clip to
@@ -199,13 +199,14 @@ __kernel void raycast(
 
         const size_t list = (size_t)j * (size_t)lists_wide + (size_t)i;
         const OFFSET_T begin = offsets[list];
-        const int count = (int)(offsets[list + 1] - begin);
+        const int count = LIST_LENGTH(begin, offsets[list + 1]);
         if (count > 0) {
-            passed = count_passing(faces + begin, count, z, away, passed);
+            BEGIN_LIST(begin)
+            passed = count_passing(LIST(begin), count, z, away, passed);
             // Going away, supersegments passed, passed + 1 … follow; coming back, passed - 1, passed - 2 …
             while (away ? passed < count : passed > 0) {
                 const OFFSET_T k = begin + (OFFSET_T)(away ? passed : passed - 1);
-                const float2 face = faces[k];
+                const float2 face = FACE(k);
                 if (away ? face.x > z_next : face.y < z_next)
                     break;
                 // Clip to the supersegment by interval: between two faces it never leaves [r, r_next]
@@ -218,7 +219,7 @@ __kernel void raycast(
                 const bool ends_here = away ? leaves <= z_next : leaves >= z_next;
                 if (away ? leaves < z_next : leaves > z_next)
                     to = clamp((leaves - deep.z) * inverse_z, from, r_next);
-                const float4 medium = media[k];
+                const float4 medium = MEDIUM(k);
 #if defined(SEGMENTS)
                 // The parts of it that are drawn
                 for (int n = 0; n < drawn_parts(&ray); ++n) {

@@ -68,6 +68,7 @@ def _text(about: Any) -> str:
         "lists": f"{width} x {height}",
         "supersegments": f"{about.n_supersegments}, "
         f"{about.n_supersegments / (width * height):.2f} per list",
+        "precision": about.precision,
         "in memory": _mebibytes(about.memory_bytes),
         "eye": _vector(view.position),
         "looking at": f"{_vector(view.focal_point)}, up {_vector(view.view_up)}, {lens}",

@@ -111,7 +111,7 @@ def given_camera(options: argparse.Namespace) -> Camera | None:
 
 def file_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments of ``VDI.save`` that the options stand for; refused now, not later."""
-    names = ("compression", "level")
+    names = ("compression", "level", "precision")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if options.standard_channels:
         given["exact"] = False

@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 from .._version import __version__
 from ..camera import check_window_size
 from ..errors import InvalidArgumentError
+from ..precision import PRECISIONS
 from ..standard_cases import ANGLES, ELEVATION, TRANSFER_FUNCTIONS, WINDOW_SIZE
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
@@ -171,6 +172,12 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
         type=int,
         metavar="N",
         help="1 (fast) to 9 (small); by default 9 for lz4 and 1 for the others",
+    )
+    group.add_argument(
+        "--precision",
+        choices=PRECISIONS,
+        help="of .vdi: exact (24 bytes per supersegment before they are compressed; default of "
+        "generate), 16-byte or 8-byte; convert keeps what the file has",
     )
     group.add_argument(
         "--standard-channels",

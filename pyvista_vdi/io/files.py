@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InvalidArgumentError, MissingDependencyError, VDIFileError
+from ..precision import check_precision
 from ..vdi import VDI
 from . import exr, layout, reader, writer
 from .chunks import CODECS
@@ -34,7 +35,8 @@ def write(vdi: VDI, path: str | os.PathLike[str], **options: Any) -> Path:
     path : path-like
         The target; its name ends in ``.vdi``, ``.exr`` or ``.vti``.
     **options
-        ``compression`` and ``level`` for all; ``exact`` for ``.exr``. See
+        ``compression`` and ``level`` for all; ``precision`` for ``.vdi``, ``exact`` for ``.exr``.
+        See
         :func:`pyvista_vdi.io.writer.write`, :func:`pyvista_vdi.io.exr.write` and
         :func:`pyvista_vdi.vtk_pipeline.vti.write`.
 
@@ -153,6 +155,8 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
         names, compressions = (*names, "exact"), exr.COMPRESSIONS
     elif _is_vti(path):
         compressions = _VTI_COMPRESSIONS
+    else:
+        names = (*names, "precision")
     _check_names("written", path, options, names)
     compression, level = options.get("compression", compressions[0]), options.get("level", 1)
     if compression not in compressions:
@@ -162,6 +166,8 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
         )
     if isinstance(level, bool) or not isinstance(level, int) or not 1 <= level <= 9:
         raise InvalidArgumentError(f"level must be a whole number from 1 to 9; got {level!r}")
+    if options.get("precision") is not None:
+        check_precision(options["precision"])
 
 
 def _is_exr(path: Any) -> bool:

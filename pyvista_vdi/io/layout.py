@@ -13,12 +13,15 @@ from typing import Any
 
 import numpy as np
 
-#: Version of the format that is written; files of this and of lower versions are read.
-FORMAT_VERSION = 2
+#: Highest version of the format; files of this and of lower versions are read.
+FORMAT_VERSION = 3
+
+#: What is written for each precision: version 3 only where version 2 has no place for it.
+VERSION_OF = {"exact": 2, "16-byte": 3, "8-byte": 3}
 
 #: Rows of an array in one chunk, for each version. What one chunk holds of all arrays, 1.5 MiB,
 #: stays in a core's cache until it has been decoded; larger chunks do not compress better.
-CHUNK_ROWS = {1: 1 << 18, 2: 1 << 16}
+CHUNK_ROWS = {1: 1 << 18, 2: 1 << 16, 3: 1 << 16}
 
 #: What a description calls the format.
 FORMAT_NAME = "pyvista-vdi"
@@ -88,6 +91,7 @@ def layouts(
     *,
     filtered: bool,
     version: int = FORMAT_VERSION,
+    precision: str = "exact",
 ) -> dict[str, Layout]:
     """Return the arrays of a file, in their order.
 
@@ -103,17 +107,33 @@ def layouts(
         Whether depths are stored as differences.
     version : int
         Of the format. In version 1 front and back were one array.
+    precision : str
+        One of :data:`pyvista_vdi.precision.PRECISIONS`; packed since version 3.
     """
+    n_lists = window_size[0] * window_size[1]
+    rows = CHUNK_ROWS[version]
+    counts_layout = Layout(counts, (), n_lists, "none", rows)
+    if precision == "8-byte":
+        u2 = np.dtype("<u2")
+        return {
+            "counts": counts_layout,
+            "origin": Layout(np.dtype("<i4"), (), n_lists, "none", rows),
+            "stride": Layout(u2, (), n_lists, "none", rows),
+            **{name: Layout(u2, (), n, "difference", rows) for name in ("front", "back")},
+            "color": Layout(np.dtype("|u1"), (3,), n, "none", rows),
+            "optical_depth": Layout(u2, (), n, "none", rows),
+        }
     f4, kind = np.dtype("<f4"), "difference" if filtered else "none"
     depth = np.dtype("<u4") if filtered else f4
-    rows = CHUNK_ROWS[version]
-    depths = {
-        1: {"depth": Layout(depth, (2,), n, kind, rows)},
-        2: {name: Layout(depth, (), n, kind, rows) for name in ("front", "back")},
-    }
+    depths = (
+        {"depth": Layout(depth, (2,), n, kind, rows)}
+        if version == 1
+        else {name: Layout(depth, (), n, kind, rows) for name in ("front", "back")}
+    )
+    color = np.dtype("<u4") if precision == "16-byte" else f4
     return {
-        "counts": Layout(counts, (), window_size[0] * window_size[1], "none", rows),
-        **depths[version],
-        "color": Layout(f4, (3,), n, "none", rows),
+        "counts": counts_layout,
+        **depths,
+        "color": Layout(color, () if precision == "16-byte" else (3,), n, "none", rows),
         "optical_depth": Layout(f4, (), n, "none", rows),
     }

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from .._version import __version__
 from ..camera import Camera, check_window_size
 from ..errors import InvalidVDIError, VDIError, VDIFileError
+from ..precision import Packed16, Packing, check_precision, packed_8
 from ..vdi import VDI
 from .chunks import CODECS, DamagedChunkError, PackedArray, chunk_sizes, workers
 from .description import from_json, number
@@ -87,6 +88,10 @@ class FileInfo:
         Size of the file.
     memory_bytes : int
         Size of the VDI's arrays in memory.
+    precision : str
+        One of :data:`pyvista_vdi.precision.PRECISIONS`.
+    depth_step : float
+        Of the 8-byte form: step of its depths, world units.
     """
 
     path: Path
@@ -101,6 +106,8 @@ class FileInfo:
     codec: str
     file_bytes: int
     memory_bytes: int
+    precision: str = "exact"
+    depth_step: float = 1.0
 
 
 def read(path: str | os.PathLike[str]) -> VDI:
@@ -185,9 +192,20 @@ class _OpenFile:
             packed = self._packed()
             with workers() as pool:
                 counts = pool.submit(self._decoded_counts, packed.pop("counts"))
-                media = self._decoded_media(packed, pool)
-                offsets = counts.result()
-            return VDI(
+                packing: Packing | None = None
+                if info.precision == "8-byte":
+                    stored = self._decoded_codes(packed, pool)
+                    offsets = counts.result()
+                    rows = CHUNK_ROWS[info.format_version]
+                    packing = packed_8(info.depth_step, offsets, stored, rows)
+                    media = packing.media(np.diff(offsets).astype(np.int64))
+                else:
+                    media = self._decoded_media(packed, pool)
+                    offsets = counts.result()
+                    if info.precision == "16-byte":
+                        packing = Packed16(media["color"].view(np.uint32).reshape(-1))
+                        media.update(packing.media(np.diff(offsets).astype(np.int64)))
+            vdi = VDI(
                 info.camera,
                 info.window_size,
                 offsets,
@@ -196,6 +214,8 @@ class _OpenFile:
                 depth_origin=info.depth_origin,
                 metadata=info.metadata,
             )
+            vdi.packing = packing
+            return vdi
         except DamagedChunkError as error:
             self._refuse(str(error))
         except OSError as error:
@@ -266,6 +286,8 @@ class _OpenFile:
             if d["chunk_rows"] != rows:
                 self._refuse(f"chunk_rows is {d['chunk_rows']!r}, not {rows}")
             n_lists = window_size[0] * window_size[1]
+            precision = check_precision(d["precision"]) if d["version"] >= 3 else "exact"
+            packed_bytes = {"exact": 0, "16-byte": 4 * n, "8-byte": 8 * n + 6 * n_lists}
             return FileInfo(
                 path=self._path,
                 format_version=d["version"],
@@ -278,7 +300,9 @@ class _OpenFile:
                 metadata=d["metadata"],
                 codec=d["codec"],
                 file_bytes=os.fstat(self._stream.fileno()).st_size,
-                memory_bytes=(n_lists + 1) * 8 + n * 24,
+                memory_bytes=(n_lists + 1) * 8 + n * 24 + packed_bytes[precision],
+                precision=precision,
+                depth_step=number(d["depth_step"]) if precision == "8-byte" else 1.0,
             )
         except VDIFileError:
             raise
@@ -302,6 +326,7 @@ class _OpenFile:
             counts,
             filtered=info.codec != "none",
             version=info.format_version,
+            precision=info.precision,
         )
         for name, layout in wanted.items():
             if arrays.get(name) != layout.to_dict():
@@ -330,9 +355,10 @@ class _OpenFile:
         self, packed: dict[str, PackedArray], pool: ThreadPoolExecutor
     ) -> dict[str, NDArray[Any]]:
         """Return front, back, color and optical depth, each decompressed where it will stay."""
-        n = self.info.n_supersegments
-        names, shapes = ("front", "back", "color", "optical_depth"), {"color": (n, 3)}
-        media = {name: np.empty(shapes.get(name, n), "<f4") for name in names}
+        n, names = self.info.n_supersegments, ("front", "back", "color", "optical_depth")
+        color = self._layouts["color"]
+        media = {name: np.empty(n, "<f4") for name in names}
+        media["color"] = np.empty((n, *color.row_shape), color.dtype)
         decode_depths = _DEPTHS[self.info.format_version]
 
         def decode(first: int, last: int) -> None:
@@ -344,6 +370,23 @@ class _OpenFile:
         for _ in pool.map(lambda rows: decode(*rows), packed["optical_depth"].ranges()):
             pass  # raises what went wrong
         return media
+
+    def _decoded_codes(
+        self, packed: dict[str, PackedArray], pool: ThreadPoolExecutor
+    ) -> dict[str, NDArray[Any]]:
+        """Return the arrays of the 8-byte form as they are stored."""
+        stored = {
+            name: np.empty((array.layout.n_rows, *array.layout.row_shape), array.layout.dtype)
+            for name, array in packed.items()
+        }
+
+        def decode(name: str, first: int, last: int) -> None:
+            packed[name].read(first, stored[name][first:last])
+
+        tasks = [(name, *rows) for name, array in packed.items() for rows in array.ranges()]
+        for _ in pool.map(lambda task: decode(*task), tasks):
+            pass  # raises what went wrong
+        return stored
 
     def _packed(self) -> dict[str, PackedArray]:
         """Return the arrays as the file holds them, their chunks known and possible."""
@@ -463,4 +506,4 @@ def _decode_depths_2(
 
 
 #: How each version of the format stores the depths of a chunk.
-_DEPTHS = {1: _decode_depths_1, 2: _decode_depths_2}
+_DEPTHS = {1: _decode_depths_1, 2: _decode_depths_2, 3: _decode_depths_2}

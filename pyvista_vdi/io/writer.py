@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..precision import Packed8, Packed16, gaps_and_thicknesses
 from ..vdi import VDI
 from .chunks import DEFAULT_LEVELS, write_chunks
 from .description import describe, to_json
 from .layout import (
     CHUNK_ROWS,
     DESCRIPTION,
-    FORMAT_VERSION,
     INDEX,
     INDEX_DTYPE,
+    VERSION_OF,
     Layout,
     layouts,
 )
@@ -35,8 +36,9 @@ def write(
     *,
     compression: str = "lz4",
     level: int | None = None,
+    precision: str | None = None,
 ) -> Path:
-    """Write a VDI to a file, exactly.
+    """Write a VDI to a file, exactly or packed.
 
     The file appears whole or not at all: it is written under a temporary name in the same folder
     and moved into place, and what was there before stays until then.
@@ -53,6 +55,9 @@ def write(
     level : int, optional
         Effort of the compressor, 1 to 9; 9 for lz4 and 1 for zstd by default. Higher levels are
         slower to write, not to read.
+    precision : {"exact", "16-byte", "8-byte"}, optional
+        Bytes of a supersegment before they are compressed, as for
+        :meth:`pyvista_vdi.VDI.with_precision`; the VDI's own by default.
 
     Returns
     -------
@@ -68,9 +73,15 @@ def write(
     --------
     pyvista_vdi.io.write : checks the options first.
     """
+    vdi = vdi if precision is None else vdi.with_precision(precision)
     counts = _smallest(np.diff(vdi.offsets))
     arrays = layouts(
-        vdi.window_size, vdi.n_supersegments, counts.dtype, filtered=compression != "none"
+        vdi.window_size,
+        vdi.n_supersegments,
+        counts.dtype,
+        filtered=compression != "none",
+        version=VERSION_OF[vdi.precision],
+        precision=vdi.precision,
     )
     description = _described(vdi, arrays, compression)
     effort = DEFAULT_LEVELS[compression] if level is None else level
@@ -100,13 +111,18 @@ def _smallest(counts: NDArray[Any]) -> NDArray[Any]:
 
 
 def _described(vdi: VDI, arrays: Mapping[str, Layout], codec: str) -> str:
-    entries = describe(vdi, FORMAT_VERSION)
+    version = VERSION_OF[vdi.precision]
+    entries = describe(vdi, version)
     metadata = entries.pop("metadata")
+    packed: dict[str, Any] = {} if version < 3 else {"precision": vdi.precision}
+    if isinstance(vdi.packing, Packed8):
+        packed["depth_step"] = vdi.packing.step
     return to_json(
         {
             **entries,
+            **packed,
             "codec": codec,
-            "chunk_rows": CHUNK_ROWS[FORMAT_VERSION],
+            "chunk_rows": CHUNK_ROWS[version],
             "arrays": {name: layout.to_dict() for name, layout in arrays.items()},
             "metadata": metadata,
         }
@@ -116,12 +132,38 @@ def _described(vdi: VDI, arrays: Mapping[str, Layout], codec: str) -> str:
 def _encoder(
     name: str, layout: Layout, vdi: VDI, counts: NDArray[Any]
 ) -> Callable[[int, int], NDArray[Any]]:
+    if isinstance(vdi.packing, Packed8) and name != "counts":
+        return _code_encoder(name, layout, vdi)
     if layout.filter == "difference":
         encode = {"front": _gaps, "back": _thicknesses}[name]
         front, back = vdi.front.view(np.uint32), vdi.back.view(np.uint32)
         return lambda first, last: encode(front[first:last], back[first:last])
     array = counts if name == "counts" else getattr(vdi, name)
+    if isinstance(vdi.packing, Packed16) and name == "color":
+        array = vdi.packing.color
     return lambda first, last: np.ascontiguousarray(array[first:last], dtype=layout.dtype)
+
+
+def _code_encoder(name: str, layout: Layout, vdi: VDI) -> Callable[[int, int], NDArray[Any]]:
+    """Encode an array of the 8-byte form."""
+    packed = vdi.packing
+    assert isinstance(packed, Packed8)
+
+    def encoded(first: int, last: int) -> NDArray[Any]:
+        rows: NDArray[Any]
+        if name in ("front", "back"):
+            rows = gaps_and_thicknesses(packed, vdi.offsets, first, last)[name == "back"]
+        elif name == "color":
+            rows = packed.colors(first, last)
+        elif name == "optical_depth":
+            rows = packed.tau_codes(first, last)
+        elif name == "origin":
+            rows = packed.origins[first:last]
+        else:
+            rows = packed.strides[first:last]
+        return np.ascontiguousarray(rows, dtype=layout.dtype)
+
+    return encoded
 
 
 def _gaps(front: NDArray[np.uint32], back: NDArray[np.uint32]) -> NDArray[Any]:

@@ -40,6 +40,7 @@ CORE = {
     "errors",
     "lighting",
     "numerics",
+    "precision",
     "transfer_function",
     "vdi",
     "volume",

@@ -412,11 +412,11 @@ def test_another_archive_with_a_description(tmp_path):
 
 
 def test_a_newer_version(file):
-    edit_description(file, version=3, written_by="pyvista-vdi 9.0")
+    edit_description(file, version=4, written_by="pyvista-vdi 9.0")
     with pytest.raises(
         VDIFileError,
-        match=r"is of format version 3, written by 'pyvista-vdi 9\.0'; this is pyvista-vdi .*, "
-        r"which reads up to version 2: upgrade by pip install -U pyvista-vdi",
+        match=r"is of format version 4, written by 'pyvista-vdi 9\.0'; this is pyvista-vdi .*, "
+        r"which reads up to version 3: upgrade by pip install -U pyvista-vdi",
     ):
         io.read(file)
 

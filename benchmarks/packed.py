@@ -1,0 +1,191 @@
+"""What packed supersegments lose and gain, for every volume: pictures, bytes, frame times.
+
+Writes ``packed_WxH.json`` (all figures) and ``.md`` (the table). See README.md in this folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from files import DENSE_BYTES, mebibytes  # beside this file
+from skipping import timed, vdi_of
+from standard_table import window_size
+from tqdm import tqdm
+
+from pyvista_vdi import examples
+from pyvista_vdi.compare import describe_system
+from pyvista_vdi.io import whole_file
+from pyvista_vdi.metrics import compare_images
+from pyvista_vdi.opencl_runtime import get_runtime
+from pyvista_vdi.precision import PRECISIONS
+from pyvista_vdi.raycast import PreparedVDI
+from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE
+from pyvista_vdi.vdi import VDI
+
+#: Degrees about the centre, from V_O.
+ANGLES = (0, 5, 30)
+
+#: Largest loss of SSIM that is allowed.
+MOST_LOSS = 0.001
+
+LEGEND = (
+    "`loss`: 1 - SSIM of the packed VDI's picture and the exact one's, over black, the worst of "
+    f"{', '.join(map(str, ANGLES))} degrees, in millionths; `worst`: the worst pixel in steps of "
+    "1/255, and `PSNR` in dB, of the same. `time`: frames over the exact ones at 5 and 30 degrees, "
+    "by the process's CPU time, medians of turns. `MiB`: on the device (lists and supersegments) / "
+    "in a file (lz4). `dense / file`: bytes of width x height x longest list x 24 over the file's."
+)
+
+
+def main() -> int:
+    """Measure what is missing, and write what was found."""
+    options = parsed()
+    width, height = options.size
+    target = options.out / f"packed_{width}x{height}.json"
+    options.out.mkdir(parents=True, exist_ok=True)
+    case = {
+        "window_size": [width, height],
+        "frame": list(options.frame or options.size),
+        "transfer_function": options.tf,
+        "max_supersegments": options.max_supersegments,
+        "system": describe_system(options.device),
+    }
+    results = json.loads(target.read_text()) if target.exists() else {**case, "volumes": {}}
+    if any(results[name] != value for name, value in case.items()):
+        sys.exit(f"{target} was measured otherwise or elsewhere: choose another --out")
+    at_hand = examples.available()
+    absent = [name for name in options.volumes if name not in at_hand]
+    if absent:
+        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
+    for name in tqdm([name for name in options.volumes if name in at_hand], unit="volume"):
+        if name in results["volumes"] and not options.redo:
+            continue
+        results["volumes"][name] = measured(vdi_of(name, options), options)
+        with whole_file(target) as stream:
+            stream.write(json.dumps(results, indent=1).encode() + b"\n")
+    with whole_file(target.with_suffix(".md")) as stream:
+        stream.write(report(results).encode())
+    print(f"Written: {target}, and .md beside it")
+    return 0 if most_loss(results) <= MOST_LOSS else 1
+
+
+def parsed() -> argparse.Namespace:
+    """Return the options."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
+    names = sorted(examples.VOLUMES)
+    parser.add_argument("--volumes", nargs="+", choices=names, default=names, metavar="NAME")
+    parser.add_argument("--frame", type=window_size, metavar="WxH", help="of the pictures")
+    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
+    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
+    parser.add_argument("--repeats", type=int, default=5, help="timed frames of each kind")
+    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
+    parser.add_argument("--vdi-cache", type=Path, metavar="FOLDER", help="as for skipping.py")
+    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
+    return parser.parse_args()
+
+
+def measured(vdi: VDI, options: argparse.Namespace) -> dict[str, Any]:
+    """Return losses, bytes and times of one VDI in every form."""
+    runtime, size = get_runtime(options.device), tuple(options.frame or options.size)
+    width, height = options.size
+    exact = vdi.with_precision("exact")
+    forms = {precision: exact.with_precision(precision) for precision in PRECISIONS}
+    prepared = {precision: PreparedVDI(runtime, form) for precision, form in forms.items()}
+    found: dict[str, Any] = {
+        "supersegments": vdi.n_supersegments,
+        "dense_bytes": width * height * options.max_supersegments * DENSE_BYTES,
+        "device_bytes": {name: form.list_bytes for name, form in prepared.items()},
+        "file_bytes": {name: file_bytes(form) for name, form in forms.items()},
+        "angles": [],
+    }
+    with runtime.buffer((size[1], size[0], 4), name="image") as image:
+        for angle in ANGLES:
+            camera = vdi.camera.azimuth(angle)
+            ways = {
+                name: partial(form.render, camera, size, image) for name, form in prepared.items()
+            }
+            pictures = {}
+            for name, draw in ways.items():
+                draw()
+                pictures[name] = runtime.download(image)
+            row: dict[str, Any] = {"angle": angle, "loss": {}}
+            for name in PRECISIONS[1:]:
+                compared = compare_images(pictures[name], pictures["exact"])
+                row["loss"][name] = {
+                    "ssim": 1 - compared.ssim,
+                    "psnr": compared.psnr if np.isfinite(compared.psnr) else None,
+                    "worst_pixel": compared.worst_pixel,
+                }
+            if angle:
+                row["seconds"] = timed(ways, options.repeats)
+            found["angles"].append(row)
+    return found
+
+
+def file_bytes(vdi: VDI) -> int:
+    """Return the size of a VDI's file."""
+    with tempfile.TemporaryDirectory() as folder:
+        return vdi.save(Path(folder) / "a.vdi").stat().st_size
+
+
+def most_loss(results: dict[str, Any]) -> float:
+    """Return the largest loss of SSIM in all cases."""
+    return max(
+        (
+            loss["ssim"]
+            for found in results["volumes"].values()
+            for row in found["angles"]
+            for loss in row["loss"].values()
+        ),
+        default=0.0,
+    )
+
+
+def report(results: dict[str, Any]) -> str:
+    """Return the table: a line per volume and form."""
+    width, height = results["window_size"]
+    case = f"{results['transfer_function']}, {results['max_supersegments']} supersegments"
+    lines = [
+        f"# Packed supersegments, {width}x{height} lists, {case}",
+        "",
+        f"{LEGEND} Pictures of {results['frame'][0]}x{results['frame'][1]}.",
+        "",
+        "| volume | form | loss | PSNR | worst | time 5° | time 30° | MiB | dense / file |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for name, found in results["volumes"].items():
+        for form in PRECISIONS:
+            cells = [name if form == PRECISIONS[0] else "", form]
+            losses = [row["loss"][form] for row in found["angles"] if form in row["loss"]]
+            if losses:
+                psnr = min(loss["psnr"] or np.inf for loss in losses)
+                cells.append(f"{1e6 * max(loss['ssim'] for loss in losses):.0f}")
+                cells += [f"{psnr:.1f}", f"{max(loss['worst_pixel'] for loss in losses):.2f}"]
+                for row in found["angles"]:
+                    if "seconds" in row:
+                        own, base = (
+                            row["seconds"][kind]["cpu"]["median"] for kind in (form, "exact")
+                        )
+                        cells.append(f"{own / base:.2f}")
+            else:
+                cells += ["", "", "", "1", "1"]
+            size = found["file_bytes"][form]
+            cells.append(f"{mebibytes(found['device_bytes'][form])} / {mebibytes(size)}")
+            cells.append(f"{found['dense_bytes'] / size:.1f}")
+            lines.append(f"| {' | '.join(cells)} |")
+    lines += ["", f"Largest loss of SSIM: {most_loss(results):.6f} (allowed: {MOST_LOSS})."]
+    system = ", ".join(f"{k} {v}" for k, v in results["system"].items())
+    return "\n".join([*lines, "", system, ""])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
