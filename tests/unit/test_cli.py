@@ -18,7 +18,17 @@ from pyvista_vdi import cli, io
 from pyvista_vdi.cli import parser
 from pyvista_vdi.standard_cases import filling_camera
 
-VERBS = ("devices", "generate", "render", "view", "info", "compare", "convert", "paraview")
+VERBS = (
+    "devices",
+    "generate",
+    "render",
+    "view",
+    "info",
+    "compare",
+    "benchmark",
+    "convert",
+    "paraview",
+)
 
 
 @pytest.fixture(autouse=True)
