@@ -12,7 +12,7 @@ from .paper import PaperCell, paper_cell
 from .plan import PROFILES, Plan
 from .report import describe
 from .results import Results, read_results
-from .run import run
+from .session import run
 
 __all__ = [
     "DEFAULT_SEED",

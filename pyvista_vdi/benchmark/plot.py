@@ -33,21 +33,18 @@ def write_plot(data: dict[str, Any], target: Path) -> bool:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    cells = [cell for cell in data["cells"] if cell["angles"]]
     kinds = list(
-        dict.fromkeys(
-            (tuple(cell["window_size"]), cell["max_supersegments"])
-            for cell in data["cells"]
-            if cell["angles"]
-        )
+        dict.fromkeys((tuple(cell["window_size"]), cell["max_supersegments"]) for cell in cells)
     )
     if not kinds:
         return False
     figure = Figure(figsize=(1.5 + 3.6 * len(kinds), 6.0), layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(2, len(kinds), squeeze=False, sharex=True, sharey="row")
-    names = list(dict.fromkeys(cell["dataset"] for cell in data["cells"]))
+    names = list(dict.fromkeys(cell["dataset"] for cell in cells))
     for (speed, ssim), (size, limit) in zip(panels.T, kinds, strict=True):
-        for cell in data["cells"]:
+        for cell in cells:
             if (tuple(cell["window_size"]), cell["max_supersegments"]) == (size, limit):
                 _draw(cell, data, names.index(cell["dataset"]), speed, ssim)
         speed.set(title=f"{size[0]}x{size[1]}, N_S {limit}", yscale="log")

@@ -277,7 +277,9 @@ def _row(*cells: str) -> str:
 
 
 def _milliseconds(seconds: float | None) -> str:
-    return _ABSENT if seconds is None else f"{seconds * 1e3:.3g}"
+    if seconds is None:
+        return _ABSENT
+    return f"{seconds * 1e3:.0f}" if seconds >= 0.1 else f"{seconds * 1e3:.3g}"
 
 
 def _ratio(of: float | None, to: float | None) -> str:
