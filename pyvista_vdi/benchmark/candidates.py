@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..device_volume import DeviceVolume
 from ..errors import VDIError
-from ..host_memory import require_host_memory
+from ..host_memory import require_free_memory
 from ..metrics import Comparison, compare_images
 from ..opencl_runtime import Profile, Runtime
 from ..raycast import PreparedVDI
@@ -36,8 +36,9 @@ CANDIDATES: MappingProxyType[str, str] = MappingProxyType(
     }
 )
 
-#: Where there is no GPU: the volume itself, ours on the device, and VTK's texture.
-_COPIES_WITH_VTK = 3
+#: Copies of the volume that VTK's GPU mapper makes on the host where there is no GPU: the texture,
+#: and what it is filled from.
+_VTK_COPIES = 2
 
 Image = NDArray[np.float32]
 Step = Callable[[], object]
@@ -135,9 +136,9 @@ class VolumeRenderers:
         for mapper in MAPPERS:
             try:
                 if mapper == "gpu":
-                    require_host_memory(
-                        _COPIES_WITH_VTK * volume.array.nbytes,
-                        f"the volume {volume.name!r} in VTK's GPU mapper as well",
+                    require_free_memory(
+                        _VTK_COPIES * volume.array.nbytes,
+                        f"the volume {volume.name!r} in VTK's GPU mapper as well, beside ours,",
                         "take a smaller one, or a machine with more memory",
                     )
                 prop = property_from_transfer_function(volume, table)

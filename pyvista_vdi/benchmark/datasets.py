@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .. import examples
 from ..errors import InvalidArgumentError, InvalidVolumeError
-from ..host_memory import require_host_memory
+from ..host_memory import require_free_memory
 from ..transfer_function import TransferFunction
 from ..volume import VOXEL_TYPES, Volume
 from .paper import paper_tables
@@ -217,7 +217,7 @@ def _read_raw(file: Path) -> Volume:
             f"{file} has {file.stat().st_size} bytes; {nx} x {ny} x {nz} of {found[4].lower()} "
             f"are {expected}"
         )
-    require_host_memory(expected, f"the volume in {file.name}", "take a smaller one")
+    require_free_memory(expected, f"the volume in {file.name}", "take a smaller one")
     array: NDArray[Any] = np.fromfile(file, dtype).reshape(nz, ny, nx)
     return Volume(array.astype(dtype.newbyteorder("="), copy=False))
 
@@ -228,7 +228,7 @@ def _procedural(name: str, kind: Procedural, factor: int, seed: int) -> Dataset:
 
     def load(progress: Progress | None) -> Volume:
         smaller = f"{name.partition('@')[0]}@{2 * factor}"
-        require_host_memory(
+        require_free_memory(
             nbytes + _WORKING_BYTES,
             f"making the volume {name!r}, {size} of {kind.dtype},",
             f"take {smaller!r}, half as large along each edge, or another machine",

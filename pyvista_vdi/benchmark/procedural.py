@@ -126,7 +126,8 @@ def _coordinates(dimensions: tuple[int, int, int]) -> tuple[Plane, Plane, Plane]
 
 def _noise(rng: np.random.Generator, shape: tuple[int, ...], exponent: float) -> Plane:
     """Return periodic noise of mean 0 and deviation 1 whose amplitude follows a power law."""
-    spectrum = np.fft.rfftn(rng.standard_normal(shape, dtype=np.float32))
+    # float64: transforms of float32 differ between versions of NumPy
+    spectrum = np.fft.rfftn(rng.standard_normal(shape))
     axes = [np.fft.fftfreq(n, 1 / n) for n in shape[:-1]]
     axes.append(np.fft.rfftfreq(shape[-1], 1 / shape[-1]))
     squared = sum(np.square(k) for k in np.meshgrid(*axes, indexing="ij", sparse=True))
@@ -138,11 +139,17 @@ def _noise(rng: np.random.Generator, shape: tuple[int, ...], exponent: float) ->
 class _NoiseBlock:
     """Periodic three-dimensional noise, read plane by plane.
 
-    The planes are bent along z, so that the periods along x and y are not seen.
+    Where it is `bent`, the planes are bent along z, so that the periods along x and y are not
+    seen; noise without structure needs none of it, and is read faster.
     """
 
     def __init__(
-        self, rng: np.random.Generator, dimensions: tuple[int, int, int], exponent: float
+        self,
+        rng: np.random.Generator,
+        dimensions: tuple[int, int, int],
+        exponent: float,
+        *,
+        bent: bool,
     ) -> None:
         nx, ny, _ = dimensions
         edge = min(_NOISE_EDGE, max(16, nx // 4))
@@ -150,13 +157,17 @@ class _NoiseBlock:
         self._block = _noise(rng, (edge, edge, edge), exponent).ravel()
         rows, columns = np.arange(ny) % edge, np.arange(nx) % edge
         self._in_plane = (rows[:, None] * edge + columns).astype(np.int32)
-        self._bend = np.rint(edge * _noise(rng, (ny, nx), -2.0)).astype(np.int32)
+        self._bend: NDArray[np.int32] | None = None
+        if bent:
+            self._bend = np.rint(edge * _noise(rng, (ny, nx), -2.0)).astype(np.int32)
 
     def plane(self, k: int) -> Plane:
         """Return plane k, (ny, nx): mean 0, deviation 1."""
+        if self._bend is None:
+            begin = k % self._edge * self._edge**2
+            return self._block[begin : begin + self._edge**2][self._in_plane]
         planes = (self._bend + np.int32(k)) % np.int32(self._edge)
-        noise: Plane = self._block[planes * np.int32(self._edge**2) + self._in_plane]
-        return noise
+        return self._block[planes * np.int32(self._edge**2) + self._in_plane]
 
 
 def _kingsnake(dimensions: tuple[int, int, int], rng: np.random.Generator) -> Slab:
@@ -166,7 +177,7 @@ def _kingsnake(dimensions: tuple[int, int, int], rng: np.random.Generator) -> Sl
     x, y, z = _coordinates(dimensions)
     radius = np.hypot(x, y[:, None])
     turns = np.arctan2(y[:, None], x) / np.float32(2 * np.pi)
-    noise = _NoiseBlock(rng, dimensions, -1.0)
+    noise = _NoiseBlock(rng, dimensions, -1.0, bent=False)
 
     def slab(k: int) -> Plane:
         # The turn of the coil that is nearest in height, and its centre there
@@ -192,8 +203,8 @@ def _beechnut(dimensions: tuple[int, int, int], rng: np.random.Generator) -> Sla
     radius = np.hypot(x, y[:, None])
     outline = 0.8 * (1 + 0.12 * np.cos(3 * np.arctan2(y[:, None], x)))
     relative = (radius / outline).astype(np.float32)
-    noise = _NoiseBlock(rng, dimensions, _TURBULENT)
-    grain = _NoiseBlock(rng, dimensions, 0.0)
+    noise = _NoiseBlock(rng, dimensions, _TURBULENT, bent=True)
+    grain = _NoiseBlock(rng, dimensions, 0.0, bent=False)
 
     def slab(k: int) -> Plane:
         profile = max(1 - (float(z[k]) / tall) ** 2, 1e-6) ** 0.5
@@ -212,7 +223,7 @@ def _richtmyer_meshkov(dimensions: tuple[int, int, int], rng: np.random.Generato
     nx, ny, nz = dimensions
     _, _, z = _coordinates(dimensions)
     surface = 0.16 * _noise(rng, (ny, nx), -2.0)
-    noise = _NoiseBlock(rng, dimensions, _TURBULENT)
+    noise = _NoiseBlock(rng, dimensions, _TURBULENT, bent=True)
     half_layer = 0.5 * nz / nx
 
     def slab(k: int) -> Plane:

@@ -271,6 +271,24 @@ def test_a_volume_beyond_the_host_is_refused_by_name(monkeypatch):
         r"host, which has 1.00 GiB: take 'beechnut_like@2'",
     ):
         find_dataset("beechnut_like").load(None)
+    monkeypatch.setattr("pyvista_vdi.host_memory.physical_memory", lambda: 2**40)
+    monkeypatch.setattr("pyvista_vdi.host_memory.free_memory", lambda: 2**30)
+    with pytest.raises(DeviceMemoryError, match="of which 1.00 GiB are free: close other programs"):
+        find_dataset("beechnut_like").load(None)
+
+
+@pytest.mark.gl
+def test_vtk_is_left_out_by_name_where_memory_is_short(default_runtime, tmp_path, monkeypatch):
+    # Enough for the volume of 25 KiB and the working memory, and not for two copies of another
+    free = iter([2**40] + [2**10] * 100)
+    monkeypatch.setattr("pyvista_vdi.host_memory.free_memory", lambda: next(free))
+    out = tmp_path / "a.json"
+    assert benchmark(*TINY_RUN, "--angles", "5", "--tables", "1", "--out", out) == 0
+    (cell,) = checked(out)["cells"]
+    assert list(cell["left_out"]) == ["vtk_gpu"]
+    assert "needs 0.00 GiB on the host" in cell["left_out"]["vtk_gpu"]
+    assert "vtk_fixed_point" in cell["angles"][0]["seconds"]
+    assert f"- VTK GPU with {TINY}: " in out.with_suffix(".md").read_text()
 
 
 @pytest.mark.parametrize(
