@@ -6,6 +6,8 @@ PYVISTA_VDI_TEST_DEVICES
     Comma separated parts of "platform / device": tests run on the devices that contain one.
 PYVISTA_VDI_REQUIRE_DEVICE
     "1": having no usable device is a failure, as in CI; otherwise such tests are skipped.
+PYVISTA_VDI_REQUIRE_INSTALLED
+    "1": the package must be an installed copy, not the sources of a checkout, as in CI.
 HYPOTHESIS_PROFILE
     "default" or "ci"; "ci" where the variable CI is set.
 """
@@ -15,11 +17,13 @@ from __future__ import annotations
 import os
 import re
 import signal
+import sysconfig
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
+import pyvista_vdi
 from pyvista_vdi.errors import MissingDependencyError, NoDeviceError
 from pyvista_vdi.opencl_runtime import DeviceInfo, Runtime, get_runtime, list_devices
 
@@ -29,6 +33,17 @@ settings.register_profile("ci", deadline=None, print_blob=True, derandomize=True
 settings.load_profile(
     os.environ.get("HYPOTHESIS_PROFILE") or ("ci" if os.environ.get("CI") else "default")
 )
+
+
+def pytest_sessionstart() -> None:
+    """Refuse to test the sources where an installed copy is asked for."""
+    place, site = Path(pyvista_vdi.__file__), Path(sysconfig.get_path("purelib"))
+    installed = place.resolve().is_relative_to(site.resolve())
+    if os.environ.get("PYVISTA_VDI_REQUIRE_INSTALLED") == "1" and not installed:
+        raise pytest.UsageError(
+            f"PYVISTA_VDI_REQUIRE_INSTALLED=1, but the tests would import {place}, "
+            f"which is not in {site}"
+        )
 
 
 def usable_test_devices() -> tuple[list[DeviceInfo], str]:

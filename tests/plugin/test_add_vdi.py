@@ -306,6 +306,28 @@ def test_copy_shows_the_same_and_leaves_the_original_alone(plotter):
     np.testing.assert_array_equal(shown(plotter), before)
 
 
+@pytest.mark.parametrize("deep", [True, False])
+def test_copies_of_what_the_plotter_holds_alone(plotter, deep):
+    """PyVista's mappers lose their lookup table with the last reference from Python."""
+    plotter.add_vdi(soft_ball(), name="ball", **LOOKS)
+    before = shown(plotter)
+    plotter.add_mesh(pv.Sphere(radius=0.1), name="mesh")
+    plotter.remove_actor("mesh")
+    gc.collect()
+    twin = plotter.actors["ball"].copy(deep=deep)
+    plotter.remove_actor("ball")
+    plotter.add_actor(twin, reset_camera=False)
+    np.testing.assert_array_equal(shown(plotter), before)
+    # Without the volume, the property is VTK's own
+    alone = plotter.add_vdi(twin.vdi, show_scalar_bar=False)
+    plotter.remove_actor(twin)
+    before = shown(plotter)
+    twin = alone.copy(deep=deep)
+    plotter.remove_actor(alone)
+    plotter.add_actor(twin, reset_camera=False)
+    np.testing.assert_array_equal(shown(plotter), before)
+
+
 def test_picking_finds_the_actor(plotter):
     actor = plotter.add_vdi(soft_ball(), **LOOKS)
     before = shown(plotter)
