@@ -93,6 +93,7 @@ def measure_preview(
 
 def _kept(way: Way, most: int, target_fps: float) -> tuple[int, list[float], Image]:
     """Let the controller find its choice; return it, the frames' times and the last picture."""
+    way(most)  # not counted: its kernel may have to be compiled
     controller = FrameRateController(target_fps, floor=1 / most)
     for _ in range(_SETTLING_FRAMES):
         samples = controller.choose(most)

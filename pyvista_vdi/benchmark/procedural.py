@@ -172,7 +172,7 @@ class _NoiseBlock:
 
 def _kingsnake(dimensions: tuple[int, int, int], rng: np.random.Generator) -> Slab:
     """A coiled body with a spine in an empty egg; lengths are shares of half the width."""
-    pitch, body, spine, egg, widest = 0.20, 0.088, 0.022, 0.72, 0.70
+    pitch, body, spine, egg, widest = 0.20, 0.095, 0.024, 0.74, 0.88
     vertebrae = 60.0  # to a turn
     x, y, z = _coordinates(dimensions)
     radius = np.hypot(x, y[:, None])

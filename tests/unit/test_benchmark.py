@@ -140,6 +140,16 @@ def test_a_tiny_run_writes_what_the_schema_says(runtime, tmp_path):
     assert "Not measured" not in text
 
 
+def test_either_table_can_be_left_out(default_runtime, tmp_path):
+    for tables, cells, previews in (("1", 1, 0), ("2", 0, 1)):
+        out = tmp_path / f"{tables}.json"
+        run = (*TINY_RUN, "--angles", "5", "--no-vtk", "--tables", tables)
+        assert benchmark(*run, "--out", out) == 0
+        data = checked(out)
+        assert (len(data["cells"]), len(data["previews"])) == (cells, previews)
+        assert list(data["datasets"]) == [TINY]
+
+
 @pytest.mark.gl
 def test_vtk_takes_part_and_draws_the_same(default_runtime, tmp_path):
     out = tmp_path / "vtk.json"
