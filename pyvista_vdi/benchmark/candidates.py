@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..device_volume import DeviceVolume
-from ..errors import VDIError
+from ..errors import InvalidArgumentError, VDIError
 from ..host_memory import require_free_memory
 from ..metrics import Comparison, compare_images
 from ..opencl_runtime import Profile, Runtime
@@ -85,6 +85,7 @@ class VolumeRenderers:
             "volume": DeviceVolume(runtime, volume, table, self.voxel, skip_empty=False),
             "volume_skipping": DeviceVolume(runtime, volume, table, self.voxel),
         }
+        self._references: dict[float, tuple[Image, dict[str, float] | None]] = {}
         self._peers: dict[str, Any] = {}
         self.left_out: dict[str, str] = {}
         self._open = ExitStack()
@@ -100,7 +101,24 @@ class VolumeRenderers:
         """Draw at the accurate step, premultiplied RGBA (H, W, 4)."""
         return raycast_medium(self._runtime, self._accurate, camera, self._size)
 
-    def vtk_image(self, camera: Camera) -> Image | None:
+    def reference(self, camera: Camera, angle: float) -> tuple[Image, dict[str, float] | None]:
+        """Return our picture of a view, and how near VTK's is; both are kept for other VDIs.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is black.
+        """
+        if angle not in self._references:
+            image = self.image(camera)
+            if not image.any():
+                raise InvalidArgumentError(f"nothing is to be seen at {angle:g} degrees")
+            theirs = self._vtk_image(camera)
+            near = None if theirs is None else accuracy(image, theirs)
+            self._references[angle] = (image, near)
+        return self._references[angle]
+
+    def _vtk_image(self, camera: Camera) -> Image | None:
         """Draw by VTK's GPU mapper at the accurate step, RGB (H, W, 3); ``None`` without it."""
         peer = self._peers.get("vtk_gpu")
         if peer is None:
