@@ -39,7 +39,8 @@ Entry points:
 ``common/probe.cl``
     ``probe``: the kernel that a device must run correctly before it is used.
 ``vdi/generate.cl``, with ``vdi/runs.cl``
-    ``march_lists``, ``shorten_lists``, ``pack_lists``: volume to lists of supersegments.
+    ``march_lists``, ``shorten_lists``, ``pack_lists``: volume to lists of supersegments; with
+    ``vdi/criteria.cl`` also ``cut_lists``, where another criterion than least error is asked for.
 ``vdi/prepare.cl``
     ``prepare_lists``: a VDI's arrays to what the raycaster reads.
 ``vdi/raycast.cl``

@@ -52,6 +52,7 @@ def generate(
     window_size: Sequence[int],
     *,
     max_supersegments: int = 20,
+    criterion: str = "least-error",
     sample_distance: float | None = None,
     tolerance: float = 0.0,
     view_cone: float = 60.0,
@@ -75,6 +76,11 @@ def generate(
     max_supersegments : int
         Longest list, 1 to 4096. A promise: never exceeded, and nothing non-transparent is
         dropped for it.
+    criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
+        What decides where a list that must be shortened is cut: merging at least error, or, to
+        compare with, a threshold on differences, equal depths, or equal shares of the light that
+        V_O loses, by differences or, with ``"optical-depth"``, by ratios. See
+        :func:`pyvista_vdi.generation.generate_vdi`.
     sample_distance : float, optional
         Length of a step along the ray, model units; half the smallest spacing by default.
     tolerance : float
@@ -140,6 +146,7 @@ def generate(
         window_size,
         looks.transfer_function(volume),
         max_supersegments=max_supersegments,
+        criterion=criterion,
         sample_distance=sample_distance,
         tolerance=tolerance,
         view_cone=view_cone,
@@ -511,6 +518,7 @@ def estimate(
     window_size: Sequence[int],
     *,
     max_supersegments: int = 20,
+    criterion: str = "least-error",
     ambient_occlusion: Any = None,
 ) -> Estimate:
     """Return how much memory generating a VDI takes, before it is taken.
@@ -523,6 +531,8 @@ def estimate(
         Width and height in pixels.
     max_supersegments : int
         Longest list.
+    criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
+        As for :func:`generate`.
     ambient_occlusion : bool, float or AmbientOcclusion, optional
         As for :func:`generate`.
 
@@ -542,6 +552,7 @@ def estimate(
         as_volume(volume),
         window_size,
         max_supersegments=max_supersegments,
+        criterion=criterion,
         ambient_occlusion=ambient_occlusion,
     )
 

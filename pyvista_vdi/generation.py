@@ -26,10 +26,24 @@ from .volume import Volume
 #: Most supersegments that a list may be allowed.
 MAX_SUPERSEGMENTS = 4096
 
+#: What decides where lists are cut that must be shortened: what users ask for, and the kernels'
+#: name. ``docs/concepts.md`` says what each means; the first is the default and compiles nothing.
+_CRITERIA: dict[str, str | None] = {
+    "least-error": None,
+    "homogeneity": "HOMOGENEITY",
+    "length": "EQUAL_LENGTH",
+    "transmittance": "EQUAL_TRANSMITTANCE",
+    "optical-depth": "EQUAL_OPTICAL_DEPTH",
+}
+CRITERIA = tuple(_CRITERIA)
+
 #: Bytes of one recorded run on the device: eight float32 and its merge error.
 _RUN_BYTES = 9 * 4
 #: Bytes of runs that one slice of rays records at a time; also how often progress is reported.
 _SLICE_BYTES = 96 * 2**20
+#: Runs that a ray's record keeps for the criteria other than least error: more than a ray through
+#: most data has, so that these cut what was sampled and not what least error has left of it.
+_UNMERGED_RUNS = 512
 #: Merge error that no picture shows: a difference of a thousandth of full opacity over one voxel.
 _INDISTINGUISHABLE = 1e-6
 #: Steps of a ray between two looks at the length of its record.
@@ -83,11 +97,21 @@ def check_max_supersegments(max_supersegments: int) -> int:
     return limit
 
 
+def check_criterion(criterion: str) -> str:
+    """Return ``criterion`` if it is one of :data:`CRITERIA`."""
+    if criterion not in CRITERIA:
+        raise InvalidArgumentError(
+            f"criterion must be one of {', '.join(CRITERIA)}; got {criterion!r}"
+        )
+    return criterion
+
+
 def estimate(
     volume: Volume,
     window_size: Sequence[int],
     *,
     max_supersegments: int = 20,
+    criterion: str = "least-error",
     ambient_occlusion: Any = None,
 ) -> Estimate:
     """State the memory that :func:`generate_vdi` takes, before it is taken.
@@ -100,6 +124,8 @@ def estimate(
         Width and height of V_O's window in pixels.
     max_supersegments : int
         Most supersegments in a list.
+    criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
+        As for :func:`generate_vdi`; all but the first record more of each ray at a time.
     ambient_occlusion : optional
         As for :func:`generate_vdi`.
 
@@ -112,7 +138,7 @@ def estimate(
     limit = check_max_supersegments(max_supersegments)
     item = min(volume.array.dtype.itemsize, 4)  # float64 is scaled to float32 for the device
     lists = width * height
-    plan = _Slices(width, height, limit)
+    plan = _Slices(width, height, limit, check_criterion(criterion))
     occlusion = AmbientOcclusion.from_any(ambient_occlusion)
     return Estimate(
         volume=volume.array.size * item,
@@ -129,6 +155,7 @@ def generate_vdi(
     transfer_function: TransferFunction,
     *,
     max_supersegments: int = 20,
+    criterion: str = "least-error",
     sample_distance: float | None = None,
     tolerance: float = 0.0,
     view_cone: float = 60.0,
@@ -141,9 +168,9 @@ def generate_vdi(
     """Make a VDI of a classified volume.
 
     Each list's ray is marched once. Neighbouring samples are merged while the medium stays
-    homogeneous (the criterion of Frey et al. 2013, which the paper uses); what is recorded is then
-    merged at least error until ``max_supersegments`` are left. Lists go on behind what V_O sees,
-    because other views may see it.
+    homogeneous; what is recorded is then merged at least error, or cut by another ``criterion``,
+    until ``max_supersegments`` are left. Lists go on behind what V_O sees, because other views may
+    see it.
 
     Parameters
     ----------
@@ -158,6 +185,16 @@ def generate_vdi(
     max_supersegments : int
         Most supersegments in a list, 1 to 4096; never exceeded, and nothing that is not
         transparent is dropped.
+    criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
+        What decides where a list is cut. ``"least-error"``: neighbours are merged at least error.
+        The others are those of the paper's section 2, for comparison. ``"homogeneity"`` (Frey et
+        al. 2013): a supersegment goes on while the medium is like its mean so far, by the least
+        threshold that keeps the budget on this ray. ``"length"`` (Brady et al. 1997): cuts at
+        equal depths from the first to the last of what is not transparent. ``"transmittance"``
+        (Lochmann et al. 2016): cuts where V_O has lost equal shares of the light it loses.
+        ``"optical-depth"``: the same by ratios, so that each lets the same share through. With
+        each of them neighbours within ``tolerance`` are merged; they record up to 512 runs of a
+        ray before unlike ones are merged, which takes more time and, in wide windows, memory.
     sample_distance : float, optional
         Length of a step, model units; half the smallest spacing by default.
     tolerance : float
@@ -166,7 +203,8 @@ def generate_vdi(
         0 merges only what is homogeneous.
     view_cone : float
         Half angle in degrees, 0 to 90, of the cone of views that must be served: what V_O cannot
-        see at all counts ``1 - cos(view_cone)`` as much as what it sees when lists are shortened.
+        see at all counts ``1 - cos(view_cone)`` as much as what it sees when neighbours are merged
+        at least error or within ``tolerance``. Other criteria cut without regard to it.
     lights : optional
         What a shaded volume is lit by; see :meth:`pyvista_vdi.Lights.from_any`. The light is
         baked into the colours: it stays as it is where V_O has it.
@@ -199,7 +237,8 @@ def generate_vdi(
     camera = Camera.from_any(camera)
     width, height = check_window_size(window_size)
     limit = check_max_supersegments(max_supersegments)
-    tolerance, hidden_weight = _check_criterion(tolerance, view_cone)
+    criterion = check_criterion(criterion)
+    tolerance, hidden_weight = _check_weights(tolerance, view_cone)
     _require_room((), (width, height))
     runtime = get_runtime(device)
     lights = Lights.from_any(lights)
@@ -212,7 +251,9 @@ def generate_vdi(
         lights=lights,
         ambient_occlusion=occlusion,
     )
-    recorder = _Recorder(runtime, medium, camera, (width, height), limit, tolerance, hidden_weight)
+    recorder = _Recorder(
+        runtime, medium, camera, (width, height), limit, criterion, tolerance, hidden_weight
+    )
     parts = []
     with recorder:
         for first_row in range(0, height, recorder.slices.rows):
@@ -226,7 +267,7 @@ def generate_vdi(
     lengths, front, back, color, optical_depth = _joined(runtime, parts)
     made_by = {
         "generator": f"pyvista-vdi {__version__}",
-        "criterion": "homogeneity, least-error merging",
+        "criterion": criterion,
         "max_supersegments": limit,
         "tolerance": tolerance,
         "view_cone": float(view_cone),
@@ -262,10 +303,13 @@ def generate_vdi(
 class _Slices:
     """How many rows of lists are made at a time, and the buffers that this takes."""
 
-    def __init__(self, width: int, height: int, limit: int) -> None:
+    def __init__(self, width: int, height: int, limit: int, criterion: str) -> None:
         # Twice the budget: the records' thresholds then stay well below the final merges' errors
         self.kept = max(2 * limit, limit + 12)
         self.capacity = self.kept + _CHUNK_STEPS
+        if _CRITERIA[criterion]:
+            self.kept = max(self.kept, _UNMERGED_RUNS)
+            self.capacity = self.kept + _CHUNK_STEPS + limit  # the kernel cuts into what is free
         per_block_row = block_items(width, 4) * self.capacity * _RUN_BYTES
         self.rows = min(height, 4 * max(1, _SLICE_BYTES // per_block_row))
         self.items = block_items(width, self.rows)
@@ -301,6 +345,7 @@ class _Recorder:
         camera: Camera,
         size: tuple[int, int],
         limit: int,
+        criterion: str,
         tolerance: float,
         hidden_weight: float,
     ) -> None:
@@ -311,20 +356,23 @@ class _Recorder:
         self._limit = limit
         # Differences stay below 1e18, whose square float32 still holds
         self._threshold = np.float32(max(min(tolerance, 1e18) ** 2, _INDISTINGUISHABLE))
-        self._criterion = (
+        self._weights = (
             np.float32(min(medium.volume.spacing)),  # reference length: a voxel
             np.float32(hidden_weight),
         )
         forms, rays, self._planes = medium.forms(camera, size, None)
         self.depth_origin = rays.reference_depth
         self._most_steps = int(np.ceil(medium.volume.length / medium.sample_distance)) + 1
-        self.slices = _Slices(*size, limit)
+        self.slices = _Slices(*size, limit, criterion)
         self._grain = _steps_per_voxel(medium.volume, medium.sample_distance)
         items, capacity = self.slices.items, self.slices.capacity
-        self._kernels = {
-            name: runtime.kernel("vdi/generate.cl", name, medium.defines)
-            for name in ("march_lists", "shorten_lists", "pack_lists")
-        }
+        self._cuts = _CRITERIA[criterion]
+        names = ["march_lists", "shorten_lists", "pack_lists"]
+        defines = dict(medium.defines)
+        if self._cuts:
+            names.append("cut_lists")
+            defines["CRITERION"] = self._cuts
+        self._kernels = {name: runtime.kernel("vdi/generate.cl", name, defines) for name in names}
         with ExitStack() as stack:
             keep = stack.enter_context
             self._forms = keep(runtime.upload(forms, "rays"))
@@ -361,24 +409,38 @@ class _Recorder:
                 np.int32(self._grain),
                 self._threshold,
                 capacity,
-                *self._criterion,
+                *self._weights,
                 self._thresholds,
                 self._records,
                 self._counts,
             )
             last = first_step + steps >= self._most_steps
+            exactly = last and not self._cuts
             self._launch(
                 "shorten_lists",
                 items,
-                np.int32(self._limit if last else self.slices.kept),
-                np.int32(last),
+                np.int32(self._limit if exactly else self.slices.kept),
+                np.int32(exactly),
                 *(np.int32(n) for n in (width, height, first_row, rows)),
                 self._forms,
                 capacity,
-                *self._criterion,
+                *self._weights,
                 self._thresholds,
                 self._records,
                 self._errors,
+                self._counts,
+            )
+        if self._cuts:
+            self._launch(
+                "cut_lists",
+                items,
+                np.int32(self._limit),
+                *(np.int32(n) for n in (width, height, first_row, rows)),
+                self._forms,
+                capacity,
+                *self._weights,
+                self._threshold,
+                self._records,
                 self._counts,
             )
 
@@ -416,7 +478,7 @@ class _Recorder:
         self._runtime.launch(self._kernels[name], items, GROUP, *arguments)
 
 
-def _check_criterion(tolerance: float, view_cone: float) -> tuple[float, float]:
+def _check_weights(tolerance: float, view_cone: float) -> tuple[float, float]:
     difference, angle = as_float(tolerance), as_float(view_cone)
     if not (np.isfinite(difference) and difference >= 0):
         raise InvalidArgumentError(f"tolerance must be a number >= 0; got {tolerance!r}")
@@ -457,4 +519,4 @@ def _report(progress: Progress | None, fraction: float) -> None:
         raise Cancelled(f"generation was cancelled at {fraction:.0%}")
 
 
-__all__ = ["MAX_SUPERSEGMENTS", "Estimate", "estimate", "generate_vdi"]
+__all__ = ["CRITERIA", "MAX_SUPERSEGMENTS", "Estimate", "estimate", "generate_vdi"]

@@ -2,6 +2,7 @@
 //
 // -D VOXEL_T, INDEX_T, RGBA, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl; OCCLUSION: see common/occlusion.cl
+// -D CRITERION: see vdi/criteria.cl; without it lists are shortened at least error
 //
 // A ray's march is cut into chunks of equally many steps. march_lists takes the steps of one chunk and appends what is not
 // homogeneous with the run before; make_room_in_lists then shortens the records that have grown too long, and raises the
@@ -11,6 +12,7 @@
 // Lengths along a ray are t, the view depth of V_O less the VDI's depth origin, world units.
 #include "common/march.cl"
 #include "vdi/runs.cl"
+#include "vdi/criteria.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Work-items are the pixels of V_O in rows first_row .. first_row + rows - 1, in blocks of 4 x 4; records are in the order
@@ -156,6 +158,38 @@ __kernel void shorten_lists(
         thresholds[item] = threshold;
     }
 }
+
+#ifdef CRITERION
+// Bring records to at most `limit` runs by another criterion than least error, and merge neighbours as while marching: what
+// is homogeneous needs no cut. Records have room for `limit` more runs.
+__kernel void cut_lists(
+    int limit,
+    int width, int height,
+    int first_row, int rows,
+    __global const float *forms,
+    int capacity,
+    float reference_length,
+    float hidden_weight,
+    float threshold,               // merge errors up to this are accepted
+    __global float *records,
+    __global uint *counts)
+{
+    const uint item = (uint)get_global_id(0);
+    const int2 pixel = block_pixel(item, width);
+    if (pixel.x >= width || pixel.y >= rows)
+        return;
+    __global uint *length_of_list = counts + (size_t)pixel.y * width + pixel.x;
+    const int count = (int)*length_of_list;
+    if (count == 0)
+        return;
+    const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
+    const float b = (float)(first_row + pixel.y) + 0.5f - 0.5f * (float)height;
+    const float per_reference = length(model_direction(forms, a, b)) / reference_length;
+    __global float *record = records + record_start(item, capacity, RUN_WORDS);
+    const int cut = cut_to_limit(record, count, limit, per_reference);
+    *length_of_list = (uint)merge_within(record, cut, threshold, per_reference, hidden_weight);
+}
+#endif
 
 // Records of a slice of rays to the VDI's arrays.
 __kernel void pack_lists(

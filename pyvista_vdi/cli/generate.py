@@ -39,6 +39,7 @@ def generate(options: argparse.Namespace) -> int:
         volume,
         options.size,
         max_supersegments=options.max_supersegments,
+        criterion=options.criterion,
         ambient_occlusion=occlusion,
     )
     print(
@@ -54,6 +55,7 @@ def generate(options: argparse.Namespace) -> int:
             view,
             options.size,
             max_supersegments=options.max_supersegments,
+            criterion=options.criterion,
             sample_distance=options.sample_distance,
             tolerance=options.tolerance,
             view_cone=options.view_cone,

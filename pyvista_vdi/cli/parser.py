@@ -458,6 +458,13 @@ def _add_limits(parser: argparse.ArgumentParser) -> None:
         "--max-supersegments", type=int, default=20, metavar="N", help="longest list (default: 20)"
     )
     group.add_argument(
+        "--criterion",
+        default="least-error",
+        metavar="NAME",
+        help="where lists are cut: least-error (default), homogeneity, length, "
+        "transmittance or optical-depth",
+    )
+    group.add_argument(
         "--sample-distance",
         type=float,
         metavar="LENGTH",

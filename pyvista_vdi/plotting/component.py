@@ -50,6 +50,7 @@ _OF_VOLUMES = {
     "diffuse": 0.7,
     "specular": 0.2,
     "max_supersegments": 20,
+    "criterion": "least-error",
     "sample_distance": None,
     "tolerance": 0.0,
     "view_cone": 60.0,
@@ -106,6 +107,9 @@ class AddVDI:
         log_scale: bool = False,
         *,
         max_supersegments: int = 20,
+        criterion: Literal[
+            "least-error", "homogeneity", "length", "transmittance", "optical-depth"
+        ] = "least-error",
         sample_distance: float | None = None,
         tolerance: float = 0.0,
         view_cone: float = 60.0,
@@ -177,6 +181,9 @@ class AddVDI:
             Map values to colours by their logarithm.
         max_supersegments : int
             Longest list, 1 to 4096.
+        criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
+            What decides where a list that must be shortened is cut, see
+            :func:`pyvista_vdi.generate`.
         sample_distance : float, optional
             Length of a step, model units; half the smallest spacing by default.
         tolerance : float
@@ -276,6 +283,7 @@ class AddVDI:
         source.SetInputDataObject(image)
         source.SetScalars(array_name, given["preference"])
         source.SetMaxSupersegments(given["max_supersegments"])
+        source.SetCriterion(given["criterion"])
         source.SetSampleDistance(given["sample_distance"])
         source.SetTolerance(given["tolerance"])
         source.SetViewCone(given["view_cone"])

@@ -18,11 +18,20 @@ from ..lighting import Lights
 from ..transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from ..vdi import VDI
 from ..volume import Volume
+from .criteria import (
+    cut_at_equal_lengths,
+    cut_at_equal_optical_depths,
+    cut_at_equal_transmittance,
+    cut_where_unlike,
+)
 from .occlusion import NodeOcclusion, mean_transmittance
 from .rays import HalfSpace, Ray, clip, inside_box, pixel_ray
 from .shading import gradient_factors, lit_colors
 
 Array = NDArray[np.float64]
+
+#: What decides where lists are cut; the engine's names.
+CRITERIA = ("least-error", "homogeneity", "length", "transmittance", "optical-depth")
 
 #: How far outside the grid, in points, a position may lie by float64 rounding alone.
 GRID_TOLERANCE = 1e-9
@@ -161,17 +170,18 @@ def build_vdi(
     sample_distance: float | None = None,
     *,
     max_supersegments: int = 20,
+    criterion: str = "least-error",
     weighting: str = "transmittance",
     lights: Lights | None = None,
     ambient_occlusion: AmbientOcclusion | None = None,
 ) -> VDI:
-    """Return a plain VDI: neighbouring samples merged greedily until the budget is kept.
+    """Return a plain VDI: neighbouring samples merged, or cut, until the budget is kept.
 
-    Every sample that is not transparent begins as a supersegment of its own. While a list is over
-    budget, the two neighbours whose merging displaces the least optical depth become one: with e
-    the extinction times (r, g, b, 1), the cost is the sum of abs(e - mean e) over length, what lies
-    between the two (e = 0) included. Merging sees opacity as well as colour, so black material
-    that changes density is not homogeneous. Rendered at V_O the result equals
+    Every sample that is not transparent begins as a supersegment of its own. At least error, while
+    a list is over budget, the two neighbours whose merging displaces the least optical depth become
+    one: with e the extinction times (r, g, b, 1), the cost is the sum of abs(e - mean e) over
+    length, what lies between the two (e = 0) included. Merging sees opacity as well as colour, so
+    black material that changes density is not homogeneous. Rendered at V_O the result equals
     :func:`volume_image` for any budget, with colours weighted by transmittance.
 
     Parameters
@@ -180,6 +190,8 @@ def build_vdi(
         As for :func:`samples`.
     max_supersegments : int
         N_S: no list gets longer.
+    criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
+        What decides where a list is cut; see :mod:`pyvista_vdi.reference.criteria`.
     weighting : {"transmittance", "optical_depth"}
         Of the colours; see :func:`pyvista_vdi.compositing.merge`.
 
@@ -191,8 +203,12 @@ def build_vdi(
     Raises
     ------
     InvalidArgumentError
-        If ``max_supersegments`` is not positive.
+        If ``max_supersegments`` is not positive or the criterion is unknown.
     """
+    if criterion not in CRITERIA:
+        raise InvalidArgumentError(
+            f"criterion must be one of {', '.join(CRITERIA)}; got {criterion!r}"
+        )
     if max_supersegments < 1:
         raise InvalidArgumentError(
             f"max_supersegments must be a whole number of at least 1; got {max_supersegments!r}"
@@ -210,8 +226,13 @@ def build_vdi(
             )
             if tau > 0
         ]
-        lists.append(_within_budget(runs, max_supersegments, weighting))
-    return _vdi_from(lists, camera, window_size, volume.bounds, depth_origin)
+        per_reference = (
+            float(ray.length[0] / (ray.end[0] - ray.begin[0])) / min(volume.spacing)
+            if runs
+            else 0.0
+        )
+        lists.append(_cut(runs, criterion, max_supersegments, per_reference, weighting))
+    return _vdi_from(lists, camera, window_size, volume.bounds, depth_origin, criterion)
 
 
 def near_depth(bounds: Sequence[float], camera: Camera) -> float:
@@ -448,6 +469,21 @@ def _steps(start: Array, slope: Array, volume: Volume, parallel: bool, stride: f
 # -- merging ---------------------------------------------------------------------------------------
 
 
+def _cut(
+    runs: list[Segment], criterion: str, budget: int, per_reference: float, weighting: str
+) -> list[Segment]:
+    """Bring a ray's runs to the budget; ``per_reference``: voxels per unit of view depth."""
+    if criterion == "homogeneity":
+        return cut_where_unlike(runs, budget, per_reference, weighting)
+    if criterion == "length":
+        return cut_at_equal_lengths(runs, budget, weighting)
+    if criterion == "transmittance":
+        return cut_at_equal_transmittance(runs, budget, weighting)
+    if criterion == "optical-depth":
+        return cut_at_equal_optical_depths(runs, budget, weighting)
+    return _within_budget(runs, budget, weighting)
+
+
 def _within_budget(runs: list[Segment], budget: int, weighting: str) -> list[Segment]:
     """Merge neighbours at least cost until there are no more than ``budget``."""
     merged = list(runs)
@@ -480,6 +516,7 @@ def _vdi_from(
     window_size: Sequence[int],
     bounds: Sequence[float],
     depth_origin: float,
+    criterion: str,
 ) -> VDI:
     """Store segments, in view depth, as a valid VDI: rounded to float32 and still disjoint."""
     front, back = [], []
@@ -504,5 +541,5 @@ def _vdi_from(
         np.array([segment.optical_depth for segment in flat]),
         bounds,
         depth_origin=depth_origin,
-        metadata={"criterion": "reference: least displaced optical depth"},
+        metadata={"criterion": f"reference: {criterion}"},
     )

@@ -26,7 +26,7 @@ from pyvista_vdi.errors import (
     VDIError,
     VDIWarning,
 )
-from pyvista_vdi.generation import check_max_supersegments, generate_vdi
+from pyvista_vdi.generation import check_criterion, check_max_supersegments, generate_vdi
 from pyvista_vdi.lighting import Lights
 from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vdi import VDI
@@ -133,6 +133,7 @@ class VDISource(VTKPythonAlgorithmBase):
         self._preference = "point"
         self._settings: dict[str, Any] = {
             "max_supersegments": 20,
+            "criterion": "least-error",
             "sample_distance": None,
             "tolerance": 0.0,
             "view_cone": 60.0,
@@ -329,6 +330,25 @@ class VDISource(VTKPythonAlgorithmBase):
     def GetMaxSupersegments(self) -> int:
         """Return the longest list."""
         return self._settings["max_supersegments"]  # type: ignore[no-any-return]
+
+    def SetCriterion(self, criterion: str) -> None:
+        """Choose what decides where a list that must be shortened is cut.
+
+        Parameters
+        ----------
+        criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
+            As for :func:`pyvista_vdi.generate`.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is none of these.
+        """
+        self._set("criterion", check_criterion(criterion))
+
+    def GetCriterion(self) -> str:
+        """Return what decides where a list is cut."""
+        return self._settings["criterion"]  # type: ignore[no-any-return]
 
     def SetSampleDistance(self, distance: float | None) -> None:
         """Set the length of a step, model units; ``None`` is half the smallest spacing."""

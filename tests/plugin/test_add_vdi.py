@@ -228,6 +228,7 @@ def test_settings_reach_the_generator(plotter):
     actor = plotter.add_vdi(
         soft_ball(),
         max_supersegments=3,
+        criterion="transmittance",
         sample_distance=0.1,
         tolerance=0.01,
         view_cone=30.0,
@@ -236,6 +237,7 @@ def test_settings_reach_the_generator(plotter):
     shown(plotter)
     made_by = actor.vdi.metadata
     assert actor.vdi.counts.max() <= 3
+    assert made_by["criterion"] == "transmittance"
     assert made_by["sample_distance"] == 0.1
     assert made_by["tolerance"] == 0.01
     assert made_by["view_cone"] == 30.0

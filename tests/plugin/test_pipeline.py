@@ -114,13 +114,20 @@ def executions(source):
 
 
 def test_source_makes_what_generate_makes():
-    source = ready_source(MaxSupersegments=7, SampleDistance=0.05, Tolerance=0.01, ViewCone=20.0)
+    source = ready_source(
+        MaxSupersegments=7,
+        Criterion="length",
+        SampleDistance=0.05,
+        Tolerance=0.01,
+        ViewCone=20.0,
+    )
     expected = pvdi.generate(
         soft_ball(12),
         camera_at(5, 4, 3),
         (40, 30),
         volume_property=red_property(),
         max_supersegments=7,
+        criterion="length",
         sample_distance=0.05,
         tolerance=0.01,
         view_cone=20.0,
@@ -129,6 +136,7 @@ def test_source_makes_what_generate_makes():
     assert vdi_from_image(source.GetOutputDataObject(0)).equals(expected)
     assert source.GetOutputDataObject(0).GetDimensions() == (40, 30, 1)
     assert source.GetMaxSupersegments() == 7
+    assert source.GetCriterion() == "length"
     assert source.GetSampleDistance() == 0.05
     assert source.GetTolerance() == 0.01
     assert source.GetViewCone() == 20.0

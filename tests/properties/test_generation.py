@@ -17,7 +17,7 @@ import strategies
 from pyvista_vdi import reference
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
-from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.generation import CRITERIA, generate_vdi
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.raycast_volume import raycast_volume
 from pyvista_vdi.reference.generate import medium_at, near_depth
@@ -152,11 +152,19 @@ def list_sums(vdi):
     return sums
 
 
-def check_against_reference(runtime, seed, volume, camera, transfer_function, budget):
+def check_against_reference(
+    runtime, seed, volume, camera, transfer_function, budget, criterion="least-error"
+):
     """All the laws of a generated VDI and of the volume's image, on one case."""
     name = f"seed {seed}, {volume}, {camera}"
     vdi = generate_vdi(
-        volume, camera, WINDOW, transfer_function, max_supersegments=budget, device=runtime
+        volume,
+        camera,
+        WINDOW,
+        transfer_function,
+        max_supersegments=budget,
+        criterion=criterion,
+        device=runtime,
     )
     rays = list(reference.samples(volume, camera, WINDOW, transfer_function))
     uncertain = [Uncertainty(volume, camera, transfer_function, ray) for ray in rays]
@@ -230,6 +238,111 @@ def test_the_budget_is_a_promise_and_the_picture_stays(runtime, budget):
     transfer_function = strategies.random_transfer_function(rng, noise, interpolation="nearest")
     camera = strategies.camera_around(rng, noise.bounds, np.eye(4))
     check_against_reference(runtime, seed, noise, camera, transfer_function, budget)
+
+
+@pytest.mark.parametrize("criterion", CRITERIA[1:])
+@pytest.mark.parametrize("budget", [2, 20])
+def test_every_criterion_keeps_the_promise_and_the_picture(runtime, criterion, budget):
+    """In data of many runs per list, and in data of few, which are cut where they could stay."""
+    for number, smooth in enumerate((False, True)):
+        seed = [budget, number, 2500]
+        rng = np.random.default_rng(seed)
+        volume = Volume(rng.random((12, 12, 12)).astype(np.float32))
+        if smooth:
+            volume, camera, looks = cases(seed, "uint8", "linear", direction=np.eye(3))
+        else:
+            looks = strategies.random_transfer_function(rng, volume, interpolation="nearest")
+            camera = strategies.camera_around(rng, volume.bounds, np.eye(4))
+        check_against_reference(runtime, seed, volume, camera, looks, budget, criterion)
+
+
+@pytest.mark.parametrize("criterion", CRITERIA[1:])
+def test_every_criterion_cuts_where_the_reference_does(runtime, criterion):
+    """The device merges what no picture tells apart, before and after; the rest is the same."""
+    rng = np.random.default_rng(2600)
+    noise = Volume(rng.random((10, 10, 10)).astype(np.float32))
+    looks = strategies.random_transfer_function(rng, noise, interpolation="linear")
+    camera = strategies.camera_around(rng, noise.bounds, np.eye(4))
+    made = generate_vdi(
+        noise, camera, WINDOW, looks, max_supersegments=6, criterion=criterion, device=runtime
+    )
+    exact = reference.build_vdi(
+        noise, camera, WINDOW, looks, max_supersegments=6, criterion=criterion
+    )
+    assert made.metadata["criterion"] == criterion
+    assert made.n_supersegments <= exact.n_supersegments
+    assert made.n_supersegments > 0.8 * exact.n_supersegments  # measured: 0.9 and more
+    step = min(noise.spacing) / 2
+    near, total = 0, 0
+    for x, y in itertools.product(range(WINDOW[0]), range(WINDOW[1])):
+        mine, other = made.list_at(x, y), exact.list_at(x, y)
+        fronts = made.front[mine].astype(float) + made.depth_origin
+        faces = exact.front[other].astype(float) + exact.depth_origin
+        if len(fronts):
+            near += (np.abs(fronts[:, None] - faces).min(axis=1) <= 0.1 * step).sum()
+            total += len(fronts)
+    assert near >= 0.97 * total, f"{near} of {total}"
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+def test_a_tolerance_is_kept_by_every_criterion(runtime, criterion):
+    volume, camera, transfer_function = cases([3, 3000], "uint8", "linear", direction=np.eye(3))
+    exact, loose = (
+        generate_vdi(
+            volume,
+            camera,
+            WINDOW,
+            transfer_function,
+            criterion=criterion,
+            tolerance=t,
+            device=runtime,
+        )
+        for t in (0.0, 0.3)
+    )
+    assert loose.n_supersegments < exact.n_supersegments
+    np.testing.assert_allclose(list_sums(loose), list_sums(exact), rtol=1000 * ROUNDOFF)
+
+
+@pytest.mark.parametrize("criterion", CRITERIA[1:])
+@pytest.mark.parametrize("budget", [7, 600])
+def test_a_ray_may_have_more_runs_than_are_recorded(runtime, criterion, budget):
+    """900 unlike voxels along each ray: some are merged before the cut, none is lost."""
+    rng = np.random.default_rng(2700)
+    volume = Volume(rng.random((3, 3, 900)).astype(np.float32))
+    looks = TransferFunction(np.eye(3), (0.2, 0.6, 0.9), (0.0, 1.0), unit_distance=100.0)
+    camera = Camera((-900, 1, 1), (450, 1, 1), (0, 0, 1), view_angle=0.1)
+    merged, cut = (
+        generate_vdi(
+            volume,
+            camera,
+            WINDOW,
+            looks,
+            max_supersegments=budget,
+            criterion=name,
+            device=runtime,
+        )
+        for name in (CRITERIA[0], criterion)
+    )
+    assert cut.counts.max() <= budget
+    np.testing.assert_array_equal(cut.counts > 0, merged.counts > 0)
+    # Each sum of float32 is rounded once per sample, 1800 of them, and once per cut
+    np.testing.assert_allclose(list_sums(cut), list_sums(merged), rtol=2400 * ROUNDOFF)
+    seen = [reference.render(vdi, camera) for vdi in (cut, merged)]
+    assert seen[0][..., 3].max() > 0.9
+    assert np.abs(seen[0] - seen[1]).max() <= 2400 * ROUNDOFF
+
+
+@pytest.mark.parametrize("criterion", CRITERIA[1:])
+def test_what_is_homogeneous_needs_no_cut(runtime, criterion):
+    """A medium that is the same throughout stays one supersegment, whatever would cut it."""
+    volume = Volume(np.full((6, 6, 6), 0.5, np.float32))
+    looks = TransferFunction(np.full((2, 3), 0.5), (0.3, 0.3), (0.0, 1.0))
+    camera = Camera((2.5, -20, 2.5), (2.5, 2.5, 2.5), (0, 0, 1))
+    vdi = generate_vdi(
+        volume, camera, WINDOW, looks, max_supersegments=20, criterion=criterion, device=runtime
+    )
+    assert vdi.n_supersegments > 0
+    assert vdi.counts.max() == 1
 
 
 @pytest.mark.parametrize("tolerance", [0.01, 0.3])
@@ -330,6 +443,7 @@ def test_progress_runs_from_0_to_1_and_can_cancel(runtime):
         ({"max_supersegments": 2.5}, "max_supersegments.*got 2.5"),
         ({"tolerance": -1.0}, "tolerance.*got -1"),
         ({"view_cone": 91.0}, "view_cone.*got 91"),
+        ({"criterion": "depth"}, "criterion must be one of least-error, .*got 'depth'"),
         ({"sample_distance": 0.0}, "sample_distance.*got 0"),
         ({"sample_distance": float("nan")}, "sample_distance.*got nan"),
     ],

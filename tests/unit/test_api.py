@@ -119,6 +119,14 @@ def test_estimate_says_bytes(volume):
     assert needed.volume == volume.array.nbytes
     assert needed.vdi_worst_case >= 640 * 480 * 10 * 24
     assert needed.total == needed.volume + needed.vdi_worst_case + needed.working
+    # More of a ray is recorded before it is cut, and four rows are made at least
+    merged, cut = (
+        api.estimate(volume, (8192, 8), criterion=name) for name in ("least-error", "length")
+    )
+    assert cut.working > 2 * merged.working
+    assert cut.vdi_worst_case == merged.vdi_worst_case
+    with pytest.raises(InvalidArgumentError, match="criterion must be one of .*; got 'depth'"):
+        api.estimate(volume, (640, 480), criterion="depth")
 
 
 def test_help_shows_every_classification_argument():

@@ -1,0 +1,313 @@
+"""What the criterion decides: SSIM by angle for each, at the same budget and at the same bytes.
+
+Writes ``criteria_WxH.json`` (all figures) and ``.md`` (tables). See README.md in this folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from statistics import mean
+from typing import Any
+
+from standard_table import INTERPOLATIONS, window_size  # beside this file
+from tqdm import tqdm
+
+from pyvista_vdi import examples
+from pyvista_vdi.classification import Classification
+from pyvista_vdi.compare import describe_system
+from pyvista_vdi.generation import CRITERIA, generate_vdi
+from pyvista_vdi.io import whole_file
+from pyvista_vdi.metrics import compare_images
+from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.vdi import VDI
+
+ANGLES = (0.0, 5.0, 15.0, 30.0, 60.0, 90.0)
+BUDGETS = (15, 30)
+VOLUMES = ("aneurism", "brain", "rayleigh_taylor")
+#: The criterion that gives the number of supersegments which the others are brought to.
+GIVES = CRITERIA[0]
+#: By how much that number may be missed; and how near the search in a small window comes.
+SLACK, SMALL_SLACK = 0.02, 0.005
+#: No budget above this is tried to reach it.
+MOST = 128
+
+EQUALLY_MANY = "same bytes"
+EQUAL_BUDGET = "same N_S"
+
+
+def main() -> int:
+    """Measure what is missing, and write what was found."""
+    options = parsed()
+    width, height = options.size
+    options.out.mkdir(parents=True, exist_ok=True)
+    target = options.out / f"criteria_{width}x{height}.json"
+    case = {
+        "window_size": [width, height],
+        "interpolation": options.interpolation,
+        "angles": list(ANGLES),
+        "system": describe_system(options.device),
+    }
+    results = json.loads(target.read_text()) if target.exists() else {**case, "cases": {}}
+    if any(results[name] != value for name, value in case.items()):
+        sys.exit(f"{target} was measured otherwise or elsewhere: choose another --out")
+    at_hand = examples.available()
+    absent = [name for name in options.volumes if name not in at_hand]
+    if absent:
+        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
+    names = [name for name in options.volumes if name in at_hand]
+    wanted = [
+        (name, look)
+        for name in names
+        for look in options.tf
+        if options.redo or f"{name}, {look}" not in results["cases"]
+    ]
+    with tqdm(total=len(wanted) * len(BUDGETS) * len(CRITERIA), unit="criterion") as bar:
+        for name, look in wanted:
+            rows = []
+            for row in Case(name, look, options).rows():
+                rows.append(row)
+                bar.update(row["way"] != EQUAL_BUDGET)
+            results["cases"][f"{name}, {look}"] = rows
+            with whole_file(target) as stream:
+                stream.write(json.dumps(results, indent=1).encode() + b"\n")
+    with whole_file(target.with_suffix(".md")) as stream:
+        stream.write("\n".join([*report(results), ""]).encode())
+    print(f"Written: {target}, and .md beside it")
+    return 0
+
+
+def parsed() -> argparse.Namespace:
+    """Return the options."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--size", type=window_size, default=(480, 270), metavar="WxH")
+    names = sorted(examples.VOLUMES)
+    parser.add_argument("--volumes", nargs="+", choices=names, default=VOLUMES, metavar="NAME")
+    looks = tuple(TRANSFER_FUNCTIONS)
+    parser.add_argument("--tf", nargs="+", choices=looks, default=looks, metavar="NAME")
+    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
+    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
+    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
+    return parser.parse_args()
+
+
+class Case:
+    """One volume with one transfer function: the references, and how its VDIs are made.
+
+    Parameters
+    ----------
+    name, look : str
+        Volume and transfer function.
+    options : argparse.Namespace
+        As :func:`parsed` returns them.
+    """
+
+    def __init__(self, name: str, look: str, options: argparse.Namespace) -> None:
+        self._volume = examples.load_data(name, as_volume=True)
+        looks = {**TRANSFER_FUNCTIONS[look], "interpolation": options.interpolation}
+        self._classified = Classification(looks, "criteria").transfer_function(self._volume)
+        self._size = tuple(options.size)
+        self._device = options.device
+        self._view = filling_camera(self._volume.bounds, self._size)
+        self._references = [
+            raycast_volume(
+                self._volume,
+                self._view.azimuth(a),
+                self._size,
+                self._classified,
+                device=self._device,
+            )
+            for a in ANGLES
+        ]
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield what each criterion gives at each budget, and what at the bytes of the first."""
+        for budget in BUDGETS:
+            given = self._made(self._size, GIVES, budget)
+            for criterion in CRITERIA:
+                vdi = given if criterion == GIVES else self._made(self._size, criterion, budget)
+                row = self._row(EQUAL_BUDGET, budget, criterion, vdi, given)
+                yield row
+                if criterion == GIVES:
+                    yield {**row, "way": EQUALLY_MANY}
+                else:
+                    vdi = self._matched(criterion, budget, given)
+                    yield self._row(EQUALLY_MANY, budget, criterion, vdi, given)
+
+    def _made(
+        self, size: tuple[int, int], criterion: str, budget: int, tolerance: float = 0.0
+    ) -> VDI:
+        return generate_vdi(
+            self._volume,
+            self._view,
+            size,
+            self._classified,
+            max_supersegments=budget,
+            criterion=criterion,
+            tolerance=tolerance,
+            device=self._device,
+        )
+
+    def _row(self, way: str, budget: int, criterion: str, vdi: VDI, given: VDI) -> dict[str, Any]:
+        found = [
+            compare_images(
+                render_vdi(vdi, self._view.azimuth(angle), self._size, device=self._device), image
+            )
+            for angle, image in zip(ANGLES, self._references, strict=True)
+        ]
+        return {
+            "way": way,
+            "budget": budget,
+            "criterion": criterion,
+            "max_supersegments": vdi.metadata["max_supersegments"],
+            "tolerance": vdi.metadata["tolerance"],
+            "supersegments": vdi.n_supersegments,
+            "share": vdi.n_supersegments / given.n_supersegments,
+            "bytes": vdi.nbytes,
+            "ssim": [f.ssim for f in found],
+            "psnr": [min(f.psnr, 999.0) for f in found],
+            "brightness": [f.mean_brightness_ratio for f in found],
+        }
+
+    def _matched(self, criterion: str, budget: int, given: VDI) -> VDI:
+        """Return the criterion's VDI with as many supersegments as ``given`` has.
+
+        The budget is the least that has no fewer, and tolerance takes the rest. Both are sought in
+        a window of a third the size, and then set right in the whole.
+        """
+        small = (self._size[0] // 3, self._size[1] // 3)
+        aim = self._made(small, GIVES, budget).n_supersegments
+
+        def in_small(limit: int, tolerance: float = 0.0) -> int:
+            return self._made(small, criterion, limit, tolerance).n_supersegments
+
+        limit = least_budget(in_small, aim, budget)
+        tolerance = settled(lambda t: in_small(limit, t), aim, 0.0, SMALL_SLACK)
+        whole: dict[float, VDI] = {}
+
+        def in_whole(tolerance: float) -> int:
+            whole.clear()
+            whole[tolerance] = self._made(self._size, criterion, limit, tolerance)
+            return whole[tolerance].n_supersegments
+
+        settled(in_whole, given.n_supersegments, tolerance, SLACK)
+        return next(iter(whole.values()))
+
+
+def least_budget(count: Callable[[int], int], aim: int, start: int) -> int:
+    """Return the least budget that gives no fewer than ``aim``, or :data:`MOST`."""
+    limit = start
+    while (found := count(limit)) < aim and limit < MOST:
+        limit = min(MOST, max(limit + 1, math.ceil(limit * aim / max(found, 1))))
+    while limit > 1 and count(limit - 1) >= aim:
+        limit -= 1
+    return limit
+
+
+def settled(count: Callable[[float], int], aim: int, tolerance: float, slack: float) -> float:
+    """Return the tolerance that gives ``aim`` but for ``slack``; the last that was tried."""
+    low, high = None, None
+    for _ in range(16):
+        share = count(tolerance) / aim
+        if abs(share - 1) <= slack or (share < 1 and tolerance == 0):
+            break
+        if share > 1:
+            low = tolerance
+        else:
+            high = tolerance
+        if low is None:
+            tolerance = high / 1.5
+        elif high is None:
+            tolerance = max(1.5 * low, 2e-3)  # below a thousandth it does nothing
+        else:
+            tolerance = (low + high) / 2
+    return tolerance
+
+
+def report(results: dict[str, Any]) -> Iterator[str]:
+    """Yield the tables as Markdown: the means, who is best, and every case at the same bytes."""
+    width, height = results["window_size"]
+    angles = results["angles"]
+    heads = " | ".join(f"{angle:g}°" for angle in angles)
+    rows = [{**r, "case": case} for case, found in results["cases"].items() for r in found]
+    n = len(results["cases"])
+    yield (
+        f"{width} x {height} lists and pixels, `{results['interpolation']}`, steps of half the "
+        f"smallest spacing, {n} cases (volume and transfer function). *{EQUALLY_MANY}*: as many "
+        f"supersegments as `{GIVES}` has with that budget, within {SLACK:.0%}, by another N_S and "
+        f"tolerance, or as many as N_S {MOST} gives where that is fewer; *supersegments*: over "
+        "those, the mean. *best*: in how many cases no other criterion has a higher SSIM, by angle."
+    )
+    for way in (EQUALLY_MANY, EQUAL_BUDGET):
+        yield from ("", f"**Mean SSIM, {way}**", "")
+        yield f"| N_S | criterion | supersegments | {heads} | best | least, 90° |"
+        yield "|---|---|---|" + "---|" * (len(angles) + 2)
+        for budget in BUDGETS:
+            for criterion in CRITERIA:
+                mine = chosen(rows, way, budget, criterion)
+                ssim = [f"{mean(r['ssim'][i] for r in mine):.4f}" for i in range(len(angles))]
+                best = "/".join(
+                    str(wins(rows, way, budget, criterion, a)) for a in range(len(angles))
+                )
+                least = min(r["ssim"][-1] for r in mine)
+                share = mean(r["share"] for r in mine)
+                cells = [str(budget), criterion, f"{share:.2f}", *ssim, best, f"{least:.4f}"]
+                yield "| " + " | ".join(cells) + " |"
+    yield from ("", f"**SSIM, {EQUALLY_MANY}**; bold: the best", "")
+    yield f"| case | N_S | criterion | with N_S, tolerance | MiB | {heads} |"
+    yield "|---|---|---|---|---|" + "---|" * len(angles)
+    for case in results["cases"]:
+        for budget in BUDGETS:
+            for criterion in CRITERIA:
+                (row,) = (
+                    r for r in chosen(rows, EQUALLY_MANY, budget, criterion) if r["case"] == case
+                )
+                cells = [case, str(budget), criterion, settings(row), f"{row['bytes'] / 2**20:.1f}"]
+                for a in range(len(angles)):
+                    text = f"{row['ssim'][a]:.4f}"
+                    cells.append(f"**{text}**" if is_best(rows, row, a) else text)
+                yield "| " + " | ".join(cells) + " |"
+    system = ", ".join(f"{k} {v}" for k, v in results["system"].items())
+    yield from ("", system)
+
+
+def settings(row: dict[str, Any]) -> str:
+    """Return what gave the row its supersegments, and how many where they are not as many."""
+    text = str(row["max_supersegments"])
+    if row["tolerance"] > 0:
+        text += f", {row['tolerance']:.2g}"
+    return text if abs(row["share"] - 1) <= SLACK else f"{text} ({row['share']:.0%})"
+
+
+def chosen(
+    rows: list[dict[str, Any]], way: str, budget: int, criterion: str
+) -> list[dict[str, Any]]:
+    """Return one criterion's rows: one per case."""
+    mine = (way, budget, criterion)
+    return [r for r in rows if (r["way"], r["budget"], r["criterion"]) == mine]
+
+
+def wins(rows: list[dict[str, Any]], way: str, budget: int, criterion: str, angle: int) -> int:
+    """Return in how many cases a criterion is the best."""
+    return sum(is_best(rows, row, angle) for row in chosen(rows, way, budget, criterion))
+
+
+def is_best(rows: list[dict[str, Any]], row: dict[str, Any], angle: int) -> bool:
+    """Whether no other criterion has a higher SSIM, at the four decimals that are shown."""
+    rivals = [
+        r["ssim"][angle]
+        for r in rows
+        if all(r[key] == row[key] for key in ("case", "way", "budget"))
+    ]
+    return round(row["ssim"][angle], 4) == round(max(rivals), 4)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
