@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from skimage.transform import resize
 from standard_table import INTERPOLATIONS, window_size  # beside this file
 from tqdm import tqdm
 
 from pyvista_vdi import examples
+from pyvista_vdi.benchmark.preview import enlarged
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.classification import Classification
 from pyvista_vdi.compare import describe_system
@@ -184,11 +184,7 @@ class Drawing:
 
     def whole(self, image: Image) -> Image:
         """Return an image in the full size, by linear interpolation as the texture unit's."""
-        width, height = self._size
-        if image.shape[:2] == (height, width):
-            return image
-        # Pixel centres keep their places and edges are extended, as GL_LINEAR and CLAMP_TO_EDGE do
-        return resize(image, (height, width, 4), order=1, mode="edge", anti_aliasing=False)
+        return enlarged(image, self._size)
 
 
 def pixels(draw: Drawing, vdi: VDI, share: float) -> Callable[[], Image]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from pathlib import Path
 
 from .errors import DeviceMemoryError
 
@@ -16,6 +17,33 @@ def physical_memory() -> int | None:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, OSError, ValueError):
         return None
+
+
+def free_memory() -> int | None:
+    """Return the bytes that can be had without swapping, or None where the system does not say."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return None
+    found = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
+    return int(found[0]) * 1024 if found else None
+
+
+def require_free_memory(nbytes: int, what: str, remedy: str) -> None:
+    """Refuse what the host cannot hold beside what is running; parameters as below.
+
+    Raises
+    ------
+    DeviceMemoryError
+        If the host has less memory in all, or less of it free.
+    """
+    require_host_memory(nbytes, what, remedy)
+    free = free_memory()
+    if free is not None and nbytes > free:
+        raise DeviceMemoryError(
+            f"{what} needs {nbytes / 2**30:.2f} GiB on the host, of which {free / 2**30:.2f} GiB "
+            f"are free: close other programs, or {remedy}"
+        )
 
 
 def require_host_memory(nbytes: int, what: str, remedy: str) -> None:

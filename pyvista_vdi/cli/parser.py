@@ -255,6 +255,58 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
     _add_device(parser)
 
 
+def _add_benchmark(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--profile",
+        choices=("quick", "full"),
+        default="quick",
+        help="quick (default): small volumes, minutes; full: the paper's sizes and all volumes at "
+        "hand, hours",
+    )
+    parser.add_argument(
+        "--out",
+        metavar="FILE",
+        default="benchmark.json",
+        help=".json to write; a table (.md) and a plot (.png) go beside it (default: "
+        "benchmark.json)",
+    )
+    parser.add_argument("--resume", action="store_true", help="go on with FILE where it was left")
+    parser.add_argument(
+        "--compare",
+        nargs=2,
+        metavar=("A", "B"),
+        help="measure nothing: say what changed between two files beyond noise",
+    )
+    group = parser.add_argument_group("what is measured", "In place of the profile's.")
+    group.add_argument(
+        "--datasets",
+        nargs="+",
+        metavar="NAME",
+        help="volumes known by name, and kingsnake_like, beechnut_like, richtmyer_meshkov_like: "
+        "made at the paper's sizes, or with @4 behind the name at a quarter along each edge",
+    )
+    group.add_argument(
+        "--volume",
+        action="append",
+        metavar="[NAME=]FILE",
+        help="a file, may be repeated; a NAME of kingsnake, beechnut or richtmyer_meshkov says "
+        "that it is the paper's; raw files are named like x_1024x1024x795_uint8.raw",
+    )
+    group.add_argument("--sizes", nargs="+", type=_size, metavar="WxH", help="windows, pixels")
+    group.add_argument("--max-supersegments", nargs="+", type=_count, metavar="N")
+    group.add_argument("--angles", type=_numbers, metavar="A,B,...", help="degrees from V_O")
+    group.add_argument(
+        "--repeats", type=_count, metavar="N", help="timed frames of each kind and view (5)"
+    )
+    group.add_argument("--interpolation", choices=("nearest", "linear"), help="(nearest)")
+    group.add_argument("--seed", type=_count, metavar="N", help="of the made volumes (1)")
+    group.add_argument(
+        "--tables", nargs="+", type=int, choices=(1, 2), help="which of the paper's tables (both)"
+    )
+    parser.add_argument("--no-vtk", action="store_true", help="leave out VTK's mappers")
+    _add_device(parser)
+
+
 _VERBS: dict[str, tuple[str, str, str, Any]] = {
     "devices": (
         "files",
@@ -291,6 +343,12 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
         "render a volume by VTK's mappers, our raycaster and a VDI, and compare them",
         "pyvista-vdi compare --example brain --tf soft --out out",
         _add_compare,
+    ),
+    "benchmark": (
+        "benchmark",
+        "measure the paper's tables: frame times and accuracy beside volume rendering",
+        "pyvista-vdi benchmark --profile quick --out quick.json",
+        _add_benchmark,
     ),
     "convert": (
         "files",

@@ -183,7 +183,7 @@ class Report:
         for entry, result in zip(described["angles"], self.angles, strict=True):
             entry["ratio_to_vtk"] = result.ratio_to_vtk
             entry["ratio_to_raycaster"] = result.ratio_to_raycaster
-        plain: dict[str, Any] = _without_infinities(described)
+        plain: dict[str, Any] = without_infinities(described)
         return plain
 
 
@@ -440,11 +440,12 @@ def _sizes(volume: Volume, vdi: VDI, settings: Settings) -> dict[str, int]:
     }
 
 
-def _without_infinities(value: Any) -> Any:
+def without_infinities(value: Any) -> Any:
+    """Return a value with null for numbers that JSON does not have."""
     if isinstance(value, dict):
-        return {key: _without_infinities(item) for key, item in value.items()}
+        return {key: without_infinities(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_without_infinities(item) for item in value]
+        return [without_infinities(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

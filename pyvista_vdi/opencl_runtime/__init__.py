@@ -10,7 +10,7 @@ from pyvista_vdi.opencl_runtime.arguments import padded
 from pyvista_vdi.opencl_runtime.buffers import DeviceBuffer, LocalMemory, aligned_empty
 from pyvista_vdi.opencl_runtime.choice import describe_devices, get_runtime, list_devices
 from pyvista_vdi.opencl_runtime.devices import DeviceInfo
-from pyvista_vdi.opencl_runtime.profiling import KernelTime
+from pyvista_vdi.opencl_runtime.profiling import KernelTime, Profile
 from pyvista_vdi.opencl_runtime.programs import Kernel
 from pyvista_vdi.opencl_runtime.runtime import Runtime
 
@@ -20,6 +20,7 @@ __all__ = [
     "Kernel",
     "KernelTime",
     "LocalMemory",
+    "Profile",
     "Runtime",
     "aligned_empty",
     "describe_devices",

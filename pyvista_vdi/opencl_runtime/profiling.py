@@ -63,6 +63,13 @@ class Profile:
             self._sums[name] = (calls + 1, nanoseconds + elapsed)
         self._pending.clear()
 
+    def kernel_seconds(self) -> float:
+        """Wait for what is pending; device time of all kernels so far, without transfers."""
+        with self._lock:
+            self._drain()
+            kernels = [ns for name, (_, ns) in self._sums.items() if not name.startswith("[")]
+        return sum(kernels) * 1e-9
+
     def figures(self) -> list[KernelTime]:
         """Waits for what is pending; rows, longest total first."""
         with self._lock:

@@ -499,19 +499,26 @@ class Runtime:
             self._queue.finish()
 
     @contextlib.contextmanager
-    def queue_scope(self) -> Iterator[None]:
+    def queue_scope(self, profile: Profile | None = None) -> Iterator[None]:
         """Give the calling thread an in-order command queue of its own inside the ``with`` block.
 
         What was enqueued before is finished first, and what is enqueued inside is finished at
         the end, so buffers may cross the borders of the block.
+
+        Parameters
+        ----------
+        profile : Profile, optional
+            Collects the device times of what the thread enqueues inside; by default they go where
+            ``PYVISTA_VDI_PROFILE`` wants them, if anywhere.
         """
         self.finish()
-        outer, inner = self._queue_number, self._new_queue()
-        self._local.queue_number = inner
+        outer, inner = self._queue_number, self._new_queue(profiled=profile is not None)
+        outer_profile = getattr(self._local, "profile", None)
+        self._local.queue_number, self._local.profile = inner, profile
         try:
             yield
         finally:
-            self._local.queue_number = outer
+            self._local.queue_number, self._local.profile = outer, outer_profile
             self._finish({inner})
             with self._queues_lock:
                 del self._queues[inner]
@@ -524,9 +531,10 @@ class Runtime:
     def _queue_number(self) -> int:
         return getattr(self._local, "queue_number", self._main_queue)
 
-    def _new_queue(self) -> int:
+    def _new_queue(self, *, profiled: bool = False) -> int:
         cl = opencl()
-        properties = cl.command_queue_properties.PROFILING_ENABLE if self._profile else 0
+        wanted = profiled or self._profile is not None
+        properties = cl.command_queue_properties.PROFILING_ENABLE if wanted else 0
         with self._driver("making a command queue"):
             queue = cl.CommandQueue(self._context, self._device, properties)
         with self._queues_lock:
@@ -617,8 +625,9 @@ class Runtime:
         return self._profile.figures() if self._profile else []
 
     def _record(self, name: str, event: Any) -> None:
-        if self._profile is not None:
-            self._profile.record(name, event)
+        profile = getattr(self._local, "profile", None) or self._profile
+        if profile is not None:
+            profile.record(name, event)
 
     def _print_profile(self) -> None:
         rows = self.profile()

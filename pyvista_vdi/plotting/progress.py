@@ -28,8 +28,8 @@ class DelayedBar:
         self._disable = False if always else None  # None: tqdm asks whether it is a terminal
         self._bar: Any = None
 
-    def __call__(self, fraction: float) -> None:
-        """Show the fraction done, 0 to 1."""
+    def __call__(self, fraction: float, doing: str | None = None) -> None:
+        """Show the fraction done, 0 to 1, and what is being done."""
         if self._bar is not None and fraction < self._bar.n:
             self.close()  # the work before was given up
         if self._bar is None:
@@ -42,6 +42,8 @@ class DelayedBar:
                 leave=False,
                 bar_format="{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}",
             )
+        if doing is not None:
+            self._bar.set_description_str(f"{self._label}: {doing}", refresh=False)
         self._bar.update(fraction - self._bar.n)
         if fraction >= 1.0:
             self.close()

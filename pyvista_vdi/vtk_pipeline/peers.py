@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..camera import Camera, check_window_size
 from ..errors import DeviceError, InvalidArgumentError, MissingDependencyError
+from ..transfer_function import TransferFunction
 from ..volume import Volume
 
 #: VTK's mappers by the names that ``Plotter.add_volume(mapper=...)`` has for them.
@@ -223,6 +224,44 @@ def image_from_volume(volume: Volume) -> Any:
     scalars.SetName(volume.name)
     image.GetPointData().SetScalars(scalars)
     return image
+
+
+def property_from_transfer_function(volume: Volume, table: TransferFunction) -> Any:
+    """Return the property with which VTK's mappers draw a volume as our raycaster does.
+
+    Parameters
+    ----------
+    volume : Volume
+        What is drawn; it gives the unit distance where the table has none.
+    table : TransferFunction
+        Without shading and gradient opacity.
+
+    Returns
+    -------
+    vtkVolumeProperty
+        With a node at every entry of the table.
+
+    Raises
+    ------
+    MissingDependencyError
+        If VTK cannot be loaded.
+    """
+    try:
+        from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
+        from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
+    except ImportError as error:
+        raise explain_import_error(error) from error
+    low, high = table.scalar_range
+    n = len(table.opacities)
+    color, opacity, prop = vtkColorTransferFunction(), vtkPiecewiseFunction(), vtkVolumeProperty()
+    color.BuildFunctionFromTable(low, high, n, table.colors.astype(np.float64).ravel())
+    opacity.BuildFunctionFromTable(low, high, n, table.opacities.astype(np.float64))
+    prop.SetColor(color)
+    prop.SetScalarOpacity(opacity)
+    prop.SetScalarOpacityUnitDistance(table.unit_distance or volume.default_unit_distance)
+    if table.interpolation == "linear":
+        prop.SetInterpolationTypeToLinear()
+    return prop
 
 
 def _make_mapper(name: str) -> Any:

@@ -287,6 +287,25 @@ def test_profile_counts_calls_and_sums_times(runtime, scale_file, monkeypatch):
     assert runtime.profile() == []
 
 
+def test_a_scope_can_be_profiled_by_itself(runtime, scale_file):
+    kernel = runtime.kernel(scale_file, "scale", {"ADD": 1})
+    profile = profiling.Profile()
+    with runtime.buffer((4,)) as x:
+        runtime.fill(x, 0)
+        with runtime.queue_scope(profile):
+            runtime.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
+            with runtime.queue_scope():  # another's work, in the same thread
+                runtime.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
+            runtime.download(x)
+        runtime.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
+        assert np.all(runtime.download(x) == 3)
+    calls = {row.name: row.calls for row in profile.figures()}
+    assert calls == {"scale": 1, "[read]": 1}
+    (kernels,) = (row.total_ms for row in profile.figures() if row.name == "scale")
+    assert profile.kernel_seconds() == pytest.approx(kernels * 1e-3)
+    assert runtime.profile() == []
+
+
 def test_profile_table_is_printed_at_exit(runtime):
     code = (
         "from pyvista_vdi.opencl_runtime import get_runtime\n"

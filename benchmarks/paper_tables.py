@@ -1,0 +1,19 @@
+"""The paper's tables, measured: ``pyvista-vdi benchmark``, with its results in ``results/``.
+
+All options are the verb's: ``python benchmarks/paper_tables.py --profile full --resume``.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from pyvista_vdi.cli import main
+
+RESULTS = Path(__file__).parent / "results" / "paper_tables.json"
+
+if __name__ == "__main__":
+    if not os.environ.get("VTK_DEFAULT_OPENGL_WINDOW") and not os.environ.get("DISPLAY"):
+        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
+    sys.exit(main(["benchmark", "--out", str(RESULTS), *sys.argv[1:]]))

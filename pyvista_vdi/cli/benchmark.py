@@ -1,0 +1,128 @@
+"""The verb ``benchmark``: the paper's tables as JSON, Markdown and a plot; or two runs compared."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from .. import examples
+from ..benchmark import (
+    PROFILES,
+    Plan,
+    Results,
+    describe,
+    describe_changes,
+    find_dataset,
+    read_results,
+    run,
+)
+from ..benchmark.plot import write_plot
+from ..compare import describe_system
+from ..errors import InvalidArgumentError
+from ..io import check_writable, whole_file
+from ..plotting.progress import DelayedBar
+
+
+def benchmark(options: argparse.Namespace) -> int:
+    """Measure and write, or compare two files."""
+    if options.compare is not None:
+        before, after = (read_results(path).data for path in options.compare)
+        print(describe_changes(before, after), end="")
+        return 0
+    plan = _plan(options)
+    results = _results(options, plan)
+    bar = DelayedBar(label="benchmark")
+    try:
+        run(plan, results, options.device, bar)
+    except KeyboardInterrupt:
+        print(f"\nWhat was measured is in {results.path}: --resume goes on", file=sys.stderr)
+        raise
+    finally:
+        bar.close()
+        written = _write_tables(results)
+    print("Written: " + ", ".join(str(path) for path in written))
+    return 0
+
+
+def _plan(options: argparse.Namespace) -> Plan:
+    """Return the profile with what the options change."""
+    chosen: dict[str, Any] = dict(PROFILES[options.profile])
+    if options.profile == "full":
+        chosen["datasets"] = (*examples.available(), *chosen["datasets"])
+    if options.datasets or options.volume:
+        chosen["datasets"] = (*(options.datasets or ()), *(options.volume or ()))
+    changes = {
+        "sizes": options.sizes,
+        "limits": options.max_supersegments,
+        "angles": options.angles,
+        "repeats": options.repeats,
+        "interpolation": options.interpolation,
+        "seed": options.seed,
+    }
+    chosen |= {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in changes.items()
+        if value is not None
+    }
+    chosen["preview"] = _preview(chosen)
+    if options.tables is not None:
+        if 2 not in options.tables:
+            chosen["preview"] = None
+        if 1 not in options.tables:
+            chosen["datasets"] = ()
+    vtk = not options.no_vtk
+    if vtk and find_spec("vtkmodules") is None:
+        print("VTK is not installed: its mappers are left out", file=sys.stderr)
+        vtk = False
+    return Plan(profile=options.profile, vtk=vtk, **chosen)
+
+
+def _preview(chosen: dict[str, Any]) -> tuple[str, tuple[int, int], int, float]:
+    """Return the profile's case of Table 2, or the one nearest to it that was chosen."""
+    dataset, size, limit, angle = chosen["preview"]
+    datasets, sizes = chosen["datasets"], chosen.get("sizes", (size,))
+    limits = chosen.get("limits", (limit,))
+    if dataset not in datasets:
+        seed = chosen.get("seed", 0)
+        stands = [name for name in datasets if find_dataset(name, seed).paper == "beechnut"]
+        dataset = [*stands, *datasets][0]
+    return (
+        dataset,
+        size if size in sizes else sizes[-1],
+        limit if limit in limits else limits[0],
+        angle,
+    )
+
+
+def _results(options: argparse.Namespace, plan: Plan) -> Results:
+    """Return the file to write to, refused now if that cannot be done."""
+    path = Path(options.out)
+    if path.suffix.lower() != ".json":
+        raise InvalidArgumentError(
+            f"--out must name a .json file (tables and plot go beside it); got {options.out!r}"
+        )
+    if path.exists() and not options.resume:
+        raise InvalidArgumentError(
+            f"{path} is there already: --resume goes on with it, or choose another --out"
+        )
+    check_writable(path)
+    system = describe_system(options.device)
+    if path.exists():
+        return Results.resumed(path, plan, system)
+    results = Results.begun(path, plan, system)
+    results.save()
+    return results
+
+
+def _write_tables(results: Results) -> list[Path]:
+    """Write the Markdown, and the plot where Matplotlib is installed."""
+    tables, plot = (results.path.with_suffix(suffix) for suffix in (".md", ".png"))
+    with whole_file(tables) as stream:
+        stream.write(describe(results.data).encode())
+    written = [results.path, tables]
+    if find_spec("matplotlib") is not None and write_plot(results.data, plot):
+        written.append(plot)
+    return written
