@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import rays
 from .blocks import GROUP
 from .camera import Camera
+from .checks import as_float
 from .errors import InvalidArgumentError
 from .lighting import Lights
 from .opencl_runtime import DeviceBuffer, Runtime, aligned_empty, padded
@@ -210,14 +211,6 @@ def checked_sample_distance(volume: Volume, sample_distance: float | None) -> fl
         )
     # No ray is longer than the diagonal; float32 may not hold how much longer the step is
     return min(step, 2 * volume.length)
-
-
-def as_float(value: Any) -> float:
-    """Return ``value`` as a float, NaN where it is no number: range checks then refuse it."""
-    try:
-        return float(value)
-    except (TypeError, ValueError, OverflowError):
-        return float("nan")
 
 
 def _per_scalar(entries: int, span: float) -> float:

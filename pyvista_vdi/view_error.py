@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import rays
 from .camera import Camera, check_window_size
-from .device_volume import DeviceVolume, as_float
+from .checks import as_float
+from .device_volume import DeviceVolume
 from .errors import Cancelled, InvalidArgumentError
 from .lighting import Lights
 from .metrics import SSIM_ARGUMENTS, SSIM_WINDOW, over_background

@@ -201,7 +201,7 @@ def test_arguments_that_are_refused_by_name(function, arguments, error, message,
         ({"cmap": "viridys"}, "cmap='viridys'.*did you mean 'viridis'"),
         ({"opacity": "sigmoid_99x"}, "opacity='sigmoid_99x'"),
         ({"clim": (2, 1)}, "clim must be two finite numbers, the smaller first"),
-        ({"n_colors": 0}, "n_colors must be a whole number above 0; got 0"),
+        ({"n_colors": 0}, "n_colors must be a whole number from 1 to 65536; got 0"),
     ],
 )
 def test_names_and_values_that_add_volume_would_not_take(arguments, message, volume, camera):

@@ -30,6 +30,7 @@ OWNERS = {
 }
 
 CORE = {
+    "checks",
     "_version",
     "camera",
     "compositing",
