@@ -488,7 +488,9 @@ def _affine(value: ArrayLike | None) -> Matrix:
             f"model_transform must be affine: its last row is {matrix[3].tolist()}, not 0 0 0 1"
         )
     # Scale-free: the determinant against the product of the column lengths (Hadamard's bound)
-    columns = np.linalg.norm(matrix[:3, :3], axis=0)
+    columns = np.abs(matrix[:3, :3]).max(axis=0)  # first, because squares may overflow
+    if columns.all():
+        columns *= np.linalg.norm(matrix[:3, :3] / columns, axis=0)
     if not columns.all() or abs(np.linalg.det(matrix[:3, :3] / columns)) < 1e-12:
         raise InvalidCameraError(
             "model_transform cannot be inverted: it flattens space "

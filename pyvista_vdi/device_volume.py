@@ -16,7 +16,7 @@ from .camera import Camera
 from .checks import as_float
 from .errors import InvalidArgumentError
 from .lighting import Lights
-from .opencl_runtime import DeviceBuffer, Runtime, aligned_empty, padded
+from .opencl_runtime import DeviceBuffer, Runtime, aligned_empty, kept_together, padded
 from .shading import gradient_table, lighting_table, shading_defines
 from .transfer_function import TransferFunction
 from .volume import Volume
@@ -244,9 +244,11 @@ def _upload(
         if key not in made:
             _require_a_number(runtime, volume)
             array = volume.array if scale is None else _all_scaled(runtime, volume.array, scale)
-            voxels = runtime.upload(array, f"volume {volume.name!r}")
-            made[key] = (voxels, _block_ranges(runtime, volume, voxels, defines))
-            runtime.finish()  # a thread with another queue may use them next
+            with kept_together() as keep:
+                voxels = keep(runtime.upload(array, f"volume {volume.name!r}"))
+                ranges = keep(_block_ranges(runtime, volume, voxels, defines))
+                runtime.finish()  # a thread with another queue may use them next
+            made[key] = (voxels, ranges)
         return made[key]
 
 

@@ -15,7 +15,7 @@ from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
 from .errors import InvalidArgumentError
 from .occupancy import OccupancyGrid
-from .opencl_runtime import DeviceBuffer, Runtime, get_runtime
+from .opencl_runtime import DeviceBuffer, Runtime, get_runtime, kept_together
 from .vdi import VDI
 
 #: A ray ends where less transmittance than this is left: no channel loses more than that.
@@ -267,19 +267,20 @@ class PreparedVDI:
         runtime = self._runtime
         n, (wide, high) = vdi.n_supersegments, vdi.window_size
         offset_type = np.uint64 if self._long_offsets else np.uint32
-        self._offsets = runtime.upload(vdi.offsets.astype(offset_type), "list offsets")
-        self._faces = runtime.buffer((n, 2), name="supersegment faces")
-        self._media = runtime.buffer((n, 4), name="supersegment media")
         # Direction of a centre ray per unit of view depth, in the model frame
         centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
         kernel = runtime.kernel("vdi/prepare.cl", "prepare_lists", self.defines)
         with (
+            kept_together() as keep,
             runtime.upload(vdi.front, "front depths") as front,
             runtime.upload(vdi.back, "back depths") as back,
             runtime.upload(vdi.color, "supersegment colours") as color,
             runtime.upload(vdi.optical_depth, "optical depths") as optical_depth,
             runtime.upload(centre.astype(np.float32), "centre rays") as directions,
         ):
+            self._offsets = keep(runtime.upload(vdi.offsets.astype(offset_type), "list offsets"))
+            self._faces = keep(runtime.buffer((n, 2), name="supersegment faces"))
+            self._media = keep(runtime.buffer((n, 4), name="supersegment media"))
             runtime.launch(
                 kernel,
                 -(-wide * high // GROUP) * GROUP,
@@ -307,4 +308,5 @@ class PreparedVDI:
                 shifted=self._shifted,
                 long_offsets=self._long_offsets,
             )
+            keep(self.occupancy.counts), keep(self.occupancy.masks)
             runtime.finish()  # the buffers above may be host memory in use

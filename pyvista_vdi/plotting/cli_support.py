@@ -38,7 +38,7 @@ def read_volume(path: str | os.PathLike[str]) -> Any:
     """
     pv = _pyvista()
     file = Path(path)
-    if not file.exists():
+    if not os.path.exists(file):  # noqa: PTH110 - pathlib's raises for a name that is too long
         raise InvalidVolumeError(f"{file} does not exist: check the volume's path")
     if file.suffix == ".vdi":
         raise InvalidVolumeError(

@@ -104,7 +104,14 @@ def _fuzz(name: str, options: argparse.Namespace) -> int:
     if folders == [str(CORPUS / name)]:
         folders.insert(0, str(_scratch(options.crashes / f"{name}.corpus")))
     prefix = f"-artifact_prefix={options.crashes}/{name}-"
-    arguments = [__file__, *LIMITS, f"-max_total_time={options.seconds}", "-max_len=4096", prefix]
+    arguments = [
+        __file__,
+        *LIMITS,
+        f"-max_total_time={options.seconds}",
+        "-max_len=2500",
+        "-len_control=20",
+        prefix,
+    ]
     atheris.Setup([*arguments, *folders], target)
     atheris.Fuzz()  # ends the process
     return 0
