@@ -115,6 +115,7 @@ class Painter:
         self._raycasts = 0
         self._last = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
         self._scene: tuple[Camera, weakref.ref[WindowClock]] | None = None
+        self._trouble: BaseException | None = None
 
     # -- what is drawn ---------------------------------------------------------------------------
 
@@ -207,11 +208,12 @@ class Painter:
             return
         try:
             self._last = self._paint(mapper, renderer)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
             self._voice.warn(
                 "generating the VDI was interrupted: what was shown stays; call "
                 "actor.regenerate() to try again"
             )
+            self._note(interrupt)
         except Exception as error:  # VTK would swallow it
             self._cannot_draw(error)
         window, drawn = renderer.GetRenderWindow(), self._last
@@ -227,8 +229,27 @@ class Painter:
         """Let go of the texture unit."""
         self._texture.let_go()
 
+    def raise_trouble(self) -> None:
+        """Raise, once, what a frame could not be drawn for: nothing passes through VTK's renderer.
+
+        Raises
+        ------
+        KeyboardInterrupt, Exception
+            The first such error since the last call.
+        """
+        trouble, self._trouble = self._trouble, None
+        if trouble is not None:
+            raise trouble
+
     def _cannot_draw(self, error: Exception) -> None:
         self._voice.warn(f"the VDI cannot be drawn: {type(error).__name__}: {error}", error)
+        self._note(error)
+
+    def _note(self, error: BaseException) -> None:
+        """Keep the first error for :meth:`raise_trouble`, without the frames that it came from."""
+        if self._trouble is None:
+            self._trouble = error.with_traceback(None)
+            error.__cause__ = error.__context__ = None
 
     def _paint(self, mapper: Any, renderer: Any) -> Drawn:
         """Return the frame's image."""
