@@ -422,6 +422,8 @@ class Camera:
 
     def _make_axes(self) -> Matrix:
         forward = np.subtract(self.focal_point, self.position)
+        # By a power of two, which rounds nothing: squares may overflow
+        forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])
         forward = forward / np.linalg.norm(forward)
         right = np.cross(forward, _unit(np.asarray(self.view_up)))
         right /= np.linalg.norm(right)
@@ -442,7 +444,13 @@ class Camera:
                 f"parallel_scale must be a positive number of world units; "
                 f"got {self.parallel_scale!r}"
             )
-        forward = np.subtract(self.focal_point, self.position)
+        with np.errstate(over="ignore"):
+            forward = np.subtract(self.focal_point, self.position)
+        if not np.isfinite(forward).all():
+            raise InvalidCameraError(
+                f"the camera's position {self.position} and focal point {self.focal_point} are "
+                "too far apart for float64: move them closer"
+            )
         if not np.any(forward):
             raise InvalidCameraError(
                 f"the camera's position and focal point are the same point {self.position}: "

@@ -68,7 +68,7 @@ class Volume:
         *,
         name: str = "values",
     ) -> None:
-        self.array = _checked_array(np.asarray(array))
+        self.array = _checked_array(array)
         self.spacing = _checked_vector("spacing", spacing)
         self.origin = _checked_vector("origin", origin)
         self.direction = _checked_direction(direction)
@@ -147,7 +147,11 @@ class Volume:
         return f"Volume({nx} x {ny} x {nz} {kind}, spacing={self.spacing})"
 
 
-def _checked_array(array: NDArray[np.generic]) -> NDArray[np.generic]:
+def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError) as error:  # lists of different lengths
+        raise InvalidVolumeError(f"a volume is an array of numbers: {error}") from error
     rgba = array.ndim == 4 and array.shape[-1] == 4 and array.dtype == np.uint8
     if array.ndim != 3 and not rgba:
         hint = (
