@@ -22,8 +22,8 @@ from pyvista_vdi.lighting import Shading
 from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vtk_pipeline.properties import RGBA_OPACITY, transfer_function_from_property
 
-#: Most entries of a table: what 16-bit scalars can tell apart.
-_MAX_COLORS = 65536
+#: Most entries of a table: building it takes PyVista time by the square, a second from here on.
+_MAX_COLORS = 4096
 
 
 def transfer_function_from_arguments(
@@ -309,5 +309,16 @@ def _checked_opacities(opacity: Any, n_colors: int) -> Any:
         raise InvalidArgumentError(
             f"an opacity array as long as n_colors={n_colors} is taken as it is, 0 to 255; got "
             f"values from {values.min():g} to {values.max():g}"
+        )
+    with np.errstate(over="ignore"):
+        spread = np.ptp(values)
+    if (
+        len(values) < n_colors
+        and (values.min() < 0 or values.max() > 1)
+        and not 0 < spread < np.inf
+    ):
+        raise InvalidArgumentError(
+            "an opacity array beyond 0 to 1 is stretched to that range, for which it needs "
+            f"different values of finite distance; got {values.min():g} to {values.max():g}"
         )
     return list(opacity) if isinstance(opacity, tuple) else opacity
