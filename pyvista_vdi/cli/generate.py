@@ -15,6 +15,7 @@ from ..plotting.progress import DelayedBar
 from ..standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
 from ..volume import Volume
 from .inputs import camera, classification, file_options, has_own_place, read_volume
+from .text import printable
 
 
 def generate(options: argparse.Namespace) -> int:
@@ -53,7 +54,7 @@ def generate(options: argparse.Namespace) -> int:
     seconds = time.perf_counter() - start
     vdi.save(target, **file_arguments)
     print(
-        f"{options.output}: {vdi.n_supersegments} supersegments in {options.size[0]} x "
+        f"{printable(options.output)}: {vdi.n_supersegments} supersegments in {options.size[0]} x "
         f"{options.size[1]} lists, {target.stat().st_size / 2**20:.1f} MiB, {seconds:.1f} s"
     )
     return 0
