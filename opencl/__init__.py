@@ -15,18 +15,24 @@ Shared functions:
     Transfer function, extinction, opacity of an optical depth.
 ``common/shading.cl``
     Lights, and gradient opacity: what the steps need of the scalar's gradient.
+``common/occlusion.cl``
+    Ambient occlusion at a sample.
 ``common/empty_blocks.cl``
     Size of the blocks by which marches skip what is transparent.
 ``common/march.cl``
     The steps along a ray of a volume: generation and direct volume rendering share them.
 ``common/list_space.cl``
     V_O's list space: coordinates of a ray in it, and its depth coordinate.
+``common/cropping.cl``
+    The parts of a ray that cropping keeps.
 ``common/list_ray.cl``
     The ray of a pixel in list space, clipped; model lengths along it.
 ``common/lists.cl``
     Which supersegment of a list a ray meets first (paper, Algorithm 1).
 ``common/occupancy.cl``
     Tiles and slabs of the occupancy grid.
+``common/segments.cl``
+    What rays cross of several VDIs, as segments in a pool.
 
 Entry points:
 
@@ -37,7 +43,10 @@ Entry points:
 ``vdi/prepare.cl``
     ``prepare_lists``: a VDI's arrays to what the raycaster reads.
 ``vdi/raycast.cl``
-    ``raycast``: VDI to image from any view (paper, section 3).
+    ``raycast``: VDI to image from any view (paper, section 3), to the depth of the first hit, or to
+    what is merged with other VDIs.
+``vdi/merge.cl``
+    ``merge``: what rays cross of several VDIs, to one image.
 ``vdi/preview.cl``
     ``preview``: VDI to image by a given number of samples per ray (paper, section 5).
 ``vdi/render_volume.cl``
@@ -46,4 +55,6 @@ Entry points:
     ``count_supersegments``, ``occupied_slabs``: the occupancy grid of a VDI (paper, section 4).
 ``grid/volume_blocks.cl``
     ``block_ranges``, ``block_visibility``: blocks of a volume that are transparent.
+``grid/ambient_occlusion.cl``
+    ``step_opacities``, ``ambient_transmittances``: ambient occlusion on a coarse grid.
 """

@@ -14,8 +14,10 @@ from ._version import __version__
 
 if TYPE_CHECKING:
     from . import errors, examples
-    from .api import estimate, generate, read, render, render_volume
+    from .ambient_occlusion import AmbientOcclusion
+    from .api import estimate, generate, pick, read, render, render_depth, render_volume
     from .camera import Camera
+    from .cropping import Cropping
     from .errors import (
         Cancelled,
         DeviceError,
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from .lighting import Light, Lights, Shading
     from .metrics import compare_images
     from .opencl_runtime import describe_devices, list_devices
+    from .picking import Pick
     from .transfer_function import TransferFunction
     from .vdi import VDI
     from .volume import Volume
@@ -60,10 +63,13 @@ _ERRORS = (
 
 #: Where each public name lives; loaded when it is first used (PEP 562).
 _HOMES = {
+    "AmbientOcclusion": "ambient_occlusion",
     "Camera": "camera",
+    "Cropping": "cropping",
     "Estimate": "generation",
     "Light": "lighting",
     "Lights": "lighting",
+    "Pick": "picking",
     "Shading": "lighting",
     "TransferFunction": "transfer_function",
     "VDI": "vdi",
@@ -76,8 +82,10 @@ _HOMES = {
     "estimate": "api",
     "generate": "api",
     "list_devices": "opencl_runtime",
+    "pick": "api",
     "read": "api",
     "render": "api",
+    "render_depth": "api",
     "render_volume": "api",
     **dict.fromkeys(_ERRORS, "errors"),
 }

@@ -16,14 +16,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from .camera import Camera
 from .classification import DEFAULTS, IN_PLACE, Classification
-from .errors import InvalidVDIError, InvalidVolumeError
+from .errors import InvalidArgumentError, InvalidVDIError, InvalidVolumeError
+from .picking import DEFAULT_OPACITY
 from .vdi import VDI
 from .volume import Volume
 
 if TYPE_CHECKING:
     from .generation import Estimate
+    from .picking import Pick
 
-__all__ = ["estimate", "generate", "read", "render", "render_volume"]
+__all__ = ["estimate", "generate", "pick", "read", "render", "render_depth", "render_volume"]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -54,6 +56,7 @@ def generate(
     tolerance: float = 0.0,
     view_cone: float = 60.0,
     lights: Any = None,
+    ambient_occlusion: Any = None,
     device: Any = None,
     progress: Callable[[float], object] | None = None,
     **classification: Any,
@@ -83,6 +86,9 @@ def generate(
         What a shaded volume is lit by; one headlight by default, which is VTK's. PyVista's
         plotters have a light kit: pass ``plotter.renderer`` for its lights. They are baked into
         the colours as they stand at V_O.
+    ambient_occlusion : bool, float or AmbientOcclusion, optional
+        Darken what is hidden from the light around it: ``True``, or the radius up to which
+        something hides, model units. Baked into the colours.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     progress : callable, optional
@@ -138,6 +144,7 @@ def generate(
         tolerance=tolerance,
         view_cone=view_cone,
         lights=lights,
+        ambient_occlusion=ambient_occlusion,
         device=device,
         progress=progress,
         metadata={"classification": looks.describe(), "scalars": volume.name},
@@ -150,33 +157,51 @@ def render(
     window_size: Sequence[int] | None = None,
     *,
     opaque_depth: ArrayLike | None = None,
-    clipping_planes: ArrayLike | None = None,
+    clipping_planes: Any = None,
+    cropping: Any = None,
+    opacity_multiplier: Any = 1.0,
+    model_transforms: Sequence[ArrayLike] | None = None,
     skip_empty: bool = True,
     preview_samples: int | None = None,
     device: Any = None,
 ) -> NDArray[np.float32]:
-    """Raycast a VDI from a new view.
+    """Raycast a VDI, or several in one scene, from a new view.
 
     Parameters
     ----------
-    vdi : VDI or vtkImageData
+    vdi : VDI or vtkImageData, or list or tuple of them
         What :func:`generate` or :func:`read` returned, or its VTK form (``pv.read("x.vdi")``).
+        Several are merged by depth along each ray; their order does not matter, to the last bit.
     camera : pyvista.Camera or vtkCamera or Camera
         The new view V_N. Its model transform places the VDI's model frame in the world.
     window_size : (int, int), optional
-        Width and height of the image in pixels; the VDI's own by default.
+        Width and height of the image in pixels; the VDI's own by default. Of several VDIs, it can
+        be left out where all have the same.
     opaque_depth : array_like of float32, shape (H, W), optional
         Depth at which each ray ends: distance from the eye along the view direction, world
         units, top row first; infinity where nothing is opaque.
     clipping_planes : array_like of float, shape (k, 6), optional
         Origin and normal of each plane, world coordinates; the side that the normal points to
-        is kept, as with VTK's mappers.
+        is kept, as with VTK's mappers. They cut all of several VDIs; a list of such arrays, or of
+        ``None``, cuts each by its own.
+    cropping : Cropping or vtkVolumeMapper or sequence of six numbers or pair, optional
+        Which of 27 regions of the data's own coordinates are drawn, as in ``vtkVolumeMapper``: a
+        :class:`Cropping`, a mapper's, x_low, x_high, y_low, y_high, z_low and z_high of a box, or
+        a pair of those planes and the regions (flags, or ``"fence"``, ``"cross"`` ...). For
+        several VDIs a list with one of these, or ``None``, for each.
+    opacity_multiplier : float, default: 1.0
+        Factor of the extinction, 0 or above: 2 is twice as dense. For what is not opaque it is
+        the same as dividing the opacity unit distance by it. For several VDIs one for all, or a
+        list with one for each.
+    model_transforms : sequence of array_like of float, shape (4, 4), optional
+        Where the model frame of each of several VDIs is; the camera's model transform for all by
+        default.
     skip_empty : bool, default: True
         Pass by space without supersegments; the picture is the same to the last bit.
     preview_samples : int, optional
         An approximation (paper section 5): look the VDI up at so many points of each ray instead
         of intersecting its supersegments. A smaller ``window_size`` is the better one: see
-        docs/performance.md, "Previews".
+        docs/performance.md, "Previews". For a single VDI only.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
 
@@ -193,6 +218,25 @@ def render(
         If there is no device, or it fails.
     """
     view = Camera.from_any(camera)
+    if isinstance(vdi, list | tuple) or model_transforms is not None:
+        if preview_samples is not None:
+            raise InvalidArgumentError(
+                "preview_samples is for a single VDI: give several a smaller window_size"
+            )
+        from .joint import render_vdis
+
+        return render_vdis(
+            [as_vdi(one) for one in vdi] if isinstance(vdi, list | tuple) else [as_vdi(vdi)],
+            view,
+            window_size,
+            model_transforms=model_transforms,
+            opaque_depth=opaque_depth,
+            clipping_planes=clipping_planes,
+            cropping=cropping,
+            opacity_multiplier=opacity_multiplier,
+            skip_empty=skip_empty,
+            device=device,
+        )
     vdi = as_vdi(vdi)
     from .raycast import render_vdi
 
@@ -202,9 +246,140 @@ def render(
         window_size,
         opaque_depth=opaque_depth,
         clipping_planes=clipping_planes,
+        cropping=cropping,
+        opacity_multiplier=opacity_multiplier,
         skip_empty=skip_empty,
         preview_samples=preview_samples,
         device=device,
+    )
+
+
+def render_depth(
+    vdi: Any,
+    camera: Any,
+    window_size: Sequence[int] | None = None,
+    *,
+    opacity_threshold: float = DEFAULT_OPACITY,
+    accumulated: bool = True,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
+    skip_empty: bool = True,
+    device: Any = None,
+) -> NDArray[np.float32]:
+    """Raycast a VDI for where it begins to be seen: :func:`pick` for every pixel of a view.
+
+    Parameters
+    ----------
+    vdi, camera, window_size, opaque_depth, clipping_planes, cropping, opacity_multiplier
+        As for :func:`render`.
+    skip_empty, device
+        As for :func:`render`.
+    opacity_threshold, accumulated
+        What counts as a hit: as for :func:`pick`.
+
+    Returns
+    -------
+    numpy.ndarray
+        View depth of each pixel's hit, float32 (H, W), world units, top row first; infinite where
+        nothing is hit. It can be passed as another :func:`render`'s ``opaque_depth``.
+
+    Raises
+    ------
+    InvalidVDIError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+    NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
+        If there is no device, or it fails.
+    """
+    view = Camera.from_any(camera)
+    vdi = as_vdi(vdi)
+    from .raycast import render_first_hits
+
+    return render_first_hits(
+        vdi,
+        view,
+        window_size,
+        opacity_threshold=opacity_threshold,
+        accumulated=accumulated,
+        opaque_depth=opaque_depth,
+        clipping_planes=clipping_planes,
+        cropping=cropping,
+        opacity_multiplier=opacity_multiplier,
+        skip_empty=skip_empty,
+        device=device,
+    )
+
+
+def pick(
+    vdi: Any,
+    camera: Any,
+    pixel: Sequence[float],
+    window_size: Sequence[int] | None = None,
+    *,
+    opacity_threshold: float = DEFAULT_OPACITY,
+    accumulated: bool = True,
+    opaque_depth: float | None = None,
+    clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
+) -> Pick | None:
+    """Return what a pixel shows of a VDI: the first supersegment that reaches an opacity.
+
+    Parameters
+    ----------
+    vdi : VDI or vtkImageData
+        As for :func:`render`.
+    camera : pyvista.Camera or vtkCamera or Camera
+        The view. Its model transform places the VDI's model frame in the world.
+    pixel : (float, float)
+        x and y in pixels, VTK's display coordinates: whole numbers are pixels' centres and y = 0
+        is the bottom row, so that pixel (x, y) is ``image[height - 1 - y, x]`` of a picture.
+    window_size : (int, int), optional
+        Width and height of the view in pixels; the VDI's own by default.
+    opacity_threshold : float
+        Opacity that the hit has to reach, at least 0 and less than 1; the default is that of
+        VTK's pickers for volumes. With 0, whatever absorbs light at all is hit.
+    accumulated : bool, default: True
+        Compare the opacity of the ray from its beginning, 1 - exp(-(tau_0 + ... + tau_k)): the hit
+        is the first supersegment with which the ray has become as opaque as that. ``False``
+        compares each supersegment's own, 1 - exp(-tau_k) over the length that the ray crosses
+        of it, and looks through haze; but it depends on how finely the lists are cut, and where
+        the ray runs across the lists, it crosses little of each.
+    opaque_depth : float, optional
+        View depth at which the ray ends, world units.
+    clipping_planes, cropping, opacity_multiplier
+        As for :func:`render`.
+
+    Returns
+    -------
+    Pick or None
+        The supersegment, and where the ray enters it; ``None`` where nothing is hit.
+
+    Raises
+    ------
+    InvalidVDIError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+
+    Notes
+    -----
+    A single ray, walked in float64 on the host: no device is needed.
+    """
+    view = Camera.from_any(camera)
+    vdi = as_vdi(vdi)
+    from .picking import pick_vdi
+
+    return pick_vdi(
+        vdi,
+        view,
+        pixel,
+        window_size,
+        opacity_threshold=opacity_threshold,
+        accumulated=accumulated,
+        opaque_depth=opaque_depth,
+        clipping_planes=clipping_planes,
+        cropping=cropping,
+        opacity_multiplier=opacity_multiplier,
     )
 
 
@@ -217,9 +392,12 @@ def render_volume(
     sample_distance: float | None = None,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
     early_termination: bool = True,
     skip_empty: bool = True,
     lights: Any = None,
+    ambient_occlusion: Any = None,
     device: Any = None,
     **classification: Any,
 ) -> NDArray[np.float32]:
@@ -235,7 +413,7 @@ def render_volume(
         Width and height in pixels.
     sample_distance : float, optional
         Length of a step along the ray, model units; half the smallest spacing by default.
-    opaque_depth, clipping_planes
+    opaque_depth, clipping_planes, cropping, opacity_multiplier
         As for :func:`render`.
     early_termination : bool
         Stop a ray where what is behind can no longer be seen.
@@ -243,6 +421,8 @@ def render_volume(
         Pass by blocks of the volume that are transparent; the picture is the same to the last bit.
     lights : renderer, or sequence of Light, vtkLight or pyvista.Light, optional
         As for :func:`generate`; lights that move with the camera are those of this view.
+    ambient_occlusion : bool, float or AmbientOcclusion, optional
+        As for :func:`generate`.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     **classification
@@ -279,20 +459,24 @@ def render_volume(
         sample_distance=sample_distance,
         opaque_depth=opaque_depth,
         clipping_planes=clipping_planes,
+        cropping=cropping,
+        opacity_multiplier=opacity_multiplier,
         early_termination=early_termination,
         skip_empty=skip_empty,
         lights=lights,
+        ambient_occlusion=ambient_occlusion,
         device=device,
     )
 
 
 def read(path: str | os.PathLike[str], **options: Any) -> VDI:
-    """Read a VDI from a file that :meth:`VDI.save` wrote, or from any deep OpenEXR image.
+    """Read a VDI from a file that :meth:`VDI.save` or VTK wrote, or any deep OpenEXR image.
 
     Parameters
     ----------
     path : path-like
-        A ``.vdi`` file, or an OpenEXR deep image, whose name ends in ``.exr``.
+        A ``.vdi`` file, an OpenEXR deep image, whose name ends in ``.exr``, or a VDI's VTK form
+        in one of VTK's image files, ``.vti``.
     **options
         For ``.exr`` files of other programs: ``camera``, the view that the image shows, where
         the file does not say it; ``thickness``, world units, given to samples that have none
@@ -322,7 +506,13 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
     return read_file(path, **options)
 
 
-def estimate(volume: Any, window_size: Sequence[int], *, max_supersegments: int = 20) -> Estimate:
+def estimate(
+    volume: Any,
+    window_size: Sequence[int],
+    *,
+    max_supersegments: int = 20,
+    ambient_occlusion: Any = None,
+) -> Estimate:
     """Return how much memory generating a VDI takes, before it is taken.
 
     Parameters
@@ -333,6 +523,8 @@ def estimate(volume: Any, window_size: Sequence[int], *, max_supersegments: int 
         Width and height in pixels.
     max_supersegments : int
         Longest list.
+    ambient_occlusion : bool, float or AmbientOcclusion, optional
+        As for :func:`generate`.
 
     Returns
     -------
@@ -346,7 +538,12 @@ def estimate(volume: Any, window_size: Sequence[int], *, max_supersegments: int 
     """
     from .generation import estimate as estimate_bytes
 
-    return estimate_bytes(as_volume(volume), window_size, max_supersegments=max_supersegments)
+    return estimate_bytes(
+        as_volume(volume),
+        window_size,
+        max_supersegments=max_supersegments,
+        ambient_occlusion=ambient_occlusion,
+    )
 
 
 def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Volume:

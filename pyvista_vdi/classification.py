@@ -152,7 +152,7 @@ class Classification:
         if blending != "composite":
             raise UnsupportedError(
                 f"blending={blending!r} is not supported: a VDI stores what is composited along a "
-                "ray; pass blending='composite'"
+                "ray; pass blending='composite', or draw the volume itself by Plotter.add_volume"
             )
         interpolation = self._given.get("interpolation", "nearest")
         if interpolation not in ("nearest", "linear"):

@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import rays
+from .ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from .blocks import GROUP
 from .camera import Camera
 from .checks import as_float
+from .device_occlusion import ambient_transmittances
 from .errors import InvalidArgumentError
 from .lighting import Lights
 from .opencl_runtime import DeviceBuffer, Runtime, aligned_empty, kept_together, padded
@@ -54,13 +56,15 @@ class DeviceVolume:
         Pass by blocks that the transfer function makes transparent; the samples stay the same.
     lights : Lights, optional
         What a shaded volume is lit by; one headlight by default.
+    ambient_occlusion : AmbientOcclusion, optional
+        Darkens samples by what stands around them; computed once for a classification.
 
     Raises
     ------
     InvalidArgumentError
         If ``sample_distance`` is not a positive length.
     DeviceMemoryError
-        If the volume does not fit.
+        If the volume or the grid of its occlusion does not fit.
     """
 
     def __init__(
@@ -72,6 +76,7 @@ class DeviceVolume:
         *,
         skip_empty: bool = True,
         lights: Lights | None = None,
+        ambient_occlusion: AmbientOcclusion | None = None,
     ) -> None:
         if not isinstance(volume, Volume):
             raise InvalidArgumentError(f"expected a Volume, got {type(volume).__name__}")
@@ -107,17 +112,35 @@ class DeviceVolume:
         self._shading = transfer_function.shading
         self._lights = Lights() if lights is None else lights
         self._lit: tuple[Camera, DeviceBuffer] | None = None
-        self.defines.update(shading_defines(transfer_function, self._lights))
         self._gradient: tuple[DeviceBuffer, ...] = ()
+        shading = shading_defines(transfer_function, self._lights)
         if transfer_function.gradient_opacities is not None:
             gradient = gradient_table(volume, transfer_function, 1.0 if native else high - low)
             self._gradient = (runtime.upload(gradient, "gradient opacity"),)
+        self.ambient_occlusion = ambient_occlusion
+        self._occlusion: tuple[Any, ...] = ()
+        if ambient_occlusion is not None:
+            unlit = {k: v for k, v in shading.items() if k == "GRADIENT_OPACITY"}
+            self._occlusion = self._occluded(
+                ambient_occlusion, transfer_function, {**self.defines, **unlit}
+            )
+            shading["OCCLUSION"] = 1
+        self.defines.update(shading)
 
     def medium_arguments(self, camera: Camera) -> tuple[Any, ...]:
         """Arguments ``voxels`` to ``forms``, without it, of the kernels that march.
 
         ``camera`` is the view: lights may move with it.
         """
+        return (
+            *self._classified(),
+            *self._lighting(camera),
+            *self._gradient,
+            *self._occlusion,
+        )
+
+    def _classified(self) -> tuple[Any, ...]:
+        """Arguments ``voxels`` to ``blocks``."""
         return (
             self._voxels,
             np.array([*self.volume.dimensions, 0], dtype=np.int32),
@@ -127,8 +150,43 @@ class DeviceVolume:
             np.float32(self._per_scalar),
             self._visible,
             np.array([*_blocks(self.volume), 0], dtype=np.int32),
-            *self._lighting(camera),
-            *self._gradient,
+        )
+
+    def _occluded(
+        self,
+        occlusion: AmbientOcclusion,
+        transfer_function: TransferFunction,
+        defines: dict[str, str | int | None],
+    ) -> tuple[Any, ...]:
+        """Return the grid of the occlusion as kernel arguments, made once and kept."""
+        grid = OcclusionGrid.of(self.volume, occlusion)
+        # Colours and shading have no part in it
+        opacity = transfer_function.replace(
+            colors=np.zeros_like(transfer_function.colors), shading=None
+        )
+        radius, directions = occlusion.radius_in(self.volume), occlusion.directions
+        key = (opacity, radius, directions, self.sample_distance)
+        uploads = _uploads_of(self.volume)
+        with self._runtime.holding(uploads.lock):
+            kept = uploads.occlusions.get(self._runtime)
+            if kept is None or kept[0] != key:
+                uploads.occlusions.pop(self._runtime, None)  # its memory goes first
+                kept = None
+                ambient = ambient_transmittances(
+                    self._runtime,
+                    grid,
+                    (*self._classified(), *self._gradient),
+                    self._classified()[-2:],
+                    defines,
+                    self.sample_distance,
+                    self.unit_distance,
+                )
+                uploads.occlusions[self._runtime] = kept = (key, ambient)
+        to_nodes = [*(1 / edge for edge in grid.cell), occlusion.strength]
+        return (
+            kept[1],
+            np.array([*grid.nodes, 0], dtype=np.int32),
+            np.array(to_nodes, dtype=np.float32),
         )
 
     def _lighting(self, camera: Camera) -> tuple[DeviceBuffer, ...]:
@@ -189,12 +247,19 @@ class DeviceVolume:
 class _Uploads:
     """What is on devices of one volume; its lock lets the thread that uploads it be the only one.
 
-    Voxels and the scalar range of each block, by device and scaling.
+    Voxels and the scalar range of each block, by device and scaling; the last classification's
+    ambient occlusion, by device, with what it was computed from.
     """
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
         self.made: dict[Any, tuple[DeviceBuffer, DeviceBuffer]] = {}
+        self.occlusions: dict[Runtime, tuple[Any, DeviceBuffer]] = {}
+
+
+def _uploads_of(volume: Volume) -> _Uploads:
+    with _uploads_lock:
+        return _uploads.setdefault(volume, _Uploads())
 
 
 def checked_sample_distance(volume: Volume, sample_distance: float | None) -> float:
@@ -234,8 +299,7 @@ def _upload(
     defines: dict[str, str | int | None],
 ) -> tuple[DeviceBuffer, DeviceBuffer]:
     """Return voxels and the scalar range of each block, made once per device and scaling."""
-    with _uploads_lock:
-        uploads = _uploads.setdefault(volume, _Uploads())
+    uploads = _uploads_of(volume)
     with runtime.holding(uploads.lock):
         made = uploads.made
         for other in [key for key in made if key[0] is runtime and key[1] != scale]:

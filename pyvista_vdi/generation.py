@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._version import __version__
+from .ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
 from .checks import as_float
@@ -52,6 +53,8 @@ class Estimate:
         The VDI with every list full; most are far shorter.
     working : int
         Buffers on the device while a slice of rays is made.
+    occlusion : int
+        The grid of the ambient occlusion on the device, while it is computed.
     total : int
         All of these.
     """
@@ -59,11 +62,12 @@ class Estimate:
     volume: int
     vdi_worst_case: int
     working: int
+    occlusion: int = 0
 
     @property
     def total(self) -> int:
-        """Sum of the three, bytes."""
-        return self.volume + self.vdi_worst_case + self.working
+        """Sum of them all, bytes."""
+        return self.volume + self.vdi_worst_case + self.working + self.occlusion
 
 
 def check_max_supersegments(max_supersegments: int) -> int:
@@ -81,7 +85,11 @@ def check_max_supersegments(max_supersegments: int) -> int:
 
 
 def estimate(
-    volume: Volume, window_size: Sequence[int], *, max_supersegments: int = 20
+    volume: Volume,
+    window_size: Sequence[int],
+    *,
+    max_supersegments: int = 20,
+    ambient_occlusion: Any = None,
 ) -> Estimate:
     """State the memory that :func:`generate_vdi` takes, before it is taken.
 
@@ -93,6 +101,8 @@ def estimate(
         Width and height of V_O's window in pixels.
     max_supersegments : int
         Most supersegments in a list.
+    ambient_occlusion : optional
+        As for :func:`generate_vdi`.
 
     Returns
     -------
@@ -104,10 +114,12 @@ def estimate(
     item = min(volume.array.dtype.itemsize, 4)  # float64 is scaled to float32 for the device
     lists = width * height
     plan = _Slices(width, height, limit)
+    occlusion = AmbientOcclusion.from_any(ambient_occlusion)
     return Estimate(
         volume=volume.array.size * item,
         vdi_worst_case=lists * (limit * 24 + 8) + 8,
         working=plan.bytes,
+        occlusion=0 if occlusion is None else OcclusionGrid.of(volume, occlusion).nbytes,
     )
 
 
@@ -122,6 +134,7 @@ def generate_vdi(
     tolerance: float = 0.0,
     view_cone: float = 60.0,
     lights: Any = None,
+    ambient_occlusion: Any = None,
     device: Any = None,
     progress: Progress | None = None,
     metadata: Mapping[str, Any] | None = None,
@@ -158,6 +171,10 @@ def generate_vdi(
     lights : optional
         What a shaded volume is lit by; see :meth:`pyvista_vdi.Lights.from_any`. The light is
         baked into the colours: it stays as it is where V_O has it.
+    ambient_occlusion : optional
+        Darken what is hidden from the light around it, see
+        :meth:`pyvista_vdi.AmbientOcclusion.from_any`; baked into the colours as well, and the same
+        from every view.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
     progress : callable, optional
@@ -187,7 +204,15 @@ def generate_vdi(
     _require_room((), (width, height))
     runtime = get_runtime(device)
     lights = Lights.from_any(lights)
-    medium = DeviceVolume(runtime, volume, transfer_function, sample_distance, lights=lights)
+    occlusion = AmbientOcclusion.from_any(ambient_occlusion)
+    medium = DeviceVolume(
+        runtime,
+        volume,
+        transfer_function,
+        sample_distance,
+        lights=lights,
+        ambient_occlusion=occlusion,
+    )
     recorder = _Recorder(runtime, medium, camera, (width, height), limit, tolerance, hidden_weight)
     parts = []
     with recorder:
@@ -219,6 +244,8 @@ def generate_vdi(
     }
     if transfer_function.shading is not None:
         made_by["lights"] = lights.to_dict()
+    if occlusion is not None:
+        made_by["ambient_occlusion"] = occlusion.to_dict(volume)
     return VDI(
         camera,
         (width, height),

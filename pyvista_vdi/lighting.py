@@ -61,7 +61,7 @@ class Light:
     position, focal_point : (float, float, float)
         Where it is and where it shines to; without meaning for a headlight.
     ambient, diffuse, specular : (float, float, float)
-        Colours, intensity included.
+        Colours, each multiplied by ``intensity``.
     positional : bool
         Whether it shines from its position, or from infinitely far in one direction.
     attenuation : (float, float, float)
@@ -70,6 +70,8 @@ class Light:
         Half angle of a positional light's cone, degrees; above 90 it shines everywhere.
     exponent : float
         How a cone's light falls off towards its edge.
+    intensity : float
+        Of all three colours; VTK shades by a lone headlight its own way only where this is 1.
     """
 
     kind: str = "headlight"
@@ -82,6 +84,7 @@ class Light:
     attenuation: Vector = (1.0, 0.0, 0.0)
     cone_angle: float = 30.0
     exponent: float = 1.0
+    intensity: float = 1.0
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -90,7 +93,7 @@ class Light:
         vectors = ("position", "focal_point", "ambient", "diffuse", "specular", "attenuation")
         for name in vectors:
             put(self, name, _vector(f"a light's {name}", getattr(self, name)))
-        for name in ("cone_angle", "exponent"):
+        for name in ("cone_angle", "exponent", "intensity"):
             put(self, name, _number(f"a light's {name}", getattr(self, name)))
         put(self, "positional", bool(self.positional))
         if self.kind != "headlight" and self.position == self.focal_point:
@@ -114,12 +117,6 @@ class Light:
                 "a light must be a Light, a vtkLight or a pyvista.Light; "
                 f"got {type(light).__name__}"
             )
-        intensity = light.GetIntensity()
-
-        def lit(color: Any) -> Vector:
-            r, g, b = (float(c) * intensity for c in color)
-            return r, g, b
-
         kind = "scene"
         if light.LightTypeIsHeadlight():
             kind = "headlight"
@@ -130,13 +127,14 @@ class Light:
             kind,
             light.GetPosition() if follows else light.GetTransformedPosition(),
             light.GetFocalPoint() if follows else light.GetTransformedFocalPoint(),
-            lit(light.GetAmbientColor()),
-            lit(light.GetDiffuseColor()),
-            lit(light.GetSpecularColor()),
+            light.GetAmbientColor(),
+            light.GetDiffuseColor(),
+            light.GetSpecularColor(),
             bool(light.GetPositional()),
             light.GetAttenuationValues(),
             light.GetConeAngle(),
             light.GetExponent(),
+            light.GetIntensity(),
         )
 
     def in_world(self, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -177,7 +175,7 @@ class Lights:
         ----------
         lights : None, Lights, vtkRenderer, or iterable of Light or vtkLight
             ``None`` is one headlight. Of a renderer, the lights that are switched on are taken as
-            they are now, and a headlight where it has none yet, which is what VTK would make.
+            they are now, and a headlight where none is on, which is what VTK would make.
 
         Raises
         ------
@@ -189,10 +187,9 @@ class Lights:
         if isinstance(lights, Lights):
             return lights
         if hasattr(lights, "GetTwoSidedLighting"):
-            found = list(lights.GetLights())
-            if not found and lights.GetAutomaticLightCreation():
+            on = tuple(Light.from_any(each) for each in lights.GetLights() if each.GetSwitch())
+            if not on and lights.GetAutomaticLightCreation():
                 return cls(two_sided=bool(lights.GetTwoSidedLighting()))
-            on = tuple(Light.from_any(light) for light in found if light.GetSwitch())
             return cls(on, bool(lights.GetTwoSidedLighting()))
         if not isinstance(lights, Iterable) or isinstance(lights, str | Mapping):
             raise InvalidArgumentError(
@@ -203,8 +200,11 @@ class Lights:
 
     @property
     def headlight_only(self) -> bool:
-        """Whether there is one headlight and nothing else: VTK shades this case its own way."""
-        return [light.kind for light in self.lights] == ["headlight"] and not self.positional
+        """Whether there is one headlight and nothing else: VTK shades this case its own way.
+
+        Of intensity 1; a dimmed one is a light like others to VTK, a positional one is not.
+        """
+        return [(light.kind, light.intensity) for light in self.lights] == [("headlight", 1.0)]
 
     @property
     def positional(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import weakref
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,9 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from . import rays
 from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
+from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
 from .occupancy import OccupancyGrid
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime, kept_together
+from .picking import DEFAULT_OPACITY, FirstHit
 from .vdi import VDI
 
 #: A ray ends where less transmittance than this is left: no channel loses more than that.
@@ -36,6 +38,8 @@ def render_vdi(
     *,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
     skip_empty: bool = True,
     preview_samples: int | None = None,
     device: Any = None,
@@ -54,6 +58,10 @@ def render_vdi(
         View depth at which each ray ends, world units, top row first; inf where nothing is opaque.
     clipping_planes : array_like of float, shape (k, 6), optional
         Origin and normal of each plane, world coordinates; the normal's side is kept.
+    cropping : Cropping or what makes one, optional
+        Which regions of the model frame are drawn: see :meth:`pyvista_vdi.Cropping.from_any`.
+    opacity_multiplier : float
+        Factor of every supersegment's extinction, 0 or above.
     skip_empty : bool
         Pass by what the occupancy grid says is empty, where the VDI has enough of it to gain by
         that. The picture is the same to the last bit.
@@ -78,6 +86,8 @@ def render_vdi(
     camera = Camera.from_any(camera)
     size = check_window_size(vdi.window_size if window_size is None else window_size)
     samples = None if preview_samples is None else check_preview_samples(preview_samples)
+    cropping = Cropping.from_any(cropping)
+    multiplier = checked_opacity_multiplier(opacity_multiplier)
     runtime = get_runtime(device)
     prepared = prepared_vdi(runtime, vdi)
     with runtime.buffer((size[1], size[0], 4), name="image") as image:
@@ -87,10 +97,67 @@ def render_vdi(
             image,
             opaque_depth,
             clipping_planes,
+            cropping=cropping,
+            opacity_multiplier=multiplier,
             skip_empty=skip_empty,
             preview_samples=samples,
         )
         return runtime.download(image)
+
+
+def render_first_hits(
+    vdi: VDI,
+    camera: Camera,
+    window_size: Sequence[int] | None = None,
+    *,
+    opacity_threshold: float = DEFAULT_OPACITY,
+    accumulated: bool = True,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
+    skip_empty: bool = True,
+    device: Any = None,
+) -> NDArray[np.float32]:
+    """Return the view depth at which each pixel's ray first hits something that can be seen.
+
+    Parameters
+    ----------
+    vdi, camera, window_size, opaque_depth, clipping_planes, cropping, opacity_multiplier
+        As for :func:`render_vdi`.
+    skip_empty, device
+        As for :func:`render_vdi`.
+    opacity_threshold, accumulated
+        What counts as a hit: see :func:`pyvista_vdi.pick`.
+
+    Returns
+    -------
+    numpy.ndarray
+        float32 (height, width), world units, top row first; infinite where nothing is hit.
+    """
+    if not isinstance(vdi, VDI):
+        raise InvalidArgumentError(f"expected a VDI, got {type(vdi).__name__}")
+    camera = Camera.from_any(camera)
+    size = check_window_size(vdi.window_size if window_size is None else window_size)
+    wanted = FirstHit.of(opacity_threshold, accumulated)
+    cropping = Cropping.from_any(cropping)
+    multiplier = checked_opacity_multiplier(opacity_multiplier)
+    runtime = get_runtime(device)
+    prepared = prepared_vdi(runtime, vdi)
+    with runtime.buffer((size[1], size[0]), name="depth of first hits") as image:
+        prepared.render(
+            camera,
+            size,
+            image,
+            opaque_depth,
+            clipping_planes,
+            cropping=cropping,
+            opacity_multiplier=multiplier,
+            skip_empty=skip_empty,
+            first_hit=wanted,
+        )
+        t = runtime.download(image)
+    return (t + rays.reference_depth(camera, vdi.bounds)).astype(np.float32)
 
 
 def check_preview_samples(samples: int) -> int:
@@ -125,6 +192,37 @@ def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
         return place.prepared
 
 
+class ListView(NamedTuple):
+    """The rays of a frame in a VDI's list space.
+
+    Attributes
+    ----------
+    size : (int, int)
+        Width and height of the image in pixels.
+    forms : numpy.ndarray
+        List coordinates, model direction and the planes to clip to, float32 (n, 6).
+    planes : int
+        How many of the forms are planes; the first six are the bounds.
+    ends : numpy.ndarray
+        t at which each ray ends, float32 (H, W), top row first, if ``has_ends``.
+    has_ends : bool
+        Whether something opaque may end rays.
+    reference_depth : float
+        View depth of t = 0, world units.
+    defines, arguments
+        ``-D`` names and arguments of the kernel, for what is cropped.
+    """
+
+    size: tuple[int, int]
+    forms: NDArray[np.float32]
+    planes: int
+    ends: NDArray[np.float32]
+    has_ends: bool
+    reference_depth: float
+    defines: dict[str, str | int | None]
+    arguments: tuple[Any, ...]
+
+
 class PreparedVDI:
     """A VDI on a device, in the form that the raycaster reads.
 
@@ -149,9 +247,7 @@ class PreparedVDI:
         camera = vdi.camera
         self._parallel = camera.parallel_projection
         near, far = rays.depth_range(camera, vdi.bounds)
-        diagonal = float(np.linalg.norm(np.subtract(vdi.bounds[1::2], vdi.bounds[::2])))
-        shrink = np.linalg.norm(camera.model_transform[:3, :3], 2)
-        self._nearest = rays.NEAREST_DEPTH * diagonal * float(shrink)
+        self._nearest = rays.nearest_depth(camera, vdi.bounds)
         # An origin much closer than the data costs the coordinate the digits that it is to save
         closest = min(near, self._depth_origin)
         self._shifted = not self._parallel and 0 < far <= _LONG_LENS * closest
@@ -179,61 +275,106 @@ class PreparedVDI:
         opaque_depth: ArrayLike | None = None,
         clipping_planes: ArrayLike | None = None,
         *,
+        cropping: Cropping | None = None,
+        opacity_multiplier: float = 1.0,
         skip_empty: bool = True,
         preview_samples: int | None = None,
+        first_hit: FirstHit | None = None,
     ) -> None:
-        """Draw a frame into ``image``, float32 (H, W, 4) on the device."""
+        """Draw a frame into ``image``, float32 (H, W, 4) on the device.
+
+        With ``first_hit``, t of each ray's first hit in its place, float32 (H, W).
+        """
         width, height = size
-        pixel_rays = rays.pixel_rays(camera, size, self._bounds)
-        coordinates = [pixel_rays.form(row[:3], row[3]) for row in self._list_rows]
-        direction = [pixel_rays.form(axis) for axis in np.eye(3)]
-        planes = rays.box_planes(pixel_rays, self._bounds)
-        planes += self._viewport_planes(coordinates)
-        planes += rays.eye_plane(camera, pixel_rays)
-        planes += rays.user_planes(camera, pixel_rays, clipping_planes)
-        forms = rays.packed([*coordinates, *direction, *planes])
-        ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
+        view = self.view(camera, size, opaque_depth, clipping_planes, cropping, opacity_multiplier)
         runtime = self._runtime
-        defines = self.defines
+        defines = {**self.defines, **view.defines}
         grid = self.occupancy
-        sampling: tuple[Any, ...] = ()
+        mode: tuple[Any, ...] = ()
         if preview_samples is not None:
             kernel = runtime.kernel("vdi/preview.cl", "preview", defines)
-            sampling = (grid.counts, np.int32(preview_samples))
+            mode = (grid.counts, np.int32(preview_samples))
         else:
+            if first_hit is not None:
+                defines["FIRST_HIT"] = 1
+                mode = (np.float32(first_hit.optical_depth), np.int32(first_hit.accumulated))
             if skip_empty and grid.worthwhile:
                 defines["SKIP_EMPTY"] = 1
             kernel = runtime.kernel("vdi/raycast.cl", "raycast", defines)
         with (
-            runtime.upload(forms, "rays") as form_buffer,
-            runtime.upload(
-                np.zeros(1, np.float32) if ends is None else ends, "opaque depth"
-            ) as depth,
+            runtime.upload(view.forms, "rays") as form_buffer,
+            runtime.upload(view.ends, "opaque depth") as depth,
         ):
             runtime.launch(
                 kernel,
                 block_items(width, height),
                 GROUP,
-                self._offsets,
-                self._faces,
-                self._media,
-                np.int32(self._window[0]),
-                np.int32(self._window[1]),
-                np.float32(self._depth_origin),
-                form_buffer,
-                np.int32(len(planes)),
-                np.int32(width),
-                np.int32(height),
-                depth,
-                np.int32(ends is not None),
-                np.float32(TRANSMITTANCE_CUTOFF),
-                grid.masks,
-                np.float32(grid.first_depth),
-                np.float32(grid.slabs_per_depth),
-                *sampling,
+                *self.walk_arguments(view, form_buffer, depth, TRANSMITTANCE_CUTOFF),
+                *mode,
                 image,
             )
             runtime.finish()  # the buffers above may be host memory in use
+
+    def view(
+        self,
+        camera: Camera,
+        size: tuple[int, int],
+        opaque_depth: ArrayLike | None,
+        clipping_planes: ArrayLike | None,
+        cropping: Cropping | None = None,
+        opacity_multiplier: float = 1.0,
+    ) -> ListView:
+        """Return a frame's rays as the kernels take them."""
+        pixel_rays = rays.pixel_rays(camera, size, self._bounds)
+        coordinates = [pixel_rays.form(row[:3], row[3]) for row in self._list_rows]
+        # Lengths are all that this is for, and a length times m absorbs as m times the extinction
+        direction = [opacity_multiplier * pixel_rays.form(axis) for axis in np.eye(3)]
+        planes = rays.box_planes(pixel_rays, self._bounds)
+        planes += self._viewport_planes(coordinates)
+        planes += rays.eye_plane(camera, pixel_rays)
+        planes += rays.user_planes(camera, pixel_rays, clipping_planes)
+        cropped = rays.cropped(pixel_rays, cropping, self._bounds)
+        planes += cropped.planes
+        forms = rays.packed([*coordinates, *direction, *planes, *cropped.forms])
+        ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
+        return ListView(
+            size,
+            forms,
+            len(planes),
+            np.zeros(1, np.float32) if ends is None else ends,
+            ends is not None,
+            pixel_rays.reference_depth,
+            cropped.defines,
+            cropped.arguments,
+        )
+
+    def walk_arguments(
+        self, view: ListView, forms: DeviceBuffer, ends: DeviceBuffer, cutoff: float
+    ) -> tuple[Any, ...]:
+        """Return the arguments that every kernel which walks through the lists begins with.
+
+        ``forms`` and ``ends`` are the view's arrays on the device; ``cutoff`` says where a ray
+        ends for want of light.
+        """
+        return (
+            self._offsets,
+            self._faces,
+            self._media,
+            np.int32(self._window[0]),
+            np.int32(self._window[1]),
+            np.float32(self._depth_origin),
+            forms,
+            np.int32(view.planes),
+            np.int32(view.size[0]),
+            np.int32(view.size[1]),
+            ends,
+            np.int32(view.has_ends),
+            np.float32(cutoff),
+            self.occupancy.masks,
+            np.float32(self.occupancy.first_depth),
+            np.float32(self.occupancy.slabs_per_depth),
+            *view.arguments,
+        )
 
     def _list_space(self, camera: Camera) -> NDArray[np.float64]:
         """Model frame to homogeneous list coordinates, float64 (4, 4).

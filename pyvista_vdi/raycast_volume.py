@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import rays
+from .ambient_occlusion import AmbientOcclusion
 from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
+from .cropping import Cropping, checked_opacity_multiplier
 from .device_volume import DeviceVolume
 from .lighting import Lights
 from .opencl_runtime import Runtime, get_runtime
@@ -28,9 +30,12 @@ def raycast_volume(
     sample_distance: float | None = None,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
     early_termination: bool = True,
     skip_empty: bool = True,
     lights: Any = None,
+    ambient_occlusion: Any = None,
     device: Any = None,
 ) -> NDArray[np.float32]:
     """Render a classified volume directly.
@@ -54,12 +59,19 @@ def raycast_volume(
         View depth at which each ray ends, world units, top row first; inf where nothing is opaque.
     clipping_planes : array_like of float, shape (k, 6), optional
         Origin and normal of each plane, world coordinates; the normal's side is kept.
+    cropping : Cropping or what makes one, optional
+        Which regions of the model frame are drawn: see :meth:`pyvista_vdi.Cropping.from_any`.
+    opacity_multiplier : float
+        Factor of the optical depth of every step, 0 or above.
     early_termination : bool
         End a ray where less than :data:`~pyvista_vdi.raycast.TRANSMITTANCE_CUTOFF` is left.
     skip_empty : bool
         Pass by blocks that are transparent; the picture is the same to the last bit.
     lights : optional
         What a shaded volume is lit by; see :meth:`pyvista_vdi.Lights.from_any`.
+    ambient_occlusion : optional
+        Darken what is hidden from the light around it, see
+        :meth:`pyvista_vdi.AmbientOcclusion.from_any`.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
 
@@ -78,6 +90,7 @@ def raycast_volume(
         sample_distance,
         skip_empty=skip_empty,
         lights=Lights.from_any(lights),
+        ambient_occlusion=AmbientOcclusion.from_any(ambient_occlusion),
     )
     return raycast_medium(
         runtime,
@@ -86,6 +99,8 @@ def raycast_volume(
         size,
         opaque_depth=opaque_depth,
         clipping_planes=clipping_planes,
+        cropping=Cropping.from_any(cropping),
+        opacity_multiplier=checked_opacity_multiplier(opacity_multiplier),
         early_termination=early_termination,
     )
 
@@ -98,13 +113,24 @@ def raycast_medium(
     *,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Cropping | None = None,
+    opacity_multiplier: float = 1.0,
     early_termination: bool = True,
 ) -> NDArray[np.float32]:
     """Render a volume that is on the device already; see :func:`raycast_volume`."""
     width, height = size
     forms, pixel_rays, planes = medium.forms(camera, size, clipping_planes)
     ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
-    kernel = runtime.kernel("vdi/render_volume.cl", "render_volume", medium.defines)
+    cropped = rays.cropped(pixel_rays, cropping, medium.volume.bounds)
+    planes += len(cropped.planes)
+    if cropped.planes or cropped.forms:
+        forms = np.concatenate([forms, rays.packed([*cropped.planes, *cropped.forms])])
+    defines = {**medium.defines, **cropped.defines}
+    multiplier: tuple[np.float32, ...] = ()
+    if opacity_multiplier != 1.0:
+        defines["OPACITY_MULTIPLIER"] = 1
+        multiplier = (np.float32(opacity_multiplier),)
+    kernel = runtime.kernel("vdi/render_volume.cl", "render_volume", defines)
     with (
         runtime.upload(forms, "rays") as form_buffer,
         runtime.upload(np.zeros(1, np.float32) if ends is None else ends, "opaque depth") as depth,
@@ -124,6 +150,8 @@ def raycast_medium(
             depth,
             np.int32(ends is not None),
             np.float32(TRANSMITTANCE_CUTOFF if early_termination else -1.0),
+            *cropped.arguments,
+            *multiplier,
             image,
         )
         return runtime.download(image)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .camera import Camera, check_window_size
+from .cropping import Cropping
 from .errors import InvalidArgumentError, InvalidCameraError
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -67,6 +68,16 @@ def depth_range(camera: Camera, bounds: Sequence[float]) -> tuple[float, float]:
     middle = row[:3] @ centre + row[3]
     reach = np.abs(row[:3]) @ half
     return float(middle - reach), float(middle + reach)
+
+
+def nearest_depth(camera: Camera, bounds: Sequence[float]) -> float:
+    """Return the view depth before which nothing is looked up in perspective, world units.
+
+    :data:`NEAREST_DEPTH` times the diagonal of the bounds, carried into the world by the model
+    transform's largest stretch.
+    """
+    diagonal = float(np.linalg.norm(np.subtract(bounds[1::2], bounds[::2])))
+    return NEAREST_DEPTH * diagonal * float(np.linalg.norm(camera.model_transform[:3, :3], 2))
 
 
 def reference_depth(camera: Camera, bounds: Sequence[float]) -> float:
@@ -175,6 +186,53 @@ def user_planes(camera: Camera, rays: PixelRays, planes: ArrayLike | None) -> li
         rays.form(normal @ matrix[:3, :3], normal @ (matrix[:3, 3] - origin))
         for origin, normal in zip(table[:, :3], normals, strict=True)
     ]
+
+
+@dataclass(frozen=True)
+class CroppedRays:
+    """How a kernel crops: by what it clips to, and what is left.
+
+    Attributes
+    ----------
+    planes : list of numpy.ndarray
+        Forms to clip to: a box, or nothing at all.
+    forms : list of numpy.ndarray
+        Six that are positive beyond the low and the high plane of each axis, for
+        ``opencl/common/cropping.cl``; empty where clipping is enough.
+    regions : int
+        The flags that belong to them.
+    """
+
+    planes: list[Floats]
+    forms: list[Floats]
+    regions: int
+
+    @property
+    def defines(self) -> dict[str, str | int | None]:
+        """``-D`` names: none where clipping is enough."""
+        return {"CROPPED": 1} if self.forms else {}
+
+    @property
+    def arguments(self) -> tuple[np.uint32, ...]:
+        """The kernel's arguments that come with the define."""
+        return (np.uint32(self.regions),) if self.forms else ()
+
+
+def cropped(rays: PixelRays, cropping: Cropping | None, bounds: Sequence[float]) -> CroppedRays:
+    """Return how the rays through a box are cropped."""
+    if cropping is None:
+        return CroppedRays([], [], 0)
+    within = cropping.within(bounds)
+    if within.box is None:
+        normals = np.repeat(np.eye(3), 2, axis=0)
+        offsets = within.cuts.ravel()
+        forms = [rays.form(normal, -at) for normal, at in zip(normals, offsets, strict=True)]
+        return CroppedRays([], forms, cropping.regions)
+    if np.isnan(within.box).any():
+        return CroppedRays([np.array([-1.0, 0, 0, 0, 0, 0])], [], 0)  # a plane that keeps nothing
+    if np.array_equal(within.box.ravel(), bounds):
+        return CroppedRays([], [], 0)
+    return CroppedRays(box_planes(rays, within.box.ravel().tolist()), [], 0)
 
 
 def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:

@@ -70,9 +70,7 @@ def _light(light: Light, camera: Camera) -> list[float]:
     to_view = camera.view_matrix
     cone = math.cos(math.radians(light.cone_angle)) if light.cone_angle <= 90 else _NO_CONE
     return [
-        *light.ambient,
-        *light.diffuse,
-        *light.specular,
+        *(light.intensity * c for c in (*light.ambient, *light.diffuse, *light.specular)),
         *(to_view[:3, :3] @ direction),
         float(light.positional),
         *(to_view[:3, :3] @ position + to_view[:3, 3]),

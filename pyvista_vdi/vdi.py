@@ -134,7 +134,7 @@ class VDI:
     # -- files -----------------------------------------------------------------------------------
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a ``.vdi`` or ``.exr`` file that :func:`pyvista_vdi.read` opens.
+        """Write a ``.vdi``, ``.exr`` or ``.vti`` file that :func:`pyvista_vdi.read` opens.
 
         The options are those of :func:`pyvista_vdi.io.write`.
         """
@@ -195,8 +195,9 @@ class VDI:
             self._require(front >= nearest, "in front of the eye (depth >= 0)")
         ordered = np.ones(len(front), dtype=bool)
         np.less_equal(back[:-1], front[1:], out=ordered[1:])
-        starts = self.offsets[:-1]
-        ordered[starts[starts < np.uint64(len(front))]] = True  # none is before a list's first
+        # None is before a list's first. As int64, which NumPy takes as indices without a copy
+        starts = self.offsets[:-1].view(np.int64)
+        ordered[starts[: np.searchsorted(starts, len(front))]] = True
         self._require(ordered, "sorted within its list and not overlapping")
 
     def _require(self, good: NDArray[np.bool_], rule: str) -> None:

@@ -17,8 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import rays
+from .ambient_occlusion import AmbientOcclusion
 from .camera import Camera, check_window_size
 from .checks import as_float
+from .cropping import Cropping, checked_opacity_multiplier
 from .device_volume import DeviceVolume
 from .errors import Cancelled, InvalidArgumentError
 from .lighting import Lights
@@ -160,6 +162,7 @@ def estimate_view_error(
     tiles: int = TILES,
     tile_size: int = TILE_SIZE,
     lights: Any = None,
+    ambient_occlusion: Any = None,
     device: Any = None,
     **options: Any,
 ) -> ViewError:
@@ -169,7 +172,9 @@ def estimate_view_error(
     ----------
     vdi : VDI
         What is judged.
-    volume, transfer_function, sample_distance, tiles, tile_size, device
+    volume, transfer_function, sample_distance, tiles, tile_size
+        As for :class:`ViewErrorEstimator`.
+    lights, ambient_occlusion, device
         As for :class:`ViewErrorEstimator`.
     camera, window_size, **options
         As for :meth:`ViewErrorEstimator.estimate`.
@@ -186,6 +191,7 @@ def estimate_view_error(
         tiles=tiles,
         tile_size=tile_size,
         lights=lights,
+        ambient_occlusion=ambient_occlusion,
         device=device,
     )
     return estimator.estimate(vdi, camera, window_size, **options)
@@ -209,6 +215,8 @@ class ViewErrorEstimator:
         pixels to each side, so a tile of 24 tells the SSIM of 14 x 14 pixels.
     lights : optional
         What a shaded volume is lit by in the view that is judged; see :meth:`Lights.from_any`.
+    ambient_occlusion : optional
+        What the VDIs were generated with; see :meth:`AmbientOcclusion.from_any`.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
 
@@ -246,6 +254,7 @@ class ViewErrorEstimator:
         tiles: int = TILES,
         tile_size: int = TILE_SIZE,
         lights: Any = None,
+        ambient_occlusion: Any = None,
         device: Any = None,
     ) -> None:
         self._tiles = _whole("tiles", tiles, 2)
@@ -257,6 +266,7 @@ class ViewErrorEstimator:
             transfer_function,
             sample_distance,
             lights=Lights.from_any(lights),
+            ambient_occlusion=AmbientOcclusion.from_any(ambient_occlusion),
         )
 
     def estimate(
@@ -268,6 +278,8 @@ class ViewErrorEstimator:
         picture: ArrayLike | None = None,
         opaque_depth: ArrayLike | None = None,
         clipping_planes: ArrayLike | None = None,
+        cropping: Any = None,
+        opacity_multiplier: float = 1.0,
         background: Sequence[float] = (0.0, 0.0, 0.0),
         pause: Pause | None = None,
     ) -> ViewError:
@@ -288,6 +300,8 @@ class ViewErrorEstimator:
             As for :func:`pyvista_vdi.render`; both pictures end there.
         clipping_planes : array_like of float, shape (k, 6), optional
             As for :func:`pyvista_vdi.render`; both pictures are clipped.
+        cropping, opacity_multiplier
+            As for :func:`pyvista_vdi.render`; both pictures are cropped, and as dense.
         background : (float, float, float)
             RGB that both pictures are blended over before they are compared.
         pause : callable, optional
@@ -315,7 +329,11 @@ class ViewErrorEstimator:
             size,
             _of_window("picture", picture, (*size[::-1], 4)),
             _of_window("opaque_depth", opaque_depth, size[::-1]),
-            clipping_planes,
+            {
+                "clipping_planes": clipping_planes,
+                "cropping": Cropping.from_any(cropping),
+                "opacity_multiplier": checked_opacity_multiplier(opacity_multiplier),
+            },
             background,
             pause,
         )
@@ -347,7 +365,7 @@ class _Scene:
         size: tuple[int, int],
         picture: NDArray[Any] | None,
         opaque_depth: NDArray[Any] | None,
-        clipping_planes: ArrayLike | None,
+        shown: dict[str, Any],
         background: Sequence[float],
         pause: Pause | None,
     ) -> None:
@@ -358,7 +376,7 @@ class _Scene:
         self._size = size
         self._picture = picture
         self._opaque_depth = opaque_depth
-        self._clipping_planes = clipping_planes
+        self._shown = shown  # what both pictures leave out, or show otherwise
         self._background = background
         self._pause = pause
 
@@ -404,7 +422,6 @@ class _Scene:
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """The pixels ``part`` of the window, seen through ``lens``, by VDI and volume."""
         depth = None if self._opaque_depth is None else self._opaque_depth[part]
-        planes = self._clipping_planes
         if self._picture is not None:
             of_vdi = self._picture[part]
         else:
@@ -414,8 +431,8 @@ class _Scene:
                 lens,
                 size,
                 opaque_depth=depth,
-                clipping_planes=planes,
                 device=self._runtime,
+                **self._shown,
             )
         self._wait()
         of_volume = raycast_medium(
@@ -424,7 +441,7 @@ class _Scene:
             lens,
             size,
             opaque_depth=depth,
-            clipping_planes=planes,
+            **self._shown,
         )
         return of_vdi, of_volume
 

@@ -116,6 +116,8 @@ class Load:
         self.frames = frames
         self.rng = np.random.default_rng(seed)
         self.runtime = get_runtime()
+        gc.collect()
+        self.before = self.runtime.allocated
         self.outcome = Outcome(frames, 0, 0, 0, 0, 0, 0.0, 0.0, [], [])
         self.plotter = pv.Plotter(off_screen=True, window_size=SIZES[0])
         self.actor = None
@@ -181,10 +183,11 @@ class Load:
         self.plotter.remove_actor(self.actor)
         self.plotter.volume = self.plotter.mapper = None  # PyVista keeps the last of each
         self.actor = None
-        gc.collect()
-        for thread in threading.enumerate():  # a VDI that nobody waits for is given up soon
-            if thread.name.startswith("pyvista-vdi"):
-                thread.join(60)
+        for _ in range(200):  # a VDI that is made in the background is given up soon, not at once
+            gc.collect()
+            if self.runtime.allocated <= self.before:
+                break
+            time.sleep(0.05)
         self.outcome.between.append(self._sample(self.outcome.volumes))
 
     def _edit(self) -> None:
@@ -237,7 +240,7 @@ class Load:
         return Sample(
             number,
             resident_bytes(),
-            self.runtime.allocated,
+            self.runtime.allocated - self.before,
             len(list(files.iterdir())) if files.exists() else 0,
             system_threads(),
         )

@@ -45,20 +45,21 @@ def vdi_of_one_list() -> pvdi.VDI:
     )
 
 
-def add_judge(plotter: pv.Plotter, volume: pv.ImageData, **more: Any) -> Any:
+def add_judge(
+    plotter: pv.Plotter, volume: pv.ImageData, *, sample_distance: float = 0.02, **more: Any
+) -> Any:
     """VTK's GPU mapper, linear interpolation, at converged steps."""
-    actor = plotter.add_volume(volume, mapper="gpu", **LOOKS, **more)
+    actor = plotter.add_volume(volume, mapper="gpu", **{**LOOKS, **more})
     actor.mapper.SetAutoAdjustSampleDistances(0)
-    actor.mapper.SetSampleDistance(0.02)
+    actor.mapper.SetSampleDistance(sample_distance)
     actor.prop.interpolation_type = "linear"
     return actor
 
 
 def add_ours(plotter: pv.Plotter, volume: pv.ImageData, **more: Any) -> Any:
     """``add_vdi`` with the same looks."""
-    return plotter.add_vdi(
-        volume, interpolation="linear", sample_distance=0.02, max_supersegments=64, **LOOKS, **more
-    )
+    how = {"interpolation": "linear", "sample_distance": 0.02, "max_supersegments": 64}
+    return plotter.add_vdi(volume, **{**how, **LOOKS, **more})
 
 
 def add_nothing(plotter: pv.Plotter, volume: pv.ImageData, **more: Any) -> Any:

@@ -89,20 +89,15 @@ inline int empty_steps(const March *march, const Medium *medium, int k, int end,
 #endif
 }
 
-// Colour (rgb) and optical depth (w) of the step between two faces.
-inline float4 step_medium(const March *march, const Medium *medium, float front, float back)
+// Colour (rgb) and optical depth (w) of a step of `units` opacity unit distances around index position (x, y, z).
+inline float4 medium_at(const Medium *medium, float x, float y, float z, float units)
 {
-    const float t = 0.5f * (front + back);
-    const float scalar = sample_volume(medium->voxels, medium->size, fma(t, march->slope.x, march->start.x),
-                                       fma(t, march->slope.y, march->start.y), fma(t, march->slope.z, march->start.z));
+    const float scalar = sample_volume(medium->voxels, medium->size, x, y, z);
     float4 sample = classify(scalar, medium->table, medium->entries, medium->low, medium->per_scalar);
     if (sample.w > 0.0f)
-        sample.w = step_optical_depth(sample.w, (back - front) * march->units);
-#if defined(RGBA) || defined(SHADED) || defined(GRADIENT_OPACITY)
+        sample.w = step_optical_depth(sample.w, units);
+#if defined(RGBA) || defined(SHADED) || defined(GRADIENT_OPACITY) || defined(OCCLUSION)
     if (sample.w > 0.0f) {
-        const float x = fma(t, march->slope.x, march->start.x);
-        const float y = fma(t, march->slope.y, march->start.y);
-        const float z = fma(t, march->slope.z, march->start.z);
 #ifdef RGBA
         sample.xyz = sample_color(medium->voxels, medium->size, x, y, z);
 #endif
@@ -115,7 +110,18 @@ inline float4 step_medium(const March *march, const Medium *medium, float front,
         sample.xyz = lit(sample.xyz, differences, x, y, z, medium->lighting);
 #endif
 #endif
+#ifdef OCCLUSION
+        sample.xyz *= ambient_factor(medium->ambient, medium->nodes, medium->to_nodes, x, y, z);
+#endif
     }
 #endif
     return sample;
+}
+
+// Colour (rgb) and optical depth (w) of the step between two faces.
+inline float4 step_medium(const March *march, const Medium *medium, float front, float back)
+{
+    const float t = 0.5f * (front + back);
+    return medium_at(medium, fma(t, march->slope.x, march->start.x), fma(t, march->slope.y, march->start.y),
+                     fma(t, march->slope.z, march->start.z), (back - front) * march->units);
 }

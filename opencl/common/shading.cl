@@ -8,12 +8,13 @@
 // Without SHADED and GRADIENT_OPACITY nothing of this is compiled. Lights are in a frame of their own, "the lights'
 // frame", whose origin is the eye: the model frame's axes for a headlight, the view's otherwise.
 #include "common/volume_sampling.cl"
+#include "common/occlusion.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Of the structure Medium, of the kernels that take one, and of its initialiser: after `blocks` in each
-#define SHADING_FIELDS LIGHTING_FIELD GRADIENT_FIELD
-#define SHADING_PARAMETERS LIGHTING_PARAMETER GRADIENT_PARAMETER
-#define SHADING_ARGUMENTS LIGHTING_ARGUMENT GRADIENT_ARGUMENT
+#define SHADING_FIELDS LIGHTING_FIELD GRADIENT_FIELD OCCLUSION_FIELD
+#define SHADING_PARAMETERS LIGHTING_PARAMETER GRADIENT_PARAMETER OCCLUSION_PARAMETER
+#define SHADING_ARGUMENTS LIGHTING_ARGUMENT GRADIENT_ARGUMENT OCCLUSION_ARGUMENT
 
 #ifdef SHADED
 #define LIGHTING_FIELD __global const float *lighting; // see lit

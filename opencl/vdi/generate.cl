@@ -1,7 +1,7 @@
 // Volume to lists of supersegments, one march per ray (paper section 2; DESIGN section 3 "Merging", "Budget").
 //
 // -D VOXEL_T, INDEX_T, RGBA, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
-// -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl
+// -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl; OCCLUSION: see common/occlusion.cl
 //
 // A ray's march is cut into chunks of equally many steps. march_lists takes the steps of one chunk and appends what is not
 // homogeneous with the run before; make_room_in_lists then shortens the records that have grown too long, and raises the

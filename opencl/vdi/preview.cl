@@ -4,7 +4,7 @@
 // lies the same integral of (supersegments in the cell) along the ray. No supersegment is intersected; a sample finds its list
 // and its supersegment by the same search as the raycaster's, and stands for the length of non-empty cells around it.
 //
-// -D OFFSET_T, PARALLEL, SHIFTED   as in vdi/raycast.cl
+// -D OFFSET_T, PARALLEL, SHIFTED, CROPPED   as in vdi/raycast.cl
 #include "common/list_ray.cl"
 #include "common/lists.cl"
 #include "common/classification.cl"
@@ -151,6 +151,7 @@ __kernel void preview(
     __global const ulong *masks,        // occupied slabs of each tile of lists
     float first_depth,                  // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,
+    CROPPING_PARAMETER                  // regions that are kept
     __global const uint *counts,        // supersegments in each cell: tiles_high, tiles_wide, SLABS
     int samples,                        // per ray
     __global float4 *image)             // premultiplied RGBA, top row first
@@ -163,7 +164,8 @@ __kernel void preview(
     const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
 
     ListRay ray;
-    if (!begin_list_ray(&ray, forms, planes, a, b, has_opaque_depth ? opaque_depth[place] : INFINITY, depth_origin)) {
+    if (!begin_list_ray(&ray, forms, planes, CROPPING_ARGUMENT a, b, has_opaque_depth ? opaque_depth[place] : INFINITY,
+                        depth_origin)) {
         image[place] = (float4)(0.0f);
         return;
     }
@@ -206,6 +208,10 @@ __kernel void preview(
                     if (guess < count && faces[begin + (OFFSET_T)guess].x <= z)
                         medium = media[begin + (OFFSET_T)guess];
                 }
+#ifdef CROPPED
+                if (!is_kept(&ray.kept, r))
+                    medium = (float4)(0.0f);
+#endif
             } else {
                 const float ends = length_before + share * (more ? crossing.length : 0.0f);
                 const float part = transmittance * opacity_of(medium.w * (ends - part_begins)); // over, front to back

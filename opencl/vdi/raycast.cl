@@ -6,12 +6,23 @@
 //
 // -D OFFSET_T           type of an offset into the supersegments: uint or ulong
 // -D PARALLEL, SHIFTED  the depth coordinate, see common/list_space.cl
+// -D CROPPED            only some regions are drawn, see common/cropping.cl
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
+// -D SEGMENTS           write what each ray crosses into a pool, to be merged with other VDIs by vdi/merge.cl, in place of
+//                       compositing it; for a band of rays
+// -D FIRST_HIT          in place of a picture, where each ray enters the first supersegment that reaches an opacity
 #include "common/list_ray.cl"
 #include "common/lists.cl"
 #include "common/classification.cl"
 #include "common/occupancy.cl"
+#include "common/segments.cl"
 #pragma OPENCL FP_CONTRACT OFF
+
+#ifdef SEGMENTS
+#define BOX_PLANES 6 // of the VDI's bounds: the first of `forms`' planes
+// More cannot be told from opaque, and a part of it is still a number
+#define MAX_OPTICAL_DEPTH 1e30f
+#endif
 
 // A ray that crosses fewer lists than this is not worth a look at the grid: at V_O it stays in one.
 #define FEW_LISTS 2.0f
@@ -27,22 +38,66 @@ __kernel void raycast(
     int width, int height,              // window of V_N
     __global const float *opaque_depth, // t at which each pixel's ray ends, top row first, if has_opaque_depth
     int has_opaque_depth,
+#ifdef SEGMENTS
+    float optical_depth_cutoff,         // the ray ends behind this much
+#else
     float transmittance_cutoff,         // the ray ends where less than this is left
+#endif
     __global const ulong *masks,        // occupied slabs of each tile of lists, if SKIP_EMPTY
     float first_depth,                  // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,
+    CROPPING_PARAMETER                  // regions that are kept
+#if defined(SEGMENTS)
+    uint first_item,                    // work-item of the band's first ray
+    int stream,                         // of this VDI
+    int rays,                           // in the band
+    float depth_shift,                  // this VDI's reference depth less the frame's
+    float margin,                       // pixels; see `contributes`
+    int capacity,                       // slots of a ray
+    __global float *pool,               // see common/segments.cl
+    __global int *ends,                 // (streams, rays): slot behind each stream's last, beyond the capacity if it was full
+    __global uchar *contributes)        // (streams, rays): 1 if a ray meets the VDI, 2 if its neighbours at `margin` pixels
+                                        // meet its bounds, too
+#define RAY_IS_DONE (absorbed > optical_depth_cutoff)
+#elif defined(FIRST_HIT)
+    float least_optical_depth,          // a hit has some, and at least this much: by itself, or with all before it
+    int accumulated,                    // whether what is before it counts
+    __global float *image)              // t of the first hit, infinite where there is none, top row first
+#define NOTHING INFINITY
+#define RAY_IS_DONE hit
+#else
     __global float4 *image)             // premultiplied RGBA, top row first
+#define NOTHING (float4)(0.0f)
+#define RAY_IS_DONE (transmittance < transmittance_cutoff)
+#endif
 {
-    const int2 pixel = block_pixel((uint)get_global_id(0), width);
+#ifdef SEGMENTS
+    const int band_ray = (int)get_global_id(0);
+    const uint item = first_item + (uint)band_ray;
+#else
+    const uint item = (uint)get_global_id(0);
+#endif
+    const int2 pixel = block_pixel(item, width);
     if (pixel.x >= width || pixel.y >= height)
         return;
     const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
     const float b = (float)pixel.y + 0.5f - 0.5f * (float)height;
     const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
+#ifdef SEGMENTS
+    const int first_slot = stream > 0 ? ends[(stream - 1) * rays + band_ray] : 0;
+    int slot = first_slot;
+    float t_reached = -INFINITY; // so that rounding puts no segment before the end of another
+    float absorbed = 0.0f;       // optical depth
+    ends[stream * rays + band_ray] = slot;
+    contributes[stream * rays + band_ray] = 0;
+#endif
 
     ListRay ray;
-    if (!begin_list_ray(&ray, forms, planes, a, b, has_opaque_depth ? opaque_depth[place] : INFINITY, depth_origin)) {
-        image[place] = (float4)(0.0f);
+    if (!begin_list_ray(&ray, forms, planes, CROPPING_ARGUMENT a, b, has_opaque_depth ? opaque_depth[place] : INFINITY,
+                        depth_origin)) {
+#ifndef SEGMENTS
+        image[place] = NOTHING;
+#endif
         return;
     }
     const float3 start = ray.start;
@@ -68,8 +123,14 @@ __kernel void raycast(
 #define CROSSING_U(i) (((float)(i) + border_i - half_wide - deep.x) * inverse_u)
 #define CROSSING_V(j) (((float)(j) + border_j - half_high - deep.y) * inverse_v)
 
+#if defined(FIRST_HIT)
+    float met = 0.0f; // optical depth
+    float r_hit = r_begin;
+    bool hit = false;
+#elif !defined(SEGMENTS)
     float3 color = (float3)(0.0f);
     float transmittance = 1.0f;
+#endif
     float r = r_begin;
     float z = start.z;
     int passed = 0; // supersegments passed in the list before: the first guess in the next
@@ -155,17 +216,55 @@ __kernel void raycast(
                 if (away ? leaves < z_next : leaves > z_next)
                     to = clamp((leaves - deep.z) * inverse_z, from, r_next);
                 const float4 medium = media[k];
-                const float length_crossed = model_length(ray.scale, from, fma(from, along.z, deep.z), to,
-                                                          fma(to, along.z, deep.z), depth_origin);
+#if defined(SEGMENTS)
+                // The parts of it that are drawn
+                for (int n = 0; n < drawn_parts(&ray); ++n) {
+                    float r_from = from;
+                    float r_to = to;
+                    cut_to_drawn_part(&ray, n, &r_from, &r_to);
+                    if (!(r_from < r_to))
+                        continue;
+                    const float z_from = fma(r_from, along.z, deep.z);
+                    const float z_to = fma(r_to, along.z, deep.z);
+                    const float length_crossed = model_length(ray.scale, r_from, z_from, r_to, z_to, depth_origin);
+                    const float optical_depth = fmin(medium.w * length_crossed, MAX_OPTICAL_DEPTH);
+                    if (!(optical_depth > 0.0f))
+                        continue;
+                    const float begins = fmax(ray_depth(&ray, r_from, z_from, depth_origin) + depth_shift, t_reached);
+                    t_reached = fmax(ray_depth(&ray, r_to, z_to, depth_origin) + depth_shift, begins);
+                    if (slot < capacity) {
+                        __global float *segment = pool + segment_place(band_ray, slot, capacity, 0);
+                        segment[SEGMENT_FROM * RAY_BLOCK] = begins;
+                        segment[SEGMENT_TO * RAY_BLOCK] = t_reached;
+                        segment[SEGMENT_OPTICAL_DEPTH * RAY_BLOCK] = optical_depth;
+                        segment[SEGMENT_COLOR * RAY_BLOCK] = medium.x;
+                        segment[(SEGMENT_COLOR + 1) * RAY_BLOCK] = medium.y;
+                        segment[(SEGMENT_COLOR + 2) * RAY_BLOCK] = medium.z;
+                    }
+                    ++slot;
+                    absorbed += optical_depth;
+                }
+#else
+                const float length_crossed = length_drawn(&ray, from, to, depth_origin);
+#ifdef FIRST_HIT
+                const float tau = medium.w * length_crossed;
+                met = accumulated ? met + tau : tau;
+                hit = met > 0.0f && met >= least_optical_depth;
+                r_hit = first_drawn(&ray, from);
+                if (hit)
+                    break;
+#else
                 const float weight = transmittance * opacity_of(medium.w * length_crossed); // over, front to back
                 color += weight * medium.xyz;
                 transmittance -= weight;
+#endif
+#endif
                 if (!ends_here)
                     break;
                 passed += away ? 1 : -1;
             }
         }
-        if (r_next >= r_end || transmittance < transmittance_cutoff)
+        if (r_next >= r_end || RAY_IS_DONE)
             break;
         r = r_next;
         z = z_next;
@@ -182,5 +281,23 @@ __kernel void raycast(
         enters_tile = (((i ^ last_i) | (j ^ last_j)) >> TILE_SHIFT) != 0;
 #endif
     }
+#if defined(SEGMENTS)
+    ends[stream * rays + band_ray] = slot;
+    if (slot > first_slot) {
+        bool inside = true;
+        for (int corner = 0; corner < 4; ++corner) {
+            float t0 = -INFINITY;
+            float t1 = INFINITY;
+            inside = clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, BOX_PLANES, a + (corner & 1 ? margin : -margin),
+                                    b + (corner & 2 ? margin : -margin), &t0, &t1) && inside;
+        }
+        contributes[stream * rays + band_ray] = inside ? 2 : 1;
+    }
+#elif defined(FIRST_HIT)
+    const float z_hit = fma(r_hit, along.z, deep.z);
+    const float passed_by = model_length(ray.scale, r_begin, start.z, r_hit, z_hit, depth_origin);
+    image[place] = hit ? ray.t_begin + passed_by / model_speed(forms, a, b) : NOTHING;
+#else
     image[place] = (float4)(color, 1.0f - transmittance);
+#endif
 }

@@ -1,9 +1,43 @@
 // Direct volume rendering: the baseline that a VDI is measured against, by the same march as generation.
 //
 // -D VOXEL_T, INDEX_T, RGBA, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
-// -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl
+// -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl; OCCLUSION: see common/occlusion.cl
+// -D CROPPED: see common/cropping.cl
+// -D OPACITY_MULTIPLIER: optical depths are multiplied
 #include "common/march.cl"
+#include "common/cropping.cl"
 #pragma OPENCL FP_CONTRACT OFF
+
+#ifdef OPACITY_MULTIPLIER
+#define MULTIPLIER_PARAMETER float opacity_multiplier,
+#else
+#define MULTIPLIER_PARAMETER
+#endif
+
+#ifdef CROPPED
+// The kept parts of a ray, in t.
+inline Kept kept_march(const March *march, __global const float *form, float a, float b, uint regions)
+{
+    float at_t0[CROPPING_PLANES], at_t1[CROPPING_PLANES];
+    for (int k = 0; k < CROPPING_PLANES; ++k, form += FORM_SIZE) {
+        at_t0[k] = fma(march->t0, form_slope(form, a, b), form_value(form, a, b));
+        at_t1[k] = fma(march->t1, form_slope(form, a, b), form_value(form, a, b));
+    }
+    return kept_parts(at_t0, at_t1, march->t0, march->t1, regions);
+}
+
+// The share of a step that is kept.
+inline float kept_share(const Kept *kept, float front, float back)
+{
+    float sum = 0.0f;
+    for (int n = 0; n < kept->count; ++n) {
+        float from = front, to = back;
+        cut_to_part(kept, n, &from, &to);
+        sum += fmax(to - from, 0.0f);
+    }
+    return sum / (back - front);
+}
+#endif
 
 __kernel void render_volume(
     __global const VOXEL_T *voxels,
@@ -22,6 +56,8 @@ __kernel void render_volume(
     __global const float *opaque_depth,   // t at which each pixel's ray ends, top row first, if has_opaque_depth
     int has_opaque_depth,
     float transmittance_cutoff,           // the ray ends where no more than this is left; negative: never
+    CROPPING_PARAMETER                    // regions that are kept; their planes are forms behind the others
+    MULTIPLIER_PARAMETER
     __global float4 *image)               // premultiplied RGBA, top row first
 {
     const int2 pixel = block_pixel((uint)get_global_id(0), width);
@@ -37,13 +73,22 @@ __kernel void render_volume(
     March march;
     if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, t_end)) {
         const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks SHADING_ARGUMENTS};
+#ifdef CROPPED
+        const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, a, b, regions);
+#endif
         int k = 0;
         while (k < march.steps && transmittance > transmittance_cutoff) {
             const int empty = empty_steps(&march, &medium, k, march.steps, 1);
             k += empty;
             if (empty > 0)
                 continue;
-            const float4 step = step_medium(&march, &medium, step_face(&march, k), step_face(&march, k + 1));
+            float4 step = step_medium(&march, &medium, step_face(&march, k), step_face(&march, k + 1));
+#ifdef CROPPED
+            step.w *= kept_share(&kept, step_face(&march, k), step_face(&march, k + 1));
+#endif
+#ifdef OPACITY_MULTIPLIER
+            step.w *= opacity_multiplier;
+#endif
             const float weight = transmittance * opacity_of(step.w); // over, front to back
             color += weight * step.xyz;
             transmittance -= weight;

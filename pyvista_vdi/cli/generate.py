@@ -14,7 +14,14 @@ from ..io import checked_target
 from ..plotting.progress import DelayedBar
 from ..standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
 from ..volume import Volume
-from .inputs import camera, classification, file_options, has_own_place, read_volume
+from .inputs import (
+    ambient_occlusion,
+    camera,
+    classification,
+    file_options,
+    has_own_place,
+    read_volume,
+)
 from .text import printable
 
 
@@ -24,11 +31,17 @@ def generate(options: argparse.Namespace) -> int:
     file_arguments = file_options(options)
     arguments = classification(options)
     Classification(arguments, "generate")  # refused before the volume is read
+    occlusion = ambient_occlusion(options)
     volume = read_volume(options)
     for name in ("scalars", "preference"):  # the array has been chosen
         arguments.pop(name, None)
     view = generating_view(options, volume)
-    needed = estimate(volume, options.size, max_supersegments=options.max_supersegments)
+    needed = estimate(
+        volume,
+        options.size,
+        max_supersegments=options.max_supersegments,
+        ambient_occlusion=occlusion,
+    )
     print(
         f"{volume.dimensions[0]} x {volume.dimensions[1]} x {volume.dimensions[2]} points, "
         f"{options.size[0]} x {options.size[1]} lists: up to {needed.total / 2**20:.0f} MiB",
@@ -45,6 +58,7 @@ def generate(options: argparse.Namespace) -> int:
             sample_distance=options.sample_distance,
             tolerance=options.tolerance,
             view_cone=options.view_cone,
+            ambient_occlusion=occlusion,
             device=options.device,
             progress=bar,
             **arguments,

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ..ambient_occlusion import AmbientOcclusion
 from ..api import as_volume
 from ..camera import Camera
 from ..errors import InvalidArgumentError
@@ -30,6 +31,11 @@ _CLASSIFICATION = (
     "scalars",
     "preference",
     "interpolation",
+    "shade",
+    "ambient",
+    "diffuse",
+    "specular",
+    "specular_power",
 )
 
 
@@ -71,6 +77,13 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
     return given
 
 
+def ambient_occlusion(options: argparse.Namespace) -> AmbientOcclusion | None:
+    """Return the ambient occlusion that the options ask for, if any."""
+    values = {n: getattr(options, f"occlusion_{n}") for n in ("radius", "strength")}
+    given = {n: value for n, value in values.items() if value is not None}
+    return AmbientOcclusion(**given) if options.ambient_occlusion or given else None
+
+
 def camera(options: argparse.Namespace, default: Camera) -> Camera:
     """Return the view that the camera options make of a default."""
     view = default
@@ -98,9 +111,8 @@ def given_camera(options: argparse.Namespace) -> Camera | None:
 
 def file_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments of ``VDI.save`` that the options stand for; refused now, not later."""
-    given: dict[str, Any] = {"level": options.level}
-    if options.compression is not None:
-        given["compression"] = options.compression
+    names = ("compression", "level")
+    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if options.standard_channels:
         given["exact"] = False
     check_write_options(options.output, given)

@@ -16,8 +16,8 @@ from ..standard_cases import ANGLES, ELEVATION, TRANSFER_FUNCTIONS, WINDOW_SIZE
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
 
-_VDI_FILE = "a .vdi file, or an .exr deep image"
-_VDI_TARGET = ".vdi or .exr to write"
+_VDI_FILE = "a .vdi file, an .exr deep image, or a VDI as .vti"
+_VDI_TARGET = ".vdi, .exr or .vti to write"
 
 
 class UsageError(Exception):
@@ -125,6 +125,7 @@ def _add_generate(parser: argparse.ArgumentParser) -> None:
     _add_size(parser, WINDOW_SIZE)
     _add_camera(parser, f"the view that the volume fills, {ELEVATION:g} degrees above its middle")
     _add_classification(parser)
+    _add_occlusion(parser)
     _add_limits(parser)
     _add_file(parser)
     _add_device(parser)
@@ -148,14 +149,29 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_paraview(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--environment",
+        action="store_true",
+        help="print, for a shell's eval, the variables that make ParaView find this package and "
+        "load the plugin",
+    )
+
+
 def _add_file(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("file")
     group.add_argument(
         "--compression",
-        choices=("zstd", "lz4", "zips", "none"),
-        help="of .vdi: zstd (default), lz4 or none; of .exr: zips (default) or none",
+        choices=("lz4", "zstd", "zips", "zlib", "lzma", "none"),
+        help="of .vdi: lz4 (default), zstd or none; of .exr: zips (default) or none; of .vti: lz4 "
+        "(default), zlib, lzma or none",
     )
-    group.add_argument("--level", type=int, default=1, help="1 (fast, default) to 9 (small)")
+    group.add_argument(
+        "--level",
+        type=int,
+        metavar="N",
+        help="1 (fast) to 9 (small); by default 9 for lz4 and 1 for the others",
+    )
     group.add_argument(
         "--standard-channels",
         action="store_true",
@@ -164,7 +180,13 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_render(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help=_VDI_FILE)
+    parser.add_argument(
+        "files",
+        nargs="+",
+        metavar="FILE",
+        help=f"{_VDI_FILE}; several are merged by depth, each where it was generated, and the "
+        "view and the size are those of the first unless they are given",
+    )
     parser.add_argument("-o", "--output", metavar="FILE", required=True, help=".png to write")
     _add_size(parser, None)
     parser.add_argument(
@@ -253,7 +275,7 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "info": (
         "files",
-        "say what a .vdi or .exr file holds",
+        "say what a .vdi, .exr or .vti file holds",
         "pyvista-vdi info knee.vdi --json",
         _add_info,
     ),
@@ -265,9 +287,15 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "convert": (
         "files",
-        "write a VDI in another format: .vdi or OpenEXR deep image",
+        "write a VDI in another format: .vdi, OpenEXR deep image or VTK's .vti",
         "pyvista-vdi convert knee.vdi -o knee.exr",
         _add_convert,
+    ),
+    "paraview": (
+        "paraview",
+        "print the path of the plugin for ParaView",
+        "pyvista-vdi paraview --environment",
+        _add_paraview,
     ),
 }
 
@@ -337,12 +365,33 @@ def _add_classification(parser: argparse.ArgumentParser, *, tables: bool = True)
     group.add_argument("--scalars", metavar="NAME", help="which array")
     group.add_argument("--preference", choices=("point", "cell"))
     group.add_argument("--interpolation", choices=("nearest", "linear"))
+    group.add_argument("--shade", action="store_true", default=None, help="lit by a headlight")
+    for name in ("--ambient", "--diffuse", "--specular", "--specular-power"):
+        group.add_argument(name, type=float, metavar="X", help="of a shaded volume")
     if tables:
         group.add_argument(
             "--transfer-function",
             metavar="FILE",
             help="TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista",
         )
+
+
+def _add_occlusion(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("ambient occlusion", "Either option below turns it on, too.")
+    group.add_argument(
+        "--ambient-occlusion",
+        action="store_true",
+        help="darken what is hidden from the light around it",
+    )
+    group.add_argument(
+        "--occlusion-radius",
+        type=float,
+        metavar="LENGTH",
+        help="how far something hides, model units (default: 0.05 of the bounds' diagonal)",
+    )
+    group.add_argument(
+        "--occlusion-strength", type=float, metavar="S", help="0 to 1 (default: 0.1; 1 is darkest)"
+    )
 
 
 def _add_limits(parser: argparse.ArgumentParser) -> None:

@@ -14,9 +14,19 @@ from .text import printable
 def render(options: argparse.Namespace) -> int:
     """Render a VDI from a new view and write the picture."""
     target = checked_png_target(options.output)
-    vdi = read(options.file)
-    view = camera(options, vdi.camera)
-    image = render_vdi(vdi, view, options.size, device=options.device)
+    vdis = [read(file) for file in options.files]
+    first = vdis[0]
+    view = camera(options, first.camera)
+    if len(vdis) == 1:
+        image = render_vdi(first, view, options.size, device=options.device)
+    else:
+        image = render_vdi(
+            vdis,
+            view,
+            options.size or first.window_size,
+            model_transforms=[vdi.camera.model_transform for vdi in vdis],
+            device=options.device,
+        )
     write_png(to_bytes(image, options.background), target)
     print(f"{printable(options.output)}: {image.shape[1]} x {image.shape[0]}")
     return 0

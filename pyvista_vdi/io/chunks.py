@@ -1,26 +1,29 @@
 """Arrays as sequences of independently compressed chunks (Blosc, by numcodecs).
 
-Chunks bound the memory that writing and reading take beside the arrays, and are what runs in
-parallel. Blosc shuffles bytes before it compresses: exponents, which hardly change, come to lie
-beside each other.
+Chunks bound the memory that writing takes beside the arrays, and are what runs in parallel. Blosc
+shuffles bytes before it compresses: exponents, which hardly change, come to lie beside each other.
 """
 
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from os import cpu_count
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-#: Rows of an array in one chunk: 1 to 3 MiB, so that a VDI of 1280 x 720 makes some dozens.
-CHUNK_ROWS = 1 << 18
+from .layout import Layout
 
 #: Compressors of Blosc that files may name.
-CODECS = ("zstd", "lz4")
+CODECS = ("lz4", "zstd")
+
+#: Level of each that is taken where none is asked for. LZ4 is fast at its highest; Zstandard's
+#: higher levels take several times as long for a few percent.
+DEFAULT_LEVELS = {"lz4": 9, "zstd": 1, "none": 1}
 
 #: Most bytes that one compressed byte can stand for. Zstandard's best is a block of 128 KiB from
 #: 4 bytes (RFC 8878, section 3.1.1.2); LZ4 stays below 255.
@@ -38,123 +41,183 @@ class DamagedChunkError(Exception):
 
 
 def write_chunks(
-    stream: Any, n_rows: int, codec: str, level: int, encoded: Callable[[int, int], NDArray[Any]]
-) -> None:
+    stream: Any,
+    layout: Layout,
+    codec: str,
+    level: int,
+    encoded: Callable[[int, int], NDArray[Any]],
+) -> list[tuple[int, int]]:
     """Compress an array chunk by chunk and write it.
 
     Parameters
     ----------
     stream : file-like
         Where the chunks go, one behind the other.
-    n_rows : int
-        Length of the array.
+    layout : Layout
+        Length of the array and of its chunks.
     codec : str
         One of :data:`CODECS`, or ``"none"`` for the bare bytes.
     level : int
         Effort of the compressor, 1 to 9.
     encoded : callable
         ``encoded(first, last)`` gives those rows as they are stored: little-endian, contiguous.
+
+    Returns
+    -------
+    list of (int, int)
+        Bytes of each chunk, and their CRC-32.
     """
 
-    def compressed(first: int) -> bytes:
-        rows = encoded(first, min(first + CHUNK_ROWS, n_rows))
+    def compressed(first: int) -> tuple[bytes, int]:
+        rows = encoded(first, min(first + layout.chunk_rows, layout.n_rows))
         if codec == "none":
-            return rows.tobytes()
-        from numcodecs import blosc
-
-        return bytes(blosc.compress(rows.reshape(-1), codec.encode(), level, blosc.SHUFFLE, 0))
-
-    # Always in worker threads: there numcodecs lets each call compress with one thread, so that
-    # the bytes do not depend on which of Blosc's own threads finishes first.
-    n_threads = _n_threads()
-    with ThreadPoolExecutor(n_threads) as pool:
-        firsts = range(0, n_rows, CHUNK_ROWS)
-        for start in range(0, len(firsts), 2 * n_threads):
-            for chunk in pool.map(compressed, firsts[start : start + 2 * n_threads]):
-                stream.write(chunk)
-
-
-def read_chunks(
-    data: bytes,
-    codec: str,
-    out: NDArray[Any],
-    finish: Callable[[int, int], None] | None = None,
-) -> None:
-    """Decompress an array chunk by chunk.
-
-    Parameters
-    ----------
-    data : bytes
-        What :func:`write_chunks` wrote; :func:`check_chunks` has passed on it.
-    codec : str
-        As written.
-    out : numpy.ndarray
-        Takes the rows as they were stored; contiguous, little-endian.
-    finish : callable, optional
-        ``finish(first, last)`` is called when those rows are there, from several threads.
-
-    Raises
-    ------
-    DamagedChunkError
-        If a chunk does not decompress.
-    """
-    view = memoryview(data)
-
-    def decompress(chunk: tuple[int, int, int, int]) -> None:
-        first, last, begin, end = chunk
-        rows = out[first:last].reshape(-1)
-        if codec == "none":
-            rows[:] = np.frombuffer(view[begin:end], dtype=out.dtype)
+            chunk = rows.tobytes()
         else:
             from numcodecs import blosc
 
-            try:
-                blosc.decompress(view[begin:end], rows)
-            except (RuntimeError, ValueError) as error:
-                raise DamagedChunkError(f"rows {first} to {last - 1} do not decompress") from error
-        if finish is not None:
-            finish(first, last)
+            chunk = blosc.compress(rows.reshape(-1), codec.encode(), level, blosc.SHUFFLE, 0)
+        return chunk, zlib.crc32(chunk)
 
-    chunks = list(_located(view, len(out), out.itemsize * _items(out), codec))
-    with ThreadPoolExecutor(_n_threads()) as pool:
-        for _ in pool.map(decompress, chunks):
-            pass
+    # Always in worker threads: there numcodecs lets each call compress with one thread, so that
+    # the bytes do not depend on which of Blosc's own threads finishes first.
+    with workers() as pool:
+        index: list[tuple[int, int]] = []
+        firsts, ahead = range(0, layout.n_rows, layout.chunk_rows), 4 * _n_threads()
+        for start in range(0, len(firsts), ahead):
+            for chunk, checksum in pool.map(compressed, firsts[start : start + ahead]):
+                stream.write(chunk)
+                index.append((len(chunk), checksum))
+    return index
 
 
-def check_chunks(data: bytes, n_rows: int, row_bytes: int, codec: str) -> None:
-    """Check that the chunks are as many, as long and as large as an array of that size needs.
+class PackedArray:
+    """An array as it lies in a file; its chunks are known, and nothing is allocated for it.
 
-    Reads the chunks' headers only and allocates nothing, so that what is allocated afterwards is
-    bounded by what the file really holds.
+    So what is allocated afterwards is bounded by what the file really holds.
+
+    Parameters
+    ----------
+    name : str
+        Of the array, for errors.
+    layout : Layout
+        What the array must be.
+    codec : str
+        As written.
+    sizes : array_like of int
+        Bytes of each chunk.
+    n_bytes : int
+        What the sizes must add up to.
+    fetch : callable
+        ``fetch(k, begin, end)`` gives the bytes of chunk k, which lie there among the array's;
+        it raises DamagedChunkError where they are not what was written.
 
     Raises
     ------
     DamagedChunkError
-        If they are not.
+        If the chunks are not as many and as long as such an array needs.
     """
-    for _ in _located(memoryview(data), n_rows, row_bytes, codec):
-        pass
+
+    def __init__(
+        self,
+        name: str,
+        layout: Layout,
+        codec: str,
+        sizes: ArrayLike,
+        n_bytes: int,
+        fetch: Callable[[int, int, int], Any],
+    ) -> None:
+        self.layout = layout
+        self._name = name
+        self._codec = codec
+        self._fetch = fetch
+        bytes_of = np.asarray(sizes, dtype=np.int64)
+        if len(bytes_of) != layout.n_chunks:
+            raise self._damaged(f"{len(bytes_of)} chunks where {layout.n_chunks} belong")
+        raw = np.full(layout.n_chunks, layout.chunk_rows * layout.row_bytes)
+        raw[-1:] -= (-layout.n_rows % layout.chunk_rows) * layout.row_bytes
+        if codec == "none":
+            possible = bytes_of == raw
+        else:
+            possible = (bytes_of > _HEADER.size) & (raw <= bytes_of * MAX_RATIO)
+        if not possible.all():
+            k = int(np.argmin(possible))
+            raise self._damaged(f"{bytes_of[k]} bytes cannot hold the {raw[k]} of chunk {k}")
+        self._ends = np.concatenate([[0], np.cumsum(bytes_of)]).tolist()
+        if self._ends[-1] != n_bytes:
+            raise self._damaged(f"its chunks have {self._ends[-1]} bytes, but {n_bytes} are there")
+
+    def ranges(self) -> Iterator[tuple[int, int]]:
+        """Yield the first row of each chunk and the one behind its last."""
+        layout = self.layout
+        for first in range(0, layout.n_rows, layout.chunk_rows):
+            yield first, min(first + layout.chunk_rows, layout.n_rows)
+
+    def read(self, first: int, out: NDArray[Any]) -> None:
+        """Decompress the chunk that begins with row ``first``.
+
+        Parameters
+        ----------
+        first : int
+            As :meth:`ranges` says.
+        out : numpy.ndarray
+            Takes the chunk's rows as they were stored; contiguous.
+
+        Raises
+        ------
+        DamagedChunkError
+            If the chunk is not what was written, or does not decompress.
+        """
+        k, rows = first // self.layout.chunk_rows, out.reshape(-1)
+        try:
+            chunk = self._fetch(k, self._ends[k], self._ends[k + 1])
+            if self._codec == "none":
+                rows.view(np.uint8)[:] = np.frombuffer(chunk, np.uint8)
+                return
+            if chunk_size(chunk, rows.nbytes, self._codec) != len(chunk):
+                raise DamagedChunkError(f"chunk {k} has another length than it says")
+            from numcodecs import blosc
+
+            blosc.decompress(chunk, rows)
+        except (DamagedChunkError, RuntimeError, ValueError) as error:
+            why = f"rows {first} to {first + len(out) - 1} do not decompress"
+            known = isinstance(error, DamagedChunkError)
+            raise self._damaged(str(error) if known else why) from error
+
+    def _damaged(self, why: str) -> DamagedChunkError:
+        return DamagedChunkError(f"array {self._name!r}: {why}")
 
 
-def _located(
-    view: memoryview, n_rows: int, row_bytes: int, codec: str
-) -> Iterator[tuple[int, int, int, int]]:
-    """Yield first row, last row, first byte and last byte of each chunk (last: one beyond)."""
-    begin = 0
-    for first in range(0, n_rows, CHUNK_ROWS):
-        last = min(first + CHUNK_ROWS, n_rows)
-        raw = (last - first) * row_bytes
-        size = raw if codec == "none" else _chunk_size(view[begin:], raw, codec)
-        if begin + size > len(view):
-            raise DamagedChunkError(f"the data end before row {last} of {n_rows}")
-        yield first, last, begin, begin + size
-        begin += size
-    if begin != len(view):
-        raise DamagedChunkError(f"{len(view) - begin} bytes follow the last of {n_rows} rows")
+def workers() -> ThreadPoolExecutor:
+    """Return threads for work on chunks; in them Blosc starts none of its own."""
+    return ThreadPoolExecutor(_n_threads())
 
 
-def _chunk_size(view: memoryview, raw: int, codec: str) -> int:
-    """Return the bytes of the compressed chunk that begins here, its header checked."""
+def chunk_sizes(data: bytes, layout: Layout, codec: str) -> list[int]:
+    """Return the bytes of each chunk of an array that says so only in the chunks' own headers.
+
+    Raises
+    ------
+    DamagedChunkError
+        If the headers are not those of such an array.
+    """
+    view, sizes, begin = memoryview(data), [], 0
+    for first in range(0, layout.n_rows, layout.chunk_rows):
+        raw = min(layout.chunk_rows, layout.n_rows - first) * layout.row_bytes
+        sizes.append(raw if codec == "none" else chunk_size(view[begin:], raw, codec))
+        begin += sizes[-1]
+        if begin > len(view):
+            raise DamagedChunkError(f"the data end before row {first + layout.chunk_rows}")
+    return sizes
+
+
+def chunk_size(view: memoryview, raw: int, codec: str) -> int:
+    """Return the bytes of the compressed chunk that begins here, its header checked.
+
+    Raises
+    ------
+    DamagedChunkError
+        If it is not the header of ``raw`` bytes compressed by that codec.
+    """
     if len(view) < _HEADER.size:
         raise DamagedChunkError("the data end before the last chunk")
     version, _, flags, _, n_bytes, block_bytes, chunk_bytes = _HEADER.unpack_from(view)
@@ -170,11 +233,6 @@ def _chunk_size(view: memoryview, raw: int, codec: str) -> int:
     if raw > chunk_bytes * MAX_RATIO:
         raise DamagedChunkError(f"{chunk_bytes} bytes cannot hold the {raw} that they declare")
     return int(chunk_bytes)
-
-
-def _items(array: NDArray[Any]) -> int:
-    """Return how many elements a row has."""
-    return int(np.prod(array.shape[1:], dtype=np.int64))
 
 
 def _n_threads() -> int:

@@ -10,14 +10,14 @@ import numpy as np
 from .._version import __version__
 from ..errors import VDIFileError
 from ..vdi import VDI
-from .layout import FORMAT_NAME, FORMAT_VERSION, MAX_DESCRIPTION_BYTES
+from .layout import FORMAT_NAME, MAX_DESCRIPTION_BYTES
 
 
-def describe(vdi: VDI) -> dict[str, Any]:
-    """Return the entries that all formats share, in their order."""
+def describe(vdi: VDI, version: int) -> dict[str, Any]:
+    """Return the entries that all formats share, in their order; ``version`` is the format's."""
     return {
         "format": FORMAT_NAME,
-        "version": FORMAT_VERSION,
+        "version": version,
         "written_by": f"pyvista-vdi {__version__}",
         "window_size": list(vdi.window_size),
         "n_supersegments": vdi.n_supersegments,

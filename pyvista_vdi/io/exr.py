@@ -25,7 +25,7 @@ from .description import describe, from_json, number, to_json
 from .exr_layout import DeepImage, OtherFormError, matrix_attribute, read_image, write_image
 from .exr_samples import agrees, media
 from .exr_view import bounds_of_lists, camera_from_matrices, view_matrices
-from .layout import FORMAT_NAME, FORMAT_VERSION
+from .layout import FORMAT_NAME
 from .reader import FileInfo
 from .whole_file import whole_file
 
@@ -34,6 +34,9 @@ SUFFIX = ".exr"
 
 #: The header's attribute that holds the description in JSON.
 DESCRIPTION_ATTRIBUTE = "pyvistaVDI"
+
+#: Version of that description and of our own channels; of this and of lower ones is read.
+IMAGE_VERSION = 1
 
 #: How samples may be compressed when they are written.
 COMPRESSIONS = ("zips", "none")
@@ -167,7 +170,7 @@ def _attributes(vdi: VDI, offset: float, exact: bool) -> dict[str, tuple[str, by
     to_camera, to_ndc = view_matrices(vdi.camera, vdi.window_size, offset - vdi.depth_origin)
     half = vdi.camera.half_extent(vdi.window_size)
     center = [c * h for c, h in zip(vdi.camera.window_center, half, strict=True)]
-    description = {**describe(vdi), "depth_offset": offset, "exact": exact}
+    description = {**describe(vdi, IMAGE_VERSION), "depth_offset": offset, "exact": exact}
     return {
         DESCRIPTION_ATTRIBUTE: ("string", to_json(description).encode("ascii")),
         "screenWindowCenter": ("v2f", struct.pack("<2f", *center)),
@@ -317,10 +320,10 @@ class _File:
             entries = from_json(text)
             if entries["format"] != FORMAT_NAME or isinstance(entries["version"], bool):
                 raise ValueError("it does not name the format")
-            if not 1 <= entries["version"] <= FORMAT_VERSION:
+            if not 1 <= entries["version"] <= IMAGE_VERSION:
                 raise VDIFileError(
                     f"{self._path} is of format version {entries['version']}; this release reads "
-                    f"up to version {FORMAT_VERSION}: upgrade by pip install -U pyvista-vdi"
+                    f"up to version {IMAGE_VERSION}: upgrade by pip install -U pyvista-vdi"
                 )
             width, height = entries["window_size"]
             if not isinstance(entries["metadata"], dict):

@@ -1,4 +1,4 @@
-"""The format of a file follows from its name: ``.vdi`` or ``.exr``."""
+"""The format of a file follows from its name: ``.vdi``, ``.exr`` or, by VTK, ``.vti``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import InvalidArgumentError, VDIFileError
+from ..errors import InvalidArgumentError, MissingDependencyError, VDIFileError
 from ..vdi import VDI
 from . import exr, layout, reader, writer
 from .chunks import CODECS
@@ -15,11 +15,14 @@ from .reader import FileInfo
 from .whole_file import check_writable, with_suffix
 
 #: What the name of a file may end in; the first is our own format.
-SUFFIXES = (layout.SUFFIX, exr.SUFFIX)
+VTI_SUFFIX = ".vti"
+SUFFIXES = (layout.SUFFIX, exr.SUFFIX, VTI_SUFFIX)
+
+_VTI_COMPRESSIONS = ("lz4", "zlib", "lzma", "none")
 
 
 def write(vdi: VDI, path: str | os.PathLike[str], **options: Any) -> Path:
-    """Write a VDI to a file, as ``.vdi`` or as an OpenEXR deep image.
+    """Write a VDI to a file, as ``.vdi``, as an OpenEXR deep image or as VTK's image.
 
     The file appears whole or not at all: it is written under a temporary name in the same folder
     and moved into place, and what was there before stays until then.
@@ -29,10 +32,11 @@ def write(vdi: VDI, path: str | os.PathLike[str], **options: Any) -> Path:
     vdi : VDI
         What to write.
     path : path-like
-        The target; its name ends in ``.vdi`` or ``.exr``.
+        The target; its name ends in ``.vdi``, ``.exr`` or ``.vti``.
     **options
-        ``compression`` and ``level`` for both; ``exact`` for ``.exr``. See
-        :func:`pyvista_vdi.io.writer.write` and :func:`pyvista_vdi.io.exr.write`.
+        ``compression`` and ``level`` for all; ``exact`` for ``.exr``. See
+        :func:`pyvista_vdi.io.writer.write`, :func:`pyvista_vdi.io.exr.write` and
+        :func:`pyvista_vdi.vtk_pipeline.vti.write`.
 
     Returns
     -------
@@ -45,6 +49,8 @@ def write(vdi: VDI, path: str | os.PathLike[str], **options: Any) -> Path:
         If the target cannot be written, or the metadata hold what JSON cannot.
     InvalidArgumentError
         If an option is unknown or out of its range.
+    MissingDependencyError
+        If VTK is not installed and the name ends in ``.vti``.
 
     See Also
     --------
@@ -54,16 +60,18 @@ def write(vdi: VDI, path: str | os.PathLike[str], **options: Any) -> Path:
     check_write_options(target, options)
     if _is_exr(target):
         return exr.write(vdi, target, **options)
+    if _is_vti(target):
+        return _vti().write(vdi, target, **options)  # type: ignore[no-any-return]
     return writer.write(vdi, target, **options)
 
 
 def read(path: str | os.PathLike[str], **options: Any) -> VDI:
-    """Read a VDI from a ``.vdi`` file or an OpenEXR deep image.
+    """Read a VDI from a ``.vdi`` file, an OpenEXR deep image or VTK's image file.
 
     Parameters
     ----------
     path : path-like
-        The file; a name that ends in ``.exr`` makes it an OpenEXR file.
+        The file; a name that ends in ``.exr`` makes it an OpenEXR file, ``.vti`` one of VTK.
     **options
         ``camera`` and ``thickness`` for ``.exr``: see :func:`pyvista_vdi.io.exr.read`.
 
@@ -79,12 +87,14 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
         says which and what can be done.
     InvalidArgumentError
         If an option is unknown.
+    MissingDependencyError
+        If VTK is not installed and the name ends in ``.vti``.
     """
     if _is_exr(path):
         _check_names("read", path, options, ("camera", "thickness"))
         return exr.read(path, **options)
     _check_names("read", path, options, ())
-    return reader.read(path)
+    return _vti().read(path) if _is_vti(path) else reader.read(path)
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:
@@ -93,7 +103,7 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
     Parameters
     ----------
     path : path-like
-        A ``.vdi`` or ``.exr`` file.
+        A ``.vdi``, ``.exr`` or ``.vti`` file.
 
     Returns
     -------
@@ -105,6 +115,8 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
     VDIFileError
         As for :func:`read`, except that damaged arrays of a ``.vdi`` file are not noticed.
     """
+    if _is_vti(path):
+        return _vti().read_info(path)  # type: ignore[no-any-return]
     return exr.read_info(path) if _is_exr(path) else reader.read_info(path)
 
 
@@ -139,6 +151,8 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
     compressions: tuple[str, ...] = (*CODECS, "none")
     if _is_exr(path):
         names, compressions = (*names, "exact"), exr.COMPRESSIONS
+    elif _is_vti(path):
+        compressions = _VTI_COMPRESSIONS
     _check_names("written", path, options, names)
     compression, level = options.get("compression", compressions[0]), options.get("level", 1)
     if compression not in compressions:
@@ -152,6 +166,22 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
 
 def _is_exr(path: Any) -> bool:
     return str(path).lower().endswith(exr.SUFFIX)
+
+
+def _is_vti(path: Any) -> bool:
+    return str(path).lower().endswith(VTI_SUFFIX)
+
+
+def _vti() -> Any:
+    """Return the module that has VTK write and read."""
+    try:
+        from ..vtk_pipeline import vti
+    except ImportError as error:
+        raise MissingDependencyError(
+            f".vti files need VTK, which cannot be loaded ({error}): install it by "
+            'pip install "pyvista-vdi[plot]", or use .vdi files'
+        ) from error
+    return vti
 
 
 def _check_names(what: str, path: Any, options: Mapping[str, Any], known: tuple[str, ...]) -> None:

@@ -14,7 +14,11 @@ from typing import Any
 import numpy as np
 
 #: Version of the format that is written; files of this and of lower versions are read.
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+
+#: Rows of an array in one chunk, for each version. What one chunk holds of all arrays, 1.5 MiB,
+#: stays in a core's cache until it has been decoded; larger chunks do not compress better.
+CHUNK_ROWS = {1: 1 << 18, 2: 1 << 16}
 
 #: What a description calls the format.
 FORMAT_NAME = "pyvista-vdi"
@@ -24,6 +28,11 @@ SUFFIX = ".vdi"
 
 #: The archive's first member.
 DESCRIPTION = "vdi.json"
+
+#: The archive's last member, since version 2: bytes and CRC-32 of every chunk, in the order of
+#: the arrays. A chunk is found, read and checked by itself.
+INDEX = "chunks"
+INDEX_DTYPE = np.dtype([("bytes", "<u4"), ("crc32", "<u4")])
 
 #: No description is longer: the longest metadata are a transfer function's table.
 MAX_DESCRIPTION_BYTES = 1 << 26
@@ -43,17 +52,25 @@ class Layout:
         Number of rows.
     filter : {"none", "difference"}
         What was done to the rows before they were compressed.
+    chunk_rows : int
+        Rows that are compressed together.
     """
 
     dtype: np.dtype[Any]
     row_shape: tuple[int, ...]
     n_rows: int
     filter: str
+    chunk_rows: int
 
     @property
     def row_bytes(self) -> int:
         """Bytes of one row."""
         return self.dtype.itemsize * int(np.prod(self.row_shape, dtype=np.int64))
+
+    @property
+    def n_chunks(self) -> int:
+        """Number of chunks."""
+        return -(-self.n_rows // self.chunk_rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what the description says about the array."""
@@ -65,7 +82,12 @@ class Layout:
 
 
 def layouts(
-    window_size: tuple[int, int], n: int, counts: np.dtype[Any], *, filtered: bool
+    window_size: tuple[int, int],
+    n: int,
+    counts: np.dtype[Any],
+    *,
+    filtered: bool,
+    version: int = FORMAT_VERSION,
 ) -> dict[str, Layout]:
     """Return the arrays of a file, in their order.
 
@@ -79,12 +101,19 @@ def layouts(
         Type of the lists' lengths, as small as they allow.
     filtered : bool
         Whether depths are stored as differences.
+    version : int
+        Of the format. In version 1 front and back were one array.
     """
-    f4, u4 = np.dtype("<f4"), np.dtype("<u4")
-    depth = Layout(u4, (2,), n, "difference") if filtered else Layout(f4, (2,), n, "none")
+    f4, kind = np.dtype("<f4"), "difference" if filtered else "none"
+    depth = np.dtype("<u4") if filtered else f4
+    rows = CHUNK_ROWS[version]
+    depths = {
+        1: {"depth": Layout(depth, (2,), n, kind, rows)},
+        2: {name: Layout(depth, (), n, kind, rows) for name in ("front", "back")},
+    }
     return {
-        "counts": Layout(counts, (), window_size[0] * window_size[1], "none"),
-        "depth": depth,
-        "color": Layout(f4, (3,), n, "none"),
-        "optical_depth": Layout(f4, (), n, "none"),
+        "counts": Layout(counts, (), window_size[0] * window_size[1], "none", rows),
+        **depths[version],
+        "color": Layout(f4, (3,), n, "none", rows),
+        "optical_depth": Layout(f4, (), n, "none", rows),
     }

@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 import struct
 import zipfile
-from collections.abc import Callable
+import zlib
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from threading import Lock
 from typing import Any, NoReturn
 
 import numpy as np
@@ -16,14 +19,17 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..camera import Camera, check_window_size
-from ..errors import VDIError, VDIFileError
+from ..errors import InvalidVDIError, VDIError, VDIFileError
 from ..vdi import VDI
-from .chunks import CHUNK_ROWS, CODECS, DamagedChunkError, check_chunks, read_chunks
+from .chunks import CODECS, DamagedChunkError, PackedArray, chunk_sizes, workers
 from .description import from_json, number
 from .layout import (
+    CHUNK_ROWS,
     DESCRIPTION,
     FORMAT_NAME,
     FORMAT_VERSION,
+    INDEX,
+    INDEX_DTYPE,
     MAX_DESCRIPTION_BYTES,
     Layout,
     layouts,
@@ -32,6 +38,9 @@ from .layout import (
 #: The first bytes: a ZIP member's local header, whose name stands at byte 30.
 _SIGNATURE = b"PK\x03\x04"
 _NAME_AT = 30
+
+#: A local header: signature, and at its end the bytes of the name and of extra fields behind it.
+_LOCAL_HEADER = struct.Struct("<4s22xHH")
 
 #: What zipfile raises, beside its own error, for archives that are not well formed.
 _ARCHIVE_ERRORS = (
@@ -171,23 +180,27 @@ class _OpenFile:
 
     def vdi(self) -> VDI:
         """Return the VDI with its arrays, all checked."""
-        info, offsets = self.info, self._read_offsets()
-        front, back = self._read_depth()
-        color, optical_depth = self._read_array("color"), self._read_array("optical_depth")
+        info = self.info
         try:
+            packed = self._packed()
+            with workers() as pool:
+                counts = pool.submit(self._decoded_counts, packed.pop("counts"))
+                media = self._decoded_media(packed, pool)
+                offsets = counts.result()
             return VDI(
                 info.camera,
                 info.window_size,
                 offsets,
-                front,
-                back,
-                color,
-                optical_depth,
-                info.bounds,
+                **media,
+                bounds=info.bounds,
                 depth_origin=info.depth_origin,
                 metadata=info.metadata,
             )
-        except VDIError as error:
+        except DamagedChunkError as error:
+            self._refuse(str(error))
+        except OSError as error:
+            raise VDIFileError(f"{self._path} cannot be read: {error.strerror}") from error
+        except InvalidVDIError as error:
             self._refuse(f"it holds no valid VDI: {error}")
 
     # -- archive and description -----------------------------------------------------------------
@@ -249,8 +262,9 @@ class _OpenFile:
                 self._refuse("its metadata or codec are of the wrong kind")
             if d["codec"] not in (*CODECS, "none"):
                 self._refuse(f"its codec {d['codec']!r} is unknown")
-            if d["chunk_rows"] != CHUNK_ROWS:
-                self._refuse(f"chunk_rows is {d['chunk_rows']!r}, not {CHUNK_ROWS}")
+            rows = CHUNK_ROWS[d["version"]]
+            if d["chunk_rows"] != rows:
+                self._refuse(f"chunk_rows is {d['chunk_rows']!r}, not {rows}")
             n_lists = window_size[0] * window_size[1]
             return FileInfo(
                 path=self._path,
@@ -283,7 +297,11 @@ class _OpenFile:
         if counts.str not in ("|u1", "<u2", "<u4", "<u8"):
             self._refuse(f"counts of type {counts} are unknown")
         wanted = layouts(
-            info.window_size, info.n_supersegments, counts, filtered=info.codec != "none"
+            info.window_size,
+            info.n_supersegments,
+            counts,
+            filtered=info.codec != "none",
+            version=info.format_version,
         )
         for name, layout in wanted.items():
             if arrays.get(name) != layout.to_dict():
@@ -296,46 +314,97 @@ class _OpenFile:
 
     # -- arrays ----------------------------------------------------------------------------------
 
-    def _read_offsets(self) -> NDArray[np.uint64]:
-        n, stored = self.info.n_supersegments, self._read_array("counts")
-        # No count above n, and no sum beyond float64's whole numbers: the sum below cannot wrap
-        if int(stored.max(initial=0)) > n or float(stored.sum(dtype=np.float64)) != n:
+    def _decoded_counts(self, packed: PackedArray) -> NDArray[np.uint64]:
+        """Return the offsets that the lists' lengths add up to."""
+        n, counts = self.info.n_supersegments, np.empty(packed.layout.n_rows, packed.layout.dtype)
+        for first, last in packed.ranges():
+            packed.read(first, counts[first:last])
+        offsets = np.zeros(len(counts) + 1, np.uint64)
+        np.cumsum(counts, out=offsets[1:])
+        # Where no count is above n, a sum that wraps falls, which no VDI's offsets may
+        if int(counts.max(initial=0)) > n or offsets[-1] != n:
             self._refuse(f"its lists do not hold {n} supersegments")
-        offsets = np.zeros(len(stored) + 1, np.uint64)
-        np.cumsum(stored, out=offsets[1:])
         return offsets
 
-    def _read_depth(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        layout = self._layouts["depth"]
-        front, back = (np.empty(layout.n_rows, np.float32) for _ in range(2))
+    def _decoded_media(
+        self, packed: dict[str, PackedArray], pool: ThreadPoolExecutor
+    ) -> dict[str, NDArray[Any]]:
+        """Return front, back, color and optical depth, each decompressed where it will stay."""
+        n = self.info.n_supersegments
+        names, shapes = ("front", "back", "color", "optical_depth"), {"color": (n, 3)}
+        media = {name: np.empty(shapes.get(name, n), "<f4") for name in names}
+        decode_depths = _DEPTHS[self.info.format_version]
 
-        def split(stored: NDArray[Any], first: int, last: int) -> None:
-            rows = stored[first:last]
-            if layout.filter == "difference":
-                bits = np.cumsum(rows.reshape(-1), dtype=np.uint32)
-                rows = bits.view(np.float32).reshape(-1, 2)
-            front[first:last] = rows[:, 0]
-            back[first:last] = rows[:, 1]
+        def decode(first: int, last: int) -> None:
+            rows = {name: array[first:last] for name, array in media.items()}
+            decode_depths(packed, first, rows["front"], rows["back"])
+            for name in ("color", "optical_depth"):
+                packed[name].read(first, rows[name])
 
-        self._read_array("depth", split)
-        return front, back
+        for _ in pool.map(lambda rows: decode(*rows), packed["optical_depth"].ranges()):
+            pass  # raises what went wrong
+        return media
 
-    def _read_array(
-        self, name: str, finish: Callable[[NDArray[Any], int, int], None] | None = None
-    ) -> NDArray[Any]:
-        """Return an array as it is stored, its chunks checked before it is allocated."""
+    def _packed(self) -> dict[str, PackedArray]:
+        """Return the arrays as the file holds them, their chunks known and possible."""
+        if self.info.format_version == 1:
+            return {name: self._packed_whole(name) for name in self._layouts}
+        return self._packed_in_place()
+
+    def _packed_whole(self, name: str) -> PackedArray:
+        """Return an array of version 1, whose member is read and checked as a whole."""
         layout, codec = self._layouts[name], self.info.codec
         data = self._read_member(name, self.info.file_bytes)
+        view = memoryview(data)
         try:
-            check_chunks(data, layout.n_rows, layout.row_bytes, codec)
-            stored = np.empty((layout.n_rows, *layout.row_shape), layout.dtype)
-            read_chunks(data, codec, stored, None if finish is None else partial(finish, stored))
+            sizes = chunk_sizes(data, layout, codec)
         except DamagedChunkError as error:
             self._refuse(f"array {name!r}: {error}")
-        return stored
+        return PackedArray(
+            name, layout, codec, sizes, len(data), lambda _, begin, end: view[begin:end]
+        )
 
-    def _read_member(self, name: str, limit: int) -> bytes:
-        """Return a stored member whole; ZIP's checksum is compared on the way."""
+    def _packed_in_place(self) -> dict[str, PackedArray]:
+        """Return the arrays of which every chunk is read from the file when it is decoded."""
+        n_chunks = sum(layout.n_chunks for layout in self._layouts.values())
+        content = self._read_member(INDEX, self.info.file_bytes)
+        if len(content) != n_chunks * INDEX_DTYPE.itemsize:
+            self._refuse(f"its member {INDEX!r} has {len(content)} bytes for {n_chunks} chunks")
+        index, packed, lock = np.frombuffer(content, INDEX_DTYPE), {}, Lock()
+        for name, layout in self._layouts.items():
+            rows, index = index[: layout.n_chunks], index[layout.n_chunks :]
+            member = self._member(name, self.info.file_bytes)
+            fetch = partial(self._fetch, lock, self._data_start(member), rows["crc32"].tolist())
+            packed[name] = PackedArray(
+                name, layout, self.info.codec, rows["bytes"], member.file_size, fetch
+            )
+        return packed
+
+    def _fetch(
+        self, lock: Lock, start: int, checksums: list[int], k: int, begin: int, end: int
+    ) -> bytes:
+        """Return the bytes of a chunk; from any thread."""
+        with lock:
+            self._stream.seek(start + begin)
+            chunk = self._stream.read(end - begin)
+        if zlib.crc32(chunk) != checksums[k]:
+            raise DamagedChunkError(f"chunk {k} is not what was written: its checksum differs")
+        return chunk
+
+    def _data_start(self, member: zipfile.ZipInfo) -> int:
+        """Return where a member's data begin: behind its local header, which must name it."""
+        self._stream.seek(member.header_offset)
+        header = self._stream.read(_LOCAL_HEADER.size)
+        if len(header) < _LOCAL_HEADER.size:
+            self._refuse(f"its member {member.filename!r} is not where its directory says")
+        signature, name_bytes, extra_bytes = _LOCAL_HEADER.unpack(header)
+        name = self._stream.read(name_bytes)
+        if signature != _SIGNATURE or name != member.filename.encode():
+            self._refuse(f"its member {member.filename!r} is not where its directory says")
+        return self._stream.tell() + int(extra_bytes)
+
+    def _member(self, name: str, limit: int) -> zipfile.ZipInfo:
+        """Return where a member is, which must be stored plainly and no longer than ``limit``."""
         try:
             member = self._archive.getinfo(name)
         except KeyError:
@@ -344,6 +413,11 @@ class _OpenFile:
             self._refuse(f"its member {name!r} is not stored plainly")
         if member.file_size != member.compress_size or member.file_size > limit:
             self._refuse(f"its member {name!r} declares {member.file_size} bytes")
+        return member
+
+    def _read_member(self, name: str, limit: int) -> bytes:
+        """Return a member whole; ZIP's checksum is compared on the way."""
+        member = self._member(name, limit)
         try:
             data = self._archive.read(member)
         except _ARCHIVE_ERRORS as error:
@@ -354,3 +428,39 @@ class _OpenFile:
 
     def _refuse(self, why: str) -> NoReturn:
         raise VDIFileError(f"{self._path} is damaged: {why}; {_REMEDY}")
+
+
+def _decode_depths_1(
+    packed: Mapping[str, PackedArray],
+    first: int,
+    front: NDArray[np.float32],
+    back: NDArray[np.float32],
+) -> None:
+    """Decode a chunk of version 1: (front, back), each bit pattern less the one before."""
+    depth = packed["depth"]
+    stored = np.empty((len(front), 2), depth.layout.dtype)
+    depth.read(first, stored)
+    if depth.layout.filter == "difference":
+        np.cumsum(stored, dtype=np.uint32, out=stored.reshape(-1))
+    pairs = stored.view(np.float32)
+    front[:], back[:] = pairs[:, 0], pairs[:, 1]
+
+
+def _decode_depths_2(
+    packed: Mapping[str, PackedArray],
+    first: int,
+    front: NDArray[np.float32],
+    back: NDArray[np.float32],
+) -> None:
+    """Decode a chunk of version 2: front less the back before it, back less its own front."""
+    packed["front"].read(first, front)
+    packed["back"].read(first, back)
+    if packed["back"].layout.filter == "difference":
+        gap, thickness = front.view(np.uint32), back.view(np.uint32).copy()
+        gap += thickness
+        np.cumsum(gap, dtype=np.uint32, out=back.view(np.uint32))
+        np.subtract(back.view(np.uint32), thickness, out=gap)
+
+
+#: How each version of the format stores the depths of a chunk.
+_DEPTHS = {1: _decode_depths_1, 2: _decode_depths_2}

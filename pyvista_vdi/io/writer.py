@@ -12,9 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..vdi import VDI
-from .chunks import CHUNK_ROWS, write_chunks
+from .chunks import DEFAULT_LEVELS, write_chunks
 from .description import describe, to_json
-from .layout import DESCRIPTION, Layout, layouts
+from .layout import (
+    CHUNK_ROWS,
+    DESCRIPTION,
+    FORMAT_VERSION,
+    INDEX,
+    INDEX_DTYPE,
+    Layout,
+    layouts,
+)
 from .whole_file import whole_file
 
 #: The oldest time that ZIP knows; a real one would make equal VDIs differ.
@@ -22,7 +30,11 @@ _NO_TIME = (1980, 1, 1, 0, 0, 0)
 
 
 def write(
-    vdi: VDI, path: str | os.PathLike[str], *, compression: str = "zstd", level: int = 1
+    vdi: VDI,
+    path: str | os.PathLike[str],
+    *,
+    compression: str = "lz4",
+    level: int | None = None,
 ) -> Path:
     """Write a VDI to a file, exactly.
 
@@ -35,11 +47,12 @@ def write(
         What to write.
     path : path-like
         The target; its name ends in ``.vdi``.
-    compression : {"zstd", "lz4", "none"}
-        ``"zstd"`` makes the smallest files, ``"lz4"`` is about three times faster to write,
-        ``"none"`` leaves plain little-endian arrays.
-    level : int
-        Effort of the compressor, 1 to 9; higher levels are slower to write, not to read.
+    compression : {"lz4", "zstd", "none"}
+        ``"lz4"`` is the fastest to write and to read, ``"zstd"`` makes files a few percent
+        smaller, ``"none"`` leaves plain little-endian arrays.
+    level : int, optional
+        Effort of the compressor, 1 to 9; 9 for lz4 and 1 for zstd by default. Higher levels are
+        slower to write, not to read.
 
     Returns
     -------
@@ -60,12 +73,15 @@ def write(
         vdi.window_size, vdi.n_supersegments, counts.dtype, filtered=compression != "none"
     )
     description = _described(vdi, arrays, compression)
+    effort = DEFAULT_LEVELS[compression] if level is None else level
     with whole_file(path) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(_member(DESCRIPTION), description)
+        index: list[tuple[int, int]] = []
         for name, layout in arrays.items():
             with archive.open(_member(name), "w", force_zip64=True) as member:
                 encoded = _encoder(name, layout, vdi, counts)
-                write_chunks(member, layout.n_rows, compression, level, encoded)
+                index += write_chunks(member, layout, compression, effort, encoded)
+        archive.writestr(_member(INDEX), np.array(index, INDEX_DTYPE).tobytes())
     return Path(os.path.realpath(path))
 
 
@@ -84,13 +100,13 @@ def _smallest(counts: NDArray[Any]) -> NDArray[Any]:
 
 
 def _described(vdi: VDI, arrays: Mapping[str, Layout], codec: str) -> str:
-    entries = describe(vdi)
+    entries = describe(vdi, FORMAT_VERSION)
     metadata = entries.pop("metadata")
     return to_json(
         {
             **entries,
             "codec": codec,
-            "chunk_rows": CHUNK_ROWS,
+            "chunk_rows": CHUNK_ROWS[FORMAT_VERSION],
             "arrays": {name: layout.to_dict() for name, layout in arrays.items()},
             "metadata": metadata,
         }
@@ -100,24 +116,24 @@ def _described(vdi: VDI, arrays: Mapping[str, Layout], codec: str) -> str:
 def _encoder(
     name: str, layout: Layout, vdi: VDI, counts: NDArray[Any]
 ) -> Callable[[int, int], NDArray[Any]]:
-    if name == "depth":
-        encode = _depth_differences if layout.filter == "difference" else _depth_pairs
-        return lambda first, last: encode(vdi.front[first:last], vdi.back[first:last])
+    if layout.filter == "difference":
+        encode = {"front": _gaps, "back": _thicknesses}[name]
+        front, back = vdi.front.view(np.uint32), vdi.back.view(np.uint32)
+        return lambda first, last: encode(front[first:last], back[first:last])
     array = counts if name == "counts" else getattr(vdi, name)
     return lambda first, last: np.ascontiguousarray(array[first:last], dtype=layout.dtype)
 
 
-def _depth_pairs(front: NDArray[np.float32], back: NDArray[np.float32]) -> NDArray[Any]:
-    return np.stack([front, back], axis=1).astype("<f4", copy=False)
+def _gaps(front: NDArray[np.uint32], back: NDArray[np.uint32]) -> NDArray[Any]:
+    """Return bit patterns of fronts less those of the backs before; 0 where supersegments touch.
 
-
-def _depth_differences(front: NDArray[np.float32], back: NDArray[np.float32]) -> NDArray[Any]:
-    """Return the depths' bit patterns less those of the depth before, as uint32 (n, 2).
-
-    Depths rise along a list and supersegments often touch: then the difference of front and
-    preceding back is 0, and that of back and front is small. Taken of the bit patterns modulo
-    2**32, it is exact.
+    Taken modulo 2**32 they are exact. The first stands as it is.
     """
-    pairs = np.stack([front, back], axis=1).view(np.uint32).reshape(-1)
-    pairs[1:] = np.diff(pairs)
-    return pairs.astype("<u4", copy=False).reshape(-1, 2)
+    gaps = front.astype("<u4")
+    gaps[1:] -= back[:-1]
+    return gaps
+
+
+def _thicknesses(front: NDArray[np.uint32], back: NDArray[np.uint32]) -> NDArray[Any]:
+    """Return bit patterns of backs less those of their fronts, modulo 2**32."""
+    return np.subtract(back, front).astype("<u4", copy=False)

@@ -28,9 +28,22 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
 class PlotterVDIActor(VDIActorMethods, Volume):
     """What ``Plotter.add_vdi`` returns: a ``pyvista.Volume`` with :attr:`vdi`."""
 
+    _held_mapper: Any = None
+
     def __init__(self) -> None:
         super().__init__()
         self._become_vdi_actor()
+
+    def SetMapper(self, mapper: Any) -> None:  # noqa: N802
+        """Set the mapper, and hold it: PyVista's lose their lookup table with the last reference.
+
+        Parameters
+        ----------
+        mapper : PlotterVDIMapper or None
+            Of this actor alone.
+        """
+        super().SetMapper(mapper)
+        self._held_mapper = mapper
 
     def copy(self, deep: bool = True) -> PlotterVDIActor:
         """Return another actor that shows the same VDI, with a mapper of its own.
@@ -49,7 +62,13 @@ class PlotterVDIActor(VDIActorMethods, Volume):
             mapper.painter.set_input(self.mapper.painter.input.shared())
         mapper.SetDevice(self.mapper.GetDevice())
         mapper.painter.take_settings(self.mapper.painter)
+        mapper.SetCropping(self.mapper.GetCropping())
+        mapper.SetCroppingRegionPlanes(self.mapper.GetCroppingRegionPlanes())
+        mapper.SetCroppingRegionFlags(self.mapper.GetCroppingRegionFlags())
         other.SetMapper(mapper)
-        if deep and self.prop is not None:
-            other.prop = self.prop.copy()
+        if deep:
+            prop = self.GetProperty()
+            copied = type(prop)()  # an actor without its volume has a plain vtkVolumeProperty
+            copied.DeepCopy(prop)
+            other.SetProperty(copied)
         return other

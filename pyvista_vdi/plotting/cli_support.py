@@ -5,17 +5,11 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyvista_vdi.errors import (
-    InvalidVolumeError,
-    MissingDependencyError,
-    UnsupportedError,
-    VDIWarning,
-)
+from pyvista_vdi.errors import MissingDependencyError, VDIWarning
 from pyvista_vdi.io import write_png
 from pyvista_vdi.plotting.convert import to_image_data
 
@@ -25,13 +19,12 @@ if TYPE_CHECKING:
 
 
 def read_volume(path: str | os.PathLike[str]) -> Any:
-    """Read a volume by PyVista's readers.
+    """Read a volume by PyVista's readers: see :func:`.volume_files.read_volume`.
 
     Parameters
     ----------
     path : path-like
-        A file in any format of ``pyvista.read`` that holds a uniform grid (NRRD, MetaImage,
-        NIfTI, .vti, .vtk, TIFF, ...), or a folder of DICOM slices.
+        A file, or a folder of DICOM slices.
 
     Returns
     -------
@@ -40,35 +33,13 @@ def read_volume(path: str | os.PathLike[str]) -> Any:
 
     Raises
     ------
-    InvalidVolumeError
-        If the file is absent, of an unknown format or cannot be read.
-    UnsupportedError
-        If it holds another kind of data set; the message says how to make a uniform grid of it.
+    MissingDependencyError
+        If PyVista is not installed.
     """
-    pv = _pyvista()
-    file = Path(path)
-    if not os.path.exists(file):  # noqa: PTH110 - pathlib's raises for a name that is too long
-        raise InvalidVolumeError(f"{file} does not exist: check the volume's path")
-    if file.suffix == ".vdi":
-        raise InvalidVolumeError(
-            f"{file} is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"
-        )
-    try:
-        with pv.vtk_verbosity("off"):
-            if file.is_dir():
-                data = pv.DICOMReader(str(file)).read()
-            else:
-                data = pv.read(file)
-    except Exception as error:  # each format has readers, and exceptions, of its own
-        raise InvalidVolumeError(f"{file} cannot be read as a volume: {error}") from error
-    if not isinstance(data, pv.ImageData):
-        raise UnsupportedError(
-            f"{file} holds a {type(data).__name__}, not a uniform grid: resample it to a "
-            "pyvista.ImageData first"
-        )
-    if data.n_points == 0 or not data.array_names:
-        raise InvalidVolumeError(f"{file} holds no scalars that PyVista could read")
-    return data
+    _pyvista()
+    from pyvista_vdi.plotting.volume_files import read_volume as read
+
+    return read(path)
 
 
 def add_volume_property(volume: Volume, arguments: Mapping[str, Any]) -> Any:

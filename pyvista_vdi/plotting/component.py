@@ -53,6 +53,7 @@ _OF_VOLUMES = {
     "sample_distance": None,
     "tolerance": 0.0,
     "view_cone": 60.0,
+    "ambient_occlusion": None,
     "camera": None,
     "coverage": "bounds",
 }
@@ -108,6 +109,7 @@ class AddVDI:
         sample_distance: float | None = None,
         tolerance: float = 0.0,
         view_cone: float = 60.0,
+        ambient_occlusion: Any = None,
         interpolation: Literal["nearest", "linear"] = "nearest",
         camera: Any = None,
         coverage: Literal["bounds", "view"] = "bounds",
@@ -181,6 +183,9 @@ class AddVDI:
             Error that may be traded for shorter lists.
         view_cone : float
             Half angle of the cone of views that must be served, degrees.
+        ambient_occlusion : bool, float or AmbientOcclusion, optional
+            Darken what is hidden from the light around it: ``True``, or the radius up to which
+            something hides, model units.
         interpolation : {"nearest", "linear"}
             Between voxels; ``add_volume`` draws ``"nearest"``.
         camera : pyvista.Camera or vtkCamera or Camera, optional
@@ -274,6 +279,7 @@ class AddVDI:
         source.SetSampleDistance(given["sample_distance"])
         source.SetTolerance(given["tolerance"])
         source.SetViewCone(given["view_cone"])
+        source.SetAmbientOcclusion(given["ambient_occlusion"])
         source.SetCoverage(given["coverage"])
         source.SetDevice(given["device"])
         source.SetProgressCallback(progress_callback(given["progress_bar"]))

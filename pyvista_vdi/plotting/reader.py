@@ -1,4 +1,4 @@
-"""``pyvista.read("x.vdi")``: a VDI in its canonical VTK form."""
+"""``pyvista.read("x.vdi")`` and ``("x.exr")``: a VDI in its canonical VTK form."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pyvista_vdi.vtk_pipeline.convert import vdi_to_image
 
 
 def read_vdi(path: str, **options: Any) -> pv.ImageData:
-    """Read a ``.vdi`` file as PyVista reads any file.
+    """Read a ``.vdi`` file, or a deep OpenEXR image, as PyVista reads any file.
 
     Parameters
     ----------
     path : str
         The file.
     **options
-        None are known.
+        Those of :func:`pyvista_vdi.read`: for ``.exr`` files of other programs.
 
     Returns
     -------
@@ -29,10 +29,8 @@ def read_vdi(path: str, **options: Any) -> pv.ImageData:
     Raises
     ------
     VDIFileError
-        If it is not a readable VDI file.
-    TypeError
-        If there are options.
+        If it is not a readable VDI file, or a flat image.
+    InvalidArgumentError
+        If an option is not one of the file's format.
     """
-    if options:
-        raise TypeError(f"reading a .vdi file takes no options; got {', '.join(sorted(options))}")
-    return pv.wrap(vdi_to_image(read(path)))
+    return pv.wrap(vdi_to_image(read(path, **options)))

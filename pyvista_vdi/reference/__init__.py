@@ -1,21 +1,26 @@
 """The oracle: slow, plain float64 NumPy generation and raycasting; never imports the device code.
 
 Written from DESIGN section 3 and from nothing in the kernels, it defines what is correct.
-:func:`render` gives the exact image of any VDI from any view, :func:`render_range` what float32
-arithmetic may make of a ray, :func:`volume_image` the direct volume rendering, and
-:func:`build_vdi` a plain VDI.
+:func:`render` gives the exact image of any VDI from any view, :func:`render_joint` that of several
+together, :func:`render_range` and :func:`render_joint_range` what float32 arithmetic may make of a
+ray, :func:`volume_image` the direct volume rendering, :func:`build_vdi` a plain VDI, and
+:func:`ambient_transmittance` what ambient occlusion stands for.
 """
 
 from __future__ import annotations
 
-from .generate import RaySamples, build_vdi, samples, volume_image
+from .generate import RaySamples, ambient_transmittance, build_vdi, samples, volume_image
+from .joint import render_joint, render_joint_range
 from .ranges import render_range
 from .raycast import render, render_pixels
 
 __all__ = [
     "RaySamples",
+    "ambient_transmittance",
     "build_vdi",
     "render",
+    "render_joint",
+    "render_joint_range",
     "render_pixels",
     "render_range",
     "samples",

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from ..camera import Camera, check_window_size
 from ..compositing import Segment, composite, merge
 from ..errors import InvalidArgumentError
@@ -17,6 +18,7 @@ from ..lighting import Lights
 from ..transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from ..vdi import VDI
 from ..volume import Volume
+from .occlusion import NodeOcclusion, mean_transmittance
 from .rays import HalfSpace, Ray, clip, inside_box, pixel_ray
 from .shading import gradient_factors, lit_colors
 
@@ -61,6 +63,7 @@ def samples(
     transfer_function: TransferFunction,
     sample_distance: float | None = None,
     lights: Lights | None = None,
+    ambient_occlusion: AmbientOcclusion | None = None,
 ) -> Iterator[RaySamples]:
     """Yield the samples of every pixel's ray.
 
@@ -83,6 +86,8 @@ def samples(
         Model units; half the smallest spacing by default.
     lights : Lights, optional
         What a shaded volume is lit by; one headlight by default.
+    ambient_occlusion : AmbientOcclusion, optional
+        Darkens samples by what stands around them.
 
     Yields
     ------
@@ -101,6 +106,7 @@ def samples(
             f"sample_distance must be a positive length in model units; got {sample_distance!r}"
         )
     to_index = np.linalg.inv(volume.index_to_model)
+    occlusion = node_occlusion(volume, transfer_function, ambient_occlusion, step)
     for y, x in itertools.product(range(height), range(width)):
         ray = pixel_ray(camera, (width, height), x, y)
         start = to_index[:3, :3] @ ray.origin + to_index[:3, 3]
@@ -109,7 +115,9 @@ def samples(
         edges = _steps(start, slope, volume, camera.parallel_projection, step / per_depth)
         position = start + slope * ((edges[:-1] + edges[1:]) / 2)[:, None]
         length = np.diff(edges) * per_depth
-        color, tau = medium_at(volume, transfer_function, position, length, camera, lights)
+        color, tau = medium_at(
+            volume, transfer_function, position, length, camera, lights, occlusion
+        )
         yield RaySamples((x, y), edges[:-1], edges[1:], position, length, color, tau)
 
 
@@ -120,12 +128,13 @@ def volume_image(
     transfer_function: TransferFunction,
     sample_distance: float | None = None,
     lights: Lights | None = None,
+    ambient_occlusion: AmbientOcclusion | None = None,
 ) -> Array:
     """Return the direct volume rendering: all samples composited, nothing ended early.
 
     Parameters
     ----------
-    volume, camera, window_size, transfer_function, sample_distance, lights
+    volume, camera, window_size, transfer_function, sample_distance, lights, ambient_occlusion
         As for :func:`samples`.
 
     Returns
@@ -135,7 +144,9 @@ def volume_image(
     """
     width, height = check_window_size(window_size)
     image = np.zeros((height, width, 4))
-    rays = samples(volume, camera, window_size, transfer_function, sample_distance, lights)
+    rays = samples(
+        volume, camera, window_size, transfer_function, sample_distance, lights, ambient_occlusion
+    )
     for ray in rays:
         x, y = ray.pixel
         image[height - 1 - y, x] = composite(ray.color, ray.optical_depth)
@@ -152,6 +163,7 @@ def build_vdi(
     max_supersegments: int = 20,
     weighting: str = "transmittance",
     lights: Lights | None = None,
+    ambient_occlusion: AmbientOcclusion | None = None,
 ) -> VDI:
     """Return a plain VDI: neighbouring samples merged greedily until the budget is kept.
 
@@ -164,7 +176,7 @@ def build_vdi(
 
     Parameters
     ----------
-    volume, camera, window_size, transfer_function, sample_distance, lights
+    volume, camera, window_size, transfer_function, sample_distance, lights, ambient_occlusion
         As for :func:`samples`.
     max_supersegments : int
         N_S: no list gets longer.
@@ -187,7 +199,9 @@ def build_vdi(
         )
     depth_origin = near_depth(volume.bounds, camera)
     lists = []
-    rays = samples(volume, camera, window_size, transfer_function, sample_distance, lights)
+    rays = samples(
+        volume, camera, window_size, transfer_function, sample_distance, lights, ambient_occlusion
+    )
     for ray in rays:
         runs = [
             Segment(float(t0), float(t1), color, float(tau))
@@ -218,6 +232,7 @@ def medium_at(
     length: Array,
     camera: Camera | None = None,
     lights: Lights | None = None,
+    occlusion: NodeOcclusion | None = None,
 ) -> tuple[Array, Array]:
     """Return colour and optical depth of steps whose midpoints have given grid coordinates.
 
@@ -236,6 +251,8 @@ def medium_at(
         The view; a shaded volume needs one.
     lights : Lights, optional
         What a shaded volume is lit by; one headlight by default.
+    occlusion : NodeOcclusion, optional
+        What :func:`node_occlusion` returned.
 
     Returns
     -------
@@ -276,7 +293,78 @@ def medium_at(
             color = lit_colors(
                 volume, camera, transfer_function.shading, lights, inside, differences, color
             )
+    if occlusion is not None:
+        color = color * occlusion.factors(inside)[:, None]
     return color, np.where(outside | np.isnan(scalar), 0.0, tau)
+
+
+def node_occlusion(
+    volume: Volume,
+    transfer_function: TransferFunction,
+    ambient_occlusion: AmbientOcclusion | None,
+    sample_distance: float | None = None,
+) -> NodeOcclusion | None:
+    """Return the occlusion on a coarse grid, as the device computes it; ``None`` for none.
+
+    Parameters
+    ----------
+    volume, transfer_function
+        What is occluded, by itself.
+    ambient_occlusion : AmbientOcclusion, optional
+        Radius, directions and strength.
+    sample_distance : float, optional
+        Length of the volume's own steps, model units; half the smallest spacing by default.
+    """
+    if ambient_occlusion is None:
+        return None
+    step = min(volume.spacing) / 2 if sample_distance is None else sample_distance
+    grid = OcclusionGrid.of(volume, ambient_occlusion)
+    depth = _optical_depth(volume, transfer_function)
+    return NodeOcclusion(volume, grid, depth, step, ambient_occlusion.strength)
+
+
+def ambient_transmittance(
+    volume: Volume,
+    transfer_function: TransferFunction,
+    position: Array,
+    radius: float,
+    directions: int = 1024,
+    step: float | None = None,
+) -> Array:
+    """Return the mean transmittance around points, by its definition and without a grid.
+
+    Parameters
+    ----------
+    volume, transfer_function
+        What takes the light.
+    position : numpy.ndarray
+        Grid coordinates (x, y, z) in points, float64 (n, 3).
+    radius : float
+        How far to look, model units.
+    directions : int
+        How many of them the mean is taken over.
+    step : float, optional
+        Length of a step, model units; half the smallest spacing by default.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 (n,), 0 to 1.
+    """
+    step = min(volume.spacing) / 2 if step is None else step
+    depth = _optical_depth(volume, transfer_function)
+    return mean_transmittance(volume, depth, position, radius, directions, step)
+
+
+def _optical_depth(
+    volume: Volume, transfer_function: TransferFunction
+) -> Callable[[Array, float], Array]:
+    unlit = transfer_function.replace(shading=None)
+
+    def optical_depth(position: Array, length: float) -> Array:
+        return medium_at(volume, unlit, position, np.full(len(position), length))[1]
+
+    return optical_depth
 
 
 def classify(transfer_function: TransferFunction, scalar: Array) -> tuple[Array, Array]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..camera import Camera
 from ..errors import InvalidArgumentError
 from ..vdi import VDI
-from .raycast import Line, Lists, composite_line, line_of_pixel, near_limit
+from .raycast import Line, Lists, composite_lines, lines_of_pixel, near_limit
 
 Array = NDArray[np.float64]
 
@@ -40,6 +40,8 @@ def render_range(
     seed: int = 0,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
 ) -> tuple[Array, Array]:
     """Return the smallest and largest colour over a ray moved by its arithmetic's roundings.
 
@@ -49,7 +51,7 @@ def render_range(
 
     Parameters
     ----------
-    vdi, camera, window_size, opaque_depth, clipping_planes
+    vdi, camera, window_size, opaque_depth, clipping_planes, cropping, opacity_multiplier
         As for :func:`pyvista_vdi.reference.render`.
     pixels : sequence of (int, int)
         ``(x, y)`` of each, y = 0 at the bottom.
@@ -98,7 +100,7 @@ def render_range(
     if not k >= 0:
         raise InvalidArgumentError(f"k must be a number of roundings >= 0; got {k}")
     space = _ListSpace(vdi)
-    lists = Lists(vdi)
+    lists = Lists(vdi, opacity_multiplier)
     shift = FACE_ROUNDINGS * ROUNDOFF * space.face_sensitivity(lists)
     media = {0: lists, 1: lists.displaced(shift), -1: lists.displaced(-shift)}
     nudges = [(0.0, 0.0), *_window_nudges(window_size, k)]
@@ -108,8 +110,8 @@ def render_range(
     low = np.empty((len(pixels), 4))
     high = np.empty((len(pixels), 4))
     for n, pixel in enumerate(pixels):
-        lines = [
-            line_of_pixel(
+        rays = [
+            lines_of_pixel(
                 vdi,
                 camera,
                 window_size,
@@ -117,14 +119,18 @@ def render_range(
                 nudge=nudge,
                 opaque_depth=opaque_depth,
                 clipping_planes=clipping_planes,
+                cropping=cropping,
             )
             for nudge in nudges
         ]
-        seen = [np.zeros(4) if line is None else composite_line(lists, line) for line in lines]
-        if lines[0] is not None:
-            for move in itertools.chain(_corners(), _inside(rng, n_random, space, lines[0], size)):
-                moved = space.moved(lines[0], move, size)
-                seen.append(composite_line(media[move.faces], moved))
+        seen = [composite_lines(lists, lines) for lines in rays]
+        if rays[0]:
+            for move in itertools.chain(
+                _corners(), _inside(rng, n_random, space, rays[0][0], size)
+            ):
+                # What cropping cuts out of a ray begins and ends at roundings of its own
+                moved = [space.moved(line, move, size) for line in rays[0]]
+                seen.append(composite_lines(media[move.faces], moved))
         low[n], high[n] = np.min(seen, axis=0), np.max(seen, axis=0)
     return low, high
 

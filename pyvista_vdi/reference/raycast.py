@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..camera import Camera, check_window_size
 from ..compositing import composite, optical_depth_over_length
+from ..cropping import Cropping
 from ..errors import InvalidArgumentError
 from ..vdi import VDI
 from .rays import HalfSpace, Ray, clip, inside_box, inside_planes, pixel_ray
@@ -47,9 +48,13 @@ class Lists:
     ----------
     vdi : VDI
         What to look at.
+    opacity_multiplier : float
+        Factor of the optical depths.
 
     Attributes
     ----------
+    optical_depth : numpy.ndarray
+        tau, float64 (n,), multiplied.
     front, back : numpy.ndarray
         View depth of the faces in V_O, float64 (n,), world units, depth origin added.
     length : numpy.ndarray
@@ -58,8 +63,9 @@ class Lists:
         float64 (4, 4), view space of V_O to (u d, v d, Z, d).
     """
 
-    def __init__(self, vdi: VDI) -> None:
+    def __init__(self, vdi: VDI, opacity_multiplier: float = 1.0) -> None:
         self.vdi = vdi
+        self.optical_depth = vdi.optical_depth.astype(np.float64) * opacity_multiplier
         self.viewport = vdi.camera.viewport_matrix(vdi.window_size)
         self.front = vdi.front.astype(np.float64) + vdi.depth_origin
         self.back = vdi.back.astype(np.float64) + vdi.depth_origin
@@ -117,6 +123,8 @@ def render(
     *,
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
 ) -> Array:
     """Return the exact image of a VDI from any view.
 
@@ -132,6 +140,10 @@ def render(
         Top row first: view depth of V_N, world units, at which the ray ends.
     clipping_planes : array_like of float, shape (k, 6), optional
         Origin and normal of each, world coordinates; the side the normal points to is kept.
+    cropping : Cropping or what makes one, optional
+        Which regions of the model frame are drawn.
+    opacity_multiplier : float
+        Factor of every optical depth.
 
     Returns
     -------
@@ -147,6 +159,8 @@ def render(
         pixels,
         opaque_depth=opaque_depth,
         clipping_planes=clipping_planes,
+        cropping=cropping,
+        opacity_multiplier=opacity_multiplier,
     )
     return colors.reshape(height, width, 4)
 
@@ -160,12 +174,14 @@ def render_pixels(
     nudge: tuple[float, float] = (0.0, 0.0),
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
 ) -> Array:
     """Return the exact colour of some pixels.
 
     Parameters
     ----------
-    vdi, camera, window_size, opaque_depth, clipping_planes
+    vdi, camera, window_size, opaque_depth, clipping_planes, cropping, opacity_multiplier
         As for :func:`render`.
     pixels : sequence of (int, int)
         ``(x, y)`` of each, y = 0 at the bottom.
@@ -177,10 +193,10 @@ def render_pixels(
     numpy.ndarray
         float64 (len(pixels), 4), premultiplied RGBA.
     """
-    lists = Lists(vdi)
+    lists = Lists(vdi, opacity_multiplier)
     colors = np.zeros((len(pixels), 4))
     for k, pixel in enumerate(pixels):
-        line = line_of_pixel(
+        lines = lines_of_pixel(
             vdi,
             camera,
             window_size,
@@ -188,13 +204,13 @@ def render_pixels(
             nudge=nudge,
             opaque_depth=opaque_depth,
             clipping_planes=clipping_planes,
+            cropping=cropping,
         )
-        if line is not None:
-            colors[k] = composite_line(lists, line)
+        colors[k] = composite_lines(lists, lines)
     return colors
 
 
-def line_of_pixel(
+def lines_of_pixel(
     vdi: VDI,
     camera: Camera,
     window_size: Sequence[int],
@@ -203,8 +219,11 @@ def line_of_pixel(
     nudge: tuple[float, float] = (0.0, 0.0),
     opaque_depth: ArrayLike | None = None,
     clipping_planes: ArrayLike | None = None,
-) -> Line | None:
-    """Return the part of a pixel's ray that may meet the medium; None where there is none.
+    cropping: Any = None,
+) -> list[Line]:
+    """Return the parts of a pixel's ray that may meet the medium, in their order.
+
+    There is one at most, unless something is cropped.
 
     A ray begins at the viewer's eye in perspective; in parallel projection, whose eye is
     infinitely far, it has no beginning: VTK too fits its near plane to what is drawn.
@@ -230,8 +249,45 @@ def line_of_pixel(
     limits += _inside_frustum(vdi, origin, direction)
     span = clip(limits)
     if span is None:
-        return None
-    return Line(origin, direction, *span, float(np.linalg.norm(ray.direction)))
+        return []
+    length = float(np.linalg.norm(ray.direction))
+    return [
+        Line(origin, direction, *part, length)
+        for part in kept_parts(ray, *span, Cropping.from_any(cropping))
+    ]
+
+
+def kept_parts(
+    ray: Ray, t0: float, t1: float, cropping: Cropping | None
+) -> list[tuple[float, float]]:
+    """Return the parts of [t0, t1] in which a ray of the model frame runs through kept regions."""
+    if cropping is None:
+        return [(t0, t1)]
+    planes = np.reshape(cropping.planes, (3, 2))
+    # Nothing lies between a low plane and a high one below it
+    planes[:, 1] = planes.max(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):  # a plane that is never reached
+        t = ((planes - ray.origin[:, None]) / ray.direction[:, None]).ravel()
+    cuts = np.unique(np.concatenate([[t0], t[(t > t0) & (t < t1)], [t1]]))
+    parts: list[tuple[float, float]] = []
+    for begin, end in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
+        point = ray.origin + (begin + end) / 2 * ray.direction
+        region = (int(np.searchsorted(planes[axis], point[axis], "right")) for axis in range(3))
+        if not cropping.keeps(*region):
+            continue
+        if parts and parts[-1][1] == begin:
+            parts[-1] = (parts[-1][0], end)
+        else:
+            parts.append((begin, end))
+    return parts
+
+
+def composite_lines(lists: Lists, lines: Sequence[Line]) -> Array:
+    """Return what the medium along several lines, one behind the other, looks like together."""
+    color = np.zeros(4)
+    for line in lines:
+        color += (1 - color[3]) * composite_line(lists, line)  # over
+    return color
 
 
 def composite_line(lists: Lists, line: Line) -> Array:
@@ -250,6 +306,34 @@ def composite_line(lists: Lists, line: Line) -> Array:
     numpy.ndarray
         float64 (4,), premultiplied RGBA.
     """
+    crossed = crossings(lists, line)
+    tau = optical_depth_over_length(
+        lists.optical_depth[crossed.member], crossed.length, lists.length[crossed.member]
+    )
+    return composite(lists.vdi.color[crossed.member], tau)
+
+
+class Crossings(NamedTuple):
+    """The supersegments that a line passes through, in the order in which it meets them.
+
+    Attributes
+    ----------
+    member : numpy.ndarray
+        int64 (n,), indices of supersegments; one may be met in several pieces.
+    length : numpy.ndarray
+        float64 (n,), what is crossed of each, model units.
+    begin, end : numpy.ndarray
+        float64 (n,), where, as t of the line.
+    """
+
+    member: NDArray[np.int64]
+    length: Array
+    begin: Array
+    end: Array
+
+
+def crossings(lists: Lists, line: Line) -> Crossings:
+    """Intersect a line with a medium; arguments as for :func:`composite_line`."""
     # Homogeneous viewport coordinates (u d, v d, Z, d) are linear in t: h(t) = at + t slope
     at = lists.viewport @ np.append(line.origin, 1.0)
     slope = lists.viewport @ np.append(line.direction, 0.0)
@@ -271,11 +355,14 @@ def composite_line(lists: Lists, line: Line) -> Array:
     depth = at[2] + cuts * slope[2]
     share = _share_between(depth[piece], depth[piece + 1], lists.front[member], lists.back[member])
     hit = share > 0
-    member, piece = member[hit], piece[hit]
-    length = share[hit] * (cuts[piece + 1] - cuts[piece]) * line.unit_length
-
-    tau = optical_depth_over_length(lists.vdi.optical_depth[member], length, lists.length[member])
-    return composite(lists.vdi.color[member], tau)
+    member, piece, share = member[hit], piece[hit], share[hit]
+    whole = cuts[piece + 1] - cuts[piece]
+    near = lists.back[member] if slope[2] < 0 else lists.front[member]
+    with np.errstate(divide="ignore", invalid="ignore"):  # across the depth: the whole piece
+        before = (near - depth[piece]) / (depth[piece + 1] - depth[piece])
+    before = np.clip(np.where(np.isfinite(before), before, 0.0), 0.0, 1.0 - share)
+    first = cuts[piece] + before * whole
+    return Crossings(member, share * whole * line.unit_length, first, first + share * whole)
 
 
 def _in_view_space(camera: Camera, ray: Ray) -> tuple[Array, Array]:

@@ -110,8 +110,9 @@ def _by_lights(
     ambient = np.zeros(3)
     diffuse, specular = np.zeros_like(color), np.zeros_like(color)
     for light in lights.lights:
-        ambient = ambient + np.array(light.ambient)
+        ambient = ambient + light.intensity * np.array(light.ambient)
         direction, strength = _arriving(light, camera, world)
+        strength = strength * light.intensity
         facing = (normal * direction).sum(axis=1)
         if lights.two_sided:
             facing = np.abs(facing)

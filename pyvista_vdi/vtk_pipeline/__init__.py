@@ -8,6 +8,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pyvista_vdi.vtk_pipeline.actor import VDIActor
     from pyvista_vdi.vtk_pipeline.convert import vdi_from_image, vdi_to_image, volume_from_vtk
+    from pyvista_vdi.vtk_pipeline.dense import (
+        VDIToDenseImage,
+        vdi_from_dense_image,
+        vdi_to_dense_image,
+    )
+    from pyvista_vdi.vtk_pipeline.files import VDIReader, VDIWriter
+    from pyvista_vdi.vtk_pipeline.image import VDIToImage
     from pyvista_vdi.vtk_pipeline.mapper import VDIMapper
     from pyvista_vdi.vtk_pipeline.properties import transfer_function_from_property
     from pyvista_vdi.vtk_pipeline.source import VDISource
@@ -17,10 +24,16 @@ if TYPE_CHECKING:
 _MODULES = {
     "VDIActor": "actor",
     "VDIMapper": "mapper",
+    "VDIReader": "files",
     "VDISource": "source",
     "VDIStatus": "status",
+    "VDIToDenseImage": "dense",
+    "VDIToImage": "image",
+    "VDIWriter": "files",
     "transfer_function_from_property": "properties",
+    "vdi_from_dense_image": "dense",
     "vdi_from_image": "convert",
+    "vdi_to_dense_image": "dense",
     "vdi_to_image": "convert",
     "volume_from_vtk": "convert",
 }
@@ -28,10 +41,16 @@ _MODULES = {
 __all__ = [
     "VDIActor",
     "VDIMapper",
+    "VDIReader",
     "VDISource",
     "VDIStatus",
+    "VDIToDenseImage",
+    "VDIToImage",
+    "VDIWriter",
     "transfer_function_from_property",
+    "vdi_from_dense_image",
     "vdi_from_image",
+    "vdi_to_dense_image",
     "vdi_to_image",
     "volume_from_vtk",
 ]

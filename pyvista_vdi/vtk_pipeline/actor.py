@@ -7,23 +7,12 @@ from typing import Any
 from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.picking import Pick
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.vtk_pipeline.frame import as_array
 from pyvista_vdi.vtk_pipeline.mapper import VDIMapperMethods
+from pyvista_vdi.vtk_pipeline.shader import show_image
 from pyvista_vdi.vtk_pipeline.status import VDIStatus
-
-#: The image is premultiplied RGBA of the whole viewport, bottom row first. The sampler is never
-#: set: VTK allows no uniform to be set in the frame that builds the shader, and its default is
-#: texture unit 0, where the mapper puts the image.
-_DECLARATION = "//VTK::Base::Dec\nuniform sampler2D vdiImage;\n"
-
-#: In place of VTK's ray caster. finalizeRayCast keeps picking and window/level.
-_LOOKUP = """
-  vec4 clip = in_projectionMatrix * in_modelViewMatrix * in_volumeMatrix[0]
-            * vec4(ip_vertexPos, 1.0);
-  g_fragColor = texture(vdiImage, clip.xy / clip.w * 0.5 + 0.5);
-  finalizeRayCast();
-"""
 
 
 class VDIActorMethods:
@@ -31,9 +20,7 @@ class VDIActorMethods:
 
     def _become_vdi_actor(self: Any) -> None:
         """Install the shader; to be called once, from ``__init__``."""
-        shader = self.GetShaderProperty()
-        shader.AddFragmentShaderReplacement("//VTK::Base::Dec", True, _DECLARATION, False)
-        shader.AddFragmentShaderReplacement("//VTK::CallWorker::Impl", True, _LOOKUP, False)
+        show_image(self)
 
     def SetMapper(self: Any, mapper: Any) -> None:
         """Set the mapper, which must be a :class:`VDIMapper` of its own.
@@ -69,6 +56,19 @@ class VDIActorMethods:
             raise InvalidArgumentError("this actor has no mapper, so there is no status of it")
         return mapper.painter.status()  # type: ignore[no-any-return]
 
+    @property
+    def opacity_multiplier(self: Any) -> float:
+        """Factor of the extinction, 1 by default: see :meth:`VDIMapper.SetOpacityMultiplier`."""
+        mapper = self.GetMapper()
+        return 1.0 if mapper is None else mapper.GetOpacityMultiplier()
+
+    @opacity_multiplier.setter
+    def opacity_multiplier(self: Any, multiplier: float) -> None:
+        mapper = self.GetMapper()
+        if mapper is None:
+            raise InvalidArgumentError("this actor has no mapper whose opacity could be set")
+        mapper.SetOpacityMultiplier(multiplier)
+
     def show_status(self: Any, renderer: Any = None, corner: str = "upper left") -> Any:
         """Show :attr:`status` as a text in a corner, written anew in each frame.
 
@@ -98,6 +98,42 @@ class VDIActorMethods:
                 "nothing shows this actor yet: add it to a renderer first, or pass the renderer"
             )
         return mapper.painter.texts.add(renderer, corner)
+
+    def pick(self: Any, x: float, y: float, *, renderer: Any = None) -> Pick | None:
+        """Return the supersegment that is seen at a place of the window.
+
+        Parameters
+        ----------
+        x, y : float
+            Display coordinates: pixels of the window from its lower left corner, as in VTK's
+            events and pickers.
+        renderer : vtkRenderer or pyvista.Plotter, optional
+            Which one, where renderers overlap; by default the one that shows the actor there.
+
+        Returns
+        -------
+        Pick or None
+            The first supersegment that reaches the opacity set by
+            ``GetMapper().SetPickingOpacity(...)``, and where the ray enters it, in world
+            coordinates. ``None`` where nothing of the VDI is hit, where something else that can
+            be picked is in front of the hit, and where the actor is invisible or not pickable.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If no renderer of a window shows the actor.
+        """
+        mapper = self.GetMapper()
+        shown = [] if mapper is None else mapper.painter.renderers()
+        shown = [r for r in shown if r.GetRenderWindow() is not None]
+        if not shown:
+            raise InvalidArgumentError(
+                "nothing shows this actor yet: add it to a renderer of a window first"
+            )
+        if renderer is not None:
+            shown = [r for r in shown if r is getattr(renderer, "renderer", renderer)]
+        there = [r for r in shown if r.IsInViewport(int(x), int(y))]
+        return mapper.painter.selection.pick(self, there[0], x, y) if there else None
 
     def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
         """Generate the VDI anew, now.

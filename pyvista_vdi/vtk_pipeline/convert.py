@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from vtkmodules import vtkCommonDataModel
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import VTK_UNSIGNED_CHAR, vtkDataArray, vtkStringArray
-from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkFiltersCore import vtkCellDataToPointData
 
 from pyvista_vdi.camera import Camera
@@ -27,6 +28,7 @@ from pyvista_vdi.vtk_pipeline.properties import transfer_function_from_property
 __all__ = [
     "is_vdi_image",
     "require_image",
+    "require_image_port",
     "scalars_of",
     "transfer_function_from_property",
     "vdi_from_image",
@@ -51,8 +53,7 @@ _REMEDIES = {
     "vtkRectilinearGrid": _RESAMPLE,
     "vtkStructuredGrid": _RESAMPLE,
     "vtkUnstructuredGrid": _RESAMPLE,
-    "vtkMultiBlockDataSet": "add its blocks one by one",
-    "vtkPartitionedDataSetCollection": "add its blocks one by one",
+    "vtkCompositeDataSet": "add its blocks one by one (vtkExtractBlock, or block by index)",
     "vtkPolyData": "a surface has no volume: voxelise it (pyvista's voxelize_binary_mask)",
 }
 
@@ -76,15 +77,33 @@ def require_image(data: Any) -> vtkImageData:
         raise InvalidVolumeError(
             f"expected a vtkImageData or pyvista.ImageData; got {type(data).__name__}"
         )
+    raise _refusal(type(data))
+
+
+def require_image_port(port: Any) -> None:
+    """Refuse an output port that is known to give something other than a uniform grid.
+
+    Raises
+    ------
+    UnsupportedError
+        As :func:`require_image`. A port that promises no more than a ``vtkDataSet``, say, passes.
+    """
+    information = port.GetProducer().GetOutputPortInformation(port.GetIndex())
+    name = str(information.Get(vtkDataObject.DATA_TYPE_NAME()))
+    promised = getattr(vtkCommonDataModel, name, None)
+    if promised is None or issubclass(promised, vtkImageData) or issubclass(vtkImageData, promised):
+        return
+    raise _refusal(promised)
+
+
+def _refusal(kind: type) -> UnsupportedError:
+    """Return what is to be said of data that are no uniform grid."""
+    named = f"a {kind.__name__} is not a uniform grid"
     for name, remedy in _REMEDIES.items():
-        if data.IsA(name):
-            raise UnsupportedError(
-                f"a {type(data).__name__} is not a uniform grid, which is all that a VDI is made "
-                f"from: {remedy}"
-            )
-    raise UnsupportedError(
-        f"a {type(data).__name__} is not a uniform grid (vtkImageData), which is all that a VDI "
-        "is made from: resample it to one"
+        if issubclass(kind, getattr(vtkCommonDataModel, name)):
+            return UnsupportedError(f"{named}, which is all that a VDI is made from: {remedy}")
+    return UnsupportedError(
+        f"{named} (vtkImageData), which is all that a VDI is made from: resample it to one"
     )
 
 
@@ -145,6 +164,11 @@ def scalars_of(image: vtkImageData, name: str | None, preference: str = "point")
     """Return the array that ``name`` means: see :func:`volume_from_vtk`."""
     if image.GetNumberOfPoints() == 0:
         raise InvalidVolumeError("the volume is empty: it has no points")
+    if is_vdi_image(image):
+        raise InvalidVolumeError(
+            "this image is a VDI in its VTK form, not a volume: render, add_vdi and VDIMapper "
+            "show it as it is"
+        )
     attributes = {"point": image.GetPointData(), "cell": image.GetCellData()}
     order = sorted(attributes, key=lambda kind: kind != preference)
     if name is None:
@@ -249,21 +273,43 @@ def vdi_to_image(vdi: VDI) -> vtkImageData:
     field = image.GetFieldData()
     for name in _RAGGED:
         field.AddArray(_to_vtk(name, getattr(vdi, name)))
-    description = vtkStringArray()
-    description.SetName(DESCRIPTION)
-    description.InsertNextValue(
-        json.dumps(
-            {
-                "form_version": FORM_VERSION,
-                "camera": vdi.camera.to_dict(),
-                "bounds": list(vdi.bounds),
-                "depth_origin": vdi.depth_origin,
-                "metadata": vdi.metadata,
-            }
-        )
-    )
-    field.AddArray(description)
+    field.AddArray(description_of(DESCRIPTION, vdi))
     return image
+
+
+def description_of(name: str, vdi: VDI) -> vtkStringArray:
+    """Return everything of a VDI that is not an array, as a field string of JSON.
+
+    Raises
+    ------
+    InvalidVDIError
+        If the metadata hold what JSON cannot.
+    """
+    about = {
+        "form_version": FORM_VERSION,
+        "camera": vdi.camera.to_dict(),
+        "bounds": list(vdi.bounds),
+        "depth_origin": vdi.depth_origin,
+        "metadata": vdi.metadata,
+    }
+    try:
+        text = json.dumps(about, default=_plain)  # NaN and infinity included, as Python reads them
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InvalidVDIError(
+            f"the VDI's metadata cannot be written: {error}; they may hold numbers, text, lists "
+            "and dictionaries with text as keys"
+        ) from error
+    description = vtkStringArray()
+    description.SetName(name)
+    description.InsertNextValue(text)
+    return description
+
+
+def _plain(value: Any) -> Any:
+    """Return NumPy's numbers and arrays as Python's."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise TypeError(f"a value of type {type(value).__name__} is not JSON")
 
 
 def is_vdi_image(data: Any) -> bool:
@@ -295,36 +341,40 @@ def vdi_from_image(image: Any) -> VDI:
         kind = type(image).__name__
         raise InvalidVDIError(
             f"this {kind} is not a VDI: it has no field string {DESCRIPTION!r}; a volume becomes "
-            "a VDI by pyvista_vdi.generate or VDISource"
+            "a VDI by pyvista_vdi.generate or VDISource, and a dense form by vdi_from_dense_image"
         )
     field = image.GetFieldData()
+    about = view_from_description(image, DESCRIPTION)
+    counts = _counts(image)
+    offsets = np.zeros(len(counts) + 1, dtype=np.uint64)
+    np.cumsum(counts, dtype=np.uint64, out=offsets[1:])
+    arrays: dict[str, Any] = {name: _ragged(field, name, int(offsets[-1])) for name in _RAGGED}
+    return VDI(window_size=image.GetDimensions()[:2], offsets=offsets, **arrays, **about)
+
+
+def view_from_description(image: vtkImageData, name: str) -> dict[str, Any]:
+    """Return what :func:`description_of` wrote: arguments of :class:`VDI`.
+
+    Raises
+    ------
+    InvalidVDIError
+        If it is damaged, or of a newer version.
+    """
     try:
-        about = json.loads(field.GetAbstractArray(DESCRIPTION).GetValue(0))
+        about = json.loads(image.GetFieldData().GetAbstractArray(name).GetValue(0))
         version = int(about["form_version"])
-        camera = Camera.from_dict(about["camera"])
-        bounds, depth_origin = about["bounds"], about["depth_origin"]
-        metadata = about["metadata"]
+        if version <= FORM_VERSION:
+            camera = Camera.from_dict(about["camera"])
+            entries = {key: about[key] for key in ("bounds", "depth_origin", "metadata")}
+            return {"camera": camera, **entries}
     except (
         *(KeyError, TypeError, IndexError, ValueError, OverflowError, RecursionError),
         InvalidCameraError,
     ) as error:
         raise InvalidVDIError(f"the VDI's description is damaged: {error!r}") from error
-    if version > FORM_VERSION:
-        raise InvalidVDIError(
-            f"the VDI's VTK form has version {version}, and this pyvista-vdi reads up to "
-            f"{FORM_VERSION}: update pyvista-vdi"
-        )
-    counts = _counts(image)
-    offsets = np.zeros(len(counts) + 1, dtype=np.uint64)
-    np.cumsum(counts, dtype=np.uint64, out=offsets[1:])
-    return VDI(
-        camera,
-        image.GetDimensions()[:2],
-        offsets,
-        **{name: _ragged(field, name, int(offsets[-1])) for name in _RAGGED},
-        bounds=bounds,
-        depth_origin=depth_origin,
-        metadata=metadata,
+    raise InvalidVDIError(
+        f"the VDI's VTK form has version {version}, and this pyvista-vdi reads up to "
+        f"{FORM_VERSION}: update pyvista-vdi"
     )
 
 

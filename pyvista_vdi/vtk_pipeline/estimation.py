@@ -7,6 +7,7 @@ import threading
 import traceback
 import weakref
 from dataclasses import dataclass
+from typing import Any
 
 from pyvista_vdi.errors import Cancelled
 from pyvista_vdi.opencl_runtime import get_runtime
@@ -40,10 +41,21 @@ class Estimation:
         """Whether an estimate is being made."""
         return self._job is not None and not self._job.done.is_set()
 
-    def start(self, vdi: VDI, request: Request, view: View) -> None:
-        """Begin another, in place of the one before."""
+    def start(
+        self, vdi: VDI, request: Request, view: View, shown: dict[str, Any] | None = None
+    ) -> None:
+        """Begin another, in place of the one before.
+
+        Parameters
+        ----------
+        vdi, request, view
+            What is judged, what it was made of, and where it is seen from.
+        shown : dict, optional
+            Clipping planes, cropping and opacity multiplier of the picture: keyword arguments of
+            :meth:`ViewErrorEstimator.estimate`.
+        """
         self.cancel()
-        self._job = _Job(vdi, request, view, self._estimator)
+        self._job = _Job(vdi, request, view, shown or {}, self._estimator)
         self._job.start()
 
     def take(self) -> Estimate | None:
@@ -83,12 +95,14 @@ class _Job(threading.Thread):
         vdi: VDI,
         request: Request,
         view: View,
+        shown: dict[str, Any],
         estimator: tuple[Request, ViewErrorEstimator] | None,
     ) -> None:
         super().__init__(name="pyvista-vdi estimate", daemon=True)
         self._vdi = vdi
         self._request = request
         self._view = view
+        self._shown = shown
         self.estimator = estimator
         self.cancelled = threading.Event()
         self.done = threading.Event()
@@ -118,10 +132,13 @@ class _Job(threading.Thread):
                     request.transfer_function,
                     sample_distance=request.settings["sample_distance"],
                     lights=request.settings["lights"],
+                    ambient_occlusion=request.settings["ambient_occlusion"],
                     device=runtime,
                 )
                 self.estimator = (request, estimator)
-            error = self.estimator[1].estimate(self._vdi, self._view.camera, self._view.size)
+            error = self.estimator[1].estimate(
+                self._vdi, self._view.camera, self._view.size, **self._shown
+            )
         self.estimate = Estimate(self._vdi, self._view, error)
 
 

@@ -101,6 +101,20 @@ class Frame:
         depth = -(p3 - n * q3) / (n * q2 - p2)
         return np.where(z >= 1.0, np.inf, depth) if background else depth
 
+    def window_depth(self, depth: NDArray[Any]) -> NDArray[np.float32]:
+        """Convert view depth to window depth: what :meth:`view_depth` undoes.
+
+        Parameters
+        ----------
+        depth : numpy.ndarray
+            World units; infinite where there is nothing, and so is the result.
+        """
+        (p2, p3), (q2, q3) = self.projection[:, 2:]
+        there = np.isfinite(depth)
+        z = -np.where(there, depth, 1.0).astype(np.float64)
+        n = (z * p2 + p3) / (z * q2 + q3)
+        return np.where(there, (n + 1.0) / 2.0, np.inf).astype(np.float32)
+
     def coarser(self, size: tuple[int, int]) -> Frame:
         """Return the same view with fewer pixels, which fill the viewport just as exactly.
 
@@ -138,6 +152,14 @@ class Frame:
         if far < farthest - slack:
             rows.append([0, 0, -far, 0, 0, 1])
         return np.array(rows, dtype=np.float64) if rows else None
+
+    def in_world(self, planes: Matrix | None) -> Matrix | None:
+        """Return planes of :meth:`clipping_planes` in world coordinates, (k, 6)."""
+        if planes is None:
+            return None
+        origins = np.column_stack([planes[:, :3], np.ones(len(planes))])
+        origins = origins @ np.linalg.inv(self.to_view).T
+        return np.hstack([origins[:, :3], planes[:, 3:] @ self.to_view[:3, :3]])
 
     def depths_of(self, bounds: tuple[float, ...]) -> tuple[float, float]:
         """Return the least and the largest view depth of a box in the model frame."""

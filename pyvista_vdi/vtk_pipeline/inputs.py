@@ -114,6 +114,8 @@ class ImageInput(Input):
         super().__init__()
         self._image = image
         self._port = port
+        # A port does not keep its algorithm; what is connected in VTK does
+        self._producer: Any = None if port is None else port.GetProducer()
         self._read_at: int | None = None
 
     def vdi(self) -> VDI | None:
@@ -132,15 +134,14 @@ class ImageInput(Input):
     def stamp(self) -> Any:
         """Return the image's time stamp."""
         if self._port is not None:
-            self._port.GetProducer().UpdateInformation()
-            return self._port.GetProducer().GetMTime()
+            self._producer.UpdateInformation()
+            return self._producer.GetMTime()
         return self._image.GetMTime()
 
     def _updated(self) -> Any:
         if self._port is not None:
-            producer = self._port.GetProducer()
-            producer.Update(self._port.GetIndex())
-            self._image = producer.GetOutputDataObject(self._port.GetIndex())
+            self._producer.Update(self._port.GetIndex())
+            self._image = self._producer.GetOutputDataObject(self._port.GetIndex())
         return self._image
 
 

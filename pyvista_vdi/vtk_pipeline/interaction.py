@@ -118,11 +118,14 @@ class WindowClock:
     seconds : float or None
         What the last one that was raycast took, from the window's StartEvent to its EndEvent;
         ``None`` before. The time between two frames would count how long a hand rests.
+    of_frame : dict
+        What those who draw share within a frame; empty between two.
     """
 
     def __init__(self, window: Any) -> None:
         self.number = 0
         self.seconds: float | None = None
+        self.of_frame: dict[Any, Any] = {}
         self._window = vtkWeakReference()
         self._window.Set(window)
         self._painters: weakref.WeakSet[Any] = weakref.WeakSet()
@@ -237,6 +240,7 @@ class WindowClock:
     def _start(self) -> None:
         self._started = time.perf_counter()
         self._frame = _Frame()
+        self.of_frame.clear()
         self.number += 1
         # Between two frames only: no frame shows two generations, nor does a picture in tiles
         painters = list(self._painters)
@@ -249,6 +253,7 @@ class WindowClock:
 
     def _end(self) -> None:
         self._foreground.close()
+        self.of_frame.clear()
         started, self._started = self._started, None
         frame, self._frame = self._frame, _Frame()
         self._previewed = frame.preview

@@ -12,7 +12,9 @@ from typing import Any, NoReturn
 
 from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 
+from pyvista_vdi.cropping import checked_opacity_multiplier
 from pyvista_vdi.errors import UnsupportedError
+from pyvista_vdi.picking import checked_opacity
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.vtk_pipeline.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.interaction import checked_rate
@@ -69,6 +71,15 @@ class VDIMapperMethods:
         """Draw a VDI, or its canonical image."""
         self._set_input(None if data is None else input_of(data))
 
+    def GetInputDataObject(self, *args: Any) -> Any:
+        """Return the box of the VDI's bounds that VTK is given in its place, and warn.
+
+        Nothing that draws asks for it by this method; what writes the scene for another renderer
+        does, and gets an empty box.
+        """
+        self.painter.say_not_exported()
+        return super().GetInputDataObject(*args)  # type: ignore[misc]
+
     def SetVDI(self, vdi: VDI) -> None:
         """Draw this VDI."""
         self._set_input(input_of(vdi))
@@ -100,6 +111,29 @@ class VDIMapperMethods:
     def GetAutomaticView(self) -> bool:
         """Whether a source without camera gets the view of the first frame."""
         return self.painter.upkeep.automatic_view
+
+    # -- how it is drawn -------------------------------------------------------------------------
+
+    def SetOpacityMultiplier(self: Any, multiplier: float) -> None:
+        """Multiply the extinction of everything that is drawn; 1 by default.
+
+        It acts on the next frame, without another VDI: 2 is twice as dense, 0 transparent. For
+        what is not opaque it is the same as dividing the volume property's scalar opacity unit
+        distance by it; changing that itself makes the VDI anew.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is no finite number, or below 0.
+        """
+        factor = checked_opacity_multiplier(multiplier)
+        if factor != self.painter.opacity_multiplier:
+            self.painter.opacity_multiplier = factor
+            self.Modified()
+
+    def GetOpacityMultiplier(self) -> float:
+        """Return the factor of the extinction."""
+        return self.painter.opacity_multiplier
 
     # -- while a hand moves ----------------------------------------------------------------------
 
@@ -198,6 +232,28 @@ class VDIMapperMethods:
         """Whether off-screen windows are treated as if somebody watched them."""
         return self.painter.interaction.off_screen
 
+    # -- picking ---------------------------------------------------------------------------------
+
+    def SetPickingOpacity(self, opacity: float) -> None:
+        """Set the opacity that a ray must reach in the VDI to pick it.
+
+        At least 0 and less than 1; 0.05 by default, as in VTK's pickers for volumes. What is
+        compared says ``SetPickingAccumulated``; see :func:`pyvista_vdi.pick`.
+        """
+        self.painter.selection.opacity = checked_opacity(opacity)
+
+    def GetPickingOpacity(self) -> float:
+        """Return the opacity that a ray must reach in the VDI to pick it."""
+        return self.painter.selection.opacity
+
+    def SetPickingAccumulated(self, accumulated: bool) -> None:
+        """Compare the opacity from the ray's beginning (the default), or each supersegment's."""
+        self.painter.selection.accumulated = bool(accumulated)
+
+    def GetPickingAccumulated(self) -> bool:
+        """Whether the opacity from the ray's beginning is compared."""
+        return self.painter.selection.accumulated
+
     def _set_input(self: Any, source: Input | None) -> None:
         self.painter.set_input(source)
         self.Modified()
@@ -233,14 +289,27 @@ class VDIMapperMethods:
         """Refuse."""
         _refuse_blending()
 
-    def SetCropping(self, on: int) -> None:
-        """Refuse to crop; ``SetCropping(0)`` is accepted."""
-        if on:
-            self.CroppingOn()
+    def SetGlobalIlluminationReach(self, reach: float) -> None:
+        """Refuse VTK's shadows along light rays; 0 is accepted."""
+        if reach:
+            _refuse_illumination("SetGlobalIlluminationReach")
 
-    def CroppingOn(self) -> NoReturn:
+    def SetVolumetricScatteringBlending(self, share: float) -> None:
+        """Refuse VTK's volumetric scattering; 0 is accepted."""
+        if share:
+            _refuse_illumination("SetVolumetricScatteringBlending")
+
+    def SetComputeNormalFromOpacity(self, on: bool) -> None:
+        """Refuse normals from opacity; ``SetComputeNormalFromOpacity(0)`` is accepted."""
+        if on:
+            self.ComputeNormalFromOpacityOn()
+
+    def ComputeNormalFromOpacityOn(self) -> NoReturn:
         """Refuse."""
-        raise UnsupportedError("a VDI cannot be cropped: use clipping planes (AddClippingPlane)")
+        raise UnsupportedError(
+            "a VDI is shaded by the gradient of its scalars, and when it is generated: leave "
+            "ComputeNormalFromOpacity off"
+        )
 
     def SetMaskInput(self, mask: Any) -> None:
         """Refuse a mask; ``SetMaskInput(None)`` is accepted."""
@@ -253,7 +322,15 @@ class VDIMapperMethods:
 
 def _refuse_blending() -> NoReturn:
     raise UnsupportedError(
-        "a VDI stores what is composited along a ray, so only composite blending is supported"
+        "a VDI stores what is composited along a ray, so only composite blending is supported: "
+        "draw the volume itself by one of VTK's mappers for another"
+    )
+
+
+def _refuse_illumination(setter: str) -> NoReturn:
+    raise UnsupportedError(
+        f"{setter} lights a volume while it is drawn, and a VDI is lit when it is generated: use "
+        "ambient_occlusion (VDISource.SetAmbientOcclusion), which darkens what is hidden"
     )
 
 
@@ -264,7 +341,9 @@ class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
     (``SetInputData``) or a :class:`~pyvista_vdi.VDI` (``SetVDI``). Before each frame it brings
     the input up to date and raycasts it from the frame's view, ending rays at opaque geometry;
     an image is kept as long as view, depth and VDI stay the same. Clipping planes
-    (``AddClippingPlane``) are honoured; other blending modes, cropping and masks are refused.
+    (``AddClippingPlane``), cropping (``SetCropping`` and its regions) and the opacity multiplier
+    act on the next frame without another VDI; other blending modes, masks and VTK's global
+    illumination are refused.
 
     Notes
     -----

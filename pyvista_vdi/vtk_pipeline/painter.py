@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.camera import Camera
+from pyvista_vdi.cropping import Cropping
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, UnsupportedError
 from pyvista_vdi.opencl_runtime import Runtime, get_runtime
 from pyvista_vdi.raycast import render_vdi
@@ -22,6 +24,8 @@ from pyvista_vdi.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.frame import Frame, as_array, sampled
 from pyvista_vdi.vtk_pipeline.inputs import Input
 from pyvista_vdi.vtk_pipeline.interaction import Interaction, WindowClock, reduced
+from pyvista_vdi.vtk_pipeline.overlap import Overlaps, Sight, rectangle, same_depth
+from pyvista_vdi.vtk_pipeline.selection import Seen, Selection
 from pyvista_vdi.vtk_pipeline.status import CornerTexts, VDIStatus
 from pyvista_vdi.vtk_pipeline.texture import ImageTexture
 from pyvista_vdi.vtk_pipeline.upkeep import Scene, Upkeep
@@ -48,18 +52,25 @@ class Task:
         View depth at which rays end, float32 (H, W), top row first.
     full_size : (int, int)
         Width and height of the viewport in pixels; the image of a preview is smaller.
+    cropping : Cropping or None
+        Regions of the model frame that are drawn.
+    opacity_multiplier : float
+        Factor of the extinction.
     """
 
     frame: Frame
     planes: NDArray[np.float64] | None
     depth: NDArray[np.float32] | None
     full_size: tuple[int, int]
+    cropping: Cropping | None = None
+    opacity_multiplier: float = 1.0
 
     @property
     def key(self) -> Any:
         """What its image is known by; the quality is in it as the two sizes."""
         planes = None if self.planes is None else self.planes.tobytes()
-        return (self.frame.camera, self.frame.size, self.full_size, planes)
+        looks = (self.cropping, self.opacity_multiplier)
+        return (self.frame.camera, self.frame.size, self.full_size, planes, looks)
 
     @property
     def preview(self) -> bool:
@@ -79,16 +90,24 @@ class Drawn:
         What it was raycast for; ``None`` for the empty image before the first.
     number : int or None
         By which an upload is known.
+    joint : bool
+        Whether it is a part of a picture that other actors show the rest of.
     """
 
     image: Image
     task: Task | None = None
     number: int | None = None
+    joint: bool = False
 
     @property
     def preview(self) -> bool:
         """Whether it has fewer pixels than the viewport."""
         return self.task is not None and self.task.preview
+
+    @property
+    def smooth(self) -> bool:
+        """Whether its pixels are interpolated: not where the neighbours are another actor's."""
+        return self.preview and not self.joint
 
 
 class Painter:
@@ -100,8 +119,10 @@ class Painter:
 
     def __init__(self) -> None:
         self.device: Any = None
+        self.opacity_multiplier = 1.0
         self.interaction = Interaction()
         self.texts = CornerTexts()
+        self.selection = Selection()
         self.proxy = make_proxy()
         self._voice = Voice()
         self.upkeep = Upkeep(self.interaction, self._voice, self.texts)
@@ -152,15 +173,26 @@ class Painter:
         if bounds is not None:
             place_proxy(self.proxy, bounds)
 
+    def say_not_exported(self) -> None:
+        """Say once that a scene which is written for another renderer lacks the VDI."""
+        self._voice.warn(
+            "the scene is being exported without its VDI: export_html, export_vtksz and views that "
+            "are rendered in the browser (client-side) get an empty box in its place; use "
+            "screenshots, movies, or server-side rendering"
+        )
+
     def release(self) -> None:
         """Free the texture and the images kept, and end what goes on; a frame begins anew."""
         self.upkeep.close()
         self._texture.release()
+        self.selection.release()
         self._images.clear()
 
     def take_settings(self, other: Painter) -> None:
-        """Take over what another allows and when it regenerates."""
+        """Take over how dense another draws, what it allows and when it regenerates."""
+        self.opacity_multiplier = other.opacity_multiplier
         vars(self.interaction).update(vars(other.interaction))
+        self.selection.take_settings(other.selection)
         self.upkeep.regeneration.policy = other.upkeep.regeneration.policy
         self.upkeep.regeneration.bound = other.upkeep.regeneration.bound
 
@@ -206,20 +238,15 @@ class Painter:
                 "VDIMapper draws only behind a VDIActor: use VDIActor in place of vtkVolume"
             )
             return
-        try:
-            self._last = self._paint(mapper, renderer)
-        except KeyboardInterrupt as interrupt:
-            self._voice.warn(
-                "generating the VDI was interrupted: what was shown stays; call "
-                "actor.regenerate() to try again"
-            )
-            self._note(interrupt)
-        except Exception as error:  # VTK would swallow it
-            self._cannot_draw(error)
+        if renderer.GetSelector() is not None:
+            self._select(mapper, renderer)
+            return
+        self.selection.leave(self._actor.Get())
+        self._last = self._guarded(self._paint, mapper, renderer) or self._last
         window, drawn = renderer.GetRenderWindow(), self._last
         WindowClock.of(window).showed(drawn.preview)
         try:
-            self._texture.show(window, drawn.image, drawn.number, smooth=drawn.preview)
+            self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
         except DeviceError as error:
             self._cannot_draw(error)
         self.texts.write(renderer, self.status)
@@ -228,6 +255,21 @@ class Painter:
     def end(self) -> None:
         """Let go of the texture unit."""
         self._texture.let_go()
+        self.selection.let_go()
+
+    def _guarded(self, draw: Callable[[Any, Any], Any], mapper: Any, renderer: Any) -> Any:
+        """Return what a part of drawing returns, or ``None`` and say what went wrong."""
+        try:
+            return draw(mapper, renderer)
+        except KeyboardInterrupt as interrupt:
+            self._voice.warn(
+                "generating the VDI was interrupted: what was shown stays; call "
+                "actor.regenerate() to try again"
+            )
+            self._note(interrupt)
+        except Exception as error:  # VTK would swallow it
+            self._cannot_draw(error)
+        return None
 
     def raise_trouble(self) -> None:
         """Raise, once, what a frame could not be drawn for: nothing passes through VTK's renderer.
@@ -253,6 +295,34 @@ class Painter:
 
     def _paint(self, mapper: Any, renderer: Any) -> Drawn:
         """Return the frame's image."""
+        sight = self._sight(mapper, renderer)
+        if sight is None:
+            return self._last
+        part = Overlaps.of(sight.clock).part(sight, renderer, _sights)
+        if part is not None:
+            return Drawn(
+                part.image, Task(part.frame, None, None, part.full_size), part.number, joint=True
+            )
+        vdi, frame, clock = sight.vdi, sight.frame, sight.clock
+        depth = None
+        if frame.sees_opaque_before(renderer, sight.actor, vdi.bounds):
+            depth = frame.opaque_depth(renderer)
+            if np.isposinf(depth).all():
+                depth = None
+        task = Task(frame, sight.planes, depth, frame.size, **sight.looks)
+        drawn = self._kept(task)
+        if drawn is not None:
+            return drawn  # however the frame is to be: where it is there, full costs nothing
+        size = self.preview_size(mapper, renderer, clock, frame.size)
+        if size == frame.size:
+            return self._raycast(vdi, task, clock)
+        sight = sight.coarser(size)
+        depth = None if depth is None else sampled(depth, size)
+        task = Task(sight.frame, sight.planes, depth, task.full_size, **sight.looks)
+        return self._kept(task) or self._raycast(vdi, task, clock)
+
+    def _sight(self, mapper: Any, renderer: Any) -> Sight | None:
+        """Return the VDI as the frame is to show it, brought up to date; ``None`` if none is."""
         actor = self._actor.Get()
         clock = WindowClock.of(renderer.GetRenderWindow())
         clock.join(self, renderer)
@@ -260,40 +330,70 @@ class Painter:
         frame = Frame.current(renderer, model_transform)
         view = _view_of(renderer, model_transform, frame)
         self._scene = (view.camera, weakref.ref(clock))
-        only = len(self._renderers()) == 1
-        scene = Scene(renderer, model_transform, view, clock, only)
+        only = len(self.renderers()) == 1
+        looks = self._looks(mapper)
+        shown = {"clipping_planes": self._world_planes(mapper, frame), **looks}
+        scene = Scene(renderer, model_transform, view, clock, only, shown)
         vdi = self.upkeep.current(scene, self.status)
         if vdi is None:
-            return self._last
+            return None
         place_proxy(self.proxy, vdi.bounds)
-        if mapper.GetCropping():
-            raise UnsupportedError(
-                "cropping (CroppingOn) is not honoured: use clipping planes (AddClippingPlane)"
-            )
         if vdi is not self._drawn():
             self._images.clear()
             self._drawn = weakref.ref(vdi)
             self._generation += 1
-        depth = None
-        if frame.sees_opaque_before(renderer, actor, vdi.bounds):
-            depth = frame.opaque_depth(renderer)
-            if np.isposinf(depth).all():
-                depth = None
-        planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
-        task = Task(frame, planes, depth, frame.size)
-        drawn = self._kept(task)
-        if drawn is not None:
-            return drawn  # however the frame is to be: where it is there, full costs nothing
-        size = self._size(mapper, renderer, clock, frame.size)
-        if size == frame.size:
-            return self._raycast(vdi, task, clock)
-        frame = frame.coarser(size)
-        planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
-        depth = None if depth is None else sampled(depth, size)
-        task = Task(frame, planes, depth, task.full_size)
-        return self._kept(task) or self._raycast(vdi, task, clock)
+        return Sight(self, mapper, actor, frame, clock, vdi, looks)
 
-    def _size(
+    def beside(self, mapper: Any, renderer: Any) -> Sight | None:
+        """Return the VDI as it is to be seen beside another one; ``None`` if it is not.
+
+        Never raises. What is out of the picture is not brought up to date.
+        """
+        return self._guarded(self._sight_in_picture, mapper, renderer)  # type: ignore[no-any-return]
+
+    def _sight_in_picture(self, mapper: Any, renderer: Any) -> Sight | None:
+        actor = self._actor.Get()
+        bounds = None if self.input is None else self.input.bounds()
+        if actor is None or bounds is None:
+            return None
+        if rectangle(Frame.current(renderer, as_array(actor.GetMatrix())), bounds) is None:
+            return None
+        return self._sight(mapper, renderer)
+
+    def _looks(self, mapper: Any) -> dict[str, Any]:
+        """Return the cropping and the opacity multiplier, arguments of whatever raycasts."""
+        return {
+            "cropping": Cropping.from_any(mapper),
+            "opacity_multiplier": self.opacity_multiplier,
+        }
+
+    def _world_planes(self, mapper: Any, frame: Frame) -> NDArray[np.float64] | None:
+        """Return what cuts the VDI made last, world coordinates: for the estimate of its error."""
+        vdi = self.upkeep.vdi
+        if vdi is None:
+            return None
+        return frame.in_world(frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds))
+
+    def _select(self, mapper: Any, renderer: Any) -> None:
+        """Draw what can be picked of what the last frame showed, or the first would show."""
+        actor, selector = self._actor.Get(), renderer.GetSelector()
+        window = renderer.GetRenderWindow()
+        self.selection.enter(actor, selector)
+        seen = None
+        try:
+            if not isinstance(self._drawn(), VDI):
+                self._last = self._paint(mapper, renderer)
+            vdi = self._drawn()
+            if isinstance(vdi, VDI):
+                frame = Frame.current(renderer, as_array(actor.GetMatrix()))
+                planes = frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
+                seen = Seen(vdi, frame, planes, self._looks(mapper))
+            self.selection.show(window, selector, seen, self.device)
+        except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
+            self._voice.warn(f"the VDI cannot be picked: {type(error).__name__}: {error}", error)
+            self.selection.show(window, selector, None, self.device)
+
+    def preview_size(
         self, mapper: Any, renderer: Any, clock: WindowClock, full: tuple[int, int]
     ) -> tuple[int, int]:
         """Return the size of this frame's image: that of the viewport, or less."""
@@ -303,7 +403,7 @@ class Painter:
     def _kept(self, task: Task) -> Drawn | None:
         """Return the image of exactly this view, if there is one."""
         drawn = self._images.get(task.key)
-        if drawn is None or drawn.task is None or not _same(drawn.task.depth, task.depth):
+        if drawn is None or drawn.task is None or not same_depth(drawn.task.depth, task.depth):
             return None
         return drawn
 
@@ -316,6 +416,8 @@ class Painter:
             task.frame.size,
             opaque_depth=task.depth,
             clipping_planes=task.planes,
+            cropping=task.cropping,
+            opacity_multiplier=task.opacity_multiplier,
             device=self.device,
         )
         clock.drawn(task.frame.size, task.full_size, time.perf_counter() - before)
@@ -333,7 +435,7 @@ class Painter:
 
     def renderer(self) -> Any:
         """Return the renderer that is drawing the actor; ``None`` if it has none."""
-        renderers = self._renderers()
+        renderers = self.renderers()
         if len(renderers) > 1:
             for candidate in renderers:
                 self._watch(candidate)
@@ -345,7 +447,7 @@ class Painter:
             renderers = drawing or renderers
         return renderers[0] if renderers else None
 
-    def _renderers(self) -> list[Any]:
+    def renderers(self) -> list[Any]:
         """Return all renderers that show the actor."""
         actor = self._actor.Get()
         if actor is None:
@@ -406,8 +508,21 @@ def _is_viewport(renderer: Any) -> bool:
     return viewport == [x[0], y[0], width[0], height[0]]
 
 
-def _planes(mapper: Any, vdi: VDI, frame: Frame) -> NDArray[np.float64] | None:
-    return frame.clipping_planes(mapper.GetClippingPlanes(), vdi.bounds)
+def _sights(own: Sight, renderer: Any) -> list[Sight]:
+    """Return what the renderer shows of VDIs in this frame, in its order."""
+    sights = []
+    props = renderer.GetViewProps()
+    for i in range(props.GetNumberOfItems()):
+        prop = props.GetItemAsObject(i)
+        if prop is own.actor:
+            sights.append(own)
+            continue
+        mapper = prop.GetMapper() if isinstance(prop, vtkVolume) and prop.GetVisibility() else None
+        painter = getattr(mapper, "painter", None)
+        sight = painter.beside(mapper, renderer) if isinstance(painter, Painter) else None
+        if sight is not None:
+            sights.append(sight)
+    return sights
 
 
 def _view_of(renderer: Any, model_transform: NDArray[np.float64], frame: Frame) -> View:
@@ -416,9 +531,3 @@ def _view_of(renderer: Any, model_transform: NDArray[np.float64], frame: Frame) 
         return View.of(renderer, model_transform)
     except UnsupportedError:  # a shear, an off-axis projection: drawn all the same
         return View(frame.camera, frame.size)
-
-
-def _same(a: NDArray[np.float32] | None, b: NDArray[np.float32] | None) -> bool:
-    if a is None or b is None:
-        return a is b
-    return np.array_equal(a, b)

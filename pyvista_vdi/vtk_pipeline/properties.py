@@ -56,8 +56,8 @@ def transfer_function_from_property(
     Raises
     ------
     UnsupportedError
-        If a label map, a 2D transfer function or cubic interpolation is on, or the components'
-        dependence does not fit the volume.
+        If a label map, a 2D transfer function, an intensity of clipped voxels or cubic
+        interpolation is on, or the components' dependence does not fit the volume.
     InvalidArgumentError
         If it is no volume property, or its functions have no points.
     """
@@ -104,6 +104,8 @@ def _refuse_unsupported(prop: vtkVolumeProperty, rgba: bool) -> None:
         reasons.append("a 2D transfer function (SetTransferFunctionModeTo1D())")
     if getattr(prop, "GetNumberOfLabels", lambda: 0)() > 0:
         reasons.append("a label map's functions (remove SetLabelColor, SetLabelScalarOpacity)")
+    if prop.GetUseClippedVoxelIntensity():
+        reasons.append("an intensity of clipped voxels (SetUseClippedVoxelIntensity(0))")
     if prop.GetInterpolationType() not in _INTERPOLATION:
         reasons.append("cubic interpolation (SetInterpolationTypeToLinear())")
     if reasons:

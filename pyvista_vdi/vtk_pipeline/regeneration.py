@@ -99,6 +99,7 @@ class Regeneration:
         self._stamp: Any = None
         self._failed_at: Any = None
         self._view: View | None = None
+        self._shown: dict[str, Any] = {}
         self._moved_at = 0.0
         self._estimated_at = -math.inf
         self._moving = False
@@ -130,6 +131,7 @@ class Regeneration:
         *,
         moving: bool,
         ask: Callable[[], VDIStatus],
+        shown: dict[str, Any],
     ) -> None:
         """Look at the frame's view and at what the VDI was made of, and begin what is needed.
 
@@ -145,6 +147,9 @@ class Regeneration:
             Whether the window is interactive.
         ask : callable
             Gives the status for a policy that is a callable.
+        shown : dict
+            What the picture leaves out or shows otherwise, for the estimate. A change of it needs
+            no new VDI, and by itself no new estimate: that is of the view.
 
         Raises
         ------
@@ -152,6 +157,7 @@ class Regeneration:
             If what has changed cannot be made a VDI of; it is said once.
         """
         self._notice(source, view, moving)
+        self._shown = shown
         if stamp != self._stamp:
             self._stamp = stamp
             self._follow_changes(source, view)
@@ -235,7 +241,7 @@ class Regeneration:
             now = time.perf_counter()
             if resting or now - self._estimated_at >= _ESTIMATE_PERIOD_IN_MOTION:
                 self._estimated_at = now
-                self._estimation.start(vdi, made, view)
+                self._estimation.start(vdi, made, view, self._shown)
             return
         allowed = (1 - self.bound) * (1 if resting else _PATIENCE_IN_MOTION)
         if estimate.error.ssim < 1 - allowed:

@@ -12,15 +12,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
 from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkWeakReference
-from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkRenderingCore import vtkVolumeProperty
 
+from pyvista_vdi.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.camera import Camera, check_window_size
 from pyvista_vdi.coverage import bounds_corners, covering_view
 from pyvista_vdi.errors import (
+    Cancelled,
     InvalidArgumentError,
     InvalidVolumeError,
+    VDIError,
     VDIWarning,
 )
 from pyvista_vdi.generation import check_max_supersegments, generate_vdi
@@ -30,11 +33,13 @@ from pyvista_vdi.vdi import VDI
 from pyvista_vdi.volume import Volume
 from pyvista_vdi.vtk_pipeline.convert import (
     require_image,
+    require_image_port,
     scalars_of,
     vdi_to_image,
     volume_from_vtk,
 )
 from pyvista_vdi.vtk_pipeline.properties import color_function, transfer_function_from_property
+from pyvista_vdi.vtk_pipeline.tracking import TrackedCamera
 from pyvista_vdi.vtk_pipeline.view import View
 
 #: What a VDI's window covers.
@@ -92,21 +97,36 @@ class VDISource(VTKPythonAlgorithmBase):
 
     One ``vtkImageData`` in; out comes the VDI in its canonical VTK form (see
     :func:`~pyvista_vdi.vtk_pipeline.convert.vdi_to_image`), or as an object from :meth:`GetVDI`.
-    It executes again only if the volume, the volume property or a setting has changed since.
+    It executes again only if the volume, the volume property or a setting has changed since; its
+    ``GetMTime()`` tells of the last two.
 
     Notes
     -----
     :meth:`SetCamera` keeps a copy of the view: turning the renderer's camera afterwards does not
-    regenerate. Without a camera, a :class:`VDIMapper` behind it sets the view of its first frame.
-    Settings are checked when they are set. Python's ``Update`` and :meth:`GetVDI` raise what went
-    wrong; an update that VTK asks for writes it to VTK's output window and gives an empty image.
+    regenerate, unless :meth:`SetTrackCamera` asks for it. Without a camera, a :class:`VDIMapper`
+    behind it sets the view of its first frame. Settings are checked when they are set. Python's
+    ``Update`` and :meth:`GetVDI` raise what went wrong; an update that VTK asks for writes it to
+    VTK's output window and gives an empty image.
+
+    ``ProgressEvent`` is invoked while it works, and ``SetAbortExecute(1)`` or
+    ``SetAbortExecuteAndUpdateTime()`` stops the work, also from before the update or in an
+    algorithm upstream: Python's ``Update`` raises ``Cancelled`` then, an update that VTK asks for
+    gives an empty image. What had been made before stays, and the next update begins anew: an
+    abort is of one execution.
     """
 
     def __init__(self) -> None:
         super().__init__(
-            nInputPorts=1, inputType="vtkImageData", nOutputPorts=1, outputType="vtkImageData"
+            # Any data object, so that what is no image is refused by name: for a required image
+            # VTK would go through a composite data set block by block
+            nInputPorts=1,
+            inputType="vtkDataObject",
+            nOutputPorts=1,
+            outputType="vtkImageData",
         )
         self._camera: Camera | None = None
+        self._given: TrackedCamera | None = None
+        self._track = False
         self._window_size: tuple[int, int] | None = None
         self._coverage = "view"
         self._scalars: str | None = None
@@ -116,6 +136,7 @@ class VDISource(VTKPythonAlgorithmBase):
             "sample_distance": None,
             "tolerance": 0.0,
             "view_cone": 60.0,
+            "ambient_occlusion": None,
             "device": None,
         }
         self._lights: Lights | None = None
@@ -130,6 +151,7 @@ class VDISource(VTKPythonAlgorithmBase):
         self._request: Request | None = None
         self._error: BaseException | None = None
         self._python_waits = False
+        self.AddObserver("EndEvent", _end_abort)
         self.inputs: weakref.WeakSet[Any] = weakref.WeakSet()  # mappers' inputs that draw this
 
     # -- settings --------------------------------------------------------------------------------
@@ -139,6 +161,19 @@ class VDISource(VTKPythonAlgorithmBase):
         if args and args[-1] is not None:
             require_image(args[-1])
         super().SetInputDataObject(*args)
+
+    def SetInputConnection(self, *args: Any) -> None:
+        """Set what makes the volume, a port of another algorithm.
+
+        Raises
+        ------
+        UnsupportedError
+            If that port is known to give something other than a ``vtkImageData``. Where only an
+            update can tell, the update raises it.
+        """
+        if args and args[-1] is not None:
+            require_image_port(args[-1])
+        super().SetInputConnection(*args)
 
     def SetInputData(self, image: vtkImageData) -> None:
         """Set the volume."""
@@ -161,7 +196,8 @@ class VDISource(VTKPythonAlgorithmBase):
         Parameters
         ----------
         camera : vtkCamera or pyvista.Camera or Camera or None
-            A copy is kept. ``None`` waits for the first frame of a mapper.
+            A copy counts, unless ``SetTrackCamera(True)``. ``None`` waits for the first frame of
+            a mapper.
         model_transform : array_like, shape (4, 4), optional
             Where the volume stands in that view's world: the actor's matrix.
 
@@ -171,11 +207,46 @@ class VDISource(VTKPythonAlgorithmBase):
             If it is no camera, or has what the optical model has no place for.
         """
         view = None if camera is None else Camera.from_any(camera, model_transform=model_transform)
+        if self._given is not None:
+            self._given.watch(None)
+        follows = hasattr(camera, "GetMTime")  # a VTK object
+        self._given = TrackedCamera(camera, model_transform, self) if follows else None
         self._change("_camera", view)
+        self._watch_camera()
 
     def GetCamera(self) -> Camera | None:
         """Return the generating view on the screen, before coverage widens it."""
+        if self._track and self._given is not None and self._given.has_moved:
+            self._camera = self._given.read()
         return self._camera
+
+    def SetTrackCamera(self, track: bool) -> None:
+        """Choose whether the ``vtkCamera`` that :meth:`SetCamera` was given is followed.
+
+        Off by default. While it is on, the VDI is out of date as soon as that camera has moved,
+        and the next update makes it anew; turned off, the view stays as it is then.
+        """
+        track = bool(track)
+        if track == self._track:
+            return
+        if not track:
+            self.GetCamera()
+        self._track = track
+        self._watch_camera()
+        if self._given is not None and self._given.has_moved:
+            self.Modified()
+
+    def GetTrackCamera(self) -> bool:
+        """Whether the camera is followed."""
+        return self._track
+
+    def TrackCameraOn(self) -> None:
+        """Follow the camera."""
+        self.SetTrackCamera(True)
+
+    def TrackCameraOff(self) -> None:
+        """Keep the view as it is."""
+        self.SetTrackCamera(False)
 
     def SetWindowSize(self, *size: Any) -> None:
         """Set the screen's width and height in pixels, as two numbers or one pair."""
@@ -234,10 +305,11 @@ class VDISource(VTKPythonAlgorithmBase):
             camera do not. What is given as a list is copied now.
         """
         renderer = lights if hasattr(lights, "GetTwoSidedLighting") else None
-        self._lit_by.Set(renderer)
         fixed = None if lights is None or renderer is not None else Lights.from_any(lights)
+        if renderer is not self._lit_by.Get():
+            self._lit_by.Set(renderer)
+            self.Modified()
         self._change("_lights", fixed)
-        self.Modified()
 
     def GetLights(self) -> Lights:
         """Return what a shaded volume is lit by, as it is now."""
@@ -290,6 +362,26 @@ class VDISource(VTKPythonAlgorithmBase):
         """Return the half angle of the cone of views, degrees."""
         return self._settings["view_cone"]  # type: ignore[no-any-return]
 
+    def SetAmbientOcclusion(self, occlusion: Any) -> None:
+        """Choose whether what is hidden from the light around it is darkened.
+
+        Parameters
+        ----------
+        occlusion : None, bool, float or AmbientOcclusion
+            ``None`` or ``False``: no, which is the default; ``True``: with the default radius; a
+            number: with this radius, model units.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is none of these, or the radius is not positive.
+        """
+        self._set("ambient_occlusion", AmbientOcclusion.from_any(occlusion))
+
+    def GetAmbientOcclusion(self) -> AmbientOcclusion | None:
+        """Return the ambient occlusion, ``None`` where there is none."""
+        return self._settings["ambient_occlusion"]  # type: ignore[no-any-return]
+
     def SetDevice(self, device: Any) -> None:
         """Choose the OpenCL device; ``None`` is the default one."""
         self._set("device", device)
@@ -307,7 +399,7 @@ class VDISource(VTKPythonAlgorithmBase):
 
     def SetMetadata(self, metadata: dict[str, Any]) -> None:
         """Set entries to add to the VDI's metadata."""
-        self._metadata = dict(metadata)
+        self._change("_metadata", dict(metadata))
 
     # -- results ---------------------------------------------------------------------------------
 
@@ -316,14 +408,21 @@ class VDISource(VTKPythonAlgorithmBase):
         self.CheckLights()
         self._python_waits = True
         try:
-            result = super().Update(*args)
+            # What vtkAlgorithm.Update() does, which does not say whether it went well
+            done = super().Update(*args) if args else self.GetExecutive().Update(0)
         finally:
             self._python_waits = False
         error, self._error = self._error, None
         if error is not None:
             self.Modified()  # so that the next update tries again
             raise error
-        return result
+        if not args and not done:
+            raise InvalidVolumeError(
+                "what is before VDISource failed: VTK's output window says why"
+                if self.GetNumberOfInputConnections(0) > 0
+                else "VDISource has no input: call SetInputDataObject(volume)"
+            )
+        return None
 
     def GetVDI(self) -> VDI:
         """Return the VDI, brought up to date.
@@ -336,8 +435,7 @@ class VDISource(VTKPythonAlgorithmBase):
             What generating raises.
         """
         self.Update()
-        if self._vdi is None:
-            raise InvalidArgumentError("VDISource has no input: call SetInputDataObject(volume)")
+        assert self._vdi is not None
         return self._vdi
 
     def GetCurrentVDI(self) -> VDI | None:
@@ -363,14 +461,16 @@ class VDISource(VTKPythonAlgorithmBase):
         self.GetInputAlgorithm(0, 0).Update()
         return self._make_request(
             self.GetInputDataObject(0, 0),
-            self._camera if view is None else view.camera,
+            self.GetCamera() if view is None else view.camera,
             self._window_size if view is None else view.size,
             warn=False,
         )
 
     def TakeVDI(self, vdi: VDI, request: Request) -> None:
         """Take a VDI that was made of a request elsewhere, as if it had been made here."""
-        self._camera, self._window_size = request.screen.camera, request.screen.size
+        self._window_size = request.screen.size
+        if not (self._track and self._given is not None):  # which goes on to be followed
+            self._camera = request.screen.camera
         self._vdi, self._request = vdi, request
         self.Modified()  # the output is another
 
@@ -398,8 +498,12 @@ class VDISource(VTKPythonAlgorithmBase):
         """Announce the output's extent: one point per list."""
         width, height = 1, 1
         grid = self._input_grid()
-        if grid is not None and self._camera is not None and self._window_size is not None:
-            _, (width, height) = self._view(grid, self._camera, self._window_size, warn=False)
+        try:
+            camera = self.GetCamera()
+        except VDIError:
+            camera = None  # RequestData says what is wrong with it
+        if grid is not None and camera is not None and self._window_size is not None:
+            _, (width, height) = self._view(grid, camera, self._window_size, warn=False)
         information = outputs.GetInformationObject(0)
         executive = vtkStreamingDemandDrivenPipeline
         information.Set(executive.WHOLE_EXTENT(), (0, width - 1, 0, height - 1, 0, 0), 6)
@@ -420,20 +524,22 @@ class VDISource(VTKPythonAlgorithmBase):
         """Generate, unless nothing that matters has changed."""
         output = vtkImageData.GetData(outputs, 0)
         self._error = None
-        self.SetAbortExecute(0)  # an abort is of one execution
         try:
-            vdi = self._generated(vtkImageData.GetData(inputs[0], 0))
+            if self._aborted():
+                raise Cancelled("generating a VDI was aborted before it began")
+            vdi = self._generated(vtkDataObject.GetData(inputs[0], 0))
         except BaseException as error:  # VTK would print it and go on (or exit, on Ctrl-C)
             self._report(error)
             output.Initialize()
+            self.SetAbortOutput(isinstance(error, Cancelled))  # then the next update tries again
             return 1
         output.ShallowCopy(vdi_to_image(vdi))
         return 1
 
     # -- how -------------------------------------------------------------------------------------
 
-    def _generated(self, image: vtkImageData) -> VDI:
-        request = self._make_request(image, self._camera, self._window_size, warn=True)
+    def _generated(self, image: Any) -> VDI:
+        request = self._make_request(image, self.GetCamera(), self._window_size, warn=True)
         if self._vdi is None or self._request is None or request.key != self._request.key:
             self._vdi = generate_vdi(*request.arguments, progress=self._advance, **request.keywords)
             self._request = request
@@ -441,7 +547,7 @@ class VDISource(VTKPythonAlgorithmBase):
 
     def _make_request(
         self,
-        image: vtkImageData,
+        image: Any,
         camera: Camera | None,
         window_size: tuple[int, int] | None,
         *,
@@ -470,11 +576,14 @@ class VDISource(VTKPythonAlgorithmBase):
             self._view(image, camera, window_size, warn=warn),
             settings,
             dict(self._metadata),
-            (self._volume_key, table, tuple(settings.items())),
+            (self._volume_key, table, tuple(settings.items()), self._metadata),
         )
 
-    def _read(self, image: vtkImageData) -> Volume:
+    def _read(self, image: Any) -> Volume:
         """Return the volume; the same object as long as it is the same (it is on the device)."""
+        if image is None:
+            raise InvalidVolumeError("what is before VDISource gives no data: check its input")
+        image = require_image(image)
         array = scalars_of(image, self._scalars, self._preference)
         direction = image.GetDirectionMatrix()
         key = (
@@ -518,7 +627,9 @@ class VDISource(VTKPythonAlgorithmBase):
         executive = vtkStreamingDemandDrivenPipeline
         grid = vtkImageData()
         data = self.GetInputDataObject(0, 0)
-        if isinstance(data, vtkImageData) and data.GetNumberOfPoints() > 0:
+        if data is not None and not isinstance(data, vtkImageData):
+            return None
+        if data is not None and data.GetNumberOfPoints() > 0:
             grid.CopyStructure(data)
             return grid
         if information is None or not information.Has(executive.WHOLE_EXTENT()):
@@ -536,11 +647,19 @@ class VDISource(VTKPythonAlgorithmBase):
     def _advance(self, fraction: float) -> bool:
         self.UpdateProgress(fraction)
         going_on = self._progress is None or self._progress(fraction) is not False
-        return going_on and not self.GetAbortExecute()
+        return going_on and not self._aborted()
+
+    def _aborted(self) -> bool:
+        """Whether this algorithm, or one before it, is to stop."""
+        return bool(self.GetAbortExecute() or self.CheckAbort())
+
+    def _watch_camera(self) -> None:
+        if self._given is not None:
+            self._given.watch(VDISource.Modified if self._track else None)
 
     def _report(self, error: BaseException) -> None:
         self._error = error
-        if not self._python_waits:
+        if not self._python_waits and not isinstance(error, Cancelled):
             vtkOutputWindow.GetInstance().DisplayErrorText(f"VDISource: {error}\n")
 
     def _set(self, name: str, value: Any) -> None:
@@ -577,6 +696,16 @@ class VDISource(VTKPythonAlgorithmBase):
             functions.append(prop.GetStoredGradientOpacity())
         for watched in (prop, *functions):
             self._observed.append((watched, watched.AddObserver("ModifiedEvent", changed)))
+
+
+def _end_abort(source: Any, event: str) -> None:
+    """Take back an abort that has been obeyed: it is of one execution.
+
+    Not before the end, or VTK would report the work as finished, and whoever aborts in each
+    ``ProgressEvent`` would do it again.
+    """
+    if source.GetAbortOutput():
+        source.SetAbortExecute(0)
 
 
 def _corners(grid: vtkImageData) -> NDArray[np.float64]:

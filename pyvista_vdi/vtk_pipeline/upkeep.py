@@ -40,6 +40,9 @@ class Scene:
         Its window's.
     only : bool
         Whether no other renderer shows the actor.
+    shown : dict
+        Clipping planes (world coordinates), cropping and opacity multiplier of its picture:
+        arguments of :meth:`ViewErrorEstimator.estimate`.
     """
 
     renderer: Any
@@ -47,6 +50,7 @@ class Scene:
     view: View
     clock: WindowClock
     only: bool
+    shown: dict[str, Any]
 
 
 class Upkeep:
@@ -174,7 +178,12 @@ class Upkeep:
         moving = self._interaction.moving(scene.renderer.GetRenderWindow())
         try:
             self.regeneration.look(
-                source.source, source.stamp(), scene.view, moving=moving, ask=ask
+                source.source,
+                source.stamp(),
+                scene.view,
+                moving=moving,
+                ask=ask,
+                shown=scene.shown,
             )
         except Exception as error:  # what is shown can still be drawn
             self._complain(error)

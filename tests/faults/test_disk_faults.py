@@ -125,7 +125,7 @@ def test_a_disk_that_fills_at_each_write(suffix, old, disk, tmp_path):
     vdi_number(2).save(tmp_path / f"counted{suffix}")
     calls = disk.last.calls
     (tmp_path / f"counted{suffix}").unlink()
-    assert calls > 10
+    assert calls > (1 if suffix == ".vti" else 10)  # VTK hands over all at once
     for k in range(calls):
         disk.calls = k
         with pytest.raises(VDIFileError, match=r"could not be written: No space left on device"):

@@ -21,6 +21,8 @@ CASES = {
     "headlight": {"shade": True},
     "light kit": {"shade": True, "lights": "kit"},
     "scene light": {"shade": True, "lights": "scene"},
+    "coloured headlight": {"shade": True, "lights": "coloured"},
+    "dimmed headlight": {"shade": True, "lights": "dimmed"},
     "spotlight": {"shade": True, "lights": "spot"},
     "gradient opacity": {"gradient": GRADIENT},
     "gradient opacity and shading": {"shade": True, "gradient": GRADIENT},
@@ -55,6 +57,14 @@ def put_lights(renderer, kind):
         vtkLightKit().AddLightsToRenderer(renderer)
         return
     light = vtkLight()
+    if kind in ("coloured", "dimmed"):  # of which VTK shades the second by other rules
+        light.SetLightTypeToHeadlight()
+        light.SetAmbientColor(0.3, 0.1, 0.0)
+        light.SetDiffuseColor(1.0, 0.6, 0.3)
+        light.SetSpecularColor(0.2, 0.9, 0.4)
+        light.SetIntensity(1.0 if kind == "coloured" else 0.7)
+        renderer.AddLight(light)
+        return
     light.SetLightTypeToSceneLight()
     light.SetPosition(300, -500, 600)
     light.SetFocalPoint(90, 100, 90)

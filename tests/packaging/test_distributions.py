@@ -132,7 +132,9 @@ def test_wheel_metadata_and_entry_points(wheel, wheel_names):
     assert "pyvista-vdi = pyvista_vdi.cli:main" in entry_points
     assert "[pyvista.plotter_components]\nadd_vdi = pyvista_vdi.plotting.component" in entry_points
     assert "[pyvista.accessors]\nvdi = pyvista_vdi.plotting.accessor" in entry_points
-    assert "[pyvista.readers]\n.vdi = pyvista_vdi.plotting.reader:read_vdi" in entry_points
+    for group, function in (("readers", "reader:read_vdi"), ("writers", "writer:write_vdi")):
+        names = [f"{suffix} = pyvista_vdi.plotting.{function}" for suffix in (".exr", ".vdi")]
+        assert "\n".join([f"[pyvista.{group}]", *names]) in entry_points
 
 
 def test_sdist_holds_the_repository(source, tmp_path):
@@ -156,11 +158,16 @@ def test_editable_install_finds_the_kernels(source, tmp_path):
         archive.extractall(site)
     kernels = sorted(n for n in names if n.startswith("opencl/") and n.endswith(".cl"))
     assert kernels
-    # The editable finder goes first, so that it is asked although an installed copy may exist.
+    # An editable install of the same version has a finder of the same name: it is forgotten first.
+    # The new one goes before all others, so that it is asked although a copy may be installed.
     code = f"""
 import importlib.resources, site, sys
+for name in [name for name in sys.modules if name.startswith("__editable__")]:
+    del sys.modules[name]
+known = list(sys.meta_path)
+sys.path.insert(0, {str(site)!r})
 site.addsitedir({str(site)!r})
-sys.meta_path.sort(key=lambda finder: "Editable" not in getattr(finder, "__name__", ""))
+sys.meta_path.sort(key=lambda finder: finder in known)
 import pyvista_vdi
 folder = importlib.resources.files("pyvista_vdi.opencl")
 for name in {kernels!r}:

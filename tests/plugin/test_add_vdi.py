@@ -226,7 +226,12 @@ def test_regenerate_takes_the_current_view(plotter, calls):
 
 def test_settings_reach_the_generator(plotter):
     actor = plotter.add_vdi(
-        soft_ball(), max_supersegments=3, sample_distance=0.1, tolerance=0.01, view_cone=30.0
+        soft_ball(),
+        max_supersegments=3,
+        sample_distance=0.1,
+        tolerance=0.01,
+        view_cone=30.0,
+        ambient_occlusion=0.4,
     )
     shown(plotter)
     made_by = actor.vdi.metadata
@@ -234,6 +239,7 @@ def test_settings_reach_the_generator(plotter):
     assert made_by["sample_distance"] == 0.1
     assert made_by["tolerance"] == 0.01
     assert made_by["view_cone"] == 30.0
+    assert made_by["ambient_occlusion"]["radius"] == 0.4
     assert made_by["scalars"] == "v"
 
 
@@ -297,6 +303,28 @@ def test_copy_shows_the_same_and_leaves_the_original_alone(plotter):
     np.testing.assert_array_equal(shown(plotter), before)
     plotter.remove_actor(twin)
     plotter.add_actor(actor, reset_camera=False)
+    np.testing.assert_array_equal(shown(plotter), before)
+
+
+@pytest.mark.parametrize("deep", [True, False])
+def test_copies_of_what_the_plotter_holds_alone(plotter, deep):
+    """PyVista's mappers lose their lookup table with the last reference from Python."""
+    plotter.add_vdi(soft_ball(), name="ball", **LOOKS)
+    before = shown(plotter)
+    plotter.add_mesh(pv.Sphere(radius=0.1), name="mesh")
+    plotter.remove_actor("mesh")
+    gc.collect()
+    twin = plotter.actors["ball"].copy(deep=deep)
+    plotter.remove_actor("ball")
+    plotter.add_actor(twin, reset_camera=False)
+    np.testing.assert_array_equal(shown(plotter), before)
+    # Without the volume, the property is VTK's own
+    alone = plotter.add_vdi(twin.vdi, show_scalar_bar=False)
+    plotter.remove_actor(twin)
+    before = shown(plotter)
+    twin = alone.copy(deep=deep)
+    plotter.remove_actor(alone)
+    plotter.add_actor(twin, reset_camera=False)
     np.testing.assert_array_equal(shown(plotter), before)
 
 

@@ -408,7 +408,13 @@ def test_lights_of_a_renderer():
     lights = Lights.from_any(renderer)
     assert not lights.two_sided
     (found,) = lights.lights
-    assert (found.kind, found.position, found.diffuse) == ("camera", (1, 2, 3), (0.5, 0.25, 0))
+    assert (found.kind, found.position, found.diffuse) == ("camera", (1, 2, 3), (1, 0.5, 0))
+    assert found.intensity == 0.5
+    light.SwitchOff()
+    renderer.TwoSidedLightingOn()
+    assert Lights.from_any(renderer) == Lights()  # as VTK makes one where none is on
+    renderer.AutomaticLightCreationOff()
+    assert Lights.from_any(renderer) == Lights(())
 
 
 def test_camera_lights_stand_where_vtk_puts_them():
@@ -447,8 +453,9 @@ def test_what_is_no_light_is_refused_by_name(lights, message):
         (lambda p: p.IndependentComponentsOff(), "dependent components, which are for RGBA"),
         (lambda p: p.SetTransferFunctionModeTo2D(), "2D transfer function"),
         (lambda p: p.SetLabelScalarOpacity(1, gradient(0.5)), "label map"),
+        (lambda p: p.SetUseClippedVoxelIntensity(1), "intensity of clipped voxels"),
     ],
-    ids=["rgba", "2d", "labels"],
+    ids=["rgba", "2d", "labels", "clipped voxels"],
 )
 def test_properties_that_cannot_be_honoured_are_refused_by_name(change, message):
     prop = linear_property()

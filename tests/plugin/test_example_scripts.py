@@ -17,7 +17,9 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 pytestmark = pytest.mark.gl
 
 
-@pytest.mark.parametrize("name", ["plotter.py", "pipeline.py"])
+@pytest.mark.parametrize(
+    "name", ["plotter.py", "pipeline.py", "overlap.py", "picking.py", "files.py", "occlusion.py"]
+)
 def test_example_writes_a_picture(name, tmp_path):
     target = tmp_path / "picture.png"
     done = subprocess.run(

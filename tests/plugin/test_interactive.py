@@ -88,8 +88,9 @@ def no_estimates(monkeypatch):
         def __init__(self, *_, **__):
             pass
 
-        def estimate(self, vdi, camera, size):
+        def estimate(self, vdi, camera, size, **shown):
             answer.asked += 1
+            answer.camera, answer.shown = camera, shown
             return estimation.ViewError(answer.ssim, 0.0, 0.0, 1.0, 1)
 
     monkeypatch.setattr(estimation, "ViewErrorEstimator", Estimator)
@@ -243,6 +244,23 @@ def test_clipping_planes_cut_previews_as_they_cut_full_frames(plotter, coarsest)
     whole = frame(plotter)
     assert np.abs(whole - full).max() > 40
     assert np.abs(preview - full).mean() < 0.2 * np.abs(whole - full).mean()
+
+
+def test_cropping_cuts_previews_as_it_cuts_full_frames(plotter, coarsest):
+    actor = watched(plotter, soft_ball(48))
+    actor.mapper.SetCropping(1)
+    actor.mapper.SetCroppingRegionPlanes(-0.4, 0.3, -0.2, 0.5, -0.4, 0.2)
+    actor.mapper.SetCroppingRegionFlagsToCross()
+    plotter.camera.Azimuth(1)
+    preview = frame(plotter, MOVING)
+    assert actor.status.mode == "preview"
+    full = frame(plotter)
+    assert actor.status.mode == "full"
+    actor.mapper.CroppingOff()
+    whole = frame(plotter)
+    assert np.abs(whole - full).max() > 40
+    # A fifth of the pixels along each edge: seen were a mean of 0.4, and 1.9 from the whole
+    assert np.abs(preview - full).mean() < np.abs(whole - full).mean() / 3
 
 
 def test_off_screen_windows_and_pictures_are_always_full(plotter, coarsest):
@@ -579,6 +597,39 @@ def test_auto_estimates_when_the_view_has_moved_and_regenerates_below_the_bound(
         frame(plotter)
     assert no_estimates.asked == asked
     assert actor.vdi is new, "a VDI of this very view would be the same again"
+
+
+def test_the_estimate_is_of_the_picture_that_is_shown(plotter, no_estimates):
+    plane = vtkPlane()
+    plane.SetOrigin(0.1, 0.2, 0.3)
+    plane.SetNormal(0.6, 0.0, 0.8)
+    planes = (-0.4, 0.3, -0.2, 0.5, -0.4, 0.2)
+    actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
+    old = actor.vdi
+    actor.mapper.AddClippingPlane(plane)
+    actor.mapper.SetCropping(1)
+    actor.mapper.SetCroppingRegionPlanes(planes)
+    actor.mapper.SetCroppingRegionFlagsToFence()
+    actor.opacity_multiplier = 0.5
+    for _ in range(3):
+        frame(plotter)
+    assert no_estimates.asked == 0, "these changes need no new VDI"
+    plotter.camera.Azimuth(30)
+    frames_until(plotter, lambda: actor.status.ssim is not None)
+    shown = no_estimates.shown
+    assert no_estimates.camera == pvdi.Camera.from_any(plotter.camera)
+    assert shown["cropping"] == pvdi.Cropping(planes, "fence")
+    assert shown["opacity_multiplier"] == 0.5
+    (row,) = shown["clipping_planes"]
+    np.testing.assert_allclose(row[3:] / np.linalg.norm(row[3:]), (0.6, 0, 0.8), atol=1e-12)
+    # any point of the plane says where it is
+    assert (row[:3] - (0.1, 0.2, 0.3)) @ (0.6, 0, 0.8) == pytest.approx(0, abs=1e-9)
+    actor.opacity_multiplier = 0.8
+    actor.mapper.CroppingOff()
+    for _ in range(3):
+        frame(plotter)
+    assert no_estimates.asked == 1
+    assert actor.vdi is old
 
 
 def test_auto_bears_more_while_the_view_moves(plotter, no_estimates, gate):

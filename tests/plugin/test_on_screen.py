@@ -10,6 +10,7 @@ from pathlib import Path
 
 import plugin_on_screen
 import pytest
+from virtual_screen import virtual_screen
 
 pytestmark = [
     pytest.mark.gl,
@@ -23,19 +24,8 @@ pytestmark = [
 @pytest.fixture(scope="module")
 def display():
     """The name of a virtual X display."""
-    reader, writer = os.pipe()
-    server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1024x768x24", "-nolisten", "tcp"],
-        pass_fds=[writer],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(writer)
-    with open(reader) as file:  # noqa: PTH123 - a pipe
-        number = file.readline().strip()  # written when the server is ready
-    yield f":{number}"
-    server.terminate()
-    server.wait()
+    with virtual_screen() as name:
+        yield name
 
 
 @pytest.mark.parametrize("case", [case.__name__ for case in plugin_on_screen.CASES])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -42,6 +43,7 @@ from pyvista_vdi.errors import (
     VDIWarning,
 )
 from pyvista_vdi.vtk_pipeline.convert import vdi_from_image, vdi_to_image
+from pyvista_vdi.vtk_pipeline.estimation import Estimation
 from pyvista_vdi.vtk_pipeline.frame import as_array, view_of
 
 pytestmark = pytest.mark.gl
@@ -133,6 +135,24 @@ def test_source_makes_what_generate_makes():
     assert source.GetWindowSize() == (40, 30)
 
 
+def test_occlusion_is_part_of_what_a_view_is_judged_by():
+    """The estimate that decides about another VDI renders the occluded volume as well."""
+    source = ready_source(AmbientOcclusion=pvdi.AmbientOcclusion(0.5, strength=1.0))
+    assert source.GetAmbientOcclusion() == pvdi.AmbientOcclusion(0.5, strength=1.0)
+    vdi, request = source.GetVDI(), source.GetCurrentRequest()
+    assert vdi.metadata["ambient_occlusion"]["radius"] == 0.5
+    estimation = Estimation()
+    estimation.start(vdi, request, request.screen)
+    while estimation.running:
+        time.sleep(0.01)
+    assert estimation.take().error.ssim > 0.9999
+    estimation.close()
+    source.SetAmbientOcclusion(None)
+    plain = source.GetVDI()
+    assert "ambient_occlusion" not in plain.metadata
+    assert vdi.color.mean() < 0.8 * plain.color.mean()
+
+
 def test_source_executes_only_when_something_changed():
     source = ready_source()
     counted = executions(source)
@@ -142,6 +162,7 @@ def test_source_executes_only_when_something_changed():
         lambda: source.Update(),
         lambda: source.SetCamera(camera_at(5, 4, 3)),  # equal
         lambda: source.SetMaxSupersegments(20),  # equal
+        lambda: source.SetAmbientOcclusion(False),  # equal
     ]
     source.Update()
     for change in changes:
@@ -155,6 +176,8 @@ def test_source_executes_only_when_something_changed():
         lambda: prop.SetScalarOpacityUnitDistance(0.3),
         lambda: source.SetCamera(camera_at(5, 5, 5)),
         lambda: source.SetMaxSupersegments(5),
+        lambda: source.SetAmbientOcclusion(True),
+        lambda: source.SetAmbientOcclusion(pvdi.AmbientOcclusion(0.3, strength=0.5)),
         lambda: volume.GetPointData().GetScalars().Modified(),
     ]
     for count, change in enumerate(changes, start=2):

@@ -167,6 +167,24 @@ ROWS = {
         errors.UnsupportedError,
         "blending='maximum'.*composite",
     ),
+    "minimum": (
+        VOLUME,
+        {"blending": "minimum"},
+        errors.UnsupportedError,
+        "blending='minimum'.*composite.*add_volume",
+    ),
+    "ambient occlusion": (
+        VOLUME,
+        {"ambient_occlusion": "strong"},
+        errors.InvalidArgumentError,
+        "ambient_occlusion must be True, a radius.*got 'strong'",
+    ),
+    "occlusion's radius": (
+        VOLUME,
+        {"ambient_occlusion": 0.0},
+        errors.InvalidArgumentError,
+        "radius of ambient occlusion.*got 0",
+    ),
     "mapper": (VOLUME, {"mapper": "gpu"}, errors.UnsupportedError, "mapper='gpu'.*has its own"),
     "multi_colors": (VOLUME, {"multi_colors": True}, errors.UnsupportedError, "block.* one by one"),
     # generation
@@ -229,6 +247,7 @@ def test_culling_is_checked_as_add_volume_checks_it(plotter):
         {"cmap": "bone"},
         {"clim": (0, 1), "opacity": "linear_r"},
         {"max_supersegments": 5},
+        {"ambient_occlusion": True},
         {"camera": pvdi.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0))},
         {"scalars": np.zeros(3)},
     ],
@@ -261,16 +280,25 @@ def test_actor_of_a_vdi_cannot_be_regenerated(plotter):
         actor.regenerate()
 
 
-def test_blending_cropping_and_masks_of_the_mapper(plotter):
+def test_blending_and_masks_of_the_mapper(plotter):
     mapper = plotter.add_vdi(VOLUME).mapper
     for blend in ("maximum", "minimum", "average", "additive"):
         with pytest.raises(errors.UnsupportedError, match="only composite blending"):
             mapper.blend_mode = blend
     mapper.blend_mode = "composite"
-    with pytest.raises(errors.UnsupportedError, match="use clipping planes"):
-        mapper.SetCropping(1)
     with pytest.raises(errors.UnsupportedError, match="cannot be masked"):
         mapper.SetMaskInput(VOLUME)
+
+
+def test_illumination_of_the_mapper(plotter):
+    mapper = plotter.add_vdi(VOLUME).mapper
+    for setter in (mapper.SetGlobalIlluminationReach, mapper.SetVolumetricScatteringBlending):
+        setter(0)
+        with pytest.raises(errors.UnsupportedError, match="SetAmbientOcclusion"):
+            setter(0.5)
+    mapper.SetComputeNormalFromOpacity(False)
+    with pytest.raises(errors.UnsupportedError, match="gradient of its scalars"):
+        mapper.SetComputeNormalFromOpacity(True)
 
 
 def test_other_mappers_and_shared_mappers(plotter):
@@ -296,12 +324,12 @@ def test_accessor_refuses_other_grids_and_unknown_keywords(method):
         generate(VOLUME, colormap="bone")
 
 
-def test_reader_takes_no_options_and_says_what_is_wrong(tmp_path):
+def test_reader_refuses_unknown_options_and_says_what_is_wrong(tmp_path):
     path = tmp_path / "x.vdi"
     with pytest.raises((errors.VDIFileError, FileNotFoundError), match=re.escape(path.name)):
         pv.read(path)
     path.write_bytes(b"something else entirely")
     with pytest.raises(errors.VDIFileError, match=re.escape(path.name)):
         pv.read(path)
-    with pytest.raises(TypeError, match="takes no options; got colour"):
+    with pytest.raises(errors.InvalidArgumentError, match="with the options none; got colour"):
         pv.read(path, colour=1)

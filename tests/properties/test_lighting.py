@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 import strategies
 
-from pyvista_vdi import Light, Lights, Shading, TransferFunction, Volume, reference
+from pyvista_vdi import (
+    AmbientOcclusion,
+    Light,
+    Lights,
+    Shading,
+    TransferFunction,
+    Volume,
+    reference,
+)
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.device_volume import DeviceVolume
 from pyvista_vdi.generation import generate_vdi
@@ -47,6 +55,8 @@ LIGHTS = {
     "one-sided": Lights((DIRECTIONAL, BESIDE), two_sided=False),
     "with a headlight": Lights((DIRECTIONAL, BESIDE, Light(diffuse=(0.2, 0.2, 0.2)))),
     "positional": Lights((SPOT, BULB, BESIDE)),
+    "dimmed headlight": Lights((Light(ambient=(0.5, 0, 0.2), diffuse=(1, 0.5, 0), intensity=0.6),)),
+    "positional headlight": Lights((Light(positional=True),)),
     "none": Lights(()),
 }
 
@@ -223,9 +233,9 @@ def preprocessed(text, defines):
     return "\n".join(kept)
 
 
-def compiled(runtime, path, function, lights=None):
+def compiled(runtime, path, function, lights=None, **options):
     volume = smooth_volume(np.random.default_rng(1))
-    medium = DeviceVolume(runtime, volume, function(volume), lights=lights)
+    medium = DeviceVolume(runtime, volume, function(volume), lights=lights, **options)
     return preprocessed(sources.expand(path), medium.defines)
 
 
@@ -239,18 +249,25 @@ def test_kernels_compile_only_what_is_used(default_runtime, path):
         "gradient": compiled(
             default_runtime, path, lambda v: looks(v, shaded=False, gradient=True)
         ),
+        "occluded": compiled(
+            default_runtime,
+            path,
+            lambda v: looks(v, shaded=False),
+            ambient_occlusion=AmbientOcclusion(),
+        ),
     }
-    functions = ("scalar_differences(", " lit(", " gradient_opacity(")
+    functions = ("scalar_differences(", " lit(", " gradient_opacity(", " ambient_factor(")
     found = {name: [f in text for f in functions] for name, text in code.items()}
     assert found == {
-        "plain": [False, False, False],
-        "headlight": [True, True, False],
-        "directional": [True, True, False],
-        "positional": [True, True, False],
-        "gradient": [True, False, True],
+        "plain": [False, False, False, False],
+        "headlight": [True, True, False, False],
+        "directional": [True, True, False, False],
+        "positional": [True, True, False, False],
+        "gradient": [True, False, True, False],
+        "occluded": [False, False, False, True],
     }
-    empty = re.sub(r"#define \w+_(FIELD|PARAMETER|ARGUMENT)S?\b.*", "", code["plain"])
-    assert not re.search(r"gradient|light|normal", empty, re.IGNORECASE)
+    empty = re.sub(r"#define \w+_(FIELD|PARAMETER|ARGUMENT)S?\b.*|#line.*", "", code["plain"])
+    assert not re.search(r"gradient|light|normal|ambient|occlusion", empty, re.IGNORECASE)
     assert "LIGHT_CONE]" in code["positional"]
     assert "LIGHT_CONE]" not in code["directional"]
     assert "LIGHT_DIRECTION)" in code["directional"]

@@ -1,87 +1,28 @@
 """The device's raycaster against the float64 oracle: random VDIs, random views, every platform.
 
 Every channel of every pixel lies within 2e-5 of the oracle's range over the ray moved by the
-roundings of list coordinates (DESIGN section 3, "Borders"; the number of roundings is derived in
-``pyvista_vdi.reference.ranges``). 2e-5 is 336 unit roundoffs of float32: a ray here composites up
-to about 100 supersegments, each with three roundings that reach the image, and the raycaster may
-drop what lies behind a transmittance of 1e-6. The share of pixels that the unmoved ray does not
-explain is reported, and bounded by 2 % over all views together.
+roundings of list coordinates (tests/oracle.py says why 2e-5). The share of pixels that
+the unmoved ray does not explain is reported, and bounded by 2 % over all views together.
 """
 
 from __future__ import annotations
 
 import functools
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 import strategies
+from oracle import explain, total
 
-from pyvista_vdi import reference
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.vdi import VDI
-
-#: Largest difference per channel; see above.
-TOLERANCE = 2e-5
 
 #: Share of pixels that may differ by more from the unmoved ray, over all views together.
 MAX_SHARE = 0.02
 
 #: VDIs per kind of view.
 N_CASES = 32
-
-#: Moved rays tried in turn for a pixel beyond the fixed set: where a ray runs along a border in
-#: two directions at once, what it meets depends on where it crosses each of them.
-ESCALATION = (0, 600, 20_000)
-
-#: Pixels of one image tried at each stage. A handful need the later ones; where more do, the
-#: raycaster is wrong, and more tries would only hide it for minutes.
-MAX_PIXELS = (10**6, 40, 4)
-
-
-class Comparison(NamedTuple):
-    pixels: int
-    drawn: int  # where the oracle sees something
-    moved: int  # beyond TOLERANCE of the unmoved ray
-    failures: list[str]
-
-
-def explain(vdi, camera, size, image, *, name, escalation=ESCALATION, **ends):
-    """Compare an image with the oracle; say which pixels no ray within rounding explains."""
-    exact = reference.render(vdi, camera, size, **ends)
-    assert image.shape == exact.shape
-    assert image.dtype == np.float32
-    # Written so that NaN is a difference
-    differs = ~(np.abs(image - exact).max(axis=-1) <= TOLERANCE)
-    rows, columns = np.nonzero(differs)
-    pixels = [(int(x), size[1] - 1 - int(row)) for row, x in zip(rows, columns, strict=True)]
-    drawn = image[differs].astype(np.float64)
-    for n_random, most in zip(escalation, MAX_PIXELS, strict=False):
-        if len(pixels) > most:
-            break
-        low, high = reference.render_range(vdi, camera, size, pixels, n_random=n_random, **ends)
-        outside = ~((drawn >= low - TOLERANCE) & (drawn <= high + TOLERANCE)).all(axis=1)
-        pixels = [p for p, out in zip(pixels, outside, strict=True) if out]
-        drawn, low, high = drawn[outside], low[outside], high[outside]
-        if not pixels:
-            break
-    failures = [
-        f"{name}: pixel {p} drawn {d}, oracle between {a} and {b}"
-        for p, d, a, b in zip(pixels, drawn, low, high, strict=True)
-    ]
-    drawn_pixels = int((exact[..., 3] > TOLERANCE).sum())
-    return Comparison(differs.size, drawn_pixels, int(differs.sum()), failures)
-
-
-def total(comparisons):
-    parts = list(comparisons)
-    return Comparison(
-        sum(part.pixels for part in parts),
-        sum(part.drawn for part in parts),
-        sum(part.moved for part in parts),
-        [failure for part in parts for failure in part.failures],
-    )
 
 
 @functools.cache

@@ -400,6 +400,12 @@ def test_rays_that_end_early(runtime, generating_view):
     ):
         image = assert_same_bits(runtime, vdi, camera, size, **ends)
         assert (image != whole).any()
+    box = np.reshape(vdi.bounds, (3, 2))
+    crops = box[:, :1] + np.array([0.3, 0.6]) * (box[:, 1:] - box[:, :1])
+    for regions in ("subvolume", "fence", "inverted_cross", int(rng.integers(2**27))):
+        shown = {"cropping": (crops.ravel(), regions), "opacity_multiplier": 2.5}
+        image = assert_same_bits(runtime, vdi, camera, size, **shown)
+        assert (image != whole).any()
     tau = vdi.optical_depth * np.float32(1e3)
     assert_same_bits(runtime, changed(vdi, optical_depth=tau), camera, size)
 

@@ -174,7 +174,10 @@ def test_an_unknown_keyword_is_a_type_error(name, suggestion, volume, camera):
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        ({"blending": "maximum"}, UnsupportedError, "blending='maximum' is not supported"),
+        ({"blending": "maximum"}, UnsupportedError, "blending='maximum' is not .* by .*add_volume"),
+        ({"blending": "minimum"}, UnsupportedError, "blending='minimum' is not .* by .*add_volume"),
+        ({"ambient_occlusion": "a"}, InvalidArgumentError, "ambient_occlusion must be True, a rad"),
+        ({"ambient_occlusion": -1}, InvalidArgumentError, "radius .* a positive length .* got -1"),
         ({"interpolation": "cubic"}, InvalidArgumentError, "must be 'nearest' or 'linear'"),
         ({"preference": "row"}, InvalidArgumentError, "preference must be 'point' or 'cell'"),
         ({"transfer_function": "bone"}, InvalidArgumentError, "must be a pyvista_vdi.TransferF"),

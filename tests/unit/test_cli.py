@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from pyvista_vdi import cli, io
 from pyvista_vdi.cli import parser
 from pyvista_vdi.standard_cases import filling_camera
 
-VERBS = ("devices", "generate", "render", "view", "info", "compare", "convert")
+VERBS = ("devices", "generate", "render", "view", "info", "compare", "convert", "paraview")
 
 
 @pytest.fixture(autouse=True)
@@ -140,7 +141,7 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
         (["render", "a.vdi", "-o", "a.png", "--view-angle", "180"], "between 0 and 180 degrees"),
         (
             ["generate", "v.nrrd", "-o", "b.png"],
-            "the name must end in .vdi or .exr, for instance 'b.vdi'",
+            "the name must end in .vdi or .exr or .vti, for instance 'b.vdi'",
         ),
         (["generate", "v.nrrd", "-o", "no/b.vdi"], "the folder .*no does not exist; create it"),
         (["generate", "--example", "nothing", "-o", "b.vdi"], "no example volume is called 'noth"),
@@ -160,6 +161,10 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
         (
             ["generate", "v.nrrd", "-o", "b.vdi", "--transfer-function", "camera.json"],
             "is no transfer function in JSON",
+        ),
+        (
+            ["generate", "v.nrrd", "-o", "b.vdi", "--occlusion-radius", "0"],
+            "radius of ambient occlusion must be a positive length in model units; got 0",
         ),
         (["compare", "v.nrrd", "--out", "v.nrrd"], "the folder v.nrrd cannot be made"),
     ],
@@ -298,6 +303,7 @@ def test_devices_fails_where_none_is_usable(capsys, monkeypatch):
 def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_path):
     target = tmp_path / "b.vdi"
     options = ["--size", "20x12", "--max-supersegments", "7", "--compression", "lz4"]
+    options += ["--ambient-occlusion", "--occlusion-strength", "0.4"]
     status, out, err = run(
         capsys,
         *("generate", folder / "v.nrrd", "-o", target),
@@ -309,6 +315,8 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
     vdi = io.read(target)
     assert vdi.window_size == (20, 12)
     assert vdi.counts.max() <= 7
+    occlusion = vdi.metadata["ambient_occlusion"]
+    assert (occlusion["strength"], occlusion["directions"]) == (0.4, 32)
     assert vdi.camera == filling_camera(vdi.bounds, (20, 12), azimuth=30)
 
     picture = tmp_path / "b.png"
@@ -321,6 +329,40 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
         expected = io.to_bytes(pvdi.render(vdi, vdi.camera, (30, 10)))
         assert np.array_equal(np.asarray(image), expected)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["b.png", "b.vdi"]
+
+
+def test_render_several(capsys, default_runtime, tmp_path):
+    from PIL import Image
+
+    camera = filling_camera((0, 7, 0, 9, 0, 11), (24, 16))
+    matrix = np.eye(4)
+    matrix[0, 3] = 0.5
+    one, other = (
+        pvdi.VDI(
+            view,
+            (24, 16),
+            np.arange(24 * 16 + 1),
+            np.full(384, front),
+            np.full(384, front + 2),
+            np.full((384, 3), color),
+            np.full(384, 0.7),
+            (0, 7, 0, 9, 0, 11),
+        )
+        for view, front, color in (
+            (camera, 26.0, (1.0, 0.5, 0.0)),
+            (camera.replace(model_transform=matrix), 27.0, (0.0, 0.5, 1.0)),
+        )
+    )
+    files = (tmp_path / "a.vdi", tmp_path / "b.vdi")
+    for vdi, file in zip((one, other), files, strict=True):
+        vdi.save(file)
+    picture = tmp_path / "both.png"
+    assert run(capsys, "render", *files, "-o", picture)[0] == 0
+    transforms = [np.eye(4), matrix]
+    expected = pvdi.render([one, other], one.camera, model_transforms=transforms)
+    with Image.open(picture) as image:
+        assert np.array_equal(np.asarray(image), io.to_bytes(expected))
+    assert not np.array_equal(expected, pvdi.render(one, one.camera))
 
 
 def test_render_over_a_background(folder, capsys, default_runtime, tmp_path):
@@ -366,6 +408,19 @@ def test_standard_transfer_functions_and_their_changes():
         "clim": [-1, 2.5],
     }
     assert arguments("--log-scale", "--n-colors", "9") == {"log_scale": True, "n_colors": 9}
+    assert arguments("--shade", "--specular-power", "4") == {"shade": True, "specular_power": 4}
+
+
+def test_ambient_occlusion_is_off_unless_asked_for():
+    from pyvista_vdi.cli.inputs import ambient_occlusion
+
+    def occlusion(*options):
+        return ambient_occlusion(parser.parse(["generate", "a", "-o", "b.vdi", *options]))
+
+    assert occlusion() is None
+    assert occlusion("--ambient-occlusion") == pvdi.AmbientOcclusion()
+    assert occlusion("--occlusion-radius", "3") == pvdi.AmbientOcclusion(3)
+    assert occlusion("--occlusion-strength", "0.5") == pvdi.AmbientOcclusion(strength=0.5)
 
 
 # -- processes -------------------------------------------------------------------------------------
@@ -424,3 +479,51 @@ def test_ctrl_c_while_generating(folder, default_runtime, tmp_path):
     assert "Traceback" not in err
     assert target.read_bytes() == b"old"
     assert [path.name for path in tmp_path.iterdir()] == ["b.vdi"]
+
+
+# -- paraview --------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def plain_installation(tmp_path, monkeypatch):
+    """An environment that holds the package and no VTK, in a folder that a shell must quote."""
+    from pyvista_vdi.cli import paraview
+
+    package = tmp_path / "a folder" / "pyvista_vdi"
+    (package / "opencl").mkdir(parents=True)
+    (package / "opencl" / "__init__.py").touch()
+    monkeypatch.setattr(paraview, "_PACKAGE", package)
+    monkeypatch.setattr(paraview, "PLUGIN", package / "paraview" / "vdi_plugin.py")
+    monkeypatch.setattr(paraview.sysconfig, "get_path", lambda name: str(package.parent))
+    return package
+
+
+def test_paraview_prints_the_plugins_path(capsys):
+    status, out, _ = run(capsys, "paraview")
+    assert status == 0
+    assert Path(out.strip()).is_file()
+
+
+def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
+    status, out, _ = run(capsys, "paraview", "--environment")
+    assert status == 0
+    shown = subprocess.run(
+        ["sh", "-c", f'{out}echo "$PYTHONPATH"; echo "$PV_PLUGIN_PATH"'],
+        env={"PYTHONPATH": "/before"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    site = plain_installation.parent
+    assert shown.stdout.splitlines() == [f"{site}:/before", f"{site}/pyvista_vdi/paraview"]
+
+
+def test_paraview_is_not_shown_a_second_vtk(plain_installation, capsys):
+    (plain_installation.parent / "vtkmodules").mkdir()
+    message = complaint(capsys, "paraview", "--environment")
+    assert "holds a VTK of its own" in message
+
+
+def test_paraview_is_not_shown_half_a_package(plain_installation, capsys):
+    (plain_installation / "opencl" / "__init__.py").unlink()
+    assert "is an editable installation" in complaint(capsys, "paraview", "--environment")

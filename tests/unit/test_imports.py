@@ -1,7 +1,8 @@
 """The arrows of the house: who may import whom, read from the source and seen in a fresh process.
 
-plotting -> vtk_pipeline -> engine -> opencl_runtime -> core; vtk, pyvista and pyopencl each have
-one place. The engine must run where neither VTK nor PyVista is installed.
+plotting -> vtk_pipeline -> engine -> opencl_runtime -> core, and paraview -> vtk_pipeline; vtk,
+pyvista, paraview and pyopencl each have one place. The engine must run where neither VTK nor
+PyVista is installed.
 """
 
 from __future__ import annotations
@@ -23,17 +24,20 @@ PACKAGE = Path(pyvista_vdi.__file__).parent
 #: The only layers that may import each of these. What renders through PyVista may speak to the
 #: VTK objects behind it.
 OWNERS = {
+    "paraview": ("paraview",),
     "pyopencl": ("opencl_runtime",),
     "pyvista": ("plotting",),
-    "vtk": ("vtk_pipeline", "plotting"),
-    "vtkmodules": ("vtk_pipeline", "plotting"),
+    "vtk": ("vtk_pipeline", "plotting", "paraview"),
+    "vtkmodules": ("vtk_pipeline", "plotting", "paraview"),
 }
 
 CORE = {
     "checks",
     "_version",
+    "ambient_occlusion",
     "camera",
     "compositing",
+    "cropping",
     "errors",
     "lighting",
     "transfer_function",
@@ -45,12 +49,13 @@ CORE = {
 DEFERRED_FROM_CORE = {("vdi", "io")}
 
 #: Layers that nothing below them may need in order to be imported.
-TOP_LAYERS = ("vtk_pipeline", "plotting", "cli")
+TOP_LAYERS = ("vtk_pipeline", "plotting", "paraview", "cli")
 
 #: Slow to import, or optional: never loaded by ``import pyvista_vdi``.
 HEAVY = (
     "matplotlib",
     "nrrd",
+    "paraview",
     "pyopencl",
     "pyvista",
     "scipy",
@@ -148,7 +153,13 @@ def test_lower_layers_do_not_import_upper_ones_when_loaded():
     offences = []
     for path, item in _at_run_time(_modules()):
         layer, target = _top_level(path), _own_layer(item.name)
-        allowed = {"cli": TOP_LAYERS, "plotting": ("vtk_pipeline", "plotting")}.get(layer, (layer,))
+        if layer == target:
+            continue
+        allowed = {
+            "cli": ("vtk_pipeline", "plotting"),
+            "paraview": ("vtk_pipeline",),
+            "plotting": ("vtk_pipeline",),
+        }.get(layer, ())
         if not item.deferred and target in TOP_LAYERS and target not in allowed:
             offences.append((path, item))
     assert not offences, _report(offences)
@@ -173,7 +184,7 @@ def _engine_modules():
     """Return the dotted names of every module that must import without VTK and PyVista."""
     names = []
     for path in _modules():
-        if _top_level(path) in ("vtk_pipeline", "plotting"):
+        if _top_level(path) in ("vtk_pipeline", "plotting", "paraview"):
             continue
         parts = ("pyvista_vdi", *_part(path).with_suffix("").parts)
         names.append(".".join(parts[:-1] if parts[-1] == "__init__" else parts))
@@ -202,7 +213,7 @@ def _run(code):
 
 
 def test_engine_imports_without_vtk_and_pyvista():
-    blocked = ("pyvista", "vtk", "vtkmodules", "matplotlib")
+    blocked = ("paraview", "pyvista", "vtk", "vtkmodules", "matplotlib")
     _run(
         "import sys, importlib\n"
         f"sys.modules.update(dict.fromkeys({blocked!r}))\n"

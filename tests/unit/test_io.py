@@ -9,6 +9,9 @@ import os
 import re
 import tracemalloc
 import zipfile
+import zlib
+from io import FileIO
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,8 +22,11 @@ from strategies import random_vdi
 from pyvista_vdi import VDI, Camera, io
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.io import chunks, writer
+from pyvista_vdi.io.layout import CHUNK_ROWS, INDEX_DTYPE
 
-CODECS = ("zstd", "lz4", "none")
+CODECS = ("lz4", "zstd", "none")
+ARRAYS = ("counts", "front", "back", "color", "optical_depth")
+STORED = Path(__file__).parent / "files"
 
 
 def small_vdi(seed=1):
@@ -56,11 +62,18 @@ def names_in(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def rewrite(path, edit, **options):
-    """Write the archive again with members changed by ``edit``; checksums fit what is written."""
+def rewrite(path, edit, *, index=True, **options):
+    """Write the archive again with members changed by ``edit``; checksums fit what is written.
+
+    Where an array has one chunk, as all of a small VDI's, its entry in the index fits as well.
+    """
     with zipfile.ZipFile(path) as archive:
         members = {info.filename: archive.read(info) for info in archive.infolist()}
     edit(members)
+    if index and len(members.get("chunks", b"")) == INDEX_DTYPE.itemsize * len(ARRAYS):
+        found = [members.get(name, b"") for name in ARRAYS]
+        rows = np.array([(len(data), zlib.crc32(data)) for data in found], INDEX_DTYPE)
+        members["chunks"] = rows.tobytes()
     with zipfile.ZipFile(path, "w") as archive:
         for name, data in members.items():
             archive.writestr(zipfile.ZipInfo(name), data, **options)
@@ -90,7 +103,7 @@ def test_reading_gives_back_every_bit(seed, codec, tmp_path_factory):
 @pytest.mark.parametrize("codec", CODECS)
 def test_several_chunks_and_metadata(codec, tmp_path):
     vdi = large_vdi(depth_origin=0.1, metadata={"criterion": "x", "values": [1, 2.5, None]})
-    assert vdi.n_supersegments > 2 * chunks.CHUNK_ROWS
+    assert vdi.n_supersegments > 2 * CHUNK_ROWS[2]
     back = io.read(io.write(vdi, tmp_path / "a.vdi", compression=codec))
     assert back.equals(vdi)
     assert back.metadata == vdi.metadata
@@ -166,7 +179,7 @@ def test_info_says_what_the_vdi_is(tmp_path):
     info = io.read_info(io.write(vdi, tmp_path / "a.vdi", compression="lz4"))
     assert (info.window_size, info.n_supersegments) == ((40, 30), 2400)
     assert (info.camera, info.bounds, info.depth_origin) == (vdi.camera, vdi.bounds, 1.0)
-    assert (info.metadata, info.codec, info.format_version) == ({"tolerance": 0.5}, "lz4", 1)
+    assert (info.metadata, info.codec, info.format_version) == ({"tolerance": 0.5}, "lz4", 2)
     assert info.memory_bytes == vdi.nbytes
     assert info.file_bytes == (tmp_path / "a.vdi").stat().st_size
 
@@ -176,6 +189,80 @@ def test_info_does_not_read_the_arrays(file):
     assert io.read_info(file).window_size == small_vdi().window_size
     with pytest.raises(VDIFileError, match=r"small\.vdi is damaged: array 'color'"):
         io.read(file)
+
+
+def test_info_reads_as_little_of_a_large_file_as_of_a_small_one(tmp_path, monkeypatch):
+    """What is read is the description and the archive's directory, however large the arrays."""
+    read_bytes = []
+    opened = Path.open
+
+    class Counting(FileIO):
+        def read(self, *size):
+            data = super().read(*size)
+            read_bytes[-1] += len(data)
+            return data
+
+    monkeypatch.setattr(Path, "open", lambda path, mode="r": Counting(path, mode))
+    for n_lists in ((2, 2), (640, 512)):
+        vdi = large_vdi(n_lists)
+        with monkeypatch.context() as unpatched:
+            unpatched.setattr(Path, "open", opened)
+            path = io.write(vdi, tmp_path / "a.vdi", compression="none")
+        read_bytes.append(0)
+        assert io.read_info(path).n_supersegments == vdi.n_supersegments
+    assert path.stat().st_size > 10**7
+    assert max(read_bytes) < 6000
+    assert read_bytes[1] - read_bytes[0] < 100  # longer numbers in the description
+
+
+# -- version 1 -------------------------------------------------------------------------------------
+
+
+def version_1_vdi(n):
+    """What the stored files hold: pyvista-vdi wrote them when 1 was the format's version."""
+    k = np.arange(n, dtype=np.float32)
+    last = k >= n - 3
+    return VDI(
+        Camera((0, 0, 0), (0, 0, 1), (0, 1, 0), view_angle=20.0),
+        (3, 2),
+        [0, 0, n - 3, n - 3, n, n, n],
+        np.where(last, k - n + 3.25, k),
+        np.where(last, k - n + 3.75, k + 1),
+        np.stack([k % 2, k % 4 / 4, k % 8 / 8], axis=1),
+        k % 16 / 3,
+        (-1, 1, -2, 2, 0, n),
+        depth_origin=0.1,
+        metadata={"criterion": "none", "values": [1, 2.5]},
+    )
+
+
+@pytest.mark.parametrize(("codec", "n"), [("zstd", 300_000), ("none", 60)])
+def test_files_of_version_1_are_read(codec, n):
+    path = STORED / f"version_1_{codec}.vdi"
+    assert n <= 100 or n > CHUNK_ROWS[1]  # one chunk, and more
+    info = io.read_info(path)
+    assert (info.format_version, info.codec, info.n_supersegments) == (1, codec, n)
+    vdi, expected = io.read(path), version_1_vdi(n)
+    assert vdi.equals(expected)
+    assert vdi.metadata == expected.metadata
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda m: m.update(depth=m["depth"][:-1]), "array 'depth': "),
+        (lambda m: m.update(color=m["color"] + b"x"), "array 'color': its chunks have"),
+        (lambda m: m.update(color=m["color"][:20]), "array 'color': the data end before row"),
+        (lambda m: m.pop("optical_depth"), "its member 'optical_depth' is missing"),
+    ],
+)
+@pytest.mark.parametrize("codec", ["zstd", "none"])
+def test_damaged_files_of_version_1(codec, edit, message, tmp_path):
+    path = tmp_path / "a.vdi"
+    path.write_bytes((STORED / f"version_1_{codec}.vdi").read_bytes())
+    rewrite(path, edit)
+    with pytest.raises(VDIFileError, match=f"is damaged: {message}"):
+        io.read(path)
 
 
 # -- whole or not at all ---------------------------------------------------------------------------
@@ -261,7 +348,7 @@ def test_links_are_followed(tmp_path):
     [
         (
             {"compression": "gzip"},
-            r"compression of .* must be one of zstd, lz4 and none; got 'gzip'",
+            r"compression of .* must be one of lz4, zstd and none; got 'gzip'",
         ),
         ({"level": 0}, "level must be a whole number from 1 to 9; got 0"),
         ({"level": "best"}, "level must be a whole number from 1 to 9; got 'best'"),
@@ -325,11 +412,11 @@ def test_another_archive_with_a_description(tmp_path):
 
 
 def test_a_newer_version(file):
-    edit_description(file, version=2, written_by="pyvista-vdi 9.0")
+    edit_description(file, version=3, written_by="pyvista-vdi 9.0")
     with pytest.raises(
         VDIFileError,
-        match=r"is of format version 2, written by 'pyvista-vdi 9\.0'; this is pyvista-vdi .*, "
-        r"which reads up to version 1: upgrade by pip install -U pyvista-vdi",
+        match=r"is of format version 3, written by 'pyvista-vdi 9\.0'; this is pyvista-vdi .*, "
+        r"which reads up to version 2: upgrade by pip install -U pyvista-vdi",
     ):
         io.read(file)
 
@@ -363,7 +450,7 @@ def test_every_changed_byte_is_noticed_or_harmless(file):
     assert refused > 0.8 * len(positions)
 
 
-@pytest.mark.parametrize("name", ["counts", "depth", "color", "optical_depth", "vdi.json"])
+@pytest.mark.parametrize("name", [*ARRAYS, "chunks", "vdi.json"])
 def test_a_missing_member(name, file):
     rewrite(file, lambda members: members.pop(name))
     with pytest.raises(VDIFileError, match=rf"its member '{name}' is missing|not a VDI file"):
@@ -424,7 +511,7 @@ def _declare(path, n=None, window=None):
     arrays = description["arrays"]
     n = n or description["n_supersegments"]
     window = window or description["window_size"]
-    for name in ("depth", "color", "optical_depth"):
+    for name in ARRAYS[1:]:
         arrays[name]["shape"][0] = n
     arrays["counts"]["shape"][0] = window[0] * window[1]
     edit_description(path, n_supersegments=n, window_size=window, arrays=arrays)
@@ -438,7 +525,7 @@ def test_nothing_is_allocated_for_what_a_file_only_declares(declared, codec, tmp
     tracemalloc.start()
     try:
         with pytest.raises(
-            VDIFileError, match="is damaged: array '(counts|depth)'|lists do not hold"
+            VDIFileError, match="its member 'chunks' has .* bytes for|array 'front': 0 chunks"
         ):
             io.read(path)
         _, peak = tracemalloc.get_traced_memory()
@@ -459,6 +546,46 @@ def test_chunks_that_lie_about_their_size(file):
         io.read(file)
 
 
+@pytest.mark.parametrize("codec", CODECS)
+@pytest.mark.parametrize("name", ARRAYS)
+def test_a_chunk_that_was_changed(name, codec, tmp_path):
+    """The index has the checksum of every chunk, whatever ZIP's own says."""
+    path = io.write(large_vdi((8, 8)), tmp_path / "a.vdi", compression=codec)
+
+    def edit(members):
+        members[name] = members[name][:-1] + bytes([members[name][-1] ^ 1])
+
+    rewrite(path, edit, index=False)
+    with pytest.raises(VDIFileError, match=f"array '{name}': chunk 0 .* checksum differs"):
+        io.read(path)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "message"),
+    [
+        ({"color": 2**32 - 1}, "array 'color': its chunks have 4294967295 bytes, but"),
+        ({"back": 16}, "array 'back': 16 bytes cannot hold"),
+        ({"front": 17}, "array 'front': its chunks have 17 bytes, but"),
+    ],
+)
+def test_an_index_that_lies(sizes, message, file):
+    def edit(members):
+        index = np.frombuffer(members["chunks"], INDEX_DTYPE).copy()
+        for name, size in sizes.items():
+            index["bytes"][ARRAYS.index(name)] = size
+        members["chunks"] = index.tobytes()
+
+    rewrite(file, edit, index=False)
+    with pytest.raises(VDIFileError, match=f"is damaged: {message}"):
+        io.read(file)
+
+
+def test_an_index_of_another_length(file):
+    rewrite(file, lambda members: members.update(chunks=members["chunks"] * 2), index=False)
+    with pytest.raises(VDIFileError, match="its member 'chunks' has 80 bytes for 5 chunks"):
+        io.read(file)
+
+
 @given(data=st.binary(max_size=200), seed=st.integers(0, 2**32))
 def test_chunks_of_noise(data, seed, tmp_path_factory):
     """Behind a header that is right, the compressed bytes are noise: no crash, one error."""
@@ -467,7 +594,7 @@ def test_chunks_of_noise(data, seed, tmp_path_factory):
     rng = np.random.default_rng(seed)
 
     def edit(members):
-        for name in ("depth", "color"):
+        for name in ("front", "color"):
             content = bytearray(members[name])
             for position in rng.integers(16, len(content), size=8):
                 content[position] = data[position % len(data)] if data else 0

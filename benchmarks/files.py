@@ -1,0 +1,234 @@
+"""How large .vdi files are, and how long saving and loading take beside NumPy's own files.
+
+Writes ``files_WxH.json`` (all figures) and ``.md`` (the tables). See README.md in this folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from skipping import timed, vdi_of  # beside this file
+from standard_table import window_size
+from tqdm import tqdm
+
+from pyvista_vdi import examples
+from pyvista_vdi.compare import describe_system
+from pyvista_vdi.io import FORMAT_VERSION, read, read_info, whole_file
+from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE
+from pyvista_vdi.vdi import VDI
+
+#: Bytes of a supersegment in the dense form: two depths, four colour components, float32.
+DENSE_BYTES = 24
+
+#: Ways to compress, the default first.
+COMPRESSIONS = ("lz4", "zstd", "none")
+
+#: A VDI's arrays; NumPy's functions write and read each as one file.
+ARRAYS = ("offsets", "front", "back", "color", "optical_depth")
+
+#: Least ratio of dense form and file, and most of our times and NumPy's.
+LEAST_SHRINKING, MOST_SAVING, MOST_LOADING = 6.0, 10.0, 3.0
+
+LEGEND = (
+    "`dense / size`: bytes of width x height x longest list x 24 over the file's. `save` and "
+    "`load`: our time over `numpy.save`'s and `numpy.load`'s for the same five arrays, by wall "
+    "clock (in brackets by the process's CPU time). Ours brings the file to the disk (fsync) and "
+    "NumPy's does not; `synced` is over NumPy's with fsync. Loading takes from the page "
+    "cache, and ours compares checksums and checks every supersegment. Medians of turns."
+)
+
+
+def main() -> int:
+    """Measure what is missing, and write what was found."""
+    options = parsed()
+    width, height = options.size
+    options.out.mkdir(parents=True, exist_ok=True)
+    target = options.out / f"files_{width}x{height}.json"
+    case = {
+        "window_size": [width, height],
+        "transfer_function": options.tf,
+        "max_supersegments": options.max_supersegments,
+        "format_version": FORMAT_VERSION,
+        "system": {**describe_system(options.device), "numcodecs": version("numcodecs")},
+    }
+    results = json.loads(target.read_text()) if target.exists() else {**case, "volumes": {}}
+    if any(results[name] != value for name, value in case.items()):
+        sys.exit(f"{target} was measured otherwise or elsewhere: choose another --out")
+    at_hand = examples.available()
+    absent = [name for name in options.volumes if name not in at_hand]
+    if absent:
+        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
+    for name in tqdm([name for name in options.volumes if name in at_hand], unit="volume"):
+        if name in results["volumes"] and not options.redo:
+            continue
+        with tempfile.TemporaryDirectory(dir=options.disk) as folder:
+            results["volumes"][name] = measured(vdi_of(name, options), Path(folder), options)
+        with whole_file(target) as stream:
+            stream.write(json.dumps(results, indent=1).encode() + b"\n")
+    with whole_file(target.with_suffix(".md")) as stream:
+        stream.write(report(results).encode())
+    print(f"Written: {target}, and .md beside it")
+    return 0 if all(v["identical"] for v in results["volumes"].values()) else 1
+
+
+def parsed() -> argparse.Namespace:
+    """Return the options."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
+    names = sorted(examples.VOLUMES)
+    parser.add_argument("--volumes", nargs="+", choices=names, default=names, metavar="NAME")
+    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
+    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
+    parser.add_argument("--repeats", type=int, default=9, help="timed turns")
+    parser.add_argument("--device", help="OpenCL device that generates VDIs")
+    parser.add_argument("--vdi-cache", type=Path, metavar="FOLDER", help="as for skipping.py")
+    parser.add_argument("--disk", type=Path, metavar="FOLDER", help="where the files are written")
+    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
+    return parser.parse_args()
+
+
+def measured(vdi: VDI, folder: Path, options: argparse.Namespace) -> dict[str, Any]:
+    """Return sizes and times of one VDI's files."""
+    files = {kind: folder / f"{kind}.vdi" for kind in COMPRESSIONS}
+    ways: dict[str, Callable[[], object]] = {
+        "numpy save": partial(save_arrays, vdi, folder),
+        "numpy save, synced": partial(save_arrays, vdi, folder, synced=True),
+        "numpy load": partial(load_arrays, folder),
+        "info": partial(read_info, files["lz4"]),
+    }
+    for kind, file in files.items():
+        ways[f"{kind} save"] = partial(vdi.save, file, compression=kind)
+        ways[f"{kind} load"] = partial(read, file)
+    packed = folder / "compressed.npz"
+    arrays = {name: getattr(vdi, name) for name in ARRAYS}
+    for way in (*(w for n, w in ways.items() if "save" in n), *ways.values()):
+        way()  # files are there, modules imported, memory warm
+    width, height = vdi.window_size
+    return {
+        "supersegments": vdi.n_supersegments,
+        "empty_lists": float((vdi.counts == 0).mean()),
+        "array_bytes": vdi.nbytes,
+        "dense_bytes": width * height * options.max_supersegments * DENSE_BYTES,
+        "file_bytes": {kind: file.stat().st_size for kind, file in files.items()},
+        "identical": all(read(file).equals(vdi) for file in files.values()),
+        "seconds": timed(ways, options.repeats),
+        "savez_compressed": {
+            **timed({"save": partial(np.savez_compressed, packed, **arrays)}, 1),
+            **timed({"load": partial(load_packed, packed)}, 3),
+            "file_bytes": packed.stat().st_size,
+        },
+    }
+
+
+def save_arrays(vdi: VDI, folder: Path, *, synced: bool = False) -> None:
+    """Write a VDI's arrays by ``numpy.save``."""
+    for name in ARRAYS:
+        with (folder / f"{name}.npy").open("wb") as stream:
+            np.save(stream, getattr(vdi, name))
+            if synced:
+                stream.flush()
+                os.fsync(stream.fileno())
+
+
+def load_arrays(folder: Path) -> list[Any]:
+    """Read a VDI's arrays by ``numpy.load``."""
+    return [np.load(folder / f"{name}.npy") for name in ARRAYS]
+
+
+def load_packed(file: Path) -> list[Any]:
+    """Read a VDI's arrays from a compressed archive of NumPy."""
+    with np.load(file) as archive:
+        return [archive[name] for name in ARRAYS]
+
+
+def report(results: dict[str, Any]) -> str:
+    """Return the tables: a line per volume, the emptiest first."""
+    width, height = results["window_size"]
+    case = f"{results['transfer_function']}, {results['max_supersegments']} supersegments"
+    volumes = sorted(results["volumes"].items(), key=lambda item: -item[1]["empty_lists"])
+    lines = [f"# Files, {width}x{height}, {case}", "", LEGEND]
+    lines += [
+        "",
+        "| volume | empty lists | arrays, MiB | .vdi, MiB | dense / size | save | synced | load |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for name, found in volumes:
+        shrinking = found["dense_bytes"] / found["file_bytes"]["lz4"]
+        cells = [
+            f"{found['empty_lists']:.0%}",
+            mebibytes(found["array_bytes"]),
+            mebibytes(found["file_bytes"]["lz4"]),
+            f"{shrinking:.1f}" if shrinking >= LEAST_SHRINKING else f"**{shrinking:.1f}**",
+            ratio(found, "lz4 save", "numpy save", MOST_SAVING),
+            ratio(found, "lz4 save", "numpy save, synced", MOST_SAVING),
+            ratio(found, "lz4 load", "numpy load", MOST_LOADING),
+        ]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    lines += [
+        "",
+        "## Other compressions",
+        "",
+        "Dense form over file, then save and load as above. `npz`: `numpy.savez_compressed`.",
+        "",
+        "| volume | zstd | save | load | none | save | load | npz | save | load |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for name, found in volumes:
+        cells = []
+        for kind in COMPRESSIONS[1:]:
+            cells.append(f"{found['dense_bytes'] / found['file_bytes'][kind]:.1f}")
+            cells += [ratio(found, f"{kind} {a}", f"numpy {a}") for a in ("save", "load")]
+        npz = found["savez_compressed"]
+        cells.append(f"{found['dense_bytes'] / npz['file_bytes']:.1f}")
+        cells += [
+            f"{npz[a]['wall']['median'] / found['seconds'][f'numpy {a}']['wall']['median']:.0f}"
+            for a in ("save", "load")
+        ]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    infos = [1e3 * found["seconds"]["info"]["wall"]["median"] for _, found in volumes]
+    spreads = [
+        (wall["most"] - wall["least"]) / wall["median"]
+        for _, found in volumes
+        for wall in (found["seconds"]["lz4 load"]["wall"], found["seconds"]["numpy load"]["wall"])
+    ]
+    if volumes:
+        spread = statistics.median(spreads)
+        lines += [
+            "",
+            f"`read_info`: {min(infos):.1f} to {max(infos):.1f} ms.",
+            f"Spread of the repeated loads, (most - least) / median: {spread:.0%}.",
+        ]
+    system = ", ".join(f"{k} {v}" for k, v in results["system"].items())
+    return "\n".join([*lines, "", system, ""])
+
+
+def ratio(found: dict[str, Any], ours: str, theirs: str, most: float = np.inf) -> str:
+    """Return our time over theirs, by wall clock and by CPU; bold where it is above ``most``."""
+    seconds = found["seconds"]
+    wall, cpu = (
+        seconds[ours][clock]["median"] / seconds[theirs][clock]["median"]
+        for clock in ("wall", "cpu")
+    )
+    text = f"{wall:.1f}" if wall <= most else f"**{wall:.1f}**"
+    return f"{text} ({cpu:.1f})"
+
+
+def mebibytes(n: int) -> str:
+    """Return bytes in MiB."""
+    return f"{n / 2**20:.1f}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

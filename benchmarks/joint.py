@@ -1,0 +1,104 @@
+"""What a joint frame of two VDIs costs, over the two frames by themselves.
+
+    python benchmarks/joint.py
+    python benchmarks/joint.py --volumes brain heptane --vdi-cache FOLDER
+
+The second volume is scaled to the size of the first and put beside its centre, so that they share
+about a third of their bounds. Candidates take turns; medians of the process's CPU time (and of the
+wall clock) are printed as ratios. See README.md in this folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from skipping import vdi_of  # beside this file
+from standard_table import window_size
+
+from pyvista_vdi.joint import render_vdis
+from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE
+from pyvista_vdi.vdi import VDI
+
+#: Azimuths from the first VDI's generating view, degrees.
+ANGLES = (0.0, 5.0, 30.0, 90.0)
+
+#: Where the second volume's centre is, from the first one's, in extents of its bounds.
+ASIDE = (0.3, 0.2, 0.1)
+
+
+def main() -> None:
+    """Measure, and print a table."""
+    options = parsed()
+    first, second = (vdi_of(name, options) for name in options.volumes)
+    place = beside(first, second)
+    print("| angle | joint / single frames, CPU time | wall clock | single frames, CPU ms |")
+    print("|---|---|---|---|")
+    for angle in ANGLES:
+        camera = first.camera.azimuth(angle)
+        moved = camera.replace(model_transform=place)
+
+        def single(camera=camera, moved=moved):  # type: ignore[no-untyped-def]
+            render_vdi(first, camera, options.size, device=options.device)
+            render_vdi(second, moved, options.size, device=options.device)
+
+        def joint(camera=camera):  # type: ignore[no-untyped-def]
+            transforms = [np.eye(4), place]
+            render_vdis(
+                [first, second],
+                camera,
+                options.size,
+                model_transforms=transforms,
+                device=options.device,
+            )
+
+        (cpu, wall), (joint_cpu, joint_wall) = times([single, joint], options.repeats)
+        print(f"| {angle:g} | {joint_cpu / cpu:.2f} | {joint_wall / wall:.2f} | {1e3 * cpu:.0f} |")
+
+
+def times(candidates: list[Callable[[], None]], repeats: int) -> list[tuple[float, float]]:
+    """Return the median CPU and wall time of each, taken in turns after one that is not counted."""
+    taken: list[list[tuple[float, float]]] = [[] for _ in candidates]
+    for repeat in range(repeats + 1):
+        for candidate, runs in zip(candidates, taken, strict=True):
+            cpu, wall = time.process_time(), time.perf_counter()
+            candidate()
+            if repeat:
+                runs.append((time.process_time() - cpu, time.perf_counter() - wall))
+    return [
+        (statistics.median(c for c, _ in runs), statistics.median(w for _, w in runs))
+        for runs in taken
+    ]
+
+
+def beside(first: VDI, second: VDI) -> NDArray[np.float64]:
+    """Return the matrix that puts the second volume beside the first one's centre."""
+    (low, high), (low_2, high_2) = (np.reshape(v.bounds, (3, 2)).T for v in (first, second))
+    scale = np.linalg.norm(high - low) / np.linalg.norm(high_2 - low_2)
+    matrix = np.diag([scale, scale, scale, 1.0])
+    centre = (low + high) / 2 + np.multiply(ASIDE, high - low)
+    matrix[:3, 3] = centre - scale * (low_2 + high_2) / 2
+    return matrix
+
+
+def parsed() -> argparse.Namespace:
+    """Return the options."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--volumes", nargs=2, default=("brain", "rayleigh_taylor"))
+    parser.add_argument("--tf", choices=sorted(TRANSFER_FUNCTIONS), default="soft")
+    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
+    parser.add_argument("--max-supersegments", type=int, default=20)
+    parser.add_argument("--repeats", type=int, default=7)
+    parser.add_argument("--device")
+    parser.add_argument("--vdi-cache", type=Path, help="folder of VDIs, read or written")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()

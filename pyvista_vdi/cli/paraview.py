@@ -1,0 +1,49 @@
+"""The verb ``paraview``: where its plugin is, and what ParaView's Python must see."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sysconfig
+from pathlib import Path
+
+from ..errors import UnsupportedError
+
+#: The package, and the plugin in it.
+_PACKAGE = Path(__file__).resolve().parents[1]
+PLUGIN = _PACKAGE / "paraview" / "vdi_plugin.py"
+
+
+def paraview(options: argparse.Namespace) -> int:
+    """Print the plugin's path, or the variables that make ParaView find it and this package."""
+    if not options.environment:
+        print(PLUGIN)
+        return 0
+    for variable, folders in _variables().items():
+        value = shlex.quote(":".join(map(str, folders)))
+        print(f'export {variable}={value}"${{{variable}:+:${variable}}}"')
+    return 0
+
+
+def _variables() -> dict[str, list[Path]]:
+    """Return what to put in front of ParaView's search paths.
+
+    Raises
+    ------
+    UnsupportedError
+        If that would show ParaView a second VTK, or not all of this package.
+    """
+    installed = [Path(sysconfig.get_path(name)).resolve() for name in ("purelib", "platlib")]
+    folders = list(dict.fromkeys([_PACKAGE.parent, *installed]))
+    for folder in folders:
+        if (folder / "vtkmodules").exists():
+            raise UnsupportedError(
+                f"{folder} holds a VTK of its own, which ParaView would load in place of its own: "
+                'make an environment without it (pip install ".[cpu]", not the extra plot)'
+            )
+    if not (_PACKAGE / "opencl" / "__init__.py").exists():
+        raise UnsupportedError(
+            f"{_PACKAGE} is an editable installation, whose kernels lie elsewhere: ParaView's "
+            'Python needs a plain one (pip install ".[cpu]")'
+        )
+    return {"PYTHONPATH": folders, "PV_PLUGIN_PATH": [PLUGIN.parent]}

@@ -1,0 +1,558 @@
+"""ParaView's plugin: VDI Source, VDI To Image, a reader and a writer.
+
+ParaView loads this file by its path (``pyvista-vdi paraview`` prints it): Tools > Manage
+Plugins, ``paraview.simple.LoadPlugin`` or ``PV_PLUGIN_PATH``. Nothing else imports it. It declares
+ParaView's properties over VTK algorithms that know nothing of ParaView.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import Any
+
+from paraview.util.vtkAlgorithm import smdomain, smhint, smproperty, smproxy
+from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
+from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkWeakReference
+from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
+from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
+
+try:
+    from pyvista_vdi import __version__, vtk_pipeline
+except ImportError as error:
+    raise ImportError(
+        f"ParaView's Python cannot import pyvista_vdi ({error}): start ParaView with PYTHONPATH="
+        f"{Path(__file__).resolve().parents[2]}"
+    ) from error
+
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.errors import VDIError
+from pyvista_vdi.standard_cases import ELEVATION, filling_camera
+from pyvista_vdi.vtk_pipeline.convert import scalars_of, volume_from_vtk
+
+#: What ParaView's plugin manager shows.
+paraview_plugin_name = "VDI"
+paraview_plugin_version = __version__
+
+#: Value of the property View that means the camera properties.
+_CAMERA = 1
+
+#: The camera properties, of our filters and of ParaView's render views alike.
+_CAMERA_PROPERTIES = (
+    "CameraPosition",
+    "CameraFocalPoint",
+    "CameraViewUp",
+    "CameraViewAngle",
+    "CameraParallelProjection",
+    "CameraParallelScale",
+)
+
+_WITH_CAMERA = """<Hints><PropertyWidgetDecorator type="GenericDecorator" mode="visibility"
+                         property="View" value="1" /></Hints>"""
+
+#: What decides a view: our two filters have it in common. {default} is what View = 0 means, {size}
+#: the default window.
+_VIEW_XML = f"""
+<IntVectorProperty name="WindowSize" command="SetSize" number_of_elements="2"
+                   default_values="{{size}}">
+  <IntRangeDomain name="range" min="{{least}} {{least}}" />
+  <Documentation>Width and height in pixels. {{note}}</Documentation>
+</IntVectorProperty>
+<IntVectorProperty name="View" command="SetView" number_of_elements="1" default_values="0">
+  <EnumerationDomain name="enum">
+    <Entry value="0" text="{{default}}" /><Entry value="{_CAMERA}" text="Camera" />
+  </EnumerationDomain>
+  <Documentation>Where the eye is before it is turned.</Documentation>
+</IntVectorProperty>
+<DoubleVectorProperty name="CameraPosition" command="SetCameraPosition" number_of_elements="3"
+                      default_values="0 0 1">{_WITH_CAMERA}</DoubleVectorProperty>
+<DoubleVectorProperty name="CameraFocalPoint" command="SetCameraFocalPoint" number_of_elements="3"
+                      default_values="0 0 0">{_WITH_CAMERA}</DoubleVectorProperty>
+<DoubleVectorProperty name="CameraViewUp" command="SetCameraViewUp" number_of_elements="3"
+                      default_values="0 1 0">{_WITH_CAMERA}</DoubleVectorProperty>
+<DoubleVectorProperty name="CameraViewAngle" command="SetCameraViewAngle" number_of_elements="1"
+                      default_values="30">{_WITH_CAMERA}</DoubleVectorProperty>
+<IntVectorProperty name="CameraParallelProjection" command="SetCameraParallelProjection"
+                   number_of_elements="1" default_values="0">
+  <BooleanDomain name="bool" />{_WITH_CAMERA}
+</IntVectorProperty>
+<DoubleVectorProperty name="CameraParallelScale" command="SetCameraParallelScale"
+                      number_of_elements="1" default_values="1">
+  {_WITH_CAMERA}
+</DoubleVectorProperty>
+<DoubleVectorProperty name="Azimuth" command="SetAzimuth" number_of_elements="1"
+                      default_values="0">
+  <DoubleRangeDomain name="range" min="-180" max="180" />
+  <Documentation>Turns the view about its up direction through the focal point,
+  degrees.</Documentation>
+</DoubleVectorProperty>
+<DoubleVectorProperty name="Elevation" command="SetElevation" number_of_elements="1"
+                      default_values="0">
+  <DoubleRangeDomain name="range" min="-90" max="90" />
+  <Documentation>Lifts the view after turning it, degrees.</Documentation>
+</DoubleVectorProperty>
+<Property name="TakeActiveView" label="Take the active view" command="TakeActiveView"
+          panel_widget="command_button">
+  <Documentation>Copy the active render view's camera and size into these properties. Client and
+  server must be one process.</Documentation>
+</Property>
+"""
+
+_DEVICE_XML = """
+<StringVectorProperty name="Device" command="SetDeviceName" number_of_elements="1"
+                      default_values="" panel_visibility="advanced">
+  <Documentation>OpenCL device; empty: the best one. `pyvista-vdi devices` lists
+  them.</Documentation>
+</StringVectorProperty>
+"""
+
+_SOURCE_XML = """
+<StringVectorProperty name="Scalars" command="SetArray" number_of_elements="5"
+                      element_types="0 0 0 0 2" animateable="0">
+  <ArrayListDomain name="array_list" attribute_type="Scalars">
+    <RequiredProperties><Property name="Input" function="Input" /></RequiredProperties>
+  </ArrayListDomain>
+  <Documentation>The array that is classified.</Documentation>
+</StringVectorProperty>
+<ProxyProperty name="ColorFunction" command="SetColorFunction">
+  <ProxyGroupDomain name="groups"><Group name="lookup_tables" /></ProxyGroupDomain>
+  <Documentation>A colour transfer function; by default black to white over the scalars'
+  range.</Documentation>
+</ProxyProperty>
+<ProxyProperty name="OpacityFunction" command="SetOpacityFunction">
+  <ProxyGroupDomain name="groups"><Group name="piecewise_functions" /></ProxyGroupDomain>
+  <Documentation>An opacity transfer function; by default 0 to 1 over the scalars'
+  range.</Documentation>
+</ProxyProperty>
+<Property name="TakeTransferFunctions" label="Take the array's colours and opacities"
+          command="TakeTransferFunctions" panel_widget="command_button">
+  <Documentation>Use the transfer functions that ParaView has for this array, and follow their
+  changes. Client and server must be one process.</Documentation>
+</Property>
+<DoubleVectorProperty name="ScalarOpacityUnitDistance" command="SetUnitDistance"
+                      number_of_elements="1" default_values="0">
+  <DoubleRangeDomain name="range" min="0" />
+  <Documentation>Length over which the opacity function's opacities are reached, in the volume's
+  units. 0: the diagonal over the mean number of points along an edge.</Documentation>
+</DoubleVectorProperty>
+<IntVectorProperty name="InterpolationType" command="SetInterpolation" number_of_elements="1"
+                   default_values="1">
+  <EnumerationDomain name="enum">
+    <Entry value="0" text="Nearest" /><Entry value="1" text="Linear" />
+  </EnumerationDomain>
+</IntVectorProperty>
+<IntVectorProperty name="Shade" command="SetShade" number_of_elements="1" default_values="0">
+  <BooleanDomain name="bool" />
+  <Documentation>Light the volume by one headlight at the generating view.</Documentation>
+</IntVectorProperty>
+<DoubleVectorProperty name="Ambient" command="SetAmbient" number_of_elements="1"
+                      default_values="0" panel_visibility="advanced" />
+<DoubleVectorProperty name="Diffuse" command="SetDiffuse" number_of_elements="1"
+                      default_values="1" panel_visibility="advanced" />
+<DoubleVectorProperty name="Specular" command="SetSpecular" number_of_elements="1"
+                      default_values="0" panel_visibility="advanced" />
+<DoubleVectorProperty name="SpecularPower" command="SetSpecularPower" number_of_elements="1"
+                      default_values="1" panel_visibility="advanced" />
+<IntVectorProperty name="AmbientOcclusion" command="SetOcclusion" number_of_elements="1"
+                   default_values="0">
+  <BooleanDomain name="bool" />
+  <Documentation>Darken what is hidden from the light around it.</Documentation>
+</IntVectorProperty>
+<DoubleVectorProperty name="AmbientOcclusionRadius" command="SetOcclusionRadius"
+                      number_of_elements="1" default_values="0" panel_visibility="advanced">
+  <DoubleRangeDomain name="range" min="0" />
+  <Documentation>How far around it that is looked for, in the volume's units. 0: the default
+  radius.</Documentation>
+</DoubleVectorProperty>
+<IntVectorProperty name="MaxSupersegments" command="SetMaxSupersegments" number_of_elements="1"
+                   default_values="20">
+  <IntRangeDomain name="range" min="1" max="4096" />
+  <Documentation>Longest list of a pixel.</Documentation>
+</IntVectorProperty>
+<DoubleVectorProperty name="SampleDistance" command="SetStep" number_of_elements="1"
+                      default_values="0" panel_visibility="advanced">
+  <DoubleRangeDomain name="range" min="0" />
+  <Documentation>Length of a step along a ray, in the volume's units. 0: half the smallest
+  spacing.</Documentation>
+</DoubleVectorProperty>
+<DoubleVectorProperty name="Tolerance" command="SetTolerance" number_of_elements="1"
+                      default_values="0" panel_visibility="advanced">
+  <DoubleRangeDomain name="range" min="0" />
+  <Documentation>Error that may be traded for shorter lists.</Documentation>
+</DoubleVectorProperty>
+<DoubleVectorProperty name="ViewCone" command="SetViewCone" number_of_elements="1"
+                      default_values="60" panel_visibility="advanced">
+  <DoubleRangeDomain name="range" min="0" max="90" />
+  <Documentation>Half angle of the cone of new views that must be served, degrees.</Documentation>
+</DoubleVectorProperty>
+<StringVectorProperty name="Coverage" command="SetCoverage" number_of_elements="1"
+                      default_values="view">
+  <StringListDomain name="list"><String value="view" /><String value="bounds" /></StringListDomain>
+  <Documentation>view: the VDI covers the window. bounds: the whole volume, whatever part of it the
+  window shows.</Documentation>
+</StringVectorProperty>
+"""
+
+
+class _Looking(VTKPythonAlgorithmBase):
+    """The properties of a view: an algorithm with ``SetCamera`` gets them as a camera."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._camera_chosen = False
+        self._lens: dict[str, Any] = {
+            "position": (0.0, 0.0, 1.0),
+            "focal_point": (0.0, 0.0, 0.0),
+            "view_up": (0.0, 1.0, 0.0),
+        }
+
+    def SetView(self, which: int) -> None:
+        """Choose between the default view and the camera properties."""
+        self._put("_camera_chosen", which == _CAMERA)
+
+    def SetCameraPosition(self, *place: float) -> None:
+        """Set the eye."""
+        self._look(position=place)
+
+    def SetCameraFocalPoint(self, *place: float) -> None:
+        """Set the point looked at."""
+        self._look(focal_point=place)
+
+    def SetCameraViewUp(self, *direction: float) -> None:
+        """Set the direction that is up."""
+        self._look(view_up=direction)
+
+    def SetCameraViewAngle(self, degrees: float) -> None:
+        """Set the vertical opening angle."""
+        self._look(view_angle=degrees)
+
+    def SetCameraParallelProjection(self, parallel: int) -> None:
+        """Choose between perspective and parallel projection."""
+        self._look(parallel_projection=bool(parallel))
+
+    def SetCameraParallelScale(self, scale: float) -> None:
+        """Set half the viewport's height in parallel projection."""
+        self._look(parallel_scale=scale)
+
+    def SetSize(self, width: int, height: int) -> None:
+        """Set the window; 0 is the default one."""
+        self.SetWindowSize((width, height) if width and height else None)
+
+    def SetDeviceName(self, name: str | None) -> None:
+        """Choose the OpenCL device; empty is the default one."""
+        self.SetDevice(name or None)
+
+    def TakeActiveView(self) -> None:
+        """Copy the active view's camera and size into the properties."""
+        client = _Client.of(self)
+        if client is None:
+            return
+        view = client.manager.GetSelectionModel("ActiveView").GetCurrentProxy()
+        if view is None or view.GetProperty("CameraPosition") is None:
+            _say(self, "the active view is no render view: click into one, or type its camera in")
+            return
+        view.SynchronizeCameraProperties()
+        client.set("View", [_CAMERA])
+        for name in _CAMERA_PROPERTIES:
+            client.set(name, client.values(name, view))
+        client.set("WindowSize", client.values("ViewSize", view))
+        client.set("Azimuth", [0.0])
+        client.set("Elevation", [0.0])
+        client.proxy.UpdateVTKObjects()
+
+    def _look(self, **part: Any) -> None:
+        self._put("_lens", {**self._lens, **part})
+
+    def _given_camera(self) -> Any:
+        # Made as late as this: set one at a time, the properties may pass through no camera at all
+        return Camera(**self._lens) if self._camera_chosen else None
+
+    def _put(self, attribute: str, value: Any) -> None:
+        if getattr(self, attribute) != value:
+            setattr(self, attribute, value)
+            self.Modified()
+
+
+@smproxy.filter(name="VDISource", label="VDI Source", support_reload=False)
+@smhint.xml('<ShowInMenu category="VDI" />')
+@smproperty.xml(
+    _SOURCE_XML
+    + _VIEW_XML.format(default="The volume fills the window", size="1280 720", least=1, note="")
+    + _DEVICE_XML
+)
+@smproperty.input(name="Input", port_index=0)
+@smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
+class VDISource(_Looking, vtk_pipeline.VDISource):
+    """A volume's VDI: :class:`pyvista_vdi.VDISource`, and a view and a ramp by default."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._azimuth = self._elevation = 0.0
+        self._kind = "point"
+        self._occluded = False
+        self._occlusion_radius = 0.0
+        self._unit_distance: float | None = None
+        self._functions: dict[str, Any] = {}
+        self._observers: dict[str, int] = {}
+        self._looks = vtkVolumeProperty()
+        self._looks.SetColor(vtkColorTransferFunction())
+        self._looks.SetScalarOpacity(vtkPiecewiseFunction())
+
+    def SetAzimuth(self, degrees: float) -> None:
+        """Turn the generating view."""
+        self._put("_azimuth", degrees)
+
+    def SetElevation(self, degrees: float) -> None:
+        """Lift the generating view."""
+        self._put("_elevation", degrees)
+
+    def SetArray(self, index: int, port: int, connection: int, kind: int, name: str) -> None:
+        """Choose the array, as ``SetInputArrayToProcess``: kind 0 is at points, 1 at cells."""
+        self._kind = "cell" if kind == 1 else "point"
+        self.SetScalars(name or None, self._kind)
+
+    def SetColorFunction(self, function: Any) -> None:
+        """Set ParaView's colour transfer function, or ``None`` for the default."""
+        self._follow("color", function)
+
+    def SetOpacityFunction(self, function: Any) -> None:
+        """Set ParaView's opacity transfer function, or ``None`` for the default."""
+        self._follow("opacity", function)
+
+    def SetUnitDistance(self, distance: float) -> None:
+        """Set the scalar opacity unit distance; 0 is the default one."""
+        self._put("_unit_distance", distance or None)
+
+    def SetInterpolation(self, which: int) -> None:
+        """Choose nearest (0) or linear (1) interpolation."""
+        self._on_looks("SetInterpolationType", which)
+
+    def SetShade(self, shade: int) -> None:
+        """Choose whether the volume is lit."""
+        self._on_looks("SetShade", shade)
+
+    def SetAmbient(self, share: float) -> None:
+        """Set the ambient coefficient."""
+        self._on_looks("SetAmbient", share)
+
+    def SetDiffuse(self, share: float) -> None:
+        """Set the diffuse coefficient."""
+        self._on_looks("SetDiffuse", share)
+
+    def SetSpecular(self, share: float) -> None:
+        """Set the specular coefficient."""
+        self._on_looks("SetSpecular", share)
+
+    def SetSpecularPower(self, power: float) -> None:
+        """Set the specular power."""
+        self._on_looks("SetSpecularPower", power)
+
+    def SetOcclusion(self, occluded: int) -> None:
+        """Choose whether what is hidden from the light around it is darkened."""
+        self._occluded = bool(occluded)
+        self.SetOcclusionRadius(self._occlusion_radius)
+
+    def SetOcclusionRadius(self, radius: float) -> None:
+        """Set how far around a point that is looked for; 0 is the default radius."""
+        self._occlusion_radius = radius
+        self.SetAmbientOcclusion((radius or True) if self._occluded else None)
+
+    def SetStep(self, distance: float) -> None:
+        """Set the length of a step along a ray; 0 is the default one."""
+        self.SetSampleDistance(distance or None)
+
+    def TakeTransferFunctions(self) -> None:
+        """Use the transfer functions that ParaView has for the array."""
+        from paraview.modules.vtkRemotingViews import (
+            vtkSMTransferFunctionManager,
+            vtkSMTransferFunctionProxy,
+        )
+
+        client = _Client.of(self)
+        name = client.values("Scalars")[4] if client else None
+        if client is None or not name:
+            return
+        functions = vtkSMTransferFunctionManager()
+        color = functions.GetColorTransferFunction(name, client.manager)
+        opacity = functions.GetOpacityTransferFunction(name, client.manager)
+        data = self.GetInputDataObject(0, 0) if self.GetNumberOfInputConnections(0) else None
+        if data is not None and not client.values("ScalarRangeInitialized", color)[0]:
+            low, high = scalars_of(data, name, self._kind).GetFiniteRange()
+            for function in (color, opacity):
+                vtkSMTransferFunctionProxy.RescaleTransferFunction(function, low, high)
+        for prop, function in (("ColorFunction", color), ("OpacityFunction", opacity)):
+            client.proxy.GetProperty(prop).RemoveAllProxies()
+            client.proxy.GetProperty(prop).AddProxy(function)
+        client.proxy.UpdateVTKObjects()
+
+    # -- the pipeline's requests -----------------------------------------------------------------
+
+    def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Announce the output's extent, which the view decides."""
+        with contextlib.suppress(VDIError):  # RequestData says it
+            self._set_view()
+        return int(super().RequestInformation(request, inputs, outputs))
+
+    def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Generate."""
+        try:
+            self._set_view()
+            self._set_looks(vtkImageData.GetData(inputs[0], 0))
+        except VDIError as error:
+            _say(self, error)
+            vtkImageData.GetData(outputs, 0).Initialize()
+            return 1
+        return int(super().RequestData(request, inputs, outputs))
+
+    def _set_view(self) -> None:
+        view, bounds, size = self._given_camera(), self.GetInputBounds(), self.GetWindowSize()
+        if view is not None:
+            view = view.azimuth(self._azimuth).elevation(self._elevation)
+        elif bounds is not None and size is not None:
+            view = filling_camera(bounds, size, self._azimuth, ELEVATION + self._elevation)
+        self.SetCamera(view)
+
+    def _set_looks(self, image: vtkImageData) -> None:
+        """Bring the volume property up to date with what is given, and with defaults."""
+        prop = self._looks
+        low, high = scalars_of(image, self.GetScalars(), self._kind).GetFiniteRange()
+        color, opacity = vtkColorTransferFunction(), vtkPiecewiseFunction()
+        for x, share in ((low, 0.0), (high, 1.0)):
+            color.AddRGBPoint(x, share, share, share)
+            opacity.AddPoint(x, share)
+        # A plain copy, not ParaView's object: that one gives as few colours as its table holds,
+        # which its volumes do not show either
+        prop.GetRGBTransferFunction().DeepCopy(self._functions.get("color") or color)
+        prop.GetScalarOpacity().DeepCopy(self._functions.get("opacity") or opacity)
+        distance = self._unit_distance
+        if distance is None:
+            volume = volume_from_vtk(image, self.GetScalars(), self._kind)
+            distance = volume.default_unit_distance
+        prop.SetScalarOpacityUnitDistance(distance)
+        self.SetVolumeProperty(prop)
+
+    def _on_looks(self, setter: str, value: Any) -> None:
+        getattr(self._looks, setter)(value)
+        self.Modified()
+
+    def _follow(self, role: str, function: Any) -> None:
+        """Be out of date whenever a transfer function changes."""
+        before = self._functions.pop(role, None)
+        if before is not None:
+            before.RemoveObserver(self._observers.pop(role))
+        if function is not None:
+            weak = vtkWeakReference()  # the function must not keep this algorithm alive
+            weak.Set(self)
+
+            def changed(caller: Any, event: str) -> None:
+                if weak.Get() is not None:
+                    weak.Get().Modified()
+
+            self._functions[role] = function
+            self._observers[role] = function.AddObserver("ModifiedEvent", changed)
+        self.Modified()
+
+
+@smproxy.filter(name="VDIToImage", label="VDI To Image", support_reload=False)
+@smhint.xml('<ShowInMenu category="VDI" />')
+@smproperty.xml(
+    _VIEW_XML.format(default="The VDI's own", size="0 0", least=0, note="0: the VDI's own.")
+    + _DEVICE_XML
+)
+@smproperty.input(name="Input", port_index=0)
+@smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
+class VDIToImage(_Looking, vtk_pipeline.VDIToImage):
+    """A picture of a VDI: :class:`pyvista_vdi.vtk_pipeline.VDIToImage`."""
+
+    def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Raycast."""
+        try:
+            self.SetCamera(self._given_camera())
+        except VDIError as error:
+            _say(self, error)
+            vtkImageData.GetData(outputs, 0).Initialize()
+            return 1
+        return int(super().RequestData(request, inputs, outputs))
+
+
+@smproxy.reader(
+    name="VDIReader",
+    label="VDI Reader",
+    extensions="vdi exr",
+    file_description="Volumetric Depth Image",
+    support_reload=False,
+)
+@smproperty.xml(
+    """<StringVectorProperty name="FileName" command="SetFileName" number_of_elements="1"
+                             animateable="0" panel_visibility="never">
+         <FileListDomain name="files" />
+         <Hints><FileChooser extensions="vdi exr" file_description="Volumetric Depth Image" />
+         </Hints>
+       </StringVectorProperty>"""
+)
+class VDIReader(vtk_pipeline.VDIReader):
+    """A VDI from a file: :class:`pyvista_vdi.vtk_pipeline.VDIReader`."""
+
+
+@smproxy.writer(
+    name="VDIWriter",
+    label="VDI Writer",
+    extensions="vdi exr",
+    file_description="Volumetric Depth Image",
+    support_reload=False,
+)
+@smproperty.xml(
+    """<StringVectorProperty name="FileName" command="SetFileName" number_of_elements="1"
+                             panel_visibility="never"><FileListDomain name="files" />
+       </StringVectorProperty>"""
+)
+@smproperty.input(name="Input", port_index=0)
+@smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
+class VDIWriter(vtk_pipeline.VDIWriter):
+    """A file of a VDI: :class:`pyvista_vdi.vtk_pipeline.VDIWriter`."""
+
+    def Write(self) -> None:
+        """Write the file; ParaView's output window says what went wrong."""
+        try:
+            super().Write()
+        except (VDIError, OSError) as error:
+            _say(self, error)
+
+
+class _Client:
+    """ParaView's client side of an algorithm, where it lives in the same process."""
+
+    def __init__(self, manager: Any, proxy: Any) -> None:
+        self.manager = manager
+        self.proxy = proxy
+
+    @classmethod
+    def of(cls, algorithm: Any) -> _Client | None:
+        """Return the client side, or ``None`` after having said why there is none."""
+        from paraview.modules.vtkRemotingServerManager import vtkSMProxyManager
+
+        manager: Any = None
+        if vtkSMProxyManager.IsInitialized():
+            manager = vtkSMProxyManager.GetProxyManager().GetActiveSessionProxyManager()
+        for i in range(manager.GetNumberOfProxies("sources") if manager else 0):
+            proxy = manager.GetProxy("sources", manager.GetProxyName("sources", i))
+            if proxy.GetClientSideObject() is algorithm:
+                return cls(manager, proxy)
+        _say(algorithm, "client and server are two processes: set the properties from the client")
+        return None
+
+    def values(self, name: str, proxy: Any = None) -> list[Any]:
+        """Return a property's values, of this algorithm or of another proxy."""
+        prop = (proxy or self.proxy).GetProperty(name)
+        return [prop.GetElement(i) for i in range(prop.GetNumberOfElements())]
+
+    def set(self, name: str, values: list[Any]) -> None:
+        """Set a property's values; ``UpdateVTKObjects`` applies them."""
+        prop = self.proxy.GetProperty(name)
+        for i, value in enumerate(values):
+            prop.SetElement(i, value)
+
+
+def _say(algorithm: Any, problem: object) -> None:
+    text = f"{type(algorithm).__name__}: {problem}\n"
+    vtkOutputWindow.GetInstance().DisplayErrorText(text)

@@ -1,0 +1,95 @@
+"""What takes the place of VTK's ray caster in the fragment shader of a VDI's actor.
+
+The sampler is never set: VTK allows no uniform to be set in the frame that builds the shader, and
+its default is texture unit 0, where the mapper puts a texture.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from vtkmodules.vtkCommonCore import reference
+from vtkmodules.vtkRenderingCore import vtkHardwareSelector
+
+_DECLARATION = "//VTK::Base::Dec\nuniform sampler2D vdiImage;\n"
+
+#: The image is premultiplied RGBA of the whole viewport, bottom row first. finalizeRayCast keeps
+#: picking and window/level.
+_LOOKUP = """
+  vec4 clip = in_projectionMatrix * in_modelViewMatrix * in_volumeMatrix[0]
+            * vec4(ip_vertexPos, 1.0);
+  g_fragColor = texture(vdiImage, clip.xy / clip.w * 0.5 + 0.5);
+  finalizeRayCast();
+"""
+
+#: For a selection's passes. Row 0 of the texture is one texel of numbers that no uniform can carry:
+#: the area's lower left corner in the framebuffer and its size, pixels. Above it lie the area's
+#: hits: (window depth, -, -, 1), or zeros for none.
+_FIRST_HIT = """
+  ivec4 area = ivec4(texelFetch(vdiImage, ivec2(0, 0), 0));
+  ivec2 place = ivec2(gl_FragCoord.xy) - area.xy;
+  if (any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, area.zw)))
+    {
+    discard;
+    }
+  vec4 hit = texelFetch(vdiImage, place + ivec2(0, 1), 0);
+  if (hit.a == 0.0)
+    {
+    discard;
+    }
+  gl_FragDepth = hit.r;
+"""
+
+#: finalizeRayCast chooses the colour of the passes that ask which prop it is.
+_PROP = """
+  g_fragColor = vec4(1.0);
+  finalizeRayCast();
+"""
+
+#: VTK would number the voxels from 1, and the only cell of the proxy is cell 0.
+_CELL = """
+  fragOutput0 = vec4(0.0, 0.0, 0.0, 1.0);
+"""
+
+
+#: What in VTK's template calls its ray caster.
+_CALL = "//VTK::CallWorker::Impl"
+
+
+def show_image(actor: Any) -> None:
+    """Have an actor's shader look its colours up in an image of the viewport."""
+    shader = actor.GetShaderProperty()
+    if _replacement(shader) is None:
+        shader.AddFragmentShaderReplacement("//VTK::Base::Dec", True, _DECLARATION, False)
+    _replace(shader, _LOOKUP)
+
+
+def show_first_hits(actor: Any, selection_pass: int) -> None:
+    """Have it draw first hits, at their depth, in place of the image.
+
+    Parameters
+    ----------
+    actor : vtkVolume
+        The VDI's.
+    selection_pass : int
+        What ``vtkHardwareSelector::GetCurrentPass`` says.
+    """
+    cells = (vtkHardwareSelector.CELL_ID_LOW24, vtkHardwareSelector.CELL_ID_HIGH24)
+    which = _CELL if selection_pass in cells else _PROP
+    _replace(actor.GetShaderProperty(), _FIRST_HIT + which)
+
+
+def _replace(shader: Any, text: str) -> None:
+    """Put the text in place, unless it is: a property that is modified has the shader rebuilt."""
+    if _replacement(shader) != text:
+        shader.AddFragmentShaderReplacement(_CALL, True, text, False)
+
+
+def _replacement(shader: Any) -> str | None:
+    """Return what is in place now. Asked of VTK: copies of an actor share its shader."""
+    for i in range(shader.GetNumberOfShaderReplacements()):
+        name, first, text, everywhere = (reference(kind) for kind in ("", False, "", False))
+        shader.GetNthShaderReplacement(i, name, first, text, everywhere)
+        if str(name) == _CALL:
+            return str(text)
+    return None

@@ -1,0 +1,247 @@
+"""The plugin in a real ParaView: ``pvpython`` off-screen, judged from outside.
+
+Needs ParaView, and an environment for it that tools/install_paraview.sh has made, in the folder
+that PYVISTA_VDI_PARAVIEW names. PYVISTA_VDI_REQUIRE_PARAVIEW=1 makes their absence a failure.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from virtual_screen import virtual_screen
+from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
+from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import examples
+from pyvista_vdi.metrics import compare_images, over_background
+from pyvista_vdi.standard_cases import filling_camera
+
+pytestmark = pytest.mark.paraview
+
+#: The folder that tools/install_paraview.sh has filled.
+FOLDER_VARIABLE = "PYVISTA_VDI_PARAVIEW"
+REQUIRED = os.environ.get("PYVISTA_VDI_REQUIRE_PARAVIEW") == "1"
+
+#: ParaView's Python is not the tests': its NumPy and its libraries for sine and cosine are others,
+#: so a view that is turned differs in its last digits. A pixel whose ray then falls on the other
+#: side of a border is another one; 0.1 % of the pixels may be.
+ROUNDING = 1e-5
+SHARE_OF_BORDER_PIXELS = 1e-3
+
+#: An opacity and a colour in eight bits each, their product in eight bits: 1.5 / 255 at most.
+BLENDED = 2 / 255
+
+
+def _missing():
+    if shutil.which("pvpython") is None:
+        return "pvpython (ParaView) is not installed: see tools/README.md"
+    if shutil.which("Xvfb") is None:
+        return "Xvfb is not installed, by which ParaView draws: Debian's package 'xvfb'"
+    named = os.environ.get(FOLDER_VARIABLE)
+    if not named:
+        return f"{FOLDER_VARIABLE} names no folder made by tools/install_paraview.sh"
+    if not Path(named, "bin", "pyvista-vdi").is_file():
+        return f"{FOLDER_VARIABLE}={named} holds no pyvista-vdi: see tools/install_paraview.sh"
+    return None
+
+
+@pytest.fixture(scope="module")
+def paraview():
+    """Run a case of inside.py in a fresh pvpython; return what it said."""
+    reason = _missing()
+    if reason is not None:
+        (pytest.fail if REQUIRED else pytest.skip)(reason)
+    command = Path(os.environ[FOLDER_VARIABLE]).resolve() / "bin" / "pyvista-vdi"
+    # To the letter what docs/guide_paraview.md says
+    line = f'eval "$({command} paraview --environment)"; exec pvpython "$@"'
+    left_out = ("PYTHONPATH", "VTK_DEFAULT_OPENGL_WINDOW", "WAYLAND_DISPLAY")
+    environment = {k: v for k, v in os.environ.items() if k not in left_out}
+    inside = Path(__file__).with_name("inside.py")
+
+    with virtual_screen() as display:
+
+        def run(case, folder, *more, script=inside):
+            arguments = ["--force-offscreen-rendering", script, case, folder, *more]
+            done = subprocess.run(
+                ["sh", "-c", line, "sh", *arguments],
+                env={**environment, "DISPLAY": display},
+                cwd=folder,
+                capture_output=True,
+                text=True,
+                timeout=600,
+                check=False,
+            )
+            said = done.stdout + done.stderr
+            assert done.returncode == 0, said
+            assert done.stdout.endswith("all well\n"), said
+            for trouble in ("Traceback", "ERR|", "WARN|"):
+                assert trouble not in said, said
+            return done.stderr
+
+        yield run
+
+
+@pytest.fixture(scope="module")
+def made(paraview, tmp_path_factory):
+    """The folder with what ParaView made in the case ``pipeline``, and its settings."""
+    folder = tmp_path_factory.mktemp("paraview")
+    assert paraview("pipeline", folder).strip() == ""
+    return folder, json.loads((folder / "scene.json").read_text())
+
+
+def screenshot(path):
+    return np.asarray(Image.open(path).convert("RGB")) / 255.0
+
+
+def pixels(path, size):
+    return np.load(path).reshape(size[1], size[0], 4)[::-1]
+
+
+def over_black(image):
+    return np.clip(image[..., :3], 0, 1)
+
+
+def volume_property(scene):
+    color, opacity, prop = vtkColorTransferFunction(), vtkPiecewiseFunction(), vtkVolumeProperty()
+    for node in np.reshape(scene["colors"], (-1, 4)):
+        color.AddRGBPoint(*node)
+    for node in np.reshape(scene["opacities"], (-1, 4)):
+        opacity.AddPoint(*node)
+    prop.SetColor(color)
+    prop.SetScalarOpacity(opacity)
+    prop.SetScalarOpacityUnitDistance(scene["unit distance"])
+    prop.SetInterpolationTypeToLinear()
+    return prop
+
+
+def test_vdi_is_what_generate_makes(made, default_runtime):
+    folder, scene = made
+    found = pvdi.read(folder / "brain.vdi")
+    whole, step = examples.load_brain(as_volume=True), scene["step"]
+    volume = pvdi.Volume(np.ascontiguousarray(whole.array[::step, ::step, ::step]), (step,) * 3)
+    camera = filling_camera(found.bounds, scene["size"])
+    assert found.window_size == tuple(scene["size"])
+    np.testing.assert_allclose(found.camera.position, camera.position, rtol=1e-12)
+    expected = pvdi.generate(
+        volume, found.camera, scene["size"], volume_property=volume_property(scene)
+    )
+    np.testing.assert_array_equal(found.offsets, expected.offsets)
+    # The matrices' last digits differ between the two Pythons. Measured: 2.4e-7 of a depth, two of
+    # its steps; by that the samples move, and the colours by 2.5e-5, the optical depths by 3e-6
+    for name, rtol, atol in (
+        ("front", 1e-6, 0),
+        ("back", 1e-6, 0),
+        ("color", 0, 1e-4),
+        ("optical_depth", 0, 1e-4),
+    ):
+        np.testing.assert_allclose(
+            getattr(found, name), getattr(expected, name), rtol=rtol, atol=atol, err_msg=name
+        )
+    assert found.metadata["scalars"] == "ImageScalars"
+
+
+def test_files_keep_every_bit(made):
+    folder, _ = made
+    first = pvdi.read(folder / "brain.vdi")
+    assert first.n_supersegments > 10_000
+    for name in ("again.vdi", "again.exr", "third.vdi"):
+        assert pvdi.read(folder / name).equals(first), name
+
+
+def test_picture_is_what_render_returns(made, default_runtime):
+    folder, scene = made
+    vdi = pvdi.read(folder / "brain.vdi")
+    expected = pvdi.render(vdi, vdi.camera.azimuth(scene["azimuth"]))
+    found = pixels(folder / "pixels.npy", scene["size"])
+    assert expected[..., 3].max() > 0.9
+    apart = np.abs(found - expected).max(axis=2)
+    assert (apart > ROUNDING).mean() <= SHARE_OF_BORDER_PIXELS
+    shown = screenshot(folder / "picture.png")
+    assert np.abs(shown - over_black(found)).max() <= BLENDED
+    assert compare_images(shown, over_black(expected)).ssim > 0.999
+
+
+@pytest.mark.parametrize("state", ["state.pvsm", "state.py"])
+def test_states_come_back(made, paraview, state):
+    folder, scene = made
+    assert paraview("load", folder, state).strip() == ""
+    before = pixels(folder / "pixels.npy", scene["size"])
+    np.testing.assert_array_equal(pixels(folder / f"{state}.npy", scene["size"]), before)
+    np.testing.assert_array_equal(
+        screenshot(folder / f"{state}.png"), screenshot(folder / "picture.png")
+    )
+
+
+def test_vdi_looks_like_paraviews_own_volume(paraview, tmp_path):
+    """One view, one pair of transfer functions: TakeActiveView, and VTK's GPU mapper as judge."""
+    paraview("volume", tmp_path)
+    judge, found = screenshot(tmp_path / "volume.png"), screenshot(tmp_path / "vdi.png")
+    assert judge.max() > 0.5
+    # 0.9994 measured; steps of the mapper are its own choice
+    assert compare_images(judge, found).ssim > 0.998
+
+
+def test_settings_reach_the_vdi(paraview, tmp_path):
+    paraview("settings", tmp_path)
+    found = json.loads((tmp_path / "settings.json").read_text())
+    assert found["grey by default"]
+    assert found["progress"]
+    assert found["points before"] == 60 * 40
+    assert found["idle"]
+    assert found["functions"] == [True, True]
+    before, after = found["blue"]
+    assert before > 0.1
+    assert after == 0.0  # the colour function has no blue any more
+    assert found["longest"] == 3
+    assert found["metadata"]["ambient_occlusion"]["radius"] == 9
+    camera = found["camera"]
+    np.testing.assert_allclose(camera["position"], (398, 108, 90), atol=1e-9)
+    assert camera["parallel_projection"]
+    # Coverage: the window is the bounds', 216 wide and 180 high, at 100 units per 40 pixels,
+    # rounded up to the screen's pixels
+    assert found["window"] == [88, 72]
+    assert camera["parallel_scale"] == pytest.approx(50 * 72 / 40)
+
+
+def test_mistakes_are_said_and_nothing_breaks(paraview, tmp_path):
+    said = paraview("mistakes", tmp_path)
+    assert json.loads((tmp_path / "mistakes.json").read_text()) == [0, 30 * 20]
+    assert "VDISource: the camera's position and focal point are the same point" in said
+    assert "VDIToImage: this vtkImageData is not a VDI" in said
+    assert f"VDIReader: {tmp_path}/absent.vdi cannot be read" in said
+    assert f"VDIWriter: {tmp_path}/no folder/x.vdi cannot be written" in said
+    assert len(said.splitlines()) == 4
+
+
+def test_paraviews_own_python_bears_our_numpy(paraview, tmp_path):
+    paraview("arrays", tmp_path)
+    found = json.loads((tmp_path / "arrays.json").read_text())
+    assert found["from"].startswith(str(Path(os.environ[FOLDER_VARIABLE]).resolve()))
+    gradient, copied = found["results"]
+    assert 0 < gradient[0] < gradient[1]
+    np.testing.assert_allclose(copied, (37.35310363769531, 276.8288269042969), rtol=1e-6)
+
+
+def test_the_guides_script_runs(paraview, tmp_path, default_runtime):
+    """What docs/guide_paraview.md shows, to the letter."""
+    checkout = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).parents[2])
+    guide = checkout / "docs" / "guide_paraview.md"
+    if not guide.is_file():
+        pytest.skip("no checkout at hand: set PYVISTA_VDI_CHECKOUT to one")
+    shown = re.search(r"```py\n(.*?)```", guide.read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "brain.py").write_text(shown[1] + 'print("all well")\n', encoding="utf-8")
+    paraview("guide", tmp_path, script=tmp_path / "brain.py")
+    vdi = pvdi.read(tmp_path / "brain.vdi")
+    found = screenshot(tmp_path / "brain.png")
+    expected = over_background(pvdi.render(vdi, vdi.camera.azimuth(20)), found[0, 0])
+    assert (np.abs(found - expected).max(axis=2) > BLENDED).mean() <= SHARE_OF_BORDER_PIXELS
+    assert (tmp_path / "brain.pvsm").stat().st_size > 0

@@ -1,0 +1,388 @@
+"""VDIs that overlap on the screen: merged by depth, whatever the order of adding."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import pyvista as pv
+from plugin_scenes import LOOKS, TOLERANCE, add_judge, add_ours, opaque_sphere, soft_ball
+from skimage.metrics import structural_similarity
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+from vtkmodules.vtkCommonDataModel import vtkPlane
+from vtkmodules.vtkRenderingCore import vtkVolume, vtkWindowToImageFilter
+from vtkmodules.vtkRenderingVolume import vtkMultiVolume
+from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
+
+from pyvista_vdi.errors import VDIWarning
+from pyvista_vdi.vtk_pipeline import overlap
+from pyvista_vdi.vtk_pipeline.frame import Frame
+
+pytestmark = pytest.mark.gl
+
+WINDOW = (150, 120)
+CAMERA = ((4.0, 3.0, 2.0), (0.4, 0.2, 0.1), (0.0, 0.0, 1.0))
+#: Two that overlap, and a third that overlaps both: colours and places.
+BALLS = (("viridis", (0.0, 0.0, 0.0)), ("hot", (0.9, 0.4, 0.2)), ("bone", (0.2, 0.7, -0.4)))
+
+
+@pytest.fixture
+def raycasts(monkeypatch):
+    """The number of VDIs in each joint picture that is raycast."""
+    counts = []
+    joint_image = overlap.joint_image
+
+    def counting(placed, *args, **kwargs):
+        counts.append(len(placed))
+        return joint_image(placed, *args, **kwargs)
+
+    monkeypatch.setattr(overlap, "joint_image", counting)
+    return counts
+
+
+def add_ball(plotter, which, *, place=None, add=add_ours, **more):
+    cmap, at = BALLS[which]
+    matrix = pv.Transform().translate(*(at if place is None else place)).matrix
+    return add(plotter, soft_ball(), cmap=cmap, user_matrix=matrix, **more)
+
+
+def new_plotter(**options):
+    plotter = pv.Plotter(**{"window_size": WINDOW, **options})
+    plotter.set_background("lightsteelblue")
+    return plotter
+
+
+def picture(plotter):
+    plotter.render()
+    return plotter.screenshot(return_img=True)[..., :3].astype(int)
+
+
+def draw(order, scene=None, shot=picture, *, camera=CAMERA, **options):
+    """The picture of balls that are added in an order; ``scene`` gets them in the fixed one."""
+    plotter = new_plotter(**options)
+    actors = {which: add_ball(plotter, which) for which in order}
+    plotter.camera_position = camera
+    if scene is not None:
+        scene(plotter, actors)
+    plotter.show(auto_close=False)
+    image = shot(plotter)
+    plotter.close()
+    return image
+
+
+def nothing_else(plotter, actors):
+    pass
+
+
+def meshes(plotter, actors):
+    opaque_sphere(plotter)
+    plotter.add_mesh(pv.Plane(direction=(1, 1, 0), i_size=2, j_size=2), color="red", opacity=0.5)
+
+
+def one_clipped(plotter, actors):
+    plane = vtkPlane()
+    plane.SetOrigin(0.9, 0.4, 0.2)
+    plane.SetNormal(0.3, -1, 0.2)
+    actors[1].mapper.AddClippingPlane(plane)
+
+
+def one_cropped(plotter, actors):
+    actors[1].mapper.SetCroppingRegionPlanes(-0.5, 0.1, -0.3, 0.4, -0.2, 0.9)
+    actors[1].mapper.SetCroppingRegionFlagsToFence()
+    actors[1].mapper.CroppingOn()
+
+
+def one_denser(plotter, actors):
+    actors[1].mapper.SetOpacityMultiplier(3.0)
+
+
+def parallel(plotter, actors):
+    plotter.enable_parallel_projection()
+
+
+def eye_in_both(plotter, actors):
+    plotter.camera_position = ((0.8, 0.3, 0.2), (-1.0, 0.0, -0.2), (0, 0, 1))
+    plotter.renderer.ResetCameraClippingRange()
+
+
+def anti_aliased(plotter, actors):
+    plotter.enable_anti_aliasing("msaa", multi_samples=4)
+    opaque_sphere(plotter)
+
+
+def right_eye(plotter, actors):
+    plotter.render_window.StereoRenderOn()
+    plotter.render_window.SetStereoType(5)
+
+
+def sheared(plotter, actors):
+    shear = np.array([[1, 0.3, 0, 0.5], [0, 1, 0, 0.2], [0, 0, 1.4, 0], [0, 0, 0, 1]])
+    actors[1].user_matrix = shear
+
+
+@pytest.mark.filterwarnings("ignore:coverage='bounds'")
+@pytest.mark.parametrize(
+    "scene",
+    [
+        nothing_else,
+        meshes,
+        one_clipped,
+        one_cropped,
+        one_denser,
+        parallel,
+        eye_in_both,
+        anti_aliased,
+        right_eye,
+        sheared,
+    ],
+    ids=lambda scene: scene.__name__,
+)
+def test_the_order_of_adding_changes_nothing(scene, raycasts):
+    first, second = draw((0, 1), scene), draw((1, 0), scene)
+    assert set(raycasts) == {2}
+    assert np.array_equal(first, second)
+    alone = draw((1,), lambda plotter, actors: scene(plotter, {0: None, **actors}))
+    assert np.abs(first - alone).max() > 40  # the other one is there
+
+
+def test_any_order_of_three(raycasts):
+    images = [draw(order) for order in itertools.permutations(range(3))]
+    assert set(raycasts) == {3}
+    for image in images[1:]:
+        assert np.array_equal(image, images[0])
+
+
+@pytest.mark.parametrize("tiled", [False, True])
+def test_pictures_of_twice_the_size(tiled, raycasts):
+    def shot(plotter):
+        if not tiled:
+            return plotter.screenshot(return_img=True, scale=2)
+        tiles = vtkWindowToImageFilter()
+        tiles.SetInput(plotter.render_window)
+        tiles.SetScale(2, 2)
+        tiles.ReadFrontBufferOff()
+        tiles.Update()
+        return vtk_to_numpy(tiles.GetOutput().GetPointData().GetScalars())
+
+    first, second = draw((0, 1), meshes, shot), draw((1, 0), meshes, shot)
+    assert set(raycasts) == {2}
+    assert first.max() > 0
+    assert np.array_equal(first, second)
+
+
+def multi_volume(scene=nothing_else):
+    """VTK's own joint picture of two volumes: one mapper that samples both at each step."""
+    plotter = new_plotter()
+    mapper, volumes = vtkOpenGLGPUVolumeRayCastMapper(), vtkMultiVolume()
+    volumes.SetMapper(mapper)
+    kept = []  # VTK's multi volume holds its parts weakly
+    for port, (cmap, place) in enumerate(BALLS[:2]):
+        donor = new_plotter()
+        actor = donor.add_volume(soft_ball(), mapper="gpu", **{**LOOKS, "cmap": cmap})
+        actor.prop.interpolation_type = "linear"
+        ball, volume = soft_ball(), vtkVolume()
+        mapper.SetInputDataObject(port, ball)
+        volume.SetProperty(actor.prop)
+        volume.SetPosition(*place)
+        volumes.SetVolume(volume, port)
+        kept += [actor, ball, volume]
+        donor.close()
+    mapper.SetAutoAdjustSampleDistances(0)
+    mapper.SetSampleDistance(0.02)
+    plotter.renderer.AddVolume(volumes)
+    scene(plotter, None)
+    plotter.camera_position = CAMERA
+    plotter.show(auto_close=False)
+    image = picture(plotter)
+    plotter.close()
+    return image
+
+
+@pytest.mark.parametrize("scene", [nothing_else, lambda plotter, _: opaque_sphere(plotter)])
+def test_as_vtk_marches_both_volumes_together(scene):
+    """The outside opinion: seen are an SSIM of .998 and 4 of 255."""
+    judge, ours = multi_volume(scene), draw((0, 1), scene)
+    assert np.abs(judge - draw((0,), scene)).max() > 40, "VTK's own picture lacks a volume"
+    ssim = structural_similarity(
+        judge / 255,
+        ours / 255,
+        data_range=1,
+        channel_axis=-1,
+        gaussian_weights=True,
+        sigma=1.5,
+        use_sample_covariance=False,
+    )
+    assert ssim >= 0.99
+    assert np.abs(judge - ours).max() <= TOLERANCE
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_one_behind_the_other(order, raycasts):
+    """Disjoint in depth, one before the other on the screen: as VTK's, added from behind."""
+    places = ((0.0, 0.0, 0.0), (-2.4, -1.8, -1.2))  # the second is behind, on the view's axis
+
+    def scene(add, order):
+        plotter = new_plotter()
+        for which in order:
+            add_ball(plotter, which, place=places[which], add=add)
+        plotter.camera_position = (CAMERA[0], (0, 0, 0), CAMERA[2])
+        plotter.show(auto_close=False)
+        image = picture(plotter)
+        plotter.close()
+        return image
+
+    far_first = scene(add_judge, (1, 0))
+    near_first = scene(add_judge, (0, 1))
+    assert np.abs(far_first - near_first).max() > 40
+    assert np.abs(scene(add_ours, order) - far_first).max() <= TOLERANCE
+    assert raycasts == [2]
+
+
+def test_apart_on_the_screen_each_draws_itself(raycasts):
+    plotter = new_plotter()
+    for which, shift in ((0, -2.0), (1, 2.0)):
+        add_ball(plotter, which, place=(shift, -shift, 0))
+    plotter.camera_position = ((6, 6, 2), (0, 0, 0), (0, 0, 1))
+    plotter.show(auto_close=False)
+    assert raycasts == []
+    plotter.close()
+
+
+def test_what_has_not_changed_is_not_raycast_again(raycasts, monkeypatch):
+    reads = []
+    opaque_depth = Frame.opaque_depth
+    monkeypatch.setattr(Frame, "opaque_depth", lambda *args: reads.append(1) or opaque_depth(*args))
+    plotter = new_plotter()
+    actors = [add_ball(plotter, which) for which in (0, 1)]
+    opaque_sphere(plotter)
+    plotter.camera_position = CAMERA
+    plotter.show(auto_close=False)
+    first = picture(plotter)
+    frames = len(reads)
+    plotter.render()
+    assert raycasts == [2]
+    assert len(reads) == frames + 1  # once for both
+    plotter.camera.Azimuth(20)
+    plotter.render()
+    assert raycasts == [2, 2]
+    plotter.camera.Azimuth(-20)
+    actors[0].SetVisibility(False)
+    plotter.render()
+    actors[0].SetVisibility(True)
+    assert np.array_equal(picture(plotter), first)
+    plotter.close()
+
+
+def test_changes_are_seen_at_once(raycasts):
+    plotter = new_plotter()
+    actors = [add_ball(plotter, which) for which in (0, 1)]
+    plotter.camera_position = CAMERA
+    plotter.show(auto_close=False)
+    both = picture(plotter)
+    actors[0].SetVisibility(False)
+    hidden = picture(plotter)
+    actors[0].SetVisibility(True)
+    assert np.array_equal(picture(plotter), both)
+    # VDIs of their own views, so only nearly what is drawn anew
+    assert np.abs(hidden - draw((1,))).max() <= 2
+    plotter.remove_actor(actors[0])
+    assert np.array_equal(picture(plotter), hidden)
+    actors[0] = add_ball(plotter, 0)
+    assert np.abs(picture(plotter) - both).max() <= 2
+    actors[1].user_matrix = np.eye(4)
+    moved = picture(plotter)
+    assert np.abs(moved - both).max() > 40
+    actors[0].mapper.lookup_table.cmap = "bone"
+    assert np.abs(picture(plotter) - moved).max() > 20
+    plotter.close()
+
+
+def test_several_renderers_and_one_actor_in_two(raycasts):
+    plotter = new_plotter(shape=(1, 2), window_size=(240, 120))
+    plotter.subplot(0, 0)
+    actors = [add_ball(plotter, which) for which in (0, 1)]
+    plotter.camera_position = CAMERA
+    plotter.subplot(0, 1)
+    for actor in reversed(actors):
+        plotter.add_actor(actor)
+    plotter.link_views()
+    plotter.show(auto_close=False)
+    image = picture(plotter)
+    plotter.close()
+    left, right = image[2:-2, 2:118], image[2:-2, 122:238]
+    assert np.abs(left - image[2, 2]).max() > 40
+    assert np.abs(left - right).max() <= 1
+
+
+def preview(order, rate=60.0):
+    """A preview as while a hand moves, its status, and the full picture."""
+    plotter = new_plotter()
+    actors = {which: add_ball(plotter, which) for which in order}
+    plotter.camera_position = CAMERA
+    plotter.show(auto_close=False)
+    full = picture(plotter)
+    for actor in actors.values():
+        actor.mapper.SetInteractiveOffScreen(True)
+        actor.mapper.SetRegenerate("never")
+        actor.mapper.SetTargetFrameRate(1e6)  # as coarse as allowed
+    actors[0].mapper.SetMaximumImageSampleDistance(2)
+    window = plotter.render_window
+    window.SetDesiredUpdateRate(rate)
+    plotter.camera.Azimuth(1)
+    window.Render()
+    plotter.camera.Azimuth(-1)
+    window.Render()
+    values = vtkUnsignedCharArray()
+    window.GetPixelData(0, 0, WINDOW[0] - 1, WINDOW[1] - 1, 1, values, 0)
+    image = vtk_to_numpy(values).reshape(WINDOW[1], WINDOW[0], 3)[::-1].astype(int)
+    status = [actor.status for actor in actors.values()]
+    window.SetDesiredUpdateRate(0.001)
+    plotter.close()
+    return image, status, full
+
+
+def test_previews_are_of_one_size():
+    image, status, full = preview((0, 1))
+    assert [s.mode for s in status] == ["preview", "preview"]
+    assert len({s.samples for s in status}) == 1
+    # The finer of what the two allow: every second pixel
+    assert status[0].samples == (WINDOW[0] // 2) * (WINDOW[1] // 2)
+    again, _, _ = preview((1, 0))
+    assert np.array_equal(image, again)
+    assert np.abs(image - full).mean() < 3
+
+
+def test_what_cannot_be_drawn_leaves_the_other(raycasts):
+    plotter = new_plotter()
+    actors = [add_ball(plotter, which) for which in (0, 1)]
+    plotter.camera_position = CAMERA
+
+    def fail():
+        raise RuntimeError("no such luck")
+
+    actors[0].mapper.GetSource().GetVDI = fail
+    with pytest.warns(VDIWarning, match="no such luck"):
+        plotter.show(auto_close=False)
+    assert raycasts == []
+    assert np.abs(picture(plotter) - draw((1,))).max() <= 2
+    plotter.close()
+
+
+@pytest.mark.usefixtures("no_leaks")
+def test_nothing_is_left(raycasts):
+    draw((0, 1), meshes)
+    assert raycasts == [2]
+
+
+@pytest.mark.usefixtures("no_leaks")
+def test_what_is_out_of_the_picture_is_not_generated(raycasts):
+    plotter = new_plotter()
+    add_ball(plotter, 0)
+    away = add_ball(plotter, 1, place=(60.0, 60.0, 0.0))
+    plotter.camera_position = CAMERA
+    plotter.show(auto_close=False)
+    assert raycasts == []
+    assert away.vdi is None
+    plotter.close()

@@ -1,0 +1,156 @@
+"""VDIToImage, VDIReader and VDIWriter: what a VTK pipeline ends in, without a window."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from plugin_scenes import soft_ball, vdi_of_one_list
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
+from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkRenderingCore import vtkCamera
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIFileError
+from pyvista_vdi.io import to_bytes
+from pyvista_vdi.vtk_pipeline import VDIReader, VDIToImage, VDIWriter, vdi_from_image, vdi_to_image
+
+
+@pytest.fixture(scope="module")
+def vdi(default_runtime):
+    camera = pvdi.Camera((3, -5, 2), (0, 0, 0), (0, 0, 1))
+    return pvdi.generate(soft_ball(), camera, (40, 30), cmap="viridis", opacity="linear")
+
+
+def to_image(vdi):
+    picture = VDIToImage()
+    picture.SetInputDataObject(vdi_to_image(vdi))
+    return picture
+
+
+def pixels(image, name):
+    """Return a point array of an image as (height, width, 4), top row first."""
+    width, height, depth = image.GetDimensions()
+    assert depth == 1
+    array = vtk_to_numpy(image.GetPointData().GetArray(name))
+    return array.reshape(height, width, 4)[::-1]
+
+
+# -- VDIToImage ------------------------------------------------------------------------------------
+
+
+def test_picture_is_what_render_returns(vdi):
+    picture = to_image(vdi)
+    image = picture.GetImage()
+    expected = pvdi.render(vdi, vdi.camera)
+    assert expected[..., 3].max() > 0.2  # there is something to see
+    np.testing.assert_array_equal(pixels(image, "premultiplied"), expected)
+    np.testing.assert_array_equal(pixels(image, "RGBA"), to_bytes(expected))
+    assert image.GetPointData().GetScalars().GetName() == "RGBA"
+
+    picture.SetWindowSize(25, 35)
+    picture.SetAzimuth(20)
+    picture.SetElevation(-10)
+    turned = pvdi.render(vdi, vdi.camera.azimuth(20).elevation(-10), (25, 35))
+    np.testing.assert_array_equal(pixels(picture.GetImage(), "premultiplied"), turned)
+
+    camera = vtkCamera()
+    camera.SetPosition(-4, -4, 1)
+    picture.SetCamera(camera)
+    picture.SetAzimuth(0)
+    picture.SetElevation(0)
+    picture.SetWindowSize(None)
+    np.testing.assert_array_equal(
+        pixels(picture.GetImage(), "premultiplied"), pvdi.render(vdi, camera)
+    )
+
+
+def test_extent_is_known_before_the_picture(vdi):
+    picture = to_image(vdi)
+    for size in (None, (7, 5)):
+        picture.SetWindowSize(size)
+        picture.UpdateInformation()
+        key = vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
+        width, height = size or vdi.window_size
+        expected = (0, width - 1, 0, height - 1, 0, 0)
+        assert picture.GetOutputInformation(0).Get(key) == expected
+    assert picture.GetOutputDataObject(0).GetNumberOfPoints() == 0
+
+
+def test_picture_is_made_again_only_if_something_changed(vdi):
+    image = vdi_to_image(vdi)
+    picture = VDIToImage()
+    picture.SetInputDataObject(image)
+    made = picture.GetImage().GetMTime()
+    picture.SetAzimuth(0)
+    assert picture.GetImage().GetMTime() == made
+    picture.SetAzimuth(5)
+    assert picture.GetImage().GetMTime() > made
+    other = vdi_of_one_list()
+    image.ShallowCopy(vdi_to_image(other))
+    np.testing.assert_array_equal(
+        pixels(picture.GetImage(), "premultiplied"),
+        pvdi.render(other, other.camera.azimuth(5)),
+    )
+
+
+def test_what_is_no_vdi_has_no_picture(vdi, vtk_messages):
+    picture = to_image(vdi)
+    picture.Update()
+    volume = vtkImageData()
+    volume.SetDimensions(3, 3, 3)
+    picture.SetInputDataObject(volume)
+    with pytest.raises(InvalidVDIError, match="is not a VDI"):
+        picture.Update()
+    assert picture.GetOutputDataObject(0).GetNumberOfPoints() == 0
+
+    # VTK's own update cannot raise
+    said = vtkStringOutputWindow()
+    vtkOutputWindow.SetInstance(said)
+    picture.GetExecutive().Update()
+    vtkOutputWindow.SetInstance(vtk_messages)
+    assert "VDIToImage: this vtkImageData is not a VDI" in said.GetOutput()
+
+
+# -- files -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", [".vdi", ".exr"])
+def test_files_keep_every_bit(vdi, suffix, tmp_path):
+    path = tmp_path / f"ball{suffix}"
+    writer = VDIWriter()
+    writer.SetInputData(vdi_to_image(vdi))
+    writer.SetFileName(path)
+    writer.Write()
+    reader = VDIReader()
+    reader.SetFileName(path)
+    reader.UpdateInformation()
+    key = vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
+    assert reader.GetOutputInformation(0).Get(key) == (0, 39, 0, 29, 0, 0)
+    picture = VDIToImage()
+    picture.SetInputConnection(reader.GetOutputPort())
+    picture.Update()
+    assert vdi_from_image(reader.GetOutputDataObject(0)).equals(vdi)
+    assert reader.GetFileName() == writer.GetFileName() == str(path)
+
+
+def test_files_say_what_is_wrong(vdi, tmp_path):
+    reader = VDIReader()
+    with pytest.raises(InvalidArgumentError, match="SetFileName"):
+        reader.Update()
+    reader.SetFileName(tmp_path / "absent.vdi")
+    with pytest.raises(VDIFileError, match="absent.vdi cannot be read"):
+        reader.Update()
+    writer = VDIWriter()
+    writer.SetInputData(vdi_to_image(vdi))
+    with pytest.raises(InvalidArgumentError, match="SetFileName"):
+        writer.Write()
+    writer.SetFileName(tmp_path / "ball.png")
+    with pytest.raises(VDIFileError, match="png"):
+        writer.Write()
+    writer.SetFileName(tmp_path / "ball.vdi")
+    writer.SetInputData(vtkImageData())
+    with pytest.raises(InvalidVDIError, match="is not a VDI"):
+        writer.Write()
+    assert list(tmp_path.iterdir()) == []

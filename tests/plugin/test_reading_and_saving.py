@@ -1,0 +1,81 @@
+"""PyVista's own ``read`` and ``save``: every format gives every bit back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista as pv
+from strategies import random_vdi
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIFileError
+from pyvista_vdi.vtk_pipeline.convert import is_vdi_image, vdi_from_image, vdi_to_image
+
+
+@pytest.fixture
+def vdi():
+    return random_vdi(np.random.default_rng(3))
+
+
+@pytest.mark.parametrize("suffix", [".vdi", ".exr", ".vti", ".VDI"])
+def test_save_and_read_give_every_bit_back(suffix, vdi, tmp_path):
+    path = tmp_path / f"a{suffix}"
+    pv.wrap(vdi_to_image(vdi)).save(path)
+    image = pv.read(path)
+    assert isinstance(image, pv.ImageData)
+    assert is_vdi_image(image)
+    assert vdi_from_image(image).equals(vdi)
+    assert vdi_from_image(image).metadata == vdi.metadata
+
+
+def test_what_pyvista_saves_is_what_we_save(vdi, tmp_path):
+    pv.wrap(vdi_to_image(vdi)).save(tmp_path / "a.vdi")
+    vdi.save(tmp_path / "b.vdi")
+    assert (tmp_path / "a.vdi").read_bytes() == (tmp_path / "b.vdi").read_bytes()
+
+
+def test_options_of_saving_and_reading(vdi, tmp_path):
+    image = pv.wrap(vdi_to_image(vdi))
+    for level in (1, 9):
+        image.save(tmp_path / f"{level}.vdi", level=level)
+        vdi.save(tmp_path / "same.vdi", level=level)
+        assert (tmp_path / f"{level}.vdi").read_bytes() == (tmp_path / "same.vdi").read_bytes()
+    with pytest.raises(InvalidArgumentError, match="with the options compression, level; got exac"):
+        image.save(tmp_path / "b.vdi", exact=False)
+    image.save(tmp_path / "a.exr", exact=False)
+    view = pvdi.Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))
+    assert vdi_from_image(pv.read(tmp_path / "a.exr", camera=view)).n_supersegments > 0
+    assert not (tmp_path / "b.vdi").exists()
+
+
+@pytest.mark.parametrize("name", ["a.vdi", "a.exr"])
+def test_what_is_no_vdi_is_not_saved_as_one(name, tmp_path):
+    with pytest.raises(InvalidVDIError, match=r"holds no VDI .*dataset\.vdi\.generate"):
+        pv.ImageData(dimensions=(3, 3, 3)).save(tmp_path / name)
+    with pytest.raises(InvalidVDIError, match="a PolyData that holds no VDI"):
+        pv.Sphere().save(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_is_no_deep_image_is_refused(tmp_path):
+    (tmp_path / "a.exr").write_bytes(b"something else")
+    with pytest.raises(VDIFileError, match=r"a\.exr"):
+        pv.read(tmp_path / "a.exr")
+
+
+def test_nothing_of_pyvista_is_shadowed():
+    ours = {"exr": ".exr", "vdi": ".vdi"}.values()
+    for registered in (pv.registered_readers(), pv.registered_writers()):
+        found = {each.extension for each in registered if "pyvista_vdi" in each.source}
+        assert found == set(ours)
+    assert not set(ours) & set(pv.ImageData._WRITERS)
+    assert not set(ours) & set(pv.core.utilities.reader.CLASS_READERS)
+
+
+def test_an_image_that_was_read_is_drawn(vdi, tmp_path):
+    """Without the volume: add_vdi takes what read gives."""
+    vdi.save(tmp_path / "a.exr")
+    plotter = pv.Plotter(off_screen=True, window_size=[32, 24])
+    actor = plotter.add_vdi(pv.read(tmp_path / "a.exr"))
+    assert actor.vdi.equals(vdi)
+    plotter.close()

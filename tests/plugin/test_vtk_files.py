@@ -1,0 +1,435 @@
+"""VDIs as VTK's data: files of VTK and PyVista, bit for bit, and the dense form."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+
+import numpy as np
+import pytest
+import pyvista as pv
+import strategies
+from hypothesis import given, settings
+from plugin_scenes import soft_ball
+from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
+from vtkmodules.vtkCommonExecutionModel import vtkTrivialProducer
+from vtkmodules.vtkImagingCore import vtkExtractVOI
+from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLImageDataWriter
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import host_memory
+from pyvista_vdi.cli import main
+from pyvista_vdi.compositing import opacity
+from pyvista_vdi.errors import (
+    DeviceMemoryError,
+    InvalidArgumentError,
+    InvalidVDIError,
+    InvalidVolumeError,
+    VDIFileError,
+)
+from pyvista_vdi.io import read_info
+from pyvista_vdi.vdi import VDI
+from pyvista_vdi.vtk_pipeline import (
+    VDIToDenseImage,
+    vdi_from_dense_image,
+    vdi_from_image,
+    vdi_to_dense_image,
+    vdi_to_image,
+)
+from pyvista_vdi.vtk_pipeline.dense import is_dense_image
+
+#: Metadata that text could spoil.
+METADATA = {
+    "nan": math.nan,
+    "infinite": [math.inf, -math.inf],
+    "negative zero": -0.0,
+    "smallest": 5e-324,
+    "third": 1 / 3,
+    "large": 2**60 + 1,
+    "text": 'ü "<&>]]>\u2028\x00\x07\U0001f600 \\ ',
+    "none": None,
+    "nested": {"a": [True, {"b": []}]},
+}
+
+
+def some_vdi(seed=1, **options):
+    vdi = strategies.random_vdi(np.random.default_rng(seed), **options)
+    vdi.metadata.update(METADATA)
+    return vdi
+
+
+def empty_vdi():
+    camera = pvdi.Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))
+    return VDI(camera, (4, 3), [0] * 13, [], [], [], [], (-1, 1, -1, 1, -1, 1), metadata=METADATA)
+
+
+def vdi_of_hard_numbers():
+    """Depths and optical depths that printing and parsing may spoil, in a parallel projection."""
+    camera = pvdi.Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), parallel_projection=True)
+    tiny, small = np.float32(1e-45), np.finfo(np.float32).tiny
+    front = np.array([-3e38, -small, -0.0, tiny, 1 / 3, 16777215.0], np.float32)
+    back = np.array([-1e38, -tiny, 0.0, small, 0.5, 16777216.0], np.float32)
+    back[2] = tiny
+    front[3] = tiny
+    color = np.array([[0, 1, 1 / 3], [tiny, small, 0.1]] * 3, np.float32)
+    tau = np.array([0, tiny, small, 1e-20, 3e38, np.nextafter(np.float32(1), np.float32(2))])
+    return VDI(
+        camera,
+        (3, 1),
+        [0, 6, 6, 6],
+        front,
+        back,
+        color,
+        tau,
+        (-1, 1, -1, 1, -1, 1),
+        depth_origin=1e300 / 3,
+        metadata=METADATA,
+    )
+
+
+VDIS = {
+    "some": some_vdi,
+    "one supersegment per list": lambda: some_vdi(2, max_supersegments=1),
+    "empty": empty_vdi,
+    "hard numbers": vdi_of_hard_numbers,
+}
+
+
+def assert_same(vdi, expected, *, text=False):
+    assert vdi.equals(expected)
+    assert repr(vdi.metadata) == repr(expected.metadata)  # NaN is not equal to itself
+    if text:
+        return  # VTK 9.4 writes -0 as 0, 9.7 does not
+    for name in ("front", "back", "color", "optical_depth"):
+        bits = [getattr(v, name).view(np.uint32) for v in (vdi, expected)]
+        np.testing.assert_array_equal(*bits)  # zeros have signs
+
+
+# -- the canonical form in files -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("mode", "compressor"),
+    [
+        ("Ascii", "None"),  # text is not compressed
+        *itertools.product(["Binary", "Appended"], ["None", "ZLib", "LZ4", "LZMA"]),
+    ],
+)
+@pytest.mark.parametrize("kind", VDIS)
+def test_vtks_files_keep_every_bit(kind, mode, compressor, tmp_path):
+    vdi = VDIS[kind]()
+    writer = vtkXMLImageDataWriter()
+    writer.SetInputData(vdi_to_image(vdi))
+    writer.SetFileName(str(tmp_path / "v.vti"))
+    getattr(writer, f"SetDataModeTo{mode}")()
+    getattr(writer, f"SetCompressorTypeTo{compressor}")()
+    assert writer.Write()
+    reader = vtkXMLImageDataReader()
+    reader.SetFileName(str(tmp_path / "v.vti"))
+    reader.Update()
+    text = mode == "Ascii"
+    assert_same(vdi_from_image(reader.GetOutput()), vdi, text=text)
+    assert_same(vdi_from_image(pv.read(tmp_path / "v.vti")), vdi, text=text)
+    assert_same(pvdi.read(tmp_path / "v.vti"), vdi, text=text)
+
+
+@pytest.mark.parametrize("binary", [True, False])
+@pytest.mark.parametrize("kind", VDIS)
+def test_pyvista_saves_and_reads_every_bit(kind, binary, tmp_path):
+    vdi = VDIS[kind]()
+    pv.wrap(vdi_to_image(vdi)).save(tmp_path / "v.vti", binary=binary)
+    assert_same(vdi_from_image(pv.read(tmp_path / "v.vti")), vdi, text=not binary)
+
+
+@given(strategies.SEEDS)
+@settings(max_examples=20)
+def test_any_vdi_in_our_vti(tmp_path_factory, seed):
+    vdi = strategies.random_vdi(np.random.default_rng(seed), max_window=(9, 7))
+    path = tmp_path_factory.mktemp("vti") / "v.vti"
+    assert vdi.save(path) == path
+    assert_same(pvdi.read(path), vdi)
+
+
+@pytest.mark.parametrize("kind", VDIS)
+@pytest.mark.parametrize("compression", ["lz4", "zlib", "lzma", "none"])
+def test_save_and_read(kind, compression, tmp_path):
+    vdi = VDIS[kind]()
+    path = vdi.save(tmp_path / "v.VTI", compression=compression, level=9)
+    assert_same(pvdi.read(str(path)), vdi)
+    about = read_info(path)
+    assert about.codec == compression
+    assert about.n_supersegments == vdi.n_supersegments
+    assert about.camera == vdi.camera
+    assert about.memory_bytes == vdi.nbytes
+    assert list(tmp_path.iterdir()) == [path], "no temporary file is left"
+
+
+@pytest.mark.gl
+def test_what_was_read_is_taken_everywhere(tmp_path):
+    plotter = pv.Plotter(off_screen=True, window_size=(80, 60))
+    vdi = soft_ball(12).vdi.generate(
+        pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1)), (80, 60), cmap="bone"
+    )
+    pv.wrap(vdi_to_image(vdi)).save(tmp_path / "v.vti")
+    image = pv.read(tmp_path / "v.vti")
+    np.testing.assert_array_equal(pvdi.render(image, vdi.camera), pvdi.render(vdi, vdi.camera))
+    actor = plotter.add_vdi(image)
+    assert actor.vdi.equals(vdi)
+    assert actor.vdi.metadata == vdi.metadata
+    plotter.screenshot(return_img=True)
+    plotter.close()
+    mapper = pvdi.VDIMapper()
+    for put in (mapper.SetInputData, mapper.SetInputDataObject):
+        put(image)
+        assert mapper.GetVDI().equals(vdi)
+    with pytest.raises(InvalidVolumeError, match="is a VDI in its VTK form, not a volume"):
+        pvdi.generate(image, vdi.camera, (8, 6), cmap="bone")
+
+
+def test_numpy_metadata_become_plain():
+    vdi = some_vdi()
+    vdi.metadata.update(a=np.float64(1 / 3), b=np.arange(3))
+    stored = vdi_from_image(vdi_to_image(vdi)).metadata
+    assert stored["a"] == 1 / 3
+    assert stored["b"] == [0, 1, 2]
+
+
+def test_metadata_that_json_cannot_hold(tmp_path):
+    vdi = some_vdi()
+    vdi.metadata["a"] = object()
+    with pytest.raises(InvalidVDIError, match="metadata cannot be written.*object.*numbers, text"):
+        vdi_to_image(vdi)
+    with pytest.raises(VDIFileError, match="metadata cannot be written"):
+        vdi.save(tmp_path / "v.vti")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda p: None, "cannot be read: No such file"),
+        (lambda p: p.mkdir(), "cannot be read: Is a directory"),
+        (lambda p: p.write_bytes(b""), "is not a VTK image file"),
+        (lambda p: p.write_text("PK nonsense"), "is not a VTK image file"),
+        (lambda p: soft_ball(4).save(p), "has no field string 'vdi'"),
+        (lambda p: pv.Sphere().save(p.with_suffix(".vtp")), "is not a VTK image file"),
+    ],
+    ids=["absent", "folder", "empty", "nonsense", "volume", "surface"],
+)
+def test_files_that_hold_no_vdi(make, message, tmp_path):
+    path = tmp_path / "v.vti"
+    make(path)
+    if path.with_suffix(".vtp").exists():
+        path.with_suffix(".vtp").rename(path)
+    with pytest.raises(VDIFileError, match=message):
+        pvdi.read(path)
+    with pytest.raises(VDIFileError, match=message):
+        read_info(path)
+
+
+def test_truncated_files_are_noticed(tmp_path):
+    """VTK's files have no checksums: a changed byte in uncompressed data is not noticed."""
+    path = some_vdi(3).save(tmp_path / "v.vti")
+    whole = path.read_bytes()
+    for share in (0.05, 0.3, 0.6, 0.9, 0.99):
+        path.write_bytes(whole[: int(share * len(whole))])
+        with pytest.raises(VDIFileError, match=r"v\.vti"):
+            pvdi.read(path)
+
+
+@pytest.mark.parametrize(
+    ("declared", "claimed"),
+    [
+        (rb'Extent="0 \d+ 0 \d+ 0 0"', b'Extent="0 65535 0 65535 0 0"'),
+        (rb'NumberOfTuples="\d+', b'NumberOfTuples="99999999999'),
+    ],
+)
+def test_nothing_is_allocated_for_what_a_file_only_declares(declared, claimed, tmp_path):
+    """VTK would take the memory, and end the process where there is none."""
+    path = some_vdi(3).save(tmp_path / "v.vti")
+    changed, n = re.subn(declared, claimed, path.read_bytes())
+    assert n
+    path.write_bytes(changed)
+    with pytest.raises(VDIFileError, match=r"v\.vti is damaged: \d+ bytes cannot hold the \d+ val"):
+        pvdi.read(path)
+
+
+def test_options_are_checked_before_anything_is_written(tmp_path):
+    for options, message in (
+        ({"compression": "zstd"}, "must be one of lz4, zlib, lzma and none; got 'zstd'"),
+        ({"level": 0}, "level must be a whole number from 1 to 9"),
+        ({"exact": True}, "written with the options compression, level; got exact"),
+    ):
+        with pytest.raises(InvalidArgumentError, match=message):
+            some_vdi().save(tmp_path / "v.vti", **options)
+    with pytest.raises(InvalidArgumentError, match="read with the options none; got camera"):
+        pvdi.read(tmp_path / "v.vti", camera=None)
+    assert not list(tmp_path.iterdir())
+
+
+def test_command_line_converts_both_ways(tmp_path, capsys):
+    vdi = strategies.random_vdi(np.random.default_rng(4))
+    vdi.save(tmp_path / "a.vdi")
+    names = [str(tmp_path / name) for name in ("a.vdi", "b.vti", "c.vdi", "d.vti")]
+    assert main(["convert", names[0], "-o", names[1]]) == 0
+    assert main(["convert", names[1], "-o", names[2]]) == 0
+    assert main(["convert", names[2], "-o", names[3], "--compression", "lzma"]) == 0
+    assert_same(pvdi.read(names[3]), vdi)
+    assert main(["info", names[3]]) == 0
+    assert "lzma" in capsys.readouterr().out
+    assert main(["render", names[1], "-o", str(tmp_path / "a.png")]) == 0
+    assert main(["generate", names[1], "-o", str(tmp_path / "e.vdi")]) == 1
+    assert "not a volume" in capsys.readouterr().err
+
+
+# -- the dense form --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", VDIS)
+def test_exact_dense_form_keeps_every_bit(kind):
+    vdi = VDIS[kind]()
+    image = vdi_to_dense_image(vdi, exact=True)
+    longest = max(1, vdi.counts.max())
+    assert image.GetDimensions() == (*vdi.window_size, longest)
+    assert is_dense_image(image)
+    assert_same(vdi_from_dense_image(image), vdi)
+
+
+def test_points_are_the_supersegments():
+    vdi = some_vdi(5, max_window=(7, 5), max_supersegments=4)
+    image = pv.wrap(vdi_to_dense_image(vdi))
+    wide, high, deep = image.dimensions
+    color, depth, tau = (
+        image.point_data[name].reshape(deep, high, wide, -1)
+        for name in ("color", "depth", "optical_depth")
+    )
+    assert color.dtype == np.uint8
+    assert image.active_scalars_name == "color"
+    for y in range(high):
+        for x in range(wide):
+            members = vdi.list_at(x, y)
+            n = members.stop - members.start
+            alpha = opacity(vdi.optical_depth[members])
+            np.testing.assert_array_equal(color[:n, y, x, :3], np.rint(vdi.color[members] * 255))
+            np.testing.assert_allclose(color[:n, y, x, 3], alpha * 255, atol=0.501)
+            np.testing.assert_array_equal(depth[:n, y, x, 0], vdi.front[members])
+            np.testing.assert_array_equal(depth[:n, y, x, 1], vdi.back[members])
+            np.testing.assert_array_equal(tau[:n, y, x, 0], vdi.optical_depth[members])
+            for rest in (color, depth, tau):
+                assert not rest[n:, y, x].any()
+    np.testing.assert_array_equal(image.field_data["count"].reshape(high, wide), vdi.counts)
+
+
+def test_bytes_lose_colour_only_and_no_more_than_documented():
+    vdi = some_vdi(6)
+    again = vdi_from_dense_image(vdi_to_dense_image(vdi))
+    for name in ("offsets", "front", "back", "optical_depth"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(vdi, name))
+    # half a step, and a rounding of the division
+    assert np.abs(again.color.astype(float) - vdi.color).max() <= 1 / 510 + 2**-24
+
+
+def test_room_for_more_and_none_for_less():
+    vdi = some_vdi(7, max_supersegments=5)
+    longest = int(vdi.counts.max())
+    image = vdi_to_dense_image(vdi, exact=True, max_supersegments=longest + 3)
+    assert image.GetDimensions()[2] == longest + 3
+    assert_same(vdi_from_dense_image(image), vdi)
+    with pytest.raises(InvalidArgumentError, match=f"longest list has {longest}.*would drop some"):
+        vdi_to_dense_image(vdi, max_supersegments=longest - 1)
+
+
+def test_memory_is_asked_for_before_it_is_taken(monkeypatch):
+    vdi = some_vdi(8)
+    width, height = vdi.window_size
+    n = width * height * int(vdi.counts.max())
+    monkeypatch.setattr(host_memory, "physical_memory", lambda: 20 * n + 24 * len(vdi.front))
+    vdi_to_dense_image(vdi)
+    with pytest.raises(DeviceMemoryError, match=r"dense form of .* lists of .*keep the canonical"):
+        vdi_to_dense_image(vdi, exact=True)
+    # A terabyte is refused at once
+    with pytest.raises(DeviceMemoryError, match="needs .* GiB on the host"):
+        vdi_to_dense_image(vdi, max_supersegments=2**40)
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda i: i.field_data.remove("vdi_dense"), "no field string 'vdi_dense'"),
+        (lambda i: i.field_data.remove("count"), "needs an array 'count' of shape.*there is none"),
+        (lambda i: i.point_data.remove("depth"), "needs an array 'depth'"),
+        (lambda i: i.field_data["count"].fill(200), "must be 0 to"),
+        (lambda i: i["depth"].fill(0.0), "front < back"),
+        (lambda i: i.field_data.set_array(["{"], "vdi_dense"), "description is damaged"),
+    ],
+    ids=["plain", "no counts", "no depths", "counts", "depths", "no json"],
+)
+def test_damaged_dense_forms_are_refused(damage, message):
+    image = pv.wrap(vdi_to_dense_image(some_vdi(9))).copy()
+    damage(image)
+    with pytest.raises(InvalidVDIError, match=message):
+        vdi_from_dense_image(image)
+
+
+def test_dense_files(tmp_path):
+    vdi = some_vdi(10)
+    pv.wrap(vdi_to_dense_image(vdi, exact=True)).save(tmp_path / "dense.vti")
+    assert_same(pvdi.read(tmp_path / "dense.vti"), vdi)
+    image = pv.read(tmp_path / "dense.vti")
+    with pytest.raises(InvalidVDIError, match="a dense form by vdi_from_dense_image"):
+        pvdi.render(image, vdi.camera)
+    # What streams by extent: one slice of it
+    voi = vtkExtractVOI()
+    voi.SetInputData(image)
+    voi.SetVOI(0, vdi.window_size[0] - 1, 0, 0, 0, 0)
+    voi.Update()
+    assert voi.GetOutput().GetPointData().GetArray("depth").GetNumberOfComponents() == 2
+
+
+def test_the_filter_in_a_pipeline():
+    vdi = some_vdi(11)
+    producer = vtkTrivialProducer()
+    producer.SetOutput(vdi_to_image(vdi))
+    dense = VDIToDenseImage()
+    dense.SetInputConnection(producer.GetOutputPort())
+    dense.Update()
+    longest = int(vdi.counts.max())
+    assert dense.GetOutputDataObject(0).GetDimensions() == (*vdi.window_size, longest)
+    assert not dense.GetExact()
+    dense.ExactOn()
+    dense.SetMaxSupersegments(longest + 2)
+    stamp = dense.GetMTime()
+    dense.SetExact(True)
+    dense.SetMaxSupersegments(longest + 2)
+    assert dense.GetMTime() == stamp
+    dense.Update()
+    assert dense.GetOutputDataObject(0).GetDimensions()[2] == longest + 2
+    assert_same(vdi_from_dense_image(dense.GetOutputDataObject(0)), vdi)
+    dense.ExactOff()
+    assert (dense.GetExact(), dense.GetMaxSupersegments()) == (False, longest + 2)
+    downstream = vtkExtractVOI()
+    downstream.SetInputConnection(dense.GetOutputPort())
+    downstream.SetVOI(0, vdi.window_size[0] - 1, 0, vdi.window_size[1] - 1, 0, 0)
+    downstream.Update()
+    assert downstream.GetOutput().GetNumberOfPoints() == np.prod(vdi.window_size)
+    dense.SetMaxSupersegments(1)
+    with pytest.raises(InvalidArgumentError, match="would drop some"):
+        dense.Update()
+    for nonsense in (0, 1.5, "two"):
+        with pytest.raises(InvalidArgumentError, match="max_supersegments must be a whole number"):
+            dense.SetMaxSupersegments(nonsense)
+
+
+def test_the_filter_refuses_what_is_no_vdi():
+    dense = VDIToDenseImage()
+    dense.SetInputDataObject(soft_ball(4))
+    with pytest.raises(InvalidVDIError, match="is not a VDI"):
+        dense.Update()
+    messages, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
+    vtkOutputWindow.SetInstance(messages)
+    downstream = vtkExtractVOI()
+    downstream.SetInputConnection(dense.GetOutputPort())
+    downstream.Update()
+    vtkOutputWindow.SetInstance(before)
+    assert "VDIToDenseImage: this ImageData is not a VDI" in messages.GetOutput()

@@ -1,0 +1,314 @@
+"""Ambient occlusion: closed forms, the device against float64, and nothing for who does not ask."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+import pytest
+import strategies
+
+from pyvista_vdi import (
+    AmbientOcclusion,
+    DeviceMemoryError,
+    Shading,
+    TransferFunction,
+    Volume,
+    device_volume,
+    reference,
+)
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.device_volume import DeviceVolume
+from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.opencl_runtime import Runtime
+from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.reference.generate import node_occlusion
+from pyvista_vdi.reference.occlusion import _trilinear as trilinear
+from pyvista_vdi.view_error import estimate_view_error
+
+WINDOW = (7, 6)
+
+#: Largest difference from the reference, of 1: float32 against float64, see test_lighting.py. Up to
+#: some hundred factors of a transmittance, each rounded: 1e-5. Measured: 2.4e-6.
+TOLERANCE = 1e-5
+
+
+def nodes_of(runtime, volume, function, occlusion, **options):
+    """Mean transmittance at the nodes, by the device, (nz, ny, nx)."""
+    medium = DeviceVolume(runtime, volume, function, ambient_occlusion=occlusion, **options)
+    return runtime.download(medium._occlusion[0])
+
+
+def homogeneous(opacity, unit_distance=1.0):
+    """Everything at or below 0.5 has this opacity, everything above is empty."""
+    return TransferFunction(
+        np.ones((2, 3)),
+        [opacity, 0],
+        (0.5, 0.5),
+        unit_distance=unit_distance,
+        interpolation="linear",
+    )
+
+
+def digest(vdi):
+    state = hashlib.sha256()
+    for name in ("offsets", "front", "back", "color", "optical_depth"):
+        state.update(getattr(vdi, name).tobytes())
+    return state.hexdigest()[:16]
+
+
+# -- closed forms ----------------------------------------------------------------------------------
+
+
+def test_inside_a_homogeneous_medium_it_is_the_transmittance_of_the_radius(runtime):
+    """exp(-sigma R), whatever the direction; an actor's matrix has no part in it."""
+    volume = Volume(np.zeros((33, 33, 33), np.uint8), spacing=(0.5, 0.5, 0.5))
+    function, radius = homogeneous(0.3, unit_distance=2.0), 4.0
+    expected = 0.7 ** (radius / 2)
+    occlusion = AmbientOcclusion(radius)
+    found = nodes_of(runtime, volume, function, occlusion)
+    assert found.shape == (33, 33, 33)
+    np.testing.assert_allclose(found[16, 16, 16], expected, rtol=1e-5)
+    # At a corner seven of eight octants are free, but for the border that cells blur
+    assert abs(found[0, 0, 0] - (7 + expected) / 8) < 0.02
+    centre = np.array([[16.0, 16, 16]])
+    direct = reference.ambient_transmittance(volume, function, centre, radius, 12)
+    np.testing.assert_allclose(direct, expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("points", [25, 97])
+def test_at_the_centre_of_a_ball_it_is_the_transmittance_of_its_radius(runtime, points):
+    """exp(-sigma a) for a ball of radius a inside the radius looked at; cells of 1 and 2 voxels."""
+    x = np.linspace(-1, 1, points)
+    z, y, x = np.meshgrid(x, x, x, indexing="ij")
+    distance = np.sqrt(x**2 + y**2 + z**2)
+    volume = Volume(distance.astype(np.float32), spacing=(2 / (points - 1),) * 3)
+    function = homogeneous(0.6)
+    occlusion = AmbientOcclusion(0.9, directions=64)
+    found = nodes_of(runtime, volume, function, occlusion)
+    middle = tuple(n // 2 for n in found.shape)
+    expected = 0.4**0.5
+    # The ball's face is found to a part of a cell: measured 0.0045 and 0.0001
+    np.testing.assert_allclose(found[middle], expected, atol=0.01)
+    centre = np.full((1, 3), (points - 1) / 2)
+    direct = reference.ambient_transmittance(volume, function, centre, 0.9, 64, step=0.005)
+    np.testing.assert_allclose(direct, expected, atol=0.002)
+
+
+def half_space(depth, sigma, radius):
+    """Mean transmittance at a depth in a half space, by quadrature over the cosine."""
+    cosine = (np.arange(20000) + 0.5) / 20000
+    out = np.exp(-sigma * np.minimum(radius, depth / cosine)).mean()
+    return (out + np.exp(-sigma * radius)) / 2
+
+
+@pytest.mark.parametrize("tilted", [False, True])
+def test_in_a_half_space_it_is_the_mean_over_the_sky(runtime, tilted):
+    """On the face half the light arrives, and below it less with every step."""
+    points = 61
+    index = np.arange(points) - 30.0
+    z, y, x = np.meshgrid(index, index, index, indexing="ij")
+    normal = np.array([1, 2, 3]) / np.sqrt(14) if tilted else np.array([0.0, 0, 1])
+    below = -(normal[0] * x + normal[1] * y + normal[2] * z)  # voxels under the face
+    volume = Volume((-below).astype(np.float32) + 0.5)  # the medium is at 0.5 and less
+    function = homogeneous(0.2)
+    sigma, radius = -np.log(0.8), 12.0
+    position = 30 - np.arange(0, 7)[:, None] * normal  # depths of 0 to 6 voxels
+    expected = [half_space(d, sigma, radius) for d in range(7)]
+    direct = reference.ambient_transmittance(volume, function, position, radius, 512)
+    # 512 directions and steps of half a voxel; measured 0.0017
+    np.testing.assert_allclose(direct, expected, atol=0.004)
+    nodes = nodes_of(runtime, volume, function, AmbientOcclusion(radius))
+    assert nodes.shape == (61, 61, 61)
+    found = trilinear(nodes.astype(float), position)
+    # 32 directions, and cells that blur the face by half a voxel; measured 0.014, and 0.070 on the
+    # face itself, along which rays then see half of the medium
+    np.testing.assert_allclose(found[1:], expected[1:], atol=0.025)
+    np.testing.assert_allclose(found[0], expected[0], atol=0.09)
+
+
+# -- the device against float64 --------------------------------------------------------------------
+
+
+def case(seed, **options):
+    rng = np.random.default_rng(seed)
+    volume = strategies.random_volume(rng, edge=12)
+    function = strategies.random_transfer_function(rng, volume, interpolation="linear")
+    camera = strategies.random_camera(rng, volume.bounds)
+    radius = rng.uniform(0.05, 0.6) * volume.length
+    return volume, camera, function.replace(**options), AmbientOcclusion(radius, 0.3, 20)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_pictures_are_the_reference_s(runtime, seed):
+    """Any spacing, direction matrix, voxel type, radius and view."""
+    volume, camera, function, occlusion = case(seed)
+    given = {"ambient_occlusion": occlusion}
+    expected = reference.volume_image(volume, camera, WINDOW, function, **given)
+    plain = reference.volume_image(volume, camera, WINDOW, function)
+    assert (plain - expected)[..., :3].max() > 0.004
+    assert (expected[..., :3] <= plain[..., :3] + 1e-12).all()
+    np.testing.assert_array_equal(expected[..., 3], plain[..., 3])
+    image = raycast_volume(volume, camera, WINDOW, function, device=runtime, **given)
+    np.testing.assert_allclose(image, expected, atol=TOLERANCE)
+    vdi = generate_vdi(volume, camera, WINDOW, function, device=runtime, **given)
+    np.testing.assert_allclose(render_vdi(vdi, camera, device=runtime), expected, atol=TOLERANCE)
+    assert vdi.metadata["ambient_occlusion"] == {
+        "radius": occlusion.radius,
+        "strength": 0.3,
+        "directions": 20,
+    }
+    own = reference.build_vdi(volume, camera, WINDOW, function, **given)
+    np.testing.assert_allclose(reference.render(own, camera), expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("more", ["nearest", "gradient opacity", "shading", "RGBA", "opaque"])
+def test_with_everything_else_as_well(runtime, more):
+    """The extinction is that of the marches; lit colours are darkened as unlit ones are."""
+    volume, camera, function, occlusion = case(7)
+    low, high = volume.finite_range()
+    changes = {
+        "nearest": {"interpolation": "nearest"},
+        "gradient opacity": {
+            "gradient_opacities": [0, 1],
+            "gradient_range": (0, (high - low) / 4),
+        },
+        "shading": {"shading": Shading(0.3, 0.6, 0.4, 5)},
+        "RGBA": {"scalar_range": (0, 255)},
+        "opaque": {"opacities": np.where(function.opacities > 0.5, 1, function.opacities)},
+    }
+    function = function.replace(**changes[more])
+    if more == "RGBA":
+        rng = np.random.default_rng(0)
+        channels = [strategies.random_array(rng, "uint8", (9, 8, 10)) for _ in range(4)]
+        volume = Volume(np.stack(channels, axis=-1), volume.spacing, volume.origin)
+    given = {"ambient_occlusion": occlusion}
+    expected = reference.volume_image(volume, camera, WINDOW, function, **given)
+    image = raycast_volume(volume, camera, WINDOW, function, device=runtime, **given)
+    off = np.abs(image - expected).max(axis=2) > TOLERANCE
+    # A nearest sample within rounding of a voxel's border may take either side's value
+    assert off.sum() <= (2 if more == "nearest" else 0), np.abs(image - expected).max()
+    plain = raycast_volume(volume, camera, WINDOW, function, device=runtime)
+    assert (plain - image)[..., :3].max() > 0.005
+
+
+def test_more_directions_come_closer_to_the_mean(runtime):
+    """Against 2048 of them, root mean square: .0040 with 12, .0013 with 32, .00001 with 512."""
+    volume, _, function, _ = case(11)
+    radius = 0.3 * volume.length
+    exact = nodes_of(runtime, volume, function, AmbientOcclusion(radius, directions=2048))
+    error = []
+    for n in (12, 32, 128, 512):
+        found = nodes_of(runtime, volume, function, AmbientOcclusion(radius, 1, n))
+        error.append(np.sqrt(np.mean((found - exact) ** 2)))
+    assert error == sorted(error, reverse=True)
+    assert error[1] < 0.003
+    assert error[3] < error[0] / 50
+
+
+def test_the_grid_is_near_the_definition(runtime):
+    """Where something is to be seen; smaller cells than the radius's eighth are not needed."""
+    rng = np.random.default_rng(3)
+    volume = Volume(strategies.random_array(rng, "float32", (32, 32, 32)))
+    low, high = volume.finite_range()
+    function = TransferFunction(
+        np.ones((3, 3)), [0, 0, 0.5], (low, high), unit_distance=1.0, interpolation="linear"
+    )
+    occlusion = AmbientOcclusion(8.0)
+    grid = node_occlusion(volume, function, occlusion)
+    grid._strength = 1.0  # then factors are what is open
+    position = rng.uniform(8, 23, size=(200, 3))
+    _, tau = reference.generate.medium_at(volume, function, position, np.ones(200))
+    position = position[tau > 0]
+    assert len(position) > 30
+    exact = reference.ambient_transmittance(volume, function, position, 8.0, 256)
+    assert np.abs(grid.factors(position) - exact).mean() < 0.02
+
+
+# -- who does not ask, and what is kept ------------------------------------------------------------
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
+def test_where_all_light_arrives_not_a_bit_changes(runtime, interpolation):
+    """A medium so thin that float32 sees no loss; and strength 0 is none at all."""
+    volume, camera, function, occlusion = case(5, interpolation=interpolation)
+    thin = function.replace(opacities=function.opacities * 1e-10)
+    assert nodes_of(runtime, volume, thin, occlusion).min() == 1.0
+    plain, occluded = (
+        generate_vdi(volume, camera, WINDOW, thin, ambient_occlusion=o, device=runtime)
+        for o in (None, occlusion)
+    )
+    assert plain.n_supersegments > 0
+    assert digest(plain) == digest(occluded)
+    none = generate_vdi(
+        volume,
+        camera,
+        WINDOW,
+        function,
+        ambient_occlusion=AmbientOcclusion(strength=0),
+        device=runtime,
+    )
+    assert digest(none) == digest(generate_vdi(volume, camera, WINDOW, function, device=runtime))
+    assert "ambient_occlusion" not in none.metadata
+
+
+def test_it_is_computed_once_for_a_classification(runtime, monkeypatch):
+    volume, camera, function, occlusion = case(2)
+    computed = []
+    compute = device_volume.ambient_transmittances
+
+    def counted(*args, **kwargs):
+        computed.append(1)
+        return compute(*args, **kwargs)
+
+    monkeypatch.setattr(device_volume, "ambient_transmittances", counted)
+
+    def render(function=function, occlusion=occlusion):
+        raycast_volume(
+            volume, camera, WINDOW, function, ambient_occlusion=occlusion, device=runtime
+        )
+        return len(computed)
+
+    assert render() == 1
+    generate_vdi(volume, camera, WINDOW, function, ambient_occlusion=occlusion, device=runtime)
+    assert render(occlusion=AmbientOcclusion(occlusion.radius, 0.9, 20)) == 1
+    assert render(function.replace(colors=1 - function.colors, shading=Shading())) == 1
+    assert render(function.replace(opacities=function.opacities / 2)) == 2
+    assert render() == 3
+    assert render(occlusion=AmbientOcclusion(occlusion.radius / 2, 0.3, 20)) == 4
+
+
+def test_its_memory_is_given_back(runtime):
+    volume, camera, function, occlusion = case(2)
+    before = runtime.allocated
+    raycast_volume(volume, camera, WINDOW, function, ambient_occlusion=occlusion, device=runtime)
+    del volume
+    assert runtime.allocated == before
+
+
+def test_a_grid_that_does_not_fit_is_refused(default_runtime, monkeypatch):
+    volume, camera, function, _ = case(2)
+    buffer = Runtime.buffer
+
+    def small(self, *args, **kwargs):
+        if kwargs.get("name") == "opacities for ambient occlusion":
+            raise DeviceMemoryError("the buffer needs more than there is")
+        return buffer(self, *args, **kwargs)
+
+    monkeypatch.setattr(Runtime, "buffer", small)
+    with pytest.raises(DeviceMemoryError, match="larger radius of ambient occlusion"):
+        raycast_volume(volume, camera, WINDOW, function, ambient_occlusion=True)
+
+
+def test_an_occluded_vdi_is_judged_by_the_occluded_volume(default_runtime):
+    """What decides when a plotter makes a VDI anew: at V_O there is no error to be seen."""
+    volume = Volume(strategies.random_array(np.random.default_rng(1), "float32", (20, 20, 20)))
+    low, high = volume.finite_range()
+    function = TransferFunction(np.ones((2, 3)), [0, 0.8], (low, high), interpolation="linear")
+    camera = Camera((9, -70, 25), (9.5, 9.5, 9.5), (0, 0, 1))
+    occlusion = AmbientOcclusion(8.0, 1.0)
+    vdi = generate_vdi(volume, camera, (64, 48), function, ambient_occlusion=occlusion)
+    given = (vdi, volume, function, camera)
+    assert estimate_view_error(*given, ambient_occlusion=occlusion).ssim > 0.9999
+    assert estimate_view_error(*given).ssim < 0.99

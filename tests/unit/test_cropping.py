@@ -1,0 +1,120 @@
+"""Cropping by itself: which regions there are, and how simply they can be said."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pyvista_vdi.cropping import PRESETS, Cropping, checked_opacity_multiplier
+from pyvista_vdi.errors import InvalidArgumentError
+
+BOX = (0.0, 3.0, 0.0, 3.0, 0.0, 3.0)
+THIRDS = (1.0, 2.0, 1.0, 2.0, 1.0, 2.0)
+
+
+def kept_by_points(cropping, bounds, n=12):
+    """Which points of a grid inside the bounds are kept, bool (n, n, n); indexed x, y, z."""
+    box = np.reshape(bounds, (3, 2))
+    axes = [low + (np.arange(n) + 0.5) / n * (high - low) for low, high in box]
+    index = [
+        (x >= low).astype(int) + (x >= max(low, high)).astype(int)
+        for x, (low, high) in zip(axes, np.reshape(cropping.planes, (3, 2)), strict=True)
+    ]
+    i, j, k = np.meshgrid(*index, indexing="ij")
+    return cropping.regions >> (i + 3 * j + 9 * k) & 1 == 1
+
+
+def kept_by_box(within, bounds, n=12):
+    box = np.reshape(bounds, (3, 2))
+    axes = [low + (np.arange(n) + 0.5) / n * (high - low) for low, high in box]
+    inside = [
+        (x >= low) & (x < high) for x, (low, high) in zip(axes, within.box, strict=True)
+    ]  # NaN: nothing
+    return inside[0][:, None, None] & inside[1][None, :, None] & inside[2][None, None, :]
+
+
+def test_from_what_users_have():
+    assert Cropping.from_any(None) is None
+    fence = Cropping(THIRDS, "fence")
+    assert Cropping.from_any(fence) is fence
+    assert Cropping.from_any((THIRDS, "fence")) == fence
+    assert Cropping.from_any((np.array(THIRDS), PRESETS["fence"])) == fence
+    assert Cropping.from_any(THIRDS) == Cropping(THIRDS)
+    assert hash(Cropping(list(THIRDS), "fence")) == hash(fence)
+
+
+@pytest.mark.parametrize(
+    ("cropping", "message"),
+    [
+        ((1, 2, 3), "six planes.*got"),
+        (5, "six planes.*got 5"),
+        ("fence", "six planes.*'fence'"),
+        ((0, 1, 0, 1, 0, math.nan), "six planes"),
+        ((THIRDS, "hedge"), "27 flags, 0 to 0x7ffffff, or one of 'subvolume'.*got 'hedge'"),
+        ((THIRDS, 2**27), "27 flags"),
+        ((THIRDS, -1), "27 flags"),
+        ((THIRDS, 1.5), "27 flags"),
+        ((THIRDS, True), "27 flags"),
+        ((THIRDS, None), "27 flags"),
+    ],
+)
+def test_nonsense_is_refused_by_name(cropping, message):
+    with pytest.raises(InvalidArgumentError, match=message):
+        Cropping.from_any(cropping)
+
+
+@pytest.mark.parametrize("multiplier", [-1, math.nan, math.inf, "thick", None, 10**400])
+def test_multipliers_that_are_none(multiplier):
+    with pytest.raises(InvalidArgumentError, match="opacity_multiplier is a finite factor"):
+        checked_opacity_multiplier(multiplier)
+
+
+def test_sub_volume_is_a_box():
+    within = Cropping(THIRDS).within(BOX)
+    np.testing.assert_array_equal(within.box, [[1, 2]] * 3)
+
+
+def test_planes_outside_the_bounds_and_infinite_ones_make_no_regions():
+    within = Cropping((-math.inf, 2, -5, 9, 1, math.inf), "subvolume").within(BOX)
+    np.testing.assert_array_equal(within.box, [[0, 2], [0, 3], [1, 3]])
+    # of a cross there is only its middle then
+    within = Cropping((-1, 4, -1, 4, -1, 4), "cross").within(BOX)
+    np.testing.assert_array_equal(within.box.ravel(), BOX)
+    assert np.isnan(Cropping((5, 6, 0, 3, 0, 3)).within(BOX).box).all()
+
+
+def test_fence_and_cross_take_the_regions_to_say():
+    for name in set(PRESETS) - {"subvolume"}:
+        within = Cropping(THIRDS, name).within(BOX)
+        assert within.box is None
+        np.testing.assert_array_equal(within.cuts, [[1, 2]] * 3)
+
+
+@given(
+    st.lists(st.integers(-2, 8), min_size=6, max_size=6),
+    st.one_of(
+        st.integers(0, Cropping.ALL),
+        # boxes of regions, which random flags never are
+        st.tuples(*[st.sampled_from([(0,), (1,), (2,), (0, 1), (1, 2), (0, 1, 2), (0, 2)])] * 3),
+    ),
+)
+def test_a_box_is_said_where_it_is_one_and_nowhere_else(halves, regions):
+    if isinstance(regions, tuple):
+        regions = sum(
+            1 << (i + 3 * j + 9 * k) for i in regions[0] for j in regions[1] for k in regions[2]
+        )
+    cropping = Cropping([h / 2 for h in halves], regions)
+    within = cropping.within(BOX)
+    points = kept_by_points(cropping, BOX)
+    if within.box is not None:
+        np.testing.assert_array_equal(kept_by_box(within, BOX), points)
+        return
+    inside = np.argwhere(points)
+    hull = tuple(
+        slice(low, high + 1) for low, high in zip(inside.min(0), inside.max(0), strict=True)
+    )
+    assert not points[hull].all(), "it is a box"
