@@ -264,11 +264,18 @@ def _uploads_of(volume: Volume) -> _Uploads:
 
 def checked_sample_distance(volume: Volume, sample_distance: float | None) -> float:
     """Return the length of a step in model units; half the smallest spacing by default."""
-    if sample_distance is None:
-        return min(volume.spacing) / 2
-    step = as_float(sample_distance)
     # Beyond 2^24 steps across the bounds, float32 cannot number them
     least = volume.length / 2**24
+    if sample_distance is None:
+        step = min(volume.spacing) / 2
+        if step < least:
+            raise InvalidArgumentError(
+                f"half the smallest spacing, {step:.3g}, is less than 2^-24 of the volume's "
+                f"diagonal, {least:.3g}: a ray would take years; give a longer sample_distance, "
+                "or resample the volume"
+            )
+        return step
+    step = as_float(sample_distance)
     if not (np.isfinite(step) and step >= least):
         raise InvalidArgumentError(
             f"sample_distance must be a length of at least {least:.3g} model units "
