@@ -202,6 +202,17 @@ run_tests() {
     ((result == 0 || (result == 5 && $# > 0)))
 }
 
+# Each target guided by coverage, where atheris has a wheel for this Python.
+run_fuzzing() {
+    if ! install "$work/venv" "[fuzz]" --only-binary atheris; then
+        log "atheris cannot be installed here: nothing is fuzzed beyond the tests"
+        return 0
+    fi
+    copy_tests
+    cd "$work/tests-only"
+    "$work/venv/bin/python" tests/fuzz/run.py --seconds "${CI_FUZZ_SECONDS:-120}"
+}
+
 # The plugin in a real ParaView; tools/ installs one where there is none.
 run_paraview_tests() {
     # PYTHON is the tests' interpreter, ParaView has its own

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .checks import as_float, as_floats
 from .errors import InvalidArgumentError, InvalidCameraError, UnsupportedError
 
 Matrix: TypeAlias = NDArray[np.float64]
@@ -130,9 +131,9 @@ class Camera:
         put(self, "position", _vector("position", position, 3))
         put(self, "focal_point", _vector("focal_point", focal_point, 3))
         put(self, "view_up", _vector("view_up", view_up, 3))
-        put(self, "view_angle", float(view_angle))
+        put(self, "view_angle", as_float(view_angle))
         put(self, "parallel_projection", bool(parallel_projection))
-        put(self, "parallel_scale", float(parallel_scale))
+        put(self, "parallel_scale", as_float(parallel_scale))
         put(self, "window_center", _vector("window_center", window_center, 2))
         put(self, "use_horizontal_view_angle", bool(use_horizontal_view_angle))
         put(self, "model_transform", _affine(model_transform))
@@ -201,6 +202,10 @@ class Camera:
     def from_dict(cls, state: Mapping[str, Any]) -> Camera:
         """Return the camera that :meth:`to_dict` described."""
         names = cls.__slots__[2:]
+        if not isinstance(state, Mapping):
+            raise InvalidCameraError(
+                f"a camera's description is a dictionary; got {type(state).__name__}"
+            )
         unknown = sorted(set(state) - set(names))
         missing = sorted({"position", "focal_point", "view_up"} - set(state))
         if unknown or missing:
@@ -417,6 +422,8 @@ class Camera:
 
     def _make_axes(self) -> Matrix:
         forward = np.subtract(self.focal_point, self.position)
+        # By a power of two, which rounds nothing: squares may overflow
+        forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])
         forward = forward / np.linalg.norm(forward)
         right = np.cross(forward, _unit(np.asarray(self.view_up)))
         right /= np.linalg.norm(right)
@@ -425,7 +432,9 @@ class Camera:
         return axes
 
     def _check(self) -> None:
-        if not self.parallel_projection and not 0 < self.view_angle < 180:
+        # In parallel projection the angle has no meaning, but it is a number
+        any_angle = self.parallel_projection and math.isfinite(self.view_angle)
+        if not (any_angle or 0 < self.view_angle < 180):
             raise InvalidCameraError(
                 f"view_angle must lie between 0 and 180 degrees, both excluded; "
                 f"got {self.view_angle!r}"
@@ -435,7 +444,13 @@ class Camera:
                 f"parallel_scale must be a positive number of world units; "
                 f"got {self.parallel_scale!r}"
             )
-        forward = np.subtract(self.focal_point, self.position)
+        with np.errstate(over="ignore"):
+            forward = np.subtract(self.focal_point, self.position)
+        if not np.isfinite(forward).all():
+            raise InvalidCameraError(
+                f"the camera's position {self.position} and focal point {self.focal_point} are "
+                "too far apart for float64: move them closer"
+            )
         if not np.any(forward):
             raise InvalidCameraError(
                 f"the camera's position and focal point are the same point {self.position}: "
@@ -453,7 +468,9 @@ class Camera:
     def _turned(self, axis: Matrix, degrees: float) -> Camera:
         """Rotate the eye about ``axis`` through the focal point (Rodrigues' formula)."""
         axis = _unit(axis)
-        angle = math.radians(degrees)
+        angle = math.radians(as_float(degrees))
+        if not math.isfinite(angle):
+            raise InvalidCameraError(f"a view is turned by a finite angle; got {degrees!r}")
         arm = np.subtract(self.position, self.focal_point)
         turned = (
             arm * math.cos(angle)
@@ -464,17 +481,14 @@ class Camera:
 
 
 def _vector(name: str, value: ArrayLike, length: int) -> tuple[float, ...]:
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.empty(0)
+    array = as_floats(value)
     if array.shape != (length,) or not np.isfinite(array).all():
         raise InvalidCameraError(f"{name} must be {length} finite numbers; got {value!r}")
     return tuple(array.tolist())
 
 
 def _affine(value: ArrayLike | None) -> Matrix:
-    matrix = np.eye(4) if value is None else np.array(value, dtype=np.float64)
+    matrix = np.eye(4) if value is None else as_floats(value)
     if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
         raise InvalidCameraError(f"model_transform must be 4 x 4 finite numbers; got {value!r}")
     if not np.array_equal(matrix[3], [0, 0, 0, 1]):
@@ -482,7 +496,9 @@ def _affine(value: ArrayLike | None) -> Matrix:
             f"model_transform must be affine: its last row is {matrix[3].tolist()}, not 0 0 0 1"
         )
     # Scale-free: the determinant against the product of the column lengths (Hadamard's bound)
-    columns = np.linalg.norm(matrix[:3, :3], axis=0)
+    columns = np.abs(matrix[:3, :3]).max(axis=0)  # first, because squares may overflow
+    if columns.all():
+        columns *= np.linalg.norm(matrix[:3, :3] / columns, axis=0)
     if not columns.all() or abs(np.linalg.det(matrix[:3, :3] / columns)) < 1e-12:
         raise InvalidCameraError(
             "model_transform cannot be inverted: it flattens space "

@@ -14,6 +14,7 @@ from . import rays
 from .ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from .blocks import GROUP
 from .camera import Camera
+from .checks import as_float
 from .device_occlusion import ambient_transmittances
 from .errors import InvalidArgumentError
 from .lighting import Lights
@@ -24,7 +25,7 @@ from .numerics import (
     held_unit_distance,
     scalars_suit_float32,
 )
-from .opencl_runtime import DeviceBuffer, Runtime, aligned_empty, padded
+from .opencl_runtime import DeviceBuffer, Runtime, aligned_empty, kept_together, padded
 from .shading import gradient_table, lighting_table, shading_defines
 from .transfer_function import TransferFunction
 from .volume import Volume
@@ -309,7 +310,14 @@ def checked_sample_distance(volume: Volume, sample_distance: float | None) -> fl
     """Return the length of a step in model units; half the smallest spacing by default."""
     least = volume.length / MOST_STEPS
     if sample_distance is None:
-        return max(min(volume.spacing) / 2, least)
+        step = min(volume.spacing) / 2
+        if step < least:
+            raise InvalidArgumentError(
+                f"half the smallest spacing, {step:.3g}, is less than 2^-19 of the volume's "
+                f"diagonal, {least:.3g}: float32 cannot sum up so many steps; give a longer "
+                "sample_distance, or resample the volume"
+            )
+        return step
     step = as_float(sample_distance)
     if not (np.isfinite(step) and step >= least):
         raise InvalidArgumentError(
@@ -318,14 +326,6 @@ def checked_sample_distance(volume: Volume, sample_distance: float | None) -> fl
         )
     # No ray is longer than the diagonal; float32 may not hold how much longer the step is
     return min(step, 2 * volume.length)
-
-
-def as_float(value: Any) -> float:
-    """Return ``value`` as a float, NaN where it is no number: range checks then refuse it."""
-    try:
-        return float(value)
-    except (TypeError, ValueError, OverflowError):
-        return float("nan")
 
 
 def _per_scalar(entries: int, span: float) -> float:
@@ -358,9 +358,11 @@ def _upload(
         if key not in made:
             _require_a_number(runtime, volume)
             array = volume.array if scale is None else _all_scaled(runtime, volume.array, scale)
-            voxels = runtime.upload(array, f"volume {volume.name!r}")
-            made[key] = (voxels, _block_ranges(runtime, volume, voxels, defines))
-            runtime.finish()  # a thread with another queue may use them next
+            with kept_together() as keep:
+                voxels = keep(runtime.upload(array, f"volume {volume.name!r}"))
+                ranges = keep(_block_ranges(runtime, volume, voxels, defines))
+                runtime.finish()  # a thread with another queue may use them next
+            made[key] = (voxels, ranges)
         return made[key]
 
 
@@ -419,9 +421,8 @@ def _scaled(array: NDArray[Any], low: float, high: float) -> NDArray[np.float32]
         # infinite voxel stays one
         finite = np.clip(scaled, -_BEYOND, _BEYOND)
         return np.where(np.isinf(array), scaled, finite).astype(np.float32)
-    above = (array > np.float64(low)).astype(
-        np.float32
-    )  # at or below the single scalar, or above it
+    # At or below the single scalar, or above it
+    above = (array > np.float64(low)).astype(np.float32)
     if array.dtype.kind == "f":
         above[np.isnan(array)] = np.nan
     return above

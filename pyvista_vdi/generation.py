@@ -14,7 +14,8 @@ from ._version import __version__
 from .ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
-from .device_volume import DeviceVolume, as_float
+from .checks import as_float
+from .device_volume import DeviceVolume
 from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory
 from .lighting import Lights

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from . import rays
 from .blocks import GROUP
-from .opencl_runtime import DeviceBuffer, Runtime
+from .opencl_runtime import DeviceBuffer, Runtime, kept_together
 from .vdi import VDI
 
 #: Lists along each edge of a tile, and slabs of depth: those of ``opencl/common/occupancy.cl``.
@@ -85,34 +85,35 @@ class OccupancyGrid:
         # Bounds without depth, or behind the eye: everything is in slab 0
         self.slabs_per_depth = SLABS / (far - near) if far > near else 1.0
         self.margin = _ROUNDINGS * 2.0**-23 * _looked_up(vdi, near, far, shifted)
-        self.counts = runtime.buffer((high, wide, SLABS), np.uint32, "occupancy counts")
-        self.masks = runtime.buffer((high, wide), np.uint64, "occupancy masks")
-        defines = {"OFFSET_T": "ulong" if long_offsets else "uint"}
-        runtime.fill(self.counts, np.uint32(0))
-        runtime.launch(
-            runtime.kernel("grid/occupancy.cl", "count_supersegments", defines),
-            -(-width * height // GROUP) * GROUP,
-            GROUP,
-            offsets,
-            front,
-            back,
-            np.int32(width),
-            np.int32(height),
-            np.int32(wide),
-            np.float32(self.first_depth),
-            np.float32(self.slabs_per_depth),
-            np.float32(self.margin),
-            self.counts,
-        )
-        runtime.launch(
-            runtime.kernel("grid/occupancy.cl", "occupied_slabs", defines),
-            -(-wide * high // GROUP) * GROUP,
-            GROUP,
-            self.counts,
-            np.uint32(wide * high),
-            self.masks,
-        )
-        masks = runtime.download(self.masks)
+        with kept_together() as keep:
+            self.counts = keep(runtime.buffer((high, wide, SLABS), np.uint32, "occupancy counts"))
+            self.masks = keep(runtime.buffer((high, wide), np.uint64, "occupancy masks"))
+            defines = {"OFFSET_T": "ulong" if long_offsets else "uint"}
+            runtime.fill(self.counts, np.uint32(0))
+            runtime.launch(
+                runtime.kernel("grid/occupancy.cl", "count_supersegments", defines),
+                -(-width * height // GROUP) * GROUP,
+                GROUP,
+                offsets,
+                front,
+                back,
+                np.int32(width),
+                np.int32(height),
+                np.int32(wide),
+                np.float32(self.first_depth),
+                np.float32(self.slabs_per_depth),
+                np.float32(self.margin),
+                self.counts,
+            )
+            runtime.launch(
+                runtime.kernel("grid/occupancy.cl", "occupied_slabs", defines),
+                -(-wide * high // GROUP) * GROUP,
+                GROUP,
+                self.counts,
+                np.uint32(wide * high),
+                self.masks,
+            )
+            masks = runtime.download(self.masks)
         cells = _share_in_bounds(vdi, near, far) * masks.size * SLABS
         self.occupied = float(np.unpackbits(masks.view(np.uint8)).sum() / max(cells, 1.0))
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 import weakref
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,7 @@ from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
 from .numerics import compensation
 from .occupancy import OccupancyGrid
-from .opencl_runtime import DeviceBuffer, Runtime, get_runtime
+from .opencl_runtime import DeviceBuffer, Runtime, get_runtime, kept_together
 from .picking import DEFAULT_OPACITY, FirstHit
 from .precision import Packed8, Packed16
 from .vdi import VDI
@@ -30,6 +30,8 @@ MAX_PREVIEW_SAMPLES = 2**23
 _LONG_LENS = 2.0
 #: Pairs of words before the supersegments of an 8-byte list: that of ``common/supersegments.cl``.
 _LIST_HEADER = 2
+
+_Keep: TypeAlias = Callable[[DeviceBuffer], DeviceBuffer]
 
 _prepared: weakref.WeakKeyDictionary[VDI, dict[Runtime, _Preparation]] = weakref.WeakKeyDictionary()
 _lock = threading.Lock()
@@ -429,10 +431,11 @@ class PreparedVDI:
         runtime = self._runtime
         offset_type = np.uint64 if self._long_offsets else np.uint32
         with (
+            kept_together() as keep,
             runtime.upload(vdi.front, "front depths") as front,
             runtime.upload(vdi.back, "back depths") as back,
         ):
-            offsets = runtime.upload(vdi.offsets.astype(offset_type), "list offsets")
+            offsets = keep(runtime.upload(vdi.offsets.astype(offset_type), "list offsets"))
             self.occupancy = OccupancyGrid(
                 runtime,
                 vdi,
@@ -443,19 +446,25 @@ class PreparedVDI:
                 shifted=self._shifted,
                 long_offsets=self._long_offsets,
             )
+            keep(self.occupancy.counts), keep(self.occupancy.masks)
             if isinstance(vdi.packing, Packed8):
                 runtime.finish()
                 offsets.release()
-                self._offsets, self._lists = self._packed_lists(vdi, vdi.packing, offset_type)
+                self._offsets, self._lists = self._packed_lists(vdi, vdi.packing, offset_type, keep)
             else:
                 self._offsets, self._lists = (
                     offsets,
-                    self._prepared_lists(vdi, offsets, front, back),
+                    self._prepared_lists(vdi, offsets, front, back, keep),
                 )
             runtime.finish()  # the buffers above may be host memory in use
 
     def _prepared_lists(
-        self, vdi: VDI, offsets: DeviceBuffer, front: DeviceBuffer, back: DeviceBuffer
+        self,
+        vdi: VDI,
+        offsets: DeviceBuffer,
+        front: DeviceBuffer,
+        back: DeviceBuffer,
+        keep: _Keep,
     ) -> tuple[DeviceBuffer, ...]:
         """Return the supersegments with depth coordinates and extinctions, 24 or 16 bytes each."""
         runtime = self._runtime
@@ -464,11 +473,11 @@ class PreparedVDI:
         colors = vdi.packing.color if isinstance(vdi.packing, Packed16) else vdi.color
         lists: tuple[DeviceBuffer, ...]
         if packed:
-            lists = (runtime.buffer((n, 4), np.uint32, "supersegments"),)
+            lists = (keep(runtime.buffer((n, 4), np.uint32, "supersegments")),)
         else:
             lists = (
-                runtime.buffer((n, 2), name="supersegment faces"),
-                runtime.buffer((n, 4), name="supersegment media"),
+                keep(runtime.buffer((n, 2), name="supersegment faces")),
+                keep(runtime.buffer((n, 4), name="supersegment media")),
             )
         # Direction of a centre ray per unit of view depth, in the model frame
         centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
@@ -494,10 +503,14 @@ class PreparedVDI:
                 *lists,
             )
             runtime.finish()  # the buffers above may be host memory in use
-        return (*lists, self._constants(1.0)) if packed else lists
+        return (*lists, keep(self._constants(1.0))) if packed else lists
 
     def _packed_lists(
-        self, vdi: VDI, packing: Packed8, offset_type: type[np.unsignedinteger[Any]]
+        self,
+        vdi: VDI,
+        packing: Packed8,
+        offset_type: type[np.unsignedinteger[Any]],
+        keep: _Keep,
     ) -> tuple[DeviceBuffer, tuple[DeviceBuffer, ...]]:
         """Return offsets, and lists of 8-byte supersegments that begin with their headers."""
         runtime = self._runtime
@@ -514,8 +527,8 @@ class PreparedVDI:
         own = np.repeat(np.arange(1, len(occupied) + 1) * _LIST_HEADER, counts[occupied])
         words[np.arange(vdi.n_supersegments) + own] = packing.words
         return (
-            runtime.upload((vdi.offsets + headers).astype(offset_type), "list offsets"),
-            (runtime.upload(words, "supersegments"), self._constants(packing.step)),
+            keep(runtime.upload((vdi.offsets + headers).astype(offset_type), "list offsets")),
+            (keep(runtime.upload(words, "supersegments")), keep(self._constants(packing.step))),
         )
 
     def _per_code(

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import InvalidArgumentError
+from .checks import as_float, as_range
+from .errors import InvalidArgumentError, VDIError
 from .lighting import Shading
 
 #: Optical depth that a fully opaque sample gets per step: exp(-30) is 1e-13, nothing passes.
@@ -88,18 +89,19 @@ class TransferFunction:
                 f"a transfer function needs as many opacities as colors; got "
                 f"{len(self.opacities)} and {len(self.colors)}"
             )
-        low, high = (float(v) for v in scalar_range)
+        low, high = as_range(scalar_range)
         if not (np.isfinite(low) and np.isfinite(high) and low <= high):
             raise InvalidArgumentError(
                 f"scalar_range (clim) must be two finite numbers, the smaller first; "
                 f"got {scalar_range!r}"
             )
         self.scalar_range = (low, high)
-        if unit_distance is not None and not (np.isfinite(unit_distance) and unit_distance > 0):
+        unit = None if unit_distance is None else as_float(unit_distance)
+        if unit is not None and not (np.isfinite(unit) and unit > 0):
             raise InvalidArgumentError(
                 f"unit_distance must be a positive length in model units; got {unit_distance!r}"
             )
-        self.unit_distance = None if unit_distance is None else float(unit_distance)
+        self.unit_distance = unit
         if interpolation not in ("nearest", "linear"):
             raise InvalidArgumentError(
                 f"interpolation must be 'nearest' or 'linear'; got {interpolation!r}"
@@ -147,11 +149,24 @@ class TransferFunction:
 
     @classmethod
     def from_dict(cls, state: dict[str, Any]) -> TransferFunction:
-        """Return the transfer function that :meth:`to_dict` described."""
-        rest = {k: v for k, v in state.items() if k not in ("colors", "opacities", "scalar_range")}
-        if rest.get("shading") is not None:
-            rest["shading"] = Shading(**rest["shading"])
-        return cls(state["colors"], state["opacities"], tuple(state["scalar_range"]), **rest)
+        """Return the transfer function that :meth:`to_dict` described.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is no such description, or a value is out of range.
+        """
+        try:
+            arguments = dict(state)
+            if arguments.get("shading") is not None:
+                arguments["shading"] = Shading(**arguments["shading"])
+            return cls(**arguments)
+        except (TypeError, ValueError) as error:
+            if isinstance(error, VDIError):
+                raise
+            raise InvalidArgumentError(
+                f"this is no description of a transfer function: {error}"
+            ) from error
 
     def __eq__(self, other: object) -> bool:
         return (
@@ -188,7 +203,7 @@ def _gradient(
         )
     if opacities is None or gradient_range is None:
         return None, None
-    low, high = (float(v) for v in gradient_range)
+    low, high = as_range(gradient_range)
     if not (np.isfinite(low) and np.isfinite(high) and 0 <= low < high):
         raise InvalidArgumentError(
             f"gradient_range must be two magnitudes, 0 <= low < high; got {gradient_range!r}"
@@ -198,8 +213,9 @@ def _gradient(
 
 def _table(name: str, values: ArrayLike, item: tuple[int, ...]) -> NDArray[np.float32]:
     try:
-        table = np.array(values, dtype=np.float32)
-    except (TypeError, ValueError) as error:
+        with np.errstate(over="ignore"):  # infinite then, and refused for its value
+            table = np.array(values, dtype=np.float32)
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidArgumentError(f"{name} must be numbers; got {values!r}") from error
     if table.ndim != 1 + len(item) or table.shape[1:] != item or len(table) == 0:
         wanted = f"(n, {item[0]})" if item else "(n,)"

@@ -83,8 +83,8 @@ class VDI:
     ) -> None:
         self.camera = Camera.from_any(camera)
         self.window_size = check_window_size(window_size)
-        self.depth_origin = float(depth_origin)
-        self.metadata = dict(metadata or {})
+        self.depth_origin = _checked_depth_origin(depth_origin)
+        self.metadata = _checked_metadata(metadata)
         self.offsets = _array("offsets", offsets, np.uint64, ())
         self.front = _array("front", front, np.float32, ())
         self.back = _array("back", back, np.float32, ())
@@ -236,8 +236,6 @@ class VDI:
                 )
 
     def _check_media(self) -> None:
-        if not math.isfinite(self.depth_origin):
-            raise InvalidVDIError(f"depth_origin must be finite; got {self.depth_origin}")
         if len(self.front) == 0:
             return
         front, back, color, tau = self.front, self.back, self.color, self.optical_depth
@@ -275,13 +273,19 @@ class VDI:
 
 
 def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> NDArray[Any]:
-    array = np.asarray(values)
-    if array.size and array.dtype.kind not in "uif":
-        raise InvalidVDIError(f"{name} must be numbers; got {array.dtype}")
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError) as error:  # lists of different lengths
+        raise InvalidVDIError(f"{name} must be an array of numbers: {error}") from error
+    if array.dtype.kind not in "uif":
+        if array.size:
+            raise InvalidVDIError(f"{name} must be numbers; got {array.dtype}")
+        array = np.zeros(array.shape, dtype)
     counts = dtype is np.uint64 and array.size > 0
     if counts and (array.dtype.kind == "f" or array.min() < 0):
         raise InvalidVDIError(f"{name} must be whole numbers >= 0; got {array.dtype}")
-    array = np.ascontiguousarray(array, dtype=dtype)
+    with np.errstate(over="ignore"):  # infinite then: a rule refuses it, and says where
+        array = np.ascontiguousarray(array, dtype=dtype)
     if array.size == 0 and item:
         array = array.reshape((0, *item))
     if array.ndim != 1 + len(item) or array.shape[1:] != item:
@@ -292,8 +296,27 @@ def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> N
     return view
 
 
+def _checked_depth_origin(depth_origin: Any) -> float:
+    try:
+        origin = float(depth_origin)
+    except (TypeError, ValueError, OverflowError):
+        origin = math.nan
+    if not math.isfinite(origin):
+        raise InvalidVDIError(f"depth_origin must be finite; got {depth_origin!r}")
+    return origin
+
+
+def _checked_metadata(metadata: Any) -> dict[str, Any]:
+    if not isinstance(metadata, Mapping | None):
+        raise InvalidVDIError(f"metadata must be a dictionary; got {type(metadata).__name__}")
+    return dict(metadata or {})
+
+
 def _checked_bounds(bounds: ArrayLike) -> tuple[float, float, float, float, float, float]:
-    box = np.asarray(bounds, dtype=np.float64)
+    try:
+        box = np.asarray(bounds, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        box = np.empty(0)
     if box.shape != (6,) or not np.isfinite(box).all() or (box[::2] > box[1::2]).any():
         raise InvalidVDIError(
             f"bounds must be six finite numbers x0 <= x1, y0 <= y1, z0 <= z1; got {bounds!r}"

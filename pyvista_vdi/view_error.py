@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from . import rays
 from .ambient_occlusion import AmbientOcclusion
 from .camera import Camera, check_window_size
+from .checks import as_float
 from .cropping import Cropping, checked_opacity_multiplier
-from .device_volume import DeviceVolume, as_float
+from .device_volume import DeviceVolume
 from .errors import Cancelled, InvalidArgumentError
 from .lighting import Lights
 from .metrics import SSIM_ARGUMENTS, SSIM_WINDOW, over_background

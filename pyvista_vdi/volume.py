@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .checks import as_floats
 from .errors import InvalidVolumeError
 
 #: Voxel types that the kernels read as they are.
@@ -67,7 +68,7 @@ class Volume:
         *,
         name: str = "values",
     ) -> None:
-        self.array = _checked_array(np.asarray(array))
+        self.array = _checked_array(array)
         self.spacing = _checked_vector("spacing", spacing)
         self.origin = _checked_vector("origin", origin)
         self.direction = _checked_direction(direction)
@@ -146,7 +147,11 @@ class Volume:
         return f"Volume({nx} x {ny} x {nz} {kind}, spacing={self.spacing})"
 
 
-def _checked_array(array: NDArray[np.generic]) -> NDArray[np.generic]:
+def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError) as error:  # lists of different lengths
+        raise InvalidVolumeError(f"a volume is an array of numbers: {error}") from error
     rgba = array.ndim == 4 and array.shape[-1] == 4 and array.dtype == np.uint8
     if array.ndim != 3 and not rgba:
         hint = (
@@ -187,10 +192,7 @@ def _from_long_integers(array: NDArray[np.generic]) -> NDArray[np.generic]:
 
 
 def _checked_vector(name: str, value: ArrayLike) -> tuple[float, float, float]:
-    try:
-        vector = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        vector = np.empty(0)
+    vector = as_floats(value)
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise InvalidVolumeError(f"{name} must be three finite numbers; got {value!r}")
     x, y, z = vector.tolist()
@@ -198,7 +200,7 @@ def _checked_vector(name: str, value: ArrayLike) -> tuple[float, float, float]:
 
 
 def _checked_direction(value: ArrayLike | None) -> NDArray[np.float64]:
-    matrix = np.eye(3) if value is None else np.array(value, dtype=np.float64)
+    matrix = np.eye(3) if value is None else as_floats(value)
     if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
         raise InvalidVolumeError(f"direction must be 3 x 3 finite numbers; got {value!r}")
     if abs(np.linalg.det(matrix)) < 1e-9:

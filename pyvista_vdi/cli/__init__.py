@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from ..errors import VDIError
 from .parser import UsageError, parse
+from .text import printable
 
 #: Set to 1, it lets errors through with their traceback.
 DEBUG_VARIABLE = "PYVISTA_VDI_DEBUG"
@@ -60,5 +61,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _complain(message: str, status: int) -> int:
-    print(f"pyvista-vdi: error: {' '.join(message.split())}", file=sys.stderr)
+    print(f"pyvista-vdi: error: {printable(' '.join(message.split()))}", file=sys.stderr)
     return status

@@ -16,6 +16,7 @@ from ..plotting.progress import DelayedBar
 from ..standard_cases import TRANSFER_FUNCTIONS
 from ..vdi import VDI
 from .inputs import classification, read_volume, volume_name
+from .text import printable
 
 #: The transfer function that is compared where none is named.
 _DEFAULT = "soft"
@@ -56,7 +57,9 @@ def compare(options: argparse.Namespace) -> int:
     with whole_file(files["json"]) as stream:
         stream.write(json.dumps(report.to_dict(), indent=1).encode())
     print(table(report))
-    print("Written: " + ", ".join(str(Path(options.out) / path.name) for path in files.values()))
+    print(
+        "Written: " + ", ".join(printable(Path(options.out) / path.name) for path in files.values())
+    )
     return 0
 
 

@@ -7,6 +7,8 @@ import json
 from dataclasses import asdict
 from typing import Any
 
+from .text import printable
+
 
 def devices(options: argparse.Namespace) -> int:
     """Print every OpenCL device; exit status 1 if none is usable."""
@@ -41,8 +43,9 @@ def convert(options: argparse.Namespace) -> int:
     vdi = read(options.file, **{name: v for name, v in foreign.items() if v is not None})
     vdi.save(target, **file_arguments)
     print(
-        f"{options.output}: {vdi.n_supersegments} supersegments in {vdi.window_size[0]} x "
-        f"{vdi.window_size[1]} lists, {_mebibytes(target.stat().st_size)}"
+        f"{printable(options.output)}: {vdi.n_supersegments} supersegments in "
+        f"{vdi.window_size[0]} x {vdi.window_size[1]} lists, "
+        f"{_mebibytes(target.stat().st_size)}"
     )
     return 0
 
@@ -77,7 +80,7 @@ def _text(about: Any) -> str:
         **{name: _short(value) for name, value in about.metadata.items()},
     }
     column = max(len(name) for name in rows)
-    return "\n".join(f"{name:<{column}}  {value}" for name, value in rows.items())
+    return "\n".join(printable(f"{name:<{column}}  {value}") for name, value in rows.items())
 
 
 def _vector(values: Any) -> str:

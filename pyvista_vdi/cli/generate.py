@@ -22,6 +22,7 @@ from .inputs import (
     has_own_place,
     read_volume,
 )
+from .text import printable
 
 
 def generate(options: argparse.Namespace) -> int:
@@ -69,7 +70,7 @@ def generate(options: argparse.Namespace) -> int:
     seconds = time.perf_counter() - start
     vdi.save(target, **file_arguments)
     print(
-        f"{options.output}: {vdi.n_supersegments} supersegments in {options.size[0]} x "
+        f"{printable(options.output)}: {vdi.n_supersegments} supersegments in {options.size[0]} x "
         f"{options.size[1]} lists, {target.stat().st_size / 2**20:.1f} MiB, {seconds:.1f} s"
     )
     return 0

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from ..ambient_occlusion import AmbientOcclusion
 from ..api import as_volume
 from ..camera import Camera
-from ..errors import InvalidArgumentError, VDIError
+from ..errors import InvalidArgumentError
 from ..io import check_write_options
 from ..standard_cases import TRANSFER_FUNCTIONS
 from ..transfer_function import TransferFunction
@@ -129,11 +129,9 @@ def _from_json(path: str, build: Callable[[dict[str, Any]], _T], kind: str) -> _
     try:
         state = json.loads(Path(path).read_text(encoding="utf-8"))
         return build(state)
-    except VDIError:
-        raise
     except OSError as error:
         raise InvalidArgumentError(f"{path} cannot be read: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, RecursionError) as error:
         raise InvalidArgumentError(
-            f"{path} is no {kind} in JSON ({error!r}): write one by json.dump(x.to_dict(), file)"
+            f"{path} is no {kind} in JSON ({error}): write one by json.dump(x.to_dict(), file)"
         ) from error

@@ -8,6 +8,7 @@ from ..api import read
 from ..api import render as render_vdi
 from ..io import checked_png_target, to_bytes, write_png
 from .inputs import camera
+from .text import printable
 
 
 def render(options: argparse.Namespace) -> int:
@@ -27,7 +28,7 @@ def render(options: argparse.Namespace) -> int:
             device=options.device,
         )
     write_png(to_bytes(image, options.background), target)
-    print(f"{options.output}: {image.shape[1]} x {image.shape[0]}")
+    print(f"{printable(options.output)}: {image.shape[1]} x {image.shape[0]}")
     return 0
 
 
@@ -48,5 +49,5 @@ def view(options: argparse.Namespace) -> int:
         status=options.status,
     )
     if screenshot is not None:
-        print(f"{options.screenshot}: written")
+        print(f"{printable(options.screenshot)}: written")
     return 0

@@ -7,7 +7,12 @@ when a device is first asked for.
 from __future__ import annotations
 
 from pyvista_vdi.opencl_runtime.arguments import padded
-from pyvista_vdi.opencl_runtime.buffers import DeviceBuffer, LocalMemory, aligned_empty
+from pyvista_vdi.opencl_runtime.buffers import (
+    DeviceBuffer,
+    LocalMemory,
+    aligned_empty,
+    kept_together,
+)
 from pyvista_vdi.opencl_runtime.choice import describe_devices, get_runtime, list_devices
 from pyvista_vdi.opencl_runtime.devices import DeviceInfo
 from pyvista_vdi.opencl_runtime.profiling import KernelTime, Profile
@@ -25,6 +30,7 @@ __all__ = [
     "aligned_empty",
     "describe_devices",
     "get_runtime",
+    "kept_together",
     "list_devices",
     "padded",
 ]

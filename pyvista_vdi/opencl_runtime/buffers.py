@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
@@ -63,6 +64,26 @@ def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any
     return raw[start : start + nbytes].view(dtype).reshape(shape)
 
 
+class Reservation:
+    """Bytes of a ledger: they go back when they are given back, or with the last reference.
+
+    So wherever an interrupt comes, nothing stays reserved that nobody holds.
+    """
+
+    nbytes = 0
+
+    def __init__(self, ledger: Ledger) -> None:
+        self._ledger = ledger
+
+    def give_back(self) -> None:
+        """Return the bytes; a second call does nothing."""
+        self._ledger.give_back(self)
+
+    def __del__(self) -> None:
+        if self.nbytes:
+            self.give_back()
+
+
 class Ledger:
     """Bytes that one runtime holds on its device.
 
@@ -94,7 +115,7 @@ class Ledger:
                 "all): use a smaller volume, window size or max_supersegments, or another device"
             )
 
-    def take(self, name: str, nbytes: int, max_allocation: int, global_memory: int) -> None:
+    def take(self, name: str, nbytes: int, max_allocation: int, global_memory: int) -> Reservation:
         """Reserve bytes, or say why they cannot be had.
 
         Parameters
@@ -104,12 +125,18 @@ class Ledger:
         nbytes, max_allocation, global_memory : int
             Bytes wanted, allowed in one buffer, and on the device.
 
+        Returns
+        -------
+        Reservation
+            What keeps them reserved.
+
         Raises
         ------
         DeviceMemoryError
             If either limit is passed; nothing is reserved then.
         """
         self.check_size(name, nbytes, max_allocation, global_memory)
+        taken = Reservation(self)
         with self._lock:
             if self.allocated + nbytes > global_memory:
                 raise DeviceMemoryError(
@@ -119,13 +146,15 @@ class Ledger:
                     "longer drawn, use a smaller window size or max_supersegments, or another "
                     "device"
                 )
-            self.allocated += nbytes
+            # One statement without a call: no interrupt comes between the two
+            self.allocated, taken.nbytes = self.allocated + nbytes, nbytes
             self.peak = max(self.peak, self.allocated)
+        return taken
 
-    def give_back(self, nbytes: int) -> None:
+    def give_back(self, taken: Reservation) -> None:
         """Return reserved bytes."""
         with self._lock:
-            self.allocated -= nbytes
+            self.allocated, taken.nbytes = self.allocated - taken.nbytes, 0
 
 
 class DeviceBuffer:
@@ -206,6 +235,18 @@ class DeviceBuffer:
     def __repr__(self) -> str:
         state = "released" if self.released else bytes_text(self.nbytes)
         return f"<DeviceBuffer {self.name!r}: {self.dtype} {self.shape}, {state}>"
+
+
+@contextlib.contextmanager
+def kept_together() -> Iterator[Callable[[DeviceBuffer], DeviceBuffer]]:
+    """Keep the buffers that the block hands over, or release them all if it fails.
+
+    An object whose buffers are made one after the other is otherwise kept half made by the error
+    that tells of it, for as long as somebody looks at the error.
+    """
+    with contextlib.ExitStack() as made:
+        yield made.enter_context
+        made.pop_all()
 
 
 def _release(memory: Any, on_release: Callable[[], None]) -> None:

@@ -68,7 +68,10 @@ def get_runtime(device: Any = None) -> Runtime:
         If ``device`` is of another type.
     MissingDependencyError
         If pyopencl cannot be imported.
+    DeviceError
+        In a fork of a process that had used or listed devices.
     """
+    devices.require_drivers()
     if isinstance(device, Runtime):
         return device
     origin = "device="

@@ -7,6 +7,7 @@ driver.
 from __future__ import annotations
 
 import importlib
+import os
 import re
 import threading
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
-from pyvista_vdi.errors import MissingDependencyError, NoDeviceError
+from pyvista_vdi.errors import DeviceError, MissingDependencyError, NoDeviceError
 from pyvista_vdi.opencl_runtime.icd import Discovery, drivers_visible
 
 DEVICE_VARIABLE = "PYVISTA_VDI_DEVICE"
@@ -223,6 +224,39 @@ def no_device_message(infos: Sequence[DeviceInfo], notes: Sequence[str]) -> str:
 
 _lock = threading.RLock()
 _found: tuple[list[Candidate], list[str]] | None = None
+#: Whether this process was forked from one that had loaded drivers.
+_forked = False
+
+
+def _note_fork() -> None:
+    global _forked, _lock
+    _forked = _forked or _found is not None
+    _lock = threading.RLock()  # a thread that is not here may have held it
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_note_fork)
+
+
+def drivers_lost() -> bool:
+    """Whether drivers are here that the threads they work with did not follow into a fork."""
+    return _forked
+
+
+def require_drivers() -> None:
+    """Raise at once where a driver would wait for ever: in a fork of a process that used one.
+
+    Raises
+    ------
+    DeviceError
+        If this process is such a fork. No lock is taken before: another thread may have held it.
+    """
+    if _forked:
+        raise DeviceError(
+            "this process was forked from one that had used OpenCL already, and drivers do not "
+            'survive that: start processes by multiprocessing.get_context("spawn"), or fork '
+            "before a device is used or listed; reading and writing files works in either"
+        )
 
 
 def opencl() -> ModuleType:
@@ -259,8 +293,11 @@ def find_candidates() -> tuple[list[Candidate], list[str]]:
     ------
     MissingDependencyError
         If pyopencl cannot be imported.
+    DeviceError
+        In a fork of a process that had listed them.
     """
     global _found
+    require_drivers()
     with _lock:
         if _found is None:
             with drivers_visible() as discovery:

@@ -25,7 +25,7 @@ from pyvista_vdi.opencl_runtime.arguments import (
     preferred_group,
 )
 from pyvista_vdi.opencl_runtime.buffers import DeviceBuffer, Ledger, bytes_text, shape_of
-from pyvista_vdi.opencl_runtime.devices import Candidate, DeviceInfo, opencl
+from pyvista_vdi.opencl_runtime.devices import Candidate, DeviceInfo, drivers_lost, opencl
 from pyvista_vdi.opencl_runtime.profiling import KernelTime, Profile, profiling_wanted, table
 from pyvista_vdi.opencl_runtime.programs import Define, Kernel, ProgramCache
 from pyvista_vdi.opencl_runtime.turns import Turns, Worker
@@ -438,7 +438,7 @@ class Runtime:
         if in_place:
             # No memory is taken, but the limit per buffer holds for it as well.
             self._ledger.check_size(name, nbytes, self.info.max_allocation, self.info.global_memory)
-        self._ledger.take(name, taken, self.info.max_allocation, self.info.global_memory)
+        reserved = self._ledger.take(name, taken, self.info.max_allocation, self.info.global_memory)
         try:
             with self._driver(f"allocating {bytes_text(nbytes)} for the buffer {name!r}"):
                 if host is None or nbytes == 0:
@@ -447,13 +447,13 @@ class Runtime:
                 else:
                     memory = cl.Buffer(self._context, flags, hostbuf=host)
         except BaseException:
-            self._ledger.give_back(taken)
+            reserved.give_back()  # now: whoever keeps the error keeps this frame
             raise
 
         readers: set[int] | None = set() if in_place else None
 
         def on_release() -> None:
-            self._ledger.give_back(taken)
+            reserved.give_back()
             if readers:
                 self._finish(readers)  # the array may go when the buffer has gone
 
@@ -551,7 +551,9 @@ class Runtime:
                 buffer.readers.add(number)
 
     def _finish(self, numbers: set[int]) -> None:
-        """Finish those of some queues that still exist."""
+        """Finish those of some queues that still exist, where their driver does."""
+        if drivers_lost():
+            return
         with self._queues_lock:
             queues = [self._queues[number] for number in numbers if number in self._queues]
         with self._driver("waiting for enqueued work"):
@@ -648,12 +650,28 @@ class Runtime:
                 codes.OUT_OF_HOST_MEMORY,
                 codes.INVALID_BUFFER_SIZE,
             )
+            lost = (
+                codes.DEVICE_NOT_AVAILABLE,
+                codes.INVALID_COMMAND_QUEUE,
+                codes.INVALID_CONTEXT,
+                codes.INVALID_DEVICE,
+            )
             # An error that pyopencl raises by itself has no code.
-            if getattr(exc, "code", None) in short_of_memory:
+            code = getattr(exc, "code", None)
+            if code in short_of_memory:
                 raise DeviceMemoryError(
                     f"{self.info.full_name!r} ran out of memory or resources while {doing} "
                     f"({exc}); it has {bytes_text(self.info.global_memory)}, of which this "
                     f"process holds {bytes_text(self.allocated)}: use a smaller volume, window "
                     "size or max_supersegments, or another device"
                 ) from exc
-            raise DeviceError(f"{self.info.full_name!r} failed while {doing}: {exc}") from exc
+            remedy = (
+                "it may be lost (unplugged, or reset by its driver): start the program again, or "
+                "use another device"
+                if code in lost
+                else "try again, or use another device"
+            )
+            raise DeviceError(
+                f"{self.info.full_name!r} failed while {doing}: {exc}; {remedy} (device=, or the "
+                "environment variable PYVISTA_VDI_DEVICE; pyvista-vdi devices lists them)"
+            ) from exc

@@ -11,14 +11,19 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike, NDArray
 
+from pyvista_vdi.checks import as_float
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVolumeError,
     MissingDependencyError,
     VDIWarning,
 )
+from pyvista_vdi.lighting import Shading
 from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vtk_pipeline.properties import RGBA_OPACITY, transfer_function_from_property
+
+#: Most entries of a table: building it takes PyVista time by the square, a second from here on.
+_MAX_COLORS = 4096
 
 
 def transfer_function_from_arguments(
@@ -152,8 +157,10 @@ def lookup_table(
         low = sys.float_info.min
     if categories:
         n_colors = len(np.unique(scalars)) if categories is True else int(categories)
-    if not (isinstance(n_colors, int | np.integer) and n_colors >= 1):
-        raise InvalidArgumentError(f"n_colors must be a whole number above 0; got {n_colors!r}")
+    if not (isinstance(n_colors, int | np.integer) and 1 <= n_colors <= _MAX_COLORS):
+        raise InvalidArgumentError(
+            f"n_colors must be a whole number from 1 to {_MAX_COLORS}; got {n_colors!r}"
+        )
     colors = _color_map((theme or pv.global_theme).cmap if cmap is None else cmap)
     table = pv.LookupTable()
     table.apply_cmap(colors.reversed() if flip_scalars else colors, int(n_colors))
@@ -173,9 +180,7 @@ def volume_property(
         raise InvalidArgumentError(
             f"interpolation must be 'nearest' or 'linear'; got {interpolation!r}"
         )
-    if opacity_unit_distance is not None and not (
-        np.isfinite(opacity_unit_distance) and opacity_unit_distance > 0
-    ):
+    if opacity_unit_distance is not None and not 0 < as_float(opacity_unit_distance) < np.inf:
         raise InvalidArgumentError(
             "opacity_unit_distance must be a positive length in model units; "
             f"got {opacity_unit_distance!r}"
@@ -213,9 +218,11 @@ def light(
     specular_power: float,
 ) -> None:
     """Set how a property reflects light; ``None`` leaves its ambient coefficient."""
-    if ambient is not None:
-        prop.ambient = ambient
-    prop.diffuse, prop.specular, prop.specular_power = diffuse, specular, specular_power
+    checked = Shading(
+        prop.ambient if ambient is None else ambient, diffuse, specular, specular_power
+    )
+    prop.ambient, prop.diffuse = checked.ambient, checked.diffuse
+    prop.specular, prop.specular_power = checked.specular, checked.specular_power
 
 
 def _scalar_range(scalars: NDArray[Any], clim: float | ArrayLike | None) -> tuple[float, float]:
@@ -230,10 +237,10 @@ def _scalar_range(scalars: NDArray[Any], clim: float | ArrayLike | None) -> tupl
             )
         return low, high
     if isinstance(clim, int | float | np.number):
-        clim = (-float(clim), float(clim))
+        clim = (-as_float(clim), as_float(clim))
     try:
         low, high = (float(v) for v in clim)  # type: ignore[union-attr, arg-type]
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidArgumentError(
             f"clim must be one number or a pair (low, high); got {clim!r}"
         ) from error
@@ -302,5 +309,16 @@ def _checked_opacities(opacity: Any, n_colors: int) -> Any:
         raise InvalidArgumentError(
             f"an opacity array as long as n_colors={n_colors} is taken as it is, 0 to 255; got "
             f"values from {values.min():g} to {values.max():g}"
+        )
+    with np.errstate(over="ignore"):
+        spread = np.ptp(values)
+    if (
+        len(values) < n_colors
+        and (values.min() < 0 or values.max() > 1)
+        and not 0 < spread < np.inf
+    ):
+        raise InvalidArgumentError(
+            "an opacity array beyond 0 to 1 is stretched to that range, for which it needs "
+            f"different values of finite distance; got {values.min():g} to {values.max():g}"
         )
     return list(opacity) if isinstance(opacity, tuple) else opacity

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from pyvista_vdi.errors import MissingDependencyError
+import numpy as np
+
+from pyvista_vdi.errors import MissingDependencyError, VDIWarning
+from pyvista_vdi.io import write_png
 from pyvista_vdi.plotting.convert import to_image_data
 
 if TYPE_CHECKING:
@@ -90,13 +94,18 @@ def show(
         File to write instead of opening a window.
     **options
         Keyword arguments of ``add_vdi``.
+
+    Raises
+    ------
+    VDIError, KeyboardInterrupt
+        If the picture cannot be drawn or is interrupted; no file is written then.
     """
     pv = _pyvista()
     view, size = vdi.camera, window_size or vdi.window_size
     with pv.vtk_verbosity("off"):
         plotter = pv.Plotter(off_screen=screenshot is not None, window_size=list(size))
     try:
-        plotter.add_vdi(vdi, **options)
+        actor = plotter.add_vdi(vdi, **options)
         camera = plotter.camera
         camera.position, camera.focal_point, camera.up = (
             view.position,
@@ -111,8 +120,14 @@ def show(
         plotter.renderer.reset_camera_clipping_range()
         if screenshot is None:
             plotter.show()
-        else:
-            plotter.screenshot(screenshot)
+            return
+        with warnings.catch_warnings():
+            # The error itself is raised below
+            warnings.filterwarnings("ignore", "the VDI cannot be drawn", VDIWarning)
+            warnings.filterwarnings("ignore", "generating the VDI was interrupted", VDIWarning)
+            picture = plotter.screenshot(return_img=True)
+        actor.mapper.painter.raise_trouble()
+        write_png(np.asarray(picture), screenshot)
     finally:
         plotter.close()
 

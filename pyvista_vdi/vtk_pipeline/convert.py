@@ -15,7 +15,12 @@ from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkFiltersCore import vtkCellDataToPointData
 
 from pyvista_vdi.camera import Camera
-from pyvista_vdi.errors import InvalidVDIError, InvalidVolumeError, UnsupportedError
+from pyvista_vdi.errors import (
+    InvalidCameraError,
+    InvalidVDIError,
+    InvalidVolumeError,
+    UnsupportedError,
+)
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.volume import Volume
 from pyvista_vdi.vtk_pipeline.properties import transfer_function_from_property
@@ -340,14 +345,11 @@ def vdi_from_image(image: Any) -> VDI:
         )
     field = image.GetFieldData()
     about = view_from_description(image, DESCRIPTION)
-    counts = image.GetPointData().GetArray(COUNT)
-    if counts is None:
-        raise InvalidVDIError(f"the VDI's image lacks its point array {COUNT!r}")
-    width, height, _ = image.GetDimensions()
-    offsets = np.zeros(width * height + 1, dtype=np.uint64)
-    np.cumsum(_as_numpy(counts), dtype=np.uint64, out=offsets[1:])
+    counts = _counts(image)
+    offsets = np.zeros(len(counts) + 1, dtype=np.uint64)
+    np.cumsum(counts, dtype=np.uint64, out=offsets[1:])
     arrays: dict[str, Any] = {name: _ragged(field, name, int(offsets[-1])) for name in _RAGGED}
-    return VDI(window_size=(width, height), offsets=offsets, **arrays, **about)
+    return VDI(window_size=image.GetDimensions()[:2], offsets=offsets, **arrays, **about)
 
 
 def view_from_description(image: vtkImageData, name: str) -> dict[str, Any]:
@@ -365,12 +367,35 @@ def view_from_description(image: vtkImageData, name: str) -> dict[str, Any]:
             camera = Camera.from_dict(about["camera"])
             entries = {key: about[key] for key in ("bounds", "depth_origin", "metadata")}
             return {"camera": camera, **entries}
-    except (KeyError, TypeError, IndexError, json.JSONDecodeError) as error:
+    except (
+        *(KeyError, TypeError, IndexError, ValueError, OverflowError, RecursionError),
+        InvalidCameraError,
+    ) as error:
         raise InvalidVDIError(f"the VDI's description is damaged: {error!r}") from error
     raise InvalidVDIError(
         f"the VDI's VTK form has version {version}, and this pyvista-vdi reads up to "
         f"{FORM_VERSION}: update pyvista-vdi"
     )
+
+
+def _counts(image: vtkImageData) -> NDArray[Any]:
+    """Return the supersegments of each list, checked; nothing is allocated for a window alone."""
+    array = image.GetPointData().GetArray(COUNT)
+    if array is None:
+        raise InvalidVDIError(f"the VDI's image lacks its point array {COUNT!r}")
+    width, height, depth = image.GetDimensions()
+    counts = _as_numpy(array)
+    if depth != 1 or counts.shape != (width * height,):
+        raise InvalidVDIError(
+            f"the VDI's image has {width} x {height} x {depth} points, and {COUNT!r} is of shape "
+            f"{counts.shape}: one whole number for each point of one plane is needed"
+        )
+    if counts.dtype.kind not in "ui" or (counts.size and counts.min() < 0):
+        raise InvalidVDIError(
+            f"{COUNT!r} must be whole numbers >= 0; got {counts.dtype} from "
+            f"{counts.min() if counts.size else 'no value'}"
+        )
+    return counts
 
 
 def _ragged(field: Any, name: str, n: int) -> NDArray[Any]:

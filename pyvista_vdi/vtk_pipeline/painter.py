@@ -136,6 +136,7 @@ class Painter:
         self._raycasts = 0
         self._last = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
         self._scene: tuple[Camera, weakref.ref[WindowClock]] | None = None
+        self._trouble: BaseException | None = None
 
     # -- what is drawn ---------------------------------------------------------------------------
 
@@ -260,17 +261,37 @@ class Painter:
         """Return what a part of drawing returns, or ``None`` and say what went wrong."""
         try:
             return draw(mapper, renderer)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
             self._voice.warn(
                 "generating the VDI was interrupted: what was shown stays; call "
                 "actor.regenerate() to try again"
             )
+            self._note(interrupt)
         except Exception as error:  # VTK would swallow it
             self._cannot_draw(error)
         return None
 
+    def raise_trouble(self) -> None:
+        """Raise, once, what a frame could not be drawn for: nothing passes through VTK's renderer.
+
+        Raises
+        ------
+        KeyboardInterrupt, Exception
+            The first such error since the last call.
+        """
+        trouble, self._trouble = self._trouble, None
+        if trouble is not None:
+            raise trouble
+
     def _cannot_draw(self, error: Exception) -> None:
         self._voice.warn(f"the VDI cannot be drawn: {type(error).__name__}: {error}", error)
+        self._note(error)
+
+    def _note(self, error: BaseException) -> None:
+        """Keep the first error for :meth:`raise_trouble`, without the frames that it came from."""
+        if self._trouble is None:
+            self._trouble = error.with_traceback(None)
+            error.__cause__ = error.__context__ = None
 
     def _paint(self, mapper: Any, renderer: Any) -> Drawn:
         """Return the frame's image."""

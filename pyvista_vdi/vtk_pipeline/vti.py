@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +22,9 @@ from pyvista_vdi.vtk_pipeline.dense import is_dense_image, vdi_from_dense_image
 
 #: Names of VTK's compressors, as its writer's methods have them.
 _COMPRESSORS = {"lz4": "LZ4", "zlib": "ZLib", "lzma": "LZMA", "none": "None"}
+
+#: Most values that one byte of a file can stand for: LZMA's best, of bytes.
+_MAX_RATIO = 1 << 13
 
 
 def write(
@@ -59,11 +64,14 @@ def write(
         writer.SetCompressionLevel(level)
     writer.SetDataModeToAppended()
     writer.EncodeAppendedDataOff()
+    writer.WriteToOutputStringOn()  # VTK does not say why a disk does not take a file
     target = Path(os.path.realpath(path))
-    with whole_file(target) as stream, _messages() as messages:
-        writer.SetFileName(stream.name)
-        if not writer.Write() or writer.GetErrorCode():
+    with whole_file(target) as stream:
+        with _messages() as messages:
+            written = writer.Write() and not writer.GetErrorCode()
+        if not written:
             raise VDIFileError(f"{target} could not be written: {_first_line(messages)}")
+        stream.write(writer.GetOutputString())
     return target
 
 
@@ -105,23 +113,38 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
 def _image(path: Any) -> Any:
     try:
         file = Path(path)
-        with file.open("rb"):
-            pass
+        # At once: VTK opens a file several times, and another may have its name by then
+        content = file.read_bytes()
     except (OSError, TypeError, ValueError) as error:
         raise VDIFileError(
             f"{path} cannot be read: {getattr(error, 'strerror', None) or error}"
         ) from error
+    _check_header(content, file)
     reader = vtkXMLImageDataReader()
-    reader.SetFileName(str(file))
+    reader.ReadFromInputStringOn()
+    reader.SetInputString(content)
     with _messages() as messages:
-        known = reader.CanReadFile(str(file))
-        if known:
-            reader.Update()
-    if not known:
-        raise VDIFileError(f"{file} is not a VTK image file (.vti): it has no such header")
+        reader.Update()
     if messages.GetOutput() or reader.GetErrorCode():
         raise VDIFileError(f"{file} is damaged: {_first_line(messages)}")
     return reader.GetOutput()
+
+
+def _check_header(content: bytes, file: Path) -> None:
+    """Refuse what is no VTK image, or declares more than its bytes could hold: VTK believes it."""
+    head = content.partition(b"<AppendedData")[0]
+    if not re.search(rb"<VTKFile[^>]*type=[\"']ImageData[\"']", head):
+        raise VDIFileError(f"{file} is not a VTK image file (.vti): it has no such header")
+    declared = [int(n) for n in re.findall(rb"NumberOfTuples=[\"']\s*(\d{1,20})", head)]
+    for extent in re.findall(rb"Extent=[\"']([^\"']*)[\"']", head):
+        ends = [int(n) for n in re.findall(rb"-?\d{1,20}", extent)]
+        sizes = [last - first + 1 for first, last in zip(ends[::2], ends[1::2], strict=False)]
+        declared.append(math.prod(max(size, 0) for size in sizes))
+    if max(declared, default=0) > len(content) * _MAX_RATIO:
+        raise VDIFileError(
+            f"{file} is damaged: {len(content)} bytes cannot hold the {max(declared)} values that "
+            "they declare"
+        )
 
 
 def _codec(file: Path) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 import pyvista as pv
@@ -213,6 +215,10 @@ def test_ordinary_image_is_no_vdi():
         vdi_from_image(some_grid())
 
 
+def text_with(image, **changes):
+    return json.dumps({**json.loads(image.field_data["vdi"][0]), **changes})
+
+
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
@@ -221,8 +227,21 @@ def test_ordinary_image_is_no_vdi():
         (lambda i: i.field_data.set_array(["{"], "vdi"), "description is damaged"),
         (lambda i: i.field_data.set_array(['{"form_version": 1}'], "vdi"), "damaged.*camera"),
         (lambda i: i["count"].fill(1), "offsets\\[-1\\]"),
+        # Found by fuzzing: errors of NumPy and Python came out, or gigabytes were taken
+        (lambda i: i.field_data.set_array(["[]"], "vdi"), "description is damaged"),
+        (lambda i: i.field_data.set_array(["[" * 9000], "vdi"), "description is damaged"),
+        (lambda i: i.field_data.set_array([text_with(i, form_version="x")], "vdi"), "damaged"),
+        (lambda i: i.field_data.set_array([text_with(i, camera=[])], "vdi"), "damaged.*list"),
+        (lambda i: i.field_data.set_array([text_with(i, bounds="x")], "vdi"), "bounds must be"),
+        (lambda i: setattr(i, "dimensions", (60000, 60000, 1)), "60000 x 60000 x 1 points"),
+        (lambda i: setattr(i, "dimensions", (4, 2, 2)), "4 x 2 x 2 points"),
+        (lambda i: i.point_data.set_array(np.full(16, -1), "count"), "whole numbers >= 0"),
+        (lambda i: i.point_data.set_array(np.full(16, np.nan), "count"), "whole numbers >= 0"),
     ],
-    ids=["no backs", "no counts", "no json", "no camera", "wrong counts"],
+    ids=[
+        *("no backs", "no counts", "no json", "no camera", "wrong counts", "a list", "deep"),
+        *("version", "camera", "bounds", "window", "planes", "negative", "nan"),
+    ],
 )
 def test_damaged_forms_are_refused(damage, message):
     image = pv.wrap(vdi_to_image(random_vdi(5, 4, 4, 3))).copy()

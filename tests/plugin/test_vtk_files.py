@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 
 import numpy as np
 import pytest
@@ -235,6 +236,23 @@ def test_truncated_files_are_noticed(tmp_path):
         path.write_bytes(whole[: int(share * len(whole))])
         with pytest.raises(VDIFileError, match=r"v\.vti"):
             pvdi.read(path)
+
+
+@pytest.mark.parametrize(
+    ("declared", "claimed"),
+    [
+        (rb'Extent="0 \d+ 0 \d+ 0 0"', b'Extent="0 65535 0 65535 0 0"'),
+        (rb'NumberOfTuples="\d+', b'NumberOfTuples="99999999999'),
+    ],
+)
+def test_nothing_is_allocated_for_what_a_file_only_declares(declared, claimed, tmp_path):
+    """VTK would take the memory, and end the process where there is none."""
+    path = some_vdi(3).save(tmp_path / "v.vti")
+    changed, n = re.subn(declared, claimed, path.read_bytes())
+    assert n
+    path.write_bytes(changed)
+    with pytest.raises(VDIFileError, match=r"v\.vti is damaged: \d+ bytes cannot hold the \d+ val"):
+        pvdi.read(path)
 
 
 def test_options_are_checked_before_anything_is_written(tmp_path):

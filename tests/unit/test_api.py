@@ -212,7 +212,15 @@ def test_arguments_that_are_refused_by_name(function, arguments, error, message,
         ({"cmap": "viridys"}, "cmap='viridys'.*did you mean 'viridis'"),
         ({"opacity": "sigmoid_99x"}, "opacity='sigmoid_99x'"),
         ({"clim": (2, 1)}, "clim must be two finite numbers, the smaller first"),
-        ({"n_colors": 0}, "n_colors must be a whole number above 0; got 0"),
+        ({"n_colors": 0}, "n_colors must be a whole number from 1 to 4096; got 0"),
+        # Found by fuzzing: errors and warnings of NumPy and VTK came out
+        ({"n_colors": 2**31}, "n_colors must be a whole number from 1 to 4096; got 2147483648"),
+        ({"opacity": [7]}, "an opacity array beyond 0 to 1 is stretched .* got 7 to 7"),
+        ({"opacity": [-1e308, 1e308]}, "stretched to that range, .* different values"),
+        ({"clim": 10**400}, "clim must be two finite numbers"),
+        ({"opacity_unit_distance": "x"}, "opacity_unit_distance must be a positive .* got 'x'"),
+        ({"shade": True, "specular_power": "x"}, "specular_power must be a finite number; got 'x'"),
+        ({"shade": True, "ambient": []}, r"ambient must be a finite number; got \[\]"),
     ],
 )
 def test_names_and_values_that_add_volume_would_not_take(arguments, message, volume, camera):

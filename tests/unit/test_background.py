@@ -392,7 +392,7 @@ def test_a_lack_of_memory(runtime, generator, monkeypatch):
     def scarce(name, *sizes):
         if name == "supersegment media":
             sizes = (sizes[0], 0, sizes[2])
-        take(name, *sizes)
+        return take(name, *sizes)
 
     with monkeypatch.context() as patched:
         patched.setattr(runtime._ledger, "take", scarce)

@@ -294,6 +294,13 @@ PROJECTIVE = np.eye(4) + np.diag([0, 0, 1], -1)
         ({"model_transform": FLAT}, "model_transform cannot be inverted"),
         ({"model_transform": PROJECTIVE}, "model_transform must be affine"),
         ({"model_transform": np.full((4, 4), np.nan)}, "model_transform must be 4 x 4 finite"),
+        # Found by fuzzing: errors of NumPy and Python came out
+        ({"model_transform": [[1, 2], [3]]}, "model_transform must be 4 x 4 finite"),
+        ({"position": (10**400, 0, 0)}, "position must be 3 finite numbers"),
+        ({"view_angle": "wide"}, "view_angle must lie between"),
+        ({"position": (1e308, 0, 0), "focal_point": (-1e308, 0, 0)}, "too far apart"),
+        ({"view_angle": np.nan, "parallel_projection": True}, "view_angle must lie between"),
+        ({"parallel_scale": [1]}, "parallel_scale .* got nan"),
     ],
 )
 def test_a_camera_that_defines_no_view_is_refused(changes, message):
@@ -309,6 +316,14 @@ def test_a_tiny_or_huge_model_transform_is_none_the_worse(scale):
     assert camera.model_to_view[0, 0] == scale
 
 
+def test_squares_of_huge_distances_do_not_overflow():
+    """Found by fuzzing: a warning, and axes of zeros."""
+    far = Camera(
+        (0, 0, 1e200), (0, 0, -1e200), (0, 1, 0), model_transform=np.diag([1e200] * 3 + [1])
+    )
+    np.testing.assert_array_equal(far.axes, Camera((0, 0, 1), (0, 0, -1), (0, 1, 0)).axes)
+
+
 def test_what_is_no_camera_is_refused_by_its_type():
     with pytest.raises(InvalidCameraError, match="got dict"):
         Camera.from_any({})
@@ -318,6 +333,11 @@ def test_what_is_no_camera_is_refused_by_its_type():
         InvalidCameraError, match="unknown entries \\['zoom'\\], lacks \\['view_up'\\]"
     ):
         Camera.from_dict({"position": (0, 0, 1), "focal_point": (0, 0, 0), "zoom": 2})
+    with pytest.raises(InvalidCameraError, match="description is a dictionary; got list"):
+        Camera.from_dict([1])
+    for angle in (np.inf, "far"):
+        with pytest.raises(InvalidCameraError, match="turned by a finite angle; got"):
+            Camera(**GOOD).azimuth(angle)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (MAX_WINDOW_EDGE, 1), (np.int64(7), 3.0), [4, 5]])

@@ -252,6 +252,32 @@ def test_an_interrupt_is_one_line_and_leaves_nothing(folder, capsys, monkeypatch
     assert sorted(folder.iterdir()) == before
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="file names of any bytes")
+def test_nothing_that_a_file_says_reaches_the_terminal_raw(folder, capsys, tmp_path):
+    """Names and text in a file may hold what moves the cursor, or what cannot be written."""
+    vdi = io.read(folder / "a.vdi")
+    named = pvdi.VDI(
+        vdi.camera,
+        vdi.window_size,
+        vdi.offsets,
+        vdi.front,
+        vdi.back,
+        vdi.color,
+        vdi.optical_depth,
+        vdi.bounds,
+        metadata={"\x1b[31mred\n": "\x1b]0;title\x07"},
+    )
+    path = tmp_path / "\udcff.vdi"  # a byte that is no UTF-8
+    named.save(path)
+    status, out, _ = run(capsys, "info", path)
+    assert status == 0
+    assert r"\udcff.vdi" in out
+    assert r"\x1b[31mred\n" in out
+    assert all(c.isprintable() for c in out.replace("\n", ""))
+    assert run(capsys, "convert", path, "-o", tmp_path / "\udcfe.exr")[0] == 0
+    assert complaint(capsys, "info", tmp_path / "\x1b[2J.vdi").startswith(str(tmp_path))
+
+
 # -- verbs -----------------------------------------------------------------------------------------
 
 

@@ -122,6 +122,14 @@ def test_sample_distance(make, draw, wrong):
         assert str(caught.value).endswith(repr(wrong))
 
 
+def test_a_volume_too_thin_for_the_default_step(make, draw):
+    """Found by fuzzing: rays of 10^18 steps were begun."""
+    thin = Volume(some_volume().array, (1e-9, 1, 1e9))
+    for function in (make, draw):
+        with pytest.raises(InvalidArgumentError, match="half the smallest spacing, 5e-10, is less"):
+            function(thin)
+
+
 def test_a_step_longer_than_every_ray_is_one_step(make, draw):
     images = [draw(sample_distance=step) for step in (1e3, 1e30, 1e300)]
     assert images[0][..., 3].max() > 0

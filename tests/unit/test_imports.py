@@ -32,6 +32,7 @@ OWNERS = {
 }
 
 CORE = {
+    "checks",
     "_version",
     "ambient_occlusion",
     "camera",

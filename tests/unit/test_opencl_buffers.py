@@ -186,8 +186,9 @@ def test_ledger_is_safe_between_threads():
 
     def work() -> None:
         for _ in range(2000):
-            ledger.take("b", 3, 10, 10**9)
-            ledger.give_back(3)
+            ledger.take("b", 3, 10, 10**9).give_back()
+            kept = ledger.take("b", 3, 10, 10**9)
+            del kept  # goes back by itself
 
     threads = [threading.Thread(target=work) for _ in range(4)]
     for thread in threads:

@@ -85,6 +85,12 @@ def test_repr_says_what_matters():
         ({"unit_distance": np.inf}, "unit_distance must be a positive length"),
         ({"unit_distance": -1}, "unit_distance .* got -1"),
         ({"interpolation": "cubic"}, "interpolation must be 'nearest' or 'linear'; got 'cubic'"),
+        # Found by fuzzing: errors of NumPy and Python came out, or a warning
+        ({"scalar_range": 3}, "must be two finite numbers"),
+        ({"scalar_range": (1, 2, 3)}, "must be two finite numbers"),
+        ({"scalar_range": ("a", "b")}, "must be two finite numbers"),
+        ({"unit_distance": "x"}, "unit_distance .* got 'x'"),
+        ({"opacities": [0, 1e300]}, "opacities must lie between 0 and 1; got 0.0 to inf"),
     ],
 )
 def test_impossible_tables_are_refused(changes, message):
@@ -92,6 +98,14 @@ def test_impossible_tables_are_refused(changes, message):
         table(**changes)
     with pytest.raises(InvalidArgumentError, match=message):
         table().replace(**changes)
+
+
+@pytest.mark.parametrize(
+    "state", [None, [1], {}, {"colors": [[0, 0, 0]]}, {"shading": 3}, {"shading": {"glow": 1}}]
+)
+def test_what_is_no_description_is_refused(state):
+    with pytest.raises(InvalidArgumentError, match="no description of a transfer function"):
+        TransferFunction.from_dict(state)
 
 
 def test_unknown_parts_are_refused_by_name():

@@ -147,6 +147,14 @@ def test_random_vdis_are_equal_to_themselves_only(rng):
         ({"bounds": (1, -1, 0, 1, 0, 1)}, "bounds must be six finite numbers"),
         ({"bounds": (0, 1, 0, 1)}, "bounds must be six finite numbers"),
         ({"bounds": (0, 1, 0, 1, 0, np.nan)}, "bounds must be six finite numbers"),
+        # Found by fuzzing: errors of NumPy and Python came out, or a warning
+        ({"bounds": [[1, 2], [3]]}, "bounds must be six finite numbers"),
+        ({"bounds": {"a": 1}}, "bounds must be six finite numbers"),
+        ({"front": [[1, 2], [3]]}, "front must be an array of numbers"),
+        ({"back": [2.0, 1e300, 1.75]}, "supersegment 1 .* 'front and back finite'"),
+        ({"depth_origin": "x"}, "depth_origin must be finite; got 'x'"),
+        ({"depth_origin": []}, r"depth_origin must be finite; got \[\]"),
+        ({"metadata": [1]}, "metadata must be a dictionary; got list"),
     ],
 )
 def test_a_broken_rule_is_named_with_its_element(changes, message):

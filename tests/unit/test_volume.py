@@ -126,3 +126,8 @@ def test_arrays_that_are_no_volume_are_refused(array, message):
 def test_impossible_grids_are_refused(changes, message):
     with pytest.raises(InvalidVolumeError, match=message):
         Volume(np.zeros((2, 2, 2)), **changes)
+
+
+def test_lists_of_different_lengths_are_no_volume():
+    with pytest.raises(InvalidVolumeError, match="a volume is an array of numbers"):
+        Volume([[1, 2], [3]])

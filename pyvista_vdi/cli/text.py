@@ -1,0 +1,14 @@
+"""Text for a terminal."""
+
+from __future__ import annotations
+
+
+def printable(text: object) -> str:
+    """Return a text whose every character can be shown: names and files may hold any.
+
+    Control characters would move the cursor, or do worse, and half a surrogate pair, which stands
+    for a byte of a file name that is no UTF-8, cannot be written at all.
+    """
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in str(text)
+    )

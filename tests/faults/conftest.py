@@ -1,0 +1,21 @@
+from __future__ import annotations
+
+import gc
+
+import pytest
+from faulty_driver import Driver
+
+
+@pytest.fixture
+def driver(monkeypatch):
+    """The driver of every device in this process, which fails when it is told to."""
+    return Driver(monkeypatch)
+
+
+@pytest.fixture(autouse=True)
+def _only_new_objects():
+    """Leave what was there before out of garbage collections, of which these tests need many."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()

@@ -1,0 +1,297 @@
+"""A device that runs short, fails or is lost: a clear error, and the next call works."""
+
+from __future__ import annotations
+
+import contextlib
+import linecache
+import signal
+import sys
+
+import pytest
+from faulty_driver import (
+    ALLOCATIONS,
+    CAMERA,
+    LAUNCHES,
+    OPERATIONS,
+    WINDOW,
+    living_buffers,
+    same,
+    state_of,
+)
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import Cancelled, DeviceError, DeviceMemoryError, KernelBuildError
+from pyvista_vdi.opencl_runtime import devices, programs
+
+#: Buffers of a volume and of a VDI that are on the device, and those that are always small.
+VOLUME = {"volume 'values'", "ranges of blocks"}
+VDI = {
+    *("list offsets", "supersegment faces", "supersegment media"),
+    *("occupancy counts", "occupancy masks"),
+}
+SMALL = {"transfer function", "visible blocks"}
+
+every_operation = pytest.mark.parametrize("operation", OPERATIONS, ids=lambda o: o.name)
+
+
+def calls_of(driver, names, operation, runtime):
+    """How often an operation calls some of the driver's functions, and what it makes."""
+    operation(runtime)  # compiles
+    driver.count(names)
+    expected = operation(runtime)
+    calls = driver.calls
+    driver.work()
+    return calls, expected
+
+
+# -- memory, launches, copies ----------------------------------------------------------------------
+
+
+#: How many calls of the driver lie between two that fail: every one is tried in the long run.
+strides = pytest.mark.parametrize("stride", [5, pytest.param(1, marks=pytest.mark.slow)])
+
+
+@every_operation
+@strides
+@pytest.mark.parametrize("code", ["MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES"])
+def test_memory_that_runs_out_at_each_allocation(runtime, driver, operation, code, stride):
+    """Also while the error is kept, as an interactive session keeps its last one."""
+    calls, expected = calls_of(driver, ALLOCATIONS, operation, runtime)
+    assert calls >= 5
+    before = state_of(runtime)
+    for k in range(0, calls, stride):
+        driver.fail(ALLOCATIONS, k, code)
+        with pytest.raises(DeviceMemoryError, match="ran out of memory .*the driver says") as error:
+            operation(runtime)
+        driver.work()
+        message = str(error.value)
+        assert "for the buffer" in message
+        assert "smaller volume, window size or max_supersegments" in message
+        # A volume or a VDI on the device is there for its next frame; nothing is there by half
+        kept = {name for name, _ in living_buffers()} - {name for name, _ in before[0]}
+        for cached in (VOLUME, VDI):
+            assert kept.isdisjoint(cached) or kept >= cached, (k, message)
+        assert kept <= SMALL | VOLUME | VDI, (k, message)
+        del error
+        assert state_of(runtime) == before, (k, message)
+    assert same(operation(runtime), expected)
+
+
+@every_operation
+@pytest.mark.parametrize(
+    ("code", "error", "remedy"),
+    [
+        ("DEVICE_NOT_AVAILABLE", DeviceError, "start the program again, or use another device"),
+        ("INVALID_COMMAND_QUEUE", DeviceError, "start the program again, or use another device"),
+        ("INVALID_OPERATION", DeviceError, "try again, or use another device"),
+        ("OUT_OF_RESOURCES", DeviceMemoryError, "use a smaller volume"),
+    ],
+)
+def test_a_device_that_is_lost_in_the_middle(runtime, driver, operation, code, error, remedy):
+    """At a launch, a copy or a fill: the first, the last, and some between."""
+    calls, expected = calls_of(driver, LAUNCHES, operation, runtime)
+    before = state_of(runtime)
+    for k in sorted({0, 1, calls // 3, calls // 2, calls - 1}):
+        driver.fail(LAUNCHES, k, code)
+        with pytest.raises(error, match=f"the driver says {code}") as caught:
+            operation(runtime)
+        driver.work()
+        assert remedy in str(caught.value)
+        del caught
+        assert state_of(runtime) == before
+        assert same(operation(runtime), expected), k
+
+
+@every_operation
+def test_a_device_that_is_lost_while_it_is_waited_for(runtime, driver, operation, monkeypatch):
+    """``finish`` is where drivers report what went wrong in a kernel."""
+    expected = operation(runtime)
+    before = state_of(runtime)
+
+    class Lost:
+        def __init__(self, queue):
+            self.queue = queue
+
+        def finish(self):
+            self.queue.finish()
+            raise driver.error("DEVICE_NOT_AVAILABLE")
+
+    queue = runtime._queues[runtime._main_queue]
+    lost = Lost(queue)
+    # Commands go to the driver's own queue; only waiting for them fails
+    monkeypatch.setattr(type(runtime), "_queue", property(lambda _: lost))
+    functions = {name: getattr(devices.opencl(), name) for name in LAUNCHES}
+    for name, function in functions.items():
+        monkeypatch.setattr(
+            devices.opencl(),
+            name,
+            lambda q, *a, _call=function, **k: _call(q.queue if q is lost else q, *a, **k),
+        )
+    message = "while waiting for enqueued work.*start the program again"
+    with pytest.raises(DeviceError, match=message):
+        operation(runtime)
+    monkeypatch.undo()
+    assert state_of(runtime) == before
+    assert same(operation(runtime), expected)
+
+
+def test_a_frame_and_background_work_go_on_after_a_loss(runtime, driver):
+    """The turns on the device are given back."""
+    operation = OPERATIONS[2]
+    _, expected = calls_of(driver, LAUNCHES, operation, runtime)
+    driver.fail(LAUNCHES, 3, "DEVICE_NOT_AVAILABLE")
+    with pytest.raises(DeviceError), runtime.foreground():
+        operation(runtime)
+    driver.fail(LAUNCHES, 3, "DEVICE_NOT_AVAILABLE")
+    with pytest.raises(DeviceError), runtime.background():
+        operation(runtime)
+    driver.work()
+    with runtime.foreground():
+        assert same(operation(runtime), expected)
+    with runtime.background():
+        assert same(operation(runtime), expected)
+
+
+# -- compilers -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("operation", "broken"),
+    [
+        *((0, name) for name in ("grid/volume_blocks.cl", "vdi/generate.cl")),
+        *((2, name) for name in ("vdi/prepare.cl", "grid/occupancy.cl", "vdi/raycast.cl")),
+        (3, "vdi/render_volume.cl"),
+    ],
+)
+def test_a_kernel_that_does_not_compile(runtime, operation, broken, monkeypatch):
+    """The message names the file and shows the compiler's log; nothing half made is kept."""
+    operation = OPERATIONS[operation]
+    expected = operation(runtime)
+    before = state_of(runtime)
+    expand = programs.sources.expand
+
+    def spoiled(path):
+        return expand(path) + ("int broken = missing_name;\n" if str(path) == broken else "")
+
+    with monkeypatch.context() as patched:
+        empty = programs.ProgramCache(runtime._context, runtime._device)
+        patched.setattr(runtime, "_programs", empty)
+        patched.setattr(programs.sources, "expand", spoiled)
+        with pytest.raises(KernelBuildError, match=f"{broken} does not compile on") as caught:
+            operation(runtime)
+    error = caught.value
+    assert "missing_name" in str(error)
+    assert "missing_name" in error.log
+    assert "missing_name" in error.source
+    assert "-D" in error.options
+    del caught, error
+    assert state_of(runtime) == before
+    assert same(operation(runtime), expected)
+
+
+# -- Ctrl-C ----------------------------------------------------------------------------------------
+
+
+@every_operation
+@strides
+def test_ctrl_c_at_each_use_of_the_device(runtime, driver, operation, stride):
+    """A real SIGINT before each launch, copy, fill and allocation."""
+    names = (*ALLOCATIONS, *LAUNCHES)
+    calls, expected = calls_of(driver, names, operation, runtime)
+    before = state_of(runtime)
+    for k in range(0, calls, stride):
+        driver.fail(names, k, lambda: signal.raise_signal(signal.SIGINT))
+        with pytest.raises(KeyboardInterrupt):
+            operation(runtime)
+        driver.work()
+        assert state_of(runtime) == before, k
+    assert same(operation(runtime), expected)
+
+
+def _begins_with(frame):
+    line = linecache.getline(frame.f_code.co_filename, frame.f_lineno).strip()
+    return line.startswith(("with ", "async with ")) or "lock.acquire" in line
+
+
+class _LineInterrupt:
+    """Raises KeyboardInterrupt at the n-th line that runs in the package."""
+
+    def __init__(self, at=None):
+        self.at = at
+        self.lines = 0
+        self.where = None
+
+    def __call__(self, frame, event, _):
+        if "pyvista_vdi" not in frame.f_code.co_filename:
+            return None
+        # A finaliser cannot pass an error on: Python prints it and goes on
+        outer = frame
+        while outer is not None:
+            if outer.f_code.co_name in ("_release", "on_release", "give_back", "__del__"):
+                return None
+            outer = outer.f_back
+        # Tracing comes to a "with" again before its end; signals do not come between the two
+        if event == "line" and not _begins_with(frame):
+            self.lines += 1
+            if self.lines == self.at:
+                self.where = f"{frame.f_code.co_filename}:{frame.f_lineno}"
+                raise KeyboardInterrupt
+        return self
+
+    @contextlib.contextmanager
+    def tracing(self):
+        before = sys.gettrace()
+        sys.settrace(self)
+        try:
+            yield
+        finally:
+            sys.settrace(before)
+
+
+@every_operation
+@pytest.mark.parametrize("samples", [8, pytest.param(1000, marks=pytest.mark.slow)])
+def test_ctrl_c_at_lines_of_the_package(default_runtime, operation, samples):
+    """As a signal may come anywhere: at some lines here, at a thousand in the long run."""
+    _interrupt_lines(default_runtime, operation, samples)
+
+
+def _interrupt_lines(runtime, operation, samples):
+    expected = operation(runtime)
+    counter = _LineInterrupt()
+    with counter.tracing():
+        operation(runtime)
+    lines = range(1, counter.lines + 1)
+    step = max(1, counter.lines // samples) | 1
+    before = state_of(runtime)
+    leaks = {}
+    for at in lines[::step]:
+        interrupt = _LineInterrupt(at)
+        with contextlib.suppress(KeyboardInterrupt), interrupt.tracing():
+            operation(runtime)
+        now = state_of(runtime)
+        if now != before:
+            leaks[interrupt.where] = now
+            before = now
+    assert not leaks, sorted(leaks)
+    assert same(operation(runtime), expected)
+
+
+def test_cancelling_at_each_report(runtime, monkeypatch):
+    """``progress`` that returns False, at every call."""
+    from faulty_driver import TRANSFER, fresh_volume
+
+    monkeypatch.setattr("pyvista_vdi.generation._SLICE_BYTES", 1)
+    fractions = []
+    arguments = (fresh_volume(), CAMERA, WINDOW, TRANSFER)
+    pvdi.generation.generate_vdi(*arguments, device=runtime, progress=fractions.append)
+    before = state_of(runtime)
+    for last in range(len(fractions)):
+        calls = []
+
+        def progress(fraction, calls=calls, last=last):
+            calls.append(fraction)
+            return len(calls) <= last
+
+        with pytest.raises(Cancelled):
+            pvdi.generation.generate_vdi(*arguments, device=runtime, progress=progress)
+        assert state_of(runtime) == before

@@ -1,0 +1,267 @@
+"""Several threads, and processes that fork: the same pictures, or a clear error; never a hang."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume, state_of
+from strategies import random_vdi
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.raycast_volume import raycast_volume
+
+#: Seconds after which a process counts as one that hangs.
+PATIENCE = 100
+
+
+def finished(code, *arguments):
+    """Run code in a new process, which must end; its output."""
+    tests = str(Path(__file__).parents[1])
+    head = f"import sys\nsys.path.insert(0, {tests!r})\n"
+    done = subprocess.run(
+        [sys.executable, "-c", head + code, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert done.returncode == 0, f"{done.returncode}: {done.stdout}{done.stderr}"
+    return done.stdout
+
+
+# -- threads ---------------------------------------------------------------------------------------
+
+
+def test_one_vdi_drawn_by_many_threads(runtime):
+    """The first frames race to put it on the device; it goes there once."""
+    views = [CAMERA.azimuth(angle) for angle in range(0, 160, 20)]
+    vdi = generate_vdi(fresh_volume(), CAMERA, WINDOW, TRANSFER, device=runtime)
+    expected = [render_vdi(vdi, view, device=runtime) for view in views]
+    del vdi
+    before = state_of(runtime)
+    shared = generate_vdi(fresh_volume(), CAMERA, WINDOW, TRANSFER, device=runtime)
+    barrier = threading.Barrier(len(views))
+
+    def draw(view, vdi=shared):
+        barrier.wait()
+        return [render_vdi(vdi, view, device=runtime) for _ in range(5)]
+
+    with ThreadPoolExecutor(len(views)) as pool:
+        for images, image in zip(pool.map(draw, views), expected, strict=True):
+            for drawn in images:
+                np.testing.assert_array_equal(drawn, image)
+    names = [name for name, _ in state_of(runtime)[0]]
+    assert names.count("supersegment media") == 1 + [n for n, _ in before[0]].count(
+        "supersegment media"
+    )
+    del shared, draw
+    assert state_of(runtime) == before
+
+
+def test_threads_that_do_different_things(runtime):
+    """Generating, rendering, volume rendering, saving and reading, all at once."""
+    volume = fresh_volume()
+    made = generate_vdi(volume, CAMERA, WINDOW, TRANSFER, device=runtime)
+    image = render_vdi(made, CAMERA.azimuth(30), device=runtime)
+    picture = raycast_volume(volume, CAMERA, WINDOW, TRANSFER, device=runtime)
+
+    def generate():
+        assert generate_vdi(volume, CAMERA, WINDOW, TRANSFER, device=runtime).equals(made)
+
+    def draw():
+        np.testing.assert_array_equal(render_vdi(made, CAMERA.azimuth(30), device=runtime), image)
+
+    def draw_volume():
+        drawn = raycast_volume(volume, CAMERA, WINDOW, TRANSFER, device=runtime)
+        np.testing.assert_array_equal(drawn, picture)
+
+    with ThreadPoolExecutor(6) as pool:
+        for future in [pool.submit(f) for f in (generate, draw, draw_volume) * 10]:
+            future.result(PATIENCE)
+
+
+TWO_PLOTTERS = """
+import threading
+import numpy as np
+import pyvista as pv
+import pyvista_vdi as pvdi
+from strategies import random_vdi
+
+pv.OFF_SCREEN = True
+vdi = random_vdi(np.random.default_rng(4), max_window=(40, 30))
+corners = np.reshape(vdi.bounds, (3, 2))
+centre = corners.mean(axis=1)
+size = np.ptp(corners, axis=1).max()
+
+def pictures(first):
+    plotter = pv.Plotter(window_size=(120, 90))
+    plotter.add_vdi(vdi, regenerate="never", show_scalar_bar=False)
+    shown = []
+    for i in range(12):
+        angle = np.radians(first + 10 * i)
+        eye = centre + 3 * size * np.array([np.cos(angle), np.sin(angle), 0.3])
+        plotter.camera_position = (tuple(eye), tuple(centre), (0, 0, 1))
+        shown.append(plotter.screenshot(return_img=True))
+    plotter.close()
+    return shown
+
+alone = [pictures(0), pictures(90)]
+assert len(np.unique(alone[0][0])) > 10
+together = [None, None]
+
+def work(i):
+    together[i] = pictures(90 * i)
+
+threads = [threading.Thread(target=work, args=(i,)) for i in range(2)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+for first, second in zip(alone, together):
+    for one, other in zip(first, second):
+        assert np.array_equal(one, other)
+print("the same")
+"""
+
+
+def test_two_plotters_in_two_threads(default_runtime):
+    """Each thread makes, uses and closes its own window; the VDI is shared."""
+    pytest.importorskip("pyvista")
+    assert finished(TWO_PLOTTERS) == "the same\n"
+
+
+# -- forks -----------------------------------------------------------------------------------------
+
+FORK = """
+import gc, multiprocessing, os
+import numpy as np
+import pyvista_vdi as pvdi
+from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
+from pyvista_vdi.opencl_runtime import aligned_empty, get_runtime, list_devices
+from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.raycast import render_vdi
+
+runtime = get_runtime(sys.argv[1])
+volume = fresh_volume()
+vdi = generate_vdi(volume, CAMERA, WINDOW, TRANSFER, device=runtime)
+image = render_vdi(vdi, CAMERA, device=runtime)
+in_place = runtime.upload(aligned_empty((64, 64), np.float32))
+
+def child():
+    said = []
+    for use in (
+        lambda: render_vdi(vdi, CAMERA, device=runtime),
+        lambda: pvdi.render(vdi, CAMERA),
+        lambda: generate_vdi(volume, CAMERA, WINDOW, TRANSFER, device=runtime),
+        lambda: list_devices(),
+        lambda: runtime.buffer((4,)),
+        lambda: runtime.finish(),
+    ):
+        try:
+            use()
+        except pvdi.DeviceError as error:
+            said.append(str(error))
+    assert len(said) == 6 and len(set(said)) == 1, said
+    assert "forked" in said[0] and "spawn" in said[0], said
+    # Files need no driver
+    vdi.save(sys.argv[2])
+    assert pvdi.read(sys.argv[2]).equals(vdi)
+    # What was on the device goes without waiting for it
+    for name in ("vdi", "volume", "in_place"):
+        globals().pop(name)
+    gc.collect()
+
+fork = multiprocessing.get_context("fork")
+for _ in range(2):
+    process = fork.Process(target=child)
+    process.start()
+    process.join(60)
+    assert process.exitcode == 0, process.exitcode
+number = os.fork()
+if number == 0:
+    child()
+    sys.exit(0)  # what Python does at exit does not hang either
+assert os.waitpid(number, 0)[1] == 0
+assert np.array_equal(render_vdi(vdi, CAMERA, device=runtime), image)
+print("well")
+"""
+
+FORK_BEFORE = """
+import multiprocessing
+import pyvista_vdi as pvdi
+from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
+from pyvista_vdi.opencl_runtime import get_runtime
+from pyvista_vdi.generation import generate_vdi
+
+def child(queue):
+    runtime = get_runtime(sys.argv[1])
+    queue.put(generate_vdi(fresh_volume(), CAMERA, WINDOW, TRANSFER, device=runtime))
+
+fork = multiprocessing.get_context("fork")
+queue = fork.Queue()
+process = fork.Process(target=child, args=(queue,))
+process.start()
+made = queue.get(timeout=60)
+process.join(60)
+assert process.exitcode == 0
+assert made.n_supersegments > 0
+print("well")
+"""
+
+forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+
+
+@forks
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_fork_of_a_process_that_used_a_device(runtime, tmp_path):
+    """A clear error at once: drivers' threads do not follow, and PoCL would wait for them."""
+    assert finished(FORK, runtime.info.selector, str(tmp_path / "a.vdi")) == "well\n"
+
+
+@forks
+def test_a_fork_before_a_device_is_used(runtime):
+    assert finished(FORK_BEFORE, runtime.info.selector) == "well\n"
+
+
+def test_spawned_processes(default_runtime, tmp_path):
+    """What the message recommends."""
+    path = random_vdi(np.random.default_rng(2)).save(tmp_path / "a.vdi")
+    (tmp_path / "work.py").write_text(
+        "import multiprocessing, sys\n"
+        "import pyvista_vdi as pvdi\n"
+        "def draw(angle):\n"
+        "    vdi = pvdi.read(sys.argv[1])\n"
+        "    return pvdi.render(vdi, vdi.camera.azimuth(angle)).sum()\n"
+        "if __name__ == '__main__':\n"
+        "    here = draw(5)\n"
+        "    with multiprocessing.get_context('spawn').Pool(1) as pool:\n"
+        "        assert pool.map(draw, [5]) == [here]\n"
+        "    print('the same')\n"
+    )
+    done = subprocess.run(
+        [sys.executable, str(tmp_path / "work.py"), str(path)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (0, "the same\n"), done.stderr
+
+
+def test_vdis_go_to_other_processes():
+    """By pickling, as multiprocessing does: arrays and view, to the last bit."""
+    import pickle
+
+    vdi = random_vdi(np.random.default_rng(6))
+    back = pickle.loads(pickle.dumps(vdi))
+    assert isinstance(back, pvdi.VDI)
+    assert back.equals(vdi)

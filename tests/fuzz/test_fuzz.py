@@ -1,0 +1,144 @@
+"""Fuzzing within bounds: every input that is kept, and some hundreds of new ones for each target.
+
+``run.py`` fuzzes for as long as one likes, guided by coverage.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from pathlib import Path
+
+import pytest
+from fuzz.targets import TARGETS
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+import pyvista_vdi
+
+CORPUS = Path(__file__).parent / "corpus"
+
+#: Inputs of each target: together some twenty seconds on two cores.
+EXAMPLES = {
+    "vdi_bytes": 100,
+    "vdi_members": 200,
+    "exr_bytes": 100,
+    "exr_patches": 200,
+    "validator": 500,
+    "vtk_form": 300,
+    "command_line": 150,
+    "public_functions": 100,
+}
+#: Those that need a device, or VTK.
+ON_A_DEVICE = ("command_line", "public_functions")
+WITH_VTK = ("vtk_form", "command_line", "public_functions")
+
+
+def kept(target):
+    folder = CORPUS / target
+    return sorted(folder.iterdir()) if folder.is_dir() else []
+
+
+@pytest.fixture
+def target(request):
+    name = request.param
+    if name in ON_A_DEVICE:
+        request.getfixturevalue("default_runtime")
+    if name in WITH_VTK:
+        pytest.importorskip("pyvista")
+    return TARGETS[name]
+
+
+@pytest.mark.parametrize("target", TARGETS, indirect=True)
+def test_inputs_that_were_kept(target):
+    """Seeds that reach far into the code, and every input that once broke a promise."""
+    for path in kept(target.__name__):
+        target(path.read_bytes())
+
+
+@pytest.mark.parametrize("target", TARGETS, indirect=True)
+def test_new_inputs(target):
+    @settings(
+        max_examples=EXAMPLES[target.__name__],
+        derandomize=True,
+        deadline=None,
+        database=None,
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(data=st.binary(max_size=500))
+    @example(data=b"")
+    def fuzz(data):
+        target(data)
+
+    fuzz()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", TARGETS, indirect=True)
+def test_many_more_inputs(target):
+    """Random bytes by number: what hypothesis' small examples hardly reach."""
+    for number in range(20 * EXAMPLES[target.__name__]):
+        seed = hashlib.sha512(number.to_bytes(4, "little")).digest()
+        data = (seed * 8)[: 20 + seed[0] * 2]
+        try:
+            target(data)
+        except BaseException as error:
+            raise AssertionError(f"input {number}: {data!r}") from error
+
+
+def test_the_corpus_is_small_and_known():
+    files = [path for path in CORPUS.rglob("*") if path.is_file()]
+    assert {path.parent.name for path in files} <= set(TARGETS)
+    assert sum(path.stat().st_size for path in files) < 200_000
+    assert set(EXAMPLES) == set(TARGETS)
+
+
+# -- nothing is executed --------------------------------------------------------------------------
+
+#: Modules that make objects or code of data, and functions that do.
+_MODULES = {
+    "pickle",
+    "cPickle",
+    "dill",
+    "cloudpickle",
+    "marshal",
+    "shelve",
+    "yaml",
+    "runpy",
+    "code",
+}
+_FUNCTIONS = {"eval", "exec", "compile", "__import__"}
+#: ``np.load`` reads pickles if it is told to; the others start programs.
+_METHODS = {"load", "loads", "system", "popen", "Popen", "fromfile", "memmap"}
+
+
+def _calls(tree):
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            yield node
+
+
+def test_nothing_in_the_package_makes_code_or_objects_of_data():
+    """No pickle, no eval: data stay data. ``json.loads`` makes numbers, text, lists and dicts."""
+    package = Path(pyvista_vdi.__file__).parent
+    sources = sorted(package.rglob("*.py"))
+    assert len(sources) > 50
+    for path in sources:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for node in ast.walk(tree):
+            names = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                names = [node.module or ""]
+            used = {name.split(".")[0] for name in names} & (_MODULES | {"subprocess"})
+            assert not used, f"{path}:{node.lineno} imports {used}"
+        for call in _calls(tree):
+            function = call.func
+            where = f"{path}:{call.lineno}"
+            if isinstance(function, ast.Name):
+                assert function.id not in _FUNCTIONS, where
+            elif isinstance(function, ast.Attribute) and function.attr in _METHODS:
+                owner = function.value.id if isinstance(function.value, ast.Name) else ""
+                assert owner in ("json", "platform"), f"{where}: {owner}.{function.attr}"
+            assert not any(k.arg == "allow_pickle" for k in call.keywords), where
