@@ -144,12 +144,14 @@ def read(
     VDIWarning
         If one of our files was changed by another program, or colours are outside 0 to 1.
     """
-    return _File(path).vdi(camera, thickness)
+    with np.errstate(invalid="ignore"):  # a signalling NaN is refused as any other
+        return _File(path).vdi(camera, thickness)
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:
     """Return what a file says about itself; of a foreign one all samples are read for it."""
-    return _File(path).info()
+    with np.errstate(invalid="ignore"):
+        return _File(path).info()
 
 
 # -- writing ---------------------------------------------------------------------------------------

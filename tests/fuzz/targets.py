@@ -122,8 +122,10 @@ def vdi_bytes(data: bytes) -> None:
 
 
 @cache
-def _vdi_members(index: int, compression: str) -> dict[str, bytes]:
-    path = base_vdi(index).save(work_folder() / "base.vdi", compression=compression)
+def _vdi_members(index: int, compression: str, precision: str) -> dict[str, bytes]:
+    path = base_vdi(index).save(
+        work_folder() / "base.vdi", compression=compression, precision=precision
+    )
     with zipfile.ZipFile(path) as archive:
         members = {info.filename: archive.read(info) for info in archive.infolist()}
     path.unlink()
@@ -133,7 +135,8 @@ def _vdi_members(index: int, compression: str) -> dict[str, bytes]:
 def vdi_members(data: bytes) -> None:
     """A ``.vdi`` file whose members were changed, with checksums that fit."""
     choices = Choices(data)
-    base = _vdi_members(choices.integer(0, 7), choices.pick(COMPRESSIONS))
+    precision = choices.pick(("exact", "16-byte", "8-byte"))
+    base = _vdi_members(choices.integer(0, 7), choices.pick(COMPRESSIONS), precision)
     members = dict(base)
     description = json.loads(members["vdi.json"])
     for _ in range(choices.integer(0, 3)):
