@@ -211,7 +211,9 @@ def test_options_that_are_unknown(options, message, tmp_path):
 
 
 def test_options_of_the_other_format(file, tmp_path):
-    with pytest.raises(InvalidArgumentError, match="options compression, level, precision; got exact"):
+    with pytest.raises(
+        InvalidArgumentError, match="options compression, level, precision; got exact"
+    ):
         small_vdi().save(tmp_path / "a.vdi", exact=True)
     path = small_vdi().save(tmp_path / "a.vdi")
     with pytest.raises(InvalidArgumentError, match="options none; got thickness"):
