@@ -40,7 +40,7 @@ def test_options_of_saving_and_reading(vdi, tmp_path):
         image.save(tmp_path / f"{level}.vdi", level=level)
         vdi.save(tmp_path / "same.vdi", level=level)
         assert (tmp_path / f"{level}.vdi").read_bytes() == (tmp_path / "same.vdi").read_bytes()
-    with pytest.raises(InvalidArgumentError, match="with the options compression, level; got exac"):
+    with pytest.raises(InvalidArgumentError, match="options compression, level, precision; got"):
         image.save(tmp_path / "b.vdi", exact=False)
     image.save(tmp_path / "a.exr", exact=False)
     view = pvdi.Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))
