@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
-from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringArray
+from vtkmodules.vtkCommonCore import vtkStringArray
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
@@ -22,6 +21,7 @@ from pyvista_vdi.compositing import opacity
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.host_memory import require_host_memory
 from pyvista_vdi.vdi import VDI
+from pyvista_vdi.vtk_pipeline.algorithm import Algorithm, ask_for_all
 from pyvista_vdi.vtk_pipeline.convert import (
     description_of,
     vdi_from_image,
@@ -180,7 +180,7 @@ def vdi_from_dense_image(image: Any) -> VDI:
     )
 
 
-class VDIToDenseImage(VTKPythonAlgorithmBase):
+class VDIToDenseImage(Algorithm):
     """A filter from a VDI's canonical form to its dense form: see :func:`vdi_to_dense_image`.
 
     One image in, from :class:`VDISource` or a reader; one image out. Python's ``Update`` raises
@@ -194,14 +194,10 @@ class VDIToDenseImage(VTKPythonAlgorithmBase):
         )
         self._exact = False
         self._max_supersegments: int | None = None
-        self._error: Exception | None = None
-        self._python_waits = False
 
     def SetExact(self, exact: bool) -> None:
         """Choose whether colours stay float32; off by default."""
-        if bool(exact) != self._exact:
-            self._exact = bool(exact)
-            self.Modified()
+        self._change("_exact", bool(exact))
 
     def GetExact(self) -> bool:
         """Whether colours stay float32."""
@@ -221,25 +217,11 @@ class VDIToDenseImage(VTKPythonAlgorithmBase):
             raise InvalidArgumentError(
                 f"max_supersegments must be a whole number from 1 on; got {limit!r}"
             )
-        if limit != self._max_supersegments:
-            self._max_supersegments = limit
-            self.Modified()
+        self._change("_max_supersegments", limit)
 
     def GetMaxSupersegments(self) -> int | None:
         """Return the points along z."""
         return self._max_supersegments
-
-    def Update(self, *args: Any) -> None:
-        """Bring the output up to date, and raise what went wrong."""
-        self._python_waits = True
-        try:
-            super().Update(*args)
-        finally:
-            self._python_waits = False
-        error, self._error = self._error, None
-        if error is not None:
-            self.Modified()  # so that the next update tries again
-            raise error
 
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the lists; how long the longest is, only the data tell."""
@@ -253,30 +235,15 @@ class VDIToDenseImage(VTKPythonAlgorithmBase):
 
     def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Ask for all lists, whatever part of the image is wanted."""
-        information = inputs[0].GetInformationObject(0)
-        executive = vtkStreamingDemandDrivenPipeline
-        if information is not None and information.Has(executive.WHOLE_EXTENT()):
-            whole = information.Get(executive.WHOLE_EXTENT())
-            information.Set(executive.UPDATE_EXTENT(), whole, 6)
+        ask_for_all(inputs)
         return 1
 
-    def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Fill the points."""
-        output = vtkImageData.GetData(outputs, 0)
-        self._error = None
-        try:
-            vdi = vdi_from_image(vtkImageData.GetData(inputs[0], 0))
-            dense = vdi_to_dense_image(
-                vdi, exact=self._exact, max_supersegments=self._max_supersegments
-            )
-        except Exception as error:  # VTK would print it and go on
-            self._error = error
-            if not self._python_waits:
-                vtkOutputWindow.GetInstance().DisplayErrorText(f"VDIToDenseImage: {error}\n")
-            output.Initialize()
-            return 1
-        output.ShallowCopy(dense)
-        return 1
+    def _execute(self, inputs: Any, outputs: Any) -> None:
+        vdi = vdi_from_image(vtkImageData.GetData(inputs[0], 0))
+        dense = vdi_to_dense_image(
+            vdi, exact=self._exact, max_supersegments=self._max_supersegments
+        )
+        vtkImageData.GetData(outputs, 0).ShallowCopy(dense)
 
 
 def _rgba_bytes(vdi: VDI) -> NDArray[np.uint8]:

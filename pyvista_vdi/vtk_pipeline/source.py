@@ -31,6 +31,7 @@ from pyvista_vdi.lighting import Lights
 from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.volume import Volume
+from pyvista_vdi.vtk_pipeline.algorithm import announce, ask_for_all
 from pyvista_vdi.vtk_pipeline.convert import (
     require_image,
     require_image_port,
@@ -524,20 +525,12 @@ class VDISource(VTKPythonAlgorithmBase):
             camera = None  # RequestData says what is wrong with it
         if grid is not None and camera is not None and self._window_size is not None:
             _, (width, height) = self._view(grid, camera, self._window_size, warn=False)
-        information = outputs.GetInformationObject(0)
-        executive = vtkStreamingDemandDrivenPipeline
-        information.Set(executive.WHOLE_EXTENT(), (0, width - 1, 0, height - 1, 0, 0), 6)
-        information.Set(vtkImageData.SPACING(), (1.0, 1.0, 1.0), 3)
-        information.Set(vtkImageData.ORIGIN(), (0.0, 0.0, 0.0), 3)
+        announce(outputs, (width, height))
         return 1
 
     def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Ask for the whole volume, whatever part of the VDI is wanted."""
-        information = inputs[0].GetInformationObject(0)
-        executive = vtkStreamingDemandDrivenPipeline
-        if information is not None and information.Has(executive.WHOLE_EXTENT()):
-            whole = information.Get(executive.WHOLE_EXTENT())
-            information.Set(executive.UPDATE_EXTENT(), whole, 6)
+        ask_for_all(inputs)
         return 1
 
     def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
