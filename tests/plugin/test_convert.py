@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 import pyvista as pv
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from vtkmodules.vtkCommonCore import vtkMath
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
@@ -315,6 +315,11 @@ def test_few_nodes_on_one_grid_give_that_grid():
     ),
     st.floats(-80, 80),
 )
+@example(
+    nodes=[(0.9907559388100751, 0.0), (-49.09375, 0.0)],
+    colors=[(0.0, 0.0, 0.75, 0.0), (0.25, 0.0, 0.0, 0.0), (2.2e-153, 0.0, 1.0, 0.0)],
+    x=0.0,
+)
 def test_any_nodes_are_sampled_closely(nodes, colors, x):
     prop = linear_property(nodes, colors)
     function = transfer_function_from_property(prop)
@@ -325,6 +330,8 @@ def test_any_nodes_are_sampled_closely(nodes, colors, x):
     # a kink, or a step, lies between entries
     step = (high - low) / max(1, len(function.opacities) - 1)
     around = [x + s * step for s in np.linspace(-1.001, 1.001, 41)]
+    # Its extremes are at nodes: two that nearly coincide make a step that other places miss
+    around += [n for n, *_ in (*nodes, *colors) if abs(n - x) <= 1.001 * step]
     values = np.array([(*color.GetColor(a), prop.GetScalarOpacity().GetValue(a)) for a in around])
     slack = np.ptp(values, axis=0) + 1e-5
     assert (np.abs(np.array(at(function, x)) - expected) <= slack).all()
