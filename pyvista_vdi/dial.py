@@ -275,10 +275,11 @@ def describe(metadata: dict[str, Any]) -> str | None:
         chosen, predicted = dial["chosen"], dial["predicted"]
         width, height = chosen["window_size"]
         return (
-            f"chosen: {width} x {height} lists of up to {chosen['max_supersegments']}; predicted: "
-            f"SSIM {predicted['ssim']:.3f} at {dial['angle']:g}°; "
-            f"{predicted['bytes'] / 2**20:.1f} MiB; {predicted['fps']:.3g} full frames/s"
-            + ("; target missed" if dial["missed"] else "")
+            f"chosen {width} x {height} lists of up to {chosen['max_supersegments']}, "
+            f"predicted SSIM {predicted['ssim']:.3f} at {dial['angle']:g}°, "
+            f"predicted {predicted['bytes'] / 2**20:.1f} MiB, "
+            f"predicted {predicted['fps']:.3g} full frames/s"
+            + (", target missed" if dial["missed"] else "")
         )
     except (TypeError, KeyError, ValueError):  # no dial's, or of a file that somebody has written
         return None
@@ -327,12 +328,12 @@ def chosen(dial: Dial, ladder: Sequence[Prediction], window_size: tuple[int, int
     rung = ladder[min(wanted, within - 1)]
     if rung.ssim < dial.ssim:
         name = f"quality={dial.quality!r}" if dial.quality else "target_ssim"
-        limits = [n for n in ("max_bytes", "target_fps") if n in dial.to_dict()]
+        limits = [f"{n}={v}" for n, v in dial.to_dict().items() if n in ("max_bytes", "target_fps")]
         held = within <= wanted
         missed.append(
             f"{name} asks for an SSIM of {dial.ssim:g} at {dial.angle:g} degrees; "
             f"{rung.ssim:.3f} is predicted for "
-            + (f"the most that {' and '.join(limits)} allow" if held else "the best settings")
+            + (f"what is within {' and '.join(limits)}" if held else "the best settings")
             + ("; allow more, or ask for less" if held else "; ask for less, or a smaller angle")
         )
     return Choice(dial, rung, tuple(missed), window_size)
