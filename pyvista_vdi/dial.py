@@ -2,8 +2,8 @@
 
 What is asked for is a quality, an SSIM, frames per second or bytes. What may be chosen is a ladder
 of settings (:data:`LADDER`). Three small measurements tell what each rung gives: a few tiles of one
-new view are rendered by the volume and by lists of half and of a quarter of the density, and the
-rest is inferred. docs/dial.md says how, and how well that predicts.
+new view are rendered by the volume and by VDIs with few or short lists, and the rest is inferred.
+docs/dial.md says how, and how well that predicts.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ QUALITIES: dict[str, float | None] = {
 TARGET_ANGLE = 30.0
 
 #: How fast the loss across lists falls beyond half a list per pixel: its exponent is the first
-#: number plus the second times the exponent between a quarter and a half. Fitted by
+#: number plus the second times the exponent between a fifth and a half. Fitted by
 #: benchmarks/dial.py.
 EXPONENT = (0.80, 0.55)
 #: Range of that exponent over the fitted cases, with some room.
 _EXPONENTS = (0.6, 1.8)
 #: A frame's time over that of the rough VDI's, as powers of the density and the longest list over
 #: its own. Fitted by benchmarks/dial.py on a CPU.
-FRAME_COST = (0.45, 0.1)
+FRAME_COST = (0.56, 0.12)
 
 #: Share of a limit in bytes that is left free: lists are counted on a sample of the rays.
 _BYTES_MARGIN = 0.05
@@ -75,12 +75,11 @@ class Setting:
         return width, height
 
 
-#: What is measured: :class:`Measurement` says of what. The rough VDI says where tiles are to lie,
-#: how long lists are and what a frame takes.
-ROUGH = Setting(1 / 5, 40, "exact")
-SPARSE = Setting(1 / 4, 10)
+#: What is measured. The VDI of ``ROUGH`` also says where tiles are to lie, how long lists are and
+#: what a frame takes.
+ROUGH = Setting(1 / 5, 40)
+SPARSE = Setting(1 / 5, 10)
 DENSE = Setting(1 / 2, 10)
-LONG = Setting(1 / 2, 40)
 
 #: What a dial chooses from. No rung has fewer or shorter lists than the one before it.
 LADDER = (
@@ -316,9 +315,10 @@ def chosen(dial: Dial, ladder: Sequence[Prediction], window_size: tuple[int, int
         fast = sum(rung.fps >= dial.fps for rung in ladder[:within])
         if fast == 0:
             missed.append(
-                f"target_fps={dial.fps:g} cannot be reached on this device: full frames of "
-                f"{window_size[0]} x {window_size[1]} are predicted at {ladder[0].fps:.3g} per "
-                "second at most; ask for a smaller window, or draw previews of fewer pixels"
+                f"{dial.fps:g} full frames per second cannot be reached on this device: for "
+                f"{window_size[0]} x {window_size[1]} pixels {ladder[0].fps:.3g} are predicted at "
+                "most; ask for fewer, or for a smaller window (a plotter keeps target_fps while "
+                "the view moves by drawing fewer pixels)"
             )
         within = max(1, fast)
     if dial.ssim is None:
@@ -348,18 +348,18 @@ class Measurement:
 
     Attributes
     ----------
-    sparse, dense, long : float
-        1 - SSIM of the picture by a VDI of the settings :data:`SPARSE`, :data:`DENSE` and
-        :data:`LONG`.
+    rough, sparse, dense : float
+        1 - SSIM of the picture by a VDI of the settings :data:`ROUGH`, :data:`SPARSE` and
+        :data:`DENSE`.
     counts : numpy.ndarray
         int64: lists of the rough VDI by their length.
     frame_seconds : float
         Of a full frame of the rough VDI.
     """
 
+    rough: float
     sparse: float
     dense: float
-    long: float
     counts: NDArray[np.int64]
     frame_seconds: float
 
@@ -380,7 +380,7 @@ def predictions(
     one density give b; two densities at one longest list give the power up to half a list per
     pixel, and, by a relation fitted to many scenes, beyond.
     """
-    along = max(0.0, (measured.dense - measured.long) / (_per(DENSE) - _per(LONG)))
+    along = max(0.0, (measured.sparse - measured.rough) / (_per(SPARSE) - _per(ROUGH)))
     across = max(0.0, measured.dense - along * _per(DENSE))
     power = _exponent(max(across, measured.sparse - along * _per(SPARSE)), across)
     beyond = float(np.clip(exponent[0] + exponent[1] * power, *_EXPONENTS))
@@ -408,7 +408,7 @@ def _per(setting: Setting) -> float:
 
 
 def _exponent(sparse: float, dense: float) -> float:
-    """Return the power of the density that a loss falls by, from a quarter to half a list."""
+    """Return the power of the density that a loss falls by, from a fifth to half a list."""
     return math.log(sparse / dense) / math.log(DENSE.lists / SPARSE.lists) if dense > 0 else 1.0
 
 

@@ -18,7 +18,6 @@ from .ambient_occlusion import AmbientOcclusion
 from .camera import Camera, check_window_size
 from .dial import (
     DENSE,
-    LONG,
     ROUGH,
     SPARSE,
     Choice,
@@ -40,13 +39,13 @@ from .view_error import TileSample, ViewErrorEstimator, tiles_ssim
 from .volume import Volume
 
 #: Tiles that are measured, and their edge in pixels: benchmarks/dial.py.
-TILES = 16
+TILES = 9
 TILE_SIZE = 32
 
 #: What generating and rendering the part of a VDI for one tile costs beyond its lists, in lists.
-_PART_OVERHEAD = 2000
-#: Frames of the rough VDI that are timed; the first also compiles and uploads.
-_FRAMES = 4
+_PART_OVERHEAD = 8000
+#: Frames of the rough VDI that are timed; the shortest counts.
+_FRAMES = 2
 #: Scenes that are remembered.
 _REMEMBERED = 32
 
@@ -184,19 +183,18 @@ class Scene:
         )
         rough = self._whole(ROUGH)
         counts = np.bincount(rough.counts.reshape(-1), minlength=2)
-        seconds = self._frame_seconds(rough)
-        self._go_on()
         tiles = estimator.sample(rough, self._view, self._size)
+        seconds = self._frame_seconds(rough)
         if tiles is None:
             return Measurement(0.0, 0.0, 0.0, counts, seconds)
         truth = [estimator.volume_tile(lens, tiles.size) for lens in self._lenses(tiles)]
         losses = []
-        for setting in (SPARSE, DENSE, LONG):
+        for setting in (ROUGH, SPARSE, DENSE):
             self._go_on()
-            pictures = self._pictures(tiles, setting)
+            pictures = self._pictures(tiles, setting, rough if setting == ROUGH else None)
             losses.append(1.0 - tiles.infer(tiles_ssim(pictures, truth))[0])
-        sparse, dense, longer = (min(1.0, max(0.0, loss)) for loss in losses)
-        return Measurement(sparse, dense, longer, counts, seconds)
+        at_rough, sparse, dense = (min(1.0, max(0.0, loss)) for loss in losses)
+        return Measurement(at_rough, sparse, dense, counts, seconds)
 
     def _go_on(self) -> None:
         if self._progress is not None and self._progress(0.0) is False:
@@ -222,26 +220,29 @@ class Scene:
             **self._settings,
         )
 
-    def _pictures(self, tiles: TileSample, setting: Setting) -> list[NDArray[np.float32]]:
-        """Return the tiles' pictures by the lists that their rays meet."""
+    def _pictures(
+        self, tiles: TileSample, setting: Setting, whole: VDI | None
+    ) -> list[NDArray[np.float32]]:
+        """Return the tiles' pictures, by the whole VDI if there is one, or else as is cheaper."""
         window = setting.window_size(self._size)
         lenses = self._lenses(tiles)
+        if whole is not None:
+            return [render_vdi(whole, at, tiles.size, device=self._runtime) for at in lenses]
         met = [
             lists_met(lens, tiles.size, self._volume.bounds, self._camera, window)
             for lens in lenses
         ]
         parts = [math.prod(part[1]) + _PART_OVERHEAD for part in met if part is not None]
         # Where the parts together cost more than the whole, the whole is made
-        whole = self._whole(setting) if sum(parts) >= math.prod(window) else None
+        if sum(parts) >= math.prod(window):
+            return self._pictures(tiles, setting, self._whole(setting))
         pictures = []
         for lens, part in zip(lenses, met, strict=True):
             if part is None:
                 pictures.append(np.zeros((*tiles.size[::-1], 4), np.float32))
                 continue
-            vdi = whole
-            if vdi is None:
-                corner, size = part
-                vdi = self._generated(self._camera.tile(window, corner, size), size, setting)
+            corner, size = part
+            vdi = self._generated(self._camera.tile(window, corner, size), size, setting)
             pictures.append(render_vdi(vdi, lens, tiles.size, device=self._runtime))
         return pictures
 

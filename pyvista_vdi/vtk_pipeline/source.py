@@ -593,6 +593,9 @@ class VDISource(VTKPythonAlgorithmBase):
             self.SetAbortOutput(isinstance(error, Cancelled))  # then the next update tries again
             return 1
         output.ShallowCopy(vdi_to_image(vdi))
+        if self._settings["dial"] is not None:
+            announce(outputs, vdi.window_size)  # which it has chosen only now
+            ask_for_all([outputs])
         return 1
 
     # -- how -------------------------------------------------------------------------------------

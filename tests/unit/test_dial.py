@@ -134,7 +134,7 @@ def test_some_bytes_are_left_free_because_sizes_are_predicted():
         ({"quality": "high", "max_bytes": 500}, 2, r"quality='high' .* 0.960 .* max_bytes=500"),
         ({"quality": "high", "target_fps": 30}, 1, r"0.930 .* target_fps=30"),
         ({"max_bytes": 50}, 0, r"max_bytes=50 cannot be kept: .* 100 bytes; allow more"),
-        ({"target_fps": 100}, 0, r"target_fps=100 cannot be reached .* 160 x 120 .* 80 per second"),
+        ({"target_fps": 100}, 0, r"100 full frames per second cannot .* 160 x 120 pixels 80 are"),
     ],
 )
 def test_what_cannot_be_reached_is_said_with_the_nearest(asked, rung, said):
@@ -229,17 +229,21 @@ def test_precision_is_that_of_with_precision(default_runtime, precision):
 # -- what is predicted -----------------------------------------------------------------------------
 
 
-def a_measurement(sparse=0.08, dense=0.04, long=0.03):
-    return Measurement(sparse, dense, long, np.array([40, 10, 10, 30, 10]), 0.02)
+def a_measurement(rough=0.09, sparse=0.1, dense=0.04):
+    return Measurement(rough, sparse, dense, np.array([40, 10, 10, 30, 10]), 0.02)
 
 
 def test_what_was_measured_is_predicted_as_it_was():
     rungs = predictions(a_measurement(), (640, 360))
     by_setting = {(r.setting.lists, r.setting.max_supersegments): r for r in rungs}
-    assert by_setting[0.25, 10].ssim == pytest.approx(1 - 0.08)
     assert by_setting[0.5, 10].ssim == pytest.approx(1 - 0.04)
-    # b = .01 / (1/10 - 1/40): between 10 and 40 as b / N
-    assert by_setting[0.5, 15].ssim == pytest.approx(1 - 0.04 + 0.01 / 0.075 * (1 / 10 - 1 / 15))
+    # b = .01 / (1/10 - 1/40): what is lost along lists is b / N
+    along = 0.01 / 0.075
+    assert by_setting[0.5, 15].ssim == pytest.approx(1 - 0.04 + along * (1 / 10 - 1 / 15))
+    # The rest is a power of the density
+    power = math.log((0.1 - along / 10) / (0.04 - along / 10)) / math.log(2.5)
+    across = (0.04 - along / 10) * 2**power
+    assert by_setting[0.25, 10].ssim == pytest.approx(1 - across - along / 10)
 
 
 @pytest.mark.parametrize(
@@ -375,7 +379,7 @@ def test_parts_predict_what_the_whole_predicts(default_runtime, monkeypatch):
     by_whole = measured()
     assert [size for setting, size in windows if setting == DENSE] == [(320, 240)]
     # The same lists but for roundings of rays at lists' borders
-    for name in ("sparse", "dense", "long"):
+    for name in ("rough", "sparse", "dense"):
         assert getattr(by_parts, name) == pytest.approx(getattr(by_whole, name), abs=1e-4)
 
 
