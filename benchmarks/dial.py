@@ -141,6 +141,7 @@ def measured(
         "rough": found.rough,
         "sparse": found.sparse,
         "dense": found.dense,
+        "least": found.least,
         "counts": found.counts.tolist(),
         "measuring_over_generating": measuring / generating,
     }
@@ -337,7 +338,7 @@ def fitted(cases: dict[str, Case], size: tuple[int, int]) -> dict[str, tuple[flo
 def _ladder(case: Case, size: tuple[int, int], **calibrated: Any) -> tuple[Prediction, ...]:
     found = case["measured"]
     losses = (found[name] for name in ("rough", "sparse", "dense"))
-    measurement = Measurement(*losses, np.array(found["counts"]), 1.0)
+    measurement = Measurement(*losses, np.array(found["counts"]), 1.0, found["least"])
     return predictions(measurement, size, **calibrated)
 
 

@@ -37,12 +37,17 @@ TARGET_ANGLE = 30.0
 #: How fast the loss across lists falls beyond half a list per pixel: its exponent is the first
 #: number plus the second times the exponent between a fifth and a half. Fitted by
 #: benchmarks/dial.py.
-EXPONENT = (0.80, 0.55)
+EXPONENT = (1.15, 0.05)
 #: Range of that exponent over the fitted cases, with some room.
 _EXPONENTS = (0.6, 1.8)
 #: A frame's time over that of the rough VDI's, as powers of the density and the longest list over
 #: its own. Fitted by benchmarks/dial.py on a CPU.
 FRAME_COST = (0.56, 0.12)
+
+_UNAVOIDABLE = (
+    "; {:.3f} of the loss is what the generating view's window does not cover, or light that moves "
+    "with the camera: another generating view helps, other settings do not"
+)
 
 #: Share of a limit in bytes that is left free: lists are counted on a sample of the rays.
 _BYTES_MARGIN = 0.05
@@ -293,11 +298,13 @@ def warn_missed(vdi: VDI, *, stacklevel: int) -> None:
 # -- choosing --------------------------------------------------------------------------------------
 
 
-def chosen(dial: Dial, ladder: Sequence[Prediction], window_size: tuple[int, int]) -> Choice:
+def chosen(
+    dial: Dial, ladder: Sequence[Prediction], window_size: tuple[int, int], least: float = 0.0
+) -> Choice:
     """Choose from what the rungs are predicted to give.
 
     Limits come before the goal, and of the limits bytes before frames per second: what breaks a
-    limit is never taken for a better picture.
+    limit is never taken for a better picture. ``least`` is the loss that no rung avoids.
     """
     missed = []
     within = len(ladder)
@@ -335,6 +342,7 @@ def chosen(dial: Dial, ladder: Sequence[Prediction], window_size: tuple[int, int
             f"{rung.ssim:.3f} is predicted for "
             + (f"what is within {' and '.join(limits)}" if held else "the best settings")
             + ("; allow more, or ask for less" if held else "; ask for less, or a smaller angle")
+            + (_UNAVOIDABLE.format(least) if least > (1 - rung.ssim) / 2 else "")
         )
     return Choice(dial, rung, tuple(missed), window_size)
 
@@ -351,6 +359,9 @@ class Measurement:
     rough, sparse, dense : float
         1 - SSIM of the picture by a VDI of the settings :data:`ROUGH`, :data:`SPARSE` and
         :data:`DENSE`.
+    least : float
+        The same of what no VDI of this V_O does better: what its window does not cover is
+        missing, and light that has moved with the camera is baked in.
     counts : numpy.ndarray
         int64: lists of the rough VDI by their length.
     frame_seconds : float
@@ -362,6 +373,7 @@ class Measurement:
     dense: float
     counts: NDArray[np.int64]
     frame_seconds: float
+    least: float = 0.0
 
 
 def predictions(
@@ -375,20 +387,21 @@ def predictions(
 
     Notes
     -----
-    The loss 1 - SSIM is taken as a sum: what is lost across lists depends on their density s
-    alone and falls as a power of it; what is lost along lists is b / N_S. Two longest lists at
-    one density give b; two densities at one longest list give the power up to half a list per
-    pixel, and, by a relation fitted to many scenes, beyond.
+    The loss 1 - SSIM is taken as a sum: what any VDI of this V_O loses; what is lost across lists,
+    which depends on their density s alone and falls as a power of it; and along lists, b / N_S.
+    Two longest lists at one density give b; two densities at one longest list give the power up to
+    half a list per pixel, and, by a relation fitted to many scenes, beyond.
     """
     along = max(0.0, (measured.sparse - measured.rough) / (_per(SPARSE) - _per(ROUGH)))
-    across = max(0.0, measured.dense - along * _per(DENSE))
-    power = _exponent(max(across, measured.sparse - along * _per(SPARSE)), across)
+    across = max(0.0, measured.dense - measured.least - along * _per(DENSE))
+    sparse = max(across, measured.sparse - measured.least - along * _per(SPARSE))
+    power = _exponent(sparse, across)
     beyond = float(np.clip(exponent[0] + exponent[1] * power, *_EXPONENTS))
     out = []
     for setting in LADDER:
         ratio = setting.lists / DENSE.lists
         loss = across * ratio ** -(power if ratio < 1 else beyond)
-        loss += along * _per(setting)
+        loss += along * _per(setting) + measured.least
         cost = (setting.lists / ROUGH.lists) ** frame_cost[0]
         cost *= (setting.max_supersegments / ROUGH.max_supersegments) ** frame_cost[1]
         out.append(

@@ -102,7 +102,8 @@ def choose(
             f"takes {SSIM_WINDOW} along each edge; choose max_supersegments and window yourself"
         )
     scene = Scene(volume, camera, size, transfer_function, dial.angle, device, settings, progress)
-    return chosen(dial, predictions(_measurement(scene), size), size)
+    measured = _measurement(scene)
+    return chosen(dial, predictions(measured, size), size, measured.least)
 
 
 def forget() -> None:
@@ -192,9 +193,31 @@ class Scene:
         for setting in (ROUGH, SPARSE, DENSE):
             self._go_on()
             pictures = self._pictures(tiles, setting, rough if setting == ROUGH else None)
-            losses.append(1.0 - tiles.infer(tiles_ssim(pictures, truth))[0])
-        at_rough, sparse, dense = (min(1.0, max(0.0, loss)) for loss in losses)
-        return Measurement(at_rough, sparse, dense, counts, seconds)
+            losses.append(_loss(tiles, pictures, truth))
+        losses.append(self._least(estimator, tiles, truth))
+        at_rough, sparse, dense, least = (min(1.0, max(0.0, loss)) for loss in losses)
+        return Measurement(at_rough, sparse, dense, counts, seconds, least)
+
+    def _least(
+        self, estimator: ViewErrorEstimator, tiles: TileSample, truth: list[NDArray[np.float32]]
+    ) -> float:
+        """Return the loss of the volume itself where V_O covers it, lit as V_O has it."""
+        sides = viewport_planes(self._camera, self._size)
+        world = self._camera.model_transform
+        corners = rays.corners(self._volume.bounds) @ world[:3, :3].T + world[:3, 3]
+        covered = all(((corners - side[:3]) @ side[3:]).min() >= 0 for side in sides)
+        if covered and self._transfer_function.shading is None:
+            return 0.0
+        pictures = [
+            estimator.volume_tile(
+                lens,
+                tiles.size,
+                clipping_planes=None if covered else sides,
+                lit_from=self._camera,
+            )
+            for lens in self._lenses(tiles)
+        ]
+        return _loss(tiles, pictures, truth)
 
     def _go_on(self) -> None:
         if self._progress is not None and self._progress(0.0) is False:
@@ -254,6 +277,36 @@ class Scene:
             render_vdi(vdi, self._view, self._size, device=self._runtime)
             seconds.append(time.perf_counter() - start)
         return max(min(seconds), 1e-9)
+
+
+def _loss(
+    tiles: TileSample, pictures: list[NDArray[np.float32]], truth: list[NDArray[np.float32]]
+) -> float:
+    """Return 1 - SSIM of the whole picture, inferred from tiles."""
+    return 1.0 - tiles.infer(tiles_ssim(pictures, truth))[0]
+
+
+def viewport_planes(camera: Camera, window_size: tuple[int, int]) -> NDArray[np.float64]:
+    """Return the four sides of what a view covers, as clipping planes that keep it.
+
+    Parameters
+    ----------
+    camera : Camera
+        The view.
+    window_size : (int, int)
+        Width and height of its window.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 (4, 6): origin and inward normal of each, world coordinates.
+    """
+    # 1 - u, 1 + u, 1 - v and 1 + v, times the homogeneous denominator, of world points
+    matrix = camera.viewport_matrix(window_size) @ camera.view_matrix
+    planes = np.stack([matrix[3] + sign * matrix[row] for row in (0, 1) for sign in (-1, 1)])
+    planes /= np.linalg.norm(planes[:, :3], axis=1)[:, np.newaxis]
+    origins = -planes[:, 3:] * planes[:, :3]
+    return np.concatenate([origins, planes[:, :3]], axis=1)
 
 
 def turned(camera: Camera, bounds: Sequence[float], degrees: float) -> Camera:

@@ -116,8 +116,12 @@ def raycast_medium(
     cropping: Cropping | None = None,
     opacity_multiplier: float = 1.0,
     early_termination: bool = True,
+    lit_from: Camera | None = None,
 ) -> NDArray[np.float32]:
-    """Render a volume that is on the device already; see :func:`raycast_volume`."""
+    """Render a volume that is on the device already; see :func:`raycast_volume`.
+
+    ``lit_from`` is the view that decides the light of a shaded volume in place of ``camera``.
+    """
     width, height = size
     forms, pixel_rays, planes = medium.forms(camera, size, clipping_planes)
     ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
@@ -140,7 +144,7 @@ def raycast_medium(
             kernel,
             block_items(width, height),
             GROUP,
-            *medium.medium_arguments(camera),
+            *medium.medium_arguments(camera if lit_from is None else lit_from),
             form_buffer,
             np.int32(planes),
             np.float32(medium.sample_distance),

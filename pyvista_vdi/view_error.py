@@ -366,9 +366,14 @@ class ViewErrorEstimator:
         scene = _Scene(self, vdi, camera, window_size, None, None, {}, (0.0, 0.0, 0.0), None)
         return self._sample(scene, vdi, camera, window_size)
 
-    def volume_tile(self, lens: Camera, tile_size: tuple[int, int]) -> NDArray[np.float32]:
-        """Return the volume's picture through the lens of a tile, as ``render_volume``'s."""
-        return raycast_medium(self._runtime, self._medium, lens, tile_size)
+    def volume_tile(
+        self, lens: Camera, tile_size: tuple[int, int], **options: Any
+    ) -> NDArray[np.float32]:
+        """Return the volume's picture through the lens of a tile.
+
+        The options are those of :func:`~pyvista_vdi.raycast_volume.raycast_medium`.
+        """
+        return raycast_medium(self._runtime, self._medium, lens, tile_size, **options)
 
     def _sample(
         self, scene: _Scene, vdi: VDI, camera: Camera, size: tuple[int, int]
