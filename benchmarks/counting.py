@@ -27,6 +27,9 @@ Integers = NDArray[np.int64]
 #: Edge of the blocks that volumes are skipped by, cells.
 BLOCK = 8
 
+#: Pixels along the edges of the blocks whose rays go together, and in a block.
+EDGE, LANES = 4, 16
+
 #: Runs are the same medium within this merge error, as generation has it.
 INDISTINGUISHABLE = 1e-6
 
@@ -52,11 +55,26 @@ class Rays:
         )
 
 
-def sampled_pixels(size: tuple[int, int], every: int) -> tuple[Integers, Integers]:
-    """Return x and y of every so many pixels both ways, the middle ones of their blocks."""
-    x, y = (np.arange(min(every // 2, n - 1), n, every) for n in size)
-    grid = np.meshgrid(x, y)
-    return grid[0].ravel(), grid[1].ravel()
+def sampled_blocks(size: tuple[int, int], every: int) -> tuple[Integers, Integers]:
+    """Return x and y of the pixels of one block of 4 x 4 in every so many pixels both ways.
+
+    Those of a block lie behind one another, as its rays lie in the lanes of a vector. A window is
+    at least four pixels wide and high.
+    """
+    columns, rows = (np.arange(0, n - EDGE + 1, max(every // EDGE, 1) * EDGE) for n in size)
+    lanes = np.arange(LANES)
+    x, y = np.broadcast_arrays(
+        columns[np.newaxis, :, np.newaxis] + lanes % EDGE,
+        rows[:, np.newaxis, np.newaxis] + lanes // EDGE,
+    )
+    return x.ravel(), y.ravel()
+
+
+def busy_lanes(turns: Integers) -> float:
+    """Return the share of lanes at work where each block's rays take their turns in lockstep."""
+    blocks = np.reshape(turns, (-1, LANES))
+    most = LANES * blocks.max(axis=1).sum()
+    return float(blocks.sum() / most) if most else 1.0
 
 
 def clipped(planes: list[tuple[Array, Array]], n: int) -> tuple[Array, Array]:
@@ -146,7 +164,9 @@ class Walk:
     filled : numpy.ndarray
         Those of them that hold a supersegment.
     occupied : numpy.ndarray
-        Those of them that lie in an occupied cell of the occupancy grid where the ray crosses them.
+        Those of all that lie in an occupied cell of the occupancy grid where the ray crosses them.
+    filled_occupied : numpy.ndarray
+        Those that are both.
     met : numpy.ndarray
         Pieces of supersegments composited.
     tiles : numpy.ndarray
@@ -158,6 +178,7 @@ class Walk:
     lists: Integers
     filled: Integers
     occupied: Integers
+    filled_occupied: Integers
     met: Integers
     tiles: Integers
     optical_depth: Array
@@ -197,7 +218,7 @@ def walk(
     t0, t1 = clipped(planes, n)
     speed = np.linalg.norm(rays.direction, axis=1)
 
-    names = ("lists", "filled", "occupied", "met", "tiles")
+    names = ("lists", "filled", "occupied", "filled_occupied", "met", "tiles")
     found = {name: np.zeros(n, np.int64) for name in names}
     depth_met = np.zeros(n)
     going = np.flatnonzero(t0 < t1)
@@ -228,7 +249,9 @@ def walk(
         found["met"][r] += np.maximum(last - first, 0)
         found["tiles"][r] += tile != tile_before[r]
         upto = counted.occupied_before[tile, counted.slab_of(high) + 1]
-        found["occupied"][r] += upto > counted.occupied_before[tile, counted.slab_of(low)]
+        occupied = upto > counted.occupied_before[tile, counted.slab_of(low)]
+        found["occupied"][r] += occupied
+        found["filled_occupied"][r] += occupied & (end > begin)
         tile_before[r] = tile
         depth_met[r] += _optical_depth(counted, first, last, low, high, (t_next - t[r]) * speed[r])
 

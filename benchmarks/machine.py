@@ -247,6 +247,7 @@ class Rates:
 
     def __init__(self, results: Mapping[str, Any]) -> None:
         self._results = results
+        self.caches: dict[str, str] = results["caches"]
         self.read = float(results["streams"]["read"])
         self.write = float(results["streams"]["write"])
         self.launch = float(results["launches"]["waited"])

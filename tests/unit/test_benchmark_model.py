@@ -23,6 +23,9 @@ pytest.importorskip("tqdm")
 sys.path.insert(0, str(BENCHMARKS))
 
 import counting  # noqa: E402
+import machine  # noqa: E402
+import model  # noqa: E402
+import scaling  # noqa: E402
 
 SIZE = (24, 18)
 
@@ -57,11 +60,25 @@ def scene():
     return volume, function, view, build_vdi(volume, view, SIZE, function, max_supersegments=6)
 
 
-def test_sampled_pixels_lie_in_the_middle_of_their_blocks():
-    x, y = counting.sampled_pixels((24, 16), 8)
-    assert sorted(set(x)) == [4, 12, 20]
-    assert sorted(set(y)) == [4, 12]
-    assert [len(n) for n in counting.sampled_pixels((3, 2), 8)] == [1, 1]
+def test_sampled_blocks_hold_four_by_four_pixels_one_after_the_other():
+    x, y = counting.sampled_blocks((24, 18), 8)
+    blocks = np.stack([x, y], axis=1).reshape(-1, 16, 2)
+    corners = {(int(a), int(b)) for a, b in blocks.min(axis=1)}
+    assert corners == {(a, b) for a in (0, 8, 16) for b in (0, 8)}
+    for block in blocks:
+        assert len({tuple(pixel) for pixel in block.tolist()}) == 16
+        assert (np.ptp(block, axis=0) == 3).all()
+    assert x.max() < 24
+    assert y.max() < 18
+
+
+def test_busy_lanes_are_those_that_do_not_wait_for_the_longest():
+    turns = np.zeros(32, int)
+    turns[:16] = 10  # one block in step
+    assert counting.busy_lanes(turns) == 1.0
+    turns[16] = 10  # and one with a single ray
+    assert counting.busy_lanes(turns) == pytest.approx(17 / 32)
+    assert counting.busy_lanes(np.zeros(16, int)) == 1.0
 
 
 @pytest.mark.parametrize("angle", [0.0, 5.0, 30.0, 160.0])
@@ -198,3 +215,127 @@ def test_a_march_that_stops_takes_no_more_samples(scene):
     alpha = volume_image(volume, view, SIZE, function, 0.45)[::-1, :, 3].ravel()
     through = 1 - alpha > 1.01e-2
     np.testing.assert_array_equal(stopped.steps[through], whole.steps[through])
+
+
+# -- floors ----------------------------------------------------------------------------------------
+
+#: A machine with round figures: 10 and 5 GB/s, 10^9 gathers of 4 bytes from a cache, a tenth of
+#: that from memory and a quarter where each is waited for.
+MACHINE = {
+    "caches": {"L1": "32K", "L2": "1M"},
+    "streams": {"read": 10e9, "write": 5e9},
+    "arithmetic": {"multiply_add": 100e9, "divide": 10e9, "exponential": 1e9},
+    "launches": {"waited": 1e-5},
+    "transfers": {"download": 2e9},
+    "gathers": {
+        "near": {"4": [[2**14, 1e9], [2**28, 1e8]], "16": [[2**14, 5e8], [2**28, 5e7]]},
+        "near, chained": {"4": [[2**14, 2.5e8], [2**28, 2.5e7]], "16": [[2**14, 1e8]]},
+    },
+}
+
+
+def test_rates_are_interpolated_between_working_sets_and_taken_from_the_next_larger_element():
+    rates = machine.Rates(MACHINE)
+    assert rates.gather(4, 2**14) == pytest.approx(1e9)
+    assert rates.gather(4, 2**21) == pytest.approx(1e8 * 10**0.5)  # half way by logarithms
+    assert rates.gather(4, 1) == pytest.approx(1e9)
+    assert rates.gather(4, 2**40) == pytest.approx(1e8)
+    assert rates.gather(8, 2**14) == pytest.approx(5e8)
+    assert rates.gather(32, 2**14) == pytest.approx(5e8)
+
+
+def test_the_floor_is_the_slowest_resource_and_what_nothing_overlaps():
+    work = model.Work(
+        read=1e9,
+        write=1e9,
+        gathers=(model.Gathers(5e8, 4, 2**14),),
+        operations=model.Operations(multiply_add=1e9, divide=1e9, exponential=1e8),
+        launches=2,
+        download=2e8,
+    )
+    floor = model.floor_of(work, machine.Rates(MACHINE))
+    assert floor.memory == pytest.approx(0.1 + 0.2)
+    assert floor.gathers == pytest.approx(0.5)
+    assert floor.arithmetic == pytest.approx(0.01 + 0.1 + 0.1)
+    assert floor.around == pytest.approx(2e-5 + 0.1)
+    assert floor.waiting == pytest.approx(2.0)
+    assert floor.seconds == pytest.approx(0.5 + 0.1 + 2e-5)
+    assert floor.bound == "gathers (L1)"
+
+
+def test_the_work_of_a_frame_at_the_generating_view_is_one_list_a_ray(scene):
+    _, _, view, vdi = scene
+    x, y = every_pixel(SIZE)
+    walk = counting.walk(counting.CountedVDI(vdi), counting.Rays.of(view, SIZE, x, y), cutoff=0.0)
+    plain, skipping = (
+        model.raycast_work(walk, SIZE, vdi.nbytes, skips=skips) for skips in (False, True)
+    )
+    visits, faces, media, tiles = (g.elements for g in plain.gathers)
+    # Lists that the bounds' silhouette misses are empty, and no ray enters them
+    assert visits == pytest.approx(walk.lists.sum())
+    assert media == pytest.approx(vdi.n_supersegments)
+    assert faces == pytest.approx(vdi.n_supersegments + np.count_nonzero(np.diff(vdi.offsets)))
+    assert tiles == 0
+    assert plain.write == 16 * SIZE[0] * SIZE[1]
+    assert plain.operations.exponential == pytest.approx(vdi.n_supersegments)
+    assert skipping.gathers[3].elements == pytest.approx(walk.tiles.sum())
+    assert skipping.gathers[0].elements <= visits
+
+
+def test_stages_are_known_by_their_kernels_names():
+    stages = {name: model.stage_of(name) for name in ("march_lists", "shorten_lists", "pack_lists")}
+    assert list(stages.values()) == ["march", "shorten", "pack"]
+
+
+def test_medians_are_of_sums_in_each_run():
+    runs = [{"a1": 1.0, "a2": 2.0, "": 5.0}, {"a1": 3.0, "a2": 3.0, "": 7.0}]
+    assert model.medians(runs, lambda name: name[:1]) == {"a": 4.5, "": 6.0}
+
+
+@pytest.mark.parametrize(
+    ("size", "place"), [(2**10, "L1"), (2**15, "L1"), (2**15 + 1, "L2"), (2**30, "memory")]
+)
+def test_a_working_set_lies_in_the_smallest_cache_that_holds_it(size, place):
+    assert machine.cache_of(size, {"L1": "32K", "L2": "1024K", "L3": "32M"}) == place
+
+
+# -- fits ------------------------------------------------------------------------------------------
+
+
+def test_a_power_law_is_found_exactly_and_noise_widens_its_interval():
+    x = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+    exact = scaling.fitted(x, 3.0 * x**1.5)
+    assert exact.exponent == pytest.approx(1.5)
+    assert exact.margin == pytest.approx(0, abs=1e-9)
+    noisy = scaling.fitted(x, 3.0 * x**1.5 * np.exp([0.1, -0.1, 0.1, -0.1, 0.1]))
+    assert noisy.margin > 0.05
+    assert abs(noisy.exponent - 1.5) < noisy.margin
+    assert noisy.residual == pytest.approx(0.1, abs=0.03)
+
+
+def test_the_interval_is_that_of_a_textbook():
+    # Logarithms 0 to 4 and 0.1, 0.9, 2.2, 2.9, 4.1, for which scipy.stats.linregress has a standard
+    # error of 0.0489898 for (t quantile of three degrees of freedom by scipy: 3.182446)
+    x = np.exp([0.0, 1.0, 2.0, 3.0, 4.0])
+    y = np.exp([0.1, 0.9, 2.2, 2.9, 4.1])
+    assert scaling.fitted(x, y).exponent == pytest.approx(1.0)
+    assert scaling.fitted(x, y).margin == pytest.approx(3.182446 * 0.0489898, rel=1e-3)
+
+
+def test_two_points_have_no_interval():
+    fit = scaling.fitted([1.0, 2.0], [1.0, 4.0])
+    assert fit.exponent == pytest.approx(2.0)
+    assert fit.margin == np.inf
+
+
+def test_what_comes_on_top_is_fitted_without_the_first_cost():
+    rows = [{"value": v, "seconds": {"VDI frame": 2.0 + 0.5 * v}} for v in (0.0, 1.0, 2.0, 8.0)]
+    found = scaling.fits(scaling.AXES["angle"], rows)
+    assert found["VDI frame"].exponent == pytest.approx(1.0)
+    flat = [{"value": v, "seconds": {"VDI frame": 2.0}} for v in (0.0, 1.0, 2.0)]
+    assert scaling.fits(scaling.AXES["angle"], flat) == {}
+
+
+def test_two_cores_must_bring_a_factor():
+    assert scaling.verdict(1.8) == "met"
+    assert scaling.verdict(1.79) == "missed"
