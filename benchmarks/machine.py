@@ -276,7 +276,12 @@ class Rates:
 
 
 def cache_of(working_set: float, known: Mapping[str, str]) -> str:
-    """Return which of the caches holds so many bytes: ``L1`` ... or ``memory``."""
+    """Return which of the caches holds so many bytes: ``L1`` ... or ``memory``.
+
+    A GPU does not tell the sizes of its caches.
+    """
+    if not known:
+        return "caches of unknown size"
     sizes = sorted((_bytes_of(text), name) for name, text in known.items())
     place = bisect.bisect_left([n for n, _ in sizes], working_set)
     return sizes[place][1] if place < len(sizes) else "memory"

@@ -23,6 +23,7 @@ pytest.importorskip("tqdm")
 sys.path.insert(0, str(BENCHMARKS))
 
 import counting  # noqa: E402
+import interactive_table  # noqa: E402
 import machine  # noqa: E402
 import model  # noqa: E402
 import scaling  # noqa: E402
@@ -339,3 +340,52 @@ def test_what_comes_on_top_is_fitted_without_the_first_cost():
 def test_two_cores_must_bring_a_factor():
     assert scaling.verdict(1.8) == "met"
     assert scaling.verdict(1.79) == "missed"
+
+
+# -- judging ---------------------------------------------------------------------------------------
+
+
+def frame_row(vdi, peers, floor):
+    """Return a row of the interactive table, all of whose floor is the raycast's."""
+    counts = {"lists": 2.0, "occupied": 1.0, "met": 3.0, "skips": False, "lanes busy": 0.5}
+    entry = {"per ray": counts, "floor": {"seconds": floor, "bound": "memory"}}
+    around = {"per ray": {}, "floor": {"seconds": 0.0, "bound": "memory"}}
+    model = {"vdi_skipping": entry, "around": around}
+    return {"angle": 5.0, "seconds": {"vdi_skipping": vdi, **peers}, "model": model}
+
+
+def test_a_frame_is_held_against_the_faster_of_the_mappers():
+    row = frame_row(0.02, {"vtk_gpu": 1.0, "vtk_fixed_point": 0.4}, 0.001)
+    cell = interactive_table.frame_cell(row, 1 / 10)
+    assert cell.ratio == pytest.approx(1 / 20)
+    assert cell.verdict == "met"
+    assert str(cell) == "1/20 (≤ 1/10), met"
+    row = frame_row(0.02, {"vtk_gpu": 1.0}, 0.001)
+    assert interactive_table.frame_cell(row, 1 / 10).ratio == pytest.approx(1 / 50)
+
+
+def test_what_is_missed_has_the_models_reason():
+    peers = {"vtk_gpu": 1.0, "vtk_fixed_point": 0.4}
+    above = interactive_table.frame_cell(frame_row(0.2, peers, 0.01), 1 / 10)
+    assert above.verdict == "missed"
+    assert above.reason.startswith("20.0 times its floor (1/40, bound by memory); 2.0 lists")
+    beyond = interactive_table.frame_cell(frame_row(0.2, peers, 0.1), 1 / 10)
+    assert beyond.reason.startswith("out of reach: the floor alone is 1/4, bound by memory")
+
+
+def test_cells_without_vtk_or_without_a_reach_are_no_verdicts():
+    assert interactive_table.frame_cell(frame_row(0.2, {}, 0.1), 1.0).verdict == "not measured"
+    reported = interactive_table.frame_cell(frame_row(0.2, {"vtk_gpu": 0.1}, 0.1), None)
+    assert (reported.verdict, str(reported)) == ("reported", "2.00")
+
+
+def test_a_group_is_as_good_as_its_worst_volume():
+    cells = {n: interactive_table.Cell(r, 0.2) for n, r in (("a", 0.1), ("b", 0.3), ("c", None))}
+    assert interactive_table.worst(cells)[0] == "b"
+    assert interactive_table.worst({})[1].verdict == "not measured"
+
+
+def test_the_reaches_are_those_of_every_group_and_standard_angle():
+    assert set(interactive_table.REACHES) == set(interactive_table.GROUPS)
+    for reaches in interactive_table.REACHES.values():
+        assert tuple(reaches) == interactive_table.ANGLES
