@@ -17,7 +17,7 @@ from pyvista_vdi.occupancy import SLABS, TILE
 from pyvista_vdi.raycast import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.rays import depth_range
 from pyvista_vdi.reference.raycast import centre_ray_scale, near_limit
-from pyvista_vdi.transfer_function import TransferFunction
+from pyvista_vdi.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.volume import Volume
 
@@ -61,7 +61,11 @@ def sampled_blocks(size: tuple[int, int], every: int) -> tuple[Integers, Integer
     Those of a block lie behind one another, as its rays lie in the lanes of a vector. A window is
     at least four pixels wide and high.
     """
-    columns, rows = (np.arange(0, n - EDGE + 1, max(every // EDGE, 1) * EDGE) for n in size)
+    every = max(every // EDGE, 1) * EDGE
+    middle = (every - EDGE) // 2 // EDGE * EDGE
+    columns, rows = (
+        np.arange(min(middle, (n - EDGE) // EDGE * EDGE), n - EDGE + 1, every) for n in size
+    )
     lanes = np.arange(LANES)
     x, y = np.broadcast_arrays(
         columns[np.newaxis, :, np.newaxis] + lanes % EDGE,
@@ -455,9 +459,8 @@ def march(
 
         seen = r[looked]
         samples = _classified(volume, function, position[looked])
-        tau = _step_optical_depth(samples[:, 3], step / unit)
         share = ((back - front) / per_step[r])[looked]  # the last step is shorter
-        tau *= share
+        tau = _step_optical_depth(samples[:, 3], share * step / unit)
         visible = tau > 0
         found["visible"][seen] += visible
         if recorder is not None:
@@ -494,10 +497,10 @@ def _classified(volume: Volume, function: TransferFunction, position: Array) -> 
     return (1 - share) * entries[here] + share * entries[np.minimum(here + 1, len(entries) - 1)]
 
 
-def _step_optical_depth(opacity: Array, units: float) -> Array:
-    with np.errstate(divide="ignore"):
+def _step_optical_depth(opacity: Array, units: Array) -> Array:
+    with np.errstate(divide="ignore", invalid="ignore"):
         tau = -np.log1p(-opacity) * units
-    return np.where(opacity < 1, tau, max(30.0, units))  # as the kernels have it
+    return np.where(opacity < 1, tau, np.maximum(OPAQUE_OPTICAL_DEPTH, units))
 
 
 class _Runs:

@@ -651,15 +651,30 @@ def parsed() -> argparse.Namespace:
 
 
 def report(results: Mapping[str, Any]) -> str:
-    """Return the tables: one per volume, a line per stage."""
+    """Return the tables: the gaps of all volumes, then one per volume, a line per stage."""
     width, height = results["window_size"]
     case = f"N_S {results['max_supersegments']}, {results['interpolation']}"
-    lines = [f"# A model, {width}x{height}, {case}", "", LEGEND]
+    lines = [f"# A model, {width}x{height}, {case}", "", LEGEND, "", "## Gaps", ""]
+    lines += table(("stage", *results["volumes"]), _gap_rows(results["volumes"]))
     for name, found in results["volumes"].items():
         lines += ["", f"## {name}: {found['supersegments']} supersegments", ""]
         heads = ("stage", "per ray", "bound by", "floor, ms", "measured, ms", "gap", "waiting")
         lines += table(heads, _rows(found["stages"]))
     return "\n".join([*lines, "", system_line(results["system"]), ""])
+
+
+def _gap_rows(volumes: Mapping[str, Any]) -> Iterator[list[str]]:
+    """Yield how many times its floor each stage takes, and what bounds the floor."""
+    for stage in dict.fromkeys(name for found in volumes.values() for name in found["stages"]):
+        entries = [found["stages"].get(stage) for found in volumes.values()]
+        yield [stage, *("-" if entry is None else _gap(entry) for entry in entries)]
+
+
+def _gap(entry: Mapping[str, Any]) -> str:
+    floor = entry["floor"]
+    if entry["seconds"] is None:
+        return f"- ({floor['bound']})"
+    return f"{entry['seconds'] / floor['seconds']:.1f} ({floor['bound']})"
 
 
 def _rows(stages: Mapping[str, Any]) -> Iterator[list[str]]:

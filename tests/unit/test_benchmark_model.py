@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pyvista_vdi.camera import Camera
+from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.occupancy import TILE
 from pyvista_vdi.reference import build_vdi, render_pixels, samples, volume_image
 from pyvista_vdi.reference.raycast import Lists, crossings, lines_of_pixel
@@ -62,10 +63,12 @@ def scene():
 
 
 def test_sampled_blocks_hold_four_by_four_pixels_one_after_the_other():
-    x, y = counting.sampled_blocks((24, 18), 8)
+    x, y = counting.sampled_blocks((24, 18), 12)
     blocks = np.stack([x, y], axis=1).reshape(-1, 16, 2)
     corners = {(int(a), int(b)) for a, b in blocks.min(axis=1)}
-    assert corners == {(a, b) for a in (0, 8, 16) for b in (0, 8)}
+    assert corners == {(4, 4), (16, 4)}
+    assert len(counting.sampled_blocks((24, 18), 4)[0]) == 24 * 16
+    assert len(counting.sampled_blocks((24, 18), 100)[0]) == 16
     for block in blocks:
         assert len({tuple(pixel) for pixel in block.tolist()}) == 16
         assert (np.ptp(block, axis=0) == 3).all()
@@ -181,6 +184,29 @@ def test_march_takes_the_samples_that_the_reference_takes(scene, interpolation):
         assert march.runs[k] <= march.visible[k]
     assert march.visible.sum() > len(x)
     assert march.blocks.any()
+
+
+@pytest.mark.parametrize("opacity", [0.3, 1.0])
+def test_runs_are_the_lists_that_generation_makes_without_a_budget(runtime, opacity):
+    volume, function = soft_volume(), soft_function(opacity)
+    view = filling_camera(volume.bounds, SIZE)
+    vdi = generate_vdi(
+        volume, view, SIZE, function, max_supersegments=500, sample_distance=0.45, device=runtime
+    )
+    x, y = every_pixel(SIZE)
+    march = counting.march(
+        volume,
+        function,
+        counting.Rays.of(view, SIZE, x, y),
+        0.45,
+        blocks=counting.visible_blocks(volume, function),
+        stops=False,
+        runs=True,
+    )
+    lengths = vdi.counts.ravel()
+    # A midpoint between two voxels is rounded either way
+    assert np.mean(march.runs != lengths) < 0.03
+    assert march.runs.sum() == pytest.approx(lengths.sum(), rel=0.005)
 
 
 def test_runs_of_a_homogeneous_slab_are_one():
