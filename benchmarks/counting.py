@@ -172,11 +172,11 @@ class Walk:
     filled_occupied : numpy.ndarray
         Those that are both.
     met : numpy.ndarray
-        Pieces of supersegments composited.
+        Pieces of supersegments composited, until too little light was left.
     tiles : numpy.ndarray
         Tiles of the occupancy grid entered.
     optical_depth : numpy.ndarray
-        Of all that was met, float64.
+        Of what the lists hold on the ray's way, float64.
     """
 
     lists: Integers
@@ -225,6 +225,7 @@ def walk(
     names = ("lists", "filled", "occupied", "filled_occupied", "met", "tiles")
     found = {name: np.zeros(n, np.int64) for name in names}
     depth_met = np.zeros(n)
+    most = -np.log(cutoff) if cutoff > 0 else np.inf
     going = np.flatnonzero(t0 < t1)
     t = t0.copy()
     i, j = _lists_at(at, slope, t0, t1, (width, height))
@@ -250,14 +251,15 @@ def walk(
 
         found["lists"][r] += 1
         found["filled"][r] += end > begin
-        found["met"][r] += np.maximum(last - first, 0)
         found["tiles"][r] += tile != tile_before[r]
         upto = counted.occupied_before[tile, counted.slab_of(high) + 1]
         occupied = upto > counted.occupied_before[tile, counted.slab_of(low)]
         found["occupied"][r] += occupied
         found["filled_occupied"][r] += occupied & (end > begin)
         tile_before[r] = tile
-        depth_met[r] += _optical_depth(counted, first, last, low, high, (t_next - t[r]) * speed[r])
+        piece = _Piece(counted, first, last, low, high, (t_next - t[r]) * speed[r])
+        found["met"][r] += piece.met(most - depth_met[r], away=z_next >= z)
+        depth_met[r] += piece.optical_depth
 
         # On to the next list
         over_u = t_u <= t_v
@@ -265,7 +267,7 @@ def walk(
         j[r] += np.where(over_u, 0, step_j[r])
         t[r] = t_next
         inside = (i[r] >= 0) & (i[r] < width) & (j[r] >= 0) & (j[r] < height)
-        going = r[(t_next < t1[r]) & inside & (np.exp(-depth_met[r]) >= cutoff)]
+        going = r[(t_next < t1[r]) & inside & (depth_met[r] <= most)]
     return Walk(**found, optical_depth=depth_met)
 
 
@@ -315,25 +317,50 @@ def _crossing(
     return np.where(np.isfinite(t) & (t >= least), t, np.inf)
 
 
-def _optical_depth(
-    counted: CountedVDI, first: Integers, last: Integers, low: Array, high: Array, length: Array
-) -> Array:
-    """Return the optical depth of supersegments first to last - 1 between two view depths.
+class _Piece:
+    """Supersegments first to last - 1 of a list between two view depths, for many rays.
 
     ``length`` is the model length of the ray there.
     """
-    some = last > first
-    begin, end = np.where(some, first, 0), np.where(some, last - 1, 0)
-    if not len(counted.front):
-        return np.zeros(len(low))
-    whole = counted.sums[end + 1] - counted.sums[begin]
-    whole -= counted.per_length[begin] * np.maximum(low - counted.front[begin], 0)
-    whole -= counted.per_length[end] * np.maximum(counted.back[end] - high, 0)
-    extent = high - low
-    # Across the depth, all of the ray's piece is in one supersegment
-    across = extent <= 1e-12 * (abs(high) + 1)
-    density = np.where(across, counted.per_length[begin], whole / np.where(across, 1.0, extent))
-    return np.where(some, np.maximum(density, 0) * length, 0.0)
+
+    def __init__(
+        self,
+        counted: CountedVDI,
+        first: Integers,
+        last: Integers,
+        low: Array,
+        high: Array,
+        length: Array,
+    ) -> None:
+        self._sums, self._count = counted.sums, np.maximum(last - first, 0)
+        self._first, self._last = np.where(self._count > 0, first, 0), last
+        end = np.where(self._count > 0, last - 1, 0)
+        self._before, self._behind = np.zeros(len(low)), np.zeros(len(low))
+        density = np.zeros(len(low))
+        if len(counted.front):
+            begin, per_length = self._first, counted.per_length
+            # What of the first and of the last lies outside, in sums of extinction by depth
+            self._before = per_length[begin] * np.maximum(low - counted.front[begin], 0)
+            self._behind = per_length[end] * np.maximum(counted.back[end] - high, 0)
+            density = per_length[begin]
+        extent = high - low
+        # Across the depth, all of the ray's piece is in one supersegment
+        self._across = extent <= 1e-12 * (abs(high) + 1)
+        self._factor = length / np.where(self._across, 1.0, extent)
+        whole = self._sums[end + (self._count > 0)] - self._sums[self._first]
+        inside = np.maximum(whole - self._before - self._behind, 0) * self._factor
+        crossed = np.where(self._across, density * length, inside)
+        self.optical_depth = np.where(self._count > 0, crossed, 0.0)
+
+    def met(self, left: Array, *, away: NDArray[np.bool_]) -> Integers:
+        """Return how many are met until an optical depth of ``left`` is reached."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            needed = np.where(self._across, np.inf, left / self._factor)
+        ahead = self._sums[self._first] + self._before + needed
+        back = self._sums[self._last] - self._behind - needed
+        onward = np.searchsorted(self._sums, ahead, "left") - self._first
+        homeward = self._last - (np.searchsorted(self._sums, back, "right") - 1)
+        return np.clip(np.where(away, onward, homeward), np.minimum(self._count, 1), self._count)
 
 
 # -- a volume --------------------------------------------------------------------------------------

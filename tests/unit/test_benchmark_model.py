@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pyvista_vdi.camera import Camera
+from pyvista_vdi.compositing import optical_depth_over_length
 from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.occupancy import TILE
 from pyvista_vdi.reference import build_vdi, render_pixels, samples, volume_image
@@ -153,17 +154,30 @@ def test_walk_counts_as_occupied_every_list_in_which_something_is_met(scene):
     assert (walk.occupied < walk.lists).any()  # half of the volume is empty
 
 
-def test_a_walk_ends_where_no_light_is_left(scene):
+@pytest.mark.parametrize("angle", [0.0, 30.0, 170.0])
+def test_a_walk_ends_where_no_light_is_left(scene, angle):
     volume, _, view, _ = scene
     opaque = build_vdi(volume, view, SIZE, soft_function(1.0), max_supersegments=6)
     x, y = every_pixel(SIZE)
-    rays = counting.Rays.of(view.azimuth(30.0), SIZE, x, y)
+    rays = counting.Rays.of(view.azimuth(angle), SIZE, x, y)
     counted = counting.CountedVDI(opaque)
     whole, cut = (counting.walk(counted, rays, cutoff=cutoff) for cutoff in (0.0, 1e-3))
-    assert cut.lists.sum() < whole.lists.sum()
+    assert angle == 0 or cut.lists.sum() < whole.lists.sum()
     through = np.exp(-whole.optical_depth) >= 1e-3
     np.testing.assert_array_equal(cut.lists[through], whole.lists[through])
     assert (np.exp(-cut.optical_depth) < 1e-3)[~through].all()
+    lists, met = Lists(opaque), np.zeros(len(x), int)
+    for k, pixel in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
+        for line in lines_of_pixel(opaque, view.azimuth(angle), SIZE, pixel):
+            found = crossings(lists, line)
+            tau = optical_depth_over_length(
+                lists.optical_depth[found.member], found.length, lists.length[found.member]
+            )
+            before = np.cumsum(tau) - tau
+            met[k] = np.count_nonzero(before < -np.log(1e-3))
+    assert np.mean(cut.met != met) < 0.02
+    assert cut.met.sum() == pytest.approx(met.sum(), rel=0.005)
+    assert cut.met.sum() < whole.met.sum()
 
 
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
