@@ -45,6 +45,8 @@ _DEVICE_TYPES = {
 _BLOCK_SHIFT = 3
 #: Share of transparent blocks from which on looking for them pays.
 _WORTH_SKIPPING = 0.05
+#: Scalars of 16 bits that are looked up and not classified at each sample: 64 KiB of media.
+_MOST_LOOKED_UP = 4096
 #: Where scaled voxels end, in ranges of the transfer function.
 _BEYOND = 2.0**60
 _uploads: weakref.WeakKeyDictionary[Volume, _Uploads] = weakref.WeakKeyDictionary()
@@ -143,6 +145,8 @@ class DeviceVolume:
             self.defines["SKIP_EMPTY"] = 1
         if transfer_function.interpolation == "nearest":
             self.defines["NEAREST"] = 1
+            if native and (ends := _integer_ends(runtime, volume, ranges)):
+                self._look_up_by_scalar(runtime, *ends)
         self._runtime = runtime
         self._shading = transfer_function.shading
         self._lights = Lights() if lights is None else lights
@@ -162,6 +166,27 @@ class DeviceVolume:
             shading["OCCLUSION"] = 1
         self.defines.update(shading)
         self.defines.update(compensation(volume.length / self.sample_distance))
+
+    def _look_up_by_scalar(self, runtime: Runtime, first: int, last: int) -> None:
+        """Replace the table by one of what each scalar from ``first`` to ``last`` looks like."""
+        n = last - first + 1
+        media = runtime.buffer((n, 4), name="media of scalars")
+        with self._table:
+            runtime.launch(
+                runtime.kernel("grid/scalar_media.cl", "scalar_media"),
+                padded(n, GROUP),
+                GROUP,
+                self._table,
+                np.int32(self._entries),
+                np.float32(self._low),
+                np.float32(self._per_scalar),
+                np.int32(first),
+                np.int32(n),
+                media,
+            )
+            runtime.finish()  # the table may be host memory in use
+        self._table, self._entries, self._low, self._per_scalar = media, n, float(first), 1.0
+        self.defines["BY_SCALAR"] = 1
 
     def medium_arguments(self, camera: Camera) -> tuple[Any, ...]:
         """Arguments ``voxels`` to ``forms``, without it, of the kernels that march.
@@ -335,6 +360,8 @@ class _Uploads:
         self.made: dict[Any, tuple[DeviceBuffer, DeviceBuffer]] = {}
         #: Whether float32 cannot hold the voxels' differences; None before anyone has asked.
         self.too_large: bool | None = None
+        #: The least and the largest voxel of 16 bits; None before anyone has asked.
+        self.ends: tuple[int, int] | None = None
         self.occlusions: dict[Runtime, tuple[Any, DeviceBuffer]] = {}
 
 
@@ -417,6 +444,21 @@ def _block_ranges(
         ranges,
     )
     return ranges
+
+
+def _integer_ends(runtime: Runtime, volume: Volume, ranges: DeviceBuffer) -> tuple[int, int] | None:
+    """Return the least and the largest scalar that voxels may have, if they are few enough."""
+    dtype = volume.array.dtype
+    if dtype.kind not in "iu":
+        return None
+    if dtype.itemsize == 1:
+        return (0, 255) if dtype.kind == "u" else (-128, 127)
+    uploads = _uploads_of(volume)
+    if uploads.ends is None:
+        blocks = runtime.download(ranges)
+        uploads.ends = int(blocks[:, 0].min()), int(blocks[:, 1].max())
+    least, largest = uploads.ends
+    return uploads.ends if largest - least < _MOST_LOOKED_UP else None
 
 
 def _require_a_number(runtime: Runtime, volume: Volume) -> None:

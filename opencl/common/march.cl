@@ -3,6 +3,8 @@
 // Samples lie at the midpoints of steps of equal model length along the ray, the last one shorter (DESIGN section 3).
 // Every face is computed from its step's number, never accumulated.
 //
+// -D BY_SCALAR     with NEAREST and voxels of integers: the table holds the medium of each scalar from `low` on, of which no
+//                  voxel is outside (grid/scalar_media.cl); otherwise it is classified at each sample
 // -D FAR_ENTRIES   see common/rays.cl: t counts from where the ray enters
 #include "common/rays.cl"
 #include "common/classification.cl"
@@ -14,7 +16,7 @@
 typedef struct {
     __global const VOXEL_T *voxels;
     int4 size;                    // points along x, y, z
-    __global const float4 *table; // transfer function
+    __global const float4 *table; // transfer function, or the media of scalars
     int entries;
     float low, per_scalar;        // scalar to table position
     __global const uchar *visible; // whether a block holds anything that is not transparent
@@ -113,10 +115,19 @@ inline int empty_steps(const March *march, const Medium *medium, int k, int end,
 // Colour (rgb) and optical depth (w) of a step of `units` opacity unit distances around index position (x, y, z).
 inline float4 medium_at(const Medium *medium, float x, float y, float z, float units)
 {
+#ifdef BY_SCALAR
+    const int scalar = (int)nearest_component(medium->voxels, medium->size, x, y, z, SCALAR);
+    const uint entry = min((uint)(scalar - (int)medium->low), (uint)(medium->entries - 1));
+    // Two loads where a vector's lanes load from different places, and not four
+    __global const ulong *halves = (__global const ulong *)(medium->table + entry);
+    float4 sample = (float4)(as_float2(halves[0]), as_float2(halves[1]));
+    sample.w = scaled_to_step(sample.w, units);
+#else
     const float scalar = sample_volume(medium->voxels, medium->size, x, y, z);
     float4 sample = classify(scalar, medium->table, medium->entries, medium->low, medium->per_scalar);
     if (sample.w > 0.0f)
         sample.w = step_optical_depth(sample.w, units);
+#endif
 #if defined(RGBA) || defined(SHADED) || defined(GRADIENT_OPACITY) || defined(OCCLUSION)
     if (sample.w > 0.0f) {
 #ifdef RGBA

@@ -1,6 +1,6 @@
 // Volume to lists of supersegments, one march per ray (paper section 2; DESIGN section 3 "Merging", "Budget").
 //
-// -D VOXEL_T, INDEX_T, RGBA, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
+// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl; OCCLUSION: see common/occlusion.cl
 // -D CRITERION: see vdi/criteria.cl; without it lists are shortened at least error
 // -D COMPENSATED: see common/over.cl; FAR_ENTRIES: see common/rays.cl

@@ -1,6 +1,6 @@
 // Direct volume rendering: the baseline that a VDI is measured against, by the same march as generation.
 //
-// -D VOXEL_T, INDEX_T, RGBA, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
+// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl; OCCLUSION: see common/occlusion.cl
 // -D COMPENSATED: see common/over.cl; FAR_ENTRIES: see common/rays.cl
 // -D CROPPED: see common/cropping.cl
