@@ -108,12 +108,14 @@ OF_SUPERSEGMENT = Operations(16, 1, 1)
 OF_TILE = Operations(16, 1)
 #: Clipping to seven planes, positions and steps.
 OF_MARCHED_RAY = Operations(80, 14)
-#: Faces of a step, position, place in the table, mixing two entries.
-OF_SAMPLE = Operations(30)
+#: Faces of a step, position, place of the nearest voxel.
+OF_SAMPLE = Operations(18)
 #: Weights and seven interpolations.
 OF_LINEAR = Operations(24)
-#: Optical depth of an opacity, opacity of a length, over; only where it is not transparent.
-OF_VISIBLE = Operations(8, 0, 2)
+#: Place in the table, two entries mixed; and the optical depth of what is not transparent.
+OF_CLASSIFICATION, OF_CLASSIFIED = Operations(12), Operations(0, 0, 1)
+#: Opacity of a step, over; only where it is not transparent.
+OF_VISIBLE = Operations(8, 0, 1)
 #: The block's border ahead.
 OF_BLOCK = Operations(18)
 #: Feature of a step, its difference from the run, the run grown.
@@ -293,6 +295,8 @@ def march_work(
     each = {name: rays * float(np.mean(value)) for name, value in vars(marched).items()}
     samples, visible = each["looked"], each["visible"]
     linear = function.interpolation == "linear"
+    # A whole number has an entry of its own, which says the optical depth as well
+    looked_up = not linear and volume.array.dtype.kind in "iu"
     item = min(volume.array.dtype.itemsize, 4)
     table_bytes = len(function.opacities) * ENTRY
     per_ray = samples / max(rays, 1) * item * (8 if linear else 1)
@@ -300,6 +304,8 @@ def march_work(
     operations += OF_BLOCK.times(each["blocks"])
     if linear:
         operations += OF_LINEAR.times(samples)
+    if not looked_up:
+        operations += OF_CLASSIFICATION.times(samples) + OF_CLASSIFIED.times(visible)
     if records:
         operations += OF_RUN_STEP.times(visible)
     return Work(
@@ -307,7 +313,7 @@ def march_work(
         write=0.0 if records else rays * PIXEL,
         gathers=(
             Gathers(samples * (8 if linear else 1), item, SHARED_BY_BLOCK * per_ray),
-            Gathers(2 * samples, ENTRY, table_bytes),
+            Gathers(samples if looked_up else 2 * samples, ENTRY, table_bytes),
             Gathers(each["blocks"] + samples / 8, 1, SHARED_BY_BLOCK * per_ray),
         ),
         operations=operations,

@@ -429,3 +429,26 @@ def test_the_reaches_are_those_of_every_group_and_standard_angle():
     assert set(interactive_table.REACHES) == set(interactive_table.GROUPS)
     for reaches in interactive_table.REACHES.values():
         assert tuple(reaches) == interactive_table.ANGLES
+
+
+@pytest.mark.parametrize(
+    ("interpolation", "voxels", "entries"), [("nearest", 1, 1), ("linear", 8, 2)]
+)
+def test_the_work_of_a_march_is_a_voxel_and_an_entry_a_sample(
+    scene, interpolation, voxels, entries
+):
+    volume, _, view, _ = scene
+    function = soft_function(interpolation=interpolation)
+    x, y = every_pixel(SIZE)
+    blocks = counting.visible_blocks(volume, function)
+    march = counting.march(
+        volume, function, counting.Rays.of(view, SIZE, x, y), 0.9, blocks=blocks, stops=True
+    )
+    work = model.march_work(march, volume, function, SIZE, blocks.mean(), records=False)
+    assert work.gathers[0].elements == pytest.approx(voxels * march.looked.sum())
+    assert work.gathers[1].elements == pytest.approx(entries * march.looked.sum())
+    assert work.operations.exponential == pytest.approx(entries * march.visible.sum())
+    assert work.read == pytest.approx(blocks.mean() * volume.array.nbytes)
+    recorded = model.march_work(march, volume, function, SIZE, blocks.mean(), records=True)
+    assert recorded.write == 0
+    assert recorded.operations.divide > work.operations.divide
