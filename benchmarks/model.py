@@ -19,8 +19,10 @@ from typing import Any
 import numpy as np
 from common import (  # beside this file
     INTERPOLATIONS,
+    add_clock,
     add_redo,
     begun,
+    clock_of,
     new_parser,
     save,
     system_line,
@@ -39,7 +41,7 @@ from counting import (
     visible_blocks,
     walk,
 )
-from machine import Rates, cache_of, results_file
+from machine import Rates, Stopwatch, cache_of, results_file
 from tqdm import tqdm
 
 from pyvista_vdi.benchmark import find_dataset
@@ -469,31 +471,28 @@ def stage_of(kernel: str) -> str:
     return "pack" if any(word in kernel for word in ("pack", "scan", "compact")) else "shorten"
 
 
-def profiled(runtime: Runtime, work: Callable[[], Any], repeats: int) -> list[dict[str, float]]:
+def profiled(watch: Stopwatch, work: Callable[[], Any]) -> list[dict[str, float]]:
     """Return, for each run of some work, seconds of its kernels by name, and of the rest as "".
 
-    One run before is not counted.
+    Kernels are timed by the driver's events; where the clock is not the wall's, in proportion. One
+    run before is not counted.
     """
     work()
     found = []
-    for _ in range(repeats):
+    for _ in range(watch.repeats):
         profile = Profile()
-        with runtime.queue_scope(profile):
-            taken = clocked(work)
+        with watch.runtime.queue_scope(profile):
+            begin, began = watch.clock(), time.perf_counter()
+            work()
+            taken = time.perf_counter() - began
+            share = (watch.clock() - begin) / taken
         kernels = {
-            row.name: row.total_ms * 1e-3
+            row.name: share * row.total_ms * 1e-3
             for row in profile.figures()
             if not row.name.startswith("[")
         }
-        found.append({**kernels, "": taken - sum(kernels.values())})
+        found.append({**kernels, "": share * taken - sum(kernels.values())})
     return found
-
-
-def clocked(work: Callable[[], Any]) -> float:
-    """Return the wall clock of one run, seconds."""
-    begin = time.perf_counter()
-    work()
-    return time.perf_counter() - begin
 
 
 def medians(runs: list[dict[str, float]], key: Callable[[str], str]) -> dict[str, float]:
@@ -515,7 +514,7 @@ def measured(name: str, options: argparse.Namespace, rates: Rates) -> dict[str, 
     function = dataset.transfer_function(volume, options.interpolation)
     view, voxel = filling_camera(volume.bounds, size), min(volume.spacing)
     model = Model(runtime, rates, volume, function, size, options.every)
-    repeats = options.repeats
+    watch = Stopwatch(runtime, options.repeats, clock_of(options, runtime))
     stages: dict[str, Any] = {}
     made: list[VDI] = []
 
@@ -532,7 +531,7 @@ def measured(name: str, options: argparse.Namespace, rates: Rates) -> dict[str, 
             )
         ]
 
-    taken = medians(profiled(runtime, generate, repeats), lambda k: stage_of(k) if k else "")
+    taken = medians(profiled(watch, generate), lambda k: stage_of(k) if k else "")
     vdi = made[0]
     for stage, entry in model.generation(vdi, view, voxel / 2).items():
         stages[f"generation: {stage}"] = {**entry, "seconds": taken.get(stage)}
@@ -541,10 +540,10 @@ def measured(name: str, options: argparse.Namespace, rates: Rates) -> dict[str, 
         "seconds": taken[""],
     }
     medium = DeviceVolume(runtime, volume, function, voxel)
-    taken = _kernels_and_rest(runtime, lambda: raycast_medium(runtime, medium, view, size), repeats)
+    taken = _kernels_and_rest(watch, lambda: raycast_medium(runtime, medium, view, size))
     stages["render_volume"] = {**model.volume_frame(view, voxel), "seconds": taken["kernels"]}
 
-    taken = _kernels_and_rest(runtime, lambda: PreparedVDI(runtime, vdi), repeats)
+    taken = _kernels_and_rest(watch, lambda: PreparedVDI(runtime, vdi))
     stages["upload and preparation"] = {
         **model.floor(preparation_work(vdi)),
         "seconds": sum(taken.values()),
@@ -553,7 +552,7 @@ def measured(name: str, options: argparse.Namespace, rates: Rates) -> dict[str, 
     draw = VDIRenderer(runtime, prepared, size)
     for angle in options.angles:
         camera = view.azimuth(angle)
-        taken = _kernels_and_rest(runtime, lambda camera=camera: draw.image(camera), repeats)
+        taken = _kernels_and_rest(watch, lambda camera=camera: draw.image(camera))
         stages[f"VDI raycast, {angle:g} degrees"] = {
             **model.frame(
                 vdi, camera, n_bytes=prepared.list_bytes, skips=prepared.occupancy.worthwhile
@@ -567,22 +566,22 @@ def measured(name: str, options: argparse.Namespace, rates: Rates) -> dict[str, 
     if find_spec("pyvista") is not None:
         stages["around a frame in a plotter"] = {
             **model.floor(plotted_work(size)),
-            "seconds": plotted(runtime, vdi, size, repeats),
+            "seconds": plotted(watch, vdi, size),
         }
     return {"supersegments": vdi.n_supersegments, "stages": stages}
 
 
-def _kernels_and_rest(runtime: Runtime, work: Callable[[], Any], repeats: int) -> dict[str, float]:
-    return medians(profiled(runtime, work, repeats), lambda name: "kernels" if name else "rest")
+def _kernels_and_rest(watch: Stopwatch, work: Callable[[], Any]) -> dict[str, float]:
+    return medians(profiled(watch, work), lambda name: "kernels" if name else "rest")
 
 
-def plotted(runtime: Runtime, vdi: VDI, size: tuple[int, int], repeats: int) -> float:
+def plotted(watch: Stopwatch, vdi: VDI, size: tuple[int, int]) -> float:
     """Return what a plotter's frame takes around the raycast, seconds; the camera moves."""
     import pyvista as pv
 
     plotter = pv.Plotter(off_screen=True, window_size=list(size))
     try:
-        plotter.add_vdi(vdi, device=runtime)
+        plotter.add_vdi(vdi, device=watch.runtime)
         camera = vdi.camera
         plotter.camera.position = camera.position
         plotter.camera.focal_point = camera.focal_point
@@ -594,7 +593,7 @@ def plotted(runtime: Runtime, vdi: VDI, size: tuple[int, int], repeats: int) -> 
             plotter.camera.Azimuth(0.01)
             plotter.render()
 
-        return _kernels_and_rest(runtime, frame, repeats)["rest"]
+        return _kernels_and_rest(watch, frame)["rest"]
     finally:
         plotter.close()
 
@@ -615,6 +614,7 @@ def main() -> int:
         "max_supersegments": options.max_supersegments,
         "interpolation": options.interpolation,
         "every": options.every,
+        "clock": options.clock,
         "system": describe_system(options.device),
     }
     results = begun(target, case)
@@ -652,6 +652,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument(
         "--machine", type=Path, metavar="FOLDER", help="of machine.py, if not --out"
     )
+    add_clock(parser)
     add_redo(parser)
     return parser.parse_args()
 
@@ -660,6 +661,8 @@ def report(results: Mapping[str, Any]) -> str:
     """Return the tables: the gaps of all volumes, then one per volume, a line per stage."""
     width, height = results["window_size"]
     case = f"N_S {results['max_supersegments']}, {results['interpolation']}"
+    if results["clock"] == "cpu":
+        case += ", by CPU time over cores"
     lines = [f"# A model, {width}x{height}, {case}", "", LEGEND, "", "## Gaps", ""]
     lines += table(("stage", *results["volumes"]), _gap_rows(results["volumes"]))
     for name, found in results["volumes"].items():
