@@ -175,6 +175,9 @@ class Walk:
         Pieces of supersegments composited, until too little light was left.
     tiles : numpy.ndarray
         Tiles of the occupancy grid entered.
+    in_step : numpy.ndarray
+        Turns that its block of 16 rays takes where all take their n-th list together, and wait for
+        the one that meets most in it: one for the list, and one for each that is met.
     optical_depth : numpy.ndarray
         Of what the lists hold on the ray's way, float64.
     """
@@ -185,6 +188,7 @@ class Walk:
     filled_occupied: Integers
     met: Integers
     tiles: Integers
+    in_step: Integers
     optical_depth: Array
 
 
@@ -193,6 +197,7 @@ def walk(
     rays: Rays,
     *,
     perspective: bool = True,
+    skips: bool = False,
     cutoff: float = TRANSMITTANCE_CUTOFF,
 ) -> Walk:
     """Walk rays through a VDI's lists, front to back.
@@ -205,6 +210,8 @@ def walk(
         In the VDI's model frame, parametrised by view depth of the new view.
     perspective : bool
         Whether rays begin at t = 0, the eye of the new view.
+    skips : bool
+        Whether lists in empty cells of the occupancy grid take no turn.
     cutoff : float
         A ray ends behind the list in which less transmittance than this is left.
     """
@@ -225,6 +232,7 @@ def walk(
     names = ("lists", "filled", "occupied", "filled_occupied", "met", "tiles")
     found = {name: np.zeros(n, np.int64) for name in names}
     depth_met = np.zeros(n)
+    block_turns = np.zeros(-(-n // LANES), np.int64)
     most = -np.log(cutoff) if cutoff > 0 else np.inf
     going = np.flatnonzero(t0 < t1)
     t = t0.copy()
@@ -258,7 +266,11 @@ def walk(
         found["filled_occupied"][r] += occupied & (end > begin)
         tile_before[r] = tile
         piece = _Piece(counted, first, last, low, high, (t_next - t[r]) * speed[r])
-        found["met"][r] += piece.met(most - depth_met[r], away=z_next >= z)
+        met = piece.met(most - depth_met[r], away=z_next >= z)
+        found["met"][r] += met
+        longest = np.zeros(-(-n // LANES), np.int64)
+        np.maximum.at(longest, r // LANES, met + (occupied if skips else 1))
+        block_turns += longest
         depth_met[r] += piece.optical_depth
 
         # On to the next list
@@ -268,7 +280,8 @@ def walk(
         t[r] = t_next
         inside = (i[r] >= 0) & (i[r] < width) & (j[r] >= 0) & (j[r] < height)
         going = r[(t_next < t1[r]) & inside & (depth_met[r] <= most)]
-    return Walk(**found, optical_depth=depth_met)
+    in_step = np.repeat(block_turns, LANES)[:n]
+    return Walk(**found, in_step=in_step, optical_depth=depth_met)
 
 
 def _viewport_lines(vdi: VDI, rays: Rays) -> tuple[Array, Array]:

@@ -228,9 +228,9 @@ def _generation(
 def _generation_model(model: Model, vdi: VDI, step: float) -> dict[str, Any]:
     """Return floors of generation and of a volume raycast at the same step."""
     stages = model.generation(vdi, vdi.camera, step)
-    to_host = model.floor(Work(download=vdi.nbytes))
+    on_host = model.floor(Work(download=vdi.nbytes))
     return {
-        "generation": {**stages, "to the host": to_host},
+        "generation": {**stages, "on the host": on_host},
         "render_volume": model.volume_frame(vdi.camera, step, stops=False),
     }
 
@@ -255,7 +255,7 @@ def frame_cell(row: Mapping[str, Any], reach: float | None) -> Cell:
     visits = counts["occupied" if counts["skips"] else "lists"]
     detail = (
         f"{visits:.1f} lists and {counts['met']:.1f} supersegments a ray, "
-        f"{counts['lanes busy']:.0%} of the lanes at work"
+        f"{counts['lanes in step']:.0%} of the lanes at work where blocks go list by list"
     )
     return _cell(seconds[_OURS], faster_peer(seconds), reach, floor, detail)
 

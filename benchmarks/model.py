@@ -407,12 +407,14 @@ class Model:
             self._counted,
             Rays.of(camera, self._size, *self._pixels),
             perspective=not camera.parallel_projection,
+            skips=skips,
         )
-        visits = walked.occupied if skips else walked.lists
+        turns = (walked.occupied if skips else walked.lists) + walked.met
         return {
             "per ray": {
                 **{name: float(np.mean(value)) for name, value in vars(walked).items()},
-                "lanes busy": busy_lanes(visits + walked.met),
+                "lanes busy": busy_lanes(turns),
+                "lanes in step": float(turns.sum() / max(walked.in_step.sum(), 1)),
                 "skips": skips,
             },
             **self._floor(raycast_work(walked, self._size, n_bytes, skips=skips)),
@@ -535,7 +537,7 @@ def measured(name: str, options: argparse.Namespace, rates: Rates) -> dict[str, 
     vdi = made[0]
     for stage, entry in model.generation(vdi, view, voxel / 2).items():
         stages[f"generation: {stage}"] = {**entry, "seconds": taken.get(stage)}
-    stages["generation: to the host"] = {
+    stages["generation: on the host"] = {
         **model.floor(Work(download=vdi.n_supersegments * SUPERSEGMENT)),
         "seconds": taken[""],
     }
@@ -708,7 +710,7 @@ def _described(counts: Mapping[str, Any]) -> str:
         tiles = f", {counts['tiles']:.1f} tiles" if counts["skips"] else ""
         return (
             f"{visits:.1f} of {counts['lists']:.1f} lists, {counts['met']:.1f} met{tiles}; "
-            f"{counts['lanes busy']:.0%} of the lanes"
+            f"{counts['lanes busy']:.0%} of the lanes, {counts['lanes in step']:.0%} list by list"
         )
     if "looked" in counts:
         return (

@@ -24,8 +24,10 @@ from typing import Any
 import numpy as np
 from common import (  # beside this file
     INTERPOLATIONS,
+    add_clock,
     add_redo,
     begun,
+    clock_of,
     new_parser,
     save,
     system_line,
@@ -201,12 +203,17 @@ class Bench:
 
 
 def measured_axis(
-    bench: Bench, runtime: Runtime, points: list[tuple[float, Case]], axis: Axis, repeats: int
+    bench: Bench,
+    runtime: Runtime,
+    points: list[tuple[float, Case]],
+    axis: Axis,
+    repeats: int,
+    clock: Callable[[], float],
 ) -> list[dict[str, Any]]:
     """Time every point of a sweep: medians in seconds by quantity."""
     rows = []
     for value, case in points:
-        taken = take_turns(runtime, bench.steps(case, axis.quantities), repeats)
+        taken = take_turns(runtime, bench.steps(case, axis.quantities), repeats, clock=clock)
         seconds = {name: statistics.median(found["clock"]) for name, found in taken.items()}
         rows.append({"value": value, "seconds": seconds})
     return rows
@@ -369,22 +376,26 @@ def main() -> int:
         "angle": options.angle,
         "interpolation": options.interpolation,
         "quick": options.quick,
+        "clock": options.clock,
         "system": describe_system(options.device),
     }
     results = begun(target, case, "axes")
     points = sweeps(options)
     bench = Bench(runtime, options.interpolation)
     base = Case(options.volume, tuple(options.size), options.max_supersegments, options.angle)
+    clock = clock_of(options, runtime)
     for name in tqdm([*AXES, "cores"], unit="axis", disable=not sys.stderr.isatty()):
         if name in results["axes"] and not options.redo:
             continue
-        if name == "cores":
+        if name == "cores" and options.clock == "wall":
             results["axes"][name] = measured_cores(
                 base, options.interpolation, options.device, options.repeats
             )
+        elif name == "cores":  # CPU time is the same on any number of them
+            results["axes"][name] = None
         else:
             results["axes"][name] = measured_axis(
-                bench, runtime, points[name], AXES[name], options.repeats
+                bench, runtime, points[name], AXES[name], options.repeats, clock
             )
         save(results, target)
     text = report(results)
@@ -410,6 +421,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--angle", type=float, default=10.0, help="of frames, from V_O")
     parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
     parser.add_argument("--quick", action="store_true", help="fewer points on each axis")
+    add_clock(parser)
     add_redo(parser)
     return parser.parse_args()
 
@@ -422,10 +434,14 @@ def report(results: Mapping[str, Any]) -> str:
         f"{results['max_supersegments']}, frames at {results['angle']:g} degrees, "
         f"{results['interpolation']}"
     )
+    if results["clock"] == "cpu":
+        case += ", by CPU time over cores"
     lines = [
         "# How cost grows",
         "",
         f"{case}, unless changed. {LEGEND}",
+        "",
+        "## Exponents",
         "",
         *table(("cost grows with", *QUANTITIES), exponent_rows(results)),
         "",

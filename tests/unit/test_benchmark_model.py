@@ -118,6 +118,11 @@ def test_walk_at_the_generating_view_stays_in_one_list(scene):
     np.testing.assert_array_equal(walk.met, counts * walk.lists)
     np.testing.assert_array_equal(walk.filled, (counts > 0) * walk.lists)
     np.testing.assert_array_equal(walk.tiles, walk.lists)
+    # One list a ray: a block waits for the ray that meets most in it
+    turns = np.reshape(walk.lists + walk.met, (-1, counting.LANES))
+    np.testing.assert_array_equal(
+        walk.in_step.reshape(turns.shape), np.broadcast_to(turns.max(1)[:, None], turns.shape)
+    )
 
 
 def test_walk_steps_through_as_many_lists_as_it_crosses_borders(scene):
@@ -387,7 +392,7 @@ def test_two_cores_must_bring_a_factor():
 
 def frame_row(vdi, peers, floor):
     """Return a row of the interactive table, all of whose floor is the raycast's."""
-    counts = {"lists": 2.0, "occupied": 1.0, "met": 3.0, "skips": False, "lanes busy": 0.5}
+    counts = {"lists": 2.0, "occupied": 1.0, "met": 3.0, "skips": False, "lanes in step": 0.5}
     entry = {"per ray": counts, "floor": {"seconds": floor, "bound": "memory"}}
     around = {"per ray": {}, "floor": {"seconds": 0.0, "bound": "memory"}}
     model = {"vdi_skipping": entry, "around": around}
