@@ -37,6 +37,9 @@ NEAR_ENTRY, FAR_ENTRY, ENTRY_PER_POINT = 256.0, 2048.0, 4.0
 #: 3.9e-5.
 MOST_DEPTHS = 128.0
 
+#: Thickness, in extents of the bounds' depths, below which nothing tells what a ray crosses.
+THINNEST_LIST = 2.0**-23
+
 #: Optical depths of one step, through any opacity of at least 2^-24, whose sums float32 holds.
 _LARGEST_STEP = 2.0**96
 
@@ -74,13 +77,13 @@ def entries(reach: float, points: int) -> dict[str, str | int | None]:
     return {"FAR_ENTRIES": 1} if reach > farthest else {}
 
 
-def lists_are_far(depth: float, thickness: float) -> bool:
+def lists_are_far(depth: float, thickness: float, extent: float) -> bool:
     """Whether depths in lists need be relative to each ray (``-D FAR_ENTRIES``).
 
     ``depth`` is the largest that is rounded, ``thickness`` that of what the thickest list holds,
-    from its first front to its last back; world units.
+    from its first front to its last back, and ``extent`` that of the bounds; world units.
     """
-    return 0 < thickness < depth / MOST_DEPTHS
+    return extent * THINNEST_LIST < thickness < depth / MOST_DEPTHS
 
 
 def held_unit_distance(unit_distance: float, sample_distance: float) -> float:

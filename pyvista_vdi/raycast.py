@@ -281,7 +281,8 @@ class PreparedVDI:
         rounded = np.maximum(np.abs(front), np.abs(back))
         if not (self._parallel or self._shifted):
             rounded = back + self._depth_origin
-        return lists_are_far(rounded.max(initial=0.0), (back - front).max(initial=0.0))
+        thickness = (back - front).max(initial=0.0)
+        return lists_are_far(rounded.max(initial=0.0), thickness, far - near)
 
     @property
     def list_bytes(self) -> int:

@@ -195,6 +195,12 @@ def test_v_o_sees_all_of_a_far_supersegment(runtime, worst, thinness, far, paral
     check_views(runtime, worst, vdi, [EYE.azimuth(a) for a in (25, 90, 180)], least_drawn=0)
 
 
+@pytest.mark.parametrize(("thickness", "far"), [(1.1 * 2.0**-22, True), (0.9 * 2.0**-22, False)])
+def test_what_depths_cannot_tell_is_left_to_float32(thickness, far):
+    """Two units of depth, and a slab of a unit in the last place of them."""
+    assert numerics.lists_are_far(2.0, thickness, 2.0) is far
+
+
 def test_lists_far_away_but_not_thin_are_computed_in_float32_alone(runtime):
     volume = field_volume()
     vdi = generate_vdi(volume, view(volume), WINDOW, transfer(), device=runtime)
