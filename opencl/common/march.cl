@@ -41,7 +41,7 @@ typedef struct {
 inline float march_value(const March *march, __global const float *form, float a, float b)
 {
 #ifdef FAR_ENTRIES
-    return form_value_at(form, a, b, march->entry);
+    return form_at(form, a, b, march->entry).x;
 #else
     return form_value(form, a, b);
 #endif
