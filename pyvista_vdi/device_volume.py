@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import weakref
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,10 +23,12 @@ from .numerics import (
     LARGEST_VOXEL,
     MOST_STEPS,
     compensation,
+    entries,
     held_unit_distance,
     scalars_suit_float32,
 )
 from .opencl_runtime import DeviceBuffer, Runtime, aligned_empty, kept_together, padded
+from .rays import Floats, PixelRays, packed, packed_pairs
 from .shading import gradient_table, lighting_table, shading_defines
 from .transfer_function import TransferFunction
 from .volume import Volume
@@ -50,6 +53,33 @@ _MOST_LOOKED_UP = 4096
 _BEYOND = 2.0**60
 _uploads: weakref.WeakKeyDictionary[Volume, _Uploads] = weakref.WeakKeyDictionary()
 _uploads_lock = threading.Lock()
+
+
+@dataclass(frozen=True)
+class MarchForms:
+    """The rays of a view through a volume, as ``begin_march`` of ``common/march.cl`` takes them.
+
+    Attributes
+    ----------
+    forms : list of numpy.ndarray
+        Three index positions, three model directions, then the planes to clip to.
+    rays : PixelRays
+        The rays that they belong to.
+    planes : int
+        How many of the forms are planes.
+    defines : dict
+        ``-D`` names of the kernels that read them.
+    """
+
+    forms: list[Floats]
+    rays: PixelRays
+    planes: int
+    defines: dict[str, str | int | None]
+
+    def packed(self, *more: Floats) -> NDArray[np.float32]:
+        """Return the forms, and more of the same rays, as the kernels read them."""
+        pack = packed_pairs if self.defines else packed
+        return pack([*self.forms, *more])
 
 
 class DeviceVolume:
@@ -286,8 +316,8 @@ class DeviceVolume:
 
     def forms(
         self, camera: Camera, window_size: Sequence[int], clipping_planes: ArrayLike | None
-    ) -> tuple[NDArray[np.float32], rays.PixelRays, int]:
-        """Return the march's forms, the rays they belong to, and the number of planes in them."""
+    ) -> MarchForms:
+        """Return what the kernels march along in a view."""
         pixel_rays = rays.pixel_rays(camera, window_size, self.volume.bounds)
         to_index = rays.inverse_affine(self.volume.index_to_model)
         index = [pixel_rays.form(row[:3], row[3]) for row in to_index[:3]]
@@ -299,7 +329,9 @@ class DeviceVolume:
             planes += [form, far]
         planes += rays.eye_plane(camera, pixel_rays)
         planes += rays.user_planes(camera, pixel_rays, clipping_planes)
-        return rays.packed([*index, *direction, *planes]), pixel_rays, len(planes)
+        reach = rays.largest_value(camera, window_size, self.volume.bounds, index)
+        defines = entries(reach, max(self.volume.dimensions))
+        return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), defines)
 
 
 def _voxel_defines(volume: Volume, native: bool) -> dict[str, str | int | None]:

@@ -119,13 +119,12 @@ def raycast_medium(
 ) -> NDArray[np.float32]:
     """Render a volume that is on the device already; see :func:`raycast_volume`."""
     width, height = size
-    forms, pixel_rays, planes = medium.forms(camera, size, clipping_planes)
-    ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
-    cropped = rays.cropped(pixel_rays, cropping, medium.volume.bounds)
-    planes += len(cropped.planes)
-    if cropped.planes or cropped.forms:
-        forms = np.concatenate([forms, rays.packed([*cropped.planes, *cropped.forms])])
-    defines = {**medium.defines, **cropped.defines}
+    march = medium.forms(camera, size, clipping_planes)
+    ends = rays.checked_opaque_depth(opaque_depth, size, march.rays)
+    cropped = rays.cropped(march.rays, cropping, medium.volume.bounds)
+    planes = march.planes + len(cropped.planes)
+    forms = march.packed(*cropped.planes, *cropped.forms)
+    defines = {**medium.defines, **march.defines, **cropped.defines}
     multiplier: tuple[np.float32, ...] = ()
     if opacity_multiplier != 1.0:
         defines["OPACITY_MULTIPLIER"] = 1

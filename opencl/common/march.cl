@@ -3,8 +3,9 @@
 // Samples lie at the midpoints of steps of equal model length along the ray, the last one shorter (DESIGN section 3).
 // Every face is computed from its step's number, never accumulated.
 //
-// -D BY_SCALAR  with NEAREST and voxels of integers: the table holds the medium of each scalar from `low` on, of which no voxel
-//               is outside (grid/scalar_media.cl); otherwise it is classified at each sample
+// -D BY_SCALAR     with NEAREST and voxels of integers: the table holds the medium of each scalar from `low` on, of which no
+//                  voxel is outside (grid/scalar_media.cl); otherwise it is classified at each sample
+// -D FAR_ENTRIES   see common/rays.cl: t counts from where the ray enters
 #include "common/rays.cl"
 #include "common/classification.cl"
 #include "common/volume_sampling.cl"
@@ -31,7 +32,20 @@ typedef struct {
     float per_step;      // 1 / step
     float units;         // opacity unit distances per unit of t
     int steps;
+#ifdef FAR_ENTRIES
+    float2 entry;        // t of the rays' forms where t is 0 here
+#endif
 } March;
+
+// Value of a form where t of the march is 0.
+inline float march_value(const March *march, __global const float *form, float a, float b)
+{
+#ifdef FAR_ENTRIES
+    return form_value_at(form, a, b, march->entry);
+#else
+    return form_value(form, a, b);
+#endif
+}
 
 // Model-frame direction of the ray per unit of t.
 inline float3 model_direction(__global const float *forms, float a, float b)
@@ -45,12 +59,18 @@ inline float3 model_direction(__global const float *forms, float a, float b)
 inline bool begin_march(March *march, __global const float *forms, int planes, float a, float b,
                         float sample_distance, float unit_distance, float t_end)
 {
+#ifdef FAR_ENTRIES
+    march->t0 = 0.0f;
+    if (!clip_from_entry(forms + 6 * FORM_SIZE, planes, a, b, t_end, &march->entry, &march->t1))
+        return false;
+#else
     march->t0 = -INFINITY;
     march->t1 = t_end;
     if (!clip_to_planes(forms + 6 * FORM_SIZE, planes, a, b, &march->t0, &march->t1))
         return false;
-    march->start = (float3)(form_value(forms, a, b), form_value(forms + FORM_SIZE, a, b),
-                            form_value(forms + 2 * FORM_SIZE, a, b));
+#endif
+    march->start = (float3)(march_value(march, forms, a, b), march_value(march, forms + FORM_SIZE, a, b),
+                            march_value(march, forms + 2 * FORM_SIZE, a, b));
     march->slope = (float3)(form_slope(forms, a, b), form_slope(forms + FORM_SIZE, a, b),
                             form_slope(forms + 2 * FORM_SIZE, a, b));
     const float speed = length(model_direction(forms, a, b)); // model units per unit of t
