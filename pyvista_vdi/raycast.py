@@ -96,7 +96,7 @@ def render_vdi(
     multiplier = checked_opacity_multiplier(opacity_multiplier)
     runtime = get_runtime(device)
     prepared = prepared_vdi(runtime, vdi)
-    with runtime.buffer((size[1], size[0], 4), name="image") as image:
+    with runtime.result((size[1], size[0], 4), name="image") as image:
         prepared.render(
             camera,
             size,
