@@ -43,6 +43,8 @@ _DEVICE_TYPES = {
 }
 #: Logarithm to base 2 of the points along each edge of a block that can be skipped.
 _BLOCK_SHIFT = 3
+#: Blocks: farther than this no march looks for what is not transparent.
+_FARTHEST = 16
 #: Share of transparent blocks from which on looking for them pays.
 _WORTH_SKIPPING = 0.05
 #: Scalars of 16 bits that are looked up and not classified at each sample: 64 KiB of media.
@@ -140,9 +142,12 @@ class DeviceVolume:
         self._entries = len(table)
         self._per_scalar = _per_scalar(self._entries, span)
         self._table = runtime.upload(np.ascontiguousarray(table), "transfer function")
-        self._visible = self._visibility(runtime, ranges, transfer_function)
-        if skip_empty and self._empty_share(runtime) >= _WORTH_SKIPPING:
-            self.defines["SKIP_EMPTY"] = 1
+        self._visible = self._reaches = self._visibility(runtime, ranges, transfer_function)
+        if skip_empty:
+            seen = runtime.download(self._visible)
+            if 1.0 - float(np.mean(seen)) >= _WORTH_SKIPPING:
+                self.defines["SKIP_EMPTY"] = 1
+                self._reaches = self._reaches_of(runtime, seen)
         if transfer_function.interpolation == "nearest":
             self.defines["NEAREST"] = 1
             if native and (ends := _integer_ends(runtime, volume, ranges)):
@@ -194,14 +199,14 @@ class DeviceVolume:
         ``camera`` is the view: lights may move with it.
         """
         return (
-            *self._classified(),
+            *self._classified(self._reaches),
             *self._lighting(camera),
             *self._gradient,
             *self._occlusion,
         )
 
-    def _classified(self) -> tuple[Any, ...]:
-        """Arguments ``voxels`` to ``blocks``."""
+    def _classified(self, blocks: DeviceBuffer) -> tuple[Any, ...]:
+        """Arguments ``voxels`` to ``blocks``, of which ``blocks`` says what may be skipped."""
         return (
             self._voxels,
             np.array([*self.volume.dimensions, 0], dtype=np.int32),
@@ -209,7 +214,7 @@ class DeviceVolume:
             np.int32(self._entries),
             np.float32(self._low),
             np.float32(self._per_scalar),
-            self._visible,
+            blocks,
             np.array([*_blocks(self.volume), 0], dtype=np.int32),
         )
 
@@ -236,8 +241,8 @@ class DeviceVolume:
                 ambient = ambient_transmittances(
                     self._runtime,
                     grid,
-                    (*self._classified(), *self._gradient),
-                    self._classified()[-2:],
+                    (*self._classified(self._visible), *self._gradient),
+                    self._classified(self._visible)[-2:],
                     defines,
                     self.sample_distance,
                     self.unit_distance,
@@ -284,8 +289,30 @@ class DeviceVolume:
             runtime.finish()  # the table above may be host memory in use
         return visible
 
-    def _empty_share(self, runtime: Runtime) -> float:
-        return 1.0 - float(np.mean(runtime.download(self._visible)))
+    def _reaches_of(self, runtime: Runtime, seen: NDArray[np.uint8]) -> DeviceBuffer:
+        """Return how far each block is from one that may be visible, uint8 on the device."""
+        n = np.uint32(seen.size)
+        kernel = runtime.kernel("grid/volume_blocks.cl", "block_reaches", self.defines)
+        far = np.where(seen > 0, 0, _FARTHEST).astype(np.uint8)
+        reaches = runtime.upload(far, "empty blocks")
+        apart = 1
+        for along in _blocks(self.volume):
+            with reaches as before:
+                reaches = runtime.buffer((seen.size,), np.uint8, "reaches of empty blocks")
+                runtime.launch(
+                    kernel,
+                    padded(seen.size, GROUP),
+                    GROUP,
+                    before,
+                    n,
+                    np.uint32(apart),
+                    np.int32(along),
+                    np.int32(_FARTHEST),
+                    reaches,
+                )
+                runtime.finish()  # what was read is released
+            apart *= along
+        return reaches
 
     def forms(
         self, camera: Camera, window_size: Sequence[int], clipping_planes: ArrayLike | None

@@ -461,10 +461,10 @@ class _Recorder:
         n = int(offsets[-1])
         with (
             runtime.upload(offsets, "list offsets") as starts,
-            runtime.buffer((n,), name="front depths") as front,
-            runtime.buffer((n,), name="back depths") as back,
-            runtime.buffer((n, 3), name="supersegment colours") as color,
-            runtime.buffer((n,), name="optical depths") as optical_depth,
+            runtime.result((n,), name="front depths") as front,
+            runtime.result((n,), name="back depths") as back,
+            runtime.result((n, 3), name="supersegment colours") as color,
+            runtime.result((n,), name="optical depths") as optical_depth,
         ):
             self._launch(
                 "pack_lists",

@@ -15,7 +15,7 @@ from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
 from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
-from .numerics import compensation
+from .numerics import compensation, lists_are_far
 from .occupancy import OccupancyGrid
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime, kept_together
 from .picking import DEFAULT_OPACITY, FirstHit
@@ -96,7 +96,7 @@ def render_vdi(
     multiplier = checked_opacity_multiplier(opacity_multiplier)
     runtime = get_runtime(device)
     prepared = prepared_vdi(runtime, vdi)
-    with runtime.buffer((size[1], size[0], 4), name="image") as image:
+    with runtime.result((size[1], size[0], 4), name="image") as image:
         prepared.render(
             camera,
             size,
@@ -262,11 +262,27 @@ class PreparedVDI:
         self._shifted = not self._parallel and 0 < far <= _LONG_LENS * closest
         # A ray that steps from list to list meets about as many as it crosses borders
         self.media = sum(vdi.window_size) + int(vdi.counts.max(initial=0))
+        self._far = self._is_far(vdi, (near, far))
         self._list_rows = self._list_space(camera)
         self._packed = {Packed16: 16, Packed8: 8}.get(type(vdi.packing), 0)
         headers = _LIST_HEADER * int(np.count_nonzero(vdi.counts)) if self._packed == 8 else 0
         self._long_offsets = vdi.n_supersegments + headers >= 2**32
         self._upload(vdi)
+
+    def _is_far(self, vdi: VDI, depths: tuple[float, float]) -> bool:
+        """Whether the lists are thin for where they lie between the depths of the bounds."""
+        occupied = np.diff(vdi.offsets) > 0
+        first, last = vdi.offsets[:-1][occupied], vdi.offsets[1:][occupied] - 1
+        near, far = (depth - self._depth_origin for depth in depths)
+        front, back = (
+            np.clip(face.astype(np.float64), near, far)
+            for face in (vdi.front[first], vdi.back[last])
+        )
+        rounded = np.maximum(np.abs(front), np.abs(back))
+        if not (self._parallel or self._shifted):
+            rounded = back + self._depth_origin
+        thickness = (back - front).max(initial=0.0)
+        return lists_are_far(rounded.max(initial=0.0), thickness, far - near)
 
     @property
     def list_bytes(self) -> int:
@@ -285,6 +301,8 @@ class PreparedVDI:
             defines["SHIFTED"] = 1
         if self._packed:
             defines["PACKED"] = self._packed
+        if self._far:
+            defines["FAR_ENTRIES"] = 1
         return defines
 
     def render(
@@ -358,7 +376,8 @@ class PreparedVDI:
         planes += rays.user_planes(camera, pixel_rays, clipping_planes)
         cropped = rays.cropped(pixel_rays, cropping, self._bounds)
         planes += cropped.planes
-        forms = rays.packed([*coordinates, *direction, *planes, *cropped.forms])
+        pack = rays.packed_pairs if self._far else rays.packed
+        forms = pack([*coordinates, *direction, *planes, *cropped.forms])
         ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
         return ListView(
             size,
@@ -407,7 +426,7 @@ class PreparedVDI:
         viewport = camera.viewport_matrix(self._window) @ camera.model_to_view
         half = np.asarray(self._window, dtype=np.float64) / 2
         u, v, depth, denominator = viewport
-        if self._parallel or self._shifted:
+        if self._parallel or self._shifted or self._far:
             coordinate = depth.copy()
             coordinate[3] -= self._depth_origin
         else:

@@ -133,7 +133,7 @@ def raycast_medium(
     with (
         runtime.upload(forms, "rays") as form_buffer,
         runtime.upload(np.zeros(1, np.float32) if ends is None else ends, "opaque depth") as depth,
-        runtime.buffer((height, width, 4), name="image") as image,
+        runtime.result((height, width, 4), name="image") as image,
     ):
         runtime.launch(
             kernel,

@@ -24,7 +24,13 @@ from pyvista_vdi.opencl_runtime.arguments import (
     driver_argument,
     preferred_group,
 )
-from pyvista_vdi.opencl_runtime.buffers import DeviceBuffer, Ledger, bytes_text, shape_of
+from pyvista_vdi.opencl_runtime.buffers import (
+    DeviceBuffer,
+    Ledger,
+    aligned_empty,
+    bytes_text,
+    shape_of,
+)
 from pyvista_vdi.opencl_runtime.devices import Candidate, DeviceInfo, drivers_lost, opencl
 from pyvista_vdi.opencl_runtime.profiling import KernelTime, Profile, profiling_wanted, table
 from pyvista_vdi.opencl_runtime.programs import Define, Kernel, ProgramCache
@@ -260,6 +266,42 @@ class Runtime:
         access = flags.READ_ONLY if read_only else flags.READ_WRITE
         return self._allocate(access, shape, dtype, name, None, writable=True)
 
+    def result(
+        self, shape: tuple[int, ...], dtype: DTypeLike = np.float32, name: str = "result"
+    ) -> DeviceBuffer:
+        """Uninitialised memory for kernels to write, downloaded when they have.
+
+        On a CPU device it is the memory of the array that :meth:`download` returns, so that nothing
+        is copied; nothing may be written after that.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Shape in elements; zero is allowed.
+        dtype : dtype_like, default: numpy.float32
+            Element type.
+        name : str, default: "result"
+            What it holds; messages say it.
+
+        Returns
+        -------
+        DeviceBuffer
+            As of :meth:`buffer`.
+
+        Raises
+        ------
+        DeviceMemoryError
+            As for :meth:`buffer`.
+        """
+        dtype = np.dtype(dtype)
+        shape = shape_of(shape, dtype)
+        if not self.is_cpu or 0 in shape:
+            return self.buffer(shape, dtype, name)
+        flags = opencl().mem_flags
+        return self._allocate(
+            flags.READ_WRITE | flags.USE_HOST_PTR, shape, dtype, name, None, writable=True
+        )
+
     def upload(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
         """An array's values on the device, for kernels to read.
 
@@ -339,6 +381,8 @@ class Runtime:
             raise InvalidArgumentError(
                 f"{count} elements were asked of the buffer {buffer.name!r}, which has {elements}"
             )
+        if buffer.result is not None and out is None and count is None:
+            return self._finished(buffer, buffer.result)
         shape = buffer.shape if count is None else (count,)
         if out is None:
             out = np.empty(shape, buffer.dtype)
@@ -349,6 +393,24 @@ class Runtime:
             with self._driver(f"reading {out.nbytes} bytes of the buffer {buffer.name!r}"):
                 self._copy("[read]", memory, out, to_host=True)
         return out
+
+    def _finished(self, buffer: DeviceBuffer, result: NDArray[Any]) -> NDArray[Any]:
+        """Return the array whose memory a buffer is, when all that was enqueued is done."""
+        cl = opencl()
+        self._turns.checkpoint()
+        with self._driver(f"reading {buffer.nbytes} bytes of the buffer {buffer.name!r}"):
+            mapped, event = cl.enqueue_map_buffer(
+                self._queue,
+                buffer.memory,
+                cl.map_flags.READ,
+                0,
+                buffer.shape,
+                buffer.dtype,
+                is_blocking=True,
+            )
+            self._record("[read]", event)
+            mapped.base.release(self._queue)
+        return result
 
     def write(self, buffer: DeviceBuffer, array: NDArray[Any]) -> None:
         """Copy an array into a buffer; the array is free to change when this returns.
@@ -407,6 +469,7 @@ class Runtime:
         if buffer.nbytes:
             with self._driver(f"filling the buffer {buffer.name!r}"):
                 event = opencl().enqueue_fill_buffer(self._queue, memory, pattern, 0, buffer.nbytes)
+                self._note_reader(buffer)
                 self._record("[fill]", event)
                 if self._turns.worker is not None:
                     self._queue.finish()  # nothing of this thread runs when its turn is over
@@ -434,12 +497,16 @@ class Runtime:
         cl = opencl()
         nbytes = int(np.prod(shape, dtype=object)) * dtype.itemsize
         in_place = bool(flags & cl.mem_flags.USE_HOST_PTR)
-        taken = 0 if in_place else max(nbytes, dtype.itemsize)  # drivers refuse size 0
-        if in_place:
+        callers = in_place and host is not None
+        taken = 0 if callers else max(nbytes, dtype.itemsize)  # drivers refuse size 0
+        if callers:
             # No memory is taken, but the limit per buffer holds for it as well.
             self._ledger.check_size(name, nbytes, self.info.max_allocation, self.info.global_memory)
         reserved = self._ledger.take(name, taken, self.info.max_allocation, self.info.global_memory)
+        result: NDArray[Any] | None = None
         try:
+            if in_place and host is None:
+                host = result = aligned_empty(shape, dtype)
             with self._driver(f"allocating {bytes_text(nbytes)} for the buffer {name!r}"):
                 if host is None or nbytes == 0:
                     flags &= ~cl.mem_flags.COPY_HOST_PTR
@@ -459,6 +526,7 @@ class Runtime:
 
         buffer = DeviceBuffer(memory, shape, dtype, name, on_release, writable=writable)
         buffer.readers = readers
+        buffer.result = result
         return buffer
 
     def _copy(self, label: str, memory: Any, host: NDArray[Any], *, to_host: bool = False) -> None:

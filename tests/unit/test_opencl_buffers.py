@@ -54,6 +54,44 @@ def test_aligned_arrays_are_used_in_place_on_a_cpu(runtime):
     assert runtime.allocated == before
 
 
+@pytest.mark.parametrize("shape", [(3, 5), (1000, 7), (0, 4)])
+def test_results_outlive_their_buffers(runtime, shape):
+    """On a CPU the array is the buffer's memory: nothing is copied, and it stays when it goes."""
+    before = runtime.allocated
+    with runtime.result(shape, np.int32) as buffer:
+        assert runtime.allocated - before >= buffer.nbytes
+        runtime.fill(buffer, np.int32(-7))
+        array = runtime.download(buffer)
+        if runtime.is_cpu and 0 not in shape:
+            assert runtime.download(buffer) is array
+        part = runtime.download(buffer, count=0)
+    assert runtime.allocated == before
+    gc.collect()
+    assert array.shape == shape
+    assert array.dtype == np.int32
+    assert array.flags.writeable
+    assert part.shape == (0,)
+    assert (array == -7).all()
+
+
+def test_a_result_that_is_never_read_is_finished_before_its_memory_goes(runtime, monkeypatch):
+    finished = []
+    monkeypatch.setattr(runtime, "_finish", lambda numbers: finished.append(set(numbers)))
+    kernel = runtime.kernel(
+        "grid/volume_blocks.cl",
+        "block_reaches",
+        {"VOXEL_T": "uchar", "INDEX_T": "uint", "BLOCK_SHIFT": 3},
+    )
+    buffer = runtime.result((64,), np.uint8)
+    with runtime.upload(np.ones(64, np.uint8)) as ones:
+        sizes = (np.uint32(64), np.uint32(1), np.int32(64), np.int32(1))
+        runtime.launch(kernel, 64, 64, ones, *sizes, buffer)
+        runtime.finish()
+    finished.clear()
+    buffer.release()
+    assert bool(finished) == runtime.is_cpu
+
+
 def test_write_fill_and_download_into(runtime):
     out = np.empty((2, 3), np.int32)
     with runtime.buffer((2, 3), np.int32, name="six") as buffer:
