@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -278,6 +280,21 @@ MACHINE = {
         "near, chained": {"4": [[2**14, 2.5e8], [2**28, 2.5e7]], "16": [[2**14, 1e8]]},
     },
 }
+
+
+def test_rates_are_those_of_the_device_that_is_asked_about(tmp_path):
+    def runtime(name):
+        return SimpleNamespace(info=SimpleNamespace(kind="CPU", full_name=name))
+
+    with pytest.raises(
+        SystemExit, match=r"machine_cpu.json holds nothing of a / b: run machine.py"
+    ):
+        machine.Rates.read_for(runtime("a / b"), tmp_path)
+    results = {**MACHINE, "system": {"device": "a / b"}}
+    (tmp_path / "machine_cpu.json").write_text(json.dumps(results))
+    assert machine.Rates.read_for(runtime("a / b"), tmp_path).read == 10e9
+    with pytest.raises(SystemExit, match="holds nothing of c / d"):
+        machine.Rates.read_for(runtime("c / d"), tmp_path)
 
 
 def test_rates_are_interpolated_between_working_sets_and_taken_from_the_next_larger_element():
