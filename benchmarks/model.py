@@ -330,10 +330,9 @@ def shorten_work(marched: March, size: tuple[int, int], supersegments: int) -> W
 
 
 def pack_work(vdi: VDI) -> Work:
-    """Return the work of writing a VDI's arrays from its records, without reading them back."""
+    """Return the work of writing a VDI's arrays from its records, which a cache can hold."""
     n, lists = vdi.n_supersegments, len(vdi.offsets)
     return Work(
-        read=n * SUPERSEGMENT + lists * 8,
         write=n * SUPERSEGMENT + lists * 8,
         operations=OF_PACKING.times(n),
         launches=1,
