@@ -55,9 +55,7 @@ class Frame:
     @classmethod
     def current(cls, renderer: Any, model_transform: Matrix) -> Frame:
         """Read the frame that ``renderer`` is drawing."""
-        viewport = [0, 0, 0, 0]
-        renderer.GetRenderWindow().GetState().vtkglGetIntegerv(_GL_VIEWPORT, viewport)
-        x, y, width, height = viewport
+        (x, y), (width, height) = viewport(renderer)
         vtk_camera = renderer.GetActiveCamera()
         aspect = renderer.GetTiledAspectRatio()
         # Not GetCompositeProjectionTransformMatrix: that one turns stereo off
@@ -227,6 +225,14 @@ class Frame:
         pixels.UnBind()  # it binds itself to be released, and would catch VTK's next glReadPixels
         texture.ReleaseGraphicsResources(window)
         return z
+
+
+def viewport(renderer: Any) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return OpenGL's viewport while a renderer draws: lower left corner and size, pixels."""
+    values = [0, 0, 0, 0]
+    renderer.GetRenderWindow().GetState().vtkglGetIntegerv(_GL_VIEWPORT, values)
+    x, y, width, height = values
+    return (x, y), (width, height)
 
 
 def sampled(depth: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:

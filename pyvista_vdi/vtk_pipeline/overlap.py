@@ -95,7 +95,7 @@ class Part:
     Attributes
     ----------
     image : numpy.ndarray
-        Premultiplied RGBA, float32 (H, W, 4), bottom row first; 0 where others show it.
+        Premultiplied RGBA, float32 (H, W, 4), top row first; 0 where others show it.
     number : int
         By which an upload is known: below 0, and another for each.
     frame : Frame
@@ -123,10 +123,8 @@ class _Picture:
         """Return what actor ``index`` shows."""
         number = self.numbers.setdefault(index, next(_numbers))
         if index not in self.parts:
-            mine = (self.joint.owner == index)[::-1]  # a texture's first row is the bottom one
-            self.parts[index] = np.where(
-                mine[..., np.newaxis], self.joint.image[::-1], np.float32(0)
-            )
+            mine = self.joint.owner == index
+            self.parts[index] = np.where(mine[..., np.newaxis], self.joint.image, np.float32(0))
         return Part(self.parts[index], number, sight.frame, full_size)
 
 

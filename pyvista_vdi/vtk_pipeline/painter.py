@@ -21,13 +21,14 @@ from pyvista_vdi.opencl_runtime import Runtime, get_runtime
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.view_error import angle_from_generating_view
-from pyvista_vdi.vtk_pipeline.frame import Frame, as_array, sampled
+from pyvista_vdi.vtk_pipeline.frame import Frame, as_array, sampled, viewport
 from pyvista_vdi.vtk_pipeline.inputs import Input
 from pyvista_vdi.vtk_pipeline.interaction import Interaction, WindowClock, reduced
 from pyvista_vdi.vtk_pipeline.overlap import Overlaps, Sight, rectangle, same_depth
 from pyvista_vdi.vtk_pipeline.selection import Seen, Selection
+from pyvista_vdi.vtk_pipeline.shader import place_image
 from pyvista_vdi.vtk_pipeline.status import CornerTexts, VDIStatus
-from pyvista_vdi.vtk_pipeline.texture import ImageTexture
+from pyvista_vdi.vtk_pipeline.texture import ImageTexture, NoDepth
 from pyvista_vdi.vtk_pipeline.upkeep import Scene, Upkeep
 from pyvista_vdi.vtk_pipeline.view import View
 from pyvista_vdi.vtk_pipeline.voice import Voice
@@ -80,7 +81,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Drawn:
-    """An image, premultiplied RGBA, float32 (H, W, 4), bottom row first.
+    """An image, premultiplied RGBA, float32 (H, W, 4), top row first.
 
     Attributes
     ----------
@@ -130,6 +131,7 @@ class Painter:
         self._active = vtkWeakReference()
         self._observed: set[str] = set()
         self._texture = ImageTexture()
+        self._no_depth = NoDepth()
         self._drawn: Any = weakref.ref(self)  # the VDI whose images are kept: none yet
         self._generation = 0
         self._images: dict[Any, Drawn] = {}
@@ -185,6 +187,7 @@ class Painter:
         """Free the texture and the images kept, and end what goes on; a frame begins anew."""
         self.upkeep.close()
         self._texture.release()
+        self._no_depth.release()
         self.selection.release()
         self._images.clear()
 
@@ -247,6 +250,8 @@ class Painter:
         WindowClock.of(window).showed(drawn.preview)
         try:
             self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
+            self._no_depth.show(window, mapper)
+            place_image(self._actor.Get(), *viewport(renderer))
         except DeviceError as error:
             self._cannot_draw(error)
         self.texts.write(renderer, self.status)
@@ -255,6 +260,7 @@ class Painter:
     def end(self) -> None:
         """Let go of the texture unit."""
         self._texture.let_go()
+        self._no_depth.let_go()
         self.selection.let_go()
 
     def _guarded(self, draw: Callable[[Any, Any], Any], mapper: Any, renderer: Any) -> Any:
@@ -392,6 +398,7 @@ class Painter:
         except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
             self._voice.warn(f"the VDI cannot be picked: {type(error).__name__}: {error}", error)
             self.selection.show(window, selector, None, self.device)
+        self._no_depth.show(window, mapper)
 
     def preview_size(
         self, mapper: Any, renderer: Any, clock: WindowClock, full: tuple[int, int]
@@ -421,7 +428,6 @@ class Painter:
             device=self.device,
         )
         clock.drawn(task.frame.size, task.full_size, time.perf_counter() - before)
-        image = np.ascontiguousarray(image[::-1])  # a texture's first row is the bottom one
         self._raycasts += 1
         drawn = Drawn(image, task, self._raycasts)
         key = task.key
@@ -503,9 +509,7 @@ def place_proxy(proxy: vtkImageData, bounds: tuple[float, ...]) -> None:
 def _is_viewport(renderer: Any) -> bool:
     width, height, x, y = [0], [0], [0], [0]
     renderer.GetTiledSizeAndOrigin(width, height, x, y)
-    viewport = [0, 0, 0, 0]
-    renderer.GetRenderWindow().GetState().vtkglGetIntegerv(0x0BA2, viewport)
-    return viewport == [x[0], y[0], width[0], height[0]]
+    return viewport(renderer) == ((x[0], y[0]), (width[0], height[0]))
 
 
 def _sights(own: Sight, renderer: Any) -> list[Sight]:
