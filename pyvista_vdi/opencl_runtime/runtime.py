@@ -287,13 +287,58 @@ class Runtime:
         shape = np.shape(array)
         array = np.ascontiguousarray(array)
         flags = opencl().mem_flags
-        in_place = self.is_cpu and array.nbytes > 0 and array.ctypes.data % self._alignment == 0
+        in_place = self._in_place(array)
         if self._turns.worker is not None and not in_place and array.nbytes > _COPY_BYTES:
             return self._upload_in_pieces(array.reshape(shape), name)
         source = flags.USE_HOST_PTR if in_place else flags.COPY_HOST_PTR
         return self._allocate(
             flags.READ_ONLY | source, shape, array.dtype, name, array, writable=False
         )
+
+    def target(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
+        """Memory for kernels to write what an array is to hold; :meth:`download` brings it there.
+
+        A CPU device writes into an array that is aligned for it in place, and the download into
+        that very array copies nothing.
+
+        Parameters
+        ----------
+        array : numpy.ndarray
+            C-contiguous and writable; what is in it is not read. Leave it alone until the
+            download.
+        name : str, default: "array"
+            What it is to hold; messages say it.
+
+        Returns
+        -------
+        DeviceBuffer
+            Of the array's shape and dtype, uninitialised.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If the array is not C-contiguous or not writable.
+        DeviceMemoryError
+            As for :meth:`buffer`.
+        """
+        if not (array.flags.c_contiguous and array.flags.writeable):
+            raise InvalidArgumentError(
+                f"the array for {name!r} must be C-contiguous and writable; its strides are "
+                f"{array.strides}, writeable={array.flags.writeable}"
+            )
+        flags = opencl().mem_flags
+        if not self._in_place(array):
+            return self._allocate(
+                flags.READ_WRITE, array.shape, array.dtype, name, None, writable=True
+            )
+        access = flags.READ_WRITE | flags.USE_HOST_PTR
+        buffer = self._allocate(access, array.shape, array.dtype, name, array, writable=True)
+        buffer.host = array
+        return buffer
+
+    def _in_place(self, array: NDArray[Any]) -> bool:
+        """Whether kernels can use a C-contiguous array where it is."""
+        return self.is_cpu and array.nbytes > 0 and array.ctypes.data % self._alignment == 0
 
     def _upload_in_pieces(self, array: NDArray[Any], name: str) -> DeviceBuffer:
         """As :meth:`upload`; a driver that makes a buffer from an array keeps Python's lock."""
@@ -347,7 +392,10 @@ class Runtime:
             raise InvalidArgumentError(f"the target for {buffer.name!r} is not writable")
         if out.nbytes:
             with self._driver(f"reading {out.nbytes} bytes of the buffer {buffer.name!r}"):
-                self._copy("[read]", memory, out, to_host=True)
+                if out is buffer.host:
+                    self._map(memory, out)
+                else:
+                    self._copy("[read]", memory, out, to_host=True)
         return out
 
     def write(self, buffer: DeviceBuffer, array: NDArray[Any]) -> None:
@@ -473,6 +521,19 @@ class Runtime:
             else:
                 ends = {"dest": memory, "src": part, "dst_offset": start}
             self._record(label, opencl().enqueue_copy(self._queue, **ends, is_blocking=True))
+
+    def _map(self, memory: Any, host: NDArray[Any]) -> None:
+        """Have an array that kernels wrote in place hold what they wrote.
+
+        That is what mapping a buffer is for; the memory being the array's, nothing is copied, and
+        the values stay when it is unmapped.
+        """
+        cl = opencl()
+        mapped, event = cl.enqueue_map_buffer(
+            self._queue, memory, cl.map_flags.READ, 0, host.shape, host.dtype, is_blocking=True
+        )
+        self._record("[map]", event)
+        mapped.base.release(self._queue)
 
     def _writable_memory(self, buffer: DeviceBuffer) -> Any:
         if not buffer.writable:

@@ -17,14 +17,15 @@ from vtkmodules.vtkRenderingCore import vtkVolume
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.cropping import Cropping
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, UnsupportedError
-from pyvista_vdi.opencl_runtime import Runtime, get_runtime
+from pyvista_vdi.opencl_runtime import Runtime, aligned_empty, get_runtime
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.view_error import angle_from_generating_view
-from pyvista_vdi.vtk_pipeline.frame import Frame, as_array, sampled, viewport
+from pyvista_vdi.vtk_pipeline.depth import OpaqueDepths
+from pyvista_vdi.vtk_pipeline.frame import Frame, as_array, rectangle, sampled, viewport
 from pyvista_vdi.vtk_pipeline.inputs import Input
 from pyvista_vdi.vtk_pipeline.interaction import Interaction, WindowClock, reduced
-from pyvista_vdi.vtk_pipeline.overlap import Overlaps, Sight, rectangle, same_depth
+from pyvista_vdi.vtk_pipeline.overlap import Overlaps, Sight, same_depth
 from pyvista_vdi.vtk_pipeline.selection import Seen, Selection
 from pyvista_vdi.vtk_pipeline.shader import place_image
 from pyvista_vdi.vtk_pipeline.status import CornerTexts, VDIStatus
@@ -93,12 +94,16 @@ class Drawn:
         By which an upload is known.
     joint : bool
         Whether it is a part of a picture that other actors show the rest of.
+    pixels : numpy.ndarray or None
+        The memory that the image begins, 1D: another image may be raycast into it when this one is
+        kept no longer.
     """
 
     image: Image
     task: Task | None = None
     number: int | None = None
     joint: bool = False
+    pixels: Image | None = None
 
     @property
     def preview(self) -> bool:
@@ -135,6 +140,7 @@ class Painter:
         self._drawn: Any = weakref.ref(self)  # the VDI whose images are kept: none yet
         self._generation = 0
         self._images: dict[Any, Drawn] = {}
+        self._free: Image | None = None  # shown by no frame, not even the last
         self._raycasts = 0
         self._last = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
         self._scene: tuple[Camera, weakref.ref[WindowClock]] | None = None
@@ -190,6 +196,7 @@ class Painter:
         self._no_depth.release()
         self.selection.release()
         self._images.clear()
+        self._free = None
 
     def take_settings(self, other: Painter) -> None:
         """Take over how dense another draws, what it allows and when it regenerates."""
@@ -310,11 +317,7 @@ class Painter:
                 part.image, Task(part.frame, None, None, part.full_size), part.number, joint=True
             )
         vdi, frame, clock = sight.vdi, sight.frame, sight.clock
-        depth = None
-        if frame.sees_opaque_before(renderer, sight.actor, vdi.bounds):
-            depth = frame.opaque_depth(renderer)
-            if np.isposinf(depth).all():
-                depth = None
+        depth = OpaqueDepths.of(clock).read(renderer, [(frame, vdi.bounds)])
         task = Task(frame, sight.planes, depth, frame.size, **sight.looks)
         drawn = self._kept(task)
         if drawn is not None:
@@ -417,6 +420,8 @@ class Painter:
     def _raycast(self, vdi: VDI, task: Task, clock: WindowClock) -> Drawn:
         """Return the image, and keep it."""
         before = time.perf_counter()
+        pixels = self._pixels(task.frame.size)
+        width, height = task.frame.size
         image = render_vdi(
             vdi,
             task.frame.camera,
@@ -426,16 +431,31 @@ class Painter:
             cropping=task.cropping,
             opacity_multiplier=task.opacity_multiplier,
             device=self.device,
+            out=pixels[: height * width * 4].reshape(height, width, 4),
         )
         clock.drawn(task.frame.size, task.full_size, time.perf_counter() - before)
         self._raycasts += 1
-        drawn = Drawn(image, task, self._raycasts)
-        key = task.key
-        self._images.pop(key, None)
-        self._images[key] = drawn
-        while len(self._images) > _KEPT_IMAGES:
-            del self._images[next(iter(self._images))]
+        drawn = Drawn(image, task, self._raycasts, pixels=pixels)
+        self._keep(task.key, drawn)
         return drawn
+
+    def _keep(self, key: Any, drawn: Drawn) -> None:
+        """Keep an image; the memory of one that goes is for the next raycast."""
+        gone = self._images.pop(key, None)
+        self._images[key] = drawn
+        if len(self._images) > _KEPT_IMAGES:
+            gone = self._images.pop(next(iter(self._images)))
+        if gone is not None:
+            self._free = gone.pixels
+
+    def _pixels(self, size: tuple[int, int]) -> Image:
+        """Return memory for an image of this size, 1D and maybe longer: what is free, if it does.
+
+        Fresh memory costs a page fault for every 4096 bytes that are written.
+        """
+        wanted = size[0] * size[1] * 4
+        free, self._free = self._free, None
+        return aligned_empty(wanted, np.float32) if free is None or free.size < wanted else free
 
     # -- which renderer --------------------------------------------------------------------------
 
