@@ -195,11 +195,17 @@ def _state(renderer: Any, view: Any, plain: Sequence[Any]) -> Any:
     """Return all that the depth in an area depends on, ``None`` if that is not known."""
     if not plain:
         return None
-    times = [(prop.GetAddressAsString(""), prop.GetRedrawMTime()) for prop in plain]
     return (
         view,
-        times,
+        [(prop.GetAddressAsString(""), *_times(prop)) for prop in plain],
         renderer.GetRenderWindow().GetMultiSamples(),
         renderer.GetUseHiddenLineRemoval(),
         vtkMapper.GetResolveCoincidentTopology(),
     )
+
+
+def _times(prop: Any) -> list[int]:
+    """Return when an actor, and the planes that its mapper clips to, were modified."""
+    planes = prop.GetMapper().GetClippingPlanes()
+    items = [] if planes is None else [planes.GetItem(i) for i in range(planes.GetNumberOfItems())]
+    return [prop.GetRedrawMTime(), *(plane.GetMTime() for plane in items)]
