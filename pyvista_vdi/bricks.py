@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -20,8 +19,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from .blocks import GROUP, block_items
-from .checks import as_float
-from .errors import DeviceMemoryError, InvalidArgumentError
+from .errors import DeviceMemoryError
 from .opencl_runtime import DeviceBuffer, Runtime, bytes_text, kept_together
 
 #: Logarithms to base 2 of the cells along a brick's edge: large ones copy fewer points twice.
@@ -34,50 +32,8 @@ _NEIGHBOURS, _GRADIENT_NEIGHBOURS = (0, 1), (1, 3)
 SAMPLE_BYTES = 16
 #: Share of a device's free memory that bricks take where no limit is given: drivers need some.
 _SHARE_OF_FREE = 0.8
-_UNITS = {
-    "": 1,
-    "b": 1,
-    **{f"{prefix}b": 1000 ** (k + 1) for k, prefix in enumerate("kmgt")},
-    **{f"{prefix}ib": 1024 ** (k + 1) for k, prefix in enumerate("kmgt")},
-}
-
 #: Turns part of a volume's array, or all of it, into what the kernels read, C-contiguous.
 Read = Callable[[NDArray[Any]], NDArray[Any]]
-
-
-def memory_limit_bytes(memory_limit: Any) -> int | None:
-    """Return a memory limit in bytes.
-
-    Parameters
-    ----------
-    memory_limit : None, int, float or str
-        Bytes, or a text with a unit: ``"2 GiB"`` (2^30 bytes), ``"2 GB"`` (10^9), KiB to TiB.
-
-    Returns
-    -------
-    int or None
-        ``None`` where there is none.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If it is no size above 0.
-    """
-    if memory_limit is None:
-        return None
-    unit, number = 1, math.nan
-    if isinstance(memory_limit, str):
-        match = re.fullmatch(r"\s*([\d.]+)\s*([a-z]*)\s*", memory_limit.lower())
-        if match and match[2] in _UNITS:
-            unit, number = _UNITS[match[2]], as_float(match[1])
-    elif not isinstance(memory_limit, bool | np.bool_):
-        number = as_float(memory_limit)
-    if not 1 <= number * unit < 2**63:
-        raise InvalidArgumentError(
-            "memory_limit must be a number of bytes above 0, or a text such as '2 GiB' or "
-            f"'800 MB'; got {memory_limit!r}"
-        )
-    return int(number * unit)
 
 
 @dataclass(frozen=True)
@@ -259,6 +215,8 @@ class DeviceBricks:
         How they are cut.
     slots : int
         Bricks on the device at once.
+    memory_limit : int or None
+        Most bytes on the device in all, as it was asked for.
     name : str
         Of the volume, for messages.
 
@@ -280,9 +238,11 @@ class DeviceBricks:
         dtype: DTypeLike,
         layout: BrickLayout,
         slots: int,
+        memory_limit: int | None,
         name: str,
     ) -> None:
         self.layout = layout
+        self.memory_limit = memory_limit
         self.copied = 0
         self._runtime = runtime
         self._array = array

@@ -220,7 +220,7 @@ class DeviceVolume:
             whole = _device_bytes(volume, scale) + others
             raise too_small(_described(volume), room, runtime, whole, least)
         self.bricks = DeviceBricks(
-            runtime, volume.array, _reader(scale), dtype, *found, name=volume.name
+            runtime, volume.array, _reader(scale), dtype, *found, room.limit, volume.name
         )
         self._voxels = self.bricks.pool
         self.defines["SAMPLED"] = 1

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from ._version import __version__
 from .ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from .blocks import GROUP, block_items
-from .bricks import Room, StepSampler, memory_limit_bytes
+from .bricks import Room, StepSampler
 from .camera import Camera, check_window_size
-from .checks import as_float
+from .checks import as_float, memory_limit_bytes
 from .device_volume import DeviceVolume, volume_bytes
 from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory

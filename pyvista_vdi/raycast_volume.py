@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from . import rays
 from .ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from .blocks import GROUP, block_items
-from .bricks import SAMPLE_BYTES, Room, StepSampler, memory_limit_bytes
+from .bricks import SAMPLE_BYTES, Room, StepSampler
 from .camera import Camera, check_window_size
+from .checks import memory_limit_bytes
 from .cropping import Cropping, checked_opacity_multiplier
 from .device_volume import DeviceVolume
 from .lighting import Lights
@@ -26,7 +27,6 @@ from .volume import Volume
 _PART_STEPS = 128
 #: Bytes of a ray's state between them: colour, transmittance and what they have rounded off.
 _STATE_BYTES = 32
-_ITEM_BYTES = _PART_STEPS * SAMPLE_BYTES + _STATE_BYTES
 #: Bytes of samples and states at a time, and how many such parts a memory limit has room for.
 _PART_BYTES, _PARTS_IN_LIMIT = 32 * 2**20, 8
 #: Bytes of the image, and of the depth at which a ray ends, for each pixel.
@@ -99,7 +99,7 @@ def raycast_volume(
     size = check_window_size(window_size)
     memory = memory_limit_bytes(memory_limit)
     occlusion = AmbientOcclusion.from_any(ambient_occlusion)
-    rows = _rows_of_part(size, memory)
+    grid = 0 if occlusion is None else OcclusionGrid.of(volume, occlusion).nbytes
     runtime = get_runtime(device)
     medium = DeviceVolume(
         runtime,
@@ -109,12 +109,7 @@ def raycast_volume(
         skip_empty=skip_empty,
         lights=Lights.from_any(lights),
         ambient_occlusion=occlusion,
-        room=_room(
-            size,
-            rows,
-            memory,
-            0 if occlusion is None else OcclusionGrid.of(volume, occlusion).nbytes,
-        ),
+        room=picture_room(size, memory, grid),
     )
     return raycast_medium(
         runtime,
@@ -126,8 +121,26 @@ def raycast_volume(
         cropping=Cropping.from_any(cropping),
         opacity_multiplier=checked_opacity_multiplier(opacity_multiplier),
         early_termination=early_termination,
-        rows=rows,
     )
+
+
+def picture_room(size: tuple[int, int], memory_limit: int | None, occlusion: int = 0) -> Room:
+    """Return the room for a volume beside an image and the grid of an occlusion.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height of the image in pixels.
+    memory_limit : int or None
+        Most bytes in all.
+    occlusion : int
+        Bytes of the occlusion's grid.
+    """
+    width, height = size
+    items = block_items(width, _rows_of_part(size, memory_limit))
+    working = width * height * _PIXEL_BYTES + items * _STATE_BYTES + occlusion
+    rays = f"an image of {width} x {height} pixels"
+    return Room(memory_limit, working, items * _PART_STEPS, rays)
 
 
 def _rows_of_part(size: tuple[int, int], memory_limit: int | None) -> int:
@@ -136,18 +149,8 @@ def _rows_of_part(size: tuple[int, int], memory_limit: int | None) -> int:
     if memory_limit is not None:
         most = min(most, memory_limit // _PARTS_IN_LIMIT)
     width, height = size
-    per_block_row = block_items(width, 4) * _ITEM_BYTES
+    per_block_row = block_items(width, 4) * (_PART_STEPS * SAMPLE_BYTES + _STATE_BYTES)
     return min(height, 4 * max(1, most // per_block_row))
-
-
-def _room(size: tuple[int, int], rows: int, memory_limit: int | None, occlusion: int) -> Room:
-    """Return the room for the volume beside an image and the grid of an occlusion."""
-    width, height = size
-    items = block_items(width, rows)
-    working = width * height * _PIXEL_BYTES + items * _STATE_BYTES + occlusion
-    return Room(
-        memory_limit, working, items * _PART_STEPS, f"an image of {width} x {height} pixels"
-    )
 
 
 def raycast_medium(
@@ -161,12 +164,8 @@ def raycast_medium(
     cropping: Cropping | None = None,
     opacity_multiplier: float = 1.0,
     early_termination: bool = True,
-    rows: int | None = None,
 ) -> NDArray[np.float32]:
-    """Render a volume that is on the device already; see :func:`raycast_volume`.
-
-    ``rows``: how many are sampled at a time, where the volume is there brick by brick.
-    """
+    """Render a volume that is on the device already; see :func:`raycast_volume`."""
     width, height = size
     forms, pixel_rays, planes = medium.forms(camera, size, clipping_planes)
     ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
@@ -215,8 +214,8 @@ def raycast_medium(
         if medium.bricks is None:
             launch(block_items(width, height), (), ())
         else:
-            # Rows and steps at a time: the state of a row's rays goes on from steps to steps
-            rows = rows or height
+            # Some steps of some rows at a time; the state of the rays goes on from step to step
+            rows = _rows_of_part(size, medium.bricks.memory_limit)
             items = block_items(width, rows)
             states = keep(runtime.buffer((items, 2, 4), name="states of rays"))
             sampler = keep(

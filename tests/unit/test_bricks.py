@@ -14,12 +14,13 @@ from pyvista_vdi.bricks import (
     DeviceBricks,
     fitting_layout,
     in_parts,
-    memory_limit_bytes,
 )
+from pyvista_vdi.checks import memory_limit_bytes
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.generation import CRITERIA, estimate, generate_vdi
 from pyvista_vdi.lighting import Shading
 from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.view_error import estimate_view_error
 
 WINDOW = (20, 13)
 #: Little enough that the volumes below do not fit, enough for the rays of that window.
@@ -222,6 +223,30 @@ def test_a_file_larger_than_the_bricks(runtime, used, tmp_path):
     assert used
 
 
+def test_views_are_judged_within_the_limit(runtime, used):
+    volume = volume_of(np.uint8)
+    function, camera = transfer_for(volume), VIEWS["perspective"]
+    vdi = make(runtime, volume, camera, function)
+    options = {"sample_distance": 1.0, "device": runtime}
+    view, window = camera.azimuth(20), (90, 60)
+    judged = estimate_view_error(vdi, volume, function, view, window, **options)
+    limited = estimate_view_error(
+        vdi, volume, function, view, window, memory_limit=2.9 * 2**20, **options
+    )
+    assert used
+    assert limited == judged
+
+
+def test_the_same_in_the_background(runtime, used):
+    volume = volume_of(np.uint8)
+    function, camera = transfer_for(volume), VIEWS["perspective"]
+    whole = make(runtime, volume, camera, function)
+    with runtime.background():
+        limited = make(runtime, volume, camera, function, memory_limit=LIMIT)
+    assert used
+    assert limited.equals(whole)
+
+
 # -- what goes to the device ----------------------------------------------------------------------
 
 
@@ -244,7 +269,7 @@ def test_transparent_bricks_stay_where_they_are(runtime, used):
 def test_what_was_used_longest_ago_makes_room(runtime):
     array = np.arange(33 * 33 * 65, dtype=np.float32).reshape(33, 33, 65)
     layout = BrickLayout.of((65, 33, 33), 4, False, 4)
-    held = DeviceBricks(runtime, array, np.asarray, np.float32, layout, 3, "some")
+    held = DeviceBricks(runtime, array, np.asarray, np.float32, layout, 3, None, "some")
     assert layout.counts == (4, 2, 2)
 
     def rounds(*wanted):
