@@ -6,6 +6,7 @@ import math
 import threading
 import weakref
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ from .numerics import (
     LARGEST_VOXEL,
     MOST_STEPS,
     compensation,
+    entries,
     held_unit_distance,
     scalars_suit_float32,
 )
@@ -42,6 +44,7 @@ from .opencl_runtime import (
     kept_together,
     padded,
 )
+from .rays import Floats, PixelRays, packed, packed_pairs
 from .shading import gradient_table, lighting_table, shading_defines
 from .transfer_function import TransferFunction
 from .volume import Volume
@@ -65,10 +68,39 @@ _BLOCK_BYTES = 9
 _TABLE_BYTES = 2**20
 #: Share of transparent blocks from which on looking for them pays.
 _WORTH_SKIPPING = 0.05
+#: Scalars of 16 bits that are looked up and not classified at each sample: 64 KiB of media.
+_MOST_LOOKED_UP = 4096
 #: Where scaled voxels end, in ranges of the transfer function.
 _BEYOND = 2.0**60
 _uploads: weakref.WeakKeyDictionary[Volume, _Uploads] = weakref.WeakKeyDictionary()
 _uploads_lock = threading.Lock()
+
+
+@dataclass(frozen=True)
+class MarchForms:
+    """The rays of a view through a volume, as ``begin_march`` of ``common/march.cl`` takes them.
+
+    Attributes
+    ----------
+    forms : list of numpy.ndarray
+        Three index positions, three model directions, then the planes to clip to.
+    rays : PixelRays
+        The rays that they belong to.
+    planes : int
+        How many of the forms are planes.
+    defines : dict
+        ``-D`` names of the kernels that read them.
+    """
+
+    forms: list[Floats]
+    rays: PixelRays
+    planes: int
+    defines: dict[str, str | int | None]
+
+    def packed(self, *more: Floats) -> NDArray[np.float32]:
+        """Return the forms, and more of the same rays, as the kernels read them."""
+        pack = packed_pairs if self.defines else packed
+        return pack([*self.forms, *more])
 
 
 class DeviceVolume:
@@ -153,6 +185,8 @@ class DeviceVolume:
             self.defines["SKIP_EMPTY"] = 1
         if transfer_function.interpolation == "nearest":
             self.defines["NEAREST"] = 1
+            if native and (ends := _integer_ends(runtime, volume, ranges)):
+                self._look_up_by_scalar(runtime, *ends)
         self._runtime = runtime
         self._shading = transfer_function.shading
         self._lights = Lights() if lights is None else lights
@@ -178,6 +212,27 @@ class DeviceVolume:
             shading["OCCLUSION"] = 1
         self.defines.update(shading)
         self.defines.update(compensation(volume.length / self.sample_distance))
+
+    def _look_up_by_scalar(self, runtime: Runtime, first: int, last: int) -> None:
+        """Replace the table by one of what each scalar from ``first`` to ``last`` looks like."""
+        n = last - first + 1
+        media = runtime.buffer((n, 4), name="media of scalars")
+        with self._table:
+            runtime.launch(
+                runtime.kernel("grid/scalar_media.cl", "scalar_media"),
+                padded(n, GROUP),
+                GROUP,
+                self._table,
+                np.int32(self._entries),
+                np.float32(self._low),
+                np.float32(self._per_scalar),
+                np.int32(first),
+                np.int32(n),
+                media,
+            )
+            runtime.finish()  # the table may be host memory in use
+        self._table, self._entries, self._low, self._per_scalar = media, n, float(first), 1.0
+        self.defines["BY_SCALAR"] = 1
 
     @property
     def most_steps(self) -> int:
@@ -314,8 +369,8 @@ class DeviceVolume:
 
     def forms(
         self, camera: Camera, window_size: Sequence[int], clipping_planes: ArrayLike | None
-    ) -> tuple[NDArray[np.float32], rays.PixelRays, int]:
-        """Return the march's forms, the rays they belong to, and the number of planes in them."""
+    ) -> MarchForms:
+        """Return what the kernels march along in a view."""
         pixel_rays = rays.pixel_rays(camera, window_size, self.volume.bounds)
         to_index = rays.inverse_affine(self.volume.index_to_model)
         index = [pixel_rays.form(row[:3], row[3]) for row in to_index[:3]]
@@ -327,7 +382,9 @@ class DeviceVolume:
             planes += [form, far]
         planes += rays.eye_plane(camera, pixel_rays)
         planes += rays.user_planes(camera, pixel_rays, clipping_planes)
-        return rays.packed([*index, *direction, *planes]), pixel_rays, len(planes)
+        reach = rays.largest_value(camera, window_size, self.volume.bounds, index)
+        defines = entries(reach, max(self.volume.dimensions))
+        return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), defines)
 
 
 def _voxel_defines(volume: Volume, native: bool) -> dict[str, str | int | None]:
@@ -390,6 +447,8 @@ class _Uploads:
         self.ranges: dict[Any, NDArray[np.float32]] = {}
         #: Whether float32 cannot hold the voxels' differences; None before anyone has asked.
         self.too_large: bool | None = None
+        #: The least and the largest voxel of 16 bits; None before anyone has asked.
+        self.ends: tuple[int, int] | None = None
         self.occlusions: dict[Runtime, tuple[Any, DeviceBuffer]] = {}
 
 
@@ -550,6 +609,21 @@ def _block_ranges(
         ranges,
     )
     return ranges
+
+
+def _integer_ends(runtime: Runtime, volume: Volume, ranges: DeviceBuffer) -> tuple[int, int] | None:
+    """Return the least and the largest scalar that voxels may have, if they are few enough."""
+    dtype = volume.array.dtype
+    if dtype.kind not in "iu":
+        return None
+    if dtype.itemsize == 1:
+        return (0, 255) if dtype.kind == "u" else (-128, 127)
+    uploads = _uploads_of(volume)
+    if uploads.ends is None:
+        blocks = runtime.download(ranges)
+        uploads.ends = int(blocks[:, 0].min()), int(blocks[:, 1].max())
+    least, largest = uploads.ends
+    return uploads.ends if largest - least < _MOST_LOOKED_UP else None
 
 
 def _require_a_number(runtime: Runtime, volume: Volume) -> None:

@@ -280,7 +280,7 @@ def generate_vdi(
             _report(progress, first_row / height)
             rows = min(recorder.slices.rows, height - first_row)
             recorder.march(first_row, rows)
-            parts.append(recorder.packed(rows))
+            parts.append(recorder.packed(first_row, rows))
             _require_room(parts, (width, height))
     _report(progress, 1.0)
 
@@ -393,22 +393,24 @@ class _Recorder:
             np.float32(hidden_weight),
         )
         check_list_space(camera, medium.volume.bounds)
-        forms, rays, self._planes = medium.forms(camera, size, None)
-        self.depth_origin = rays.reference_depth
+        rays = medium.forms(camera, size, None)
+        self._planes = rays.planes
+        self._far_entries = bool(rays.defines)
+        self.depth_origin = rays.rays.reference_depth
         self._most_steps = medium.most_steps
         self.slices = slices
         self._grain = _steps_per_voxel(medium.volume, medium.sample_distance)
         items, capacity = self.slices.items, self.slices.capacity
         self._cuts = _CRITERIA[criterion]
         names = ["march_lists", "shorten_lists", "pack_lists"]
-        defines = dict(medium.defines)
+        defines = {**medium.defines, **rays.defines}
         if self._cuts:
             names.append("cut_lists")
             defines["CRITERION"] = self._cuts
         self._kernels = {name: runtime.kernel("vdi/generate.cl", name, defines) for name in names}
         with ExitStack() as stack:
             keep = stack.enter_context
-            self._forms = keep(runtime.upload(forms, "rays"))
+            self._forms = keep(runtime.upload(rays.packed(), "rays"))
             self._records = keep(runtime.buffer((items, capacity, 8), name="recorded runs"))
             self._errors = keep(runtime.buffer((items, capacity), name="merge errors"))
             self._thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
@@ -494,9 +496,12 @@ class _Recorder:
                 self._counts,
             )
 
-    def packed(self, rows: int) -> tuple[NDArray[Any], ...]:
+    def packed(self, first_row: int, rows: int) -> tuple[NDArray[Any], ...]:
         """Return lengths, fronts, backs, colours and optical depths of the slice's lists."""
-        runtime, width = self._runtime, self._size[0]
+        runtime, (width, height) = self._runtime, self._size
+        entries: tuple[Any, ...] = ()
+        if self._far_entries:
+            entries = (self._forms, np.int32(self._planes), np.int32(height), np.int32(first_row))
         lengths = runtime.download(self._counts, count=rows * width)
         offsets = np.zeros(rows * width + 1, np.uint64)
         np.cumsum(lengths, dtype=np.uint64, out=offsets[1:])
@@ -520,6 +525,7 @@ class _Recorder:
                 back,
                 color,
                 optical_depth,
+                *entries,
             )
             arrays = [runtime.download(buffer) for buffer in (front, back, color, optical_depth)]
         return (lengths, *arrays)

@@ -167,13 +167,12 @@ def raycast_medium(
 ) -> NDArray[np.float32]:
     """Render a volume that is on the device already; see :func:`raycast_volume`."""
     width, height = size
-    forms, pixel_rays, planes = medium.forms(camera, size, clipping_planes)
-    ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
-    cropped = rays.cropped(pixel_rays, cropping, medium.volume.bounds)
-    planes += len(cropped.planes)
-    if cropped.planes or cropped.forms:
-        forms = np.concatenate([forms, rays.packed([*cropped.planes, *cropped.forms])])
-    defines = {**medium.defines, **cropped.defines}
+    march = medium.forms(camera, size, clipping_planes)
+    ends = rays.checked_opaque_depth(opaque_depth, size, march.rays)
+    cropped = rays.cropped(march.rays, cropping, medium.volume.bounds)
+    planes = march.planes + len(cropped.planes)
+    forms = march.packed(*cropped.planes, *cropped.forms)
+    defines = {**medium.defines, **march.defines, **cropped.defines}
     multiplier: tuple[np.float32, ...] = ()
     if opacity_multiplier != 1.0:
         defines["OPACITY_MULTIPLIER"] = 1
@@ -185,7 +184,7 @@ def raycast_medium(
         no_ends = np.zeros(1, np.float32)
         depth = keep(runtime.upload(no_ends if ends is None else ends, "opaque depth"))
         image = keep(runtime.buffer((height, width, 4), name="image"))
-        march = (
+        begin = (
             form_buffer,
             np.int32(planes),
             np.float32(medium.sample_distance),
@@ -199,7 +198,7 @@ def raycast_medium(
                 GROUP,
                 *medium.medium_arguments(camera),
                 *sampled,
-                *march,
+                *begin,
                 np.int32(width),
                 np.int32(height),
                 depth,
@@ -224,7 +223,7 @@ def raycast_medium(
                     medium.bricks,
                     medium.medium_arguments(camera),
                     defines,
-                    march,
+                    begin,
                     size,
                     items * _PART_STEPS,
                     None if ends is None else depth,

@@ -2,6 +2,10 @@
 //
 // Samples lie at the midpoints of steps of equal model length along the ray, the last one shorter (DESIGN section 3).
 // Every face is computed from its step's number, never accumulated.
+//
+// -D BY_SCALAR     with NEAREST and voxels of integers: the table holds the medium of each scalar from `low` on, of which no
+//                  voxel is outside (grid/scalar_media.cl); otherwise it is classified at each sample
+// -D FAR_ENTRIES   see common/rays.cl: t counts from where the ray enters
 #include "common/rays.cl"
 #include "common/classification.cl"
 #include "common/volume_sampling.cl"
@@ -12,7 +16,7 @@
 typedef struct {
     __global const VOXEL_T *voxels;
     int4 size;                    // points along x, y, z
-    __global const float4 *table; // transfer function
+    __global const float4 *table; // transfer function, or the media of scalars
     int entries;
     float low, per_scalar;        // scalar to table position
     __global const uchar *visible; // whether a block holds anything that is not transparent
@@ -28,7 +32,20 @@ typedef struct {
     float per_step;      // 1 / step
     float units;         // opacity unit distances per unit of t
     int steps;
+#ifdef FAR_ENTRIES
+    float2 entry;        // t of the rays' forms where t is 0 here
+#endif
 } March;
+
+// Value of a form where t of the march is 0.
+inline float march_value(const March *march, __global const float *form, float a, float b)
+{
+#ifdef FAR_ENTRIES
+    return form_value_at(form, a, b, march->entry);
+#else
+    return form_value(form, a, b);
+#endif
+}
 
 // Model-frame direction of the ray per unit of t.
 inline float3 model_direction(__global const float *forms, float a, float b)
@@ -42,12 +59,18 @@ inline float3 model_direction(__global const float *forms, float a, float b)
 inline bool begin_march(March *march, __global const float *forms, int planes, float a, float b,
                         float sample_distance, float unit_distance, float t_end)
 {
+#ifdef FAR_ENTRIES
+    march->t0 = 0.0f;
+    if (!clip_from_entry(forms + 6 * FORM_SIZE, planes, a, b, t_end, &march->entry, &march->t1))
+        return false;
+#else
     march->t0 = -INFINITY;
     march->t1 = t_end;
     if (!clip_to_planes(forms + 6 * FORM_SIZE, planes, a, b, &march->t0, &march->t1))
         return false;
-    march->start = (float3)(form_value(forms, a, b), form_value(forms + FORM_SIZE, a, b),
-                            form_value(forms + 2 * FORM_SIZE, a, b));
+#endif
+    march->start = (float3)(march_value(march, forms, a, b), march_value(march, forms + FORM_SIZE, a, b),
+                            march_value(march, forms + 2 * FORM_SIZE, a, b));
     march->slope = (float3)(form_slope(forms, a, b), form_slope(forms + FORM_SIZE, a, b),
                             form_slope(forms + 2 * FORM_SIZE, a, b));
     const float speed = length(model_direction(forms, a, b)); // model units per unit of t
@@ -105,10 +128,19 @@ inline int empty_steps(const March *march, const Medium *medium, int k, int end,
 // Colour (rgb) and optical depth (w) of a step of `units` opacity unit distances around index position (x, y, z).
 inline float4 medium_at(const Medium *medium, float x, float y, float z, float units)
 {
+#ifdef BY_SCALAR
+    const int scalar = (int)nearest_component(medium->voxels, medium->size, x, y, z, SCALAR);
+    const uint entry = min((uint)(scalar - (int)medium->low), (uint)(medium->entries - 1));
+    // Two loads where a vector's lanes load from different places, and not four
+    __global const ulong *halves = (__global const ulong *)(medium->table + entry);
+    float4 sample = (float4)(as_float2(halves[0]), as_float2(halves[1]));
+    sample.w = scaled_to_step(sample.w, units);
+#else
     const float scalar = sample_volume(medium->voxels, medium->size, x, y, z);
     float4 sample = classify(scalar, medium->table, medium->entries, medium->low, medium->per_scalar);
     if (sample.w > 0.0f)
         sample.w = step_optical_depth(sample.w, units);
+#endif
 #if defined(RGBA) || defined(SHADED) || defined(GRADIENT_OPACITY) || defined(OCCLUSION)
     if (sample.w > 0.0f) {
 #ifdef RGBA

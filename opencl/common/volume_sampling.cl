@@ -28,15 +28,24 @@
 #endif
 #define SCALAR (COMPONENTS - 1) // which of them classification sees
 
+#ifdef NEAREST
+// A component of the point nearest to a position.
+inline VOXEL_T nearest_component(__global const VOXEL_T *voxels, int4 size, float x, float y, float z, int component)
+{
+    // What is below 0 is clamped, so that (int) rounds down
+    const int i = clamp((int)(x + 0.5f), 0, size.x - 1);
+    const int j = clamp((int)(y + 0.5f), 0, size.y - 1);
+    const int k = clamp((int)(z + 0.5f), 0, size.z - 1);
+    const INDEX_T voxel = ((INDEX_T)k * (INDEX_T)POINTS_Y(size) + (INDEX_T)j) * (INDEX_T)POINTS_X(size) + (INDEX_T)i -
+                          FIRST_POINT(size);
+    return voxels[voxel * COMPONENTS + component];
+}
+#endif
+
 inline float sample_component(__global const VOXEL_T *voxels, int4 size, float x, float y, float z, int component)
 {
 #ifdef NEAREST
-    const int i = clamp((int)floor(x + 0.5f), 0, size.x - 1);
-    const int j = clamp((int)floor(y + 0.5f), 0, size.y - 1);
-    const int k = clamp((int)floor(z + 0.5f), 0, size.z - 1);
-    const INDEX_T voxel = ((INDEX_T)k * (INDEX_T)POINTS_Y(size) + (INDEX_T)j) * (INDEX_T)POINTS_X(size) + (INDEX_T)i -
-                          FIRST_POINT(size);
-    return (float)voxels[voxel * COMPONENTS + component];
+    return (float)nearest_component(voxels, size, x, y, z, component);
 #else
     // Rounding can put a position on the far face a hair outside: clamp the cell, keep the weight in [0, 1]
     const int i = clamp((int)x, 0, size.x - 2);

@@ -1,8 +1,8 @@
 // Direct volume rendering: the baseline that a VDI is measured against, by the same march as generation.
 //
-// -D VOXEL_T, INDEX_T, RGBA, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
+// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl; OCCLUSION: see common/occlusion.cl
-// -D COMPENSATED: see common/over.cl
+// -D COMPENSATED: see common/over.cl; FAR_ENTRIES: see common/rays.cl
 // -D CROPPED: see common/cropping.cl
 // -D OPACITY_MULTIPLIER: optical depths are multiplied
 // -D SAMPLED: see common/samples.cl; some steps of some rows at a time then, as they are sampled
@@ -31,8 +31,9 @@ inline Kept kept_march(const March *march, __global const float *form, float a, 
 {
     float at_t0[CROPPING_PLANES], at_t1[CROPPING_PLANES];
     for (int k = 0; k < CROPPING_PLANES; ++k, form += FORM_SIZE) {
-        at_t0[k] = fma(march->t0, form_slope(form, a, b), form_value(form, a, b));
-        at_t1[k] = fma(march->t1, form_slope(form, a, b), form_value(form, a, b));
+        const float value = march_value(march, form, a, b);
+        at_t0[k] = fma(march->t0, form_slope(form, a, b), value);
+        at_t1[k] = fma(march->t1, form_slope(form, a, b), value);
     }
     return kept_parts(at_t0, at_t1, march->t0, march->t1, regions);
 }
