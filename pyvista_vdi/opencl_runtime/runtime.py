@@ -439,7 +439,7 @@ class Runtime:
                     self._copy("[read]", memory, out, to_host=True)
         return out
 
-    def write(self, buffer: DeviceBuffer, array: NDArray[Any]) -> None:
+    def write(self, buffer: DeviceBuffer, array: NDArray[Any], *, first: int | None = None) -> None:
         """Copy an array into a buffer; the array is free to change when this returns.
 
         Parameters
@@ -448,6 +448,8 @@ class Runtime:
             The target, not one from :meth:`upload`.
         array : numpy.ndarray
             Of the buffer's dtype and of as many elements.
+        first : int, optional
+            Write only part of the buffer: as many elements as the array has, from this one on.
 
         Raises
         ------
@@ -458,10 +460,16 @@ class Runtime:
         """
         memory = self._writable_memory(buffer)
         array = np.ascontiguousarray(array)
-        check_host_array(array, buffer, buffer.nbytes // buffer.dtype.itemsize)
+        elements = buffer.nbytes // buffer.dtype.itemsize
+        if first is not None and not 0 <= first <= elements - array.size:
+            raise InvalidArgumentError(
+                f"{array.size} elements from {first} on are not all in the buffer "
+                f"{buffer.name!r}, which has {elements}"
+            )
+        check_host_array(array, buffer, elements if first is None else array.size)
         if array.nbytes:
             with self._driver(f"writing {array.nbytes} bytes to the buffer {buffer.name!r}"):
-                self._copy("[write]", memory, array)
+                self._copy("[write]", memory, array, offset=(first or 0) * array.itemsize)
 
     def fill(self, buffer: DeviceBuffer, value: int | np.generic) -> None:
         """Fill a buffer with one byte or one element.
@@ -555,17 +563,28 @@ class Runtime:
         buffer.host = host if in_place and writable else None
         return buffer
 
-    def _copy(self, label: str, memory: Any, host: NDArray[Any], *, to_host: bool = False) -> None:
-        """Copy between a buffer and a C-contiguous array; background work in pieces."""
+    def _copy(
+        self,
+        label: str,
+        memory: Any,
+        host: NDArray[Any],
+        *,
+        to_host: bool = False,
+        offset: int = 0,
+    ) -> None:
+        """Copy between a buffer, from a byte on, and a C-contiguous array.
+
+        Background work copies in pieces.
+        """
         data = host.reshape(-1).view(np.uint8)
         size = data.nbytes if self._turns.worker is None else _COPY_BYTES
         for start in range(0, data.nbytes, size):
             self._turns.checkpoint()
             part = data[start : start + size]
             if to_host:
-                ends = {"dest": part, "src": memory, "src_offset": start}
+                ends = {"dest": part, "src": memory, "src_offset": offset + start}
             else:
-                ends = {"dest": memory, "src": part, "dst_offset": start}
+                ends = {"dest": memory, "src": part, "dst_offset": offset + start}
             self._record(label, opencl().enqueue_copy(self._queue, **ends, is_blocking=True))
 
     def _map(self, memory: Any, host: NDArray[Any]) -> None:
