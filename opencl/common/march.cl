@@ -87,19 +87,25 @@ inline float step_face(const March *march, int k)
     return fmin(fma((float)k, march->step, march->t0), march->t1);
 }
 
-// Steps from step k on whose midpoints lie in transparent blocks around the first one's, in whole groups of `group` steps, so
-// that the others are grouped as if none had been passed by; 0 where there is something to look at. Skipping decides what is
-// looked at and changes no sample. -D SKIP_EMPTY, or every step is looked at.
-inline int empty_steps(const March *march, const Medium *medium, int k, int end, int group)
-{
 #ifdef SKIP_EMPTY
+// The block that the midpoint of step k lies in.
+inline int3 block_of_step(const March *march, const Medium *medium, int k)
+{
     const float t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
     const float3 position = march->start + t * march->slope;
-    const int3 block = clamp(convert_int3(position) >> BLOCK_SHIFT, (int3)(0), medium->blocks.xyz - 1);
-    const int reach = medium->reaches[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x];
-    if (reach == 0)
-        return 0;
-    // Where the ray leaves the blocks that are known to be transparent: past the face ahead on each axis, or never
+    return clamp(convert_int3(position) >> BLOCK_SHIFT, (int3)(0), medium->blocks.xyz - 1);
+}
+
+// How far a block is from one that may be visible, see grid/volume_blocks.cl; 0 where it may be so itself.
+inline int reach_of_block(const Medium *medium, int3 block)
+{
+    return medium->reaches[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x];
+}
+
+// The first step from which on midpoints may lie farther than `reach` - 1 blocks from a block that the ray is in.
+inline int first_step_behind(const March *march, int3 block, int reach)
+{
+    // Where the ray leaves those blocks: past the face ahead on each axis, or never
     const float3 lower = convert_float3((block - (reach - 1)) << BLOCK_SHIFT);
     const float3 upper = convert_float3((block + reach) << BLOCK_SHIFT);
     const float3 crossing = ((march->slope > 0.0f ? upper : lower) - march->start) * march->inverse;
@@ -107,8 +113,19 @@ inline int empty_steps(const March *march, const Medium *medium, int k, int end,
                               fmin(march->slope.y != 0.0f ? crossing.y : INFINITY,
                                    march->slope.z != 0.0f ? crossing.z : INFINITY));
     // Steps with their midpoint before that, less a hundredth of a step for the rounding of positions
-    const int passed = (int)fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f) + 1;
-    return max(min(passed, end) - k, 0) / group * group;
+    return (int)fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f) + 1;
+}
+#endif
+
+// Steps from step k on whose midpoints lie in transparent blocks around the first one's, in whole groups of `group` steps, so
+// that the others are grouped as if none had been passed by; 0 where there is something to look at. Skipping decides what is
+// looked at and changes no sample. -D SKIP_EMPTY, or every step is looked at.
+inline int empty_steps(const March *march, const Medium *medium, int k, int end, int group)
+{
+#ifdef SKIP_EMPTY
+    const int3 block = block_of_step(march, medium, k);
+    const int reach = reach_of_block(medium, block);
+    return reach > 0 ? max(min(first_step_behind(march, block, reach), end) - k, 0) / group * group : 0;
 #else
     return 0;
 #endif
@@ -152,10 +169,14 @@ inline float4 medium_at(const Medium *medium, float x, float y, float z, float u
     return sample;
 }
 
-// Colour (rgb) and optical depth (w) of the step between two faces.
-inline float4 step_medium(const March *march, const Medium *medium, float front, float back)
+// Colour (rgb) and optical depth (w) of step k, between two faces.
+inline float4 step_medium(const March *march, const Medium *medium, int k, float front, float back)
 {
+#ifdef SAMPLED
+    return medium->samples[(k - medium->first_sample) * SAMPLE_LANES];
+#else
     const float t = 0.5f * (front + back);
     return medium_at(medium, fma(t, march->slope.x, march->start.x), fma(t, march->slope.y, march->start.y),
                      fma(t, march->slope.z, march->start.z), (back - front) * march->units);
+#endif
 }

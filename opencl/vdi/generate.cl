@@ -2,6 +2,7 @@
 //
 // -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl; OCCLUSION: see common/occlusion.cl
+// -D SAMPLED: see common/samples.cl
 // -D CRITERION: see vdi/criteria.cl; without it lists are shortened at least error
 // -D COMPENSATED: see common/over.cl; FAR_ENTRIES: see common/rays.cl
 //
@@ -90,7 +91,7 @@ __kernel void march_lists(
         float8 sample = (float8)(face, face, 0.0f, transmittance, 0.0f, 0.0f, 0.0f, 0.0f);
         for (const int group_end = min(k + group, end); k < group_end; ++k) {
             const float back = step_face(&march, k + 1);
-            const float4 step = step_medium(&march, &medium, face, back);
+            const float4 step = step_medium(&march, &medium, k, face, back);
             const float opacity = opacity_of(step.w);
             const float weight = (1.0f - sample.OPACITY) * opacity; // over, front to back
             sample.TAU += step.w;

@@ -42,6 +42,7 @@ def generate(options: argparse.Namespace) -> int:
         max_supersegments=options.max_supersegments,
         criterion=options.criterion,
         ambient_occlusion=occlusion,
+        memory_limit=options.memory_limit,
     )
     print(
         f"{volume.dimensions[0]} x {volume.dimensions[1]} x {volume.dimensions[2]} points, "
@@ -61,6 +62,7 @@ def generate(options: argparse.Namespace) -> int:
             tolerance=options.tolerance,
             view_cone=options.view_cone,
             ambient_occlusion=occlusion,
+            memory_limit=options.memory_limit,
             device=options.device,
             progress=bar,
             **arguments,

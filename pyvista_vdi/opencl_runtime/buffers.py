@@ -176,8 +176,9 @@ class DeviceBuffer:
         Whether :meth:`Runtime.write` and :meth:`Runtime.fill` may change it.
     readers : set of int or None
         Where the memory is a host array's: the queues whose kernels use it.
-    result : numpy.ndarray or None
-        The array whose memory it is, of :meth:`Runtime.result` on a CPU device.
+    host : numpy.ndarray or None
+        The array whose memory it is and that kernels write, of :meth:`Runtime.result` and
+        :meth:`Runtime.target` on a CPU device.
     """
 
     def __init__(
@@ -196,7 +197,7 @@ class DeviceBuffer:
         self.name = name
         self.writable = writable
         self.readers: set[int] | None = None
-        self.result: NDArray[Any] | None = None
+        self.host: NDArray[Any] | None = None
         self._memory = memory
         self._finalizer = weakref.finalize(self, _release, memory, on_release)
         self._finalizer.atexit = False  # the driver frees everything at exit

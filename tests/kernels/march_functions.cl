@@ -25,7 +25,7 @@ __kernel void marches(int count, __global const VOXEL_T *voxels, int4 size, __gl
     for (int k = 0; k < min(march.steps, capacity - 1); ++k) {
         const int at = i * capacity + k;
         faces[at] = step_face(&march, k);
-        media[at] = step_medium(&march, &medium, step_face(&march, k), step_face(&march, k + 1));
+        media[at] = step_medium(&march, &medium, k, step_face(&march, k), step_face(&march, k + 1));
         empty[at] = empty_steps(&march, &medium, k, march.steps, group);
     }
     faces[i * capacity + min(march.steps, capacity - 1)] = step_face(&march, march.steps);
