@@ -243,11 +243,11 @@ def _generation_model(model: Model, runtime: Runtime, vdi: VDI, step: float) -> 
 
 def faster_peer(seconds: Mapping[str, float | None]) -> tuple[str, float] | None:
     """Return the faster of VTK's mappers, and its time; None without any."""
-    peers = {name: seconds[name] for name in _PEERS if seconds.get(name)}
+    peers = [(taken, name) for name in _PEERS if (taken := seconds.get(name))]
     if not peers:
         return None
-    name = min(peers, key=lambda n: peers[n])  # type: ignore[arg-type,return-value]
-    return name, float(peers[name])  # type: ignore[arg-type]
+    taken, name = min(peers)
+    return name, taken
 
 
 def frame_cell(row: Mapping[str, Any], reach: float | None) -> Cell:
@@ -382,17 +382,24 @@ def parsed() -> argparse.Namespace:
     options = parser.parse_args()
     if options.quick:
         options.repeats = options.generations = 2
+    names = [n for members in _groups(options).values() for n in members]
+    unknown = [name for name in options.volumes or () if name not in names]
+    if unknown:
+        parser.error(f"--volumes: {', '.join(unknown)} not among {', '.join(names)}")
     return options
 
 
 def chosen(options: argparse.Namespace) -> dict[str, list[str]]:
     """Return the volumes to be measured, by group."""
-    groups = QUICK_GROUPS if options.quick else GROUPS
     wanted = options.volumes
     return {
         group: [name for name in names if wanted is None or name in wanted]
-        for group, names in groups.items()
+        for group, names in _groups(options).items()
     }
+
+
+def _groups(options: argparse.Namespace) -> dict[str, tuple[str, ...]]:
+    return QUICK_GROUPS if options.quick else GROUPS
 
 
 def report(results: Mapping[str, Any], scaling: Mapping[str, Any] | None) -> str:
@@ -413,9 +420,12 @@ def report(results: Mapping[str, Any], scaling: Mapping[str, Any] | None) -> str
     if scaling is not None:
         lines += [*table(("cores", *QUANTITIES), core_rows(scaling)), ""]
     lines += ["## By volume", "", *table(_HEADS, _volume_rows(results, cells)), ""]
-    reasons = list(_reasons(results, cells))
-    if reasons:
-        lines += ["## Missed, and why", "", *reasons, ""]
+    for title, found in (
+        ("Missed, and why", _reasons(results, cells)),
+        ("Left out", _left_out(results)),
+    ):
+        if reasons := list(found):
+            lines += [f"## {title}", "", *reasons, ""]
     return "\n".join([*lines, system_line(results["system"]), ""])
 
 
@@ -512,6 +522,13 @@ def _reasons(
         ):
             if cell.reason:
                 yield f"- {name}, {what}: {cell.reason}"
+
+
+def _left_out(results: Mapping[str, Any]) -> Iterator[str]:
+    """Yield which of VTK's mappers could not draw a volume: the other one was the faster."""
+    for name, found in _all_measured(results):
+        for peer, reason in found["left_out"].items():
+            yield f"- {CANDIDATES[peer]} with {name}: {reason}"
 
 
 if __name__ == "__main__":
