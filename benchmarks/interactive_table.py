@@ -406,9 +406,11 @@ def report(results: Mapping[str, Any], scaling: Mapping[str, Any] | None) -> str
     """Return the reaches' tables, the volumes', and why what is missed is missed."""
     width, height = results["window_size"]
     cells = frame_cells(results)
+    case = f"N_S {results['max_supersegments']}, {results['interpolation']}"
+    if results["clock"] == "cpu":
+        case += ", by CPU time over cores"
     lines = [
-        f"# Against VTK, {width}x{height}, N_S {results['max_supersegments']}, "
-        + results["interpolation"],
+        f"# Against VTK, {width}x{height}, {case}",
         "",
         f"{LEGEND} A group's cell is its worst volume's.",
         "",
