@@ -87,28 +87,17 @@ inline float step_face(const March *march, int k)
     return fmin(fma((float)k, march->step, march->t0), march->t1);
 }
 
-#ifdef SKIP_EMPTY
-// The block that the midpoint of step k lies in.
-inline int3 block_of_step(const March *march, const Medium *medium, int k)
+// The first step from which on midpoints may lie outside a box that the ray is in, between two index positions.
+inline int first_step_outside(const March *march, float3 lower, float3 upper)
 {
-    const float t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
-    const float3 position = march->start + t * march->slope;
-    return clamp(convert_int3(position) >> BLOCK_SHIFT, (int3)(0), medium->blocks.xyz - 1);
-}
-
-// The first step from which on midpoints may lie outside a block that the ray is in.
-inline int first_step_behind(const March *march, int3 block)
-{
-    // Where the ray leaves the block: past the face ahead on each axis, or never
-    const float3 lower = convert_float3(block << BLOCK_SHIFT);
-    const float3 crossing = ((march->slope > 0.0f ? lower + (float)BLOCK : lower) - march->start) * march->inverse;
+    // Where the ray leaves the box: past the face ahead on each axis, or never
+    const float3 crossing = ((march->slope > 0.0f ? upper : lower) - march->start) * march->inverse;
     const float leaves = fmin(march->slope.x != 0.0f ? crossing.x : INFINITY,
                               fmin(march->slope.y != 0.0f ? crossing.y : INFINITY,
                                    march->slope.z != 0.0f ? crossing.z : INFINITY));
     // Steps with their midpoint before that, less a hundredth of a step for the rounding of positions
     return (int)fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f) + 1;
 }
-#endif
 
 // Steps from step k on whose midpoints lie in the same transparent block, in whole groups of `group` steps, so that the
 // others are grouped as if none had been passed by; 0 where there is something to look at. Skipping decides what is looked
@@ -116,10 +105,13 @@ inline int first_step_behind(const March *march, int3 block)
 inline int empty_steps(const March *march, const Medium *medium, int k, int end, int group)
 {
 #ifdef SKIP_EMPTY
-    const int3 block = block_of_step(march, medium, k);
+    const float t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
+    const float3 position = march->start + t * march->slope;
+    const int3 block = clamp(convert_int3(position) >> BLOCK_SHIFT, (int3)(0), medium->blocks.xyz - 1);
     if (medium->visible[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x])
         return 0;
-    return max(min(first_step_behind(march, block), end) - k, 0) / group * group;
+    const float3 lower = convert_float3(block << BLOCK_SHIFT);
+    return max(min(first_step_outside(march, lower, lower + (float)BLOCK), end) - k, 0) / group * group;
 #else
     return 0;
 #endif
