@@ -513,6 +513,7 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
     return read_file(path, **options)
 
 
+@_classified
 def estimate(
     volume: Any,
     window_size: Sequence[int],
@@ -520,6 +521,7 @@ def estimate(
     max_supersegments: int = 20,
     criterion: str = "least-error",
     ambient_occlusion: Any = None,
+    **classification: Any,
 ) -> Estimate:
     """Return how much memory generating a VDI takes, before it is taken.
 
@@ -535,6 +537,9 @@ def estimate(
         As for :func:`generate`.
     ambient_occlusion : bool, float or AmbientOcclusion, optional
         As for :func:`generate`.
+    **classification
+        As for :func:`generate`: scalars whose range is narrow for how far it is from 0 take four
+        bytes each.
 
     Returns
     -------
@@ -546,14 +551,17 @@ def estimate(
     InvalidVolumeError, InvalidArgumentError
         If an argument cannot be used.
     """
+    looks = Classification(classification, "estimate", _keywords(estimate))
+    volume = as_volume(volume, looks.scalars, looks.preference)
     from .generation import estimate as estimate_bytes
 
     return estimate_bytes(
-        as_volume(volume),
+        volume,
         window_size,
         max_supersegments=max_supersegments,
         criterion=criterion,
         ambient_occlusion=ambient_occlusion,
+        transfer_function=looks.transfer_function(volume),
     )
 
 

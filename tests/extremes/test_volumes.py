@@ -19,7 +19,7 @@ from extreme_scenes import (
     view,
 )
 
-from pyvista_vdi import reference
+from pyvista_vdi import Shading, reference
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.device_volume import DeviceVolume
 from pyvista_vdi.errors import DeviceMemoryError, InvalidVolumeError
@@ -155,6 +155,33 @@ def test_a_range_of_one_scalar(runtime, worst, at, dtype):
         [[1, 0, 0], [0, 1, 0]], [0.2, 0.6], (at, at), unit_distance=1.0, interpolation="nearest"
     )
     check(runtime, worst, Volume(cube), function)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64", "int32"])
+@pytest.mark.parametrize("look", ["plain", "gradient", "shaded"])
+@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
+def test_gradients_beside_a_range_of_one_scalar(runtime, worst, interpolation, look, dtype):
+    """What is above is drawn, and how fast the scalar changes there counts as ever."""
+    scale = 1e6 if dtype == "int32" else 1.0
+    at = 300001.0 if dtype == "int32" else 0.3  # which neither float32 nor a fifth of it holds
+    options = {
+        "plain": {},
+        "gradient": {
+            "gradient_opacities": [0.0, 0.1, 0.8, 1.0],
+            "gradient_range": (0.02 * scale, 0.25 * scale),
+        },
+        "shaded": {"shading": Shading(0.2, 0.6, 0.5, 30.0)},
+    }[look]
+    volume = Volume((FIELD * scale).astype(dtype))
+    function = TransferFunction(
+        [[1, 0.2, 0], [0, 1, 0.5]],
+        [0.0, 0.4],
+        (at, at),
+        unit_distance=1.0,
+        interpolation=interpolation,
+        **options,
+    )
+    check(runtime, worst, volume, function)
 
 
 @pytest.mark.parametrize(("factor", "suits"), [(0.999, True), (1.001, False)])
