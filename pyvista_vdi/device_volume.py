@@ -7,7 +7,7 @@ import threading
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -75,6 +75,8 @@ _WORTH_SKIPPING = 0.05
 _MOST_LOOKED_UP = 4096
 #: Where scaled voxels end, in ranges of the transfer function.
 _BEYOND = 2.0**60
+#: Scaled voxels that are above the only scalar of a range are so by this at least.
+_ABOVE = 2.0**-60
 _uploads: weakref.WeakKeyDictionary[Volume, _Uploads] = weakref.WeakKeyDictionary()
 _uploads_lock = threading.Lock()
 
@@ -168,7 +170,7 @@ class DeviceVolume:
         )
         low, high = transfer_function.scalar_range
         native = _reads_natively(runtime, volume, transfer_function, room)
-        scale = None if native else (low, high)
+        scale = None if native else _scale_of(volume, low, high)
         self.defines = _voxel_defines(volume, native)
         whole = room is None or _fits(runtime, volume, scale, room)
         if room is None or whole:
@@ -200,7 +202,7 @@ class DeviceVolume:
         self._gradient: tuple[DeviceBuffer, ...] = ()
         shading = shading_defines(transfer_function, self._lights)
         if transfer_function.gradient_opacities is not None:
-            gradient = gradient_table(volume, transfer_function, 1.0 if native else high - low)
+            gradient = gradient_table(volume, transfer_function, scale.unit if scale else 1.0)
             self._gradient = (runtime.upload(gradient, "gradient opacity"),)
         self.ambient_occlusion = ambient_occlusion
         self._occlusion: tuple[Any, ...] = ()
@@ -260,7 +262,7 @@ class DeviceVolume:
     def _hold_bricks(
         self,
         runtime: Runtime,
-        scale: tuple[float, float] | None,
+        scale: _Scale | None,
         transfer_function: TransferFunction,
         room: Room,
     ) -> None:
@@ -434,19 +436,35 @@ def _voxel_defines(volume: Volume, native: bool) -> dict[str, str | int | None]:
     return defines
 
 
+def voxel_bytes(volume: Volume, transfer_function: TransferFunction | None = None) -> int:
+    """Return the bytes of a scalar, or of a colour's component, on the device.
+
+    Scalars are taken to be read as they are where it is not known what for.
+    """
+    native = volume.array.dtype.name in _DEVICE_TYPES
+    if transfer_function is not None:
+        native = _suits_natively(volume, transfer_function)
+    return volume.array.dtype.itemsize if native else np.dtype(np.float32).itemsize
+
+
 def _reads_natively(
     runtime: Runtime, volume: Volume, transfer_function: TransferFunction, room: Room | None
 ) -> bool:
     """Whether kernels read the voxels as they are, or scaled to the transfer function's range."""
+    if not _suits_natively(volume, transfer_function):
+        return False
+    return volume.array.dtype.kind != "f" or not _too_large(runtime, volume, room)
+
+
+def _suits_natively(volume: Volume, transfer_function: TransferFunction) -> bool:
+    """Whether type and range let kernels read the voxels as they are."""
     dtype = volume.array.dtype
     if dtype.name not in _DEVICE_TYPES:
         return False
     if volume.rgba:  # a byte is exact, and colours have no such range
         return True
     low, high = transfer_function.scalar_range
-    if not scalars_suit_float32(low, high, dtype, transfer_function.interpolation):
-        return False
-    return dtype.kind != "f" or not _too_large(runtime, volume, room)
+    return scalars_suit_float32(low, high, dtype, transfer_function.interpolation)
 
 
 def _too_large(runtime: Runtime, volume: Volume, room: Room | None) -> bool:
@@ -528,7 +546,7 @@ def _blocks_of(dimensions: Sequence[int]) -> tuple[int, int, int]:
     return x, y, z
 
 
-def _device_bytes(volume: Volume, scale: tuple[float, float] | None) -> int:
+def _device_bytes(volume: Volume, scale: _Scale | None) -> int:
     """Bytes of the volume on a device."""
     return volume.array.nbytes if scale is None else 4 * volume.array.size
 
@@ -538,7 +556,7 @@ def _described(volume: Volume) -> str:
     return f"the volume {volume.name!r}, {nx} x {ny} x {nz} of {volume.array.dtype}"
 
 
-def _fits(runtime: Runtime, volume: Volume, scale: tuple[float, float] | None, room: Room) -> bool:
+def _fits(runtime: Runtime, volume: Volume, scale: _Scale | None, room: Room) -> bool:
     """Whether there is room for a volume in one piece."""
     uploaded = (runtime, scale) in _uploads_of(volume).made
     nbytes, blocks = _device_bytes(volume, scale), math.prod(_blocks(volume))
@@ -558,15 +576,15 @@ def volume_bytes(volume: Volume, nbytes: int, room: Room) -> tuple[int, int]:
     return room.limit - room.working - room.sample_bytes, room.sample_bytes
 
 
-def _reader(scale: tuple[float, float] | None) -> Callable[[NDArray[Any]], NDArray[Any]]:
+def _reader(scale: _Scale | None) -> Callable[[NDArray[Any]], NDArray[Any]]:
     """Return what makes of voxels what the kernels read."""
-    return (lambda part: part) if scale is None else (lambda part: _scaled(part, *scale))
+    return (lambda part: part) if scale is None else (lambda part: _scaled(part, scale))
 
 
 def _upload(
     runtime: Runtime,
     volume: Volume,
-    scale: tuple[float, float] | None,
+    scale: _Scale | None,
     defines: dict[str, str | int | None],
 ) -> tuple[DeviceBuffer, DeviceBuffer]:
     """Return voxels and the scalar range of each block, made once per device and scaling."""
@@ -590,7 +608,7 @@ def _upload(
 def _upload_ranges(
     runtime: Runtime,
     volume: Volume,
-    scale: tuple[float, float] | None,
+    scale: _Scale | None,
     defines: dict[str, str | int | None],
     room: Room,
 ) -> DeviceBuffer:
@@ -608,7 +626,7 @@ def _upload_ranges(
 def _ranges_in_parts(
     runtime: Runtime,
     volume: Volume,
-    scale: tuple[float, float] | None,
+    scale: _Scale | None,
     defines: dict[str, str | int | None],
     room: Room,
 ) -> NDArray[np.float32]:
@@ -677,31 +695,51 @@ def _require_a_number(runtime: Runtime, volume: Volume) -> None:
     volume.finite_range()  # says what is wrong
 
 
-def _all_scaled(
-    runtime: Runtime, array: NDArray[Any], scale: tuple[float, float]
-) -> NDArray[np.float32]:
+class _Scale(NamedTuple):
+    """How voxels are taken relative to a transfer function's range.
+
+    Attributes
+    ----------
+    low : float
+        The scalar that becomes 0.
+    unit : float
+        Scalars per unit of the device's voxels.
+    step : bool
+        Whether ``low`` is the whole range, so that being above it is what counts.
+    """
+
+    low: float
+    unit: float
+    step: bool
+
+
+def _scale_of(volume: Volume, low: float, high: float) -> _Scale:
+    if high > low:
+        return _Scale(low, high - low, False)
+    finite = volume.scalars[np.isfinite(volume.scalars)]
+    ends = np.array([finite.min(), finite.max()], np.float64) if finite.size else np.array([low])
+    return _Scale(low, float(np.abs(ends / 2 - low / 2).max()) * 2 or 1.0, True)
+
+
+def _all_scaled(runtime: Runtime, array: NDArray[Any], scale: _Scale) -> NDArray[np.float32]:
     """Scale a volume plane by plane, see :func:`_scaled`."""
     scaled = aligned_empty(array.shape, np.float32)
     for plane, target in zip(array, scaled, strict=True):
         runtime.give_way()
-        target[...] = _scaled(plane, *scale)
+        target[...] = _scaled(plane, scale)
     return scaled
 
 
-def _scaled(array: NDArray[Any], low: float, high: float) -> NDArray[np.float32]:
+def _scaled(array: NDArray[Any], scale: _Scale) -> NDArray[np.float32]:
     """32-bit integers and float64 to float32, taken relative to the transfer function's range.
 
     float32 holds 24 bits: of a value far from zero compared with the range little would be left,
     of its place in the range everything that the table can tell apart is.
     """
-    if high > low:
-        scaled = (array.astype(np.float64) - low) / (high - low)
-        # Beyond any table anyway: their differences and the squares of these stay finite. An
-        # infinite voxel stays one
-        finite = np.clip(scaled, -_BEYOND, _BEYOND)
-        return np.where(np.isinf(array), scaled, finite).astype(np.float32)
-    # At or below the single scalar, or above it
-    above = (array > np.float64(low)).astype(np.float32)
-    if array.dtype.kind == "f":
-        above[np.isnan(array)] = np.nan
-    return above
+    scaled = (array.astype(np.float64) - scale.low) / scale.unit
+    if scale.step:  # what is above stays above, however little
+        scaled = np.where(scaled > 0, np.maximum(scaled, _ABOVE), scaled)
+    # Beyond any table anyway: their differences and the squares of these stay finite. An infinite
+    # voxel stays one
+    finite = np.clip(scaled, -_BEYOND, _BEYOND)
+    return np.where(np.isinf(array), scaled, finite).astype(np.float32)
