@@ -301,7 +301,8 @@ def march_work(
     looked_up = not linear and volume.array.dtype.kind in "iu"
     item = min(volume.array.dtype.itemsize, 4)
     table_bytes = len(function.opacities) * ENTRY
-    per_ray = samples / max(rays, 1) * item * (8 if linear else 1)
+    sampled = samples * item * (8 if linear else 1)
+    per_ray = sampled / max(rays, 1)
     operations = OF_MARCHED_RAY.times(rays) + OF_SAMPLE.times(samples) + OF_VISIBLE.times(visible)
     operations += OF_BLOCK.times(each["blocks"])
     if linear:
@@ -311,7 +312,7 @@ def march_work(
     if records:
         operations += OF_RUN_STEP.times(visible)
     return Work(
-        read=visible_share * volume.array.size * item,
+        read=min(visible_share * volume.array.size * item, sampled),
         write=0.0 if records else rays * PIXEL,
         gathers=(
             Gathers(samples * (8 if linear else 1), item, SHARED_BY_BLOCK * per_ray),
