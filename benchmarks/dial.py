@@ -15,12 +15,13 @@ import math
 import statistics
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 from standard_table import SOFT_ONLY, window_size  # beside this file
 from tqdm import tqdm
 
@@ -281,9 +282,10 @@ def tables(cases: dict[str, Case], size: tuple[int, int]) -> list[str]:
 def predicted(cases: dict[str, Case], size: tuple[int, int]) -> list[Case]:
     """Return each rung of each case, predicted by what the other volumes calibrate."""
     rows = []
+    missed = {key: misses(case, size) for key, case in cases.items()}
     for volume in sorted({key.split("/")[0] for key in cases}):
         others = {k: c for k, c in cases.items() if k.split("/")[0] != volume} or cases
-        calibrated = fitted(others, size)
+        calibrated = fitted(others, missed)
         for key, case in cases.items():
             if key.split("/")[0] != volume:
                 continue
@@ -306,18 +308,17 @@ def predicted(cases: dict[str, Case], size: tuple[int, int]) -> list[Case]:
     return rows
 
 
-def fitted(cases: dict[str, Case], size: tuple[int, int]) -> dict[str, tuple[float, float]]:
-    """Return the calibration that fits cases best."""
+def misses(case: Case, size: tuple[int, int]) -> NDArray[np.float64]:
+    """Return how far the rungs' predictions are off together, for each exponent of GRID."""
+    true = np.array([one["ssim"] for one in case["truth"]])
+    ladders = (_ladder(case, size, exponent=exponent) for exponent in GRID)
+    return np.array([np.abs([rung.ssim for rung in ladder] - true).sum() for ladder in ladders])
 
-    def misses(exponent: tuple[float, float]) -> float:
-        return sum(
-            abs(rung.ssim - true["ssim"])
-            for case in cases.values()
-            for rung, true in zip(
-                _ladder(case, size, exponent=exponent), case["truth"], strict=True
-            )
-        )
 
+def fitted(
+    cases: dict[str, Case], missed: dict[str, NDArray[np.float64]]
+) -> dict[str, tuple[float, float]]:
+    """Return the calibration that fits cases best; ``missed`` is what :func:`misses` gives."""
     # Times: least squares of logarithms
     equations, values = [[1.0, 0.0], [0.0, 1.0]], list(FRAME_COST)
     for case in cases.values():
@@ -327,8 +328,7 @@ def fitted(cases: dict[str, Case], size: tuple[int, int]) -> dict[str, tuple[flo
             equations.append([denser, longer])
             values.append(math.log(ratio))
     cost = np.linalg.lstsq(np.array(equations[2:] or equations), np.array(values[2:] or values))[0]
-    best: Callable[..., Any] = min
-    first, second = best(GRID, key=misses)
+    first, second = GRID[int(np.sum([missed[key] for key in cases], axis=0).argmin())]
     return {
         "exponent": (float(first), float(second)),
         "frame_cost": (float(cost[0]), float(cost[1])),
@@ -402,7 +402,7 @@ def _measuring(cases: dict[str, Case]) -> float:
 
 
 def _fitted(cases: dict[str, Case], size: tuple[int, int]) -> list[str]:
-    best = fitted(cases, size)
+    best = fitted(cases, {key: misses(case, size) for key, case in cases.items()})
     (a, b), (c, d) = best["exponent"], best["frame_cost"]
     return [
         f"Fitted to all volumes: EXPONENT ({a:.2f}, {b:.2f}), FRAME_COST ({c:.2f}, {d:.2f});",

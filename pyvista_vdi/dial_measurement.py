@@ -80,7 +80,7 @@ def choose(
         Called with 0 between the parts of the measurement; when it returns False it is given up.
     **settings
         Keyword arguments of ``generate_vdi`` that the VDI will be made with: criterion,
-        sample_distance, view_cone, lights, ambient_occlusion.
+        sample_distance, view_cone, lights, ambient_occlusion, memory_limit.
 
     Returns
     -------
@@ -180,6 +180,7 @@ class Scene:
             tile_size=TILE_SIZE,
             lights=self._settings["lights"],
             ambient_occlusion=self._settings["ambient_occlusion"],
+            memory_limit=self._settings.get("memory_limit"),
             device=self._runtime,
         )
         rough = self._whole(ROUGH)

@@ -37,7 +37,7 @@ def generate(options: argparse.Namespace) -> int:
     asked = {n: getattr(options, n) for n in _DIAL}
     dial = Dial.of(**asked)  # refused before the volume is read, too
     arguments = classification(options)
-    Classification(arguments, "generate")  # refused before the volume is read
+    looks = Classification(arguments, "generate")  # refused before the volume is read
     occlusion = ambient_occlusion(options)
     volume = read_volume(options)
     for name in ("scalars", "preference"):  # the array has been chosen
@@ -49,6 +49,8 @@ def generate(options: argparse.Namespace) -> int:
         max_supersegments=options.max_supersegments,
         criterion=options.criterion,
         ambient_occlusion=occlusion,
+        memory_limit=options.memory_limit,
+        transfer_function=looks.transfer_function(volume),
     )
     width, height = options.size
     print(
@@ -75,6 +77,7 @@ def generate(options: argparse.Namespace) -> int:
             precision=precision,
             **asked,
             ambient_occlusion=occlusion,
+            memory_limit=options.memory_limit,
             device=options.device,
             progress=bar,
             **arguments,

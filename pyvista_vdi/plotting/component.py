@@ -65,6 +65,7 @@ _OF_VOLUMES = {
     "max_bytes": None,
     "target_angle": TARGET_ANGLE,
     "ambient_occlusion": None,
+    "memory_limit": None,
     "camera": None,
     "coverage": "bounds",
 }
@@ -130,6 +131,7 @@ class AddVDI:
         max_bytes: int | None = None,
         target_angle: float = TARGET_ANGLE,
         ambient_occlusion: Any = None,
+        memory_limit: float | str | None = None,
         interpolation: Literal["nearest", "linear"] = "nearest",
         camera: Any = None,
         coverage: Literal["bounds", "view"] = "bounds",
@@ -222,6 +224,8 @@ class AddVDI:
         ambient_occlusion : bool, float or AmbientOcclusion, optional
             Darken what is hidden from the light around it: ``True``, or the radius up to which
             something hides, model units.
+        memory_limit : int, float or str, optional
+            Most bytes that generating may take on the device, see :func:`pyvista_vdi.generate`.
         interpolation : {"nearest", "linear"}
             Between voxels; ``add_volume`` draws ``"nearest"``.
         camera : pyvista.Camera or vtkCamera or Camera, optional
@@ -323,6 +327,7 @@ class AddVDI:
             target_fps=given["full_fps"],
         )
         source.SetAmbientOcclusion(given["ambient_occlusion"])
+        source.SetMemoryLimit(given["memory_limit"])
         source.SetCoverage(given["coverage"])
         source.SetDevice(given["device"])
         source.SetProgressCallback(progress_callback(given["progress_bar"]))
