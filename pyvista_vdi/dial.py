@@ -42,7 +42,7 @@ EXPONENT = (1.15, 0.05)
 _EXPONENTS = (0.6, 1.8)
 #: A frame's time over that of the rough VDI's, as powers of the density and the longest list over
 #: its own. Fitted by benchmarks/dial.py on a CPU.
-FRAME_COST = (0.56, 0.12)
+FRAME_COST = (0.44, 0.27)
 
 _UNAVOIDABLE = (
     "; {:.3f} of the loss is what the generating view's window does not cover, or light that moves "
