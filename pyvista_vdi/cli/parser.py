@@ -14,6 +14,7 @@ from ..camera import check_window_size
 from ..errors import InvalidArgumentError
 from ..precision import PRECISIONS
 from ..standard_cases import ANGLES, ELEVATION, TRANSFER_FUNCTIONS, WINDOW_SIZE
+from .tradeoff_options import add_sweep_options
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
 
@@ -307,6 +308,13 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
     _add_device(parser)
 
 
+def _add_tradeoff(parser: argparse.ArgumentParser) -> None:
+    _add_volume(parser)
+    add_sweep_options(parser, _size, _numbers, _count)
+    _add_classification(parser)
+    _add_device(parser)
+
+
 _VERBS: dict[str, tuple[str, str, str, Any]] = {
     "devices": (
         "files",
@@ -349,6 +357,12 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
         "measure the paper's tables: frame times and accuracy beside volume rendering",
         "pyvista-vdi benchmark --profile quick --out quick.json",
         _add_benchmark,
+    ),
+    "tradeoff": (
+        "tradeoff",
+        "measure what each setting of a VDI costs and gives, and draw the fronts",
+        "pyvista-vdi tradeoff --example brain --out out",
+        _add_tradeoff,
     ),
     "convert": (
         "files",
