@@ -388,8 +388,8 @@ def _add_volume(parser: argparse.ArgumentParser) -> None:
         "volume",
         metavar="VOLUME",
         nargs="?",
-        help="a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), or a "
-        "folder of DICOM slices",
+        help="a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), .npy, "
+        "a raw file named like x_1024x1024x795_uint8.raw, or a folder of DICOM slices",
     )
     source.add_argument("--example", metavar="NAME", help="a volume known by name, e.g. brain")
 
