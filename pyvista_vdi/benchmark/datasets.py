@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from tokenize import TokenError
 from types import MappingProxyType
 from typing import Any
 
@@ -40,6 +41,9 @@ _OPACITIES: MappingProxyType[str, tuple[float, ...]] = MappingProxyType(
         "one of two fluids": (0.0, 0.0, 0.0, 0.01, 0.05, 0.15, 0.05, 0.01, 0.005),
     }
 )
+#: What NumPy raises for files that are no arrays: their header is a Python expression.
+_BAD_ARRAY = (ValueError, TypeError, SyntaxError, OverflowError, RecursionError, TokenError)
+
 #: RGB at equidistant scalars: black, blue-grey, white.
 _COLORS = ((0.0, 0.0, 0.0), (0.25, 0.3, 0.45), (0.7, 0.7, 0.6), (1.0, 1.0, 1.0))
 
@@ -236,7 +240,7 @@ def _read_npy(file: Path) -> Volume:
             array = np.lib.format.read_array(stream, allow_pickle=False)
     except OSError as error:
         raise InvalidVolumeError(f"{file} cannot be read: {error.strerror or error}") from error
-    except ValueError as error:
+    except _BAD_ARRAY as error:
         raise InvalidVolumeError(
             f"{file} cannot be read as an array ({error}): write one by numpy.save"
         ) from error

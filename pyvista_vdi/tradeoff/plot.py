@@ -115,7 +115,7 @@ def draw(found: Tradeoff) -> Figure:
     handles = [_marker(color, label) for label, color in _legend(found)]
     handles.append(_marker("none", "not on the front"))
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), fontsize="small")
-    figure.subplots_adjust(left=0.055, right=0.99, top=0.92, bottom=0.15, wspace=0.06)
+    figure.subplots_adjust(left=0.062, right=0.99, top=0.92, bottom=0.15, wspace=0.06)
     for panel, kind in zip(panels, _PANELS, strict=True):
         _name_front(figure, panel, found, kind)
     return figure
@@ -167,7 +167,8 @@ def _draw_limits(panel: Axes, found: Tradeoff, kind: str) -> None:
                 rotation=90,
                 fontsize=7,
                 color="#777777",
-                ha="right",
+                # Outwards of the two, which may be close together
+                ha="right" if x == min(limits.values()) else "left",
                 va="bottom",
             )
 

@@ -381,7 +381,20 @@ def test_a_file_of_another_kind_is_refused(folder, capsys, tmp_path):
     assert "holds no results: name a file that pyvista-vdi tradeoff has" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("content", [b"", b"no array", b"PK\x03\x04"])
+HEADER = b"\x93NUMPY\x01\x00\x28\x00"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"no array",
+        b"PK\x03\x04",  # an .npz
+        HEADER + b"{'descr': '|u1', 'shape': (3,           ",  # a bracket that is not closed
+        HEADER + b"{'descr': '|u1', b'shape': (3, 4), 2: 1}",  # keys that cannot be sorted
+        HEADER + b"{'descr': '|O', 'fortran_order': 0}     ",
+    ],
+)
 def test_what_is_no_array_is_refused(content, tmp_path, capsys):
     (tmp_path / "a.npy").write_bytes(content)
     assert tradeoff(tmp_path / "a.npy", "--no-vtk", "--out", tmp_path) == 1
@@ -616,6 +629,21 @@ def test_the_plot_names_the_front_and_no_names_overlap():
         for box in labels(figure)[figure.axes.index(panel)].values():
             assert inside.x0 <= box.x0 <= box.x1 <= inside.x1
             assert inside.y0 <= box.y0 <= box.y1 <= inside.y1
+
+
+def test_the_limits_do_not_overlap_either():
+    pytest.importorskip("matplotlib")
+    data = made_up(*FOUR, (Setting(lists=4.0), 1.5, 0.995, 64_000_000, 80.0))
+    for row in data["baselines"]:  # VTK is nearly as fast as render_volume
+        row["seconds"]["vtk_gpu"]["clock"] = [0.0101] * 5
+    figure = Tradeoff(data).plot()
+    figure.canvas.draw()
+    from matplotlib.text import Annotation
+
+    texts = [text for text in figure.axes[0].texts if not isinstance(text, Annotation)]
+    assert {text.get_text().strip() for text in texts} == {"render_volume", "VTK, faster mapper"}
+    one, other = (text.get_window_extent() for text in texts)
+    assert not one.overlaps(other)
 
 
 def test_the_plot_is_written_whole(tmp_path):
