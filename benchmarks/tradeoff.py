@@ -96,7 +96,10 @@ def beside_the_default(found: dict[str, Tradeoff]) -> Iterator[str]:
         yield _row(
             name,
             *(
-                ", ".join(f"{1e3 * (a.ssims[angle] - b.ssims[angle]):+.1f}" for a, b in pairs)
+                ", ".join(
+                    f"{round(1e3 * (a.ssims[angle] - b.ssims[angle]), 1) + 0.0:+.1f}"
+                    for a, b in pairs
+                )
                 for angle in angles
             ),
             *(
