@@ -30,9 +30,12 @@ FROM_MANY_ANGLES = ("brain", "heptane", "berea", "rayleigh_taylor", "tooth", "is
 #: Options by name of the results, which begins with the volume's.
 RUNS = {
     **dict.fromkeys(SWEPT, ()),
-    "brain-on-request": ("--sweep", "criterion", "view-cone", "sample-distance", "--repeats", "3"),
+    "brain-on-request": (
+        *("--sweep", "criterion", "view-cone", "sample-distance"),
+        *("--repeats", "3", "--generations", "3", "--no-vtk"),
+    ),
     "brain-linear": (
-        *("--interpolation", "linear", "--repeats", "3"),
+        *("--interpolation", "linear", "--repeats", "3", "--generations", "3", "--no-vtk"),
         *("--sweep", "max-supersegments=10,40", "lists=0.5,2", "precision=8-byte", "--alone"),
     ),
     **{
