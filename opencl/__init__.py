@@ -9,6 +9,8 @@ Shared functions:
 
 ``common/rays.cl``
     Affine forms along the ray of a pixel, clipping to planes, pixels in blocks of 4 x 4.
+``common/pairs.cl``
+    Sums, products and quotients of numbers of two floats.
 ``common/volume_sampling.cl``
     Samples of a uniform grid, nearest or trilinear, of scalars or RGBA.
 ``common/classification.cl``

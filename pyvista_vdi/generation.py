@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from ._version import __version__
 from .ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from .blocks import GROUP, block_items
+from .bricks import Room, StepSampler
 from .camera import Camera, check_window_size
-from .checks import as_float
-from .device_volume import DeviceVolume
+from .checks import as_float, memory_limit_bytes
+from .device_volume import DeviceVolume, volume_bytes, voxel_bytes
 from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory
 from .lighting import Lights
@@ -43,6 +44,8 @@ CRITERIA = tuple(_CRITERIA)
 _RUN_BYTES = 9 * 4
 #: Bytes of runs that one slice of rays records at a time; also how often progress is reported.
 _SLICE_BYTES = 96 * 2**20
+#: Slices that a memory limit has room for: the volume gets more than they do.
+_SLICES_IN_LIMIT = 4
 #: Runs that a ray's record keeps for the criteria other than least error: more than a ray through
 #: most data has, so that these cut what was sampled and not what least error has left of it.
 _UNMERGED_RUNS = 512
@@ -63,7 +66,7 @@ class Estimate:
     Attributes
     ----------
     volume : int
-        The volume on the device.
+        The volume on the device, or as many bricks of it as a memory limit leaves room for.
     vdi_worst_case : int
         The VDI with every list full; most are far shorter.
     working : int
@@ -115,6 +118,8 @@ def estimate(
     max_supersegments: int = 20,
     criterion: str = "least-error",
     ambient_occlusion: Any = None,
+    memory_limit: Any = None,
+    transfer_function: TransferFunction | None = None,
 ) -> Estimate:
     """State the memory that :func:`generate_vdi` takes, before it is taken.
 
@@ -128,8 +133,12 @@ def estimate(
         Most supersegments in a list.
     criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
         As for :func:`generate_vdi`; all but the first record more of each ray at a time.
-    ambient_occlusion : optional
+    ambient_occlusion, memory_limit : optional
         As for :func:`generate_vdi`.
+    transfer_function : TransferFunction, optional
+        Scalars whose range is narrow for how far it is from 0 are taken relative to it, which
+        takes 4 bytes a voxel on the device, and as much on the host while they are scaled. Without
+        it they are taken to be read as they are.
 
     Returns
     -------
@@ -138,15 +147,19 @@ def estimate(
     """
     width, height = check_window_size(window_size)
     limit = check_max_supersegments(max_supersegments)
-    item = min(volume.array.dtype.itemsize, 4)  # float64 is scaled to float32 for the device
+    memory = memory_limit_bytes(memory_limit)
+    item = voxel_bytes(volume, transfer_function)
     lists = width * height
-    plan = _Slices(width, height, limit, check_criterion(criterion))
+    plan = _Slices(width, height, limit, check_criterion(criterion), memory)
     occlusion = AmbientOcclusion.from_any(ambient_occlusion)
+    grid = 0 if occlusion is None else OcclusionGrid.of(volume, occlusion).nbytes
+    room = plan.room(memory, grid)
+    on_device, samples = volume_bytes(volume, volume.array.size * item, room)
     return Estimate(
-        volume=volume.array.size * item,
+        volume=on_device,
         vdi_worst_case=lists * (limit * 24 + 8) + 8,
-        working=plan.bytes,
-        occlusion=0 if occlusion is None else OcclusionGrid.of(volume, occlusion).nbytes,
+        working=plan.bytes + samples,
+        occlusion=grid,
     )
 
 
@@ -163,6 +176,7 @@ def generate_vdi(
     view_cone: float = 60.0,
     lights: Any = None,
     ambient_occlusion: Any = None,
+    memory_limit: Any = None,
     device: Any = None,
     progress: Progress | None = None,
     metadata: Mapping[str, Any] | None = None,
@@ -214,6 +228,10 @@ def generate_vdi(
         Darken what is hidden from the light around it, see
         :meth:`pyvista_vdi.AmbientOcclusion.from_any`; baked into the colours as well, and the same
         from every view.
+    memory_limit : int, float or str, optional
+        Most bytes to take on the device, or a text such as ``"2 GiB"``; by default what the device
+        has. A volume that does not fit goes there brick by brick, which takes more time and makes
+        the same VDI to the last bit.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
     progress : callable, optional
@@ -234,7 +252,8 @@ def generate_vdi(
     Cancelled
         If ``progress`` returned False.
     DeviceMemoryError
-        If the device lacks the memory, see :func:`estimate`.
+        If the device lacks the memory, see :func:`estimate`, or ``memory_limit`` is too little
+        even for one brick.
     """
     camera = Camera.from_any(camera)
     width, height = check_window_size(window_size)
@@ -245,6 +264,9 @@ def generate_vdi(
     runtime = get_runtime(device)
     lights = Lights.from_any(lights)
     occlusion = AmbientOcclusion.from_any(ambient_occlusion)
+    memory = memory_limit_bytes(memory_limit)
+    slices = _Slices(width, height, limit, criterion, memory)
+    grid = 0 if occlusion is None else OcclusionGrid.of(volume, occlusion).nbytes
     medium = DeviceVolume(
         runtime,
         volume,
@@ -252,9 +274,10 @@ def generate_vdi(
         sample_distance,
         lights=lights,
         ambient_occlusion=occlusion,
+        room=slices.room(memory, grid),
     )
     recorder = _Recorder(
-        runtime, medium, camera, (width, height), limit, criterion, tolerance, hidden_weight
+        runtime, medium, camera, (width, height), slices, limit, criterion, tolerance, hidden_weight
     )
     parts = []
     with recorder:
@@ -262,7 +285,7 @@ def generate_vdi(
             _report(progress, first_row / height)
             rows = min(recorder.slices.rows, height - first_row)
             recorder.march(first_row, rows)
-            parts.append(recorder.packed(rows))
+            parts.append(recorder.packed(first_row, rows))
             _require_room(parts, (width, height))
     _report(progress, 1.0)
 
@@ -305,7 +328,9 @@ def generate_vdi(
 class _Slices:
     """How many rows of lists are made at a time, and the buffers that this takes."""
 
-    def __init__(self, width: int, height: int, limit: int, criterion: str) -> None:
+    def __init__(
+        self, width: int, height: int, limit: int, criterion: str, memory_limit: int | None
+    ) -> None:
         # Twice the budget: the records' thresholds then stay well below the final merges' errors
         self.kept = max(2 * limit, limit + 12)
         self.capacity = self.kept + _CHUNK_STEPS
@@ -313,10 +338,19 @@ class _Slices:
             self.kept = max(self.kept, _UNMERGED_RUNS)
             self.capacity = self.kept + _CHUNK_STEPS + limit  # the kernel cuts into what is free
         per_block_row = block_items(width, 4) * self.capacity * _RUN_BYTES
-        self.rows = min(height, 4 * max(1, _SLICE_BYTES // per_block_row))
+        most = _SLICE_BYTES
+        if memory_limit is not None:
+            most = min(most, memory_limit // _SLICES_IN_LIMIT)
+        self.rows = min(height, 4 * max(1, most // per_block_row))
         self.items = block_items(width, self.rows)
         packed_bytes = self.items * (limit * 24 + 8)
         self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + packed_bytes
+        self.text = f"{self.rows} rows of {width} lists of up to {limit} supersegments"
+
+    def room(self, memory_limit: int | None, occlusion: int) -> Room:
+        """Return the room for the volume beside a slice and the grid of an occlusion."""
+        steps = self.items * _CHUNK_STEPS
+        return Room(memory_limit, self.bytes + occlusion, steps, self.text)
 
 
 def _steps_per_voxel(volume: Volume, sample_distance: float) -> int:
@@ -346,6 +380,7 @@ class _Recorder:
         medium: DeviceVolume,
         camera: Camera,
         size: tuple[int, int],
+        slices: _Slices,
         limit: int,
         criterion: str,
         tolerance: float,
@@ -363,26 +398,41 @@ class _Recorder:
             np.float32(hidden_weight),
         )
         check_list_space(camera, medium.volume.bounds)
-        forms, rays, self._planes = medium.forms(camera, size, None)
-        self.depth_origin = rays.reference_depth
-        self._most_steps = int(np.ceil(medium.volume.length / medium.sample_distance)) + 1
-        self.slices = _Slices(*size, limit, criterion)
+        rays = medium.forms(camera, size, None)
+        self._planes = rays.planes
+        self._far_entries = bool(rays.defines)
+        self.depth_origin = rays.rays.reference_depth
+        self._most_steps = medium.most_steps
+        self.slices = slices
         self._grain = _steps_per_voxel(medium.volume, medium.sample_distance)
         items, capacity = self.slices.items, self.slices.capacity
         self._cuts = _CRITERIA[criterion]
         names = ["march_lists", "shorten_lists", "pack_lists"]
-        defines = dict(medium.defines)
+        defines = {**medium.defines, **rays.defines}
         if self._cuts:
             names.append("cut_lists")
             defines["CRITERION"] = self._cuts
         self._kernels = {name: runtime.kernel("vdi/generate.cl", name, defines) for name in names}
         with ExitStack() as stack:
             keep = stack.enter_context
-            self._forms = keep(runtime.upload(forms, "rays"))
+            self._forms = keep(runtime.upload(rays.packed(), "rays"))
             self._records = keep(runtime.buffer((items, capacity, 8), name="recorded runs"))
             self._errors = keep(runtime.buffer((items, capacity), name="merge errors"))
             self._thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
             self._counts = keep(runtime.buffer((items,), np.uint32, "list lengths"))
+            self._sampler = None
+            if medium.bricks is not None:
+                march = (
+                    self._forms,
+                    np.int32(self._planes),
+                    np.float32(medium.sample_distance),
+                    np.float32(medium.unit_distance),
+                )
+                of_medium = medium.medium_arguments(camera)
+                steps = items * _CHUNK_STEPS
+                self._sampler = keep(
+                    StepSampler(runtime, medium.bricks, of_medium, defines, march, size, steps)
+                )
             self._buffers = stack.pop_all()
 
     def __enter__(self) -> _Recorder:
@@ -400,10 +450,14 @@ class _Recorder:
         runtime.fill(self._thresholds, self._threshold)
         capacity = np.int32(self.slices.capacity)
         for first_step, steps in _chunks(self._most_steps):
+            sampled: tuple[Any, ...] = ()
+            if self._sampler is not None:
+                sampled = self._sampler.sample(first_row, rows, first_step, steps)
             self._launch(
                 "march_lists",
                 items,
                 *medium.medium_arguments(self._camera),
+                *sampled,
                 self._forms,
                 np.int32(self._planes),
                 np.float32(medium.sample_distance),
@@ -447,19 +501,22 @@ class _Recorder:
                 self._counts,
             )
 
-    def packed(self, rows: int) -> tuple[NDArray[Any], ...]:
+    def packed(self, first_row: int, rows: int) -> tuple[NDArray[Any], ...]:
         """Return lengths, fronts, backs, colours and optical depths of the slice's lists."""
-        runtime, width = self._runtime, self._size[0]
+        runtime, (width, height) = self._runtime, self._size
+        entries: tuple[Any, ...] = ()
+        if self._far_entries:
+            entries = (self._forms, np.int32(self._planes), np.int32(height), np.int32(first_row))
         lengths = runtime.download(self._counts, count=rows * width)
         offsets = np.zeros(rows * width + 1, np.uint64)
         np.cumsum(lengths, dtype=np.uint64, out=offsets[1:])
         n = int(offsets[-1])
         with (
             runtime.upload(offsets, "list offsets") as starts,
-            runtime.buffer((n,), name="front depths") as front,
-            runtime.buffer((n,), name="back depths") as back,
-            runtime.buffer((n, 3), name="supersegment colours") as color,
-            runtime.buffer((n,), name="optical depths") as optical_depth,
+            runtime.result((n,), name="front depths") as front,
+            runtime.result((n,), name="back depths") as back,
+            runtime.result((n, 3), name="supersegment colours") as color,
+            runtime.result((n,), name="optical depths") as optical_depth,
         ):
             self._launch(
                 "pack_lists",
@@ -473,6 +530,7 @@ class _Recorder:
                 back,
                 color,
                 optical_depth,
+                *entries,
             )
             arrays = [runtime.download(buffer) for buffer in (front, back, color, optical_depth)]
         return (lengths, *arrays)
@@ -493,25 +551,30 @@ def _check_weights(tolerance: float, view_cone: float) -> tuple[float, float]:
 
 
 def _joined(runtime: Runtime, parts: list[tuple[NDArray[Any], ...]]) -> list[NDArray[Any]]:
-    """Join the slices' arrays, each kind into one that a CPU device uses in place."""
-    joined = []
-    for arrays in zip(*parts, strict=True):
-        size = sum(len(array) for array in arrays)
-        whole = aligned_empty((size, *arrays[0].shape[1:]), arrays[0].dtype)
-        end = 0
-        for array in arrays:
+    """Join the slices' arrays, each kind into one that a CPU device uses in place.
+
+    ``parts`` are let go of one by one, so that the VDI is not there twice.
+    """
+    sizes = [sum(len(array) for array in arrays) for arrays in zip(*parts, strict=True)]
+    joined = [
+        aligned_empty((size, *array.shape[1:]), array.dtype)  # taken as it is written
+        for size, array in zip(sizes, parts[0], strict=True)
+    ]
+    ends = sizes
+    while parts:
+        firsts = [end - len(array) for end, array in zip(ends, parts[-1], strict=True)]
+        for whole, array, first, end in zip(joined, parts.pop(), firsts, ends, strict=True):
             runtime.give_way()
-            first, end = end, end + len(array)
             whole[first:end] = array
-        joined.append(whole)
+        ends = firsts
     return joined
 
 
 def _require_room(parts: Sequence[tuple[NDArray[Any], ...]], size: tuple[int, int]) -> None:
-    """Refuse to go on where the host cannot hold the VDI: its arrays, and the slices they join."""
-    made = sum(array.nbytes for part in parts for array in part)
+    """Refuse to go on where the host cannot hold the VDI: its arrays, and a slice of them twice."""
+    made = [sum(array.nbytes for array in part) for part in parts]
     require_host_memory(
-        2 * made + 8 * size[0] * size[1],
+        sum(made) + max(made, default=0) + 8 * size[0] * size[1],
         f"a VDI of {size[0]} x {size[1]} lists",
         "lower the window size or max_supersegments, or raise tolerance",
     )

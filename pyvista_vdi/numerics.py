@@ -25,6 +25,24 @@ _SMALLEST_RANGE, _LARGEST_SCALAR = 2.0**-100, 2.0**100
 #: Largest magnitude of voxels whose differences float32 holds.
 LARGEST_VOXEL = 2.0**126
 
+#: Grid coordinates up to which positions on a ray are computed in float32 alone, from where the
+#: rays are formed: their 16 roundings are a 4000th of a voxel at 256 and a 500th at 2048. Between,
+#: it is so up to four times the points of the longest axis: what is not much longer than wide never
+#: reaches that, and its positions are rounded nearly as much within it.
+NEAR_ENTRY, FAR_ENTRY, ENTRY_PER_POINT = 256.0, 2048.0, 4.0
+
+#: Most times the thickness of what a VDI's lists hold that their depths may be, in the sense of the
+#: depth coordinate's rounding, for float32 alone: 14 roundings (12 of a ray's coordinate, 2 of a
+#: face's; ``reference.render_range``) of so many thicknesses change an opacity by 1/e of that,
+#: 3.9e-5.
+MOST_DEPTHS = 128.0
+
+#: Thickness, in extents of the bounds' depths, below which nothing tells what a ray crosses.
+THINNEST_LIST = 2.0**-23
+
+#: Largest specular power of a cosine as it is: 8 roundings, near 1, change its power by 4.8e-5.
+LARGEST_POWER = 100.0
+
 #: Optical depths of one step, through any opacity of at least 2^-24, whose sums float32 holds.
 _LARGEST_STEP = 2.0**96
 
@@ -50,6 +68,25 @@ def compensation(media: float) -> dict[str, int]:
     if media <= MANY_MEDIA:
         return {}
     return {"COMPENSATED": 1 if media <= VERY_MANY_MEDIA else 2}
+
+
+def entries(reach: float, points: int) -> dict[str, str | int | None]:
+    """Return the ``-D FAR_ENTRIES`` of kernels that march, if they need it.
+
+    ``reach`` is the largest grid coordinate of a ray between the depths of the volume's bounds, and
+    ``points`` the number of grid points along its longest axis.
+    """
+    farthest = min(max(NEAR_ENTRY, ENTRY_PER_POINT * points), FAR_ENTRY)
+    return {"FAR_ENTRIES": 1} if reach > farthest else {}
+
+
+def lists_are_far(depth: float, thickness: float, extent: float) -> bool:
+    """Whether depths in lists need be relative to each ray (``-D FAR_ENTRIES``).
+
+    ``depth`` is the largest that is rounded, ``thickness`` that of what the thickest list holds,
+    from its first front to its last back, and ``extent`` that of the bounds; world units.
+    """
+    return extent * THINNEST_LIST < thickness < depth / MOST_DEPTHS
 
 
 def held_unit_distance(unit_distance: float, sample_distance: float) -> float:

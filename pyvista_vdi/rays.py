@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from .camera import Camera, check_window_size
 from .cropping import Cropping
 from .errors import InvalidArgumentError, InvalidCameraError
+from .opencl_runtime import aligned_empty
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -278,10 +279,52 @@ def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
     return table
 
 
+def packed_pairs(forms: Sequence[Floats]) -> NDArray[np.float32]:
+    """Return forms with what float32 rounds off them, float32 (n, 12): see ``common/rays.cl``."""
+    table = packed(forms)
+    return np.hstack([table, np.subtract(forms, table, dtype=np.float64).astype(np.float32)])
+
+
+def largest_value(
+    camera: Camera,
+    window_size: Sequence[int],
+    bounds: Sequence[float],
+    forms: Sequence[Floats],
+) -> float:
+    """Return the largest magnitude of forms, or of a part of one, on rays that meet the bounds.
+
+    Parameters
+    ----------
+    camera, window_size, bounds
+        As for :func:`pixel_rays`, whose forms they are.
+    forms : sequence of numpy.ndarray
+        float64 (6,) each.
+
+    Returns
+    -------
+    float
+        Over the depths of the bounds; infinite where nothing of them is in the window.
+    """
+    width, height = window_size
+    near, far = depth_range(camera, bounds)
+    depth = reference_depth(camera, bounds)
+    low, high = np.array([-width / 2, -height / 2]), np.array([width / 2, height / 2])
+    if camera.parallel_projection or near > 0:  # the bounds have a place in the window
+        matrix = camera.viewport_matrix((width, height)) @ camera.model_to_view
+        x, y, _, d = matrix @ np.vstack([corners(bounds).T, np.ones(8)])
+        at = np.array([x / d * width / 2, y / d * height / 2])
+        low, high = np.clip(at.min(axis=1), low, high), np.clip(at.max(axis=1), low, high)
+    pixels = np.array([[1, a, b] for a in (low[0], high[0]) for b in (low[1], high[1])])
+    table = np.asarray(forms)
+    values, slopes = pixels @ table[:, :3].T, pixels @ table[:, 3:].T
+    parts = (table[:, 0], values, values + (far - depth) * slopes)
+    return float(max(np.abs(part).max() for part in parts))
+
+
 def checked_opaque_depth(
     opaque_depth: ArrayLike | None, window_size: tuple[int, int], rays: PixelRays
 ) -> NDArray[np.float32] | None:
-    """Return where each pixel's ray ends, as t: float32 (H, W), top row first.
+    """Return where each pixel's ray ends, as t: float32 (H, W), top row first; page-aligned.
 
     Raises
     ------
@@ -291,13 +334,17 @@ def checked_opaque_depth(
     if opaque_depth is None:
         return None
     wanted = f"opaque_depth must have shape (height, width) = {window_size[::-1]}"
-    depth = _numbers(opaque_depth, wanted)
+    depth = opaque_depth
+    if not (isinstance(depth, np.ndarray) and depth.dtype in (np.float32, np.float64)):
+        depth = _numbers(opaque_depth, wanted)
     if depth.shape != window_size[::-1]:
         raise InvalidArgumentError(f"{wanted}; got {depth.shape}")
-    if np.isnan(depth).any():
-        raise InvalidArgumentError("opaque_depth holds NaN: use inf where nothing is opaque")
+    ends = aligned_empty(depth.shape, np.float32)
     with np.errstate(over="ignore"):  # beyond float32 is as good as never
-        return (depth - rays.reference_depth).astype(np.float32)
+        np.subtract(depth, rays.reference_depth, out=ends, dtype=np.float64, casting="same_kind")
+    if np.isnan(ends.min()):
+        raise InvalidArgumentError("opaque_depth holds NaN: use inf where nothing is opaque")
+    return ends
 
 
 def _numbers(values: ArrayLike, wanted: str) -> Floats:

@@ -2,6 +2,10 @@
 //
 // Samples lie at the midpoints of steps of equal model length along the ray, the last one shorter (DESIGN section 3).
 // Every face is computed from its step's number, never accumulated.
+//
+// -D BY_SCALAR     with NEAREST and voxels of integers: the table holds the medium of each scalar from `low` on, of which no
+//                  voxel is outside (grid/scalar_media.cl); otherwise it is classified at each sample
+// -D FAR_ENTRIES   see common/rays.cl: t counts from where the ray enters
 #include "common/rays.cl"
 #include "common/classification.cl"
 #include "common/volume_sampling.cl"
@@ -12,10 +16,10 @@
 typedef struct {
     __global const VOXEL_T *voxels;
     int4 size;                    // points along x, y, z
-    __global const float4 *table; // transfer function
+    __global const float4 *table; // transfer function, or the media of scalars
     int entries;
     float low, per_scalar;        // scalar to table position
-    __global const uchar *visible; // whether a block holds anything that is not transparent
+    __global const uchar *reaches; // of the blocks, see grid/volume_blocks.cl
     int4 blocks;                  // along x, y, z
     SHADING_FIELDS
 } Medium;
@@ -28,7 +32,20 @@ typedef struct {
     float per_step;      // 1 / step
     float units;         // opacity unit distances per unit of t
     int steps;
+#ifdef FAR_ENTRIES
+    float2 entry;        // t of the rays' forms where t is 0 here
+#endif
 } March;
+
+// Value of a form where t of the march is 0.
+inline float march_value(const March *march, __global const float *form, float a, float b)
+{
+#ifdef FAR_ENTRIES
+    return form_at(form, a, b, march->entry).x;
+#else
+    return form_value(form, a, b);
+#endif
+}
 
 // Model-frame direction of the ray per unit of t.
 inline float3 model_direction(__global const float *forms, float a, float b)
@@ -42,12 +59,18 @@ inline float3 model_direction(__global const float *forms, float a, float b)
 inline bool begin_march(March *march, __global const float *forms, int planes, float a, float b,
                         float sample_distance, float unit_distance, float t_end)
 {
+#ifdef FAR_ENTRIES
+    march->t0 = 0.0f;
+    if (!clip_from_entry(forms + 6 * FORM_SIZE, planes, a, b, t_end, &march->entry, &march->t1))
+        return false;
+#else
     march->t0 = -INFINITY;
     march->t1 = t_end;
     if (!clip_to_planes(forms + 6 * FORM_SIZE, planes, a, b, &march->t0, &march->t1))
         return false;
-    march->start = (float3)(form_value(forms, a, b), form_value(forms + FORM_SIZE, a, b),
-                            form_value(forms + 2 * FORM_SIZE, a, b));
+#endif
+    march->start = (float3)(march_value(march, forms, a, b), march_value(march, forms + FORM_SIZE, a, b),
+                            march_value(march, forms + 2 * FORM_SIZE, a, b));
     march->slope = (float3)(form_slope(forms, a, b), form_slope(forms + FORM_SIZE, a, b),
                             form_slope(forms + 2 * FORM_SIZE, a, b));
     const float speed = length(model_direction(forms, a, b)); // model units per unit of t
@@ -64,26 +87,33 @@ inline float step_face(const March *march, int k)
     return fmin(fma((float)k, march->step, march->t0), march->t1);
 }
 
-// Steps from step k on whose midpoints lie in the same transparent block, in whole groups of `group` steps, so that the
-// others are grouped as if none had been passed by; 0 where there is something to look at. Skipping decides what is looked
-// at and changes no sample. -D SKIP_EMPTY, or every step is looked at.
+// The first step from which on midpoints may lie outside a box that the ray is in, between two index positions.
+inline int first_step_outside(const March *march, float3 lower, float3 upper)
+{
+    // Where the ray leaves the box: past the face ahead on each axis, or never
+    const float3 crossing = ((march->slope > 0.0f ? upper : lower) - march->start) * march->inverse;
+    const float leaves = fmin(march->slope.x != 0.0f ? crossing.x : INFINITY,
+                              fmin(march->slope.y != 0.0f ? crossing.y : INFINITY,
+                                   march->slope.z != 0.0f ? crossing.z : INFINITY));
+    // Steps with their midpoint before that, less a hundredth of a step for the rounding of positions
+    return (int)fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f) + 1;
+}
+
+// Steps from step k on whose midpoints lie in transparent blocks around the first one's, in whole groups of `group` steps, so
+// that the others are grouped as if none had been passed by; 0 where there is something to look at. Skipping decides what is
+// looked at and changes no sample. -D SKIP_EMPTY, or every step is looked at.
 inline int empty_steps(const March *march, const Medium *medium, int k, int end, int group)
 {
 #ifdef SKIP_EMPTY
     const float t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
     const float3 position = march->start + t * march->slope;
     const int3 block = clamp(convert_int3(position) >> BLOCK_SHIFT, (int3)(0), medium->blocks.xyz - 1);
-    if (medium->visible[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x])
+    const int reach = medium->reaches[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x];
+    if (reach == 0)
         return 0;
-    // Where the ray leaves the block: past the face ahead on each axis, or never
-    const float3 lower = convert_float3(block << BLOCK_SHIFT);
-    const float3 crossing = ((march->slope > 0.0f ? lower + (float)BLOCK : lower) - march->start) * march->inverse;
-    const float leaves = fmin(march->slope.x != 0.0f ? crossing.x : INFINITY,
-                              fmin(march->slope.y != 0.0f ? crossing.y : INFINITY,
-                                   march->slope.z != 0.0f ? crossing.z : INFINITY));
-    // Steps with their midpoint before that, less a hundredth of a step for the rounding of positions
-    const int passed = (int)fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f) + 1;
-    return max(min(passed, end) - k, 0) / group * group;
+    const float3 lower = convert_float3((block - (reach - 1)) << BLOCK_SHIFT);
+    const float3 upper = convert_float3((block + reach) << BLOCK_SHIFT);
+    return max(min(first_step_outside(march, lower, upper), end) - k, 0) / group * group;
 #else
     return 0;
 #endif
@@ -92,10 +122,19 @@ inline int empty_steps(const March *march, const Medium *medium, int k, int end,
 // Colour (rgb) and optical depth (w) of a step of `units` opacity unit distances around index position (x, y, z).
 inline float4 medium_at(const Medium *medium, float x, float y, float z, float units)
 {
+#ifdef BY_SCALAR
+    const int scalar = (int)nearest_component(medium->voxels, medium->size, x, y, z, SCALAR);
+    const uint entry = min((uint)(scalar - (int)medium->low), (uint)(medium->entries - 1));
+    // Two loads where a vector's lanes load from different places, and not four
+    __global const ulong *halves = (__global const ulong *)(medium->table + entry);
+    float4 sample = (float4)(as_float2(halves[0]), as_float2(halves[1]));
+    sample.w = scaled_to_step(sample.w, units);
+#else
     const float scalar = sample_volume(medium->voxels, medium->size, x, y, z);
     float4 sample = classify(scalar, medium->table, medium->entries, medium->low, medium->per_scalar);
     if (sample.w > 0.0f)
         sample.w = step_optical_depth(sample.w, units);
+#endif
 #if defined(RGBA) || defined(SHADED) || defined(GRADIENT_OPACITY) || defined(OCCLUSION)
     if (sample.w > 0.0f) {
 #ifdef RGBA
@@ -118,10 +157,14 @@ inline float4 medium_at(const Medium *medium, float x, float y, float z, float u
     return sample;
 }
 
-// Colour (rgb) and optical depth (w) of the step between two faces.
-inline float4 step_medium(const March *march, const Medium *medium, float front, float back)
+// Colour (rgb) and optical depth (w) of step k, between two faces.
+inline float4 step_medium(const March *march, const Medium *medium, int k, float front, float back)
 {
+#ifdef SAMPLED
+    return medium->samples[(k - medium->first_sample) * SAMPLE_LANES];
+#else
     const float t = 0.5f * (front + back);
     return medium_at(medium, fma(t, march->slope.x, march->start.x), fma(t, march->slope.y, march->start.y),
                      fma(t, march->slope.z, march->start.z), (back - front) * march->units);
+#endif
 }

@@ -7,9 +7,17 @@
 // with t the view depth of the ray's own camera less a reference depth (world units). The host forms all six in float64
 // about a reference depth near the data, so that float32 is enough here however far away the eye or the origin is
 // (docs/conventions.md, "Rays"). y = 0 is the bottom row.
+//
+// -D FAR_ENTRIES   rays may enter the data so far from there that it is not enough for the positions of samples: six more
+//                  floats of each form are what float32 has rounded off the first six (docs/numerics.md)
+#include "common/pairs.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
+#ifdef FAR_ENTRIES
+#define FORM_SIZE 12
+#else
 #define FORM_SIZE 6
+#endif
 
 // Value of a form at t = 0 for pixel offsets (a, b).
 inline float form_value(__global const float *form, float a, float b)
@@ -39,10 +47,69 @@ inline bool clip_to_planes(__global const float *planes, int count, float a, flo
     return *t0 < *t1;
 }
 
+#ifdef FAR_ENTRIES
+// Three coefficients of a form, and their rests, at pixel offsets (a, b), which are exact.
+inline float2 pair_of_form(__global const float *c, float a, float b)
+{
+    const float2 of_a = pair_product((float2)(c[1], c[7]), (float2)(a, 0.0f));
+    const float2 of_b = pair_product((float2)(c[2], c[8]), (float2)(b, 0.0f));
+    return pair_sum(pair_sum((float2)(c[0], c[6]), of_a), of_b);
+}
+
+// Value of a form at t.
+inline float2 form_at(__global const float *form, float a, float b, float2 t)
+{
+    return pair_sum(pair_of_form(form, a, b), pair_product(t, pair_of_form(form + 3, a, b)));
+}
+
+// clip_to_planes, and what is left as its entry and its length.
+inline bool clip_from_entry(__global const float *planes, int count, float a, float b, float t_end, float2 *entry,
+                            float *length)
+{
+    float2 t0 = (float2)(-INFINITY, 0.0f);
+    float2 t1 = (float2)(t_end, 0.0f);
+    for (int k = 0; k < count; ++k) {
+        const float2 value = pair_of_form(planes + k * FORM_SIZE, a, b);
+        const float2 slope = pair_of_form(planes + k * FORM_SIZE + 3, a, b);
+        if (slope.x == 0.0f) {
+            if (value.x < 0.0f) // parallel to the plane and outside it
+                return false;
+            continue;
+        }
+        const float2 t = pair_quotient(-value, slope);
+        if (slope.x > 0.0f)
+            t0 = pair_less(t0, t) ? t : t0;
+        else
+            t1 = pair_less(t, t1) ? t : t1;
+    }
+    if (!pair_less(t0, t1))
+        return false;
+    *entry = t0;
+    *length = pair_sum(t1, -t0).x;
+    return *length < INFINITY; // not so where every slope has become 0
+}
+#endif
+
 // Pixel of a work-item: blocks of 4 x 4 pixels, so that neighbouring items walk through the same lists and voxels.
 inline int2 block_pixel(uint item, int width)
 {
     const uint block = item >> 4;
     const uint columns = (uint)(width + 3) >> 2;
     return (int2)((int)((block % columns) << 2 | (item & 3)), (int)((block / columns) << 2 | (item >> 2 & 3)));
+}
+
+// The same in strips STRIP blocks high, each from left to right, so that one work-item's lists are still cached when those
+// above and below come to them.
+#define STRIP 4
+inline int2 strip_pixel(uint item, int width, int height)
+{
+    const uint block = item >> 4;
+    const uint columns = (uint)(width + 3) >> 2;
+    const uint rows = (uint)(height + 3) >> 2;
+    const uint strip = block / (STRIP * columns);
+    const uint place = block - strip * STRIP * columns;
+    const uint high = clamp((int)rows - (int)(strip * STRIP), 1, STRIP); // blocks; the last strip may be lower
+    const uint column = place / high;
+    const uint row = strip * STRIP + place - column * high;
+    return (int2)((int)(column << 2 | (item & 3)), (int)(row << 2 | (item >> 2 & 3)));
 }

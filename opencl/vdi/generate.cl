@@ -1,16 +1,18 @@
 // Volume to lists of supersegments, one march per ray (paper section 2; DESIGN section 3 "Merging", "Budget").
 //
-// -D VOXEL_T, INDEX_T, RGBA, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
+// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl; OCCLUSION: see common/occlusion.cl
+// -D SAMPLED: see common/samples.cl
 // -D CRITERION: see vdi/criteria.cl; without it lists are shortened at least error
-// -D COMPENSATED: see common/over.cl
+// -D COMPENSATED: see common/over.cl; FAR_ENTRIES: see common/rays.cl
 //
 // A ray's march is cut into chunks of equally many steps. march_lists takes the steps of one chunk and appends what is not
 // homogeneous with the run before; make_room_in_lists then shortens the records that have grown too long, and raises the
 // ray's threshold. After the last chunk merge_lists shortens each record to the budget, and pack_lists writes the arrays.
 // The march is one kernel and the merging another because they want different vector code on a CPU.
 //
-// Lengths along a ray are t, the view depth of V_O less the VDI's depth origin, world units.
+// Lengths along a ray are t, the view depth of V_O less the VDI's depth origin, world units; with FAR_ENTRIES, less that of
+// where the ray enters, until they are packed.
 #include "common/march.cl"
 #include "vdi/runs.cl"
 #include "vdi/criteria.cl"
@@ -25,7 +27,7 @@ __kernel void march_lists(
     __global const float4 *table,  // transfer function, `entries` (R, G, B, opacity)
     int entries,
     float low, float per_scalar,   // scalar to table position
-    __global const uchar *visible, // blocks that are not transparent, see grid/volume_blocks.cl
+    __global const uchar *reaches, // of the blocks, see grid/volume_blocks.cl
     int4 blocks,                   // along x, y, z
     SHADING_PARAMETERS             // see common/shading.cl
     __global const float *forms,   // see begin_march
@@ -54,7 +56,7 @@ __kernel void march_lists(
     March march;
     if (!begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, INFINITY))
         return;
-    const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks SHADING_ARGUMENTS};
+    const Medium medium = {voxels, size, table, entries, low, per_scalar, reaches, blocks SHADING_ARGUMENTS};
     const float per_reference = march.units * unit_distance / reference_length;
     const float threshold = thresholds[item];
     __global float *record = records + record_start(item, capacity, RUN_WORDS);
@@ -89,7 +91,7 @@ __kernel void march_lists(
         float8 sample = (float8)(face, face, 0.0f, transmittance, 0.0f, 0.0f, 0.0f, 0.0f);
         for (const int group_end = min(k + group, end); k < group_end; ++k) {
             const float back = step_face(&march, k + 1);
-            const float4 step = step_medium(&march, &medium, face, back);
+            const float4 step = step_medium(&march, &medium, k, face, back);
             const float opacity = opacity_of(step.w);
             const float weight = (1.0f - sample.OPACITY) * opacity; // over, front to back
             sample.TAU += step.w;
@@ -211,7 +213,13 @@ __kernel void pack_lists(
     __global float *fronts,         // view depth less the depth origin, world units
     __global float *backs,
     __global float *colors,         // straight RGB, 3 per supersegment
-    __global float *optical_depths)
+    __global float *optical_depths
+#ifdef FAR_ENTRIES
+    , __global const float *forms,
+    int planes,
+    int height, int first_row
+#endif
+)
 {
     const uint item = (uint)get_global_id(0);
     const int2 pixel = block_pixel(item, width);
@@ -221,8 +229,26 @@ __kernel void pack_lists(
     const size_t list = (size_t)pixel.y * width + pixel.x;
     const ulong begin = offsets[list];
     const int count = (int)(offsets[list + 1] - begin);
+#ifdef FAR_ENTRIES
+    const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
+    const float b = (float)(first_row + pixel.y) + 0.5f - 0.5f * (float)height;
+    float2 entry = (float2)(0.0f);
+    float length = 0.0f;
+    clip_from_entry(forms + 6 * FORM_SIZE, planes, a, b, INFINITY, &entry, &length);
+    const float2 exit = pair_sum(entry, (float2)(length, 0.0f));
+    // Faces as they are stored lie in the volume, or its bounds would cut off what rounding has put outside
+    float least = entry.y > 0.0f ? nextafter(entry.x, INFINITY) : entry.x;
+    const float most = exit.y < 0.0f ? nextafter(exit.x, -INFINITY) : exit.x;
+#endif
     for (int k = 0; k < count; ++k) {
-        const float8 run = load_run(record, k);
+        float8 run = load_run(record, k);
+#ifdef FAR_ENTRIES
+        // Rounding must neither leave a supersegment without thickness nor let two overlap
+        run.FRONT = fmax(pair_sum(entry, (float2)(run.FRONT, 0.0f)).x, least);
+        run.BACK = fmin(pair_sum(entry, (float2)(run.BACK, 0.0f)).x, most);
+        run.BACK = fmax(run.BACK, nextafter(run.FRONT, INFINITY));
+        least = run.BACK;
+#endif
         fronts[begin + k] = run.FRONT;
         backs[begin + k] = run.BACK;
         optical_depths[begin + k] = run.TAU;

@@ -91,19 +91,15 @@ def test_direct_rendering_goes_further_than_lists(runtime, worst, exponent):
     assert np.abs(image - exact).max() <= BOUND
 
 
-@pytest.mark.parametrize(
-    "spacing", [(1, 1, 1000), (1000, 1, 1), (1, 0.001, 1), (1e-3, 1, 1e3)], ids=str
-)
-def test_anisotropy(runtime, worst, spacing):
+@pytest.mark.parametrize("spacing", [(1, 1, 1000), (1000, 1, 1), (1, 0.001, 1)], ids=str)
+def test_plates_and_needles(runtime, worst, spacing):
     """Cells a thousand times as long as wide."""
     volume = field_volume(spacing)
     camera = view(volume, zoom=True)
     function = transfer(unit_distance=5 * min(spacing))
     # A plate is a staircase of lists: rays in its plane, at larger angles, may pass between them
     views = turned(camera, volume, (0, 8), zoom=True)
-    # Half the least spacing would be up to fourteen million steps, which float64 takes long to do
-    step = max(min(spacing) / 2, volume.length / 2000)
-    check_scene(runtime, worst, volume, function, camera, views, sample_distance=step, bound=None)
+    check_scene(runtime, worst, volume, function, camera, views)
 
 
 MATRICES = {

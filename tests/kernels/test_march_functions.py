@@ -30,17 +30,19 @@ def marched(
 ):
     """Whole marches of every pixel of a small window, and the rays that they belong to."""
     medium = DeviceVolume(runtime, volume, transfer, step)
-    forms, rays, n_planes = medium.forms(camera, window, planes)
+    march = medium.forms(camera, window, planes)
+    rays = march.rays
     x, y = (i.ravel() for i in np.meshgrid(np.arange(window[0]), np.arange(window[1])))
     offsets = np.column_stack([x + 0.5 - window[0] / 2, y + 0.5 - window[1] / 2])
     n, capacity = len(offsets), int(volume.length / medium.sample_distance) + 4
+    n_planes = np.int32(march.planes)
     results = call(
-        FILE, "marches", n, *medium.medium_arguments(camera), forms, np.int32(n_planes),
+        FILE, "marches", n, *medium.medium_arguments(camera), march.packed(), n_planes,
         offsets.astype(np.float32), np.float32(medium.sample_distance),
         np.float32(medium.unit_distance), np.float32(t_end), np.int32(group), np.int32(capacity),
         call.empty(n, 4), call.empty(n, dtype=np.int32), call.empty(n, capacity),
         call.empty(n, capacity, 4), call.empty(n, capacity, dtype=np.int32),
-        by_value=(1, 7), **medium.defines,
+        by_value=(1, 7), **medium.defines, **march.defines,
     )  # fmt: skip
     assert (results[1] <= capacity - 1).all()
     pixel = np.column_stack([np.ones(n), offsets])

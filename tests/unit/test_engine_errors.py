@@ -254,10 +254,11 @@ def limited(runtime, monkeypatch, *, buffer=2**40, total=2**40):
 
 def test_a_volume_too_large_is_named(runtime, make, draw, monkeypatch):
     volume = Volume(np.ones((64, 64, 64), np.float32), name="density")
-    limited(runtime, monkeypatch, buffer=2**19)
+    limited(runtime, monkeypatch, buffer=2**14)  # a brick of 17 x 17 x 17 points needs 19 KiB
     before = runtime.allocated
+    message = "volume 'density', 64 x 64 x 64 of float32 .*brick by brick.* 16.00 KiB .*per buffer"
     for function in (make, draw):
-        with pytest.raises(DeviceMemoryError, match="volume 'density'.* needs 1.00 MiB"):
+        with pytest.raises(DeviceMemoryError, match=message):
             function(volume=volume)
     gc.collect()
     assert runtime.allocated == before
@@ -321,6 +322,21 @@ def test_the_estimate_bounds_what_is_taken(runtime, make, monkeypatch, dtype, wi
     assert taken >= stated.working / 4
     assert vdi.nbytes <= stated.vdi_worst_case
     assert stated.total == stated.volume + stated.vdi_worst_case + stated.working
+
+
+@pytest.mark.parametrize(("low", "bytes_each"), [(0.0, 2), (60000.0, 4)])
+def test_the_estimate_counts_scalars_taken_relative(runtime, make, monkeypatch, low, bytes_each):
+    volume = Volume((60000 + np.arange(32**3).reshape(32, 32, 32) % 90).astype(np.uint16))
+    function = TransferFunction([[1, 1, 1]] * 2, [0, 0.2], (low, 60090.0))
+    stated = estimate(volume, (16, 16), transfer_function=function)
+    assert stated.volume == bytes_each * 32**3
+    gc.collect()
+    before = runtime.allocated
+    monkeypatch.setattr(runtime._ledger, "peak", before)
+    camera = Camera((15.5, 15.5, 90), (15.5, 15.5, 15.5), (0, 1, 0))
+    generate_vdi(volume, camera, (16, 16), function, device=runtime)
+    taken = runtime.peak_allocated - before
+    assert stated.volume < taken <= stated.volume + stated.working + 2**14
 
 
 # -- giving up -------------------------------------------------------------------------------------

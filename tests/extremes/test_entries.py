@@ -1,0 +1,224 @@
+"""Rays that enter the volume many voxels from where they are formed, on both sides of the border
+from which on their positions are computed with numbers of two floats."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import strategies
+from extreme_scenes import (
+    BOUND,
+    WINDOW,
+    check_scene,
+    check_views,
+    field_volume,
+    slabs_vdi,
+    transfer,
+    turned,
+    view,
+)
+from oracle import explain
+
+from pyvista_vdi import Cropping, Shading, numerics, reference
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.cropping import PRESETS
+from pyvista_vdi.device_volume import DeviceVolume
+from pyvista_vdi.generation import CRITERIA, generate_vdi
+from pyvista_vdi.raycast import PreparedVDI, render_vdi
+from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.reference.rays import pixel_ray
+from pyvista_vdi.transfer_function import TransferFunction
+from pyvista_vdi.volume import Volume
+
+pytestmark = pytest.mark.extremes
+
+SHINY = Shading(0.2, 0.6, 0.5, 30.0)
+
+
+def is_far(runtime, volume, camera, window=WINDOW):
+    medium = DeviceVolume(runtime, volume, transfer())
+    return "FAR_ENTRIES" in medium.forms(camera, window, None).defines
+
+
+def plate(thinness):
+    """A plate whose cells are so many times as wide as high, its look, and a view along it."""
+    volume = field_volume((1, 1 / thinness, 1))
+    return volume, view(volume, 75, 10, zoom=True)
+
+
+@pytest.mark.parametrize(("reach", "points", "far"), [
+    (256, 9, False), (257, 9, True), (256, 64, False), (257, 64, True), (1600, 400, False),
+    (1601, 400, True), (2048, 600, False), (2049, 600, True), (2048, 5000, False),
+    (2049, 5000, True),
+])  # fmt: skip
+def test_the_border(reach, points, far):
+    assert bool(numerics.entries(reach, points)) is far
+
+
+@pytest.mark.parametrize("lit", [False, True])
+@pytest.mark.parametrize(("thinness", "far"), [(123, False), (125, True)])
+def test_the_bound_holds_on_both_sides_of_the_border(runtime, worst, thinness, far, lit):
+    """The scenes differ by a hundredth, and their pictures hardly; the arithmetic changes."""
+    volume, camera = plate(thinness)
+    assert is_far(runtime, volume, camera) is far
+    function = transfer(unit_distance=5 / thinness, shading=SHINY if lit else None)
+    image = raycast_volume(volume, camera, WINDOW, function, device=runtime)
+    exact = reference.volume_image(volume, camera, WINDOW, function)
+    assert (exact[..., 3] > 1e-3).sum() > 3
+    worst("volume", np.abs(image - exact).max())
+    assert np.abs(image - exact).max() <= BOUND
+
+
+@pytest.mark.parametrize("dimensions", [(500, 500, 500), (500, 400, 100), (512, 512, 30)], ids=str)
+def test_what_is_not_very_thin_is_computed_in_float32_alone(runtime, dimensions):
+    """Whatever the view: as large as it fits into the window, near, or wide."""
+    volume = Volume(np.broadcast_to(np.uint8(3), dimensions[::-1]))
+    for azimuth in range(0, 91, 15):
+        for options in ({}, {"distance": 1.3}, {"parallel": True}):
+            camera = view(volume, azimuth, 35, **options)
+            assert not DeviceVolume.forms(_Bare(volume), camera, (640, 480), None).defines
+
+
+class _Bare:
+    """What :meth:`DeviceVolume.forms` needs of itself: no device."""
+
+    def __init__(self, volume):
+        self.volume = volume
+
+
+def test_needles(runtime, worst):
+    """Cells of 1:10^6: a chord of a hundredth, six thousand from where rays are formed."""
+    spacing = (1e-3, 1, 1e3)
+    volume = field_volume(spacing)
+    camera = view(volume, zoom=True)
+    function = transfer(unit_distance=5 * min(spacing))
+    # Half the least spacing would be fourteen million steps, which float64 takes long to do
+    step = volume.length / 2000
+    views = turned(camera, volume, (0, 0.01), zoom=True)
+    vdi = check_scene(
+        runtime, worst, volume, function, camera, views, sample_distance=step, bound=BOUND
+    )
+    # A staircase of lists so thin that rays from aside may pass between them
+    check_views(runtime, worst, vdi, turned(camera, volume, (8,), zoom=True), least_drawn=0)
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+def test_supersegments_of_far_entries_are_ordered_and_have_a_thickness(runtime, worst, criterion):
+    """Steps of few units in the last place of their depth, which rounding could make nothing."""
+    volume = field_volume((1e-3, 1, 1e3))
+    camera = view(volume, zoom=True)
+    function = transfer(unit_distance=5e-3)
+    vdi = generate_vdi(
+        volume, camera, WINDOW, function, sample_distance=volume.length / 2**19,
+        max_supersegments=40, criterion=criterion, device=runtime,
+    )  # fmt: skip
+    assert vdi.counts.max() > 1
+    assert (vdi.back > vdi.front).all()
+    lists = np.repeat(np.arange(vdi.counts.size), vdi.counts.ravel())
+    touching = lists[1:] == lists[:-1]
+    assert (vdi.front[1:] >= vdi.back[:-1])[touching].all()
+    exact = reference.volume_image(volume, camera, WINDOW, function, volume.length / 2**19)
+    stored = reference.render(vdi, camera, WINDOW)
+    worst("VDI as it is stored", np.abs(stored - exact).max())
+    assert np.abs(stored - exact).max() <= BOUND
+
+
+PLATE = (2, 6, 1e-3, 5e-3, 1, 5)
+
+
+@pytest.mark.parametrize("end", ["none", "plane", "opaque", "subvolume", "fence", "inverted_cross"])
+def test_far_entries_are_clipped_cropped_and_ended(runtime, worst, end):
+    """A constant medium absorbs by the length that is left of each ray."""
+    volume = Volume(np.ones((7, 8, 9), np.uint8), (1, 1e-3, 1))
+    camera = view(volume, 75, 10, zoom=True)
+    assert is_far(runtime, volume, camera)
+    function = TransferFunction([[1, 1, 1]] * 2, [0.3, 0.3], (0, 1), unit_distance=5e-3)
+    box = np.reshape(volume.bounds, (3, 2))
+    point, normal = box.mean(axis=1), np.array([0.1, 1, 0.2])
+    depth = camera.model_to_view[2, :3] @ point + camera.model_to_view[2, 3]
+    cropping = Cropping(PLATE, end) if end in PRESETS else None
+    exact = np.zeros(WINDOW[::-1])
+    for y, x in np.ndindex(exact.shape):
+        origin, direction = pixel_ray(camera, WINDOW, x, y)
+        cuts = np.sort((box - origin[:, np.newaxis]) / direction[:, np.newaxis], axis=1)
+        first, last = cuts[:, 0].max(), cuts[:, 1].min()
+        if end == "opaque":
+            last = min(last, depth)
+        if end == "plane":
+            at = normal @ (point - origin) / (normal @ direction)
+            first, last = (
+                (max(first, at), last) if normal @ direction > 0 else (first, min(last, at))
+            )
+        parts = np.array([[first, last]]) if last > first else np.zeros((0, 2))
+        if cropping is not None and len(parts):
+            parts = cropping.parts_of_ray(origin, direction, first, last)
+        length = np.diff(parts, axis=1).sum() * np.linalg.norm(direction)
+        exact[WINDOW[1] - 1 - y, x] = -np.expm1(np.log1p(-0.3) * length / 5e-3)
+    image = raycast_volume(
+        volume, camera, WINDOW, function, device=runtime, cropping=cropping,
+        clipping_planes=[[*point, *normal]] if end == "plane" else None,
+        opaque_depth=np.full(exact.shape, depth) if end == "opaque" else None,
+    )  # fmt: skip
+    assert (exact > 1e-3).sum() > 3
+    off = np.abs(image[..., 3] - exact).max()
+    worst("volume", off)
+    assert off <= BOUND
+
+
+# -- lists far behind the near plane ---------------------------------------------------------------
+
+EYE = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=16)
+
+
+def thin_slab(thickness, optical_depth=1.0, parallel=False):
+    """A slab at the far end of the bounds, two units behind their near depth."""
+    camera = EYE.replace(parallel_projection=parallel, parallel_scale=0.7)
+    return slabs_vdi(
+        camera, [[2 - thickness, 2]], optical_depth,
+        window=(4, 3), bounds=(-1, 1, -1, 1, -1, 1), depth_origin=9.0,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("precision", ["exact", "16-byte"])
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize(
+    ("thinness", "far"), [(100, False), (127, False), (130, True), (1e5, True)]
+)
+def test_v_o_sees_all_of_a_far_supersegment(runtime, worst, thinness, far, parallel, precision):
+    """Both forms of depth, on either side of the border: 128 thicknesses from the near plane."""
+    vdi = thin_slab(2 / thinness, parallel=parallel).with_precision(precision)
+    assert ("FAR_ENTRIES" in PreparedVDI(runtime, vdi).defines) is far
+    alpha = render_vdi(vdi, vdi.camera, (4, 3), device=runtime)[..., 3]
+    off = np.abs(alpha - reference.render(vdi, vdi.camera, (4, 3))[..., 3]).max()
+    worst("VDI at V_O", off)
+    assert off <= BOUND
+    check_views(runtime, worst, vdi, [EYE.azimuth(a) for a in (25, 90, 180)], least_drawn=0)
+
+
+@pytest.mark.parametrize(("thickness", "far"), [(1.1 * 2.0**-22, True), (0.9 * 2.0**-22, False)])
+def test_what_depths_cannot_tell_is_left_to_float32(thickness, far):
+    """Two units of depth, and a slab of a unit in the last place of them."""
+    assert numerics.lists_are_far(2.0, thickness, 2.0) is far
+
+
+def test_lists_far_away_but_not_thin_are_computed_in_float32_alone(runtime):
+    volume = field_volume()
+    vdi = generate_vdi(volume, view(volume), WINDOW, transfer(), device=runtime)
+    assert "FAR_ENTRIES" not in PreparedVDI(runtime, vdi).defines
+
+
+@pytest.mark.parametrize("precision", ["exact", "16-byte", "8-byte"])
+@pytest.mark.parametrize("kind", ["near", "around", "parallel"])
+def test_any_vdi_may_be_drawn_by_depths_relative_to_the_ray(
+    runtime, worst, monkeypatch, kind, precision
+):
+    """Nothing but rounding tells the two forms apart."""
+    rng = np.random.default_rng([4, 901])
+    vdi = strategies.random_vdi(rng, max_window=(9, 7)).with_precision(precision)
+    camera, size = strategies.random_view(rng, vdi, kind)
+    monkeypatch.setattr("pyvista_vdi.raycast.lists_are_far", lambda *_: True)
+    assert "FAR_ENTRIES" in PreparedVDI(runtime, vdi).defines
+    image = render_vdi(vdi, camera, size, device=runtime)
+    result = explain(vdi, camera, size, image, name=kind)
+    worst("random VDI", result.worst)
+    assert not result.failures
