@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from standard_table import window_size  # beside this file
+from common import window_size  # beside this file
 from tqdm import tqdm
 
 from pyvista_vdi import AmbientOcclusion, examples

@@ -14,7 +14,7 @@ from pathlib import Path
 from statistics import mean
 from typing import Any
 
-from standard_table import INTERPOLATIONS, window_size  # beside this file
+from common import INTERPOLATIONS, window_size  # beside this file
 from tqdm import tqdm
 
 from pyvista_vdi import examples

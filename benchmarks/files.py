@@ -6,7 +6,6 @@ Writes ``files_WxH.json`` (all figures) and ``.md`` (the tables). See README.md 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import statistics
 import sys
@@ -18,14 +17,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from skipping import timed, vdi_of  # beside this file
-from standard_table import window_size
+from common import (  # beside this file
+    add_vdi_options,
+    at_hand,
+    begun,
+    new_parser,
+    save,
+    system_line,
+    timed,
+    vdi_of,
+    write_text,
+)
 from tqdm import tqdm
 
-from pyvista_vdi import examples
 from pyvista_vdi.compare import describe_system
-from pyvista_vdi.io import FORMAT_VERSION, read, read_info, whole_file
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE
+from pyvista_vdi.io import FORMAT_VERSION, read, read_info
 from pyvista_vdi.vdi import VDI
 
 #: Bytes of a supersegment in the dense form: two depths, four colour components, float32.
@@ -53,7 +59,6 @@ def main() -> int:
     """Measure what is missing, and write what was found."""
     options = parsed()
     width, height = options.size
-    options.out.mkdir(parents=True, exist_ok=True)
     target = options.out / f"files_{width}x{height}.json"
     case = {
         "window_size": [width, height],
@@ -62,40 +67,23 @@ def main() -> int:
         "format_version": FORMAT_VERSION,
         "system": {**describe_system(options.device), "numcodecs": version("numcodecs")},
     }
-    results = json.loads(target.read_text()) if target.exists() else {**case, "volumes": {}}
-    if any(results[name] != value for name, value in case.items()):
-        sys.exit(f"{target} was measured otherwise or elsewhere: choose another --out")
-    at_hand = examples.available()
-    absent = [name for name in options.volumes if name not in at_hand]
-    if absent:
-        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
-    for name in tqdm([name for name in options.volumes if name in at_hand], unit="volume"):
+    results = begun(target, case)
+    for name in tqdm(at_hand(options.volumes), unit="volume"):
         if name in results["volumes"] and not options.redo:
             continue
         with tempfile.TemporaryDirectory(dir=options.disk) as folder:
             results["volumes"][name] = measured(vdi_of(name, options), Path(folder), options)
-        with whole_file(target) as stream:
-            stream.write(json.dumps(results, indent=1).encode() + b"\n")
-    with whole_file(target.with_suffix(".md")) as stream:
-        stream.write(report(results).encode())
+        save(results, target)
+    write_text(target.with_suffix(".md"), report(results))
     print(f"Written: {target}, and .md beside it")
     return 0 if all(v["identical"] for v in results["volumes"].values()) else 1
 
 
 def parsed() -> argparse.Namespace:
     """Return the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
-    names = sorted(examples.VOLUMES)
-    parser.add_argument("--volumes", nargs="+", choices=names, default=names, metavar="NAME")
-    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
-    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
-    parser.add_argument("--repeats", type=int, default=9, help="timed turns")
-    parser.add_argument("--device", help="OpenCL device that generates VDIs")
-    parser.add_argument("--vdi-cache", type=Path, metavar="FOLDER", help="as for skipping.py")
+    parser = new_parser(__doc__, repeats=9, repeated="timed turns")
+    add_vdi_options(parser)
     parser.add_argument("--disk", type=Path, metavar="FOLDER", help="where the files are written")
-    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
     return parser.parse_args()
 
 
@@ -210,8 +198,7 @@ def report(results: dict[str, Any]) -> str:
             f"`read_info`: {min(infos):.1f} to {max(infos):.1f} ms.",
             f"Spread of the repeated loads, (most - least) / median: {spread:.0%}.",
         ]
-    system = ", ".join(f"{k} {v}" for k, v in results["system"].items())
-    return "\n".join([*lines, "", system, ""])
+    return "\n".join([*lines, "", system_line(results["system"]), ""])
 
 
 def ratio(found: dict[str, Any], ours: str, theirs: str, most: float = np.inf) -> str:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from standard_table import INTERPOLATIONS, window_size  # beside this file
+from common import INTERPOLATIONS, window_size  # beside this file
 from tqdm import tqdm
 
 from pyvista_vdi import examples

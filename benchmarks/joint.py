@@ -17,9 +17,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from common import vdi_of, window_size  # beside this file
 from numpy.typing import NDArray
-from skipping import vdi_of  # beside this file
-from standard_table import window_size
 
 from pyvista_vdi.joint import render_vdis
 from pyvista_vdi.raycast import render_vdi

@@ -6,7 +6,6 @@ Writes ``packed_WxH.json`` (all figures) and ``.md`` (the table). See README.md 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 from functools import partial
@@ -14,19 +13,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from files import DENSE_BYTES, mebibytes  # beside this file
-from skipping import timed, vdi_of
-from standard_table import window_size
+from common import (  # beside this file
+    add_vdi_options,
+    at_hand,
+    begun,
+    new_parser,
+    save,
+    system_line,
+    timed,
+    vdi_of,
+    window_size,
+    write_text,
+)
+from files import DENSE_BYTES, mebibytes
 from tqdm import tqdm
 
-from pyvista_vdi import examples
 from pyvista_vdi.compare import describe_system
-from pyvista_vdi.io import whole_file
 from pyvista_vdi.metrics import compare_images
 from pyvista_vdi.opencl_runtime import get_runtime
 from pyvista_vdi.precision import PRECISIONS
 from pyvista_vdi.raycast import PreparedVDI
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE
 from pyvista_vdi.vdi import VDI
 
 #: Degrees about the centre, from V_O.
@@ -49,7 +55,6 @@ def main() -> int:
     options = parsed()
     width, height = options.size
     target = options.out / f"packed_{width}x{height}.json"
-    options.out.mkdir(parents=True, exist_ok=True)
     case = {
         "window_size": [width, height],
         "frame": list(options.frame or options.size),
@@ -57,39 +62,22 @@ def main() -> int:
         "max_supersegments": options.max_supersegments,
         "system": describe_system(options.device),
     }
-    results = json.loads(target.read_text()) if target.exists() else {**case, "volumes": {}}
-    if any(results[name] != value for name, value in case.items()):
-        sys.exit(f"{target} was measured otherwise or elsewhere: choose another --out")
-    at_hand = examples.available()
-    absent = [name for name in options.volumes if name not in at_hand]
-    if absent:
-        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
-    for name in tqdm([name for name in options.volumes if name in at_hand], unit="volume"):
+    results = begun(target, case)
+    for name in tqdm(at_hand(options.volumes), unit="volume"):
         if name in results["volumes"] and not options.redo:
             continue
         results["volumes"][name] = measured(vdi_of(name, options), options)
-        with whole_file(target) as stream:
-            stream.write(json.dumps(results, indent=1).encode() + b"\n")
-    with whole_file(target.with_suffix(".md")) as stream:
-        stream.write(report(results).encode())
+        save(results, target)
+    write_text(target.with_suffix(".md"), report(results))
     print(f"Written: {target}, and .md beside it")
     return 0 if most_loss(results) <= MOST_LOSS else 1
 
 
 def parsed() -> argparse.Namespace:
     """Return the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
-    names = sorted(examples.VOLUMES)
-    parser.add_argument("--volumes", nargs="+", choices=names, default=names, metavar="NAME")
+    parser = new_parser(__doc__, repeats=5, repeated="timed frames of each kind")
+    add_vdi_options(parser)
     parser.add_argument("--frame", type=window_size, metavar="WxH", help="of the pictures")
-    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
-    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
-    parser.add_argument("--repeats", type=int, default=5, help="timed frames of each kind")
-    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
-    parser.add_argument("--vdi-cache", type=Path, metavar="FOLDER", help="as for skipping.py")
-    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
     return parser.parse_args()
 
 
@@ -183,8 +171,7 @@ def report(results: dict[str, Any]) -> str:
             cells.append(f"{found['dense_bytes'] / size:.1f}")
             lines.append(f"| {' | '.join(cells)} |")
     lines += ["", f"Largest loss of SSIM: {most_loss(results):.6f} (allowed: {MOST_LOSS})."]
-    system = ", ".join(f"{k} {v}" for k, v in results["system"].items())
-    return "\n".join([*lines, "", system, ""])
+    return "\n".join([*lines, "", system_line(results["system"]), ""])
 
 
 if __name__ == "__main__":

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from common import INTERPOLATIONS, window_size  # beside this file
 from numpy.typing import NDArray
-from standard_table import INTERPOLATIONS, window_size  # beside this file
 from tqdm import tqdm
 
 from pyvista_vdi import examples

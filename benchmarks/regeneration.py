@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from standard_table import INTERPOLATIONS, window_size  # beside this file
+from common import INTERPOLATIONS, window_size  # beside this file
 from tqdm import tqdm
 
 from pyvista_vdi import examples

@@ -6,29 +6,30 @@ Writes ``skipping_WxH.json`` (all figures) and ``.md`` (the table). See README.m
 from __future__ import annotations
 
 import argparse
-import json
 import statistics
 import sys
-import time
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from common import (  # beside this file
+    add_vdi_options,
+    at_hand,
+    begun,
+    new_parser,
+    save,
+    system_line,
+    timed,
+    vdi_of,
+    write_text,
+)
 from numpy.typing import NDArray
-from standard_table import window_size  # beside this file
 from tqdm import tqdm
 
-from pyvista_vdi import examples
 from pyvista_vdi.camera import Camera
-from pyvista_vdi.classification import Classification
 from pyvista_vdi.compare import describe_system
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.io import read, whole_file
 from pyvista_vdi.occupancy import OccupancyGrid
 from pyvista_vdi.opencl_runtime import Runtime, get_runtime
 from pyvista_vdi.raycast import PreparedVDI
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
 from pyvista_vdi.vdi import VDI
 
 #: Azimuths from V_O, degrees.
@@ -46,7 +47,6 @@ def main() -> int:
     """Measure what is missing, and write what was found."""
     options = parsed()
     width, height = options.size
-    options.out.mkdir(parents=True, exist_ok=True)
     target = options.out / f"skipping_{width}x{height}.json"
     case = {
         "window_size": [width, height],
@@ -54,21 +54,13 @@ def main() -> int:
         "max_supersegments": options.max_supersegments,
         "system": describe_system(options.device),
     }
-    results = json.loads(target.read_text()) if target.exists() else {**case, "volumes": {}}
-    if any(results[name] != value for name, value in case.items()):
-        sys.exit(f"{target} was measured otherwise or elsewhere: choose another --out")
-    at_hand = examples.available()
-    absent = [name for name in options.volumes if name not in at_hand]
-    if absent:
-        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
-    for name in tqdm([name for name in options.volumes if name in at_hand], unit="volume"):
+    results = begun(target, case)
+    for name in tqdm(at_hand(options.volumes), unit="volume"):
         if name in results["volumes"] and not options.redo:
             continue
         results["volumes"][name] = measured(vdi_of(name, options), options)
-        with whole_file(target) as stream:
-            stream.write(json.dumps(results, indent=1).encode() + b"\n")
-    with whole_file(target.with_suffix(".md")) as stream:
-        stream.write(report(results).encode())
+        save(results, target)
+    write_text(target.with_suffix(".md"), report(results))
     print(f"Written: {target}, and .md beside it")
     same = all(a["identical"] for v in results["volumes"].values() for a in v["angles"])
     return 0 if same else 1
@@ -76,50 +68,9 @@ def main() -> int:
 
 def parsed() -> argparse.Namespace:
     """Return the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
-    names = sorted(examples.VOLUMES)
-    parser.add_argument("--volumes", nargs="+", choices=names, default=names, metavar="NAME")
-    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
-    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
-    parser.add_argument("--repeats", type=int, default=9, help="timed frames of each kind")
-    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
-    parser.add_argument(
-        "--vdi-cache",
-        type=Path,
-        metavar="FOLDER",
-        help="read VDIs from there that an earlier run has written, and write those it lacks",
-    )
-    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
+    parser = new_parser(__doc__, repeats=9, repeated="timed frames of each kind")
+    add_vdi_options(parser)
     return parser.parse_args()
-
-
-def vdi_of(name: str, options: argparse.Namespace) -> VDI:
-    """Return the volume's VDI: from the cache, or generated and written there."""
-    path = None
-    if options.vdi_cache is not None:
-        width = options.size[0]
-        file = f"{name}_{options.tf}_{width}_{options.max_supersegments}.vdi"
-        path = options.vdi_cache / file
-        if path.exists():
-            vdi = read(path)
-            if vdi.window_size == tuple(options.size):
-                return vdi
-    volume = examples.load_data(name, as_volume=True)
-    classification = Classification(TRANSFER_FUNCTIONS[options.tf], "skipping")
-    vdi = generate_vdi(
-        volume,
-        filling_camera(volume.bounds, options.size),
-        options.size,
-        classification.transfer_function(volume),
-        max_supersegments=options.max_supersegments,
-        device=options.device,
-    )
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        vdi.save(path)
-    return vdi
 
 
 def measured(vdi: VDI, options: argparse.Namespace) -> dict[str, Any]:
@@ -205,23 +156,6 @@ class Drawing:
         }
 
 
-def timed(ways: dict[str, Callable[[], object]], repeats: int) -> dict[str, dict[str, Any]]:
-    """Time several ways in turns: seconds by wall clock and by CPU, with the spread."""
-    taken: dict[str, list[tuple[float, float]]] = {name: [] for name in ways}
-    for _ in range(repeats):
-        for name, way in ways.items():
-            wall, cpu = time.perf_counter(), time.process_time()
-            way()
-            taken[name].append((time.perf_counter() - wall, time.process_time() - cpu))
-    return {
-        name: {
-            clock: {"median": statistics.median(s), "least": min(s), "most": max(s)}
-            for clock, s in zip(("wall", "cpu"), zip(*pairs, strict=True), strict=True)
-        }
-        for name, pairs in taken.items()
-    }
-
-
 def report(results: dict[str, Any]) -> str:
     """Return the table: a line per volume."""
     width, height = results["window_size"]
@@ -250,8 +184,7 @@ def report(results: dict[str, Any]) -> str:
     if spreads:
         spread = statistics.median(spreads)
         lines += ["", f"Spread of the repeated frames, (most - least) / median: {spread:.0%}."]
-    system = ", ".join(f"{k} {v}" for k, v in results["system"].items())
-    return "\n".join([*lines, "", system, ""])
+    return "\n".join([*lines, "", system_line(results["system"]), ""])
 
 
 if __name__ == "__main__":

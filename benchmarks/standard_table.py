@@ -15,17 +15,15 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from standard_report import write_plot, write_tables  # beside this file
+from common import INTERPOLATIONS, at_hand, save, window_size  # beside this file
+from standard_report import write_plot, write_tables
 from tqdm import tqdm
 
 from pyvista_vdi import examples
 from pyvista_vdi.compare import Report, Settings, judge_times, judge_vdi, judge_vtk, measure
 from pyvista_vdi.compare.bounds import CONVERGED_STEPS, FRAME_RATIO_ANGLE
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.io import whole_file
 from pyvista_vdi.standard_cases import ANGLES, TRANSFER_FUNCTIONS, WINDOW_SIZE
-
-INTERPOLATIONS = ("nearest", "linear")
 
 #: Volumes for which one transfer function has to do, because of their size.
 SOFT_ONLY = ("allen_mouse_brain",)
@@ -112,23 +110,10 @@ def parsed(arguments: list[str] | None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def window_size(text: str) -> tuple[int, int]:
-    """Parse ``1280x720``."""
-    try:
-        width, height = (int(n) for n in text.split("x"))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT; got {text!r}") from None
-    return width, height
-
-
 def chosen(options: argparse.Namespace) -> list[Case]:
     """Return the cases to be measured whose volume is at hand; name those that are not."""
-    at_hand = examples.available()
-    wanted = options.volumes or sorted(examples.VOLUMES)
-    absent = [name for name in wanted if name not in at_hand]
-    if absent:
-        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
-    combinations = product(options.interpolation, [v for v in wanted if v in at_hand], options.tf)
+    volumes = at_hand(options.volumes or sorted(examples.VOLUMES))
+    combinations = product(options.interpolation, volumes, options.tf)
     return [
         Case(interpolation, volume, look)
         for interpolation, volume, look in combinations
@@ -190,12 +175,6 @@ def condensed(report: Report) -> dict[str, Any]:
         "generation_ratio": described["generation_ratio"],
         "angles": described["angles"],
     }
-
-
-def save(results: dict[str, Any], target: Path) -> None:
-    """Write the file; a run that is stopped meanwhile leaves the old one."""
-    with whole_file(target) as stream:
-        stream.write(json.dumps(results, indent=1).encode() + b"\n")
 
 
 if __name__ == "__main__":

@@ -58,6 +58,7 @@ def generate(
     view_cone: float = 60.0,
     lights: Any = None,
     ambient_occlusion: Any = None,
+    memory_limit: int | float | str | None = None,
     device: Any = None,
     progress: Callable[[float], object] | None = None,
     **classification: Any,
@@ -95,6 +96,10 @@ def generate(
     ambient_occlusion : bool, float or AmbientOcclusion, optional
         Darken what is hidden from the light around it: ``True``, or the radius up to which
         something hides, model units. Baked into the colours.
+    memory_limit : int, float or str, optional
+        Most bytes to take on the device, or a text such as ``"2 GiB"``; by default what the device
+        has. A volume that does not fit goes there brick by brick: that takes more time, and the
+        VDI is the same to the last bit. See docs/performance.md, "Larger than memory".
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     progress : callable, optional
@@ -152,6 +157,7 @@ def generate(
         view_cone=view_cone,
         lights=lights,
         ambient_occlusion=ambient_occlusion,
+        memory_limit=memory_limit,
         device=device,
         progress=progress,
         metadata={"classification": looks.describe(), "scalars": volume.name},
@@ -405,6 +411,7 @@ def render_volume(
     skip_empty: bool = True,
     lights: Any = None,
     ambient_occlusion: Any = None,
+    memory_limit: int | float | str | None = None,
     device: Any = None,
     **classification: Any,
 ) -> NDArray[np.float32]:
@@ -430,6 +437,8 @@ def render_volume(
         As for :func:`generate`; lights that move with the camera are those of this view.
     ambient_occlusion : bool, float or AmbientOcclusion, optional
         As for :func:`generate`.
+    memory_limit : int, float or str, optional
+        As for :func:`generate`; the picture is the same to the last bit.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     **classification
@@ -472,6 +481,7 @@ def render_volume(
         skip_empty=skip_empty,
         lights=lights,
         ambient_occlusion=ambient_occlusion,
+        memory_limit=memory_limit,
         device=device,
     )
 
@@ -521,6 +531,7 @@ def estimate(
     max_supersegments: int = 20,
     criterion: str = "least-error",
     ambient_occlusion: Any = None,
+    memory_limit: int | float | str | None = None,
     **classification: Any,
 ) -> Estimate:
     """Return how much memory generating a VDI takes, before it is taken.
@@ -537,6 +548,8 @@ def estimate(
         As for :func:`generate`.
     ambient_occlusion : bool, float or AmbientOcclusion, optional
         As for :func:`generate`.
+    memory_limit : int, float or str, optional
+        As for :func:`generate`; the volume's share is then what is left of it.
     **classification
         As for :func:`generate`: scalars whose range is narrow for how far it is from 0 take four
         bytes each.
@@ -561,6 +574,7 @@ def estimate(
         max_supersegments=max_supersegments,
         criterion=criterion,
         ambient_occlusion=ambient_occlusion,
+        memory_limit=memory_limit,
         transfer_function=looks.transfer_function(volume),
     )
 

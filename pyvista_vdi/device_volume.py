@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -14,10 +15,18 @@ from numpy.typing import ArrayLike, NDArray
 from . import rays
 from .ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from .blocks import GROUP
+from .bricks import (
+    DeviceBricks,
+    Room,
+    fitting_layout,
+    in_parts,
+    least_brick_bytes,
+    too_small,
+)
 from .camera import Camera
 from .checks import as_float
 from .device_occlusion import ambient_transmittances
-from .errors import InvalidArgumentError
+from .errors import DeviceMemoryError, InvalidArgumentError
 from .lighting import Lights
 from .numerics import (
     LARGEST_VOXEL,
@@ -27,7 +36,14 @@ from .numerics import (
     held_unit_distance,
     scalars_suit_float32,
 )
-from .opencl_runtime import DeviceBuffer, Runtime, aligned_empty, kept_together, padded
+from .opencl_runtime import (
+    DeviceBuffer,
+    Runtime,
+    aligned_empty,
+    bytes_text,
+    kept_together,
+    padded,
+)
 from .rays import Floats, PixelRays, packed, packed_pairs
 from .shading import gradient_table, lighting_table, shading_defines
 from .transfer_function import TransferFunction
@@ -43,8 +59,20 @@ _DEVICE_TYPES = {
 }
 #: Logarithm to base 2 of the points along each edge of a block that can be skipped.
 _BLOCK_SHIFT = 3
+#: Blocks: farther than this no march looks for what is not transparent.
+_FARTHEST = 16
+#: Most bytes of a volume that are looked through at a time for the ranges of its blocks, and how
+#: many such parts there must be room for.
+_PART_BYTES, _PARTS = 64 * 2**20, 4
+#: Bytes on the device of what is known of a block: its scalar range, whether it is visible, and its
+#: reach, which is made from another one.
+_BLOCK_BYTES = 11
+#: Bytes that are kept for tables: transfer functions, lights, rays. They may be a tenth of it.
+_TABLE_BYTES = 2**20
 #: Share of transparent blocks from which on looking for them pays.
 _WORTH_SKIPPING = 0.05
+#: Scalars of 16 bits that are looked up and not classified at each sample: 64 KiB of media.
+_MOST_LOOKED_UP = 4096
 #: Where scaled voxels end, in ranges of the transfer function.
 _BEYOND = 2.0**60
 #: Scaled voxels that are above the only scalar of a range are so by this at least.
@@ -99,6 +127,15 @@ class DeviceVolume:
         What a shaded volume is lit by; one headlight by default.
     ambient_occlusion : AmbientOcclusion, optional
         Darkens samples by what stands around them; computed once for a classification.
+    room : Room, optional
+        Memory that there is; a volume for which it is too little is held brick by brick. Without
+        it a volume is held in one piece or refused.
+
+    Attributes
+    ----------
+    bricks : DeviceBricks or None
+        What is on the device, where that is not the whole volume: steps must be sampled by a
+        :class:`~pyvista_vdi.bricks.StepSampler` before kernels march along them.
 
     Raises
     ------
@@ -118,6 +155,7 @@ class DeviceVolume:
         skip_empty: bool = True,
         lights: Lights | None = None,
         ambient_occlusion: AmbientOcclusion | None = None,
+        room: Room | None = None,
     ) -> None:
         if not isinstance(volume, Volume):
             raise InvalidArgumentError(f"expected a Volume, got {type(volume).__name__}")
@@ -131,20 +169,33 @@ class DeviceVolume:
             transfer_function.unit_distance or volume.default_unit_distance, self.sample_distance
         )
         low, high = transfer_function.scalar_range
-        native = _reads_natively(runtime, volume, transfer_function)
+        native = _reads_natively(runtime, volume, transfer_function, room)
         scale = None if native else _scale_of(volume, low, high)
         self.defines = _voxel_defines(volume, native)
-        self._voxels, ranges = _upload(runtime, volume, scale, self.defines)
+        whole = room is None or _fits(runtime, volume, scale, room)
+        if room is None or whole:
+            self._voxels, ranges = _upload(runtime, volume, scale, self.defines)
+        else:
+            ranges = _upload_ranges(runtime, volume, scale, self.defines, room)
         self._low, span = (low, high - low) if native else (0.0, 1.0 if high > low else 0.0)
         table = np.column_stack([transfer_function.colors, transfer_function.opacities])
         self._entries = len(table)
         self._per_scalar = _per_scalar(self._entries, span)
         self._table = runtime.upload(np.ascontiguousarray(table), "transfer function")
-        self._visible = self._visibility(runtime, ranges, transfer_function)
-        if skip_empty and self._empty_share(runtime) >= _WORTH_SKIPPING:
-            self.defines["SKIP_EMPTY"] = 1
+        self._visible = self._reaches = self._visibility(runtime, ranges, transfer_function)
+        self.bricks: DeviceBricks | None = None
+        if room is not None and not whole:
+            self._hold_bricks(runtime, scale, transfer_function, room)
+        if skip_empty or self.bricks is not None:
+            seen = runtime.download(self._visible)
+            if skip_empty and 1.0 - float(np.mean(seen)) >= _WORTH_SKIPPING:
+                self.defines["SKIP_EMPTY"] = 1
+            if self.bricks is not None or "SKIP_EMPTY" in self.defines:
+                self._reaches = self._reaches_of(runtime, seen)
         if transfer_function.interpolation == "nearest":
             self.defines["NEAREST"] = 1
+            if native and (ends := _integer_ends(runtime, volume, ranges)):
+                self._look_up_by_scalar(runtime, *ends)
         self._runtime = runtime
         self._shading = transfer_function.shading
         self._lights = Lights() if lights is None else lights
@@ -157,6 +208,12 @@ class DeviceVolume:
         self.ambient_occlusion = ambient_occlusion
         self._occlusion: tuple[Any, ...] = ()
         if ambient_occlusion is not None:
+            if self.bricks is not None:
+                raise DeviceMemoryError(
+                    f"ambient occlusion needs the volume {volume.name!r} in one piece, "
+                    f"{bytes_text(_device_bytes(volume, scale))}: raise memory_limit, leave "
+                    "ambient_occlusion out, or use another device"
+                )
             unlit = {k: v for k, v in shading.items() if k == "GRADIENT_OPACITY"}
             self._occlusion = self._occluded(
                 ambient_occlusion, transfer_function, {**self.defines, **unlit}
@@ -165,20 +222,75 @@ class DeviceVolume:
         self.defines.update(shading)
         self.defines.update(compensation(volume.length / self.sample_distance))
 
+    def _look_up_by_scalar(self, runtime: Runtime, first: int, last: int) -> None:
+        """Replace the table by one of what each scalar from ``first`` to ``last`` looks like."""
+        n = last - first + 1
+        media = runtime.buffer((n, 4), name="media of scalars")
+        with self._table:
+            runtime.launch(
+                runtime.kernel("grid/scalar_media.cl", "scalar_media"),
+                padded(n, GROUP),
+                GROUP,
+                self._table,
+                np.int32(self._entries),
+                np.float32(self._low),
+                np.float32(self._per_scalar),
+                np.int32(first),
+                np.int32(n),
+                media,
+            )
+            runtime.finish()  # the table may be host memory in use
+        self._table, self._entries, self._low, self._per_scalar = media, n, float(first), 1.0
+        self.defines["BY_SCALAR"] = 1
+
+    @property
+    def most_steps(self) -> int:
+        """Steps of the longest ray."""
+        return math.ceil(self.volume.length / self.sample_distance) + 1
+
     def medium_arguments(self, camera: Camera) -> tuple[Any, ...]:
         """Arguments ``voxels`` to ``forms``, without it, of the kernels that march.
 
         ``camera`` is the view: lights may move with it.
         """
         return (
-            *self._classified(),
+            *self._classified(self._reaches),
             *self._lighting(camera),
             *self._gradient,
             *self._occlusion,
         )
 
-    def _classified(self) -> tuple[Any, ...]:
-        """Arguments ``voxels`` to ``blocks``."""
+    def _hold_bricks(
+        self,
+        runtime: Runtime,
+        scale: _Scale | None,
+        transfer_function: TransferFunction,
+        room: Room,
+    ) -> None:
+        """Make room for bricks of the volume, none of which is there yet."""
+        volume = self.volume
+        gradients = (
+            transfer_function.shading is not None
+            or transfer_function.gradient_opacities is not None
+        )
+        dtype = volume.array.dtype if scale is None else np.dtype(np.float32)
+        point_bytes = dtype.itemsize * math.prod(volume.array.shape[3:])
+        others = math.prod(_blocks(volume.dimensions)) * _BLOCK_BYTES + _TABLE_BYTES
+        left = room.for_bricks(runtime, others)
+        largest = runtime.info.max_allocation
+        found = fitting_layout(volume.dimensions, point_bytes, gradients, left, largest)
+        if found is None:
+            least = least_brick_bytes(volume.dimensions, point_bytes, gradients) + others
+            whole = _device_bytes(volume, scale) + others
+            raise too_small(_described(volume), room, runtime, whole, least)
+        self.bricks = DeviceBricks(
+            runtime, volume.array, _reader(scale), dtype, *found, room.limit, volume.name
+        )
+        self._voxels = self.bricks.pool
+        self.defines["SAMPLED"] = 1
+
+    def _classified(self, blocks: DeviceBuffer) -> tuple[Any, ...]:
+        """Arguments ``voxels`` to ``blocks``, of which ``blocks`` says what may be skipped."""
         return (
             self._voxels,
             np.array([*self.volume.dimensions, 0], dtype=np.int32),
@@ -186,8 +298,8 @@ class DeviceVolume:
             np.int32(self._entries),
             np.float32(self._low),
             np.float32(self._per_scalar),
-            self._visible,
-            np.array([*_blocks(self.volume), 0], dtype=np.int32),
+            blocks,
+            np.array([*_blocks(self.volume.dimensions), 0], dtype=np.int32),
         )
 
     def _occluded(
@@ -213,8 +325,8 @@ class DeviceVolume:
                 ambient = ambient_transmittances(
                     self._runtime,
                     grid,
-                    (*self._classified(), *self._gradient),
-                    self._classified()[-2:],
+                    (*self._classified(self._visible), *self._gradient),
+                    self._classified(self._visible)[-2:],
                     defines,
                     self.sample_distance,
                     self.unit_distance,
@@ -240,7 +352,7 @@ class DeviceVolume:
         self, runtime: Runtime, ranges: DeviceBuffer, transfer_function: TransferFunction
     ) -> DeviceBuffer:
         """Return which blocks hold anything that is not transparent, uint8 on the device."""
-        n = int(np.prod(_blocks(self.volume)))
+        n = int(np.prod(_blocks(self.volume.dimensions)))
         visible = runtime.buffer((n,), np.uint8, "visible blocks")
         before = np.zeros(self._entries + 1, np.uint32)
         np.cumsum(transfer_function.opacities > 0, out=before[1:])
@@ -261,8 +373,30 @@ class DeviceVolume:
             runtime.finish()  # the table above may be host memory in use
         return visible
 
-    def _empty_share(self, runtime: Runtime) -> float:
-        return 1.0 - float(np.mean(runtime.download(self._visible)))
+    def _reaches_of(self, runtime: Runtime, seen: NDArray[np.uint8]) -> DeviceBuffer:
+        """Return how far each block is from one that may be visible, uint8 on the device."""
+        n = np.uint32(seen.size)
+        kernel = runtime.kernel("grid/volume_blocks.cl", "block_reaches", self.defines)
+        far = np.where(seen > 0, 0, _FARTHEST).astype(np.uint8)
+        reaches = runtime.upload(far, "empty blocks")
+        apart = 1
+        for along in _blocks(self.volume.dimensions):
+            with reaches as before:
+                reaches = runtime.buffer((seen.size,), np.uint8, "reaches of empty blocks")
+                runtime.launch(
+                    kernel,
+                    padded(seen.size, GROUP),
+                    GROUP,
+                    before,
+                    n,
+                    np.uint32(apart),
+                    np.int32(along),
+                    np.int32(_FARTHEST),
+                    reaches,
+                )
+                runtime.finish()  # what was read is released
+            apart *= along
+        return reaches
 
     def forms(
         self, camera: Camera, window_size: Sequence[int], clipping_planes: ArrayLike | None
@@ -307,11 +441,13 @@ def voxel_bytes(volume: Volume, transfer_function: TransferFunction | None = Non
     return volume.array.dtype.itemsize if native else np.dtype(np.float32).itemsize
 
 
-def _reads_natively(runtime: Runtime, volume: Volume, transfer_function: TransferFunction) -> bool:
+def _reads_natively(
+    runtime: Runtime, volume: Volume, transfer_function: TransferFunction, room: Room | None
+) -> bool:
     """Whether kernels read the voxels as they are, or scaled to the transfer function's range."""
     if not _suits_natively(volume, transfer_function):
         return False
-    return volume.array.dtype.kind != "f" or not _too_large(runtime, volume)
+    return volume.array.dtype.kind != "f" or not _too_large(runtime, volume, room)
 
 
 def _suits_natively(volume: Volume, transfer_function: TransferFunction) -> bool:
@@ -325,12 +461,15 @@ def _suits_natively(volume: Volume, transfer_function: TransferFunction) -> bool
     return scalars_suit_float32(low, high, dtype, transfer_function.interpolation)
 
 
-def _too_large(runtime: Runtime, volume: Volume) -> bool:
+def _too_large(runtime: Runtime, volume: Volume, room: Room | None) -> bool:
     """Whether differences of a float32 volume's finite voxels may overflow; found once."""
     uploads = _uploads_of(volume)
     if uploads.too_large is None:
-        _, ranges = _upload(runtime, volume, None, _voxel_defines(volume, True))
-        ends = runtime.download(ranges)
+        defines = _voxel_defines(volume, True)
+        if room is None or _fits(runtime, volume, None, room):
+            ends = runtime.download(_upload(runtime, volume, None, defines)[1])
+        else:
+            ends = _ranges_in_parts(runtime, volume, None, defines, room)
         largest = np.abs(ends).max(initial=0.0, where=np.isfinite(ends))
         uploads.too_large = bool(largest > LARGEST_VOXEL)
     return uploads.too_large
@@ -351,8 +490,12 @@ class _Uploads:
     def __init__(self) -> None:
         self.lock = threading.Lock()
         self.made: dict[Any, tuple[DeviceBuffer, DeviceBuffer]] = {}
+        #: Scalar range of each block of a volume that no device holds in one piece, by scaling.
+        self.ranges: dict[Any, NDArray[np.float32]] = {}
         #: Whether float32 cannot hold the voxels' differences; None before anyone has asked.
         self.too_large: bool | None = None
+        #: The least and the largest voxel of 16 bits; None before anyone has asked.
+        self.ends: tuple[int, int] | None = None
         self.occlusions: dict[Runtime, tuple[Any, DeviceBuffer]] = {}
 
 
@@ -386,10 +529,45 @@ def _per_scalar(entries: int, span: float) -> float:
     return min((entries - 1) / span, largest) if span > 0 else largest
 
 
-def _blocks(volume: Volume) -> tuple[int, int, int]:
-    """Blocks along x, y and z that cover the cells of the grid."""
-    x, y, z = (-(-(points - 1) // 2**_BLOCK_SHIFT) for points in volume.dimensions)
+def _blocks(dimensions: Sequence[int]) -> tuple[int, int, int]:
+    """Blocks along x, y and z that cover the cells of a grid of so many points."""
+    x, y, z = (-(-(points - 1) // 2**_BLOCK_SHIFT) for points in dimensions)
     return x, y, z
+
+
+def _device_bytes(volume: Volume, scale: _Scale | None) -> int:
+    """Bytes of the volume on a device."""
+    return volume.array.nbytes if scale is None else 4 * volume.array.size
+
+
+def _described(volume: Volume) -> str:
+    nx, ny, nz = volume.dimensions
+    return f"the volume {volume.name!r}, {nx} x {ny} x {nz} of {volume.array.dtype}"
+
+
+def _fits(runtime: Runtime, volume: Volume, scale: _Scale | None, room: Room) -> bool:
+    """Whether there is room for a volume in one piece."""
+    uploaded = (runtime, scale) in _uploads_of(volume).made
+    nbytes, blocks = _device_bytes(volume, scale), math.prod(_blocks(volume.dimensions))
+    return room.holds(runtime, nbytes, blocks * _BLOCK_BYTES + _TABLE_BYTES, uploaded=uploaded)
+
+
+def volume_bytes(volume: Volume, nbytes: int, room: Room) -> tuple[int, int]:
+    """Return what a volume of ``nbytes`` on the device takes there, and its rays' samples, bytes.
+
+    What its blocks and tables take is in it where there is a limit.
+    """
+    if room.limit is None:
+        return nbytes, 0
+    others = math.prod(_blocks(volume.dimensions)) * _BLOCK_BYTES + _TABLE_BYTES
+    if nbytes + others + room.working <= room.limit:
+        return nbytes + others, 0
+    return room.limit - room.working - room.sample_bytes, room.sample_bytes
+
+
+def _reader(scale: _Scale | None) -> Callable[[NDArray[Any]], NDArray[Any]]:
+    """Return what makes of voxels what the kernels read."""
+    return (lambda part: part) if scale is None else (lambda part: _scaled(part, scale))
 
 
 def _upload(
@@ -410,19 +588,62 @@ def _upload(
             array = volume.array if scale is None else _all_scaled(runtime, volume.array, scale)
             with kept_together() as keep:
                 voxels = keep(runtime.upload(array, f"volume {volume.name!r}"))
-                ranges = keep(_block_ranges(runtime, volume, voxels, defines))
+                ranges = keep(_block_ranges(runtime, volume.dimensions, voxels, defines))
                 runtime.finish()  # a thread with another queue may use them next
             made[key] = (voxels, ranges)
         return made[key]
 
 
-def _block_ranges(
+def _upload_ranges(
     runtime: Runtime,
     volume: Volume,
+    scale: _Scale | None,
+    defines: dict[str, str | int | None],
+    room: Room,
+) -> DeviceBuffer:
+    """Return the scalar range of each block of a volume that the device holds brick by brick."""
+    uploads = _uploads_of(volume)
+    with runtime.holding(uploads.lock):
+        for other in [key for key in uploads.made if key[0] is runtime]:
+            del uploads.made[other]  # its memory goes to the bricks
+        if scale not in uploads.ranges:
+            _require_a_number(runtime, volume)
+            uploads.ranges = {scale: _ranges_in_parts(runtime, volume, scale, defines, room)}
+        return runtime.upload(uploads.ranges[scale], "ranges of blocks")
+
+
+def _ranges_in_parts(
+    runtime: Runtime,
+    volume: Volume,
+    scale: _Scale | None,
+    defines: dict[str, str | int | None],
+    room: Room,
+) -> NDArray[np.float32]:
+    """Return the scalar range of each block, float32 (n, 2), from parts of the volume."""
+    blocks, read = _blocks(volume.dimensions), _reader(scale)
+    ranges = aligned_empty((*reversed(blocks), 2), np.float32)
+    point_bytes = _device_bytes(volume, scale) // math.prod(volume.dimensions)
+    nbytes = min(_PART_BYTES, room.in_all(runtime) // _PARTS, runtime.info.max_allocation)
+    for place, points in in_parts(blocks, 2**_BLOCK_SHIFT, point_bytes, nbytes):
+        runtime.give_way()
+        part = np.ascontiguousarray(read(volume.array[points]))
+        nz, ny, nx = part.shape[:3]
+        with (
+            runtime.upload(part, f"part of volume {volume.name!r}") as voxels,
+            _block_ranges(runtime, (nx, ny, nz), voxels, defines) as found,
+        ):
+            ranges[place] = runtime.download(found).reshape(ranges[place].shape)
+    return ranges.reshape(-1, 2)
+
+
+def _block_ranges(
+    runtime: Runtime,
+    dimensions: Sequence[int],
     voxels: DeviceBuffer,
     defines: dict[str, str | int | None],
 ) -> DeviceBuffer:
-    blocks = _blocks(volume)
+    """Return the scalar range of each block of a grid of so many points along x, y and z."""
+    blocks = _blocks(dimensions)
     n = int(np.prod(blocks))
     ranges = runtime.buffer((n, 2), name="ranges of blocks")
     runtime.launch(
@@ -430,11 +651,26 @@ def _block_ranges(
         padded(n, GROUP),
         GROUP,
         voxels,
-        np.array([*volume.dimensions, 0], dtype=np.int32),
+        np.array([*dimensions, 0], dtype=np.int32),
         np.array([*blocks, 0], dtype=np.int32),
         ranges,
     )
     return ranges
+
+
+def _integer_ends(runtime: Runtime, volume: Volume, ranges: DeviceBuffer) -> tuple[int, int] | None:
+    """Return the least and the largest scalar that voxels may have, if they are few enough."""
+    dtype = volume.array.dtype
+    if dtype.kind not in "iu":
+        return None
+    if dtype.itemsize == 1:
+        return (0, 255) if dtype.kind == "u" else (-128, 127)
+    uploads = _uploads_of(volume)
+    if uploads.ends is None:
+        blocks = runtime.download(ranges)
+        uploads.ends = int(blocks[:, 0].min()), int(blocks[:, 1].max())
+    least, largest = uploads.ends
+    return uploads.ends if largest - least < _MOST_LOOKED_UP else None
 
 
 def _require_a_number(runtime: Runtime, volume: Volume) -> None:
@@ -469,9 +705,11 @@ class _Scale(NamedTuple):
 def _scale_of(volume: Volume, low: float, high: float) -> _Scale:
     if high > low:
         return _Scale(low, high - low, False)
-    finite = volume.scalars[np.isfinite(volume.scalars)]
-    ends = np.array([finite.min(), finite.max()], np.float64) if finite.size else np.array([low])
-    return _Scale(low, float(np.abs(ends / 2 - low / 2).max()) * 2 or 1.0, True)
+    farthest = 0.0
+    for plane in volume.scalars:
+        finite = plane[np.isfinite(plane)].astype(np.float64)
+        farthest = max(farthest, float(np.abs(finite / 2 - low / 2).max(initial=0.0)))
+    return _Scale(low, 2 * farthest or 1.0, True)
 
 
 def _all_scaled(runtime: Runtime, array: NDArray[Any], scale: _Scale) -> NDArray[np.float32]:

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from ._version import __version__
 from .ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from .blocks import GROUP, block_items
+from .bricks import Room, StepSampler
 from .camera import Camera, check_window_size
-from .checks import as_float
-from .device_volume import DeviceVolume, voxel_bytes
+from .checks import as_float, memory_limit_bytes
+from .device_volume import DeviceVolume, volume_bytes, voxel_bytes
 from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory
 from .lighting import Lights
@@ -43,6 +44,8 @@ CRITERIA = tuple(_CRITERIA)
 _RUN_BYTES = 9 * 4
 #: Bytes of runs that one slice of rays records at a time; also how often progress is reported.
 _SLICE_BYTES = 96 * 2**20
+#: Slices that a memory limit has room for: the volume gets more than they do.
+_SLICES_IN_LIMIT = 4
 #: Runs that a ray's record keeps for the criteria other than least error: more than a ray through
 #: most data has, so that these cut what was sampled and not what least error has left of it.
 _UNMERGED_RUNS = 512
@@ -63,7 +66,7 @@ class Estimate:
     Attributes
     ----------
     volume : int
-        The volume on the device.
+        The volume on the device, or as many bricks of it as a memory limit leaves room for.
     vdi_worst_case : int
         The VDI with every list full; most are far shorter.
     working : int
@@ -115,6 +118,7 @@ def estimate(
     max_supersegments: int = 20,
     criterion: str = "least-error",
     ambient_occlusion: Any = None,
+    memory_limit: Any = None,
     transfer_function: TransferFunction | None = None,
 ) -> Estimate:
     """State the memory that :func:`generate_vdi` takes, before it is taken.
@@ -129,7 +133,7 @@ def estimate(
         Most supersegments in a list.
     criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
         As for :func:`generate_vdi`; all but the first record more of each ray at a time.
-    ambient_occlusion : optional
+    ambient_occlusion, memory_limit : optional
         As for :func:`generate_vdi`.
     transfer_function : TransferFunction, optional
         Scalars whose range is narrow for how far it is from 0 are taken relative to it, which
@@ -143,15 +147,19 @@ def estimate(
     """
     width, height = check_window_size(window_size)
     limit = check_max_supersegments(max_supersegments)
+    memory = memory_limit_bytes(memory_limit)
     item = voxel_bytes(volume, transfer_function)
     lists = width * height
-    plan = _Slices(width, height, limit, check_criterion(criterion))
+    plan = _Slices(width, height, limit, check_criterion(criterion), memory)
     occlusion = AmbientOcclusion.from_any(ambient_occlusion)
+    grid = 0 if occlusion is None else OcclusionGrid.of(volume, occlusion).nbytes
+    room = plan.room(memory, grid)
+    on_device, samples = volume_bytes(volume, volume.array.size * item, room)
     return Estimate(
-        volume=volume.array.size * item,
+        volume=on_device,
         vdi_worst_case=lists * (limit * 24 + 8) + 8,
-        working=plan.bytes,
-        occlusion=0 if occlusion is None else OcclusionGrid.of(volume, occlusion).nbytes,
+        working=plan.bytes + samples,
+        occlusion=grid,
     )
 
 
@@ -168,6 +176,7 @@ def generate_vdi(
     view_cone: float = 60.0,
     lights: Any = None,
     ambient_occlusion: Any = None,
+    memory_limit: Any = None,
     device: Any = None,
     progress: Progress | None = None,
     metadata: Mapping[str, Any] | None = None,
@@ -219,6 +228,10 @@ def generate_vdi(
         Darken what is hidden from the light around it, see
         :meth:`pyvista_vdi.AmbientOcclusion.from_any`; baked into the colours as well, and the same
         from every view.
+    memory_limit : int, float or str, optional
+        Most bytes to take on the device, or a text such as ``"2 GiB"``; by default what the device
+        has. A volume that does not fit goes there brick by brick, which takes more time and makes
+        the same VDI to the last bit.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
     progress : callable, optional
@@ -239,7 +252,8 @@ def generate_vdi(
     Cancelled
         If ``progress`` returned False.
     DeviceMemoryError
-        If the device lacks the memory, see :func:`estimate`.
+        If the device lacks the memory, see :func:`estimate`, or ``memory_limit`` is too little
+        even for one brick.
     """
     camera = Camera.from_any(camera)
     width, height = check_window_size(window_size)
@@ -250,6 +264,9 @@ def generate_vdi(
     runtime = get_runtime(device)
     lights = Lights.from_any(lights)
     occlusion = AmbientOcclusion.from_any(ambient_occlusion)
+    memory = memory_limit_bytes(memory_limit)
+    slices = _Slices(width, height, limit, criterion, memory)
+    grid = 0 if occlusion is None else OcclusionGrid.of(volume, occlusion).nbytes
     medium = DeviceVolume(
         runtime,
         volume,
@@ -257,9 +274,10 @@ def generate_vdi(
         sample_distance,
         lights=lights,
         ambient_occlusion=occlusion,
+        room=slices.room(memory, grid),
     )
     recorder = _Recorder(
-        runtime, medium, camera, (width, height), limit, criterion, tolerance, hidden_weight
+        runtime, medium, camera, (width, height), slices, limit, criterion, tolerance, hidden_weight
     )
     parts = []
     with recorder:
@@ -310,7 +328,9 @@ def generate_vdi(
 class _Slices:
     """How many rows of lists are made at a time, and the buffers that this takes."""
 
-    def __init__(self, width: int, height: int, limit: int, criterion: str) -> None:
+    def __init__(
+        self, width: int, height: int, limit: int, criterion: str, memory_limit: int | None
+    ) -> None:
         # Twice the budget: the records' thresholds then stay well below the final merges' errors
         self.kept = max(2 * limit, limit + 12)
         self.capacity = self.kept + _CHUNK_STEPS
@@ -318,10 +338,19 @@ class _Slices:
             self.kept = max(self.kept, _UNMERGED_RUNS)
             self.capacity = self.kept + _CHUNK_STEPS + limit  # the kernel cuts into what is free
         per_block_row = block_items(width, 4) * self.capacity * _RUN_BYTES
-        self.rows = min(height, 4 * max(1, _SLICE_BYTES // per_block_row))
+        most = _SLICE_BYTES
+        if memory_limit is not None:
+            most = min(most, memory_limit // _SLICES_IN_LIMIT)
+        self.rows = min(height, 4 * max(1, most // per_block_row))
         self.items = block_items(width, self.rows)
         packed_bytes = self.items * (limit * 24 + 8)
         self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + packed_bytes
+        self.text = f"{self.rows} rows of {width} lists of up to {limit} supersegments"
+
+    def room(self, memory_limit: int | None, occlusion: int) -> Room:
+        """Return the room for the volume beside a slice and the grid of an occlusion."""
+        steps = self.items * _CHUNK_STEPS
+        return Room(memory_limit, self.bytes + occlusion, steps, self.text)
 
 
 def _steps_per_voxel(volume: Volume, sample_distance: float) -> int:
@@ -351,6 +380,7 @@ class _Recorder:
         medium: DeviceVolume,
         camera: Camera,
         size: tuple[int, int],
+        slices: _Slices,
         limit: int,
         criterion: str,
         tolerance: float,
@@ -372,8 +402,8 @@ class _Recorder:
         self._planes = rays.planes
         self._far_entries = bool(rays.defines)
         self.depth_origin = rays.rays.reference_depth
-        self._most_steps = int(np.ceil(medium.volume.length / medium.sample_distance)) + 1
-        self.slices = _Slices(*size, limit, criterion)
+        self._most_steps = medium.most_steps
+        self.slices = slices
         self._grain = _steps_per_voxel(medium.volume, medium.sample_distance)
         items, capacity = self.slices.items, self.slices.capacity
         self._cuts = _CRITERIA[criterion]
@@ -390,6 +420,19 @@ class _Recorder:
             self._errors = keep(runtime.buffer((items, capacity), name="merge errors"))
             self._thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
             self._counts = keep(runtime.buffer((items,), np.uint32, "list lengths"))
+            self._sampler = None
+            if medium.bricks is not None:
+                march = (
+                    self._forms,
+                    np.int32(self._planes),
+                    np.float32(medium.sample_distance),
+                    np.float32(medium.unit_distance),
+                )
+                of_medium = medium.medium_arguments(camera)
+                steps = items * _CHUNK_STEPS
+                self._sampler = keep(
+                    StepSampler(runtime, medium.bricks, of_medium, defines, march, size, steps)
+                )
             self._buffers = stack.pop_all()
 
     def __enter__(self) -> _Recorder:
@@ -407,10 +450,14 @@ class _Recorder:
         runtime.fill(self._thresholds, self._threshold)
         capacity = np.int32(self.slices.capacity)
         for first_step, steps in _chunks(self._most_steps):
+            sampled: tuple[Any, ...] = ()
+            if self._sampler is not None:
+                sampled = self._sampler.sample(first_row, rows, first_step, steps)
             self._launch(
                 "march_lists",
                 items,
                 *medium.medium_arguments(self._camera),
+                *sampled,
                 self._forms,
                 np.int32(self._planes),
                 np.float32(medium.sample_distance),
@@ -466,10 +513,10 @@ class _Recorder:
         n = int(offsets[-1])
         with (
             runtime.upload(offsets, "list offsets") as starts,
-            runtime.buffer((n,), name="front depths") as front,
-            runtime.buffer((n,), name="back depths") as back,
-            runtime.buffer((n, 3), name="supersegment colours") as color,
-            runtime.buffer((n,), name="optical depths") as optical_depth,
+            runtime.result((n,), name="front depths") as front,
+            runtime.result((n,), name="back depths") as back,
+            runtime.result((n, 3), name="supersegment colours") as color,
+            runtime.result((n,), name="optical depths") as optical_depth,
         ):
             self._launch(
                 "pack_lists",

@@ -49,6 +49,7 @@ def render_vdi(
     skip_empty: bool = True,
     preview_samples: int | None = None,
     device: Any = None,
+    out: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
     """Raycast a VDI from any view (paper section 3).
 
@@ -76,11 +77,15 @@ def render_vdi(
         (paper section 5): an approximation. Fewer pixels are the better one (docs/performance.md).
     device : optional
         See :func:`pyvista_vdi.list_devices`.
+    out : numpy.ndarray, optional
+        Array for the image, float32 (height, width, 4), C-contiguous. A CPU device draws into it
+        without a copy if it begins at a multiple of 4096 bytes
+        (:func:`pyvista_vdi.opencl_runtime.aligned_empty`).
 
     Returns
     -------
     numpy.ndarray
-        Premultiplied RGBA, float32 (height, width, 4), top row first.
+        Premultiplied RGBA, float32 (height, width, 4), top row first; ``out`` if it was given.
 
     Notes
     -----
@@ -96,7 +101,14 @@ def render_vdi(
     multiplier = checked_opacity_multiplier(opacity_multiplier)
     runtime = get_runtime(device)
     prepared = prepared_vdi(runtime, vdi)
-    with runtime.buffer((size[1], size[0], 4), name="image") as image:
+    shape = (size[1], size[0], 4)
+    if out is not None and (out.shape != shape or out.dtype != np.float32):
+        raise InvalidArgumentError(
+            f"out must be float32 of the image's shape {shape}; got {out.dtype}, {out.shape}"
+        )
+    with (
+        runtime.result(shape, name="image") if out is None else runtime.target(out, "image")
+    ) as image:
         prepared.render(
             camera,
             size,
@@ -108,7 +120,7 @@ def render_vdi(
             skip_empty=skip_empty,
             preview_samples=samples,
         )
-        return runtime.download(image)
+        return runtime.download(image, out)
 
 
 def render_first_hits(

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import rays
-from .ambient_occlusion import AmbientOcclusion
+from .ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from .blocks import GROUP, block_items
+from .bricks import SAMPLE_BYTES, Room, StepSampler
 from .camera import Camera, check_window_size
+from .checks import memory_limit_bytes
 from .cropping import Cropping, checked_opacity_multiplier
 from .device_volume import DeviceVolume
 from .lighting import Lights
@@ -19,6 +22,15 @@ from .opencl_runtime import Runtime, get_runtime
 from .raycast import TRANSMITTANCE_CUTOFF
 from .transfer_function import TransferFunction
 from .volume import Volume
+
+#: Steps of a ray that are sampled at a time where the volume is on the device brick by brick.
+_PART_STEPS = 128
+#: Bytes of a ray's state between them: colour, transmittance and what they have rounded off.
+_STATE_BYTES = 32
+#: Bytes of samples and states at a time, and how many such parts a memory limit has room for.
+_PART_BYTES, _PARTS_IN_LIMIT = 32 * 2**20, 8
+#: Bytes of the image, and of the depth at which a ray ends, for each pixel.
+_PIXEL_BYTES = 16 + 4
 
 
 def raycast_volume(
@@ -36,6 +48,7 @@ def raycast_volume(
     skip_empty: bool = True,
     lights: Any = None,
     ambient_occlusion: Any = None,
+    memory_limit: Any = None,
     device: Any = None,
 ) -> NDArray[np.float32]:
     """Render a classified volume directly.
@@ -72,6 +85,8 @@ def raycast_volume(
     ambient_occlusion : optional
         Darken what is hidden from the light around it, see
         :meth:`pyvista_vdi.AmbientOcclusion.from_any`.
+    memory_limit : int, float or str, optional
+        Most bytes to take on the device, see :func:`~pyvista_vdi.generation.generate_vdi`.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
 
@@ -82,6 +97,9 @@ def raycast_volume(
     """
     camera = Camera.from_any(camera)
     size = check_window_size(window_size)
+    memory = memory_limit_bytes(memory_limit)
+    occlusion = AmbientOcclusion.from_any(ambient_occlusion)
+    grid = 0 if occlusion is None else OcclusionGrid.of(volume, occlusion).nbytes
     runtime = get_runtime(device)
     medium = DeviceVolume(
         runtime,
@@ -90,7 +108,8 @@ def raycast_volume(
         sample_distance,
         skip_empty=skip_empty,
         lights=Lights.from_any(lights),
-        ambient_occlusion=AmbientOcclusion.from_any(ambient_occlusion),
+        ambient_occlusion=occlusion,
+        room=picture_room(size, memory, grid),
     )
     return raycast_medium(
         runtime,
@@ -103,6 +122,35 @@ def raycast_volume(
         opacity_multiplier=checked_opacity_multiplier(opacity_multiplier),
         early_termination=early_termination,
     )
+
+
+def picture_room(size: tuple[int, int], memory_limit: int | None, occlusion: int = 0) -> Room:
+    """Return the room for a volume beside an image and the grid of an occlusion.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height of the image in pixels.
+    memory_limit : int or None
+        Most bytes in all.
+    occlusion : int
+        Bytes of the occlusion's grid.
+    """
+    width, height = size
+    items = block_items(width, _rows_of_part(size, memory_limit))
+    working = width * height * _PIXEL_BYTES + items * _STATE_BYTES + occlusion
+    rays = f"an image of {width} x {height} pixels"
+    return Room(memory_limit, working, items * _PART_STEPS, rays)
+
+
+def _rows_of_part(size: tuple[int, int], memory_limit: int | None) -> int:
+    """Return how many rows of pixels are sampled at a time where the volume is in bricks."""
+    most = _PART_BYTES
+    if memory_limit is not None:
+        most = min(most, memory_limit // _PARTS_IN_LIMIT)
+    width, height = size
+    per_block_row = block_items(width, 4) * (_PART_STEPS * SAMPLE_BYTES + _STATE_BYTES)
+    return min(height, 4 * max(1, most // per_block_row))
 
 
 def raycast_medium(
@@ -130,27 +178,61 @@ def raycast_medium(
         defines["OPACITY_MULTIPLIER"] = 1
         multiplier = (np.float32(opacity_multiplier),)
     kernel = runtime.kernel("vdi/render_volume.cl", "render_volume", defines)
-    with (
-        runtime.upload(forms, "rays") as form_buffer,
-        runtime.upload(np.zeros(1, np.float32) if ends is None else ends, "opaque depth") as depth,
-        runtime.buffer((height, width, 4), name="image") as image,
-    ):
-        runtime.launch(
-            kernel,
-            block_items(width, height),
-            GROUP,
-            *medium.medium_arguments(camera),
+    with ExitStack() as stack:
+        keep = stack.enter_context
+        form_buffer = keep(runtime.upload(forms, "rays"))
+        no_ends = np.zeros(1, np.float32)
+        depth = keep(runtime.upload(no_ends if ends is None else ends, "opaque depth"))
+        image = keep(runtime.result((height, width, 4), name="image"))
+        begin = (
             form_buffer,
             np.int32(planes),
             np.float32(medium.sample_distance),
             np.float32(medium.unit_distance),
-            np.int32(width),
-            np.int32(height),
-            depth,
-            np.int32(ends is not None),
-            np.float32(TRANSMITTANCE_CUTOFF if early_termination else -1.0),
-            *cropped.arguments,
-            *multiplier,
-            image,
         )
+
+        def launch(items: int, sampled: Sequence[Any], part: Sequence[Any]) -> None:
+            runtime.launch(
+                kernel,
+                items,
+                GROUP,
+                *medium.medium_arguments(camera),
+                *sampled,
+                *begin,
+                np.int32(width),
+                np.int32(height),
+                depth,
+                np.int32(ends is not None),
+                np.float32(TRANSMITTANCE_CUTOFF if early_termination else -1.0),
+                *cropped.arguments,
+                *multiplier,
+                *part,
+                image,
+            )
+
+        if medium.bricks is None:
+            launch(block_items(width, height), (), ())
+        else:
+            # Some steps of some rows at a time; the state of the rays goes on from step to step
+            rows = _rows_of_part(size, medium.bricks.memory_limit)
+            items = block_items(width, rows)
+            states = keep(runtime.buffer((items, 2, 4), name="states of rays"))
+            sampler = keep(
+                StepSampler(
+                    runtime,
+                    medium.bricks,
+                    medium.medium_arguments(camera),
+                    defines,
+                    begin,
+                    size,
+                    items * _PART_STEPS,
+                    None if ends is None else depth,
+                )
+            )
+            for first_row in range(0, height, rows):
+                now = min(rows, height - first_row)
+                for first_step in range(0, medium.most_steps, _PART_STEPS):
+                    sampled = sampler.sample(first_row, now, first_step, _PART_STEPS)
+                    part = (np.int32(n) for n in (first_row, now, first_step, _PART_STEPS))
+                    launch(block_items(width, now), sampled, (*part, states))
         return runtime.download(image)

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import rays
 from .ambient_occlusion import AmbientOcclusion
 from .camera import Camera, check_window_size
-from .checks import as_float
+from .checks import as_float, memory_limit_bytes
 from .cropping import Cropping, checked_opacity_multiplier
 from .device_volume import DeviceVolume
 from .errors import Cancelled, InvalidArgumentError
@@ -27,7 +27,7 @@ from .lighting import Lights
 from .metrics import SSIM_ARGUMENTS, SSIM_WINDOW, over_background
 from .opencl_runtime import get_runtime
 from .raycast import render_vdi
-from .raycast_volume import raycast_medium
+from .raycast_volume import picture_room, raycast_medium
 from .transfer_function import TransferFunction
 from .vdi import VDI
 from .volume import Volume
@@ -163,6 +163,7 @@ def estimate_view_error(
     tile_size: int = TILE_SIZE,
     lights: Any = None,
     ambient_occlusion: Any = None,
+    memory_limit: Any = None,
     device: Any = None,
     **options: Any,
 ) -> ViewError:
@@ -174,7 +175,7 @@ def estimate_view_error(
         What is judged.
     volume, transfer_function, sample_distance, tiles, tile_size
         As for :class:`ViewErrorEstimator`.
-    lights, ambient_occlusion, device
+    lights, ambient_occlusion, memory_limit, device
         As for :class:`ViewErrorEstimator`.
     camera, window_size, **options
         As for :meth:`ViewErrorEstimator.estimate`.
@@ -192,6 +193,7 @@ def estimate_view_error(
         tile_size=tile_size,
         lights=lights,
         ambient_occlusion=ambient_occlusion,
+        memory_limit=memory_limit,
         device=device,
     )
     return estimator.estimate(vdi, camera, window_size, **options)
@@ -217,6 +219,8 @@ class ViewErrorEstimator:
         What a shaded volume is lit by in the view that is judged; see :meth:`Lights.from_any`.
     ambient_occlusion : optional
         What the VDIs were generated with; see :meth:`AmbientOcclusion.from_any`.
+    memory_limit : int, float or str, optional
+        Most bytes to take on the device, see :func:`~pyvista_vdi.generation.generate_vdi`.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
 
@@ -255,11 +259,13 @@ class ViewErrorEstimator:
         tile_size: int = TILE_SIZE,
         lights: Any = None,
         ambient_occlusion: Any = None,
+        memory_limit: Any = None,
         device: Any = None,
     ) -> None:
         self._tiles = _whole("tiles", tiles, 2)
         self._edge = _whole("tile_size", tile_size, SSIM_WINDOW) - 2 * _REACH
         self._runtime = get_runtime(device)
+        edge = max(int(tile_size), math.isqrt(2 * _COARSE_LAUNCH))  # of what is rendered at a time
         self._medium = DeviceVolume(
             self._runtime,
             volume,
@@ -267,6 +273,7 @@ class ViewErrorEstimator:
             sample_distance,
             lights=Lights.from_any(lights),
             ambient_occlusion=AmbientOcclusion.from_any(ambient_occlusion),
+            room=picture_room((edge, edge), memory_limit_bytes(memory_limit)),
         )
 
     def estimate(

@@ -20,11 +20,22 @@ inline float4 classify(float scalar, __global const float4 *table, int entries, 
     return mix(here, next, x - (float)i);
 }
 
-// Optical depth of a step of `units` opacity unit distances through opacity a: -log1p(-a) units.
+// Optical depth of one opacity unit distance of opacity a: -log1p(-a), INFINITY where it is opaque.
+inline float unit_optical_depth(float opacity)
+{
+    return opacity < 1.0f ? -log1p(-opacity) : INFINITY;
+}
+
+// Optical depth of a step of `units` opacity unit distances, of which one has the optical depth `of_unit`.
+inline float scaled_to_step(float of_unit, float units)
+{
+    return of_unit < INFINITY ? of_unit * units : fmax(OPAQUE_OPTICAL_DEPTH, units);
+}
+
+// Optical depth of a step of `units` opacity unit distances through opacity a.
 inline float step_optical_depth(float opacity, float units)
 {
-    const float tau = -log1p(-opacity) * units;
-    return opacity < 1.0f ? tau : fmax(OPAQUE_OPTICAL_DEPTH, units);
+    return scaled_to_step(unit_optical_depth(opacity), units);
 }
 
 // Opacity of an optical depth: 1 - exp(-tau) without cancellation.

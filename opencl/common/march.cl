@@ -3,6 +3,8 @@
 // Samples lie at the midpoints of steps of equal model length along the ray, the last one shorter (DESIGN section 3).
 // Every face is computed from its step's number, never accumulated.
 //
+// -D BY_SCALAR     with NEAREST and voxels of integers: the table holds the medium of each scalar from `low` on, of which no
+//                  voxel is outside (grid/scalar_media.cl); otherwise it is classified at each sample
 // -D FAR_ENTRIES   see common/rays.cl: t counts from where the ray enters
 #include "common/rays.cl"
 #include "common/classification.cl"
@@ -14,10 +16,10 @@
 typedef struct {
     __global const VOXEL_T *voxels;
     int4 size;                    // points along x, y, z
-    __global const float4 *table; // transfer function
+    __global const float4 *table; // transfer function, or the media of scalars
     int entries;
     float low, per_scalar;        // scalar to table position
-    __global const uchar *visible; // whether a block holds anything that is not transparent
+    __global const uchar *reaches; // of the blocks, see grid/volume_blocks.cl
     int4 blocks;                  // along x, y, z
     SHADING_FIELDS
 } Medium;
@@ -85,26 +87,45 @@ inline float step_face(const March *march, int k)
     return fmin(fma((float)k, march->step, march->t0), march->t1);
 }
 
-// Steps from step k on whose midpoints lie in the same transparent block, in whole groups of `group` steps, so that the
-// others are grouped as if none had been passed by; 0 where there is something to look at. Skipping decides what is looked
-// at and changes no sample. -D SKIP_EMPTY, or every step is looked at.
-inline int empty_steps(const March *march, const Medium *medium, int k, int end, int group)
-{
 #ifdef SKIP_EMPTY
+// The block that the midpoint of step k lies in.
+inline int3 block_of_step(const March *march, const Medium *medium, int k)
+{
     const float t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
     const float3 position = march->start + t * march->slope;
-    const int3 block = clamp(convert_int3(position) >> BLOCK_SHIFT, (int3)(0), medium->blocks.xyz - 1);
-    if (medium->visible[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x])
-        return 0;
-    // Where the ray leaves the block: past the face ahead on each axis, or never
-    const float3 lower = convert_float3(block << BLOCK_SHIFT);
-    const float3 crossing = ((march->slope > 0.0f ? lower + (float)BLOCK : lower) - march->start) * march->inverse;
+    return clamp(convert_int3(position) >> BLOCK_SHIFT, (int3)(0), medium->blocks.xyz - 1);
+}
+
+// How far a block is from one that may be visible, see grid/volume_blocks.cl; 0 where it may be so itself.
+inline int reach_of_block(const Medium *medium, int3 block)
+{
+    return medium->reaches[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x];
+}
+
+// The first step from which on midpoints may lie farther than `reach` - 1 blocks from a block that the ray is in.
+inline int first_step_behind(const March *march, int3 block, int reach)
+{
+    // Where the ray leaves those blocks: past the face ahead on each axis, or never
+    const float3 lower = convert_float3((block - (reach - 1)) << BLOCK_SHIFT);
+    const float3 upper = convert_float3((block + reach) << BLOCK_SHIFT);
+    const float3 crossing = ((march->slope > 0.0f ? upper : lower) - march->start) * march->inverse;
     const float leaves = fmin(march->slope.x != 0.0f ? crossing.x : INFINITY,
                               fmin(march->slope.y != 0.0f ? crossing.y : INFINITY,
                                    march->slope.z != 0.0f ? crossing.z : INFINITY));
     // Steps with their midpoint before that, less a hundredth of a step for the rounding of positions
-    const int passed = (int)fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f) + 1;
-    return max(min(passed, end) - k, 0) / group * group;
+    return (int)fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f) + 1;
+}
+#endif
+
+// Steps from step k on whose midpoints lie in transparent blocks around the first one's, in whole groups of `group` steps, so
+// that the others are grouped as if none had been passed by; 0 where there is something to look at. Skipping decides what is
+// looked at and changes no sample. -D SKIP_EMPTY, or every step is looked at.
+inline int empty_steps(const March *march, const Medium *medium, int k, int end, int group)
+{
+#ifdef SKIP_EMPTY
+    const int3 block = block_of_step(march, medium, k);
+    const int reach = reach_of_block(medium, block);
+    return reach > 0 ? max(min(first_step_behind(march, block, reach), end) - k, 0) / group * group : 0;
 #else
     return 0;
 #endif
@@ -113,10 +134,19 @@ inline int empty_steps(const March *march, const Medium *medium, int k, int end,
 // Colour (rgb) and optical depth (w) of a step of `units` opacity unit distances around index position (x, y, z).
 inline float4 medium_at(const Medium *medium, float x, float y, float z, float units)
 {
+#ifdef BY_SCALAR
+    const int scalar = (int)nearest_component(medium->voxels, medium->size, x, y, z, SCALAR);
+    const uint entry = min((uint)(scalar - (int)medium->low), (uint)(medium->entries - 1));
+    // Two loads where a vector's lanes load from different places, and not four
+    __global const ulong *halves = (__global const ulong *)(medium->table + entry);
+    float4 sample = (float4)(as_float2(halves[0]), as_float2(halves[1]));
+    sample.w = scaled_to_step(sample.w, units);
+#else
     const float scalar = sample_volume(medium->voxels, medium->size, x, y, z);
     float4 sample = classify(scalar, medium->table, medium->entries, medium->low, medium->per_scalar);
     if (sample.w > 0.0f)
         sample.w = step_optical_depth(sample.w, units);
+#endif
 #if defined(RGBA) || defined(SHADED) || defined(GRADIENT_OPACITY) || defined(OCCLUSION)
     if (sample.w > 0.0f) {
 #ifdef RGBA
@@ -139,10 +169,14 @@ inline float4 medium_at(const Medium *medium, float x, float y, float z, float u
     return sample;
 }
 
-// Colour (rgb) and optical depth (w) of the step between two faces.
-inline float4 step_medium(const March *march, const Medium *medium, float front, float back)
+// Colour (rgb) and optical depth (w) of step k, between two faces.
+inline float4 step_medium(const March *march, const Medium *medium, int k, float front, float back)
 {
+#ifdef SAMPLED
+    return medium->samples[(k - medium->first_sample) * SAMPLE_LANES];
+#else
     const float t = 0.5f * (front + back);
     return medium_at(medium, fma(t, march->slope.x, march->start.x), fma(t, march->slope.y, march->start.y),
                      fma(t, march->slope.z, march->start.z), (back - front) * march->units);
+#endif
 }

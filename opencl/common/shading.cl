@@ -10,12 +10,13 @@
 // frame", whose origin is the eye: the model frame's axes for a headlight, the view's otherwise.
 #include "common/volume_sampling.cl"
 #include "common/occlusion.cl"
+#include "common/samples.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Of the structure Medium, of the kernels that take one, and of its initialiser: after `blocks` in each
-#define SHADING_FIELDS LIGHTING_FIELD GRADIENT_FIELD OCCLUSION_FIELD
-#define SHADING_PARAMETERS LIGHTING_PARAMETER GRADIENT_PARAMETER OCCLUSION_PARAMETER
-#define SHADING_ARGUMENTS LIGHTING_ARGUMENT GRADIENT_ARGUMENT OCCLUSION_ARGUMENT
+#define SHADING_FIELDS LIGHTING_FIELD GRADIENT_FIELD OCCLUSION_FIELD SAMPLES_FIELD
+#define SHADING_PARAMETERS LIGHTING_PARAMETER GRADIENT_PARAMETER OCCLUSION_PARAMETER SAMPLES_PARAMETER
+#define SHADING_ARGUMENTS LIGHTING_ARGUMENT GRADIENT_ARGUMENT OCCLUSION_ARGUMENT SAMPLES_ARGUMENT
 
 #ifdef SHADED
 #define LIGHTING_FIELD __global const float *lighting; // see lit

@@ -1,6 +1,6 @@
 // Ambient occlusion of a classified volume: the mean transmittance around each node of a coarse grid.
 //
-// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
+// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 // -D GRADIENT_OPACITY: see common/shading.cl
 //
 // Node (i, j, k) lies at the volume's index position (i, j, k) * cell. step_opacities gives each node the mean opacity, over

@@ -1,7 +1,8 @@
 // Volume to lists of supersegments, one march per ray (paper section 2; DESIGN section 3 "Merging", "Budget").
 //
-// -D VOXEL_T, INDEX_T, RGBA, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
+// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl; OCCLUSION: see common/occlusion.cl
+// -D SAMPLED: see common/samples.cl
 // -D CRITERION: see vdi/criteria.cl; without it lists are shortened at least error
 // -D COMPENSATED: see common/over.cl; FAR_ENTRIES: see common/rays.cl
 //
@@ -26,7 +27,7 @@ __kernel void march_lists(
     __global const float4 *table,  // transfer function, `entries` (R, G, B, opacity)
     int entries,
     float low, float per_scalar,   // scalar to table position
-    __global const uchar *visible, // blocks that are not transparent, see grid/volume_blocks.cl
+    __global const uchar *reaches, // of the blocks, see grid/volume_blocks.cl
     int4 blocks,                   // along x, y, z
     SHADING_PARAMETERS             // see common/shading.cl
     __global const float *forms,   // see begin_march
@@ -55,7 +56,7 @@ __kernel void march_lists(
     March march;
     if (!begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, INFINITY))
         return;
-    const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks SHADING_ARGUMENTS};
+    const Medium medium = {voxels, size, table, entries, low, per_scalar, reaches, blocks SHADING_ARGUMENTS};
     const float per_reference = march.units * unit_distance / reference_length;
     const float threshold = thresholds[item];
     __global float *record = records + record_start(item, capacity, RUN_WORDS);
@@ -90,7 +91,7 @@ __kernel void march_lists(
         float8 sample = (float8)(face, face, 0.0f, transmittance, 0.0f, 0.0f, 0.0f, 0.0f);
         for (const int group_end = min(k + group, end); k < group_end; ++k) {
             const float back = step_face(&march, k + 1);
-            const float4 step = step_medium(&march, &medium, face, back);
+            const float4 step = step_medium(&march, &medium, k, face, back);
             const float opacity = opacity_of(step.w);
             const float weight = (1.0f - sample.OPACITY) * opacity; // over, front to back
             sample.TAU += step.w;

@@ -1,10 +1,11 @@
 // Direct volume rendering: the baseline that a VDI is measured against, by the same march as generation.
 //
-// -D VOXEL_T, INDEX_T, RGBA, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
+// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl; OCCLUSION: see common/occlusion.cl
 // -D COMPENSATED: see common/over.cl; FAR_ENTRIES: see common/rays.cl
 // -D CROPPED: see common/cropping.cl
 // -D OPACITY_MULTIPLIER: optical depths are multiplied
+// -D SAMPLED: see common/samples.cl; some steps of some rows at a time then, as they are sampled
 #include "common/march.cl"
 #include "common/cropping.cl"
 #include "common/over.cl"
@@ -14,6 +15,14 @@
 #define MULTIPLIER_PARAMETER float opacity_multiplier,
 #else
 #define MULTIPLIER_PARAMETER
+#endif
+
+#ifdef SAMPLED
+#define PART_PARAMETERS                                                                        \
+    int first_row, int rows, int first_step, int steps,                                        \
+    __global float4 *states, /* of each ray: colour and transmittance, what they rounded off */
+#else
+#define PART_PARAMETERS
 #endif
 
 #ifdef CROPPED
@@ -48,7 +57,7 @@ __kernel void render_volume(
     __global const float4 *table,
     int entries,
     float low, float per_scalar,
-    __global const uchar *visible, // blocks that are not transparent, see grid/volume_blocks.cl
+    __global const uchar *reaches, // of the blocks, see grid/volume_blocks.cl
     int4 blocks,                   // along x, y, z
     SHADING_PARAMETERS             // see common/shading.cl
     __global const float *forms,          // see begin_march
@@ -61,9 +70,16 @@ __kernel void render_volume(
     float transmittance_cutoff,           // the ray ends where no more than this is left; negative: never
     CROPPING_PARAMETER                    // regions that are kept; their planes are forms behind the others
     MULTIPLIER_PARAMETER
+    PART_PARAMETERS
     __global float4 *image)               // premultiplied RGBA, top row first
 {
-    const int2 pixel = block_pixel((uint)get_global_id(0), width);
+    int2 pixel = block_pixel((uint)get_global_id(0), width);
+#ifdef SAMPLED
+    pixel.y = pixel.y < rows ? first_row + pixel.y : height;
+    __global float4 *state = states + 2 * (size_t)get_global_id(0);
+#else
+    const int first_step = 0, steps = INT_MAX;
+#endif
     if (pixel.x >= width || pixel.y >= height)
         return;
     const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
@@ -74,29 +90,46 @@ __kernel void render_volume(
     float3 color = (float3)(0.0f);
     float transmittance = 1.0f;
     float4 rest = (float4)(0.0f);
+#ifdef SAMPLED
+    if (first_step > 0) {
+        color = state[0].xyz;
+        transmittance = state[0].w;
+        rest = state[1];
+    }
+#endif
     March march;
     if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, t_end)) {
-        const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks SHADING_ARGUMENTS};
+        const Medium medium = {voxels, size, table, entries, low, per_scalar, reaches, blocks SHADING_ARGUMENTS};
 #ifdef CROPPED
         const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, a, b, regions);
 #endif
-        int k = 0;
-        while (k < march.steps && transmittance > transmittance_cutoff) {
-            const int empty = empty_steps(&march, &medium, k, march.steps, 1);
+        int k = first_step;
+        const int end = march.steps - first_step > steps ? first_step + steps : march.steps;
+        float front = step_face(&march, k);
+        while (k < end && transmittance > transmittance_cutoff) {
+            const int empty = empty_steps(&march, &medium, k, end, 1);
             k += empty;
-            if (empty > 0)
+            if (empty > 0) {
+                front = step_face(&march, k);
                 continue;
-            float4 step = step_medium(&march, &medium, step_face(&march, k), step_face(&march, k + 1));
+            }
+            const float back = step_face(&march, k + 1);
+            float4 step = step_medium(&march, &medium, k, front, back);
 #ifdef CROPPED
-            step.w *= kept_share(&kept, step_face(&march, k), step_face(&march, k + 1));
+            step.w *= kept_share(&kept, front, back);
 #endif
 #ifdef OPACITY_MULTIPLIER
             step.w *= opacity_multiplier;
 #endif
             const float weight = transmittance * opacity_of(step.w); // over, front to back
             composite_over(&color, &transmittance, &rest, weight, step.xyz);
+            front = back;
             ++k;
         }
     }
+#ifdef SAMPLED
+    state[0] = (float4)(color, transmittance);
+    state[1] = rest;
+#endif
     image[place] = composited(color, transmittance, rest);
 }

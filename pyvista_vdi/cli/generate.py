@@ -42,6 +42,7 @@ def generate(options: argparse.Namespace) -> int:
         max_supersegments=options.max_supersegments,
         criterion=options.criterion,
         ambient_occlusion=occlusion,
+        memory_limit=options.memory_limit,
         transfer_function=looks.transfer_function(volume),
     )
     print(
@@ -62,6 +63,7 @@ def generate(options: argparse.Namespace) -> int:
             tolerance=options.tolerance,
             view_cone=options.view_cone,
             ambient_occlusion=occlusion,
+            memory_limit=options.memory_limit,
             device=options.device,
             progress=bar,
             **arguments,

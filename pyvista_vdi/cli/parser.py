@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 from .._version import __version__
 from ..camera import check_window_size
+from ..checks import memory_limit_bytes
 from ..errors import InvalidArgumentError
 from ..precision import PRECISIONS
 from ..standard_cases import ANGLES, ELEVATION, TRANSFER_FUNCTIONS, WINDOW_SIZE
@@ -485,6 +486,13 @@ def _add_limits(parser: argparse.ArgumentParser) -> None:
         metavar="DEGREES",
         help="half angle of the cone of new views to serve (default: 60)",
     )
+    group.add_argument(
+        "--memory-limit",
+        type=_bytes,
+        metavar="SIZE",
+        help="most memory to take on the device, like 2GiB; a volume that does not fit goes there "
+        "brick by brick (default: what the device has)",
+    )
 
 
 def _add_device(parser: argparse.ArgumentParser) -> None:
@@ -511,6 +519,15 @@ def _numbers(text: str) -> tuple[float, ...]:
         raise argparse.ArgumentTypeError(
             f"expected numbers with commas between them, like 0,5,30; got {text!r}"
         ) from error
+
+
+def _bytes(text: str) -> int | None:
+    try:
+        return memory_limit_bytes(text)
+    except InvalidArgumentError:
+        raise argparse.ArgumentTypeError(
+            f"expected a size such as 2GiB or 800MB; got {text!r}"
+        ) from None
 
 
 def _count(text: str) -> int:

@@ -11,6 +11,7 @@ from pyvista_vdi.opencl_runtime.buffers import (
     DeviceBuffer,
     LocalMemory,
     aligned_empty,
+    bytes_text,
     kept_together,
 )
 from pyvista_vdi.opencl_runtime.choice import describe_devices, get_runtime, list_devices
@@ -28,6 +29,7 @@ __all__ = [
     "Profile",
     "Runtime",
     "aligned_empty",
+    "bytes_text",
     "describe_devices",
     "get_runtime",
     "kept_together",

@@ -55,6 +55,7 @@ _OF_VOLUMES = {
     "tolerance": 0.0,
     "view_cone": 60.0,
     "ambient_occlusion": None,
+    "memory_limit": None,
     "camera": None,
     "coverage": "bounds",
 }
@@ -114,6 +115,7 @@ class AddVDI:
         tolerance: float = 0.0,
         view_cone: float = 60.0,
         ambient_occlusion: Any = None,
+        memory_limit: float | str | None = None,
         interpolation: Literal["nearest", "linear"] = "nearest",
         camera: Any = None,
         coverage: Literal["bounds", "view"] = "bounds",
@@ -193,6 +195,8 @@ class AddVDI:
         ambient_occlusion : bool, float or AmbientOcclusion, optional
             Darken what is hidden from the light around it: ``True``, or the radius up to which
             something hides, model units.
+        memory_limit : int, float or str, optional
+            Most bytes that generating may take on the device, see :func:`pyvista_vdi.generate`.
         interpolation : {"nearest", "linear"}
             Between voxels; ``add_volume`` draws ``"nearest"``.
         camera : pyvista.Camera or vtkCamera or Camera, optional
@@ -288,6 +292,7 @@ class AddVDI:
         source.SetTolerance(given["tolerance"])
         source.SetViewCone(given["view_cone"])
         source.SetAmbientOcclusion(given["ambient_occlusion"])
+        source.SetMemoryLimit(given["memory_limit"])
         source.SetCoverage(given["coverage"])
         source.SetDevice(given["device"])
         source.SetProgressCallback(progress_callback(given["progress_bar"]))

@@ -133,6 +133,7 @@ class _Job(threading.Thread):
                     sample_distance=request.settings["sample_distance"],
                     lights=request.settings["lights"],
                     ambient_occlusion=request.settings["ambient_occlusion"],
+                    memory_limit=request.settings["memory_limit"],
                     device=runtime,
                 )
                 self.estimator = (request, estimator)

@@ -18,6 +18,7 @@ from vtkmodules.vtkRenderingCore import vtkVolumeProperty
 
 from pyvista_vdi.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.camera import Camera, check_window_size
+from pyvista_vdi.checks import memory_limit_bytes
 from pyvista_vdi.coverage import bounds_corners, covering_view
 from pyvista_vdi.errors import (
     Cancelled,
@@ -139,6 +140,7 @@ class VDISource(VTKPythonAlgorithmBase):
             "tolerance": 0.0,
             "view_cone": 60.0,
             "ambient_occlusion": None,
+            "memory_limit": None,
             "device": None,
         }
         self._lights: Lights | None = None
@@ -402,6 +404,27 @@ class VDISource(VTKPythonAlgorithmBase):
     def GetAmbientOcclusion(self) -> AmbientOcclusion | None:
         """Return the ambient occlusion, ``None`` where there is none."""
         return self._settings["ambient_occlusion"]  # type: ignore[no-any-return]
+
+    def SetMemoryLimit(self, limit: float | str | None) -> None:
+        """Set the most bytes that generating may take on the device.
+
+        Parameters
+        ----------
+        limit : None, int, float or str
+            Bytes, or a text such as ``"2 GiB"``; ``None``, the default, is what the device has. A
+            volume that does not fit goes there brick by brick, for the same VDI. The estimate
+            whether a view needs a VDI of its own keeps to the limit by itself.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is no size above 0.
+        """
+        self._set("memory_limit", memory_limit_bytes(limit))
+
+    def GetMemoryLimit(self) -> int | None:
+        """Return the most bytes that generating may take on the device, if they are limited."""
+        return self._settings["memory_limit"]  # type: ignore[no-any-return]
 
     def SetDevice(self, device: Any) -> None:
         """Choose the OpenCL device; ``None`` is the default one."""

@@ -239,15 +239,43 @@ def test_very_many_voxels(runtime, worst, planes, interpolation):
     assert np.abs(seen - image).max() <= BOUND
 
 
-def test_what_one_allocation_does_not_hold_is_refused(runtime, monkeypatch):
-    """Until volumes are split into bricks: the buffer, both sizes, and a remedy."""
-    volume = Volume(np.zeros((256, 64, 64), np.uint8), name="density")
-    monkeypatch.setattr(runtime, "info", replace(runtime.info, max_allocation=2**19))
-    with pytest.raises(
-        DeviceMemoryError,
-        match=r"'density'.* needs 1\.00 MiB .*512\.00 KiB .*per buffer.*use a smaller volume",
-    ):
-        generate_vdi(volume, view(volume), WINDOW, transfer(0, 255), device=runtime)
+def test_what_one_allocation_does_not_hold_goes_brick_by_brick(runtime, monkeypatch):
+    rng = np.random.default_rng(5)
+    volume = Volume(rng.integers(0, 256, (96, 96, 300), np.uint8))
+    camera, function = view(volume), transfer(0, 255)
+    image = raycast_volume(volume, camera, WINDOW, function, device=runtime)
+    vdi = generate_vdi(volume, camera, WINDOW, function, device=runtime)
+    same = Volume(volume.array)  # nothing of it is on the device
+    monkeypatch.setattr(runtime, "info", replace(runtime.info, max_allocation=2**21))
+    assert volume.array.nbytes > 2**21
+    assert np.array_equal(raycast_volume(same, camera, WINDOW, function, device=runtime), image)
+    assert generate_vdi(same, camera, WINDOW, function, device=runtime).equals(vdi)
+
+
+@pytest.mark.slow
+def test_more_than_2_31_voxels_that_the_host_never_holds(runtime, worst, monkeypatch, tmp_path):
+    """From a file, mostly a hole, of which bricks alone are in memory."""
+    start, planes = 1017, 1025
+    array = np.memmap(tmp_path / "voxels", np.uint8, "w+", shape=(planes, 1024, 2048))
+    array[-3:, 400:600, 1400:1600] = 200
+    # The same corner alone, with the planes before it left out
+    volume, part = Volume(array), Volume(np.array(array[start:]), origin=(0, 0, start))
+    assert array.size > 2**31
+    function = transfer(0, 200, unit_distance=2.0)
+    centre = np.array([1500.3, 500.2, planes - 2.5])
+    camera = Camera(centre + np.array([900, 700, 3000]), centre, (0, 1, 0), view_angle=4)
+    options = {"sample_distance": 1.0, "memory_limit": "100 MiB", "device": runtime}
+    monkeypatch.setattr(runtime._ledger, "peak", before := runtime.allocated)
+    image = raycast_volume(volume, camera, WINDOW, function, **options)
+    vdi = generate_vdi(volume, camera, WINDOW, function, **options)
+    assert runtime.peak_allocated - before <= 100 * 2**20
+    exact = reference.volume_image(part, camera, WINDOW, function, 1.0)
+    assert exact[..., 3].max() > 0.3
+    error = np.abs(image - exact).max()
+    worst("brick by brick", error)
+    assert error <= max(BOUND, 2.0**-24 * planes / 2)  # as in test_very_many_voxels
+    seen = render_vdi(vdi, camera, device=runtime)
+    assert np.abs(seen - image).max() <= BOUND
 
 
 def test_gradients_see_scalars_taken_relative(runtime, worst):

@@ -370,6 +370,7 @@ _VERBS: dict[str, tuple[tuple[Any, ...], tuple[str, ...]]] = {
             *("--elevation", "--view-angle", "--parallel-scale", "--camera-json", "--n-colors"),
             *("--transfer-function", "--sample-distance", "--scalars", "--preference", "--tf"),
             *("--device", "--opacity-unit-distance", "--log-scale", "--flip-scalars"),
+            "--memory-limit",
         ),
     ),
     "render": (

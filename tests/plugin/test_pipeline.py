@@ -120,6 +120,7 @@ def test_source_makes_what_generate_makes():
         SampleDistance=0.05,
         Tolerance=0.01,
         ViewCone=20.0,
+        MemoryLimit="1 GiB",
     )
     expected = pvdi.generate(
         soft_ball(12),
@@ -140,6 +141,7 @@ def test_source_makes_what_generate_makes():
     assert source.GetSampleDistance() == 0.05
     assert source.GetTolerance() == 0.01
     assert source.GetViewCone() == 20.0
+    assert source.GetMemoryLimit() == 2**30
     assert source.GetWindowSize() == (40, 30)
 
 

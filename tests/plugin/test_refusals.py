@@ -214,6 +214,12 @@ ROWS = {
     ),
     "tolerance": (VOLUME, {"tolerance": -1}, errors.InvalidArgumentError, "tolerance.*got -1"),
     "cone": (VOLUME, {"view_cone": 91}, errors.InvalidArgumentError, "view_cone.*got 91"),
+    "memory": (
+        VOLUME,
+        {"memory_limit": "lots"},
+        errors.InvalidArgumentError,
+        "memory_limit.*got 'lots'",
+    ),
     "coverage": (VOLUME, {"coverage": "all"}, errors.InvalidArgumentError, "coverage.*got 'all'"),
     "camera": (VOLUME, {"camera": "xy"}, errors.InvalidCameraError, "vtkCamera.*got str"),
     "device": (

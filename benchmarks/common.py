@@ -1,0 +1,208 @@
+"""What the scripts of this folder share: options, volumes at hand, VDIs, clocks, results' files."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pyvista_vdi import examples
+from pyvista_vdi.classification import Classification
+from pyvista_vdi.compare.measure import without_infinities
+from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.io import read, whole_file
+from pyvista_vdi.opencl_runtime import Runtime
+from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
+from pyvista_vdi.vdi import VDI
+
+INTERPOLATIONS = ("nearest", "linear")
+
+#: Where results go by default.
+RESULTS = Path(__file__).parent / "results"
+
+
+def window_size(text: str) -> tuple[int, int]:
+    """Parse ``1280x720``."""
+    try:
+        width, height = (int(n) for n in text.split("x"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT; got {text!r}") from None
+    return width, height
+
+
+def new_parser(doc: str | None, *, repeats: int, repeated: str) -> argparse.ArgumentParser:
+    """Return a parser with the options that every script has.
+
+    Parameters
+    ----------
+    doc : str, optional
+        The script's docstring; its first line is the description.
+    repeats : int
+        How often things are timed by default.
+    repeated : str
+        What is.
+    """
+    parser = argparse.ArgumentParser(description=doc.splitlines()[0] if doc else None)
+    parser.add_argument("--out", type=Path, default=RESULTS, metavar="FOLDER")
+    parser.add_argument("--repeats", type=int, default=repeats, help=repeated)
+    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
+    return parser
+
+
+def add_vdi_options(
+    parser: argparse.ArgumentParser,
+    *,
+    size: tuple[int, int] = WINDOW_SIZE,
+    volumes: Sequence[str] | None = None,
+) -> None:
+    """Add the options of scripts that measure VDIs of many volumes, one after the other.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Of :func:`new_parser`.
+    size : (int, int)
+        V_O's window by default, pixels.
+    volumes : sequence of str, optional
+        Names by default; every known volume if there are none.
+    """
+    names = sorted(examples.VOLUMES)
+    parser.add_argument("--size", type=window_size, default=size, metavar="WxH")
+    parser.add_argument(
+        "--volumes", nargs="+", choices=names, default=volumes or names, metavar="NAME"
+    )
+    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
+    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
+    parser.add_argument(
+        "--vdi-cache",
+        type=Path,
+        metavar="FOLDER",
+        help="read VDIs from there that an earlier run has written, and write those it lacks",
+    )
+    add_redo(parser)
+
+
+def add_redo(parser: argparse.ArgumentParser) -> None:
+    """Add ``--redo`` for scripts that go on where an earlier run has stopped."""
+    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
+
+
+def at_hand(names: Iterable[str]) -> list[str]:
+    """Return the names whose volume can be loaded; say which are left out."""
+    names, there = list(names), examples.available()
+    absent = [name for name in names if name not in there]
+    if absent:
+        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
+    return [name for name in names if name in there]
+
+
+def begun(target: Path, case: Mapping[str, Any], parts: str = "volumes") -> dict[str, Any]:
+    """Return the results that an earlier run of the same case has left, or new ones.
+
+    Parameters
+    ----------
+    target : pathlib.Path
+        Their file; its folder is made.
+    case : mapping
+        What must be the same for results to stand in one file.
+    parts : str
+        Name of the dictionary that is filled, one entry at a time.
+    """
+    target.parent.mkdir(parents=True, exist_ok=True)
+    fresh = {**case, parts: {}}
+    results: dict[str, Any] = json.loads(target.read_text()) if target.exists() else fresh
+    if any(results.get(name) != value for name, value in case.items()):
+        sys.exit(f"{target} was measured otherwise or elsewhere: choose another --out")
+    return results
+
+
+def save(results: Mapping[str, Any], target: Path) -> None:
+    """Write a file of results; a run that is stopped meanwhile leaves the old one."""
+    with whole_file(target) as stream:
+        stream.write(json.dumps(without_infinities(dict(results)), indent=1).encode() + b"\n")
+
+
+def write_text(target: Path, text: str) -> None:
+    """Write a report, whole."""
+    with whole_file(target) as stream:
+        stream.write(text.encode())
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a Markdown table."""
+    lines = [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"]
+    return [*lines, *(f"| {' | '.join(row)} |" for row in rows)]
+
+
+def system_line(system: Mapping[str, str]) -> str:
+    """Return in one line what a figure depends on."""
+    return ", ".join(f"{name} {value}" for name, value in system.items())
+
+
+def vdi_of(name: str, options: argparse.Namespace) -> VDI:
+    """Return the volume's VDI: from the cache, or generated and written there."""
+    path = None
+    if options.vdi_cache is not None:
+        width = options.size[0]
+        file = f"{name}_{options.tf}_{width}_{options.max_supersegments}.vdi"
+        path = options.vdi_cache / file
+        if path.exists():
+            vdi = read(path)
+            if vdi.window_size == tuple(options.size):
+                return vdi
+    volume = examples.load_data(name, as_volume=True)
+    classification = Classification(TRANSFER_FUNCTIONS[options.tf], "a benchmark")
+    vdi = generate_vdi(
+        volume,
+        filling_camera(volume.bounds, options.size),
+        options.size,
+        classification.transfer_function(volume),
+        max_supersegments=options.max_supersegments,
+        device=options.device,
+    )
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        vdi.save(path)
+    return vdi
+
+
+def add_clock(parser: argparse.ArgumentParser) -> None:
+    """Add ``--clock``: how a CPU is timed on a machine that others use as well."""
+    parser.add_argument(
+        "--clock",
+        choices=("wall", "cpu"),
+        default="wall",
+        help="cpu: the process's CPU time over the device's cores, for a CPU device on a machine "
+        "that does other work as well; what one core does alone then counts too little",
+    )
+
+
+def clock_of(options: argparse.Namespace, runtime: Runtime) -> Callable[[], float]:
+    """Return the clock that was chosen, seconds."""
+    if options.clock == "wall":
+        return time.perf_counter
+    if not runtime.is_cpu:
+        sys.exit("--clock cpu says nothing of a device that is no CPU: leave it out")
+    return lambda: time.process_time() / runtime.info.compute_units
+
+
+def timed(ways: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, dict[str, Any]]:
+    """Time several ways in turns: seconds by wall clock and by CPU, with the spread."""
+    taken: dict[str, list[tuple[float, float]]] = {name: [] for name in ways}
+    for _ in range(repeats):
+        for name, way in ways.items():
+            wall, cpu = time.perf_counter(), time.process_time()
+            way()
+            taken[name].append((time.perf_counter() - wall, time.process_time() - cpu))
+    return {
+        name: {
+            clock: {"median": statistics.median(s), "least": min(s), "most": max(s)}
+            for clock, s in zip(("wall", "cpu"), zip(*pairs, strict=True), strict=True)
+        }
+        for name, pairs in taken.items()
+    }
