@@ -19,8 +19,10 @@ from typing import Any
 
 from common import (  # beside this file
     INTERPOLATIONS,
+    add_clock,
     add_redo,
     begun,
+    clock_of,
     new_parser,
     save,
     system_line,
@@ -28,8 +30,8 @@ from common import (  # beside this file
     window_size,
     write_text,
 )
-from machine import Rates, results_file
-from model import Model, Work, around_work
+from machine import Rates
+from model import Model, around_work, hosted_work
 from scaling import QUANTITIES, core_rows
 from tqdm import tqdm
 
@@ -170,7 +172,7 @@ def measured(
             camera = view.azimuth(angle)
             frames = {**draw.frames(camera), **renderers.frames(camera)}
             steps = {n: frames[n] for n in (_OURS, _OUR_VOLUME, *_PEERS) if n in frames}
-            taken = take_turns(runtime, steps, options.repeats)
+            taken = take_turns(runtime, steps, options.repeats, clock=clock_of(options, runtime))
             found["angles"].append(
                 {
                     "angle": angle,
@@ -184,11 +186,11 @@ def measured(
                             skips=prepared.occupancy.worthwhile,
                         ),
                         _OUR_VOLUME: model.volume_frame(camera, step),
-                        "around": model.floor(around_work(tuple(options.size))),
+                        "around": model.floor(around_work(tuple(options.size), runtime)),
                     },
                 }
             )
-        found["model"] = _generation_model(model, vdi, step / 2)
+        found["model"] = _generation_model(model, runtime, vdi, step / 2)
         found["left_out"] = dict(renderers.left_out)
         return found
     finally:
@@ -221,14 +223,15 @@ def _generation(
     generate(_WARM_UP_SIZE)
     raycast(_WARM_UP_SIZE)
     steps = {"generation": partial(generate, size), "render_volume": partial(raycast, size)}
-    taken = take_turns(runtime, steps, options.generations, warm_up=False)
+    clock = clock_of(options, runtime)
+    taken = take_turns(runtime, steps, options.generations, warm_up=False, clock=clock)
     return made[0], {name: median(t) for name, t in taken.items()}
 
 
-def _generation_model(model: Model, vdi: VDI, step: float) -> dict[str, Any]:
+def _generation_model(model: Model, runtime: Runtime, vdi: VDI, step: float) -> dict[str, Any]:
     """Return floors of generation and of a volume raycast at the same step."""
     stages = model.generation(vdi, vdi.camera, step)
-    on_host = model.floor(Work(download=vdi.nbytes))
+    on_host = model.floor(hosted_work(vdi, runtime))
     return {
         "generation": {**stages, "on the host": on_host},
         "render_volume": model.volume_frame(vdi.camera, step, stops=False),
@@ -240,11 +243,11 @@ def _generation_model(model: Model, vdi: VDI, step: float) -> dict[str, Any]:
 
 def faster_peer(seconds: Mapping[str, float | None]) -> tuple[str, float] | None:
     """Return the faster of VTK's mappers, and its time; None without any."""
-    peers = {name: seconds[name] for name in _PEERS if seconds.get(name)}
+    peers = [(taken, name) for name in _PEERS if (taken := seconds.get(name))]
     if not peers:
         return None
-    name = min(peers, key=lambda n: peers[n])  # type: ignore[arg-type,return-value]
-    return name, float(peers[name])  # type: ignore[arg-type]
+    taken, name = min(peers)
+    return name, taken
 
 
 def frame_cell(row: Mapping[str, Any], reach: float | None) -> Cell:
@@ -325,7 +328,7 @@ def main() -> int:
     if not os.environ.get("VTK_DEFAULT_OPENGL_WINDOW") and not os.environ.get("DISPLAY"):
         os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
     runtime = get_runtime(options.device)
-    rates = Rates.read_from(results_file(options.machine or options.out, runtime))
+    rates = Rates.read_for(runtime, options.machine or options.out)
     width, height = options.size
     target = options.out / f"interactive{'_quick' if options.quick else ''}_{width}x{height}.json"
     case = {
@@ -333,6 +336,7 @@ def main() -> int:
         "max_supersegments": options.max_supersegments,
         "interpolation": options.interpolation,
         "repeats": options.repeats,
+        "clock": options.clock,
         "system": describe_system(options.device),
     }
     results = begun(target, case)
@@ -373,30 +377,40 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help="one volume a group, two repeats")
     parser.add_argument("--no-vtk", dest="vtk", action="store_false", help="leave VTK out")
     parser.add_argument("--machine", type=Path, metavar="FOLDER", help="of machine.py's results")
+    add_clock(parser)
     add_redo(parser)
     options = parser.parse_args()
     if options.quick:
         options.repeats = options.generations = 2
+    names = [n for members in _groups(options).values() for n in members]
+    unknown = [name for name in options.volumes or () if name not in names]
+    if unknown:
+        parser.error(f"--volumes: {', '.join(unknown)} not among {', '.join(names)}")
     return options
 
 
 def chosen(options: argparse.Namespace) -> dict[str, list[str]]:
     """Return the volumes to be measured, by group."""
-    groups = QUICK_GROUPS if options.quick else GROUPS
     wanted = options.volumes
     return {
         group: [name for name in names if wanted is None or name in wanted]
-        for group, names in groups.items()
+        for group, names in _groups(options).items()
     }
+
+
+def _groups(options: argparse.Namespace) -> dict[str, tuple[str, ...]]:
+    return QUICK_GROUPS if options.quick else GROUPS
 
 
 def report(results: Mapping[str, Any], scaling: Mapping[str, Any] | None) -> str:
     """Return the reaches' tables, the volumes', and why what is missed is missed."""
     width, height = results["window_size"]
     cells = frame_cells(results)
+    case = f"N_S {results['max_supersegments']}, {results['interpolation']}"
+    if results["clock"] == "cpu":
+        case += ", by CPU time over cores"
     lines = [
-        f"# Against VTK, {width}x{height}, N_S {results['max_supersegments']}, "
-        + results["interpolation"],
+        f"# Against VTK, {width}x{height}, {case}",
         "",
         f"{LEGEND} A group's cell is its worst volume's.",
         "",
@@ -408,9 +422,12 @@ def report(results: Mapping[str, Any], scaling: Mapping[str, Any] | None) -> str
     if scaling is not None:
         lines += [*table(("cores", *QUANTITIES), core_rows(scaling)), ""]
     lines += ["## By volume", "", *table(_HEADS, _volume_rows(results, cells)), ""]
-    reasons = list(_reasons(results, cells))
-    if reasons:
-        lines += ["## Missed, and why", "", *reasons, ""]
+    for title, found in (
+        ("Missed, and why", _reasons(results, cells)),
+        ("Left out", _left_out(results)),
+    ):
+        if reasons := list(found):
+            lines += [f"## {title}", "", *reasons, ""]
     return "\n".join([*lines, system_line(results["system"]), ""])
 
 
@@ -507,6 +524,13 @@ def _reasons(
         ):
             if cell.reason:
                 yield f"- {name}, {what}: {cell.reason}"
+
+
+def _left_out(results: Mapping[str, Any]) -> Iterator[str]:
+    """Yield which of VTK's mappers could not draw a volume: the other one was the faster."""
+    for name, found in _all_measured(results):
+        for peer, reason in found["left_out"].items():
+            yield f"- {CANDIDATES[peer]} with {name}: {reason}"
 
 
 if __name__ == "__main__":

@@ -282,11 +282,16 @@ class Rates:
         self.operations: dict[str, float] = results["arithmetic"]
 
     @classmethod
-    def read_from(cls, file: Path) -> Rates:
-        """Read what a run has written; end with what to run where there is nothing."""
-        if not file.exists():
-            sys.exit(f"{file} is not there: run machine.py with the same --device and --out first")
-        return cls(json.loads(file.read_text()))
+    def read_for(cls, runtime: Runtime, folder: Path) -> Rates:
+        """Read what a run has written of a device; end with what to run where there is nothing."""
+        file = results_file(folder, runtime)
+        results = json.loads(file.read_text()) if file.exists() else None
+        if results is None or results["system"]["device"] != runtime.info.full_name:
+            sys.exit(
+                f"{file} holds nothing of {runtime.info.full_name}: run machine.py with the same "
+                "--device and --out first"
+            )
+        return cls(results)
 
     def gather(self, size: float, working_set: float, pattern: str = "near") -> float:
         """Return elements of ``size`` bytes per second that are gathered from a working set.

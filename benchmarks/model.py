@@ -41,7 +41,7 @@ from counting import (
     visible_blocks,
     walk,
 )
-from machine import Rates, Stopwatch, cache_of, results_file
+from machine import Rates, Stopwatch, cache_of
 from tqdm import tqdm
 
 from pyvista_vdi.benchmark import find_dataset
@@ -301,7 +301,8 @@ def march_work(
     looked_up = not linear and volume.array.dtype.kind in "iu"
     item = min(volume.array.dtype.itemsize, 4)
     table_bytes = len(function.opacities) * ENTRY
-    per_ray = samples / max(rays, 1) * item * (8 if linear else 1)
+    sampled = samples * item * (8 if linear else 1)
+    per_ray = sampled / max(rays, 1)
     operations = OF_MARCHED_RAY.times(rays) + OF_SAMPLE.times(samples) + OF_VISIBLE.times(visible)
     operations += OF_BLOCK.times(each["blocks"])
     if linear:
@@ -311,7 +312,7 @@ def march_work(
     if records:
         operations += OF_RUN_STEP.times(visible)
     return Work(
-        read=visible_share * volume.array.size * item,
+        read=min(visible_share * volume.array.size * item, sampled),
         write=0.0 if records else rays * PIXEL,
         gathers=(
             Gathers(samples * (8 if linear else 1), item, SHARED_BY_BLOCK * per_ray),
@@ -330,10 +331,9 @@ def shorten_work(marched: March, size: tuple[int, int], supersegments: int) -> W
 
 
 def pack_work(vdi: VDI) -> Work:
-    """Return the work of writing a VDI's arrays from its records, without reading them back."""
+    """Return the work of writing a VDI's arrays from its records, which a cache can hold."""
     n, lists = vdi.n_supersegments, len(vdi.offsets)
     return Work(
-        read=n * SUPERSEGMENT + lists * 8,
         write=n * SUPERSEGMENT + lists * 8,
         operations=OF_PACKING.times(n),
         launches=1,
@@ -351,9 +351,18 @@ def preparation_work(vdi: VDI) -> Work:
     )
 
 
-def around_work(size: tuple[int, int]) -> Work:
-    """Return the work around a frame whose picture goes to the host."""
-    return Work(download=size[0] * size[1] * PIXEL)
+def hosted_work(vdi: VDI, runtime: Runtime) -> Work:
+    """Return the work of a VDI's arrays on the host: each is looked at once, to be checked.
+
+    A CPU device writes them where they stay.
+    """
+    n_bytes = vdi.n_supersegments * SUPERSEGMENT
+    return Work(read=n_bytes, download=0.0 if runtime.is_cpu else n_bytes)
+
+
+def around_work(size: tuple[int, int], runtime: Runtime) -> Work:
+    """Return the work around a frame whose picture goes to the host: from a GPU, a copy."""
+    return Work(launches=1, download=0.0 if runtime.is_cpu else size[0] * size[1] * PIXEL)
 
 
 def plotted_work(size: tuple[int, int]) -> Work:
@@ -538,7 +547,7 @@ def measured(name: str, options: argparse.Namespace, rates: Rates) -> dict[str, 
     for stage, entry in model.generation(vdi, view, voxel / 2).items():
         stages[f"generation: {stage}"] = {**entry, "seconds": taken.get(stage)}
     stages["generation: on the host"] = {
-        **model.floor(Work(download=vdi.n_supersegments * SUPERSEGMENT)),
+        **model.floor(hosted_work(vdi, runtime)),
         "seconds": taken[""],
     }
     medium = DeviceVolume(runtime, volume, function, voxel)
@@ -562,7 +571,7 @@ def measured(name: str, options: argparse.Namespace, rates: Rates) -> dict[str, 
             "seconds": taken["kernels"],
         }
     stages["around a frame to the host"] = {
-        **model.floor(around_work(size)),
+        **model.floor(around_work(size, runtime)),
         "seconds": taken["rest"],
     }
     if find_spec("pyvista") is not None:
@@ -607,9 +616,8 @@ def main() -> int:
     """Measure what is missing, and write what was found."""
     options = parsed()
     width, height = options.size
-    rates = Rates.read_from(
-        results_file(options.machine or options.out, get_runtime(options.device))
-    )
+    runtime = get_runtime(options.device)
+    rates = Rates.read_for(runtime, options.machine or options.out)
     target = options.out / f"model_{width}x{height}.json"
     case = {
         "window_size": [width, height],

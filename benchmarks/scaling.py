@@ -517,12 +517,20 @@ def write_plot(results: Mapping[str, Any], target: Path) -> None:
                 label = f"{quantity}: {found[quantity].exponent:.2f}"
                 panel.plot(x, line, color=dots.get_color(), label=label)
         panel.set(xscale="log", yscale="log", xlabel=axis.name)
+        values = [row["value"] for row in rows if row["value"] > 0]
+        panel.set_xticks(values, [_short(value) for value in values])
+        panel.tick_params(axis="x", which="minor", bottom=False, labelbottom=False)
         panel.grid(alpha=0.3, which="both")
         if found:
             panel.legend(fontsize="small")
     panels[0].set_ylabel("ms")
     with whole_file(target) as stream:
         figure.savefig(stream, dpi=110, format="png")
+
+
+def _short(value: float) -> str:
+    """Return a number for an axis: ``32k`` for 32 400."""
+    return f"{value / 1e3:.0f}k" if value >= 1e3 else f"{value:.0f}"
 
 
 if __name__ == "__main__":

@@ -144,7 +144,6 @@ class BrickLayout:
             "BRICK_POINTS": self.points,
             "BRICK_MARGIN": self.before,
             "INDEX_T": "uint",  # of a brick's points
-            "SKIP_EMPTY": 1,  # transparent bricks are never copied
         }
 
     def region(self, brick: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
@@ -217,6 +216,8 @@ class DeviceBricks:
         Bricks on the device at once.
     memory_limit : int or None
         Most bytes on the device in all, as it was asked for.
+    visible : DeviceBuffer
+        Which blocks hold anything that is not transparent; other bricks are never copied.
     name : str
         Of the volume, for messages.
 
@@ -239,9 +240,11 @@ class DeviceBricks:
         layout: BrickLayout,
         slots: int,
         memory_limit: int | None,
+        visible: DeviceBuffer,
         name: str,
     ) -> None:
         self.layout = layout
+        self.visible = visible
         self.memory_limit = memory_limit
         self.copied = 0
         self._runtime = runtime
@@ -338,7 +341,7 @@ class StepSampler:
         self._medium = tuple(medium)
         self._march = tuple(march)
         self._size = size
-        own = {k: v for k, v in defines.items() if k != "SAMPLED"}
+        own = {k: v for k, v in defines.items() if k not in ("SAMPLED", "SKIP_EMPTY")}
         self._kernels = {
             name: runtime.kernel("vdi/bricks.cl", name, {**own, **bricks.layout.defines})
             for name in ("want_bricks", "sample_steps")
@@ -381,6 +384,7 @@ class StepSampler:
                 *self._march,
                 *place,
                 *self._ends,
+                self._bricks.visible,
                 counts,
                 table,
                 self._samples,

@@ -186,11 +186,10 @@ class DeviceVolume:
         self.bricks: DeviceBricks | None = None
         if room is not None and not whole:
             self._hold_bricks(runtime, scale, transfer_function, room)
-        if skip_empty or self.bricks is not None:
+        if skip_empty:
             seen = runtime.download(self._visible)
-            if skip_empty and 1.0 - float(np.mean(seen)) >= _WORTH_SKIPPING:
+            if 1.0 - float(np.mean(seen)) >= _WORTH_SKIPPING:
                 self.defines["SKIP_EMPTY"] = 1
-            if self.bricks is not None or "SKIP_EMPTY" in self.defines:
                 self._reaches = self._reaches_of(runtime, seen)
         if transfer_function.interpolation == "nearest":
             self.defines["NEAREST"] = 1
@@ -275,7 +274,7 @@ class DeviceVolume:
         )
         dtype = volume.array.dtype if scale is None else np.dtype(np.float32)
         point_bytes = dtype.itemsize * math.prod(volume.array.shape[3:])
-        others = math.prod(_blocks(volume.dimensions)) * _BLOCK_BYTES + _TABLE_BYTES
+        others = math.prod(_blocks(volume)) * _BLOCK_BYTES + _TABLE_BYTES
         left = room.for_bricks(runtime, others)
         largest = runtime.info.max_allocation
         found = fitting_layout(volume.dimensions, point_bytes, gradients, left, largest)
@@ -284,7 +283,14 @@ class DeviceVolume:
             whole = _device_bytes(volume, scale) + others
             raise too_small(_described(volume), room, runtime, whole, least)
         self.bricks = DeviceBricks(
-            runtime, volume.array, _reader(scale), dtype, *found, room.limit, volume.name
+            runtime,
+            volume.array,
+            _reader(scale),
+            dtype,
+            *found,
+            room.limit,
+            self._visible,
+            volume.name,
         )
         self._voxels = self.bricks.pool
         self.defines["SAMPLED"] = 1
@@ -299,7 +305,7 @@ class DeviceVolume:
             np.float32(self._low),
             np.float32(self._per_scalar),
             blocks,
-            np.array([*_blocks(self.volume.dimensions), 0], dtype=np.int32),
+            np.array([*_blocks(self.volume), 0], dtype=np.int32),
         )
 
     def _occluded(
@@ -352,7 +358,7 @@ class DeviceVolume:
         self, runtime: Runtime, ranges: DeviceBuffer, transfer_function: TransferFunction
     ) -> DeviceBuffer:
         """Return which blocks hold anything that is not transparent, uint8 on the device."""
-        n = int(np.prod(_blocks(self.volume.dimensions)))
+        n = int(np.prod(_blocks(self.volume)))
         visible = runtime.buffer((n,), np.uint8, "visible blocks")
         before = np.zeros(self._entries + 1, np.uint32)
         np.cumsum(transfer_function.opacities > 0, out=before[1:])
@@ -380,7 +386,7 @@ class DeviceVolume:
         far = np.where(seen > 0, 0, _FARTHEST).astype(np.uint8)
         reaches = runtime.upload(far, "empty blocks")
         apart = 1
-        for along in _blocks(self.volume.dimensions):
+        for along in _blocks(self.volume):
             with reaches as before:
                 reaches = runtime.buffer((seen.size,), np.uint8, "reaches of empty blocks")
                 runtime.launch(
@@ -529,7 +535,12 @@ def _per_scalar(entries: int, span: float) -> float:
     return min((entries - 1) / span, largest) if span > 0 else largest
 
 
-def _blocks(dimensions: Sequence[int]) -> tuple[int, int, int]:
+def _blocks(volume: Volume) -> tuple[int, int, int]:
+    """Blocks along x, y and z that cover the cells of a volume."""
+    return _blocks_of(volume.dimensions)
+
+
+def _blocks_of(dimensions: Sequence[int]) -> tuple[int, int, int]:
     """Blocks along x, y and z that cover the cells of a grid of so many points."""
     x, y, z = (-(-(points - 1) // 2**_BLOCK_SHIFT) for points in dimensions)
     return x, y, z
@@ -548,7 +559,7 @@ def _described(volume: Volume) -> str:
 def _fits(runtime: Runtime, volume: Volume, scale: _Scale | None, room: Room) -> bool:
     """Whether there is room for a volume in one piece."""
     uploaded = (runtime, scale) in _uploads_of(volume).made
-    nbytes, blocks = _device_bytes(volume, scale), math.prod(_blocks(volume.dimensions))
+    nbytes, blocks = _device_bytes(volume, scale), math.prod(_blocks(volume))
     return room.holds(runtime, nbytes, blocks * _BLOCK_BYTES + _TABLE_BYTES, uploaded=uploaded)
 
 
@@ -559,7 +570,7 @@ def volume_bytes(volume: Volume, nbytes: int, room: Room) -> tuple[int, int]:
     """
     if room.limit is None:
         return nbytes, 0
-    others = math.prod(_blocks(volume.dimensions)) * _BLOCK_BYTES + _TABLE_BYTES
+    others = math.prod(_blocks(volume)) * _BLOCK_BYTES + _TABLE_BYTES
     if nbytes + others + room.working <= room.limit:
         return nbytes + others, 0
     return room.limit - room.working - room.sample_bytes, room.sample_bytes
@@ -620,7 +631,7 @@ def _ranges_in_parts(
     room: Room,
 ) -> NDArray[np.float32]:
     """Return the scalar range of each block, float32 (n, 2), from parts of the volume."""
-    blocks, read = _blocks(volume.dimensions), _reader(scale)
+    blocks, read = _blocks(volume), _reader(scale)
     ranges = aligned_empty((*reversed(blocks), 2), np.float32)
     point_bytes = _device_bytes(volume, scale) // math.prod(volume.dimensions)
     nbytes = min(_PART_BYTES, room.in_all(runtime) // _PARTS, runtime.info.max_allocation)
@@ -643,7 +654,7 @@ def _block_ranges(
     defines: dict[str, str | int | None],
 ) -> DeviceBuffer:
     """Return the scalar range of each block of a grid of so many points along x, y and z."""
-    blocks = _blocks(dimensions)
+    blocks = _blocks_of(dimensions)
     n = int(np.prod(blocks))
     ranges = runtime.buffer((n, 2), name="ranges of blocks")
     runtime.launch(

@@ -297,15 +297,19 @@ def read_nrrd(file: Path, quantity: str) -> Volume:
     """Read a three-dimensional NRRD file; axes as stored, so that x is the fastest."""
     import nrrd
 
+    from .opencl_runtime import aligned_empty
     from .volume import Volume
 
     try:
         array, header = nrrd.read(str(file), index_order="C")
     except (nrrd.NRRDError, OSError, ValueError, EOFError) as error:
         raise InvalidVolumeError(f"{file} cannot be read as NRRD: {error}") from error
+    # Where a CPU device reads it without a copy of its own
+    aligned = aligned_empty(array.shape, array.dtype.newbyteorder("="))
+    aligned[...] = array
     spacing, direction = _grid_axes(header)
     origin = header.get("space origin", np.zeros(3))
-    return Volume(array, spacing, origin, direction, name=quantity)
+    return Volume(aligned, spacing, origin, direction, name=quantity)
 
 
 def _grid_axes(header: dict[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -551,25 +551,30 @@ def _check_weights(tolerance: float, view_cone: float) -> tuple[float, float]:
 
 
 def _joined(runtime: Runtime, parts: list[tuple[NDArray[Any], ...]]) -> list[NDArray[Any]]:
-    """Join the slices' arrays, each kind into one that a CPU device uses in place."""
-    joined = []
-    for arrays in zip(*parts, strict=True):
-        size = sum(len(array) for array in arrays)
-        whole = aligned_empty((size, *arrays[0].shape[1:]), arrays[0].dtype)
-        end = 0
-        for array in arrays:
+    """Join the slices' arrays, each kind into one that a CPU device uses in place.
+
+    ``parts`` are let go of one by one, so that the VDI is not there twice.
+    """
+    sizes = [sum(len(array) for array in arrays) for arrays in zip(*parts, strict=True)]
+    joined = [
+        aligned_empty((size, *array.shape[1:]), array.dtype)  # taken as it is written
+        for size, array in zip(sizes, parts[0], strict=True)
+    ]
+    ends = sizes
+    while parts:
+        firsts = [end - len(array) for end, array in zip(ends, parts[-1], strict=True)]
+        for whole, array, first, end in zip(joined, parts.pop(), firsts, ends, strict=True):
             runtime.give_way()
-            first, end = end, end + len(array)
             whole[first:end] = array
-        joined.append(whole)
+        ends = firsts
     return joined
 
 
 def _require_room(parts: Sequence[tuple[NDArray[Any], ...]], size: tuple[int, int]) -> None:
-    """Refuse to go on where the host cannot hold the VDI: its arrays, and the slices they join."""
-    made = sum(array.nbytes for part in parts for array in part)
+    """Refuse to go on where the host cannot hold the VDI: its arrays, and a slice of them twice."""
+    made = [sum(array.nbytes for array in part) for part in parts]
     require_host_memory(
-        2 * made + 8 * size[0] * size[1],
+        sum(made) + max(made, default=0) + 8 * size[0] * size[1],
         f"a VDI of {size[0]} x {size[1]} lists",
         "lower the window size or max_supersegments, or raise tolerance",
     )

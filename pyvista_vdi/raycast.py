@@ -28,6 +28,11 @@ TRANSMITTANCE_CUTOFF = 1e-6
 MAX_PREVIEW_SAMPLES = 2**23
 #: Far depth over near depth up to which a lens counts as long, and depth is kept relative.
 _LONG_LENS = 2.0
+#: Lists along each edge of a tile, in which supersegments lie together; those of 8 bytes lie list
+#: by list: that of ``common/supersegments.cl``.
+_LIST_TILE = 2
+#: Bits of a tile's header that say where it begins: that of ``common/supersegments.cl``.
+_FIRST_BITS = 36
 #: Pairs of words before the supersegments of an 8-byte list: that of ``common/supersegments.cl``.
 _LIST_HEADER = 2
 
@@ -277,8 +282,6 @@ class PreparedVDI:
         self._far = self._is_far(vdi, (near, far))
         self._list_rows = self._list_space(camera)
         self._packed = {Packed16: 16, Packed8: 8}.get(type(vdi.packing), 0)
-        headers = _LIST_HEADER * int(np.count_nonzero(vdi.counts)) if self._packed == 8 else 0
-        self._long_offsets = vdi.n_supersegments + headers >= 2**32
         self._upload(vdi)
 
     def _is_far(self, vdi: VDI, depths: tuple[float, float]) -> bool:
@@ -298,15 +301,13 @@ class PreparedVDI:
 
     @property
     def list_bytes(self) -> int:
-        """Bytes of the lists on the device: offsets and supersegments."""
-        return sum(buffer.nbytes for buffer in (self._offsets, *self._lists))
+        """Bytes of the lists on the device: headers and supersegments."""
+        return sum(buffer.nbytes for buffer in (self._headers, *self._lists))
 
     @property
     def defines(self) -> dict[str, str | int | None]:
         """``-D`` names that fix the kernels' shape for this VDI."""
-        defines: dict[str, str | int | None] = {
-            "OFFSET_T": "ulong" if self._long_offsets else "uint"
-        }
+        defines: dict[str, str | int | None] = {"OFFSET_T": "long" if self._long_offsets else "int"}
         if self._parallel:
             defines["PARALLEL"] = 1
         if self._shifted:
@@ -411,7 +412,7 @@ class PreparedVDI:
         ends for want of light.
         """
         return (
-            self._offsets,
+            self._headers,
             *self._lists,
             np.int32(self._window[0]),
             np.int32(self._window[1]),
@@ -460,17 +461,30 @@ class PreparedVDI:
     def _upload(self, vdi: VDI) -> None:
         """Bring the lists to the device, exact or packed, and build the occupancy grid."""
         runtime = self._runtime
-        offset_type = np.uint64 if self._long_offsets else np.uint32
+        if self._packed == 8:
+            lengths = vdi.counts + _LIST_HEADER * (vdi.counts > 0)
+        else:
+            lengths = _longest(vdi.counts) * _LIST_TILE**2
+        begins = np.zeros(lengths.size + 1, np.int64)
+        np.cumsum(lengths, out=begins[1:])
+        # Kernels count words of 8 bytes, of which an entry takes up to two, by signed numbers
+        self._long_offsets = 2 * int(begins[-1]) >= 2**31
+        offset_type = np.int64 if self._long_offsets else np.int32
+        if self._packed == 8:
+            headers: NDArray[Any] = begins.astype(offset_type)
+        else:
+            longest = lengths.reshape(-1) // _LIST_TILE**2
+            headers = (begins[:-1] | longest << _FIRST_BITS).view(np.uint64)
         with (
             kept_together() as keep,
             runtime.upload(vdi.front, "front depths") as front,
             runtime.upload(vdi.back, "back depths") as back,
+            runtime.upload(vdi.offsets.astype(offset_type), "list offsets") as starts,
         ):
-            offsets = keep(runtime.upload(vdi.offsets.astype(offset_type), "list offsets"))
             self.occupancy = OccupancyGrid(
                 runtime,
                 vdi,
-                offsets,
+                starts,
                 front,
                 back,
                 nearest=self._nearest,
@@ -478,37 +492,38 @@ class PreparedVDI:
                 long_offsets=self._long_offsets,
             )
             keep(self.occupancy.counts), keep(self.occupancy.masks)
+            self._headers = keep(runtime.upload(headers, "list headers"))
             if isinstance(vdi.packing, Packed8):
-                runtime.finish()
-                offsets.release()
-                self._offsets, self._lists = self._packed_lists(vdi, vdi.packing, offset_type, keep)
+                self._lists = self._packed_lists(vdi, vdi.packing, keep)
             else:
-                self._offsets, self._lists = (
-                    offsets,
-                    self._prepared_lists(vdi, offsets, front, back, keep),
-                )
+                self._lists = self._prepared_lists(vdi, int(begins[-1]), starts, front, back, keep)
             runtime.finish()  # the buffers above may be host memory in use
 
     def _prepared_lists(
         self,
         vdi: VDI,
-        offsets: DeviceBuffer,
+        entries: int,
+        starts: DeviceBuffer,
         front: DeviceBuffer,
         back: DeviceBuffer,
         keep: _Keep,
     ) -> tuple[DeviceBuffer, ...]:
-        """Return the supersegments with depth coordinates and extinctions, 24 or 16 bytes each."""
+        """Return the supersegments with depth coordinates and extinctions, 24 or 16 bytes each.
+
+        They lie by tiles of lists, in so many ``entries``; ``starts`` are the lists' in the VDI's
+        arrays.
+        """
         runtime = self._runtime
-        n, (wide, high) = vdi.n_supersegments, vdi.window_size
+        wide, high = vdi.window_size
         packed = isinstance(vdi.packing, Packed16)
         colors = vdi.packing.color if isinstance(vdi.packing, Packed16) else vdi.color
         lists: tuple[DeviceBuffer, ...]
         if packed:
-            lists = (keep(runtime.buffer((n, 4), np.uint32, "supersegments")),)
+            lists = (keep(runtime.buffer((entries, 4), np.uint32, "supersegments")),)
         else:
             lists = (
-                keep(runtime.buffer((n, 2), name="supersegment faces")),
-                keep(runtime.buffer((n, 4), name="supersegment media")),
+                keep(runtime.buffer((entries, 2), name="supersegment faces")),
+                keep(runtime.buffer((entries, 4), name="supersegment media")),
             )
         # Direction of a centre ray per unit of view depth, in the model frame
         centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
@@ -521,7 +536,8 @@ class PreparedVDI:
                 runtime.kernel("vdi/prepare.cl", "prepare_lists", self.defines),
                 -(-wide * high // GROUP) * GROUP,
                 GROUP,
-                offsets,
+                starts,
+                self._headers,
                 front,
                 back,
                 color,
@@ -540,10 +556,9 @@ class PreparedVDI:
         self,
         vdi: VDI,
         packing: Packed8,
-        offset_type: type[np.unsignedinteger[Any]],
         keep: _Keep,
-    ) -> tuple[DeviceBuffer, tuple[DeviceBuffer, ...]]:
-        """Return offsets, and lists of 8-byte supersegments that begin with their headers."""
+    ) -> tuple[DeviceBuffer, ...]:
+        """Return lists of 8-byte supersegments that begin with their scales."""
         runtime = self._runtime
         counts = vdi.counts.reshape(-1)
         occupied = np.flatnonzero(counts)
@@ -557,10 +572,7 @@ class PreparedVDI:
         words[first + 1, 1] = 0
         own = np.repeat(np.arange(1, len(occupied) + 1) * _LIST_HEADER, counts[occupied])
         words[np.arange(vdi.n_supersegments) + own] = packing.words
-        return (
-            keep(runtime.upload((vdi.offsets + headers).astype(offset_type), "list offsets")),
-            (keep(runtime.upload(words, "supersegments")), keep(self._constants(packing.step))),
-        )
+        return (keep(runtime.upload(words, "supersegments")), keep(self._constants(packing.step)))
 
     def _per_code(
         self, vdi: VDI, packing: Packed8, lists: NDArray[np.int64]
@@ -576,3 +588,12 @@ class PreparedVDI:
     def _constants(self, step: float) -> DeviceBuffer:
         constants = np.array([step, self._nearest - self._depth_origin], np.float32)
         return self._runtime.upload(constants, "constants of depths")
+
+
+def _longest(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the length of the longest list of each tile; ``counts`` are (height, width)."""
+    height, width = counts.shape
+    padded = np.pad(counts, ((0, -height % _LIST_TILE), (0, -width % _LIST_TILE)))
+    rows, columns = padded.shape
+    tiles = padded.reshape(rows // _LIST_TILE, _LIST_TILE, columns // _LIST_TILE, _LIST_TILE)
+    return np.asarray(tiles.max(axis=(1, 3)))

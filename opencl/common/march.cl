@@ -87,27 +87,10 @@ inline float step_face(const March *march, int k)
     return fmin(fma((float)k, march->step, march->t0), march->t1);
 }
 
-#ifdef SKIP_EMPTY
-// The block that the midpoint of step k lies in.
-inline int3 block_of_step(const March *march, const Medium *medium, int k)
+// The first step from which on midpoints may lie outside a box that the ray is in, between two index positions.
+inline int first_step_outside(const March *march, float3 lower, float3 upper)
 {
-    const float t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
-    const float3 position = march->start + t * march->slope;
-    return clamp(convert_int3(position) >> BLOCK_SHIFT, (int3)(0), medium->blocks.xyz - 1);
-}
-
-// How far a block is from one that may be visible, see grid/volume_blocks.cl; 0 where it may be so itself.
-inline int reach_of_block(const Medium *medium, int3 block)
-{
-    return medium->reaches[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x];
-}
-
-// The first step from which on midpoints may lie farther than `reach` - 1 blocks from a block that the ray is in.
-inline int first_step_behind(const March *march, int3 block, int reach)
-{
-    // Where the ray leaves those blocks: past the face ahead on each axis, or never
-    const float3 lower = convert_float3((block - (reach - 1)) << BLOCK_SHIFT);
-    const float3 upper = convert_float3((block + reach) << BLOCK_SHIFT);
+    // Where the ray leaves the box: past the face ahead on each axis, or never
     const float3 crossing = ((march->slope > 0.0f ? upper : lower) - march->start) * march->inverse;
     const float leaves = fmin(march->slope.x != 0.0f ? crossing.x : INFINITY,
                               fmin(march->slope.y != 0.0f ? crossing.y : INFINITY,
@@ -115,7 +98,6 @@ inline int first_step_behind(const March *march, int3 block, int reach)
     // Steps with their midpoint before that, less a hundredth of a step for the rounding of positions
     return (int)fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f) + 1;
 }
-#endif
 
 // Steps from step k on whose midpoints lie in transparent blocks around the first one's, in whole groups of `group` steps, so
 // that the others are grouped as if none had been passed by; 0 where there is something to look at. Skipping decides what is
@@ -123,9 +105,15 @@ inline int first_step_behind(const March *march, int3 block, int reach)
 inline int empty_steps(const March *march, const Medium *medium, int k, int end, int group)
 {
 #ifdef SKIP_EMPTY
-    const int3 block = block_of_step(march, medium, k);
-    const int reach = reach_of_block(medium, block);
-    return reach > 0 ? max(min(first_step_behind(march, block, reach), end) - k, 0) / group * group : 0;
+    const float t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
+    const float3 position = march->start + t * march->slope;
+    const int3 block = clamp(convert_int3(position) >> BLOCK_SHIFT, (int3)(0), medium->blocks.xyz - 1);
+    const int reach = medium->reaches[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x];
+    if (reach == 0)
+        return 0;
+    const float3 lower = convert_float3((block - (reach - 1)) << BLOCK_SHIFT);
+    const float3 upper = convert_float3((block + reach) << BLOCK_SHIFT);
+    return max(min(first_step_outside(march, lower, upper), end) - k, 0) / group * group;
 #else
     return 0;
 #endif

@@ -97,3 +97,19 @@ inline int2 block_pixel(uint item, int width)
     const uint columns = (uint)(width + 3) >> 2;
     return (int2)((int)((block % columns) << 2 | (item & 3)), (int)((block / columns) << 2 | (item >> 2 & 3)));
 }
+
+// The same in strips STRIP blocks high, each from left to right, so that one work-item's lists are still cached when those
+// above and below come to them.
+#define STRIP 4
+inline int2 strip_pixel(uint item, int width, int height)
+{
+    const uint block = item >> 4;
+    const uint columns = (uint)(width + 3) >> 2;
+    const uint rows = (uint)(height + 3) >> 2;
+    const uint strip = block / (STRIP * columns);
+    const uint place = block - strip * STRIP * columns;
+    const uint high = clamp((int)rows - (int)(strip * STRIP), 1, STRIP); // blocks; the last strip may be lower
+    const uint column = place / high;
+    const uint row = strip * STRIP + place - column * high;
+    return (int2)((int)(column << 2 | (item & 3)), (int)(row << 2 | (item >> 2 & 3)));
+}

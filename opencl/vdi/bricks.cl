@@ -1,6 +1,6 @@
 // A volume that is on the device brick by brick: the steps of rays are sampled before they are composited.
 //
-// -D VOXEL_T, INDEX_T, RGBA, NEAREST, SKIP_EMPTY, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
+// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BLOCK_SHIFT: see common/volume_sampling.cl and common/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see common/shading.cl
 // -D BRICK_SHIFT   logarithm to base 2 of a brick's cells along each edge
 // -D BRICK_POINTS  points along each edge that a brick in memory holds
@@ -53,7 +53,7 @@ typedef struct {
     bool transparent;
 } Stretch;
 
-inline Stretch next_stretch(const Walk *walk, const Medium *medium, int4 bricks)
+inline Stretch next_stretch(const Walk *walk, const Medium *medium, __global const uchar *seen, int4 bricks)
 {
     const March *march = &walk->march;
     Stretch stretch;
@@ -61,9 +61,10 @@ inline Stretch next_stretch(const Walk *walk, const Medium *medium, int4 bricks)
     const int3 block = stretch.cell >> BLOCK_SHIFT;
     const int3 brick = stretch.cell >> BRICK_SHIFT;
     stretch.brick = (brick.z * bricks.y + brick.y) * bricks.x + brick.x;
-    stretch.transparent = reach_of_block(medium, block) > 0;
+    stretch.transparent = !seen[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x];
     // Positions never turn back: where the last step is in the block as well, all between are
-    stretch.end = max(min(first_step_behind(march, block, 1), walk->end), walk->k + 1);
+    const float3 lower = convert_float3(block << BLOCK_SHIFT);
+    stretch.end = max(min(first_step_outside(march, lower, lower + (float)BLOCK), walk->end), walk->k + 1);
     if (any((cell_of_step(march, medium, stretch.end - 1) >> BLOCK_SHIFT) != block))
         stretch.end = walk->k + 1;
     return stretch;
@@ -87,6 +88,7 @@ __kernel void want_bricks(
     int first_step, int steps,
     __global const float *opaque_depth, // where each ray ends in t, top row first
     int has_opaque_depth,
+    __global const uchar *seen,    // whether a block holds anything that is not transparent
     int4 bricks,                   // along x, y, z
     __global uint *wanted,         // per brick; set to 1
     __global float4 *samples)      // see common/samples.cl; room for `steps` of each ray
@@ -103,7 +105,7 @@ __kernel void want_bricks(
         return;
     __global float4 *sample = samples + samples_start(item, steps);
     while (walk.k < walk.end) {
-        const Stretch stretch = next_stretch(&walk, &medium, bricks);
+        const Stretch stretch = next_stretch(&walk, &medium, seen, bricks);
         if (stretch.transparent)
             for (int k = walk.k; k < stretch.end; ++k)
                 sample[(k - first_step) * SAMPLE_LANES] = (float4)(0.0f);
@@ -131,6 +133,7 @@ __kernel void sample_steps(
     int first_step, int steps,
     __global const float *opaque_depth,
     int has_opaque_depth,
+    __global const uchar *seen,
     int4 bricks,
     __global const int *slots,     // of each brick; negative where its steps are not to be sampled now
     __global float4 *samples)
@@ -147,7 +150,7 @@ __kernel void sample_steps(
         return;
     __global float4 *sample = samples + samples_start(item, steps);
     while (walk.k < walk.end) {
-        const Stretch stretch = next_stretch(&walk, &medium, bricks);
+        const Stretch stretch = next_stretch(&walk, &medium, seen, bricks);
         const int slot = stretch.transparent ? -1 : slots[stretch.brick];
         if (slot >= 0) {
             const int3 first = ((stretch.cell >> BRICK_SHIFT) << BRICK_SHIFT) - BRICK_MARGIN;

@@ -28,7 +28,7 @@ __kernel void merge(
     __global short *owner)              // the VDI to which each pixel belongs, top row first; -1: to none
 {
     const int ray = (int)get_global_id(0);
-    const int2 pixel = block_pixel(first_item + (uint)ray, width);
+    const int2 pixel = strip_pixel(first_item + (uint)ray, width, height);
     if (pixel.x >= width || pixel.y >= height)
         return;
     const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;

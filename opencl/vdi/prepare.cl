@@ -1,8 +1,9 @@
 // A VDI's arrays to what the raycaster reads: faces in list space and extinction in place of optical depth.
-// The arrays hold offsets, see common/list_space.cl, whose -D names hold here.
+// The arrays hold offsets, see common/list_space.cl, whose -D names hold here. They are brought into tiles, see
+// common/supersegments.cl.
 //
 // -D PACKED=16   both in one array, see common/supersegments.cl; the form of 8 bytes is made by the host
-#include "common/list_space.cl"
+#include "common/supersegments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // What is kept of a face
@@ -14,7 +15,8 @@
 
 // One work-item per list.
 __kernel void prepare_lists(
-    __global const OFFSET_T *offsets,     // width * height + 1
+    __global const OFFSET_T *starts,      // of the lists in the arrays, width * height + 1
+    __global const ulong *headers,        // of the tiles of lists, see common/supersegments.cl
     __global const float *fronts,         // view depth less depth_origin
     __global const float *backs,
 #ifdef PACKED
@@ -41,7 +43,21 @@ __kernel void prepare_lists(
     const float b = (float)(list / (size_t)width) + 0.5f - 0.5f * (float)height;
     const float3 direction = fma(b, vload3(2, centre_ray), fma(a, vload3(1, centre_ray), vload3(0, centre_ray)));
     const float per_depth = length(direction); // model length per unit of view depth
-    for (OFFSET_T k = offsets[list]; k < offsets[list + 1]; ++k) {
+    const List target = list_at(headers, (int)(list % (size_t)width), (int)(list / (size_t)width), width);
+    const OFFSET_T start = starts[list];
+    const int count = (int)(starts[list + 1] - start);
+    for (int n = 0; n < target.count; ++n) {
+        const OFFSET_T entry = entry_of(&target, n);
+        if (n >= count) {
+#ifdef PACKED
+            supersegments[entry] = (uint4)(as_uint2(NO_FACE), 0, 0);
+#else
+            faces[entry] = NO_FACE;
+            media[entry] = (float4)(0.0f);
+#endif
+            continue;
+        }
+        const OFFSET_T k = start + n;
         const float front = fronts[k];
         const float back = backs[k];
 #ifdef PARALLEL
@@ -55,10 +71,10 @@ __kernel void prepare_lists(
         const float length = fmax((back - front) * per_depth, FLT_MIN);
         const float extinction = fmin(optical_depths[k] / length, FLT_MAX);
 #ifdef PACKED
-        supersegments[k] = (uint4)(as_uint(z0), as_uint(z1), as_uint(extinction), colors[k]);
+        supersegments[entry] = (uint4)(as_uint(z0), as_uint(z1), as_uint(extinction), colors[k]);
 #else
-        faces[k] = (float2)(z0, z1);
-        media[k] = (float4)(vload3(k, colors), extinction);
+        faces[entry] = (float2)(z0, z1);
+        media[entry] = (float4)(vload3(k, colors), extinction);
 #endif
     }
 }

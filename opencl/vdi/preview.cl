@@ -139,7 +139,7 @@ inline float r_at(const Crossing *crossing, float share, Depths depths)
 }
 
 __kernel void preview(
-    __global const OFFSET_T *offsets,   // lists_wide * lists_high + 1
+    __global const HEADER_T *headers,   // of the tiles of lists, see common/supersegments.cl
     SUPERSEGMENTS_PARAMETERS            // see common/supersegments.cl
     int lists_wide, int lists_high,     // window of V_O
     float depth_origin,                 // world units
@@ -201,16 +201,15 @@ __kernel void preview(
                 const float z = fma(r, ray.along.z, ray.deep.z);
                 const int i = clamp((int)floor(fma(r, ray.along.x, ray.deep.x) + cells.half_wide), 0, lists_wide - 1);
                 const int j = clamp((int)floor(fma(r, ray.along.y, ray.deep.y) + cells.half_high), 0, lists_high - 1);
-                const size_t list = (size_t)j * (size_t)lists_wide + (size_t)i;
-                const OFFSET_T begin = offsets[list];
-                const int count = LIST_LENGTH(begin, offsets[list + 1]);
+                const List list = LIST_AT(i, j);
+                Search search = begin_search(guess);
+                float2 face;
+                while (!search_on(&search, list, SUPERSEGMENTS_ARGUMENTS z, true, &face))
+                    ;
+                guess = search.n;
                 medium = (float4)(0.0f);
-                if (count > 0) {
-                    BEGIN_LIST(begin)
-                    guess = count_passing(LIST(begin), count, z, true, guess);
-                    if (guess < count && front_of(LIST(begin), guess) <= z)
-                        medium = MEDIUM(begin + (OFFSET_T)guess);
-                }
+                if (face.x <= z)
+                    medium = MEDIUM(list, guess);
 #ifdef CROPPED
                 if (!is_kept(&ray.kept, r))
                     medium = (float4)(0.0f);

@@ -2,9 +2,10 @@
 //
 // A ray steps from list to list (Amanatides and Woo), finds the first supersegment of each by the index found in the last
 // one, and composites, front to back, the length that it crosses of each (DESIGN section 3 "Lengths", "A supersegment is a
-// homogeneous medium").
+// homogeneous medium"). All that is one loop, each turn of which makes a guess, composites a supersegment or leaves a list, or
+// the last two: the lanes of a vector need not wait for the one that searches longest or meets most.
 //
-// -D OFFSET_T           type of an offset into the supersegments: uint or ulong
+// -D OFFSET_T           type of an offset into the supersegments: int or long
 // -D PARALLEL, SHIFTED  the depth coordinate, see common/list_space.cl
 // -D FAR_ENTRIES        see common/list_space.cl
 // -D COMPENSATED        see common/over.cl
@@ -30,9 +31,22 @@
 
 // A ray that crosses fewer lists than this is not worth a look at the grid: at V_O it stays in one.
 #define FEW_LISTS 2.0f
+// One that crosses fewer than this goes through the whole depth of a list's neighbourhood: worth to be brought close at once.
+#define LISTS_TO_PREFETCH 48.0f
+// Turns of the loop from one look at the grid to the next: lanes that come to a new tile one after another look together.
+#define TURNS_PER_TEST 4
+// As fmin and fmax for what is never NaN: one instruction each
+#define LOWER(x, y) ((x) < (y) ? (x) : (y))
+#define HIGHER(x, y) ((x) > (y) ? (x) : (y))
+
+// The list that holds a coordinate in lists, or the nearest one.
+inline int list_index(float coordinate, int lists)
+{
+    return clamp((int)floor(coordinate), 0, lists - 1);
+}
 
 __kernel void raycast(
-    __global const OFFSET_T *offsets,   // lists_wide * lists_high + 1
+    __global const HEADER_T *headers,   // of the tiles of lists, see common/supersegments.cl
     SUPERSEGMENTS_PARAMETERS            // see common/supersegments.cl
     int lists_wide, int lists_high,     // window of V_O
     float depth_origin,                 // world units
@@ -80,7 +94,7 @@ __kernel void raycast(
 #else
     const uint item = (uint)get_global_id(0);
 #endif
-    const int2 pixel = block_pixel(item, width);
+    const int2 pixel = strip_pixel(item, width, height);
     if (pixel.x >= width || pixel.y >= height)
         return;
     const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
@@ -105,26 +119,43 @@ __kernel void raycast(
     }
     const float3 start = ray.start;
     const float3 deep = ray.deep;
-    const float3 along = ray.along;
+    // What changes by less than a normal number does not change: its reciprocal is not finite
+    const float3 along = (float3)(fabs(ray.along.x) < FLT_MIN ? 0.0f : ray.along.x,
+                                  fabs(ray.along.y) < FLT_MIN ? 0.0f : ray.along.y, ray.along.z);
     const bool away = ray.away;
     const float r_begin = ray.r_begin;
     const float r_end = r_begin + 1.0f;
 
-    // Where planes u = const, v = const and z = const are crossed; a component that does not change crosses none
-    const float inverse_u = along.x != 0.0f ? 1.0f / along.x : 0.0f;
-    const float inverse_v = along.y != 0.0f ? 1.0f / along.y : 0.0f;
-    const float inverse_z = along.z != 0.0f ? 1.0f / along.z : 0.0f;
     const float half_wide = 0.5f * (float)lists_wide;
     const float half_high = 0.5f * (float)lists_high;
-    int i = clamp((int)floor(start.x + half_wide), 0, lists_wide - 1);
-    int j = clamp((int)floor(start.y + half_high), 0, lists_high - 1);
+    int i = list_index(start.x + half_wide, lists_wide);
+    int j = list_index(start.y + half_high, lists_high);
+    if (fabs(along.x) + fabs(along.y) < LISTS_TO_PREFETCH) {
+        // The lists that it begins and ends in: those in between are others' ends
+        const int last_column = list_index(fma(r_end, along.x, deep.x) + half_wide, lists_wide);
+        const int last_row = list_index(fma(r_end, along.y, deep.y) + half_high, lists_high);
+        PREFETCH(LIST_AT(i, j), i, j);
+        PREFETCH(LIST_AT(last_column, last_row), last_column, last_row);
+    }
+
+    // Where planes u = const and v = const are crossed; by a component that does not change, at infinity
+    const float deep_u = along.x != 0.0f ? deep.x : -INFINITY;
+    const float deep_v = along.y != 0.0f ? deep.y : -INFINITY;
+    const float inverse_u = along.x != 0.0f ? 1.0f / along.x : 1.0f;
+    const float inverse_v = along.y != 0.0f ? 1.0f / along.y : 1.0f;
     const int step_i = along.x > 0.0f ? 1 : -1;
     const int step_j = along.y > 0.0f ? 1 : -1;
-    const float border_i = along.x > 0.0f ? 1.0f : 0.0f; // from a list's lower border to the one ahead
-    const float border_j = along.y > 0.0f ? 1.0f : 0.0f;
+    // From a list's index to its border ahead: exact
+    const float border_u = (along.x > 0.0f ? 1.0f : 0.0f) - half_wide;
+    const float border_v = (along.y > 0.0f ? 1.0f : 0.0f) - half_high;
 // Where the ray leaves column i, or row j, of lists: from the border's number, never accumulated
-#define CROSSING_U(i) (((float)(i) + border_i - half_wide - deep.x) * inverse_u)
-#define CROSSING_V(j) (((float)(j) + border_j - half_high - deep.y) * inverse_v)
+#define CROSSING_U(i) (((float)(i) + border_u - deep_u) * inverse_u)
+#define CROSSING_V(j) (((float)(j) + border_v - deep_v) * inverse_v)
+    // Depth in the ray's sense, see common/lists.cl: it does not decrease along the ray
+    const float sense = away ? 1.0f : -1.0f;
+    const float along_depth = sense * along.z;
+    const float deep_depth = sense * deep.z;
+    const float inverse_depth = along.z != 0.0f ? 1.0f / along_depth : 0.0f;
 
 #if defined(FIRST_HIT)
     float met = 0.0f; // optical depth
@@ -136,32 +167,35 @@ __kernel void raycast(
     float4 rest = (float4)(0.0f);
 #endif
     float r = r_begin;
-    float z = start.z;
-    int passed = 0; // supersegments passed in the list before: the first guess in the next
+    float depth = sense * start.z;
+    Search search = begin_search(0);
 #ifdef SKIP_EMPTY
     const int tiles_wide = (lists_wide + TILE - 1) >> TILE_SHIFT;
     bool enters_tile = fabs(along.x) + fabs(along.y) > FEW_LISTS;
+    int turn = 0;
 #endif
     while (true) {
 #ifdef SKIP_EMPTY
         // Pass by tiles, and parts of tiles, whose slabs ahead are empty. Written with selects, and in a loop of its own, so
         // that the lanes of a vector meet again behind it.
         bool leaves_lists = false;
-        while (enters_tile) {
+        bool looks = enters_tile && turn % TURNS_PER_TEST == 0;
+        ++turn;
+        while (looks) {
+            looks = false;
             enters_tile = false;
             const int edge_i = along.x > 0.0f ? i | (TILE - 1) : i & ~(TILE - 1);
             const int edge_j = along.y > 0.0f ? j | (TILE - 1) : j & ~(TILE - 1);
             const ulong mask = masks[(j >> TILE_SHIFT) * tiles_wide + (i >> TILE_SHIFT)];
-            const int slab = slab_of(depth_offset(z, DEPTHS), first_depth, slabs_per_depth);
+            const int slab = slab_of(depth_offset(sense * depth, DEPTHS), first_depth, slabs_per_depth);
             const ulong ahead = mask & (away ? slabs_from(slab) : slabs_to(slab));
             const int nearest = away ? (int)popcount((ahead & -ahead) - 1) : SLABS - 1 - (int)clz(ahead);
             if (ahead == 0 || nearest != slab) {
                 // Up to here nothing is met: the tile's border, or the face of the next occupied slab
-                float r_until = fmin(along.x != 0.0f ? CROSSING_U(edge_i) : INFINITY,
-                                     along.y != 0.0f ? CROSSING_V(edge_j) : INFINITY);
+                float r_until = fmin(CROSSING_U(edge_i), CROSSING_V(edge_j));
                 if (ahead != 0 && along.z != 0.0f) {
                     const float face = first_depth + (float)(away ? nearest : nearest + 1) / slabs_per_depth;
-                    r_until = fmin(r_until, (depth_coordinate(face, DEPTHS) - deep.z) * inverse_z);
+                    r_until = fmin(r_until, (sense * depth_coordinate(face, DEPTHS) - deep_depth) * inverse_depth);
                 }
                 // The list that steps from list to list would have reached, by the crossings of its borders: where r_until
                 // lies by its coordinates, one back or one on where rounding has it otherwise
@@ -179,12 +213,16 @@ __kernel void raycast(
                 row = along.y != 0.0f ? row : j;
                 r = column != i ? fmax(r, CROSSING_U(column - step_i)) : r;
                 r = row != j ? fmax(r, CROSSING_V(row - step_j)) : r;
-                z = column != i || row != j ? fma(r, along.z, deep.z) : z;
+                if (column != i || row != j) {
+                    depth = fma(r, along_depth, deep_depth);
+                    search = begin_search(search.n);
+                }
                 enters_tile = (((i ^ column) | (j ^ row)) >> TILE_SHIFT) != 0;
                 i = column;
                 j = row;
                 leaves_lists = r_until >= r_end || i < 0 || i >= lists_wide || j < 0 || j >= lists_high;
                 enters_tile = enters_tile && !leaves_lists;
+                looks = enters_tile;
             }
         }
         if (leaves_lists)
@@ -193,96 +231,81 @@ __kernel void raycast(
         const int last_j = j;
 #endif
         // The ray crosses list (i, j) from r to r_next
-        const float r_u = along.x != 0.0f ? CROSSING_U(i) : INFINITY;
-        const float r_v = along.y != 0.0f ? CROSSING_V(j) : INFINITY;
-        const float r_next = fmax(r, fmin(r_end, fmin(r_u, r_v)));
-        const float z_next = fma(r_next, along.z, deep.z);
+        const float r_u = CROSSING_U(i);
+        const float r_v = CROSSING_V(j);
+        const float r_next = HIGHER(r, LOWER(r_end, LOWER(r_u, r_v)));
+        const float next_depth = fma(r_next, along_depth, deep_depth);
 
-        const size_t list = (size_t)j * (size_t)lists_wide + (size_t)i;
-        const OFFSET_T begin = offsets[list];
-        const int count = LIST_LENGTH(begin, offsets[list + 1]);
-        if (count > 0) {
-            BEGIN_LIST(begin)
-            passed = count_passing(LIST(begin), count, z, away, passed);
-            // Going away, supersegments passed, passed + 1 … follow; coming back, passed - 1, passed - 2 …
-            while (away ? passed < count : passed > 0) {
-                const OFFSET_T k = begin + (OFFSET_T)(away ? passed : passed - 1);
-                const float2 face = FACE(k);
-                if (away ? face.x > z_next : face.y < z_next)
-                    break;
-                // Clip to the supersegment by interval: between two faces it never leaves [r, r_next]
-                float from = r;
-                float to = r_next;
-                const float enters = away ? face.x : face.y;
-                const float leaves = away ? face.y : face.x;
-                if (away ? enters > z : enters < z)
-                    from = clamp((enters - deep.z) * inverse_z, r, r_next);
-                const bool ends_here = away ? leaves <= z_next : leaves >= z_next;
-                if (away ? leaves < z_next : leaves > z_next)
-                    to = clamp((leaves - deep.z) * inverse_z, from, r_next);
-                const float4 medium = MEDIUM(k);
+        const List list = LIST_AT(i, j);
+        float2 face;
+        const bool found = search_on(&search, list, SUPERSEGMENTS_ARGUMENTS depth, away, &face);
+        bool stays = !found; // in this list
+        if (found && face.x <= next_depth) {
+            // Clip to the supersegment by interval: between two faces it never leaves [r, r_next]
+            const float r_enters = (face.x - deep_depth) * inverse_depth;
+            const float r_leaves = (face.y - deep_depth) * inverse_depth;
+            const float from = face.x > depth ? LOWER(HIGHER(r_enters, r), r_next) : r;
+            const float to = face.y < next_depth ? LOWER(HIGHER(r_leaves, from), r_next) : r_next;
+            const float4 medium = MEDIUM(list, away ? search.n : list.count - 1 - search.n);
+            stays = face.y <= next_depth;
 #if defined(SEGMENTS)
-                // The parts of it that are drawn
-                for (int n = 0; n < drawn_parts(&ray); ++n) {
-                    float r_from = from;
-                    float r_to = to;
-                    cut_to_drawn_part(&ray, n, &r_from, &r_to);
-                    if (!(r_from < r_to))
-                        continue;
-                    const float z_from = fma(r_from, along.z, deep.z);
-                    const float z_to = fma(r_to, along.z, deep.z);
-                    const float length_crossed = model_length(ray.scale, r_from, z_from, r_to, z_to, DEPTHS);
-                    const float optical_depth = fmin(medium.w * length_crossed, MAX_OPTICAL_DEPTH);
-                    if (!(optical_depth > 0.0f))
-                        continue;
-                    const float begins = fmax(ray_depth(&ray, r_from, z_from, DEPTHS) + depth_shift, t_reached);
-                    t_reached = fmax(ray_depth(&ray, r_to, z_to, DEPTHS) + depth_shift, begins);
-                    if (slot < capacity) {
-                        __global float *segment = pool + segment_place(band_ray, slot, capacity, 0);
-                        segment[SEGMENT_FROM * RAY_BLOCK] = begins;
-                        segment[SEGMENT_TO * RAY_BLOCK] = t_reached;
-                        segment[SEGMENT_OPTICAL_DEPTH * RAY_BLOCK] = optical_depth;
-                        segment[SEGMENT_COLOR * RAY_BLOCK] = medium.x;
-                        segment[(SEGMENT_COLOR + 1) * RAY_BLOCK] = medium.y;
-                        segment[(SEGMENT_COLOR + 2) * RAY_BLOCK] = medium.z;
-                    }
-                    ++slot;
-                    absorbed += optical_depth;
+            // The parts of it that are drawn
+            for (int n = 0; n < drawn_parts(&ray); ++n) {
+                float r_from = from;
+                float r_to = to;
+                cut_to_drawn_part(&ray, n, &r_from, &r_to);
+                if (!(r_from < r_to))
+                    continue;
+                const float z_from = fma(r_from, along.z, deep.z);
+                const float z_to = fma(r_to, along.z, deep.z);
+                const float length_crossed = model_length(ray.scale, r_from, z_from, r_to, z_to, DEPTHS);
+                const float optical_depth = fmin(medium.w * length_crossed, MAX_OPTICAL_DEPTH);
+                if (!(optical_depth > 0.0f))
+                    continue;
+                const float begins = fmax(ray_depth(&ray, r_from, z_from, DEPTHS) + depth_shift, t_reached);
+                t_reached = fmax(ray_depth(&ray, r_to, z_to, DEPTHS) + depth_shift, begins);
+                if (slot < capacity) {
+                    __global float *segment = pool + segment_place(band_ray, slot, capacity, 0);
+                    segment[SEGMENT_FROM * RAY_BLOCK] = begins;
+                    segment[SEGMENT_TO * RAY_BLOCK] = t_reached;
+                    segment[SEGMENT_OPTICAL_DEPTH * RAY_BLOCK] = optical_depth;
+                    segment[SEGMENT_COLOR * RAY_BLOCK] = medium.x;
+                    segment[(SEGMENT_COLOR + 1) * RAY_BLOCK] = medium.y;
+                    segment[(SEGMENT_COLOR + 2) * RAY_BLOCK] = medium.z;
                 }
-#else
-                const float length_crossed = length_drawn(&ray, from, to, DEPTHS);
-#ifdef FIRST_HIT
-                const float tau = medium.w * length_crossed;
-                met = accumulated ? met + tau : tau;
-                hit = met > 0.0f && met >= least_optical_depth;
-                r_hit = first_drawn(&ray, from);
-                if (hit)
-                    break;
-#else
-                const float weight = transmittance * opacity_of(medium.w * length_crossed); // over, front to back
-                composite_over(&color, &transmittance, &rest, weight, medium.xyz);
-#endif
-#endif
-                if (!ends_here)
-                    break;
-                passed += away ? 1 : -1;
+                ++slot;
+                absorbed += optical_depth;
             }
+#else
+            const float length_crossed = length_drawn(&ray, from, to, DEPTHS);
+#ifdef FIRST_HIT
+            const float tau = medium.w * length_crossed;
+            met = accumulated ? met + tau : tau;
+            hit = met > 0.0f && met >= least_optical_depth;
+            r_hit = first_drawn(&ray, from);
+            stays = stays && !hit;
+#else
+            const float weight = transmittance * opacity_of(medium.w * length_crossed); // over, front to back
+            composite_over(&color, &transmittance, &rest, weight, medium.xyz);
+#endif
+#endif
+            // Behind it comes the next one, and nothing is left to search for
+            search.n += stays ? 1 : 0;
+            search.low = search.n;
         }
-        if (r_next >= r_end || RAY_IS_DONE)
-            break;
-        r = r_next;
-        z = z_next;
-        if (r_u <= r_v) {
-            i += step_i;
-            if (i < 0 || i >= lists_wide)
+        if (!stays) {
+            if (r_next >= r_end || RAY_IS_DONE)
                 break;
-        } else {
-            j += step_j;
-            if (j < 0 || j >= lists_high)
+            r = r_next;
+            depth = next_depth;
+            search = begin_search(search.n);
+            i += r_u <= r_v ? step_i : 0;
+            j += r_u <= r_v ? 0 : step_j;
+            if (i < 0 || i >= lists_wide || j < 0 || j >= lists_high)
                 break;
         }
 #ifdef SKIP_EMPTY
-        enters_tile = (((i ^ last_i) | (j ^ last_j)) >> TILE_SHIFT) != 0;
+        enters_tile = enters_tile || (((i ^ last_i) | (j ^ last_j)) >> TILE_SHIFT) != 0;
 #endif
     }
 #if defined(SEGMENTS)

@@ -198,7 +198,7 @@ class VDIRenderer:
     ) -> Image:
         """Draw a frame; premultiplied RGBA (H, W, 4) on the host."""
         width, height = size or self._size
-        with self._runtime.buffer((height, width, 4), name="image") as image:
+        with self._runtime.result((height, width, 4), name="image") as image:
             self._prepared.render(
                 camera,
                 (width, height),

@@ -170,7 +170,10 @@ class Overlaps:
         groups = own.clock.of_frame.setdefault(("overlaps", renderer.GetAddressAsString("")), {})
         key, group = groups.pop(id(own.painter), (None, None))
         if group is None or key != own.key:
-            for members in _overlapping(others(own, renderer)):
+            sights = others(own, renderer)
+            if len(sights) == 1:
+                return None
+            for members in _overlapping(sights):
                 together = _Group(members)
                 groups.update({id(sight.painter): (sight.key, together) for sight in members})
             _, group = groups.pop(id(own.painter), (None, _Group([own])))

@@ -32,3 +32,10 @@ __kernel void block_pixels(int count, int width, uint first, __global int2 *pixe
     if (i < count)
         pixels[i] = block_pixel(first + (uint)i, width);
 }
+
+__kernel void strip_pixels(int count, int width, int height, __global int2 *pixels)
+{
+    const int i = get_global_id(0);
+    if (i < count)
+        pixels[i] = strip_pixel((uint)i, width, height);
+}

@@ -41,14 +41,18 @@ def linear_scan(faces, depth, away):
 
 def counts(call, lists, queries):
     """``queries``: (list, depth, away, guess)."""
-    flat = np.float32([face for faces in lists for face in faces] + [(np.nan, np.nan)])
+    stride = int(call(FILE, "lists_per_tile", 1, call.empty(1, dtype=np.int32), OFFSET_T="int")[0])
+    faces = np.float32([face for faces in lists for face in faces]).reshape(-1, 2)
+    flat = np.full((stride * len(faces) + 1, 2), np.nan, np.float32)  # nothing else is read
+    flat[: stride * len(faces) : stride] = faces
     begin = np.cumsum([0, *(len(faces) for faces in lists)])
     which = np.array([q[0] for q in queries])
     places = np.column_stack([begin[which], [len(lists[w]) for w in which]]).astype(np.int32)
     how = np.array([(q[2], q[3]) for q in queries], np.int32)
     depths = np.array([q[1] for q in queries], np.float32)
     n = len(queries)
-    return call(FILE, "counts_passing", n, flat, places, depths, how, call.empty(n, dtype=np.int32))
+    results = call.empty(n, dtype=np.int32)
+    return call(FILE, "counts_passing", n, flat, places, depths, how, results, OFFSET_T="int")
 
 
 def check(call, lists, queries):

@@ -134,6 +134,31 @@ def test_every_pixel_has_one_work_item(call, width):
         assert inside.sum() == width * height
 
 
+@pytest.mark.parametrize("width", WIDTHS)
+def test_every_pixel_has_one_work_item_in_strips(call, width):
+    for height in (1, 2, 4, 5, 9, 15, 16, 17, 31, 33, 64):
+        items = block_items(width, height)
+        pixels = call(
+            FILE, "strip_pixels", items, np.int32(width), np.int32(height),
+            call.empty(items, 2, dtype=np.int32),
+        )  # fmt: skip
+        assert (pixels >= 0).all()
+        inside = (pixels[:, 0] < width) & (pixels[:, 1] < height)
+        assert inside.sum() == width * height
+        assert len(np.unique(pixels[inside], axis=0)) == width * height  # no pixel twice
+        blocks = pixels[: len(pixels) // 16 * 16].reshape(-1, 16, 2)
+        assert (np.ptp(blocks, axis=1) == 3).all()
+        assert (blocks.min(axis=1) % 4 == 0).all()
+
+
+def test_strips_are_four_blocks_high(call):
+    pixels = call(
+        FILE, "strip_pixels", 128, np.int32(9), np.int32(33), call.empty(128, 2, dtype=np.int32)
+    )
+    corners = pixels.reshape(8, 16, 2).min(axis=1)
+    assert corners.tolist() == [[4 * (k // 4), 4 * (k % 4)] for k in range(8)]
+
+
 def test_blocks_are_four_by_four(call):
     pixels = call(
         FILE, "block_pixels", 64, np.int32(9), np.uint32(0), call.empty(64, 2, dtype=np.int32)

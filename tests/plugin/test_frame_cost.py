@@ -234,20 +234,25 @@ def test_vtk_copies_no_depth(plotter):
     assert texture.GetHandle() != 0
 
 
-def test_two_windows_in_turns():
-    """One actor in two windows, whose viewports differ: each frame says where its image is."""
-    plotters = [pv.Plotter(window_size=size) for size in (WINDOW, (70, 110))]
-    actor = plotters[0].add_vdi(soft_ball(), **LOOKS)
-    plotters[1].add_actor(actor)
-    for plotter in plotters:
-        plotter.camera_position = ((4, 3, 2), (0, 0, 0), (0, 0, 1))
-    first = [picture(plotter) for plotter in plotters]
-    again = [picture(plotter) for plotter in plotters]
-    for one, other in zip(first, again, strict=True):
-        np.testing.assert_array_equal(one, other)
-        assert np.ptp(one) > 40
-    for plotter in plotters:
-        plotter.close()
+def test_an_actor_in_two_viewports():
+    """Their sizes differ: each frame says where its image is."""
+    sides = pv.Plotter(shape=(1, 2), col_weights=[2, 1], window_size=(180, 90), border=False)
+    actor = sides.add_vdi(soft_ball(), **LOOKS)
+    sides.subplot(0, 1)
+    sides.add_actor(actor)
+    for column in (0, 1):
+        sides.subplot(0, column)
+        sides.camera_position = ((4, 3, 2), (0, 0, 0), (0, 0, 1))
+    both = picture(sides)
+    vdi = actor.vdi
+    sides.close()
+    for part, size in ((both[:, :120], (120, 90)), (both[:, 120:], (60, 90))):
+        alone = pv.Plotter(window_size=size)
+        alone.add_vdi(vdi, show_scalar_bar=False)
+        alone.camera_position = ((4, 3, 2), (0, 0, 0), (0, 0, 1))
+        np.testing.assert_array_equal(picture(alone), part)
+        assert np.ptp(part) > 40
+        alone.close()
 
 
 def test_cpu_devices_draw_where_vtk_uploads_from(plotter, monkeypatch):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -280,6 +282,21 @@ MACHINE = {
 }
 
 
+def test_rates_are_those_of_the_device_that_is_asked_about(tmp_path):
+    def runtime(name):
+        return SimpleNamespace(info=SimpleNamespace(kind="CPU", full_name=name))
+
+    with pytest.raises(
+        SystemExit, match=r"machine_cpu.json holds nothing of a / b: run machine.py"
+    ):
+        machine.Rates.read_for(runtime("a / b"), tmp_path)
+    results = {**MACHINE, "system": {"device": "a / b"}}
+    (tmp_path / "machine_cpu.json").write_text(json.dumps(results))
+    assert machine.Rates.read_for(runtime("a / b"), tmp_path).read == 10e9
+    with pytest.raises(SystemExit, match="holds nothing of c / d"):
+        machine.Rates.read_for(runtime("c / d"), tmp_path)
+
+
 def test_rates_are_interpolated_between_working_sets_and_taken_from_the_next_larger_element():
     rates = machine.Rates(MACHINE)
     assert rates.gather(4, 2**14) == pytest.approx(1e9)
@@ -453,7 +470,78 @@ def test_the_work_of_a_march_is_a_voxel_and_an_entry_a_sample(
     assert work.gathers[0].elements == pytest.approx(voxels * march.looked.sum())
     assert work.gathers[1].elements == pytest.approx(entries * march.looked.sum())
     assert work.operations.exponential == pytest.approx(entries * march.visible.sum())
-    assert work.read == pytest.approx(blocks.mean() * volume.array.nbytes)
+    sampled = work.gathers[0].elements * volume.array.itemsize
+    assert work.read == pytest.approx(min(blocks.mean() * volume.array.nbytes, sampled))
     recorded = model.march_work(march, volume, function, SIZE, blocks.mean(), records=True)
     assert recorded.write == 0
     assert recorded.operations.divide > work.operations.divide
+
+
+def measured_volume(ratio):
+    """Return what the interactive table finds of a volume whose frames take ``ratio`` of VTK's."""
+    rows = []
+    for angle in interactive_table.ANGLES:
+        row = {**frame_row(0.4 * ratio, {"vtk_fixed_point": 0.4}, 0.001), "angle": angle}
+        counts = {"looked": 9.0, "lanes busy": 0.9}
+        row["seconds"]["volume_skipping"] = 0.5
+        floor = {"seconds": 0.01, "bound": "memory"}
+        row["model"]["volume_skipping"] = {"per ray": counts, "floor": floor}
+        rows.append(row)
+    floor = {"seconds": 0.1, "bound": "gathers (L1)"}
+    shorten = {"per ray": {"runs": 9.0, "supersegments": 3.0}, "floor": floor}
+    return {
+        "angles": rows,
+        "generation": {"generation": 1.1, "render_volume": 1.0},
+        "model": {"generation": {"shorten": shorten}},
+        "left_out": {"vtk_gpu": "no memory"},
+    }
+
+
+def test_the_report_names_the_worst_volumes_what_is_missed_and_what_is_not_there():
+    results = {
+        "window_size": [64, 36],
+        "max_supersegments": 20,
+        "interpolation": "nearest",
+        "clock": "wall",
+        "system": {"device": "a / b"},
+        "groups": {"large": ["one", "two", "three"], "medium": [], "solid": ["four"]},
+        "volumes": {
+            "one": measured_volume(1 / 40),
+            "two": measured_volume(1 / 20),
+            "three": {"refused": "DeviceMemoryError: too large"},
+            "four": measured_volume(1 / 4),
+        },
+    }
+    text = interactive_table.report(results, None)
+    assert "| at V_O | 1/20 (≤ 1/30), **missed**, two | - | 1/4 (≤ 1/2), met, four |" in text
+    assert "| at 30° | 1/20 (≤ 1/4), met, two | - | 1/4, four |" in text
+    assert "| three | DeviceMemoryError: too large |" in text
+    assert "- two, VDI at 0 degrees: 20.0 times its floor" in text
+    assert "- four, render_volume: " in text
+    assert "- VTK GPU with one: no memory" in text
+    assert "1.10 (≤ 1.20), met" in text
+
+
+def test_scalings_report_has_exponents_and_says_what_is_not_measured():
+    rows = [
+        {"value": v, "seconds": dict.fromkeys(scaling.QUANTITIES, 0.001 * v**0.5)}
+        for v in (1.0, 4.0, 16.0)
+    ]
+    results = {
+        "volume": "heptane",
+        "procedural": "beechnut_like",
+        "window_size": [64, 36],
+        "max_supersegments": 20,
+        "angle": 10.0,
+        "interpolation": "nearest",
+        "clock": "cpu",
+        "system": {},
+        "axes": {"pixels": rows, "cores": None},
+    }
+    text = scaling.report(results)
+    assert "| pixels | 0.50 ± 0.00 | 0.50 ± 0.00 | 0.50 ± 0.00 |" in text
+    assert "1 to 2 (not measured here)" in text
+    results["axes"]["cores"] = {
+        "ratio": {"VDI frame": 1.9, "render_volume": 1.7, "generation": 1.8}
+    }
+    assert "| 1.90, met | 1.70, missed | 1.80, met |" in scaling.report(results)

@@ -269,7 +269,7 @@ def test_transparent_bricks_stay_where_they_are(runtime, used):
 def test_what_was_used_longest_ago_makes_room(runtime):
     array = np.arange(33 * 33 * 65, dtype=np.float32).reshape(33, 33, 65)
     layout = BrickLayout.of((65, 33, 33), 4, False, 4)
-    held = DeviceBricks(runtime, array, np.asarray, np.float32, layout, 3, None, "some")
+    held = DeviceBricks(runtime, array, np.asarray, np.float32, layout, 3, None, None, "some")
     assert layout.counts == (4, 2, 2)
 
     def rounds(*wanted):
