@@ -16,6 +16,7 @@ from pyvista_vdi.classification import Classification
 from pyvista_vdi.compare.measure import without_infinities
 from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.io import read, whole_file
+from pyvista_vdi.opencl_runtime import Runtime
 from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
 from pyvista_vdi.vdi import VDI
 
@@ -168,6 +169,26 @@ def vdi_of(name: str, options: argparse.Namespace) -> VDI:
         path.parent.mkdir(parents=True, exist_ok=True)
         vdi.save(path)
     return vdi
+
+
+def add_clock(parser: argparse.ArgumentParser) -> None:
+    """Add ``--clock``: how a CPU is timed on a machine that others use as well."""
+    parser.add_argument(
+        "--clock",
+        choices=("wall", "cpu"),
+        default="wall",
+        help="cpu: the process's CPU time over the device's cores, for a CPU device on a machine "
+        "that does other work as well; what one core does alone then counts too little",
+    )
+
+
+def clock_of(options: argparse.Namespace, runtime: Runtime) -> Callable[[], float]:
+    """Return the clock that was chosen, seconds."""
+    if options.clock == "wall":
+        return time.perf_counter
+    if not runtime.is_cpu:
+        sys.exit("--clock cpu says nothing of a device that is no CPU: leave it out")
+    return lambda: time.process_time() / runtime.info.compute_units
 
 
 def timed(ways: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, dict[str, Any]]:

@@ -17,7 +17,7 @@ from pyvista_vdi.occupancy import SLABS, TILE
 from pyvista_vdi.raycast import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.rays import depth_range
 from pyvista_vdi.reference.raycast import centre_ray_scale, near_limit
-from pyvista_vdi.transfer_function import TransferFunction
+from pyvista_vdi.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.volume import Volume
 
@@ -26,6 +26,9 @@ Integers = NDArray[np.int64]
 
 #: Edge of the blocks that volumes are skipped by, cells.
 BLOCK = 8
+
+#: Pixels along the edges of the blocks whose rays go together, and in a block.
+EDGE, LANES = 4, 16
 
 #: Runs are the same medium within this merge error, as generation has it.
 INDISTINGUISHABLE = 1e-6
@@ -52,11 +55,30 @@ class Rays:
         )
 
 
-def sampled_pixels(size: tuple[int, int], every: int) -> tuple[Integers, Integers]:
-    """Return x and y of every so many pixels both ways, the middle ones of their blocks."""
-    x, y = (np.arange(min(every // 2, n - 1), n, every) for n in size)
-    grid = np.meshgrid(x, y)
-    return grid[0].ravel(), grid[1].ravel()
+def sampled_blocks(size: tuple[int, int], every: int) -> tuple[Integers, Integers]:
+    """Return x and y of the pixels of one block of 4 x 4 in every so many pixels both ways.
+
+    Those of a block lie behind one another, as its rays lie in the lanes of a vector. A window is
+    at least four pixels wide and high.
+    """
+    every = max(every // EDGE, 1) * EDGE
+    middle = (every - EDGE) // 2 // EDGE * EDGE
+    columns, rows = (
+        np.arange(min(middle, (n - EDGE) // EDGE * EDGE), n - EDGE + 1, every) for n in size
+    )
+    lanes = np.arange(LANES)
+    x, y = np.broadcast_arrays(
+        columns[np.newaxis, :, np.newaxis] + lanes % EDGE,
+        rows[:, np.newaxis, np.newaxis] + lanes // EDGE,
+    )
+    return x.ravel(), y.ravel()
+
+
+def busy_lanes(turns: Integers) -> float:
+    """Return the share of lanes at work where each block's rays take their turns in lockstep."""
+    blocks = np.reshape(turns, (-1, LANES))
+    most = LANES * blocks.max(axis=1).sum()
+    return float(blocks.sum() / most) if most else 1.0
 
 
 def clipped(planes: list[tuple[Array, Array]], n: int) -> tuple[Array, Array]:
@@ -146,20 +168,27 @@ class Walk:
     filled : numpy.ndarray
         Those of them that hold a supersegment.
     occupied : numpy.ndarray
-        Those of them that lie in an occupied cell of the occupancy grid where the ray crosses them.
+        Those of all that lie in an occupied cell of the occupancy grid where the ray crosses them.
+    filled_occupied : numpy.ndarray
+        Those that are both.
     met : numpy.ndarray
-        Pieces of supersegments composited.
+        Pieces of supersegments composited, until too little light was left.
     tiles : numpy.ndarray
         Tiles of the occupancy grid entered.
+    in_step : numpy.ndarray
+        Turns that its block of 16 rays takes where all take their n-th list together, and wait for
+        the one that meets most in it: one for the list, and one for each that is met.
     optical_depth : numpy.ndarray
-        Of all that was met, float64.
+        Of what the lists hold on the ray's way, float64.
     """
 
     lists: Integers
     filled: Integers
     occupied: Integers
+    filled_occupied: Integers
     met: Integers
     tiles: Integers
+    in_step: Integers
     optical_depth: Array
 
 
@@ -168,6 +197,7 @@ def walk(
     rays: Rays,
     *,
     perspective: bool = True,
+    skips: bool = False,
     cutoff: float = TRANSMITTANCE_CUTOFF,
 ) -> Walk:
     """Walk rays through a VDI's lists, front to back.
@@ -180,6 +210,8 @@ def walk(
         In the VDI's model frame, parametrised by view depth of the new view.
     perspective : bool
         Whether rays begin at t = 0, the eye of the new view.
+    skips : bool
+        Whether lists in empty cells of the occupancy grid take no turn.
     cutoff : float
         A ray ends behind the list in which less transmittance than this is left.
     """
@@ -197,9 +229,11 @@ def walk(
     t0, t1 = clipped(planes, n)
     speed = np.linalg.norm(rays.direction, axis=1)
 
-    names = ("lists", "filled", "occupied", "met", "tiles")
+    names = ("lists", "filled", "occupied", "filled_occupied", "met", "tiles")
     found = {name: np.zeros(n, np.int64) for name in names}
     depth_met = np.zeros(n)
+    block_turns = np.zeros(-(-n // LANES), np.int64)
+    most = -np.log(cutoff) if cutoff > 0 else np.inf
     going = np.flatnonzero(t0 < t1)
     t = t0.copy()
     i, j = _lists_at(at, slope, t0, t1, (width, height))
@@ -225,12 +259,19 @@ def walk(
 
         found["lists"][r] += 1
         found["filled"][r] += end > begin
-        found["met"][r] += np.maximum(last - first, 0)
         found["tiles"][r] += tile != tile_before[r]
         upto = counted.occupied_before[tile, counted.slab_of(high) + 1]
-        found["occupied"][r] += upto > counted.occupied_before[tile, counted.slab_of(low)]
+        occupied = upto > counted.occupied_before[tile, counted.slab_of(low)]
+        found["occupied"][r] += occupied
+        found["filled_occupied"][r] += occupied & (end > begin)
         tile_before[r] = tile
-        depth_met[r] += _optical_depth(counted, first, last, low, high, (t_next - t[r]) * speed[r])
+        piece = _Piece(counted, first, last, low, high, (t_next - t[r]) * speed[r])
+        met = piece.met(most - depth_met[r], away=z_next >= z)
+        found["met"][r] += met
+        longest = np.zeros(-(-n // LANES), np.int64)
+        np.maximum.at(longest, r // LANES, met + (occupied if skips else 1))
+        block_turns += longest
+        depth_met[r] += piece.optical_depth
 
         # On to the next list
         over_u = t_u <= t_v
@@ -238,8 +279,9 @@ def walk(
         j[r] += np.where(over_u, 0, step_j[r])
         t[r] = t_next
         inside = (i[r] >= 0) & (i[r] < width) & (j[r] >= 0) & (j[r] < height)
-        going = r[(t_next < t1[r]) & inside & (np.exp(-depth_met[r]) >= cutoff)]
-    return Walk(**found, optical_depth=depth_met)
+        going = r[(t_next < t1[r]) & inside & (depth_met[r] <= most)]
+    in_step = np.repeat(block_turns, LANES)[:n]
+    return Walk(**found, in_step=in_step, optical_depth=depth_met)
 
 
 def _viewport_lines(vdi: VDI, rays: Rays) -> tuple[Array, Array]:
@@ -288,25 +330,50 @@ def _crossing(
     return np.where(np.isfinite(t) & (t >= least), t, np.inf)
 
 
-def _optical_depth(
-    counted: CountedVDI, first: Integers, last: Integers, low: Array, high: Array, length: Array
-) -> Array:
-    """Return the optical depth of supersegments first to last - 1 between two view depths.
+class _Piece:
+    """Supersegments first to last - 1 of a list between two view depths, for many rays.
 
     ``length`` is the model length of the ray there.
     """
-    some = last > first
-    begin, end = np.where(some, first, 0), np.where(some, last - 1, 0)
-    if not len(counted.front):
-        return np.zeros(len(low))
-    whole = counted.sums[end + 1] - counted.sums[begin]
-    whole -= counted.per_length[begin] * np.maximum(low - counted.front[begin], 0)
-    whole -= counted.per_length[end] * np.maximum(counted.back[end] - high, 0)
-    extent = high - low
-    # Across the depth, all of the ray's piece is in one supersegment
-    across = extent <= 1e-12 * (abs(high) + 1)
-    density = np.where(across, counted.per_length[begin], whole / np.where(across, 1.0, extent))
-    return np.where(some, np.maximum(density, 0) * length, 0.0)
+
+    def __init__(
+        self,
+        counted: CountedVDI,
+        first: Integers,
+        last: Integers,
+        low: Array,
+        high: Array,
+        length: Array,
+    ) -> None:
+        self._sums, self._count = counted.sums, np.maximum(last - first, 0)
+        self._first, self._last = np.where(self._count > 0, first, 0), last
+        end = np.where(self._count > 0, last - 1, 0)
+        self._before, self._behind = np.zeros(len(low)), np.zeros(len(low))
+        density = np.zeros(len(low))
+        if len(counted.front):
+            begin, per_length = self._first, counted.per_length
+            # What of the first and of the last lies outside, in sums of extinction by depth
+            self._before = per_length[begin] * np.maximum(low - counted.front[begin], 0)
+            self._behind = per_length[end] * np.maximum(counted.back[end] - high, 0)
+            density = per_length[begin]
+        extent = high - low
+        # Across the depth, all of the ray's piece is in one supersegment
+        self._across = extent <= 1e-12 * (abs(high) + 1)
+        self._factor = length / np.where(self._across, 1.0, extent)
+        whole = self._sums[end + (self._count > 0)] - self._sums[self._first]
+        inside = np.maximum(whole - self._before - self._behind, 0) * self._factor
+        crossed = np.where(self._across, density * length, inside)
+        self.optical_depth = np.where(self._count > 0, crossed, 0.0)
+
+    def met(self, left: Array, *, away: NDArray[np.bool_]) -> Integers:
+        """Return how many are met until an optical depth of ``left`` is reached."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            needed = np.where(self._across, np.inf, left / self._factor)
+        ahead = self._sums[self._first] + self._before + needed
+        back = self._sums[self._last] - self._behind - needed
+        onward = np.searchsorted(self._sums, ahead, "left") - self._first
+        homeward = self._last - (np.searchsorted(self._sums, back, "right") - 1)
+        return np.clip(np.where(away, onward, homeward), np.minimum(self._count, 1), self._count)
 
 
 # -- a volume --------------------------------------------------------------------------------------
@@ -432,9 +499,8 @@ def march(
 
         seen = r[looked]
         samples = _classified(volume, function, position[looked])
-        tau = _step_optical_depth(samples[:, 3], step / unit)
         share = ((back - front) / per_step[r])[looked]  # the last step is shorter
-        tau *= share
+        tau = _step_optical_depth(samples[:, 3], share * step / unit)
         visible = tau > 0
         found["visible"][seen] += visible
         if recorder is not None:
@@ -471,10 +537,10 @@ def _classified(volume: Volume, function: TransferFunction, position: Array) -> 
     return (1 - share) * entries[here] + share * entries[np.minimum(here + 1, len(entries) - 1)]
 
 
-def _step_optical_depth(opacity: Array, units: float) -> Array:
-    with np.errstate(divide="ignore"):
+def _step_optical_depth(opacity: Array, units: Array) -> Array:
+    with np.errstate(divide="ignore", invalid="ignore"):
         tau = -np.log1p(-opacity) * units
-    return np.where(opacity < 1, tau, max(30.0, units))  # as the kernels have it
+    return np.where(opacity < 1, tau, np.maximum(OPAQUE_OPTICAL_DEPTH, units))
 
 
 class _Runs:

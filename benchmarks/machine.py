@@ -12,14 +12,14 @@ import math
 import os
 import statistics
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import new_parser, save, table  # beside this file
+from common import add_clock, clock_of, new_parser, save, table  # beside this file
 from tqdm import tqdm
 
 from pyvista_vdi.compare import describe_system
@@ -54,13 +54,16 @@ def main() -> int:
     """Measure, and write what was found."""
     parser = new_parser(__doc__, repeats=5, repeated="timed launches; the fastest counts")
     parser.add_argument("--quick", action="store_true", help="fewer working sets and repeats")
+    add_clock(parser)
     options = parser.parse_args()
     runtime = get_runtime(options.device)
+    repeats = 2 if options.quick else options.repeats
     results = {
         "system": describe_system(options.device),
         "kind": runtime.info.kind,
         "caches": caches() if runtime.is_cpu else {},
-        **measured(runtime, 2 if options.quick else options.repeats, quick=options.quick),
+        "clock": options.clock,
+        **measured(Stopwatch(runtime, repeats, clock_of(options, runtime)), quick=options.quick),
     }
     target = results_file(options.out, runtime)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -87,14 +90,14 @@ def caches() -> dict[str, str]:
     return found
 
 
-def measured(runtime: Runtime, repeats: int, *, quick: bool = False) -> dict[str, Any]:
+def measured(watch: Stopwatch, *, quick: bool = False) -> dict[str, Any]:
     """Return every figure of a device, SI units."""
     sets = QUICK_WORKING_SETS if quick else WORKING_SETS
     work: list[tuple[str, Callable[[], Any]]] = [
-        ("streams", partial(streams, runtime, repeats, 26 if quick else 29)),
-        ("arithmetic", partial(arithmetic, runtime, repeats)),
-        ("launches", partial(launches, runtime)),
-        ("transfers", partial(transfers, runtime, repeats, 24 if quick else 26)),
+        ("streams", partial(streams, watch, 26 if quick else 29)),
+        ("arithmetic", partial(arithmetic, watch)),
+        ("launches", partial(launches, watch)),
+        ("transfers", partial(transfers, watch, 24 if quick else 26)),
     ]
     found: dict[str, Any] = {}
     gathered: dict[str, Any] = {name: {} for name in PATTERNS}
@@ -103,7 +106,7 @@ def measured(runtime: Runtime, repeats: int, *, quick: bool = False) -> dict[str
         found[name] = measure()
         bar.update()
     for size in ELEMENTS:
-        for rates in gathers(runtime, size, sets, repeats):
+        for rates in gathers(watch, size, sets):
             for name, (working_set, rate) in rates.items():
                 gathered[name].setdefault(str(size), []).append([working_set, rate])
             bar.update()
@@ -111,30 +114,50 @@ def measured(runtime: Runtime, repeats: int, *, quick: bool = False) -> dict[str
     return {**found, "gathers": gathered}
 
 
-def fastest(runtime: Runtime, work: Callable[[], object], repeats: int) -> float:
-    """Return the least time of some work, seconds, after one run that is not counted."""
-    taken = []
-    for _ in range(repeats + 1):
-        runtime.finish()
-        begin = time.perf_counter()
-        work()
-        runtime.finish()
-        taken.append(time.perf_counter() - begin)
-    return min(taken[1:])
+@dataclass(frozen=True)
+class Stopwatch:
+    """Times work on a device.
+
+    Parameters
+    ----------
+    runtime : Runtime
+        The device.
+    repeats : int
+        How often; the fastest counts.
+    clock : callable
+        Seconds.
+    """
+
+    runtime: Runtime
+    repeats: int
+    clock: Callable[[], float]
+
+    def fastest(self, work: Callable[[], object], repeats: int | None = None) -> float:
+        """Return the least time of some work, seconds, after one run that is not counted."""
+        taken = []
+        for _ in range((repeats or self.repeats) + 1):
+            self.runtime.finish()
+            begin = self.clock()
+            work()
+            self.runtime.finish()
+            taken.append(self.clock() - begin)
+        return max(min(taken[1:]), 1e-9)
+
+    def per_turn(self, launch: Callable[[int], object]) -> float:
+        """Return seconds per turn of a kernel's loop, so many turns that launching counts little.
+
+        ``launch`` takes the number of turns.
+        """
+        turns = 16
+        while (seconds := self.fastest(partial(launch, turns), 1)) < _LAUNCH_SECONDS / 4:
+            turns *= 4
+        turns = max(1, round(turns * _LAUNCH_SECONDS / seconds))
+        return self.fastest(partial(launch, turns)) / turns
 
 
-def repeated_for(runtime: Runtime, launch: Callable[[int], object], repeats: int) -> float:
-    """Return seconds per turn of a kernel's loop: enough turns that launching does not count."""
-    turns = 16
-    while (seconds := fastest(runtime, partial(launch, turns), 1)) < _LAUNCH_SECONDS / 4:
-        turns *= 4
-    turns = max(1, round(turns * _LAUNCH_SECONDS / seconds))
-    return fastest(runtime, partial(launch, turns), repeats) / turns
-
-
-def streams(runtime: Runtime, repeats: int, bits: int) -> dict[str, float]:
+def streams(watch: Stopwatch, bits: int) -> dict[str, float]:
     """Return bytes per second that are read and written, of an array that no cache holds."""
-    per_item = 256
+    runtime, per_item = watch.runtime, 256
     items = 2**bits // 16 // per_item
     with (
         runtime.buffer(2**bits, name="stream") as array,
@@ -149,15 +172,16 @@ def streams(runtime: Runtime, repeats: int, bits: int) -> dict[str, float]:
         reading = partial(runtime.launch, read, items, GROUP, array, np.uint32(per_item), kept)
         return {
             "bytes": 2**bits,
-            "write": 2**bits / fastest(runtime, writing, repeats),
-            "read": 2**bits / fastest(runtime, reading, repeats),
+            "write": 2**bits / watch.fastest(writing),
+            "read": 2**bits / watch.fastest(reading),
         }
 
 
 def gathers(
-    runtime: Runtime, size: int, sets: tuple[int, ...], repeats: int
+    watch: Stopwatch, size: int, sets: tuple[int, ...]
 ) -> Iterator[dict[str, tuple[int, float]]]:
     """Yield, for each working set, its bytes and elements gathered per second, by pattern."""
+    runtime = watch.runtime
     kind, components = ELEMENTS[size]
     defines = {"ELEMENT": kind, "COMPONENTS": components, **DEFINES}
     kernel = runtime.kernel(KERNELS, "gather", defines)
@@ -176,13 +200,14 @@ def gathers(
                     numbers = np.uint32(elements), np.uint32(turns), *map(np.int32, flags)
                     runtime.launch(kernel, items, GROUP, array, *numbers, np.uint32(ROW), kept)
 
-                seconds = repeated_for(runtime, launch, repeats)
+                seconds = watch.per_turn(launch)
                 rates[name] = (2**bits, items / seconds)
             yield rates
 
 
-def arithmetic(runtime: Runtime, repeats: int) -> dict[str, float]:
+def arithmetic(watch: Stopwatch) -> dict[str, float]:
     """Return float32 operations per second; a multiplication with an addition counts as one."""
+    runtime = watch.runtime
     items, chains = _items(runtime), 8
     found = {}
     # The iterations' fixed points are neither denormal nor infinite
@@ -195,27 +220,29 @@ def arithmetic(runtime: Runtime, repeats: int) -> dict[str, float]:
             ) -> None:
                 runtime.launch(kernel, items, GROUP, np.uint32(turns), *factors, kept)
 
-            found[name] = items * chains / repeated_for(runtime, launch, repeats)
+            found[name] = items * chains / watch.per_turn(launch)
     return found
 
 
-def launches(runtime: Runtime) -> dict[str, float]:
+def launches(watch: Stopwatch) -> dict[str, float]:
     """Return what a launch of next to nothing takes, seconds: waited for, and in a row."""
-    kernel, in_a_row = runtime.kernel(KERNELS, "nothing", DEFINES), 200
+    runtime, in_a_row = watch.runtime, 200
+    kernel = runtime.kernel(KERNELS, "nothing", DEFINES)
     with runtime.buffer((1,), np.uint32, "kept") as kept:
         launch = partial(runtime.launch, kernel, GROUP, GROUP, kept)
         launch()
-        waited = statistics.median(fastest(runtime, launch, 1) for _ in range(50))
+        waited = statistics.median(watch.fastest(launch, 1) for _ in range(50))
 
         def many() -> None:
             for _ in range(in_a_row):
                 launch()
 
-        return {"waited": waited, "in a row": fastest(runtime, many, 5) / in_a_row}
+        return {"waited": waited, "in a row": watch.fastest(many) / in_a_row}
 
 
-def transfers(runtime: Runtime, repeats: int, bits: int) -> dict[str, float]:
+def transfers(watch: Stopwatch, bits: int) -> dict[str, float]:
     """Return bytes per second to and from the device, and how long using aligned memory takes."""
+    runtime = watch.runtime
     aligned = aligned_empty((2**bits + 64,), np.uint8)
     aligned[:] = 1
     beside = aligned[1 : 2**bits + 1]  # a CPU device cannot use it in place
@@ -229,10 +256,10 @@ def transfers(runtime: Runtime, repeats: int, bits: int) -> dict[str, float]:
     with runtime.buffer((2**bits,), np.uint8, "transferred") as buffer:
         runtime.write(buffer, whole)
         return {
-            "upload": 2**bits / fastest(runtime, partial(upload, beside), repeats),
-            "aligned upload": 2**bits / fastest(runtime, partial(upload, whole), repeats),
-            "write": 2**bits / fastest(runtime, partial(runtime.write, buffer, whole), repeats),
-            "download": 2**bits / fastest(runtime, partial(runtime.download, buffer, out), repeats),
+            "upload": 2**bits / watch.fastest(partial(upload, beside)),
+            "aligned upload": 2**bits / watch.fastest(partial(upload, whole)),
+            "write": 2**bits / watch.fastest(partial(runtime.write, buffer, whole)),
+            "download": 2**bits / watch.fastest(partial(runtime.download, buffer, out)),
         }
 
 
@@ -247,6 +274,7 @@ class Rates:
 
     def __init__(self, results: Mapping[str, Any]) -> None:
         self._results = results
+        self.caches: dict[str, str] = results["caches"]
         self.read = float(results["streams"]["read"])
         self.write = float(results["streams"]["write"])
         self.launch = float(results["launches"]["waited"])
@@ -254,11 +282,16 @@ class Rates:
         self.operations: dict[str, float] = results["arithmetic"]
 
     @classmethod
-    def read_from(cls, file: Path) -> Rates:
-        """Read what a run has written; end with what to run where there is nothing."""
-        if not file.exists():
-            sys.exit(f"{file} is not there: run machine.py with the same --device and --out first")
-        return cls(json.loads(file.read_text()))
+    def read_for(cls, runtime: Runtime, folder: Path) -> Rates:
+        """Read what a run has written of a device; end with what to run where there is nothing."""
+        file = results_file(folder, runtime)
+        results = json.loads(file.read_text()) if file.exists() else None
+        if results is None or results["system"]["device"] != runtime.info.full_name:
+            sys.exit(
+                f"{file} holds nothing of {runtime.info.full_name}: run machine.py with the same "
+                "--device and --out first"
+            )
+        return cls(results)
 
     def gather(self, size: float, working_set: float, pattern: str = "near") -> float:
         """Return elements of ``size`` bytes per second that are gathered from a working set.
@@ -275,7 +308,12 @@ class Rates:
 
 
 def cache_of(working_set: float, known: Mapping[str, str]) -> str:
-    """Return which of the caches holds so many bytes: ``L1`` ... or ``memory``."""
+    """Return which of the caches holds so many bytes: ``L1`` ... or ``memory``.
+
+    A GPU does not tell the sizes of its caches.
+    """
+    if not known:
+        return "caches of unknown size"
     sizes = sorted((_bytes_of(text), name) for name, text in known.items())
     place = bisect.bisect_left([n for n, _ in sizes], working_set)
     return sizes[place][1] if place < len(sizes) else "memory"

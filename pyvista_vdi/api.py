@@ -523,6 +523,7 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
     return read_file(path, **options)
 
 
+@_classified
 def estimate(
     volume: Any,
     window_size: Sequence[int],
@@ -531,6 +532,7 @@ def estimate(
     criterion: str = "least-error",
     ambient_occlusion: Any = None,
     memory_limit: int | float | str | None = None,
+    **classification: Any,
 ) -> Estimate:
     """Return how much memory generating a VDI takes, before it is taken.
 
@@ -548,6 +550,9 @@ def estimate(
         As for :func:`generate`.
     memory_limit : int, float or str, optional
         As for :func:`generate`; the volume's share is then what is left of it.
+    **classification
+        As for :func:`generate`: scalars whose range is narrow for how far it is from 0 take four
+        bytes each.
 
     Returns
     -------
@@ -559,15 +564,18 @@ def estimate(
     InvalidVolumeError, InvalidArgumentError
         If an argument cannot be used.
     """
+    looks = Classification(classification, "estimate", _keywords(estimate))
+    volume = as_volume(volume, looks.scalars, looks.preference)
     from .generation import estimate as estimate_bytes
 
     return estimate_bytes(
-        as_volume(volume),
+        volume,
         window_size,
         max_supersegments=max_supersegments,
         criterion=criterion,
         ambient_occlusion=ambient_occlusion,
         memory_limit=memory_limit,
+        transfer_function=looks.transfer_function(volume),
     )
 
 

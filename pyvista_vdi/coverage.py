@@ -94,10 +94,13 @@ def covering_view(
     return camera.replace(window_center=middle / new_half, **lens), (width, height)
 
 
+#: Which of the six numbers of bounds are x, y and z of each corner, int (3, 8).
+_CORNERS = np.array(np.meshgrid([0, 1], [2, 3], [4, 5])).reshape(3, 8)
+
+
 def bounds_corners(bounds: ArrayLike) -> NDArray[np.float64]:
     """Return the eight corners of axis-aligned bounds (x0, x1, y0, y1, z0, z1), float64 (8, 3)."""
-    x, y, z = np.asarray(bounds, dtype=np.float64).reshape(3, 2)
-    return np.array(np.meshgrid(x, y, z)).reshape(3, 8).T
+    return np.asarray(bounds, dtype=np.float64)[_CORNERS].T
 
 
 def _project(

@@ -7,7 +7,7 @@ import threading
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,11 +59,14 @@ _DEVICE_TYPES = {
 }
 #: Logarithm to base 2 of the points along each edge of a block that can be skipped.
 _BLOCK_SHIFT = 3
+#: Blocks: farther than this no march looks for what is not transparent.
+_FARTHEST = 16
 #: Most bytes of a volume that are looked through at a time for the ranges of its blocks, and how
 #: many such parts there must be room for.
 _PART_BYTES, _PARTS = 64 * 2**20, 4
-#: Bytes on the device of what is known of a block: its scalar range, and whether it is visible.
-_BLOCK_BYTES = 9
+#: Bytes on the device of what is known of a block: its scalar range, whether it is visible, and its
+#: reach, which is made from another one.
+_BLOCK_BYTES = 11
 #: Bytes that are kept for tables: transfer functions, lights, rays. They may be a tenth of it.
 _TABLE_BYTES = 2**20
 #: Share of transparent blocks from which on looking for them pays.
@@ -72,6 +75,8 @@ _WORTH_SKIPPING = 0.05
 _MOST_LOOKED_UP = 4096
 #: Where scaled voxels end, in ranges of the transfer function.
 _BEYOND = 2.0**60
+#: Scaled voxels that are above the only scalar of a range are so by this at least.
+_ABOVE = 2.0**-60
 _uploads: weakref.WeakKeyDictionary[Volume, _Uploads] = weakref.WeakKeyDictionary()
 _uploads_lock = threading.Lock()
 
@@ -165,7 +170,7 @@ class DeviceVolume:
         )
         low, high = transfer_function.scalar_range
         native = _reads_natively(runtime, volume, transfer_function, room)
-        scale = None if native else (low, high)
+        scale = None if native else _scale_of(volume, low, high)
         self.defines = _voxel_defines(volume, native)
         whole = room is None or _fits(runtime, volume, scale, room)
         if room is None or whole:
@@ -177,12 +182,15 @@ class DeviceVolume:
         self._entries = len(table)
         self._per_scalar = _per_scalar(self._entries, span)
         self._table = runtime.upload(np.ascontiguousarray(table), "transfer function")
-        self._visible = self._visibility(runtime, ranges, transfer_function)
+        self._visible = self._reaches = self._visibility(runtime, ranges, transfer_function)
         self.bricks: DeviceBricks | None = None
         if room is not None and not whole:
             self._hold_bricks(runtime, scale, transfer_function, room)
-        if skip_empty and self._empty_share(runtime) >= _WORTH_SKIPPING:
-            self.defines["SKIP_EMPTY"] = 1
+        if skip_empty:
+            seen = runtime.download(self._visible)
+            if 1.0 - float(np.mean(seen)) >= _WORTH_SKIPPING:
+                self.defines["SKIP_EMPTY"] = 1
+                self._reaches = self._reaches_of(runtime, seen)
         if transfer_function.interpolation == "nearest":
             self.defines["NEAREST"] = 1
             if native and (ends := _integer_ends(runtime, volume, ranges)):
@@ -194,7 +202,7 @@ class DeviceVolume:
         self._gradient: tuple[DeviceBuffer, ...] = ()
         shading = shading_defines(transfer_function, self._lights)
         if transfer_function.gradient_opacities is not None:
-            gradient = gradient_table(volume, transfer_function, 1.0 if native else high - low)
+            gradient = gradient_table(volume, transfer_function, scale.unit if scale else 1.0)
             self._gradient = (runtime.upload(gradient, "gradient opacity"),)
         self.ambient_occlusion = ambient_occlusion
         self._occlusion: tuple[Any, ...] = ()
@@ -245,7 +253,7 @@ class DeviceVolume:
         ``camera`` is the view: lights may move with it.
         """
         return (
-            *self._classified(),
+            *self._classified(self._reaches),
             *self._lighting(camera),
             *self._gradient,
             *self._occlusion,
@@ -254,7 +262,7 @@ class DeviceVolume:
     def _hold_bricks(
         self,
         runtime: Runtime,
-        scale: tuple[float, float] | None,
+        scale: _Scale | None,
         transfer_function: TransferFunction,
         room: Room,
     ) -> None:
@@ -287,8 +295,8 @@ class DeviceVolume:
         self._voxels = self.bricks.pool
         self.defines["SAMPLED"] = 1
 
-    def _classified(self) -> tuple[Any, ...]:
-        """Arguments ``voxels`` to ``blocks``."""
+    def _classified(self, blocks: DeviceBuffer) -> tuple[Any, ...]:
+        """Arguments ``voxels`` to ``blocks``, of which ``blocks`` says what may be skipped."""
         return (
             self._voxels,
             np.array([*self.volume.dimensions, 0], dtype=np.int32),
@@ -296,7 +304,7 @@ class DeviceVolume:
             np.int32(self._entries),
             np.float32(self._low),
             np.float32(self._per_scalar),
-            self._visible,
+            blocks,
             np.array([*_blocks(self.volume), 0], dtype=np.int32),
         )
 
@@ -323,8 +331,8 @@ class DeviceVolume:
                 ambient = ambient_transmittances(
                     self._runtime,
                     grid,
-                    (*self._classified(), *self._gradient),
-                    self._classified()[-2:],
+                    (*self._classified(self._visible), *self._gradient),
+                    self._classified(self._visible)[-2:],
                     defines,
                     self.sample_distance,
                     self.unit_distance,
@@ -371,8 +379,30 @@ class DeviceVolume:
             runtime.finish()  # the table above may be host memory in use
         return visible
 
-    def _empty_share(self, runtime: Runtime) -> float:
-        return 1.0 - float(np.mean(runtime.download(self._visible)))
+    def _reaches_of(self, runtime: Runtime, seen: NDArray[np.uint8]) -> DeviceBuffer:
+        """Return how far each block is from one that may be visible, uint8 on the device."""
+        n = np.uint32(seen.size)
+        kernel = runtime.kernel("grid/volume_blocks.cl", "block_reaches", self.defines)
+        far = np.where(seen > 0, 0, _FARTHEST).astype(np.uint8)
+        reaches = runtime.upload(far, "empty blocks")
+        apart = 1
+        for along in _blocks(self.volume):
+            with reaches as before:
+                reaches = runtime.buffer((seen.size,), np.uint8, "reaches of empty blocks")
+                runtime.launch(
+                    kernel,
+                    padded(seen.size, GROUP),
+                    GROUP,
+                    before,
+                    n,
+                    np.uint32(apart),
+                    np.int32(along),
+                    np.int32(_FARTHEST),
+                    reaches,
+                )
+                runtime.finish()  # what was read is released
+            apart *= along
+        return reaches
 
     def forms(
         self, camera: Camera, window_size: Sequence[int], clipping_planes: ArrayLike | None
@@ -406,19 +436,35 @@ def _voxel_defines(volume: Volume, native: bool) -> dict[str, str | int | None]:
     return defines
 
 
+def voxel_bytes(volume: Volume, transfer_function: TransferFunction | None = None) -> int:
+    """Return the bytes of a scalar, or of a colour's component, on the device.
+
+    Scalars are taken to be read as they are where it is not known what for.
+    """
+    native = volume.array.dtype.name in _DEVICE_TYPES
+    if transfer_function is not None:
+        native = _suits_natively(volume, transfer_function)
+    return volume.array.dtype.itemsize if native else np.dtype(np.float32).itemsize
+
+
 def _reads_natively(
     runtime: Runtime, volume: Volume, transfer_function: TransferFunction, room: Room | None
 ) -> bool:
     """Whether kernels read the voxels as they are, or scaled to the transfer function's range."""
+    if not _suits_natively(volume, transfer_function):
+        return False
+    return volume.array.dtype.kind != "f" or not _too_large(runtime, volume, room)
+
+
+def _suits_natively(volume: Volume, transfer_function: TransferFunction) -> bool:
+    """Whether type and range let kernels read the voxels as they are."""
     dtype = volume.array.dtype
     if dtype.name not in _DEVICE_TYPES:
         return False
     if volume.rgba:  # a byte is exact, and colours have no such range
         return True
     low, high = transfer_function.scalar_range
-    if not scalars_suit_float32(low, high, dtype, transfer_function.interpolation):
-        return False
-    return dtype.kind != "f" or not _too_large(runtime, volume, room)
+    return scalars_suit_float32(low, high, dtype, transfer_function.interpolation)
 
 
 def _too_large(runtime: Runtime, volume: Volume, room: Room | None) -> bool:
@@ -500,7 +546,7 @@ def _blocks_of(dimensions: Sequence[int]) -> tuple[int, int, int]:
     return x, y, z
 
 
-def _device_bytes(volume: Volume, scale: tuple[float, float] | None) -> int:
+def _device_bytes(volume: Volume, scale: _Scale | None) -> int:
     """Bytes of the volume on a device."""
     return volume.array.nbytes if scale is None else 4 * volume.array.size
 
@@ -510,7 +556,7 @@ def _described(volume: Volume) -> str:
     return f"the volume {volume.name!r}, {nx} x {ny} x {nz} of {volume.array.dtype}"
 
 
-def _fits(runtime: Runtime, volume: Volume, scale: tuple[float, float] | None, room: Room) -> bool:
+def _fits(runtime: Runtime, volume: Volume, scale: _Scale | None, room: Room) -> bool:
     """Whether there is room for a volume in one piece."""
     uploaded = (runtime, scale) in _uploads_of(volume).made
     nbytes, blocks = _device_bytes(volume, scale), math.prod(_blocks(volume))
@@ -530,15 +576,15 @@ def volume_bytes(volume: Volume, nbytes: int, room: Room) -> tuple[int, int]:
     return room.limit - room.working - room.sample_bytes, room.sample_bytes
 
 
-def _reader(scale: tuple[float, float] | None) -> Callable[[NDArray[Any]], NDArray[Any]]:
+def _reader(scale: _Scale | None) -> Callable[[NDArray[Any]], NDArray[Any]]:
     """Return what makes of voxels what the kernels read."""
-    return (lambda part: part) if scale is None else (lambda part: _scaled(part, *scale))
+    return (lambda part: part) if scale is None else (lambda part: _scaled(part, scale))
 
 
 def _upload(
     runtime: Runtime,
     volume: Volume,
-    scale: tuple[float, float] | None,
+    scale: _Scale | None,
     defines: dict[str, str | int | None],
 ) -> tuple[DeviceBuffer, DeviceBuffer]:
     """Return voxels and the scalar range of each block, made once per device and scaling."""
@@ -562,7 +608,7 @@ def _upload(
 def _upload_ranges(
     runtime: Runtime,
     volume: Volume,
-    scale: tuple[float, float] | None,
+    scale: _Scale | None,
     defines: dict[str, str | int | None],
     room: Room,
 ) -> DeviceBuffer:
@@ -580,7 +626,7 @@ def _upload_ranges(
 def _ranges_in_parts(
     runtime: Runtime,
     volume: Volume,
-    scale: tuple[float, float] | None,
+    scale: _Scale | None,
     defines: dict[str, str | int | None],
     room: Room,
 ) -> NDArray[np.float32]:
@@ -649,31 +695,51 @@ def _require_a_number(runtime: Runtime, volume: Volume) -> None:
     volume.finite_range()  # says what is wrong
 
 
-def _all_scaled(
-    runtime: Runtime, array: NDArray[Any], scale: tuple[float, float]
-) -> NDArray[np.float32]:
+class _Scale(NamedTuple):
+    """How voxels are taken relative to a transfer function's range.
+
+    Attributes
+    ----------
+    low : float
+        The scalar that becomes 0.
+    unit : float
+        Scalars per unit of the device's voxels.
+    step : bool
+        Whether ``low`` is the whole range, so that being above it is what counts.
+    """
+
+    low: float
+    unit: float
+    step: bool
+
+
+def _scale_of(volume: Volume, low: float, high: float) -> _Scale:
+    if high > low:
+        return _Scale(low, high - low, False)
+    finite = volume.scalars[np.isfinite(volume.scalars)]
+    ends = np.array([finite.min(), finite.max()], np.float64) if finite.size else np.array([low])
+    return _Scale(low, float(np.abs(ends / 2 - low / 2).max()) * 2 or 1.0, True)
+
+
+def _all_scaled(runtime: Runtime, array: NDArray[Any], scale: _Scale) -> NDArray[np.float32]:
     """Scale a volume plane by plane, see :func:`_scaled`."""
     scaled = aligned_empty(array.shape, np.float32)
     for plane, target in zip(array, scaled, strict=True):
         runtime.give_way()
-        target[...] = _scaled(plane, *scale)
+        target[...] = _scaled(plane, scale)
     return scaled
 
 
-def _scaled(array: NDArray[Any], low: float, high: float) -> NDArray[np.float32]:
+def _scaled(array: NDArray[Any], scale: _Scale) -> NDArray[np.float32]:
     """32-bit integers and float64 to float32, taken relative to the transfer function's range.
 
     float32 holds 24 bits: of a value far from zero compared with the range little would be left,
     of its place in the range everything that the table can tell apart is.
     """
-    if high > low:
-        scaled = (array.astype(np.float64) - low) / (high - low)
-        # Beyond any table anyway: their differences and the squares of these stay finite. An
-        # infinite voxel stays one
-        finite = np.clip(scaled, -_BEYOND, _BEYOND)
-        return np.where(np.isinf(array), scaled, finite).astype(np.float32)
-    # At or below the single scalar, or above it
-    above = (array > np.float64(low)).astype(np.float32)
-    if array.dtype.kind == "f":
-        above[np.isnan(array)] = np.nan
-    return above
+    scaled = (array.astype(np.float64) - scale.low) / scale.unit
+    if scale.step:  # what is above stays above, however little
+        scaled = np.where(scaled > 0, np.maximum(scaled, _ABOVE), scaled)
+    # Beyond any table anyway: their differences and the squares of these stay finite. An infinite
+    # voxel stays one
+    finite = np.clip(scaled, -_BEYOND, _BEYOND)
+    return np.where(np.isinf(array), scaled, finite).astype(np.float32)

@@ -16,7 +16,7 @@ from .blocks import GROUP, block_items
 from .bricks import Room, StepSampler
 from .camera import Camera, check_window_size
 from .checks import as_float, memory_limit_bytes
-from .device_volume import DeviceVolume, volume_bytes
+from .device_volume import DeviceVolume, volume_bytes, voxel_bytes
 from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory
 from .lighting import Lights
@@ -119,6 +119,7 @@ def estimate(
     criterion: str = "least-error",
     ambient_occlusion: Any = None,
     memory_limit: Any = None,
+    transfer_function: TransferFunction | None = None,
 ) -> Estimate:
     """State the memory that :func:`generate_vdi` takes, before it is taken.
 
@@ -134,6 +135,10 @@ def estimate(
         As for :func:`generate_vdi`; all but the first record more of each ray at a time.
     ambient_occlusion, memory_limit : optional
         As for :func:`generate_vdi`.
+    transfer_function : TransferFunction, optional
+        Scalars whose range is narrow for how far it is from 0 are taken relative to it, which
+        takes 4 bytes a voxel on the device, and as much on the host while they are scaled. Without
+        it they are taken to be read as they are.
 
     Returns
     -------
@@ -143,7 +148,7 @@ def estimate(
     width, height = check_window_size(window_size)
     limit = check_max_supersegments(max_supersegments)
     memory = memory_limit_bytes(memory_limit)
-    item = min(volume.array.dtype.itemsize, 4)  # float64 is scaled to float32 for the device
+    item = voxel_bytes(volume, transfer_function)
     lists = width * height
     plan = _Slices(width, height, limit, check_criterion(criterion), memory)
     occlusion = AmbientOcclusion.from_any(ambient_occlusion)
@@ -508,10 +513,10 @@ class _Recorder:
         n = int(offsets[-1])
         with (
             runtime.upload(offsets, "list offsets") as starts,
-            runtime.buffer((n,), name="front depths") as front,
-            runtime.buffer((n,), name="back depths") as back,
-            runtime.buffer((n, 3), name="supersegment colours") as color,
-            runtime.buffer((n,), name="optical depths") as optical_depth,
+            runtime.result((n,), name="front depths") as front,
+            runtime.result((n,), name="back depths") as back,
+            runtime.result((n, 3), name="supersegment colours") as color,
+            runtime.result((n,), name="optical depths") as optical_depth,
         ):
             self._launch(
                 "pack_lists",

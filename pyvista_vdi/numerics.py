@@ -31,6 +31,18 @@ LARGEST_VOXEL = 2.0**126
 #: reaches that, and its positions are rounded nearly as much within it.
 NEAR_ENTRY, FAR_ENTRY, ENTRY_PER_POINT = 256.0, 2048.0, 4.0
 
+#: Most times the thickness of what a VDI's lists hold that their depths may be, in the sense of the
+#: depth coordinate's rounding, for float32 alone: 14 roundings (12 of a ray's coordinate, 2 of a
+#: face's; ``reference.render_range``) of so many thicknesses change an opacity by 1/e of that,
+#: 3.9e-5.
+MOST_DEPTHS = 128.0
+
+#: Thickness, in extents of the bounds' depths, below which nothing tells what a ray crosses.
+THINNEST_LIST = 2.0**-23
+
+#: Largest specular power of a cosine as it is: 8 roundings, near 1, change its power by 4.8e-5.
+LARGEST_POWER = 100.0
+
 #: Optical depths of one step, through any opacity of at least 2^-24, whose sums float32 holds.
 _LARGEST_STEP = 2.0**96
 
@@ -65,7 +77,16 @@ def entries(reach: float, points: int) -> dict[str, str | int | None]:
     ``points`` the number of grid points along its longest axis.
     """
     farthest = min(max(NEAR_ENTRY, ENTRY_PER_POINT * points), FAR_ENTRY)
-    return {"FAR_ENTRIES": None} if reach > farthest else {}
+    return {"FAR_ENTRIES": 1} if reach > farthest else {}
+
+
+def lists_are_far(depth: float, thickness: float, extent: float) -> bool:
+    """Whether depths in lists need be relative to each ray (``-D FAR_ENTRIES``).
+
+    ``depth`` is the largest that is rounded, ``thickness`` that of what the thickest list holds,
+    from its first front to its last back, and ``extent`` that of the bounds; world units.
+    """
+    return extent * THINNEST_LIST < thickness < depth / MOST_DEPTHS
 
 
 def held_unit_distance(unit_distance: float, sample_distance: float) -> float:

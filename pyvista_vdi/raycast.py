@@ -15,7 +15,7 @@ from .blocks import GROUP, block_items
 from .camera import Camera, check_window_size
 from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
-from .numerics import compensation
+from .numerics import compensation, lists_are_far
 from .occupancy import OccupancyGrid
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime, kept_together
 from .picking import DEFAULT_OPACITY, FirstHit
@@ -49,6 +49,7 @@ def render_vdi(
     skip_empty: bool = True,
     preview_samples: int | None = None,
     device: Any = None,
+    out: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
     """Raycast a VDI from any view (paper section 3).
 
@@ -76,11 +77,15 @@ def render_vdi(
         (paper section 5): an approximation. Fewer pixels are the better one (docs/performance.md).
     device : optional
         See :func:`pyvista_vdi.list_devices`.
+    out : numpy.ndarray, optional
+        Array for the image, float32 (height, width, 4), C-contiguous. A CPU device draws into it
+        without a copy if it begins at a multiple of 4096 bytes
+        (:func:`pyvista_vdi.opencl_runtime.aligned_empty`).
 
     Returns
     -------
     numpy.ndarray
-        Premultiplied RGBA, float32 (height, width, 4), top row first.
+        Premultiplied RGBA, float32 (height, width, 4), top row first; ``out`` if it was given.
 
     Notes
     -----
@@ -96,7 +101,14 @@ def render_vdi(
     multiplier = checked_opacity_multiplier(opacity_multiplier)
     runtime = get_runtime(device)
     prepared = prepared_vdi(runtime, vdi)
-    with runtime.buffer((size[1], size[0], 4), name="image") as image:
+    shape = (size[1], size[0], 4)
+    if out is not None and (out.shape != shape or out.dtype != np.float32):
+        raise InvalidArgumentError(
+            f"out must be float32 of the image's shape {shape}; got {out.dtype}, {out.shape}"
+        )
+    with (
+        runtime.result(shape, name="image") if out is None else runtime.target(out, "image")
+    ) as image:
         prepared.render(
             camera,
             size,
@@ -108,7 +120,7 @@ def render_vdi(
             skip_empty=skip_empty,
             preview_samples=samples,
         )
-        return runtime.download(image)
+        return runtime.download(image, out)
 
 
 def render_first_hits(
@@ -262,11 +274,27 @@ class PreparedVDI:
         self._shifted = not self._parallel and 0 < far <= _LONG_LENS * closest
         # A ray that steps from list to list meets about as many as it crosses borders
         self.media = sum(vdi.window_size) + int(vdi.counts.max(initial=0))
+        self._far = self._is_far(vdi, (near, far))
         self._list_rows = self._list_space(camera)
         self._packed = {Packed16: 16, Packed8: 8}.get(type(vdi.packing), 0)
         headers = _LIST_HEADER * int(np.count_nonzero(vdi.counts)) if self._packed == 8 else 0
         self._long_offsets = vdi.n_supersegments + headers >= 2**32
         self._upload(vdi)
+
+    def _is_far(self, vdi: VDI, depths: tuple[float, float]) -> bool:
+        """Whether the lists are thin for where they lie between the depths of the bounds."""
+        occupied = np.diff(vdi.offsets) > 0
+        first, last = vdi.offsets[:-1][occupied], vdi.offsets[1:][occupied] - 1
+        near, far = (depth - self._depth_origin for depth in depths)
+        front, back = (
+            np.clip(face.astype(np.float64), near, far)
+            for face in (vdi.front[first], vdi.back[last])
+        )
+        rounded = np.maximum(np.abs(front), np.abs(back))
+        if not (self._parallel or self._shifted):
+            rounded = back + self._depth_origin
+        thickness = (back - front).max(initial=0.0)
+        return lists_are_far(rounded.max(initial=0.0), thickness, far - near)
 
     @property
     def list_bytes(self) -> int:
@@ -285,6 +313,8 @@ class PreparedVDI:
             defines["SHIFTED"] = 1
         if self._packed:
             defines["PACKED"] = self._packed
+        if self._far:
+            defines["FAR_ENTRIES"] = 1
         return defines
 
     def render(
@@ -358,7 +388,8 @@ class PreparedVDI:
         planes += rays.user_planes(camera, pixel_rays, clipping_planes)
         cropped = rays.cropped(pixel_rays, cropping, self._bounds)
         planes += cropped.planes
-        forms = rays.packed([*coordinates, *direction, *planes, *cropped.forms])
+        pack = rays.packed_pairs if self._far else rays.packed
+        forms = pack([*coordinates, *direction, *planes, *cropped.forms])
         ends = rays.checked_opaque_depth(opaque_depth, size, pixel_rays)
         return ListView(
             size,
@@ -407,7 +438,7 @@ class PreparedVDI:
         viewport = camera.viewport_matrix(self._window) @ camera.model_to_view
         half = np.asarray(self._window, dtype=np.float64) / 2
         u, v, depth, denominator = viewport
-        if self._parallel or self._shifted:
+        if self._parallel or self._shifted or self._far:
             coordinate = depth.copy()
             coordinate[3] -= self._depth_origin
         else:

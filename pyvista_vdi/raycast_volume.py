@@ -183,7 +183,7 @@ def raycast_medium(
         form_buffer = keep(runtime.upload(forms, "rays"))
         no_ends = np.zeros(1, np.float32)
         depth = keep(runtime.upload(no_ends if ends is None else ends, "opaque depth"))
-        image = keep(runtime.buffer((height, width, 4), name="image"))
+        image = keep(runtime.result((height, width, 4), name="image"))
         begin = (
             form_buffer,
             np.int32(planes),

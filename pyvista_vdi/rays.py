@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from .camera import Camera, check_window_size
 from .cropping import Cropping
 from .errors import InvalidArgumentError, InvalidCameraError
+from .opencl_runtime import aligned_empty
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -323,7 +324,7 @@ def largest_value(
 def checked_opaque_depth(
     opaque_depth: ArrayLike | None, window_size: tuple[int, int], rays: PixelRays
 ) -> NDArray[np.float32] | None:
-    """Return where each pixel's ray ends, as t: float32 (H, W), top row first.
+    """Return where each pixel's ray ends, as t: float32 (H, W), top row first; page-aligned.
 
     Raises
     ------
@@ -333,13 +334,17 @@ def checked_opaque_depth(
     if opaque_depth is None:
         return None
     wanted = f"opaque_depth must have shape (height, width) = {window_size[::-1]}"
-    depth = _numbers(opaque_depth, wanted)
+    depth = opaque_depth
+    if not (isinstance(depth, np.ndarray) and depth.dtype in (np.float32, np.float64)):
+        depth = _numbers(opaque_depth, wanted)
     if depth.shape != window_size[::-1]:
         raise InvalidArgumentError(f"{wanted}; got {depth.shape}")
-    if np.isnan(depth).any():
-        raise InvalidArgumentError("opaque_depth holds NaN: use inf where nothing is opaque")
+    ends = aligned_empty(depth.shape, np.float32)
     with np.errstate(over="ignore"):  # beyond float32 is as good as never
-        return (depth - rays.reference_depth).astype(np.float32)
+        np.subtract(depth, rays.reference_depth, out=ends, dtype=np.float64, casting="same_kind")
+    if np.isnan(ends.min()):
+        raise InvalidArgumentError("opaque_depth holds NaN: use inf where nothing is opaque")
+    return ends
 
 
 def _numbers(values: ArrayLike, wanted: str) -> Floats:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from . import rays
 from .camera import Camera
 from .lighting import Light, Lights, Shading
+from .numerics import LARGEST_POWER
 from .transfer_function import TransferFunction
 from .volume import Volume
 
@@ -28,6 +29,8 @@ def shading_defines(transfer_function: TransferFunction, lights: Lights) -> dict
             defines["HEADLIGHT"] = 1
         elif lights.positional:
             defines["POSITIONAL_LIGHTS"] = 1
+        if transfer_function.shading.specular_power > LARGEST_POWER:
+            defines["SHARP_HIGHLIGHTS"] = 1
     if transfer_function.gradient_opacities is not None:
         defines["GRADIENT_OPACITY"] = 1
     return defines

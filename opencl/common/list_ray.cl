@@ -12,6 +12,9 @@ typedef struct {
     float3 start; // where it enters what it is clipped to: u, v, depth coordinate
     float3 deep, along;
     bool away;     // from V_O: depth does not decrease along the ray
+#ifdef FAR_ENTRIES
+    Depths depths;
+#endif
     float r_begin; // 0 or -1; it ends at r_begin + 1
     float scale;   // model length per unit of r, but for the division by w(r_a) w(r_b) in perspective
     float t_begin; // where it enters, as t
@@ -24,24 +27,56 @@ typedef struct {
 #endif
 } ListRay;
 
+#ifdef FAR_ENTRIES
+typedef float2 ListDepth; // t
+#define LIST_DEPTH(t) (t).x
+#define DEPTHS_OF(ray) (ray)->depths
+
+inline float list_form(__global const float *form, float a, float b, ListDepth t)
+{
+    return form_at(form, a, b, t).x;
+}
+
+// (u, v, depth coordinate) at t, where the offset is known.
+inline float3 list_point(__global const float *forms, float a, float b, ListDepth t, float2 offset, Depths depths)
+{
+    const float u = list_form(forms + U_FORM * FORM_SIZE, a, b, t);
+    const float v = list_form(forms + V_FORM * FORM_SIZE, a, b, t);
+    const float beyond = pair_sum(offset, -depths.deep).x;
+#ifdef PARALLEL
+    return (float3)(u, v, beyond);
+#else
+    const float d = list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
+    return (float3)(u / d, v / d, beyond * depths.reciprocal / d);
+#endif
+}
+#else
+typedef float ListDepth;
+#define LIST_DEPTH(t) (t)
+#define DEPTHS_OF(ray) depth_origin
+
+inline float list_form(__global const float *form, float a, float b, ListDepth t)
+{
+    return fma(t, form_slope(form, a, b), form_value(form, a, b));
+}
+#endif
+
 #ifdef CROPPED
 // The kept parts of a ray from t_deep, where r is 0, to t_other. Over the homogeneous denominator, what is affine in t is
 // linear in r.
-inline Kept kept_list_parts(__global const float *forms, int planes, float a, float b, float t_deep, float t_other,
-                            float r_other, uint regions)
+inline Kept kept_list_parts(__global const float *forms, int planes, float a, float b, ListDepth t_deep,
+                            ListDepth t_other, float r_other, uint regions)
 {
     __global const float *form = forms + (PLANE_FORMS + planes) * FORM_SIZE;
     float at_deep[CROPPING_PLANES], at_other[CROPPING_PLANES];
     float w_deep = 1.0f, w_other = 1.0f;
 #ifndef PARALLEL
-    const float value = form_value(forms + DENOMINATOR_FORM * FORM_SIZE, a, b);
-    const float slope = form_slope(forms + DENOMINATOR_FORM * FORM_SIZE, a, b);
-    w_deep = 1.0f / fma(t_deep, slope, value);
-    w_other = 1.0f / fma(t_other, slope, value);
+    w_deep = 1.0f / list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t_deep);
+    w_other = 1.0f / list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t_other);
 #endif
     for (int k = 0; k < CROPPING_PLANES; ++k, form += FORM_SIZE) {
-        at_deep[k] = fma(t_deep, form_slope(form, a, b), form_value(form, a, b)) * w_deep;
-        at_other[k] = fma(t_other, form_slope(form, a, b), form_value(form, a, b)) * w_other;
+        at_deep[k] = list_form(form, a, b, t_deep) * w_deep;
+        at_other[k] = list_form(form, a, b, t_other) * w_other;
     }
     return kept_parts(at_deep, at_other, 0.0f, r_other, regions);
 }
@@ -52,27 +87,43 @@ inline Kept kept_list_parts(__global const float *forms, int planes, float a, fl
 inline bool begin_list_ray(ListRay *ray, __global const float *forms, int planes, CROPPING_PARAMETER float a, float b,
                            float t_end, float depth_origin)
 {
+#ifdef FAR_ENTRIES
+    float2 t0;
+    float t_length;
+    if (!clip_from_entry(forms + PLANE_FORMS * FORM_SIZE, planes, a, b, t_end, &t0, &t_length))
+        return false;
+    const float2 t1 = pair_sum(t0, (float2)(t_length, 0.0f));
+    const float2 offset = form_at(forms + DEPTH_FORM * FORM_SIZE, a, b, t0);
+    const float2 end_offset = form_at(forms + DEPTH_FORM * FORM_SIZE, a, b, t1);
+    ray->depths.deep = pair_less(end_offset, offset) ? offset : end_offset;
+    ray->depths.reciprocal = 1.0f / (ray->depths.deep.x + depth_origin);
+    ray->depths.depth_origin = depth_origin;
+    const float3 start = list_point(forms, a, b, t0, offset, ray->depths);
+    const float3 end = list_point(forms, a, b, t1, end_offset, ray->depths);
+#else
     float t0 = -INFINITY;
     float t1 = t_end;
     if (!clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, planes, a, b, &t0, &t1))
         return false;
+    const float t_length = t1 - t0;
     const float3 start = list_point(forms, a, b, t0);
     const float3 end = list_point(forms, a, b, t1);
-    ray->t_begin = t0;
+#endif
+    ray->t_begin = LIST_DEPTH(t0);
     ray->start = start;
     ray->along = end - start;
     ray->away = ray->along.z >= 0.0f;
     ray->deep = ray->away ? end : start;
     ray->r_begin = ray->away ? -1.0f : 0.0f;
-    ray->scale = (t1 - t0) * model_speed(forms, a, b);
+    ray->scale = t_length * model_speed(forms, a, b);
 #ifndef PARALLEL
-    ray->scale *= reciprocal_depth(start.z, depth_origin) * reciprocal_depth(end.z, depth_origin);
+    ray->scale *= reciprocal_depth(start.z, DEPTHS_OF(ray)) * reciprocal_depth(end.z, DEPTHS_OF(ray));
 #endif
 #ifdef SEGMENTS
-    ray->t_deep = ray->away ? t1 : t0;
-    ray->t_scale = t1 - t0;
+    ray->t_deep = LIST_DEPTH(ray->away ? t1 : t0);
+    ray->t_scale = t_length;
 #ifndef PARALLEL
-    ray->t_scale *= reciprocal_depth(ray->away ? start.z : end.z, depth_origin);
+    ray->t_scale *= reciprocal_depth(ray->away ? start.z : end.z, DEPTHS_OF(ray));
 #endif
 #endif
 #ifdef CROPPED
@@ -87,28 +138,28 @@ inline bool begin_list_ray(ListRay *ray, __global const float *forms, int planes
 #ifdef SEGMENTS
 // t at r, whose depth coordinate is z. With w = 1/Z linear in r and Z linear in t, the share of the ray between r and its
 // deep end is r w_shallow / w(r): small where r is, so that nothing cancels there.
-inline float ray_depth(const ListRay *ray, float r, float z, float depth_origin)
+inline float ray_depth(const ListRay *ray, float r, float z, Depths depths)
 {
 #ifdef PARALLEL
     return fma(r, ray->t_scale, ray->t_deep);
 #else
-    return ray->t_deep + r * ray->t_scale / reciprocal_depth(z, depth_origin);
+    return ray->t_deep + r * ray->t_scale / reciprocal_depth(z, depths);
 #endif
 }
 #endif
 
 // Model length from r = from to r = to, whose depth coordinates are z_from and z_to.
-inline float model_length(float scale, float from, float z_from, float to, float z_to, float depth_origin)
+inline float model_length(float scale, float from, float z_from, float to, float z_to, Depths depths)
 {
 #ifdef PARALLEL
     return scale * (to - from);
 #else
-    return scale * (to - from) / (reciprocal_depth(z_from, depth_origin) * reciprocal_depth(z_to, depth_origin));
+    return scale * (to - from) / (reciprocal_depth(z_from, depths) * reciprocal_depth(z_to, depths));
 #endif
 }
 
 // Model length of what is not cropped away from r = from to r = to.
-inline float length_drawn(const ListRay *ray, float from, float to, float depth_origin)
+inline float length_drawn(const ListRay *ray, float from, float to, Depths depths)
 {
 #ifdef CROPPED
     float sum = 0.0f;
@@ -117,12 +168,12 @@ inline float length_drawn(const ListRay *ray, float from, float to, float depth_
         cut_to_part(&ray->kept, n, &r_from, &r_to);
         if (r_from < r_to)
             sum += model_length(ray->scale, r_from, fma(r_from, ray->along.z, ray->deep.z), r_to,
-                                fma(r_to, ray->along.z, ray->deep.z), depth_origin);
+                                fma(r_to, ray->along.z, ray->deep.z), depths);
     }
     return sum;
 #else
     return model_length(ray->scale, from, fma(from, ray->along.z, ray->deep.z), to, fma(to, ray->along.z, ray->deep.z),
-                        depth_origin);
+                        depths);
 #endif
 }
 

@@ -7,6 +7,10 @@
 //     otherwise        z = -1 / Z                the same relative precision at every depth
 //
 // with Z view depth from V_O in world units and Z_ref the VDI's depth origin. An "offset" is Z - Z_ref.
+//
+//     -D FAR_ENTRIES   lists hold so little of the depth that float32 has for all of it, that z is relative to Z_deep, where
+//                      a ray is deepest: 1/Z_deep - 1/Z, or Z - Z_deep if PARALLEL; faces are kept as offsets, DEPTH_FORM
+//                      is that of the offset (docs/numerics.md)
 #include "common/rays.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -17,38 +21,66 @@
 #define MODEL_FORM 4
 #define PLANE_FORMS 7
 
-inline float depth_coordinate(float offset, float depth_origin)
+#ifdef FAR_ENTRIES
+typedef struct {
+    float2 deep;      // the offset of Z_deep, a pair of common/pairs.cl
+    float reciprocal; // 1 / Z_deep
+    float depth_origin;
+} Depths;
+#define DEPTHS ray.depths // of a kernel whose ray is `ray`
+#else
+typedef float Depths; // the depth origin
+#define DEPTHS depth_origin
+#endif
+
+inline float depth_coordinate(float offset, Depths depths)
 {
-#if defined(PARALLEL)
+#if defined(FAR_ENTRIES)
+    const float beyond = (offset - depths.deep.x) - depths.deep.y;
+#ifdef PARALLEL
+    return beyond;
+#else
+    return beyond * depths.reciprocal / (offset + depths.depth_origin);
+#endif
+#elif defined(PARALLEL)
     return offset;
 #elif defined(SHIFTED)
-    return offset / (offset + depth_origin);
+    return offset / (offset + depths);
 #else
-    return -1.0f / (offset + depth_origin);
+    return -1.0f / (offset + depths);
 #endif
 }
 
-inline float depth_offset(float z, float depth_origin)
+inline float depth_offset(float z, Depths depths)
 {
-#if defined(PARALLEL)
+#if defined(FAR_ENTRIES)
+#ifdef PARALLEL
+    return depths.deep.x + z;
+#else
+    return depths.deep.x + z / (depths.reciprocal * (depths.reciprocal - z));
+#endif
+#elif defined(PARALLEL)
     return z;
 #elif defined(SHIFTED)
-    return z * depth_origin / (1.0f - z);
+    return z * depths / (1.0f - z);
 #else
-    return -1.0f / z - depth_origin;
+    return -1.0f / z - depths;
 #endif
 }
 
 // 1 / Z of a depth coordinate. Not used in parallel projection.
-inline float reciprocal_depth(float z, float depth_origin)
+inline float reciprocal_depth(float z, Depths depths)
 {
-#ifdef SHIFTED
-    return (1.0f - z) / depth_origin;
+#if defined(FAR_ENTRIES)
+    return depths.reciprocal - z;
+#elif defined(SHIFTED)
+    return (1.0f - z) / depths;
 #else
     return -z;
 #endif
 }
 
+#ifndef FAR_ENTRIES
 // Homogeneous list coordinates at t, divided out: (u, v, depth coordinate).
 inline float3 list_point(__global const float *forms, float a, float b, float t)
 {
@@ -64,6 +96,7 @@ inline float3 list_point(__global const float *forms, float a, float b, float t)
     return (float3)(u, v, z) / d;
 #endif
 }
+#endif
 
 // Model length per unit of t along the ray.
 inline float model_speed(__global const float *forms, float a, float b)

@@ -19,7 +19,7 @@ typedef struct {
     __global const float4 *table; // transfer function, or the media of scalars
     int entries;
     float low, per_scalar;        // scalar to table position
-    __global const uchar *visible; // whether a block holds anything that is not transparent
+    __global const uchar *reaches; // of the blocks, see grid/volume_blocks.cl
     int4 blocks;                  // along x, y, z
     SHADING_FIELDS
 } Medium;
@@ -41,7 +41,7 @@ typedef struct {
 inline float march_value(const March *march, __global const float *form, float a, float b)
 {
 #ifdef FAR_ENTRIES
-    return form_value_at(form, a, b, march->entry);
+    return form_at(form, a, b, march->entry).x;
 #else
     return form_value(form, a, b);
 #endif
@@ -99,19 +99,21 @@ inline int first_step_outside(const March *march, float3 lower, float3 upper)
     return (int)fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f) + 1;
 }
 
-// Steps from step k on whose midpoints lie in the same transparent block, in whole groups of `group` steps, so that the
-// others are grouped as if none had been passed by; 0 where there is something to look at. Skipping decides what is looked
-// at and changes no sample. -D SKIP_EMPTY, or every step is looked at.
+// Steps from step k on whose midpoints lie in transparent blocks around the first one's, in whole groups of `group` steps, so
+// that the others are grouped as if none had been passed by; 0 where there is something to look at. Skipping decides what is
+// looked at and changes no sample. -D SKIP_EMPTY, or every step is looked at.
 inline int empty_steps(const March *march, const Medium *medium, int k, int end, int group)
 {
 #ifdef SKIP_EMPTY
     const float t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
     const float3 position = march->start + t * march->slope;
     const int3 block = clamp(convert_int3(position) >> BLOCK_SHIFT, (int3)(0), medium->blocks.xyz - 1);
-    if (medium->visible[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x])
+    const int reach = medium->reaches[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x];
+    if (reach == 0)
         return 0;
-    const float3 lower = convert_float3(block << BLOCK_SHIFT);
-    return max(min(first_step_outside(march, lower, lower + (float)BLOCK), end) - k, 0) / group * group;
+    const float3 lower = convert_float3((block - (reach - 1)) << BLOCK_SHIFT);
+    const float3 upper = convert_float3((block + reach) << BLOCK_SHIFT);
+    return max(min(first_step_outside(march, lower, upper), end) - k, 0) / group * group;
 #else
     return 0;
 #endif

@@ -57,9 +57,9 @@ inline float2 pair_of_form(__global const float *c, float a, float b)
 }
 
 // Value of a form at t.
-inline float form_value_at(__global const float *form, float a, float b, float2 t)
+inline float2 form_at(__global const float *form, float a, float b, float2 t)
 {
-    return pair_sum(pair_of_form(form, a, b), pair_product(t, pair_of_form(form + 3, a, b))).x;
+    return pair_sum(pair_of_form(form, a, b), pair_product(t, pair_of_form(form + 3, a, b)));
 }
 
 // clip_to_planes, and what is left as its entry and its length.

@@ -3,6 +3,7 @@
 // -D SHADED             samples are lit
 // -D HEADLIGHT          by one headlight and nothing else, which VTK shades its own way
 // -D POSITIONAL_LIGHTS  some of the lights shine from a position
+// -D SHARP_HIGHLIGHTS   the specular power is so large that a cosine's rounding shows in its power
 // -D GRADIENT_OPACITY   opacity depends on how fast the scalar changes
 //
 // Without SHADED and GRADIENT_OPACITY nothing of this is compiled. Lights are in a frame of their own, "the lights'
@@ -106,6 +107,16 @@ inline float3 unit_or_zero(float3 v)
     return size > 0.0f ? v / size : (float3)(0.0f);
 }
 
+// The power of a cosine, 0 < cosine. `lost`: 1 - cosine, which is right where the cosine has rounded it off.
+inline float highlight(float cosine, float lost, float power)
+{
+#ifdef SHARP_HIGHLIGHTS
+    return exp(power * log1p(-fmin(lost, 1.0f)));
+#else
+    return pow(cosine, power);
+#endif
+}
+
 // Colour that a sample sends to the eye. `differences`: see scalar_differences. `x`, `y`, `z`: its index position.
 // The normal points to where the scalar grows, so that it looks away from a light in front of a denser inside: vectors
 // towards lights and eye are taken the other way round throughout.
@@ -127,9 +138,12 @@ inline float3 lit(float3 color, float3 differences, float x, float y, float z, _
     if (two_sided)
         facing = fabs(facing);
     float3 sum = lighting[AMBIENT] * color; // the light's own ambient colour has no part in it
-    if (facing > 0.0f)
+    if (facing > 0.0f) {
+        const float3 across = cross(normal, view); // as long as the sine of half the angle to the reflected ray
         sum += facing * lighting[DIFFUSE] * vload3(0, light + LIGHT_DIFFUSE) * color +
-               pow(reflected, power) * lighting[SPECULAR] * vload3(0, light + LIGHT_SPECULAR);
+               highlight(reflected, 2.0f * dot(across, across), power) * lighting[SPECULAR] *
+                   vload3(0, light + LIGHT_SPECULAR);
+    }
 #else
     float3 ambient = (float3)(0.0f), diffuse = (float3)(0.0f), specular = (float3)(0.0f);
     const int count = (int)lighting[LIGHT_COUNT];
@@ -159,11 +173,16 @@ inline float3 lit(float3 color, float3 differences, float x, float y, float z, _
         if (facing > 0.0f) {
             diffuse += strength * facing * vload3(0, light + LIGHT_DIFFUSE);
             // VTK turns the cosine of a side that faces away, and not its normal: its highlights lie elsewhere
-            float reflected = dot(view, unit_or_zero(2.0f * facing * normal - direction));
-            if (reflected < 0.0f && two_sided && positional)
+            float3 mirrored = unit_or_zero(2.0f * facing * normal - direction);
+            float reflected = dot(view, mirrored);
+            if (reflected < 0.0f && two_sided && positional) {
                 reflected = -reflected;
+                mirrored = -mirrored;
+            }
+            const float3 chord = view - mirrored;
             if (reflected > 0.0f)
-                specular += strength * pow(reflected, power) * vload3(0, light + LIGHT_SPECULAR);
+                specular += strength * highlight(reflected, 0.5f * dot(chord, chord), power) *
+                            vload3(0, light + LIGHT_SPECULAR);
         }
         ambient += vload3(0, light + LIGHT_AMBIENT);
     }

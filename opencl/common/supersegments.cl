@@ -16,42 +16,28 @@
 #define SUPERSEGMENTS_PARAMETERS                                                   \
     __global const float2 *faces, /* depth coordinates of front and back */        \
     __global const float4 *media, /* straight RGB, extinction per model length */
-typedef __global const float2 *List;
+typedef __global const float2 *Stored;
+#define STORED faces
 #define LIST_LENGTH(begin, end) (int)((end) - (begin))
-#define BEGIN_LIST(begin)
-#define LIST(begin) faces + (begin)
-#define FACE(k) faces[k]
 #define MEDIUM(k) media[k]
 
-inline float front_of(List list, int k)
+inline float2 stored_face(Stored list, int k)
 {
-    return list[k].x;
-}
-
-inline float back_of(List list, int k)
-{
-    return list[k].y;
+    return list[k];
 }
 
 #elif PACKED == 16
 
 // A supersegment is (front, back, extinction, colour), the first three as bits of floats.
 #define SUPERSEGMENTS_PARAMETERS __global const uint4 *supersegments, __global const float *constants,
-typedef __global const uint4 *List;
+typedef __global const uint4 *Stored;
+#define STORED supersegments
 #define LIST_LENGTH(begin, end) (int)((end) - (begin))
-#define BEGIN_LIST(begin)
-#define LIST(begin) supersegments + (begin)
-#define FACE(k) as_float2(supersegments[k].xy)
 #define MEDIUM(k) medium_of(supersegments[k])
 
-inline float front_of(List list, int k)
+inline float2 stored_face(Stored list, int k)
 {
-    return as_float(list[k].x);
-}
-
-inline float back_of(List list, int k)
-{
-    return as_float(list[k].y);
+    return as_float2(list[k].xy);
 }
 
 inline float4 medium_of(uint4 supersegment)
@@ -72,7 +58,7 @@ inline float4 medium_of(uint4 supersegment)
 #define DEPTH_CODES 16383
 #define TAU_BASE ((127 - 18) << 7)
 #define LIST_LENGTH(begin, end) max((int)((end) - (begin)) - LIST_HEADER, 0)
-#define BEGIN_LIST(begin) const List here = list_at(words + (begin), constants, depth_origin);
+#define BEGIN_LIST(begin) const List here = list_at(words + (begin), constants, DEPTHS);
 #define LIST(begin) here
 #define FACE(k) (float2)(front_of(here, (int)((k) - begin)), back_of(here, (int)((k) - begin)))
 #define MEDIUM(k) medium_of(here, (int)((k) - begin))
@@ -81,13 +67,14 @@ typedef struct {
     __global const uint2 *words; // behind the header
     int origin, stride;
     float per_code;              // 1 over a code's model length
-    float step, nearest, depth_origin;
+    float step, nearest;
+    Depths depths;
 } List;
 
-inline List list_at(__global const uint2 *words, __global const float *constants, float depth_origin)
+inline List list_at(__global const uint2 *words, __global const float *constants, Depths depths)
 {
     const List list = {words + LIST_HEADER, as_int(words[0].x), as_int(words[0].y), as_float(words[1].x),
-                       constants[0],        constants[1],       depth_origin};
+                       constants[0],        constants[1],       depths};
     return list;
 }
 
@@ -96,9 +83,9 @@ inline float face_of_code(const List *list, uint code)
 {
     const float offset = (float)(list->origin + (int)code * list->stride) * list->step;
 #ifdef PARALLEL
-    return offset;
+    return depth_coordinate(offset, list->depths);
 #else
-    return depth_coordinate(fmax(offset, list->nearest), list->depth_origin);
+    return depth_coordinate(fmax(offset, list->nearest), list->depths);
 #endif
 }
 
@@ -123,4 +110,41 @@ inline float4 medium_of(List list, int k)
                     fmin(optical_depth * list.per_code / (float)thickness, FLT_MAX));
 }
 
+#endif
+
+#if PACKED != 8
+#ifdef FAR_ENTRIES
+typedef struct {
+    Stored faces; // offsets
+    Depths depths;
+} List;
+#define BEGIN_LIST(begin) const List here = {STORED + (begin), DEPTHS};
+#define LIST(begin) here
+#define FACE(k) (float2)(front_of(here, (int)((k) - begin)), back_of(here, (int)((k) - begin)))
+
+inline float front_of(List list, int k)
+{
+    return depth_coordinate(stored_face(list.faces, k).x, list.depths);
+}
+
+inline float back_of(List list, int k)
+{
+    return depth_coordinate(stored_face(list.faces, k).y, list.depths);
+}
+#else
+typedef Stored List;
+#define BEGIN_LIST(begin)
+#define LIST(begin) STORED + (begin)
+#define FACE(k) stored_face(STORED + k, 0)
+
+inline float front_of(List list, int k)
+{
+    return stored_face(list, k).x;
+}
+
+inline float back_of(List list, int k)
+{
+    return stored_face(list, k).y;
+}
+#endif
 #endif

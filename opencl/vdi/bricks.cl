@@ -77,7 +77,7 @@ __kernel void want_bricks(
     __global const float4 *table,
     int entries,
     float low, float per_scalar,
-    __global const uchar *visible,
+    __global const uchar *reaches,
     int4 blocks,
     SHADING_PARAMETERS
     __global const float *forms,
@@ -98,7 +98,7 @@ __kernel void want_bricks(
     if (pixel.x >= width || pixel.y >= rows)
         return;
     pixel.y += first_row;
-    const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks SHADING_ARGUMENTS};
+    const Medium medium = {voxels, size, table, entries, low, per_scalar, reaches, blocks SHADING_ARGUMENTS};
     Walk walk;
     if (!begin_walk(&walk, forms, planes, sample_distance, unit_distance, pixel, width, height, opaque_depth,
                     has_opaque_depth, first_step, steps))
@@ -122,7 +122,7 @@ __kernel void sample_steps(
     __global const float4 *table,
     int entries,
     float low, float per_scalar,
-    __global const uchar *visible,
+    __global const uchar *reaches,
     int4 blocks,
     SHADING_PARAMETERS
     __global const float *forms,
@@ -143,7 +143,7 @@ __kernel void sample_steps(
     if (pixel.x >= width || pixel.y >= rows)
         return;
     pixel.y += first_row;
-    Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks SHADING_ARGUMENTS};
+    Medium medium = {voxels, size, table, entries, low, per_scalar, reaches, blocks SHADING_ARGUMENTS};
     Walk walk;
     if (!begin_walk(&walk, forms, planes, sample_distance, unit_distance, pixel, width, height, opaque_depth,
                     has_opaque_depth, first_step, steps))

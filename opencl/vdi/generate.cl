@@ -27,7 +27,7 @@ __kernel void march_lists(
     __global const float4 *table,  // transfer function, `entries` (R, G, B, opacity)
     int entries,
     float low, float per_scalar,   // scalar to table position
-    __global const uchar *visible, // blocks that are not transparent, see grid/volume_blocks.cl
+    __global const uchar *reaches, // of the blocks, see grid/volume_blocks.cl
     int4 blocks,                   // along x, y, z
     SHADING_PARAMETERS             // see common/shading.cl
     __global const float *forms,   // see begin_march
@@ -56,7 +56,7 @@ __kernel void march_lists(
     March march;
     if (!begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, INFINITY))
         return;
-    const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks SHADING_ARGUMENTS};
+    const Medium medium = {voxels, size, table, entries, low, per_scalar, reaches, blocks SHADING_ARGUMENTS};
     const float per_reference = march.units * unit_distance / reference_length;
     const float threshold = thresholds[item];
     __global float *record = records + record_start(item, capacity, RUN_WORDS);

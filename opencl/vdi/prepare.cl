@@ -5,6 +5,13 @@
 #include "common/list_space.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
+// What is kept of a face
+#ifdef FAR_ENTRIES
+#define FACE_OF(offset) (offset)
+#else
+#define FACE_OF(offset) depth_coordinate(offset, depth_origin)
+#endif
+
 // One work-item per list.
 __kernel void prepare_lists(
     __global const OFFSET_T *offsets,     // width * height + 1
@@ -41,8 +48,8 @@ __kernel void prepare_lists(
         const float z0 = front, z1 = back;
 #else
         // A face on the eye's plane has no list coordinate; nothing nearer than `nearest` is ever looked up
-        const float z0 = depth_coordinate(fmax(front, nearest - depth_origin), depth_origin);
-        const float z1 = depth_coordinate(fmax(back, nearest - depth_origin), depth_origin);
+        const float z0 = FACE_OF(fmax(front, nearest - depth_origin));
+        const float z1 = FACE_OF(fmax(back, nearest - depth_origin));
 #endif
         // Finite however thin: nothing or everything of such a supersegment is crossed
         const float length = fmax((back - front) * per_depth, FLT_MIN);

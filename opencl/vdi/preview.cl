@@ -34,19 +34,20 @@ typedef struct {
     __global const uint *counts;
     int tiles_wide, tiles_high;
     float half_wide, half_high;  // lists
-    float depth_origin, first_depth, slabs_per_depth;
+    Depths depths;
+    float first_depth, slabs_per_depth;
 } Cells;
 
 inline int slab_at(const Cells *cells, float z)
 {
-    return slab_of(depth_offset(z, cells->depth_origin), cells->first_depth, cells->slabs_per_depth);
+    return slab_of(depth_offset(z, cells->depths), cells->first_depth, cells->slabs_per_depth);
 }
 
 // r where the depth coordinate reaches the near face of a slab, or an end of the ray; the ray is not parallel to the slabs.
 inline float reaches_slab(const Cells *cells, int slab)
 {
     const float face = cells->first_depth + (float)slab / cells->slabs_per_depth;
-    return (depth_coordinate(face, cells->depth_origin) - cells->ray->deep.z) / cells->ray->along.z;
+    return (depth_coordinate(face, cells->depths) - cells->ray->deep.z) / cells->ray->along.z;
 }
 
 // Find where the ray leaves the walk's tile, and the occupied slabs that it crosses there.
@@ -118,21 +119,21 @@ inline bool next_cell(Walk *walk, const Cells *cells, Crossing *crossing)
     crossing->z_from = fma(crossing->from, ray->along.z, ray->deep.z);
     crossing->z_to = fma(crossing->to, ray->along.z, ray->deep.z);
     crossing->length = model_length(ray->scale, crossing->from, crossing->z_from, crossing->to, crossing->z_to,
-                                    cells->depth_origin);
+                                    cells->depths);
     crossing->weight = crossing->length
                      * (float)cells->counts[(walk->tile_j * cells->tiles_wide + walk->tile_i) * SLABS + slab];
     return true;
 }
 
 // r at a share of a crossing's length.
-inline float r_at(const Crossing *crossing, float share, float depth_origin)
+inline float r_at(const Crossing *crossing, float share, Depths depths)
 {
 #ifdef PARALLEL
     return mix(crossing->from, crossing->to, share);
 #else
     // Linear in model space: projective here, weighted by the depths of the ends
-    const float near_end = (1.0f - share) * reciprocal_depth(crossing->z_to, depth_origin);
-    const float far_end = share * reciprocal_depth(crossing->z_from, depth_origin);
+    const float near_end = (1.0f - share) * reciprocal_depth(crossing->z_to, depths);
+    const float far_end = share * reciprocal_depth(crossing->z_from, depths);
     return (near_end * crossing->from + far_end * crossing->to) / (near_end + far_end);
 #endif
 }
@@ -170,7 +171,7 @@ __kernel void preview(
         return;
     }
     const Cells cells = {&ray, masks, counts, (lists_wide + TILE - 1) >> TILE_SHIFT, (lists_high + TILE - 1) >> TILE_SHIFT,
-                         0.5f * (float)lists_wide, 0.5f * (float)lists_high, depth_origin, first_depth, slabs_per_depth};
+                         0.5f * (float)lists_wide, 0.5f * (float)lists_high, DEPTHS, first_depth, slabs_per_depth};
 
     float weight = 0.0f;
     Crossing crossing;
@@ -196,7 +197,7 @@ __kernel void preview(
         while (halves <= 2 * samples && (float)halves * half_part < weight_until) {
             const float share = more ? clamp(((float)halves * half_part - weight_before) / crossing.weight, 0.0f, 1.0f) : 0.0f;
             if (halves & 1) {
-                const float r = r_at(&crossing, share, depth_origin);
+                const float r = r_at(&crossing, share, DEPTHS);
                 const float z = fma(r, ray.along.z, ray.deep.z);
                 const int i = clamp((int)floor(fma(r, ray.along.x, ray.deep.x) + cells.half_wide), 0, lists_wide - 1);
                 const int j = clamp((int)floor(fma(r, ray.along.y, ray.deep.y) + cells.half_high), 0, lists_high - 1);

@@ -6,6 +6,7 @@
 //
 // -D OFFSET_T           type of an offset into the supersegments: uint or ulong
 // -D PARALLEL, SHIFTED  the depth coordinate, see common/list_space.cl
+// -D FAR_ENTRIES        see common/list_space.cl
 // -D COMPENSATED        see common/over.cl
 // -D PACKED             the form of the supersegments, see common/supersegments.cl
 // -D CROPPED            only some regions are drawn, see common/cropping.cl
@@ -151,7 +152,7 @@ __kernel void raycast(
             const int edge_i = along.x > 0.0f ? i | (TILE - 1) : i & ~(TILE - 1);
             const int edge_j = along.y > 0.0f ? j | (TILE - 1) : j & ~(TILE - 1);
             const ulong mask = masks[(j >> TILE_SHIFT) * tiles_wide + (i >> TILE_SHIFT)];
-            const int slab = slab_of(depth_offset(z, depth_origin), first_depth, slabs_per_depth);
+            const int slab = slab_of(depth_offset(z, DEPTHS), first_depth, slabs_per_depth);
             const ulong ahead = mask & (away ? slabs_from(slab) : slabs_to(slab));
             const int nearest = away ? (int)popcount((ahead & -ahead) - 1) : SLABS - 1 - (int)clz(ahead);
             if (ahead == 0 || nearest != slab) {
@@ -160,7 +161,7 @@ __kernel void raycast(
                                      along.y != 0.0f ? CROSSING_V(edge_j) : INFINITY);
                 if (ahead != 0 && along.z != 0.0f) {
                     const float face = first_depth + (float)(away ? nearest : nearest + 1) / slabs_per_depth;
-                    r_until = fmin(r_until, (depth_coordinate(face, depth_origin) - deep.z) * inverse_z);
+                    r_until = fmin(r_until, (depth_coordinate(face, DEPTHS) - deep.z) * inverse_z);
                 }
                 // The list that steps from list to list would have reached, by the crossings of its borders: where r_until
                 // lies by its coordinates, one back or one on where rounding has it otherwise
@@ -230,12 +231,12 @@ __kernel void raycast(
                         continue;
                     const float z_from = fma(r_from, along.z, deep.z);
                     const float z_to = fma(r_to, along.z, deep.z);
-                    const float length_crossed = model_length(ray.scale, r_from, z_from, r_to, z_to, depth_origin);
+                    const float length_crossed = model_length(ray.scale, r_from, z_from, r_to, z_to, DEPTHS);
                     const float optical_depth = fmin(medium.w * length_crossed, MAX_OPTICAL_DEPTH);
                     if (!(optical_depth > 0.0f))
                         continue;
-                    const float begins = fmax(ray_depth(&ray, r_from, z_from, depth_origin) + depth_shift, t_reached);
-                    t_reached = fmax(ray_depth(&ray, r_to, z_to, depth_origin) + depth_shift, begins);
+                    const float begins = fmax(ray_depth(&ray, r_from, z_from, DEPTHS) + depth_shift, t_reached);
+                    t_reached = fmax(ray_depth(&ray, r_to, z_to, DEPTHS) + depth_shift, begins);
                     if (slot < capacity) {
                         __global float *segment = pool + segment_place(band_ray, slot, capacity, 0);
                         segment[SEGMENT_FROM * RAY_BLOCK] = begins;
@@ -249,7 +250,7 @@ __kernel void raycast(
                     absorbed += optical_depth;
                 }
 #else
-                const float length_crossed = length_drawn(&ray, from, to, depth_origin);
+                const float length_crossed = length_drawn(&ray, from, to, DEPTHS);
 #ifdef FIRST_HIT
                 const float tau = medium.w * length_crossed;
                 met = accumulated ? met + tau : tau;
@@ -298,7 +299,7 @@ __kernel void raycast(
     }
 #elif defined(FIRST_HIT)
     const float z_hit = fma(r_hit, along.z, deep.z);
-    const float passed_by = model_length(ray.scale, r_begin, start.z, r_hit, z_hit, depth_origin);
+    const float passed_by = model_length(ray.scale, r_begin, start.z, r_hit, z_hit, DEPTHS);
     image[place] = hit ? ray.t_begin + passed_by / model_speed(forms, a, b) : NOTHING;
 #else
     image[place] = composited(color, transmittance, rest);

@@ -57,7 +57,7 @@ __kernel void render_volume(
     __global const float4 *table,
     int entries,
     float low, float per_scalar,
-    __global const uchar *visible, // blocks that are not transparent, see grid/volume_blocks.cl
+    __global const uchar *reaches, // of the blocks, see grid/volume_blocks.cl
     int4 blocks,                   // along x, y, z
     SHADING_PARAMETERS             // see common/shading.cl
     __global const float *forms,          // see begin_march
@@ -99,26 +99,31 @@ __kernel void render_volume(
 #endif
     March march;
     if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, t_end)) {
-        const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks SHADING_ARGUMENTS};
+        const Medium medium = {voxels, size, table, entries, low, per_scalar, reaches, blocks SHADING_ARGUMENTS};
 #ifdef CROPPED
         const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, a, b, regions);
 #endif
         int k = first_step;
         const int end = march.steps - first_step > steps ? first_step + steps : march.steps;
+        float front = step_face(&march, k);
         while (k < end && transmittance > transmittance_cutoff) {
             const int empty = empty_steps(&march, &medium, k, end, 1);
             k += empty;
-            if (empty > 0)
+            if (empty > 0) {
+                front = step_face(&march, k);
                 continue;
-            float4 step = step_medium(&march, &medium, k, step_face(&march, k), step_face(&march, k + 1));
+            }
+            const float back = step_face(&march, k + 1);
+            float4 step = step_medium(&march, &medium, k, front, back);
 #ifdef CROPPED
-            step.w *= kept_share(&kept, step_face(&march, k), step_face(&march, k + 1));
+            step.w *= kept_share(&kept, front, back);
 #endif
 #ifdef OPACITY_MULTIPLIER
             step.w *= opacity_multiplier;
 #endif
             const float weight = transmittance * opacity_of(step.w); // over, front to back
             composite_over(&color, &transmittance, &rest, weight, step.xyz);
+            front = back;
             ++k;
         }
     }

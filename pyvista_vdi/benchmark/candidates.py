@@ -198,7 +198,7 @@ class VDIRenderer:
     ) -> Image:
         """Draw a frame; premultiplied RGBA (H, W, 4) on the host."""
         width, height = size or self._size
-        with self._runtime.buffer((height, width, 4), name="image") as image:
+        with self._runtime.result((height, width, 4), name="image") as image:
             self._prepared.render(
                 camera,
                 (width, height),
@@ -217,7 +217,12 @@ class VDIRenderer:
 
 
 def take_turns(
-    runtime: Runtime, steps: Mapping[str, Step], repeats: int, *, warm_up: bool = True
+    runtime: Runtime,
+    steps: Mapping[str, Step],
+    repeats: int,
+    *,
+    warm_up: bool = True,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, dict[str, list[float]]]:
     """Time pieces of work, one after the other in turn.
 
@@ -231,6 +236,8 @@ def take_turns(
         How often each is timed.
     warm_up : bool
         Do each once before, so that nothing is compiled or uploaded while it is timed.
+    clock : callable
+        Seconds; the wall's by default.
 
     Returns
     -------
@@ -247,9 +254,9 @@ def take_turns(
         for _ in range(repeats):
             for name, step in steps.items():
                 before = profile.kernel_seconds()
-                begin = time.perf_counter()
+                begin = clock()
                 step()
-                taken[name]["clock"].append(time.perf_counter() - begin)
+                taken[name]["clock"].append(clock() - begin)
                 if (kernels := profile.kernel_seconds() - before) > 0:
                     taken[name]["device"].append(kernels)
     return taken

@@ -30,7 +30,7 @@ def generate(options: argparse.Namespace) -> int:
     target = checked_target(options.output)
     file_arguments = file_options(options)
     arguments = classification(options)
-    Classification(arguments, "generate")  # refused before the volume is read
+    looks = Classification(arguments, "generate")  # refused before the volume is read
     occlusion = ambient_occlusion(options)
     volume = read_volume(options)
     for name in ("scalars", "preference"):  # the array has been chosen
@@ -43,6 +43,7 @@ def generate(options: argparse.Namespace) -> int:
         criterion=options.criterion,
         ambient_occlusion=occlusion,
         memory_limit=options.memory_limit,
+        transfer_function=looks.transfer_function(volume),
     )
     print(
         f"{volume.dimensions[0]} x {volume.dimensions[1]} x {volume.dimensions[2]} points, "

@@ -175,7 +175,10 @@ class DeviceBuffer:
     writable : bool
         Whether :meth:`Runtime.write` and :meth:`Runtime.fill` may change it.
     readers : set of int or None
-        Where the memory is a caller's array: the queues that kernels read it on.
+        Where the memory is a host array's: the queues whose kernels use it.
+    host : numpy.ndarray or None
+        The array whose memory it is and that kernels write, of :meth:`Runtime.result` and
+        :meth:`Runtime.target` on a CPU device.
     """
 
     def __init__(
@@ -194,6 +197,7 @@ class DeviceBuffer:
         self.name = name
         self.writable = writable
         self.readers: set[int] | None = None
+        self.host: NDArray[Any] | None = None
         self._memory = memory
         self._finalizer = weakref.finalize(self, _release, memory, on_release)
         self._finalizer.atexit = False  # the driver frees everything at exit

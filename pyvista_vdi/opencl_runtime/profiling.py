@@ -24,7 +24,8 @@ class KernelTime:
     Attributes
     ----------
     name : str
-        Kernel, or ``[write]``, ``[read]``, ``[fill]`` for transfers.
+        Kernel, or ``[write]``, ``[read]``, ``[fill]`` for transfers; ``[map]`` where what was
+        written in place is read.
     calls : int
         How often it ran.
     total_ms, mean_ms : float

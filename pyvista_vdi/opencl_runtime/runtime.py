@@ -24,7 +24,13 @@ from pyvista_vdi.opencl_runtime.arguments import (
     driver_argument,
     preferred_group,
 )
-from pyvista_vdi.opencl_runtime.buffers import DeviceBuffer, Ledger, bytes_text, shape_of
+from pyvista_vdi.opencl_runtime.buffers import (
+    DeviceBuffer,
+    Ledger,
+    aligned_empty,
+    bytes_text,
+    shape_of,
+)
 from pyvista_vdi.opencl_runtime.devices import Candidate, DeviceInfo, drivers_lost, opencl
 from pyvista_vdi.opencl_runtime.profiling import KernelTime, Profile, profiling_wanted, table
 from pyvista_vdi.opencl_runtime.programs import Define, Kernel, ProgramCache
@@ -260,6 +266,42 @@ class Runtime:
         access = flags.READ_ONLY if read_only else flags.READ_WRITE
         return self._allocate(access, shape, dtype, name, None, writable=True)
 
+    def result(
+        self, shape: tuple[int, ...], dtype: DTypeLike = np.float32, name: str = "result"
+    ) -> DeviceBuffer:
+        """Uninitialised memory for kernels to write, downloaded when they have.
+
+        On a CPU device it is the memory of the array that :meth:`download` returns, so that nothing
+        is copied, and that array holds what is written afterwards, too.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Shape in elements; zero is allowed.
+        dtype : dtype_like, default: numpy.float32
+            Element type.
+        name : str, default: "result"
+            What it holds; messages say it.
+
+        Returns
+        -------
+        DeviceBuffer
+            As of :meth:`buffer`.
+
+        Raises
+        ------
+        DeviceMemoryError
+            As for :meth:`buffer`.
+        """
+        dtype = np.dtype(dtype)
+        shape = shape_of(shape, dtype)
+        if not self.is_cpu or 0 in shape:
+            return self.buffer(shape, dtype, name)
+        flags = opencl().mem_flags
+        return self._allocate(
+            flags.READ_WRITE | flags.USE_HOST_PTR, shape, dtype, name, None, writable=True
+        )
+
     def upload(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
         """An array's values on the device, for kernels to read.
 
@@ -287,13 +329,56 @@ class Runtime:
         shape = np.shape(array)
         array = np.ascontiguousarray(array)
         flags = opencl().mem_flags
-        in_place = self.is_cpu and array.nbytes > 0 and array.ctypes.data % self._alignment == 0
+        in_place = self._in_place(array)
         if self._turns.worker is not None and not in_place and array.nbytes > _COPY_BYTES:
             return self._upload_in_pieces(array.reshape(shape), name)
         source = flags.USE_HOST_PTR if in_place else flags.COPY_HOST_PTR
         return self._allocate(
             flags.READ_ONLY | source, shape, array.dtype, name, array, writable=False
         )
+
+    def target(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
+        """Memory for kernels to write what an array is to hold; :meth:`download` brings it there.
+
+        A CPU device writes into an array that is aligned for it in place, and the download into
+        that very array copies nothing.
+
+        Parameters
+        ----------
+        array : numpy.ndarray
+            C-contiguous and writable; what is in it is not read. Leave it alone until the
+            download.
+        name : str, default: "array"
+            What it is to hold; messages say it.
+
+        Returns
+        -------
+        DeviceBuffer
+            Of the array's shape and dtype, uninitialised.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If the array is not C-contiguous or not writable.
+        DeviceMemoryError
+            As for :meth:`buffer`.
+        """
+        if not (array.flags.c_contiguous and array.flags.writeable):
+            raise InvalidArgumentError(
+                f"the array for {name!r} must be C-contiguous and writable; its strides are "
+                f"{array.strides}, writeable={array.flags.writeable}"
+            )
+        flags = opencl().mem_flags
+        if not self._in_place(array):
+            return self._allocate(
+                flags.READ_WRITE, array.shape, array.dtype, name, None, writable=True
+            )
+        access = flags.READ_WRITE | flags.USE_HOST_PTR
+        return self._allocate(access, array.shape, array.dtype, name, array, writable=True)
+
+    def _in_place(self, array: NDArray[Any]) -> bool:
+        """Whether kernels can use a C-contiguous array where it is."""
+        return self.is_cpu and array.nbytes > 0 and array.ctypes.data % self._alignment == 0
 
     def _upload_in_pieces(self, array: NDArray[Any], name: str) -> DeviceBuffer:
         """As :meth:`upload`; a driver that makes a buffer from an array keeps Python's lock."""
@@ -339,15 +424,19 @@ class Runtime:
             raise InvalidArgumentError(
                 f"{count} elements were asked of the buffer {buffer.name!r}, which has {elements}"
             )
-        shape = buffer.shape if count is None else (count,)
+        if out is None and count is None and buffer.host is not None:
+            out = buffer.host
         if out is None:
-            out = np.empty(shape, buffer.dtype)
+            out = np.empty(buffer.shape if count is None else count, buffer.dtype)
         check_host_array(out, buffer, elements if count is None else count)
         if not out.flags.writeable:
             raise InvalidArgumentError(f"the target for {buffer.name!r} is not writable")
         if out.nbytes:
             with self._driver(f"reading {out.nbytes} bytes of the buffer {buffer.name!r}"):
-                self._copy("[read]", memory, out, to_host=True)
+                if out is buffer.host:
+                    self._map(memory, out)
+                else:
+                    self._copy("[read]", memory, out, to_host=True)
         return out
 
     def write(self, buffer: DeviceBuffer, array: NDArray[Any], *, first: int | None = None) -> None:
@@ -415,6 +504,7 @@ class Runtime:
         if buffer.nbytes:
             with self._driver(f"filling the buffer {buffer.name!r}"):
                 event = opencl().enqueue_fill_buffer(self._queue, memory, pattern, 0, buffer.nbytes)
+                self._note_reader(buffer)
                 self._record("[fill]", event)
                 if self._turns.worker is not None:
                     self._queue.finish()  # nothing of this thread runs when its turn is over
@@ -442,12 +532,15 @@ class Runtime:
         cl = opencl()
         nbytes = int(np.prod(shape, dtype=object)) * dtype.itemsize
         in_place = bool(flags & cl.mem_flags.USE_HOST_PTR)
-        taken = 0 if in_place else max(nbytes, dtype.itemsize)  # drivers refuse size 0
-        if in_place:
+        callers = in_place and host is not None
+        taken = 0 if callers else max(nbytes, dtype.itemsize)  # drivers refuse size 0
+        if callers:
             # No memory is taken, but the limit per buffer holds for it as well.
             self._ledger.check_size(name, nbytes, self.info.max_allocation, self.info.global_memory)
         reserved = self._ledger.take(name, taken, self.info.max_allocation, self.info.global_memory)
         try:
+            if in_place and host is None:
+                host = aligned_empty(shape, dtype)
             with self._driver(f"allocating {bytes_text(nbytes)} for the buffer {name!r}"):
                 if host is None or nbytes == 0:
                     flags &= ~cl.mem_flags.COPY_HOST_PTR
@@ -467,6 +560,7 @@ class Runtime:
 
         buffer = DeviceBuffer(memory, shape, dtype, name, on_release, writable=writable)
         buffer.readers = readers
+        buffer.host = host if in_place and writable else None
         return buffer
 
     def _copy(
@@ -492,6 +586,20 @@ class Runtime:
             else:
                 ends = {"dest": memory, "src": part, "dst_offset": offset + start}
             self._record(label, opencl().enqueue_copy(self._queue, **ends, is_blocking=True))
+
+    def _map(self, memory: Any, host: NDArray[Any]) -> None:
+        """Have an array that kernels wrote in place hold what they wrote.
+
+        That is what mapping a buffer is for; the memory being the array's, nothing is copied, and
+        the values stay when it is unmapped.
+        """
+        cl = opencl()
+        self._turns.checkpoint()
+        mapped, event = cl.enqueue_map_buffer(
+            self._queue, memory, cl.map_flags.READ, 0, host.shape, host.dtype, is_blocking=True
+        )
+        self._record("[map]", event)
+        mapped.base.release(self._queue)
 
     def _writable_memory(self, buffer: DeviceBuffer) -> Any:
         if not buffer.writable:

@@ -10,13 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import VTK_FLOAT, vtkFloatArray
-from vtkmodules.vtkRenderingCore import vtkActor2D, vtkVolume
 from vtkmodules.vtkRenderingOpenGL2 import vtkPixelBufferObject, vtkTextureObject
 
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.coverage import bounds_corners
+from pyvista_vdi.opencl_runtime import aligned_empty
 
 Matrix = NDArray[np.float64]
+
+#: Left, bottom, right and top in pixels of the viewport; right and top are outside.
+Area = tuple[int, int, int, int]
+
+#: Pixels whose depth is converted at a time.
+_BLOCK = 16384
 
 _GL_VIEWPORT = 0x0BA2
 _GL_DRAW_FRAMEBUFFER_BINDING = 0x8CA6
@@ -55,9 +61,7 @@ class Frame:
     @classmethod
     def current(cls, renderer: Any, model_transform: Matrix) -> Frame:
         """Read the frame that ``renderer`` is drawing."""
-        viewport = [0, 0, 0, 0]
-        renderer.GetRenderWindow().GetState().vtkglGetIntegerv(_GL_VIEWPORT, viewport)
-        x, y, width, height = viewport
+        (x, y), (width, height) = viewport(renderer)
         vtk_camera = renderer.GetActiveCamera()
         aspect = renderer.GetTiledAspectRatio()
         # Not GetCompositeProjectionTransformMatrix: that one turns stereo off
@@ -163,70 +167,92 @@ class Frame:
 
     def depths_of(self, bounds: tuple[float, ...]) -> tuple[float, float]:
         """Return the least and the largest view depth of a box in the model frame."""
-        return _depths(self.camera.model_transform, bounds)
+        return depths_of(self.camera.model_transform, bounds)
 
-    def sees_opaque_before(self, renderer: Any, actor: Any, bounds: tuple[float, ...]) -> bool:
-        """Whether something opaque may hide a part of the VDI, so that depth must be read.
+    def opaque_z(self, renderer: Any, area: Area) -> NDArray[np.float32]:
+        """Read the window depth of what has been drawn in an area.
 
-        Conservative: what has no bounds counts, and so does everything a lower layer drew if
-        its depth was kept.
+        Parameters
+        ----------
+        renderer : vtkRenderer
+            It is drawing the frame.
+        area : tuple of int
+            Left, bottom, right and top in pixels of the viewport; right and top are outside.
+
+        Returns
+        -------
+        numpy.ndarray
+            float32 (h, w), bottom row first, 1 where nothing is.
         """
-        if renderer.GetPreserveDepthBuffer():
-            return True
-        farthest = self.depths_of(bounds)[1]
-        props = renderer.GetViewProps()
-        for i in range(props.GetNumberOfItems()):
-            prop = props.GetItemAsObject(i)
-            if (
-                prop is actor
-                or not prop.GetVisibility()
-                or isinstance(prop, vtkActor2D | vtkVolume)
-            ):
-                continue
-            if not prop.HasOpaqueGeometry():
-                continue
-            box = prop.GetBounds()
-            if box is None or box[0] > box[1] or _depths(self.to_view, box)[0] < farthest:
-                return True
-        return False
-
-    def opaque_depth(self, renderer: Any) -> NDArray[np.float32]:
-        """Read the depth of what has been drawn, float32 (H, W), top row first, world units."""
         window = renderer.GetRenderWindow()
         bound = [0]
         window.GetState().vtkglGetIntegerv(_GL_DRAW_FRAMEBUFFER_BINDING, bound)
+        left, bottom, right, top = area
+        corner, size = (
+            (self.origin[0] + left, self.origin[1] + bottom),
+            (right - left, top - bottom),
+        )
         if bound[0] == window.GetRenderFramebuffer().GetFBOIndex():
-            z = self._window_depth(window)
+            z = _window_depth(window, corner, size)
         else:
-            z = self._framebuffer_depth(window)
-        depth = self.view_depth(z).astype(np.float32)
-        return np.ascontiguousarray(depth.reshape(self.size[::-1])[::-1])
+            z = _framebuffer_depth(window, corner, size)
+        return z.reshape(size[::-1])
 
-    def _window_depth(self, window: Any) -> NDArray[Any]:
-        (x, y), (width, height) = self.origin, self.size
-        values = vtkFloatArray()
-        window.GetZbufferData(x, y, x + width - 1, y + height - 1, values)
-        return vtk_to_numpy(values)  # type: ignore[no-any-return]
+    def depth_image(self, z: NDArray[np.float32], area: Area) -> NDArray[np.float32] | None:
+        """Return the view depth of what :meth:`opaque_z` has read, float32 (H, W), top row first.
 
-    def _framebuffer_depth(self, window: Any) -> NDArray[Any]:
-        """Copy the depth of a render pass's own framebuffer (SSAA, EDL, blur ...)."""
-        width, height = self.size
-        texture = vtkTextureObject()
-        texture.SetContext(window)
-        texture.AllocateDepth(width, height, vtkTextureObject.Float32)
-        samples = window.GetMultiSamples()
-        window.SetMultiSamples(0)  # or the copy resolves the window's framebuffer instead
-        try:
-            texture.CopyFromFrameBuffer(*self.origin, 0, 0, width, height)
-        finally:
-            window.SetMultiSamples(samples)
-        pixels: vtkPixelBufferObject = texture.Download()
-        z = np.empty(width * height, dtype=np.float32)
-        pixels.Download2D(VTK_FLOAT, z, [width, height], 1, [0, 0])
-        pixels.ReleaseMemory()
-        pixels.UnBind()  # it binds itself to be released, and would catch VTK's next glReadPixels
-        texture.ReleaseGraphicsResources(window)
-        return z
+        World units; infinite where nothing is. ``None`` if nothing is anywhere.
+        """
+        if z.min() >= 1.0:
+            return None
+        left, bottom, right, top = area
+        depth = aligned_empty(self.size[::-1], np.float32)
+        depth.fill(np.inf)
+        there = depth[self.size[1] - top : self.size[1] - bottom, left:right]
+        rows = max(1, _BLOCK // (right - left))
+        for first in range(0, top - bottom, rows):  # so that what is in between stays in the cache
+            there[first : first + rows] = self.view_depth(z[::-1][first : first + rows])
+        return depth
+
+
+def _window_depth(
+    window: Any, corner: tuple[int, int], size: tuple[int, int]
+) -> NDArray[np.float32]:
+    (x, y), (width, height) = corner, size
+    values = vtkFloatArray()
+    window.GetZbufferData(x, y, x + width - 1, y + height - 1, values)
+    return vtk_to_numpy(values)  # type: ignore[no-any-return]
+
+
+def _framebuffer_depth(
+    window: Any, corner: tuple[int, int], size: tuple[int, int]
+) -> NDArray[np.float32]:
+    """Copy the depth of a render pass's own framebuffer (SSAA, EDL, blur ...)."""
+    width, height = size
+    texture = vtkTextureObject()
+    texture.SetContext(window)
+    texture.AllocateDepth(width, height, vtkTextureObject.Float32)
+    samples = window.GetMultiSamples()
+    window.SetMultiSamples(0)  # or the copy resolves the window's framebuffer instead
+    try:
+        texture.CopyFromFrameBuffer(*corner, 0, 0, width, height)
+    finally:
+        window.SetMultiSamples(samples)
+    pixels: vtkPixelBufferObject = texture.Download()
+    z = np.empty(width * height, dtype=np.float32)
+    pixels.Download2D(VTK_FLOAT, z, [width, height], 1, [0, 0])
+    pixels.ReleaseMemory()
+    pixels.UnBind()  # it binds itself to be released, and would catch VTK's next glReadPixels
+    texture.ReleaseGraphicsResources(window)
+    return z
+
+
+def viewport(renderer: Any) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return OpenGL's viewport while a renderer draws: lower left corner and size, pixels."""
+    values = [0, 0, 0, 0]
+    renderer.GetRenderWindow().GetState().vtkglGetIntegerv(_GL_VIEWPORT, values)
+    x, y, width, height = values
+    return (x, y), (width, height)
 
 
 def sampled(depth: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
@@ -298,7 +324,28 @@ def as_array(matrix: Any) -> Matrix:
     return np.array(matrix.GetData(), dtype=np.float64).reshape(4, 4)
 
 
-def _depths(to_view: Matrix, bounds: tuple[float, ...]) -> tuple[float, float]:
+def rectangle(
+    frame: Frame, bounds: tuple[float, ...], *, margin: float = 0.0
+) -> NDArray[np.float64] | None:
+    """Return what bounds cover of the viewport, pixels, float64 rows (low, high) by (x, y).
+
+    From the lower left corner, and ``margin`` pixels wider on each side. All of it if they reach
+    behind the eye; ``None`` if none of it.
+    """
+    camera, size = frame.camera, np.asarray(frame.size, dtype=np.float64)
+    corners = np.column_stack([bounds_corners(bounds), np.ones(8)])
+    u, v, _, w = camera.viewport_matrix(frame.size) @ (camera.model_to_view @ corners.T)
+    if not camera.parallel_projection and w.min() <= 0:
+        return None if w.max() <= 0 else np.stack([0 * size, size])
+    places = (np.stack([u, v]) / w + 1) / 2 * size[:, None]
+    low, high = places.min(axis=1) - margin, places.max(axis=1) + margin
+    if (high < 0).any() or (low > size).any():
+        return None
+    return np.stack([low, high])
+
+
+def depths_of(to_view: Matrix, bounds: tuple[float, ...]) -> tuple[float, float]:
+    """Return the least and the largest view depth of a box that a matrix brings to view space."""
     corners = bounds_corners(bounds)
     depth = -(corners @ to_view[2, :3] + to_view[2, 3])
     return float(depth.min()), float(depth.max())

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.coverage import bounds_corners
 from pyvista_vdi.joint import JointImage, PlacedVDI, joint_image
 from pyvista_vdi.vdi import VDI
-from pyvista_vdi.vtk_pipeline.frame import Frame, sampled
+from pyvista_vdi.vtk_pipeline.depth import OpaqueDepths
+from pyvista_vdi.vtk_pipeline.frame import Frame, rectangle, sampled
 from pyvista_vdi.vtk_pipeline.interaction import WindowClock
 
 #: Pictures kept: two eyes, and two more for other renderers.
@@ -95,7 +95,7 @@ class Part:
     Attributes
     ----------
     image : numpy.ndarray
-        Premultiplied RGBA, float32 (H, W, 4), bottom row first; 0 where others show it.
+        Premultiplied RGBA, float32 (H, W, 4), top row first; 0 where others show it.
     number : int
         By which an upload is known: below 0, and another for each.
     frame : Frame
@@ -123,10 +123,8 @@ class _Picture:
         """Return what actor ``index`` shows."""
         number = self.numbers.setdefault(index, next(_numbers))
         if index not in self.parts:
-            mine = (self.joint.owner == index)[::-1]  # a texture's first row is the bottom one
-            self.parts[index] = np.where(
-                mine[..., np.newaxis], self.joint.image[::-1], np.float32(0)
-            )
+            mine = self.joint.owner == index
+            self.parts[index] = np.where(mine[..., np.newaxis], self.joint.image, np.float32(0))
         return Part(self.parts[index], number, sight.frame, full_size)
 
 
@@ -172,7 +170,10 @@ class Overlaps:
         groups = own.clock.of_frame.setdefault(("overlaps", renderer.GetAddressAsString("")), {})
         key, group = groups.pop(id(own.painter), (None, None))
         if group is None or key != own.key:
-            for members in _overlapping(others(own, renderer)):
+            sights = others(own, renderer)
+            if len(sights) == 1:
+                return None
+            for members in _overlapping(sights):
                 together = _Group(members)
                 groups.update({id(sight.painter): (sight.key, together) for sight in members})
             _, group = groups.pop(id(own.painter), (None, _Group([own])))
@@ -220,7 +221,7 @@ class Overlaps:
 
 def same_depth(a: NDArray[np.float32] | None, b: NDArray[np.float32] | None) -> bool:
     """Whether rays end at the same depths; ``None`` where none end early."""
-    if a is None or b is None:
+    if a is b or a is None or b is None:
         return a is b
     return np.array_equal(a, b)
 
@@ -231,10 +232,8 @@ def _key(sights: Sequence[Sight], full: tuple[int, int]) -> Any:
 
 def _depth(sights: Sequence[Sight], renderer: Any) -> NDArray[np.float32] | None:
     """Return where rays end, read once for all; ``None`` if nothing opaque is in the way."""
-    if not any(s.frame.sees_opaque_before(renderer, s.actor, s.vdi.bounds) for s in sights):
-        return None
-    depth = sights[0].frame.opaque_depth(renderer)
-    return None if np.isposinf(depth).all() else depth
+    depths = OpaqueDepths.of(sights[0].clock)
+    return depths.read(renderer, [(sight.frame, sight.vdi.bounds) for sight in sights])
 
 
 def _raycast(
@@ -255,23 +254,6 @@ def _raycast(
     for sight in sights:  # as if each had drawn its own
         sight.clock.drawn(size, full, seconds / len(sights))
     return joint
-
-
-def rectangle(frame: Frame, bounds: tuple[float, ...]) -> NDArray[np.float64] | None:
-    """Return what bounds cover of the viewport, pixels, float64 rows (low, high) by (x, y).
-
-    All of it if they reach behind the eye; ``None`` if none of it.
-    """
-    camera, size = frame.camera, np.asarray(frame.size, dtype=np.float64)
-    corners = np.column_stack([bounds_corners(bounds), np.ones(8)])
-    u, v, _, w = camera.viewport_matrix(frame.size) @ (camera.model_to_view @ corners.T)
-    if not camera.parallel_projection and w.min() <= 0:
-        return None if w.max() <= 0 else np.stack([0 * size, size])
-    places = (np.stack([u, v]) / w + 1) / 2 * size[:, None]
-    low, high = places.min(axis=1), places.max(axis=1)
-    if (high < 0).any() or (low > size).any():
-        return None
-    return np.stack([low, high])
 
 
 def _overlapping(sights: Sequence[Sight]) -> list[list[Sight]]:

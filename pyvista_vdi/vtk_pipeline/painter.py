@@ -17,17 +17,19 @@ from vtkmodules.vtkRenderingCore import vtkVolume
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.cropping import Cropping
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, UnsupportedError
-from pyvista_vdi.opencl_runtime import Runtime, get_runtime
+from pyvista_vdi.opencl_runtime import Runtime, aligned_empty, get_runtime
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.view_error import angle_from_generating_view
-from pyvista_vdi.vtk_pipeline.frame import Frame, as_array, sampled
+from pyvista_vdi.vtk_pipeline.depth import OpaqueDepths
+from pyvista_vdi.vtk_pipeline.frame import Frame, as_array, rectangle, sampled, viewport
 from pyvista_vdi.vtk_pipeline.inputs import Input
 from pyvista_vdi.vtk_pipeline.interaction import Interaction, WindowClock, reduced
-from pyvista_vdi.vtk_pipeline.overlap import Overlaps, Sight, rectangle, same_depth
+from pyvista_vdi.vtk_pipeline.overlap import Overlaps, Sight, same_depth
 from pyvista_vdi.vtk_pipeline.selection import Seen, Selection
+from pyvista_vdi.vtk_pipeline.shader import place_image
 from pyvista_vdi.vtk_pipeline.status import CornerTexts, VDIStatus
-from pyvista_vdi.vtk_pipeline.texture import ImageTexture
+from pyvista_vdi.vtk_pipeline.texture import ImageTexture, NoDepth
 from pyvista_vdi.vtk_pipeline.upkeep import Scene, Upkeep
 from pyvista_vdi.vtk_pipeline.view import View
 from pyvista_vdi.vtk_pipeline.voice import Voice
@@ -80,7 +82,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Drawn:
-    """An image, premultiplied RGBA, float32 (H, W, 4), bottom row first.
+    """An image, premultiplied RGBA, float32 (H, W, 4), top row first.
 
     Attributes
     ----------
@@ -92,12 +94,16 @@ class Drawn:
         By which an upload is known.
     joint : bool
         Whether it is a part of a picture that other actors show the rest of.
+    pixels : numpy.ndarray or None
+        The memory that the image begins, 1D: another image may be raycast into it when this one is
+        kept no longer.
     """
 
     image: Image
     task: Task | None = None
     number: int | None = None
     joint: bool = False
+    pixels: Image | None = None
 
     @property
     def preview(self) -> bool:
@@ -130,9 +136,11 @@ class Painter:
         self._active = vtkWeakReference()
         self._observed: set[str] = set()
         self._texture = ImageTexture()
+        self._no_depth = NoDepth()
         self._drawn: Any = weakref.ref(self)  # the VDI whose images are kept: none yet
         self._generation = 0
         self._images: dict[Any, Drawn] = {}
+        self._free: Image | None = None  # shown by no frame, not even the last
         self._raycasts = 0
         self._last = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
         self._scene: tuple[Camera, weakref.ref[WindowClock]] | None = None
@@ -185,8 +193,10 @@ class Painter:
         """Free the texture and the images kept, and end what goes on; a frame begins anew."""
         self.upkeep.close()
         self._texture.release()
+        self._no_depth.release()
         self.selection.release()
         self._images.clear()
+        self._free = None
 
     def take_settings(self, other: Painter) -> None:
         """Take over how dense another draws, what it allows and when it regenerates."""
@@ -247,6 +257,8 @@ class Painter:
         WindowClock.of(window).showed(drawn.preview)
         try:
             self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
+            self._no_depth.show(window, mapper)
+            place_image(self._actor.Get(), *viewport(renderer))
         except DeviceError as error:
             self._cannot_draw(error)
         self.texts.write(renderer, self.status)
@@ -255,6 +267,7 @@ class Painter:
     def end(self) -> None:
         """Let go of the texture unit."""
         self._texture.let_go()
+        self._no_depth.let_go()
         self.selection.let_go()
 
     def _guarded(self, draw: Callable[[Any, Any], Any], mapper: Any, renderer: Any) -> Any:
@@ -304,11 +317,7 @@ class Painter:
                 part.image, Task(part.frame, None, None, part.full_size), part.number, joint=True
             )
         vdi, frame, clock = sight.vdi, sight.frame, sight.clock
-        depth = None
-        if frame.sees_opaque_before(renderer, sight.actor, vdi.bounds):
-            depth = frame.opaque_depth(renderer)
-            if np.isposinf(depth).all():
-                depth = None
+        depth = OpaqueDepths.of(clock).read(renderer, [(frame, vdi.bounds)])
         task = Task(frame, sight.planes, depth, frame.size, **sight.looks)
         drawn = self._kept(task)
         if drawn is not None:
@@ -392,6 +401,7 @@ class Painter:
         except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
             self._voice.warn(f"the VDI cannot be picked: {type(error).__name__}: {error}", error)
             self.selection.show(window, selector, None, self.device)
+        self._no_depth.show(window, mapper)
 
     def preview_size(
         self, mapper: Any, renderer: Any, clock: WindowClock, full: tuple[int, int]
@@ -410,6 +420,8 @@ class Painter:
     def _raycast(self, vdi: VDI, task: Task, clock: WindowClock) -> Drawn:
         """Return the image, and keep it."""
         before = time.perf_counter()
+        pixels = self._pixels(task.frame.size)
+        width, height = task.frame.size
         image = render_vdi(
             vdi,
             task.frame.camera,
@@ -419,17 +431,31 @@ class Painter:
             cropping=task.cropping,
             opacity_multiplier=task.opacity_multiplier,
             device=self.device,
+            out=pixels[: height * width * 4].reshape(height, width, 4),
         )
         clock.drawn(task.frame.size, task.full_size, time.perf_counter() - before)
-        image = np.ascontiguousarray(image[::-1])  # a texture's first row is the bottom one
         self._raycasts += 1
-        drawn = Drawn(image, task, self._raycasts)
-        key = task.key
-        self._images.pop(key, None)
-        self._images[key] = drawn
-        while len(self._images) > _KEPT_IMAGES:
-            del self._images[next(iter(self._images))]
+        drawn = Drawn(image, task, self._raycasts, pixels=pixels)
+        self._keep(task.key, drawn)
         return drawn
+
+    def _keep(self, key: Any, drawn: Drawn) -> None:
+        """Keep an image; the memory of one that goes is for the next raycast."""
+        gone = self._images.pop(key, None)
+        self._images[key] = drawn
+        if len(self._images) > _KEPT_IMAGES:
+            gone = self._images.pop(next(iter(self._images)))
+        if gone is not None:
+            self._free = gone.pixels
+
+    def _pixels(self, size: tuple[int, int]) -> Image:
+        """Return memory for an image of this size, 1D and maybe longer: what is free, if it does.
+
+        Fresh memory costs a page fault for every 4096 bytes that are written.
+        """
+        wanted = size[0] * size[1] * 4
+        free, self._free = self._free, None
+        return aligned_empty(wanted, np.float32) if free is None or free.size < wanted else free
 
     # -- which renderer --------------------------------------------------------------------------
 
@@ -503,9 +529,7 @@ def place_proxy(proxy: vtkImageData, bounds: tuple[float, ...]) -> None:
 def _is_viewport(renderer: Any) -> bool:
     width, height, x, y = [0], [0], [0], [0]
     renderer.GetTiledSizeAndOrigin(width, height, x, y)
-    viewport = [0, 0, 0, 0]
-    renderer.GetRenderWindow().GetState().vtkglGetIntegerv(0x0BA2, viewport)
-    return viewport == [x[0], y[0], width[0], height[0]]
+    return viewport(renderer) == ((x[0], y[0]), (width[0], height[0]))
 
 
 def _sights(own: Sight, renderer: Any) -> list[Sight]:

@@ -1,6 +1,6 @@
 """What takes the place of VTK's ray caster in the fragment shader of a VDI's actor.
 
-The sampler is never set: VTK allows no uniform to be set in the frame that builds the shader, and
+The sampler is never set: VTK allows no sampler to be set in the frame that builds the shader, and
 its default is texture unit 0, where the mapper puts a texture.
 """
 
@@ -13,12 +13,14 @@ from vtkmodules.vtkRenderingCore import vtkHardwareSelector
 
 _DECLARATION = "//VTK::Base::Dec\nuniform sampler2D vdiImage;\n"
 
-#: The image is premultiplied RGBA of the whole viewport, bottom row first. finalizeRayCast keeps
-#: picking and window/level.
-_LOOKUP = """
-  vec4 clip = in_projectionMatrix * in_modelViewMatrix * in_volumeMatrix[0]
-            * vec4(ip_vertexPos, 1.0);
-  g_fragColor = texture(vdiImage, clip.xy / clip.w * 0.5 + 0.5);
+#: Where the viewport is in the framebuffer, pixels: left edge, upper edge, 1 / width, -1 / height.
+_VIEWPORT = "vdiViewport"
+
+#: The image is premultiplied RGBA of the whole viewport, top row first. The pixel's place is taken
+#: from its number: from a vertex position it would take three matrices, per pixel.
+#: finalizeRayCast keeps picking and window/level.
+_LOOKUP = f"""
+  g_fragColor = texture(vdiImage, (gl_FragCoord.xy - {_VIEWPORT}.xy) * {_VIEWPORT}.zw);
   finalizeRayCast();
 """
 
@@ -62,6 +64,13 @@ def show_image(actor: Any) -> None:
     if _replacement(shader) is None:
         shader.AddFragmentShaderReplacement("//VTK::Base::Dec", True, _DECLARATION, False)
     _replace(shader, _LOOKUP)
+
+
+def place_image(actor: Any, origin: tuple[int, int], size: tuple[int, int]) -> None:
+    """Say where in the framebuffer the viewport is that the image fills, pixels."""
+    (x, y), (width, height) = origin, size
+    place = (float(x), float(y + height), 1 / max(1, width), -1 / max(1, height))
+    actor.GetShaderProperty().GetFragmentCustomUniforms().SetUniform4f(_VIEWPORT, place)
 
 
 def show_first_hits(actor: Any, selection_pass: int) -> None:

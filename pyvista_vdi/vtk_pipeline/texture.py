@@ -1,4 +1,4 @@
-"""The texture in which the actor's shader looks up a frame's image."""
+"""The textures of a VDI's actor: the image that its shader looks up, and no depth."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from vtkmodules.vtkCommonCore import VTK_FLOAT
 from vtkmodules.vtkRenderingOpenGL2 import vtkTextureObject
 
 from pyvista_vdi.errors import DeviceError
+
+#: Window depth of nothing: 1 is the far plane.
+_FAR = np.ones(1, dtype=np.float32)
 
 
 class ImageTexture:
@@ -29,7 +32,7 @@ class ImageTexture:
         window : vtkRenderWindow
             Its context is current.
         image : numpy.ndarray
-            Premultiplied RGBA, float32 (H, W, 4), bottom row first.
+            RGBA, float32 (H, W, 4), its rows in the order that the shader takes them in.
         number : int, optional
             The same as last time if the image is; it is not uploaded again then.
         smooth : bool
@@ -77,3 +80,37 @@ class ImageTexture:
             if window is not None:
                 self._texture.ReleaseGraphicsResources(window)
         self._texture = self._uploaded = None
+
+
+class NoDepth:
+    """A depth texture of one texel, in place of the copy of the depth buffer that VTK would make.
+
+    VTK's volume mapper copies the whole depth buffer in each frame, for the ray caster that our
+    shader replaces: under MSAA that takes longer than to draw the image.
+    """
+
+    def __init__(self) -> None:
+        self._texture: Any = None
+
+    def show(self, window: Any, mapper: Any) -> None:
+        """Give it to a mapper for the frame that begins; the image's texture is active already."""
+        if self._texture is None:
+            self._texture = vtkTextureObject()
+        texture = self._texture
+        if texture.GetContext() is not window:
+            texture.SetContext(window)
+        if texture.GetHandle() == 0:
+            texture.CreateDepthFromRaw(1, 1, vtkTextureObject.Float32, VTK_FLOAT, _FAR)
+        mapper.SetSharedDepthTexture(texture)
+        texture.Activate()
+
+    def let_go(self) -> None:
+        """Give the texture unit back."""
+        if self._texture is not None:
+            self._texture.Deactivate()
+
+    def release(self) -> None:
+        """Free it. The mapper keeps the object, which the next frame fills anew."""
+        window = None if self._texture is None else self._texture.GetContext()
+        if window is not None:
+            self._texture.ReleaseGraphicsResources(window)

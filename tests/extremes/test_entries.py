@@ -5,12 +5,26 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from extreme_scenes import BOUND, WINDOW, check_views, field_volume, transfer, turned, view
+import strategies
+from extreme_scenes import (
+    BOUND,
+    WINDOW,
+    check_scene,
+    check_views,
+    field_volume,
+    slabs_vdi,
+    transfer,
+    turned,
+    view,
+)
+from oracle import explain
 
 from pyvista_vdi import Cropping, Shading, numerics, reference
+from pyvista_vdi.camera import Camera
 from pyvista_vdi.cropping import PRESETS
 from pyvista_vdi.device_volume import DeviceVolume
 from pyvista_vdi.generation import CRITERIA, generate_vdi
+from pyvista_vdi.raycast import PreparedVDI, render_vdi
 from pyvista_vdi.raycast_volume import raycast_volume
 from pyvista_vdi.reference.rays import pixel_ray
 from pyvista_vdi.transfer_function import TransferFunction
@@ -80,18 +94,10 @@ def test_needles(runtime, worst):
     function = transfer(unit_distance=5 * min(spacing))
     # Half the least spacing would be fourteen million steps, which float64 takes long to do
     step = volume.length / 2000
-    scene = (volume, camera, WINDOW, function)
-    exact = reference.volume_image(*scene, step)
-    image = raycast_volume(*scene, sample_distance=step, device=runtime)
-    worst("volume", np.abs(image - exact).max())
-    assert np.abs(image - exact).max() <= BOUND
-    # Depths are stored in float32, 32 of whose units are the whole chord: what is stored lies in
-    # the bounds, and so V_O sees all of it
-    vdi = generate_vdi(*scene, max_supersegments=8, sample_distance=step, device=runtime)
-    stored = reference.render(vdi, camera, WINDOW)
-    worst("VDI as it is stored", np.abs(stored - exact).max())
-    assert np.abs(stored - exact).max() <= BOUND
-    check_views(runtime, worst, vdi, turned(camera, volume, (0, 0.01), zoom=True))
+    views = turned(camera, volume, (0, 0.01), zoom=True)
+    vdi = check_scene(
+        runtime, worst, volume, function, camera, views, sample_distance=step, bound=BOUND
+    )
     # A staircase of lists so thin that rays from aside may pass between them
     check_views(runtime, worst, vdi, turned(camera, volume, (8,), zoom=True), least_drawn=0)
 
@@ -157,3 +163,62 @@ def test_far_entries_are_clipped_cropped_and_ended(runtime, worst, end):
     off = np.abs(image[..., 3] - exact).max()
     worst("volume", off)
     assert off <= BOUND
+
+
+# -- lists far behind the near plane ---------------------------------------------------------------
+
+EYE = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=16)
+
+
+def thin_slab(thickness, optical_depth=1.0, parallel=False):
+    """A slab at the far end of the bounds, two units behind their near depth."""
+    camera = EYE.replace(parallel_projection=parallel, parallel_scale=0.7)
+    return slabs_vdi(
+        camera, [[2 - thickness, 2]], optical_depth,
+        window=(4, 3), bounds=(-1, 1, -1, 1, -1, 1), depth_origin=9.0,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("precision", ["exact", "16-byte"])
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize(
+    ("thinness", "far"), [(100, False), (127, False), (130, True), (1e5, True)]
+)
+def test_v_o_sees_all_of_a_far_supersegment(runtime, worst, thinness, far, parallel, precision):
+    """Both forms of depth, on either side of the border: 128 thicknesses from the near plane."""
+    vdi = thin_slab(2 / thinness, parallel=parallel).with_precision(precision)
+    assert ("FAR_ENTRIES" in PreparedVDI(runtime, vdi).defines) is far
+    alpha = render_vdi(vdi, vdi.camera, (4, 3), device=runtime)[..., 3]
+    off = np.abs(alpha - reference.render(vdi, vdi.camera, (4, 3))[..., 3]).max()
+    worst("VDI at V_O", off)
+    assert off <= BOUND
+    check_views(runtime, worst, vdi, [EYE.azimuth(a) for a in (25, 90, 180)], least_drawn=0)
+
+
+@pytest.mark.parametrize(("thickness", "far"), [(1.1 * 2.0**-22, True), (0.9 * 2.0**-22, False)])
+def test_what_depths_cannot_tell_is_left_to_float32(thickness, far):
+    """Two units of depth, and a slab of a unit in the last place of them."""
+    assert numerics.lists_are_far(2.0, thickness, 2.0) is far
+
+
+def test_lists_far_away_but_not_thin_are_computed_in_float32_alone(runtime):
+    volume = field_volume()
+    vdi = generate_vdi(volume, view(volume), WINDOW, transfer(), device=runtime)
+    assert "FAR_ENTRIES" not in PreparedVDI(runtime, vdi).defines
+
+
+@pytest.mark.parametrize("precision", ["exact", "16-byte", "8-byte"])
+@pytest.mark.parametrize("kind", ["near", "around", "parallel"])
+def test_any_vdi_may_be_drawn_by_depths_relative_to_the_ray(
+    runtime, worst, monkeypatch, kind, precision
+):
+    """Nothing but rounding tells the two forms apart."""
+    rng = np.random.default_rng([4, 901])
+    vdi = strategies.random_vdi(rng, max_window=(9, 7)).with_precision(precision)
+    camera, size = strategies.random_view(rng, vdi, kind)
+    monkeypatch.setattr("pyvista_vdi.raycast.lists_are_far", lambda *_: True)
+    assert "FAR_ENTRIES" in PreparedVDI(runtime, vdi).defines
+    image = render_vdi(vdi, camera, size, device=runtime)
+    result = explain(vdi, camera, size, image, name=kind)
+    worst("random VDI", result.worst)
+    assert not result.failures

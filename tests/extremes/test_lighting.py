@@ -6,10 +6,11 @@ import itertools
 
 import numpy as np
 import pytest
-from extreme_scenes import FIELD, check_scene, field_volume, transfer, turned, view
+from extreme_scenes import BOUND, FIELD, check_scene, field_volume, transfer, turned, view
 
-from pyvista_vdi import Light, Lights, Shading
+from pyvista_vdi import Light, Lights, Shading, reference
 from pyvista_vdi.camera import Camera
+from pyvista_vdi.raycast_volume import raycast_volume
 from pyvista_vdi.volume import Volume
 
 pytestmark = pytest.mark.extremes
@@ -144,13 +145,37 @@ def test_rgba_of_one_opacity(runtime, worst):
 
 
 @pytest.mark.parametrize("power", [0.0, 1e-3, 1e3, 1e6])
-def test_highlights(runtime, worst, power):
-    """From everywhere to a point: a cosine's rounding is raised to the power with it."""
-    volume = field_volume()
-    shading = Shading(0.1, 0.5, 1.0, power)
-    # pow(c, p) of a cosine within 8 roundings: p 8 2^-24 of it, and no cosine is that near to 1
-    bound = 5e-5 if power <= 1e3 else 8 * power * 2.0**-24
-    check(runtime, worst, volume, transfer(shading=shading), bound=bound)
+def test_specular_powers(runtime, worst, power):
+    """From a highlight everywhere to one that hardly a sample is in."""
+    check(runtime, worst, field_volume(), transfer(shading=Shading(0.1, 0.5, 1.0, power)))
+
+
+@pytest.mark.parametrize("lit_by", ["headlight", "lamp", "back lamp"])
+@pytest.mark.parametrize("power", [99.0, 101.0, 1e3, 1e4, 1e5, 1e6])
+def test_the_middle_of_a_highlight(runtime, worst, power, lit_by):
+    """A ramp seen along its gradient, and nothing but its highlight, from the middle to its rim."""
+    ramp = np.broadcast_to(np.linspace(0.2, 1, 9)[:, None, None], (9, 4, 5))
+    volume = Volume(ramp.astype(np.float32))
+    centre = np.reshape(volume.bounds, (3, 2)).mean(axis=1)
+    eye = centre - [0, 0, 20]  # before the thin side, where VTK's normals look away
+    # The rim, where a thousandth is left, is half way to the window's edge
+    angle = 2 * np.degrees(np.arccos(np.exp(np.log(1e-3) / power)))
+    camera = Camera(eye, centre, (0, 1, 0), view_angle=float(angle))
+    lights = None
+    if lit_by != "headlight":
+        light = Light(
+            "scene", eye if lit_by == "lamp" else centre * 2 - eye, centre, positional=True
+        )
+        lights = Lights((light,), two_sided=lit_by == "back lamp")
+    function = transfer(opacity=0.9, shading=Shading(0.0, 0.0, 1.0, power))
+    scene = (volume, camera, (9, 7), function)
+    exact = reference.volume_image(*scene, None, lights)
+    image = raycast_volume(*scene, lights=lights, device=runtime)
+    assert exact[..., 0].max() > 0.3
+    assert exact[..., 0].min() < 0.2
+    off = np.abs(image - exact).max()
+    worst(f"power {power:g}", off)
+    assert off <= BOUND
 
 
 @pytest.mark.parametrize(

@@ -28,5 +28,5 @@ __kernel void entries(int count, __global const float *forms, int planes, __glob
     float length = 0.0f;
     left[i] = clip_from_entry(own, planes, offsets[i].x, offsets[i].y, t_end, &t, &length);
     entry[i] = t;
-    length_and_value[i] = (float2)(length, form_value_at(own, offsets[i].x, offsets[i].y, t));
+    length_and_value[i] = (float2)(length, form_at(own, offsets[i].x, offsets[i].y, t).x);
 }

@@ -344,10 +344,8 @@ def test_picking_finds_the_actor(plotter):
 def test_depth_is_read_only_where_something_opaque_can_hide_the_vdi(plotter, monkeypatch):
     reads = []
     frame_type = painter_module.Frame
-    read = frame_type.opaque_depth
-    monkeypatch.setattr(
-        frame_type, "opaque_depth", lambda self, r: (reads.append(1), read(self, r))[1]
-    )
+    read = frame_type.opaque_z
+    monkeypatch.setattr(frame_type, "opaque_z", lambda *args: (reads.append(1), read(*args))[1])
     plotter.add_vdi(soft_ball(), **LOOKS)
     plotter.add_axes()
     plotter.add_text("words")

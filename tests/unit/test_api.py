@@ -129,8 +129,18 @@ def test_estimate_says_bytes(volume):
         api.estimate(volume, (640, 480), criterion="depth")
 
 
+def test_estimate_counts_scalars_that_are_taken_relative_to_their_range():
+    counts = (60000 + np.arange(504).reshape(7, 8, 9) % 90).astype(np.uint16)
+    narrow, wide = (
+        api.estimate(pvdi.Volume(counts), (64, 48), clim=clim).volume for clim in (None, (0, 60100))
+    )
+    assert (narrow, wide) == (4 * counts.size, 2 * counts.size)
+    with pytest.raises(TypeError, match="color_map"):
+        api.estimate(pvdi.Volume(counts), (64, 48), color_map="bone")
+
+
 def test_help_shows_every_classification_argument():
-    for function in (api.generate, api.render_volume):
+    for function in (api.generate, api.render_volume, api.estimate):
         parameters = inspect.signature(function).parameters
         assert {*classification.DEFAULTS, *classification.IN_PLACE} <= set(parameters)
         assert parameters["diffuse"].default == 0.7

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pyvista_vdi.camera import Camera
+from pyvista_vdi.compositing import optical_depth_over_length
+from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.occupancy import TILE
 from pyvista_vdi.reference import build_vdi, render_pixels, samples, volume_image
 from pyvista_vdi.reference.raycast import Lists, crossings, lines_of_pixel
@@ -23,6 +27,10 @@ pytest.importorskip("tqdm")
 sys.path.insert(0, str(BENCHMARKS))
 
 import counting  # noqa: E402
+import interactive_table  # noqa: E402
+import machine  # noqa: E402
+import model  # noqa: E402
+import scaling  # noqa: E402
 
 SIZE = (24, 18)
 
@@ -57,11 +65,27 @@ def scene():
     return volume, function, view, build_vdi(volume, view, SIZE, function, max_supersegments=6)
 
 
-def test_sampled_pixels_lie_in_the_middle_of_their_blocks():
-    x, y = counting.sampled_pixels((24, 16), 8)
-    assert sorted(set(x)) == [4, 12, 20]
-    assert sorted(set(y)) == [4, 12]
-    assert [len(n) for n in counting.sampled_pixels((3, 2), 8)] == [1, 1]
+def test_sampled_blocks_hold_four_by_four_pixels_one_after_the_other():
+    x, y = counting.sampled_blocks((24, 18), 12)
+    blocks = np.stack([x, y], axis=1).reshape(-1, 16, 2)
+    corners = {(int(a), int(b)) for a, b in blocks.min(axis=1)}
+    assert corners == {(4, 4), (16, 4)}
+    assert len(counting.sampled_blocks((24, 18), 4)[0]) == 24 * 16
+    assert len(counting.sampled_blocks((24, 18), 100)[0]) == 16
+    for block in blocks:
+        assert len({tuple(pixel) for pixel in block.tolist()}) == 16
+        assert (np.ptp(block, axis=0) == 3).all()
+    assert x.max() < 24
+    assert y.max() < 18
+
+
+def test_busy_lanes_are_those_that_do_not_wait_for_the_longest():
+    turns = np.zeros(32, int)
+    turns[:16] = 10  # one block in step
+    assert counting.busy_lanes(turns) == 1.0
+    turns[16] = 10  # and one with a single ray
+    assert counting.busy_lanes(turns) == pytest.approx(17 / 32)
+    assert counting.busy_lanes(np.zeros(16, int)) == 1.0
 
 
 @pytest.mark.parametrize("angle", [0.0, 5.0, 30.0, 160.0])
@@ -96,6 +120,11 @@ def test_walk_at_the_generating_view_stays_in_one_list(scene):
     np.testing.assert_array_equal(walk.met, counts * walk.lists)
     np.testing.assert_array_equal(walk.filled, (counts > 0) * walk.lists)
     np.testing.assert_array_equal(walk.tiles, walk.lists)
+    # One list a ray: a block waits for the ray that meets most in it
+    turns = np.reshape(walk.lists + walk.met, (-1, counting.LANES))
+    np.testing.assert_array_equal(
+        walk.in_step.reshape(turns.shape), np.broadcast_to(turns.max(1)[:, None], turns.shape)
+    )
 
 
 def test_walk_steps_through_as_many_lists_as_it_crosses_borders(scene):
@@ -132,17 +161,30 @@ def test_walk_counts_as_occupied_every_list_in_which_something_is_met(scene):
     assert (walk.occupied < walk.lists).any()  # half of the volume is empty
 
 
-def test_a_walk_ends_where_no_light_is_left(scene):
+@pytest.mark.parametrize("angle", [0.0, 30.0, 170.0])
+def test_a_walk_ends_where_no_light_is_left(scene, angle):
     volume, _, view, _ = scene
     opaque = build_vdi(volume, view, SIZE, soft_function(1.0), max_supersegments=6)
     x, y = every_pixel(SIZE)
-    rays = counting.Rays.of(view.azimuth(30.0), SIZE, x, y)
+    rays = counting.Rays.of(view.azimuth(angle), SIZE, x, y)
     counted = counting.CountedVDI(opaque)
     whole, cut = (counting.walk(counted, rays, cutoff=cutoff) for cutoff in (0.0, 1e-3))
-    assert cut.lists.sum() < whole.lists.sum()
+    assert angle == 0 or cut.lists.sum() < whole.lists.sum()
     through = np.exp(-whole.optical_depth) >= 1e-3
     np.testing.assert_array_equal(cut.lists[through], whole.lists[through])
     assert (np.exp(-cut.optical_depth) < 1e-3)[~through].all()
+    lists, met = Lists(opaque), np.zeros(len(x), int)
+    for k, pixel in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
+        for line in lines_of_pixel(opaque, view.azimuth(angle), SIZE, pixel):
+            found = crossings(lists, line)
+            tau = optical_depth_over_length(
+                lists.optical_depth[found.member], found.length, lists.length[found.member]
+            )
+            before = np.cumsum(tau) - tau
+            met[k] = np.count_nonzero(before < -np.log(1e-3))
+    assert np.mean(cut.met != met) < 0.02
+    assert cut.met.sum() == pytest.approx(met.sum(), rel=0.005)
+    assert cut.met.sum() < whole.met.sum()
 
 
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
@@ -163,6 +205,29 @@ def test_march_takes_the_samples_that_the_reference_takes(scene, interpolation):
         assert march.runs[k] <= march.visible[k]
     assert march.visible.sum() > len(x)
     assert march.blocks.any()
+
+
+@pytest.mark.parametrize("opacity", [0.3, 1.0])
+def test_runs_are_the_lists_that_generation_makes_without_a_budget(runtime, opacity):
+    volume, function = soft_volume(), soft_function(opacity)
+    view = filling_camera(volume.bounds, SIZE)
+    vdi = generate_vdi(
+        volume, view, SIZE, function, max_supersegments=500, sample_distance=0.45, device=runtime
+    )
+    x, y = every_pixel(SIZE)
+    march = counting.march(
+        volume,
+        function,
+        counting.Rays.of(view, SIZE, x, y),
+        0.45,
+        blocks=counting.visible_blocks(volume, function),
+        stops=False,
+        runs=True,
+    )
+    lengths = vdi.counts.ravel()
+    # A midpoint between two voxels is rounded either way
+    assert np.mean(march.runs != lengths) < 0.03
+    assert march.runs.sum() == pytest.approx(lengths.sum(), rel=0.005)
 
 
 def test_runs_of_a_homogeneous_slab_are_one():
@@ -198,3 +263,284 @@ def test_a_march_that_stops_takes_no_more_samples(scene):
     alpha = volume_image(volume, view, SIZE, function, 0.45)[::-1, :, 3].ravel()
     through = 1 - alpha > 1.01e-2
     np.testing.assert_array_equal(stopped.steps[through], whole.steps[through])
+
+
+# -- floors ----------------------------------------------------------------------------------------
+
+#: A machine with round figures: 10 and 5 GB/s, 10^9 gathers of 4 bytes from a cache, a tenth of
+#: that from memory and a quarter where each is waited for.
+MACHINE = {
+    "caches": {"L1": "32K", "L2": "1M"},
+    "streams": {"read": 10e9, "write": 5e9},
+    "arithmetic": {"multiply_add": 100e9, "divide": 10e9, "exponential": 1e9},
+    "launches": {"waited": 1e-5},
+    "transfers": {"download": 2e9},
+    "gathers": {
+        "near": {"4": [[2**14, 1e9], [2**28, 1e8]], "16": [[2**14, 5e8], [2**28, 5e7]]},
+        "near, chained": {"4": [[2**14, 2.5e8], [2**28, 2.5e7]], "16": [[2**14, 1e8]]},
+    },
+}
+
+
+def test_rates_are_those_of_the_device_that_is_asked_about(tmp_path):
+    def runtime(name):
+        return SimpleNamespace(info=SimpleNamespace(kind="CPU", full_name=name))
+
+    with pytest.raises(
+        SystemExit, match=r"machine_cpu.json holds nothing of a / b: run machine.py"
+    ):
+        machine.Rates.read_for(runtime("a / b"), tmp_path)
+    results = {**MACHINE, "system": {"device": "a / b"}}
+    (tmp_path / "machine_cpu.json").write_text(json.dumps(results))
+    assert machine.Rates.read_for(runtime("a / b"), tmp_path).read == 10e9
+    with pytest.raises(SystemExit, match="holds nothing of c / d"):
+        machine.Rates.read_for(runtime("c / d"), tmp_path)
+
+
+def test_rates_are_interpolated_between_working_sets_and_taken_from_the_next_larger_element():
+    rates = machine.Rates(MACHINE)
+    assert rates.gather(4, 2**14) == pytest.approx(1e9)
+    assert rates.gather(4, 2**21) == pytest.approx(1e8 * 10**0.5)  # half way by logarithms
+    assert rates.gather(4, 1) == pytest.approx(1e9)
+    assert rates.gather(4, 2**40) == pytest.approx(1e8)
+    assert rates.gather(8, 2**14) == pytest.approx(5e8)
+    assert rates.gather(32, 2**14) == pytest.approx(5e8)
+
+
+def test_the_floor_is_the_slowest_resource_and_what_nothing_overlaps():
+    work = model.Work(
+        read=1e9,
+        write=1e9,
+        gathers=(model.Gathers(5e8, 4, 2**14),),
+        operations=model.Operations(multiply_add=1e9, divide=1e9, exponential=1e8),
+        launches=2,
+        download=2e8,
+    )
+    floor = model.floor_of(work, machine.Rates(MACHINE))
+    assert floor.memory == pytest.approx(0.1 + 0.2)
+    assert floor.gathers == pytest.approx(0.5)
+    assert floor.arithmetic == pytest.approx(0.01 + 0.1 + 0.1)
+    assert floor.around == pytest.approx(2e-5 + 0.1)
+    assert floor.waiting == pytest.approx(2.0)
+    assert floor.seconds == pytest.approx(0.5 + 0.1 + 2e-5)
+    assert floor.bound == "gathers (L1)"
+
+
+def test_the_work_of_a_frame_at_the_generating_view_is_one_list_a_ray(scene):
+    _, _, view, vdi = scene
+    x, y = every_pixel(SIZE)
+    walk = counting.walk(counting.CountedVDI(vdi), counting.Rays.of(view, SIZE, x, y), cutoff=0.0)
+    plain, skipping = (
+        model.raycast_work(walk, SIZE, vdi.nbytes, skips=skips) for skips in (False, True)
+    )
+    visits, faces, media, tiles = (g.elements for g in plain.gathers)
+    # Lists that the bounds' silhouette misses are empty, and no ray enters them
+    assert visits == pytest.approx(walk.lists.sum())
+    assert media == pytest.approx(vdi.n_supersegments)
+    assert faces == pytest.approx(vdi.n_supersegments + np.count_nonzero(np.diff(vdi.offsets)))
+    assert tiles == 0
+    assert plain.write == 16 * SIZE[0] * SIZE[1]
+    assert plain.operations.exponential == pytest.approx(vdi.n_supersegments)
+    assert skipping.gathers[3].elements == pytest.approx(walk.tiles.sum())
+    assert skipping.gathers[0].elements <= visits
+
+
+def test_stages_are_known_by_their_kernels_names():
+    stages = {name: model.stage_of(name) for name in ("march_lists", "shorten_lists", "pack_lists")}
+    assert list(stages.values()) == ["march", "shorten", "pack"]
+
+
+def test_medians_are_of_sums_in_each_run():
+    runs = [{"a1": 1.0, "a2": 2.0, "": 5.0}, {"a1": 3.0, "a2": 3.0, "": 7.0}]
+    assert model.medians(runs, lambda name: name[:1]) == {"a": 4.5, "": 6.0}
+
+
+@pytest.mark.parametrize(
+    ("size", "place"), [(2**10, "L1"), (2**15, "L1"), (2**15 + 1, "L2"), (2**30, "memory")]
+)
+def test_a_working_set_lies_in_the_smallest_cache_that_holds_it(size, place):
+    assert machine.cache_of(size, {"L1": "32K", "L2": "1024K", "L3": "32M"}) == place
+
+
+# -- fits ------------------------------------------------------------------------------------------
+
+
+def test_a_power_law_is_found_exactly_and_noise_widens_its_interval():
+    x = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+    exact = scaling.fitted(x, 3.0 * x**1.5)
+    assert exact.exponent == pytest.approx(1.5)
+    assert exact.margin == pytest.approx(0, abs=1e-9)
+    noisy = scaling.fitted(x, 3.0 * x**1.5 * np.exp([0.1, -0.1, 0.1, -0.1, 0.1]))
+    assert noisy.margin > 0.05
+    assert abs(noisy.exponent - 1.5) < noisy.margin
+    assert noisy.residual == pytest.approx(0.1, abs=0.03)
+
+
+def test_the_interval_is_that_of_a_textbook():
+    # Logarithms 0 to 4 and 0.1, 0.9, 2.2, 2.9, 4.1, for which scipy.stats.linregress has a standard
+    # error of 0.0489898 for (t quantile of three degrees of freedom by scipy: 3.182446)
+    x = np.exp([0.0, 1.0, 2.0, 3.0, 4.0])
+    y = np.exp([0.1, 0.9, 2.2, 2.9, 4.1])
+    assert scaling.fitted(x, y).exponent == pytest.approx(1.0)
+    assert scaling.fitted(x, y).margin == pytest.approx(3.182446 * 0.0489898, rel=1e-3)
+
+
+def test_two_points_have_no_interval():
+    fit = scaling.fitted([1.0, 2.0], [1.0, 4.0])
+    assert fit.exponent == pytest.approx(2.0)
+    assert fit.margin == np.inf
+
+
+def test_what_comes_on_top_is_fitted_without_the_first_cost():
+    rows = [{"value": v, "seconds": {"VDI frame": 2.0 + 0.5 * v}} for v in (0.0, 1.0, 2.0, 8.0)]
+    found = scaling.fits(scaling.AXES["angle"], rows)
+    assert found["VDI frame"].exponent == pytest.approx(1.0)
+    flat = [{"value": v, "seconds": {"VDI frame": 2.0}} for v in (0.0, 1.0, 2.0)]
+    assert scaling.fits(scaling.AXES["angle"], flat) == {}
+
+
+def test_two_cores_must_bring_a_factor():
+    assert scaling.verdict(1.8) == "met"
+    assert scaling.verdict(1.79) == "missed"
+
+
+# -- judging ---------------------------------------------------------------------------------------
+
+
+def frame_row(vdi, peers, floor):
+    """Return a row of the interactive table, all of whose floor is the raycast's."""
+    counts = {"lists": 2.0, "occupied": 1.0, "met": 3.0, "skips": False, "lanes in step": 0.5}
+    entry = {"per ray": counts, "floor": {"seconds": floor, "bound": "memory"}}
+    around = {"per ray": {}, "floor": {"seconds": 0.0, "bound": "memory"}}
+    model = {"vdi_skipping": entry, "around": around}
+    return {"angle": 5.0, "seconds": {"vdi_skipping": vdi, **peers}, "model": model}
+
+
+def test_a_frame_is_held_against_the_faster_of_the_mappers():
+    row = frame_row(0.02, {"vtk_gpu": 1.0, "vtk_fixed_point": 0.4}, 0.001)
+    cell = interactive_table.frame_cell(row, 1 / 10)
+    assert cell.ratio == pytest.approx(1 / 20)
+    assert cell.verdict == "met"
+    assert str(cell) == "1/20 (≤ 1/10), met"
+    row = frame_row(0.02, {"vtk_gpu": 1.0}, 0.001)
+    assert interactive_table.frame_cell(row, 1 / 10).ratio == pytest.approx(1 / 50)
+
+
+def test_what_is_missed_has_the_models_reason():
+    peers = {"vtk_gpu": 1.0, "vtk_fixed_point": 0.4}
+    above = interactive_table.frame_cell(frame_row(0.2, peers, 0.01), 1 / 10)
+    assert above.verdict == "missed"
+    assert above.reason.startswith("20.0 times its floor (1/40, bound by memory); 2.0 lists")
+    beyond = interactive_table.frame_cell(frame_row(0.2, peers, 0.1), 1 / 10)
+    assert beyond.reason.startswith("out of reach: the floor alone is 1/4, bound by memory")
+
+
+def test_cells_without_vtk_or_without_a_reach_are_no_verdicts():
+    assert interactive_table.frame_cell(frame_row(0.2, {}, 0.1), 1.0).verdict == "not measured"
+    reported = interactive_table.frame_cell(frame_row(0.2, {"vtk_gpu": 0.1}, 0.1), None)
+    assert (reported.verdict, str(reported)) == ("reported", "2.00")
+
+
+def test_a_group_is_as_good_as_its_worst_volume():
+    cells = {n: interactive_table.Cell(r, 0.2) for n, r in (("a", 0.1), ("b", 0.3), ("c", None))}
+    assert interactive_table.worst(cells)[0] == "b"
+    assert interactive_table.worst({})[1].verdict == "not measured"
+
+
+def test_the_reaches_are_those_of_every_group_and_standard_angle():
+    assert set(interactive_table.REACHES) == set(interactive_table.GROUPS)
+    for reaches in interactive_table.REACHES.values():
+        assert tuple(reaches) == interactive_table.ANGLES
+
+
+@pytest.mark.parametrize(
+    ("interpolation", "voxels", "entries"), [("nearest", 1, 1), ("linear", 8, 2)]
+)
+def test_the_work_of_a_march_is_a_voxel_and_an_entry_a_sample(
+    scene, interpolation, voxels, entries
+):
+    volume, _, view, _ = scene
+    function = soft_function(interpolation=interpolation)
+    x, y = every_pixel(SIZE)
+    blocks = counting.visible_blocks(volume, function)
+    march = counting.march(
+        volume, function, counting.Rays.of(view, SIZE, x, y), 0.9, blocks=blocks, stops=True
+    )
+    work = model.march_work(march, volume, function, SIZE, blocks.mean(), records=False)
+    assert work.gathers[0].elements == pytest.approx(voxels * march.looked.sum())
+    assert work.gathers[1].elements == pytest.approx(entries * march.looked.sum())
+    assert work.operations.exponential == pytest.approx(entries * march.visible.sum())
+    assert work.read == pytest.approx(blocks.mean() * volume.array.nbytes)
+    recorded = model.march_work(march, volume, function, SIZE, blocks.mean(), records=True)
+    assert recorded.write == 0
+    assert recorded.operations.divide > work.operations.divide
+
+
+def measured_volume(ratio):
+    """Return what the interactive table finds of a volume whose frames take ``ratio`` of VTK's."""
+    rows = []
+    for angle in interactive_table.ANGLES:
+        row = {**frame_row(0.4 * ratio, {"vtk_fixed_point": 0.4}, 0.001), "angle": angle}
+        counts = {"looked": 9.0, "lanes busy": 0.9}
+        row["seconds"]["volume_skipping"] = 0.5
+        floor = {"seconds": 0.01, "bound": "memory"}
+        row["model"]["volume_skipping"] = {"per ray": counts, "floor": floor}
+        rows.append(row)
+    floor = {"seconds": 0.1, "bound": "gathers (L1)"}
+    shorten = {"per ray": {"runs": 9.0, "supersegments": 3.0}, "floor": floor}
+    return {
+        "angles": rows,
+        "generation": {"generation": 1.1, "render_volume": 1.0},
+        "model": {"generation": {"shorten": shorten}},
+        "left_out": {"vtk_gpu": "no memory"},
+    }
+
+
+def test_the_report_names_the_worst_volumes_what_is_missed_and_what_is_not_there():
+    results = {
+        "window_size": [64, 36],
+        "max_supersegments": 20,
+        "interpolation": "nearest",
+        "clock": "wall",
+        "system": {"device": "a / b"},
+        "groups": {"large": ["one", "two", "three"], "medium": [], "solid": ["four"]},
+        "volumes": {
+            "one": measured_volume(1 / 40),
+            "two": measured_volume(1 / 20),
+            "three": {"refused": "DeviceMemoryError: too large"},
+            "four": measured_volume(1 / 4),
+        },
+    }
+    text = interactive_table.report(results, None)
+    assert "| at V_O | 1/20 (≤ 1/30), **missed**, two | - | 1/4 (≤ 1/2), met, four |" in text
+    assert "| at 30° | 1/20 (≤ 1/4), met, two | - | 1/4, four |" in text
+    assert "| three | DeviceMemoryError: too large |" in text
+    assert "- two, VDI at 0 degrees: 20.0 times its floor" in text
+    assert "- four, render_volume: " in text
+    assert "- VTK GPU with one: no memory" in text
+    assert "1.10 (≤ 1.20), met" in text
+
+
+def test_scalings_report_has_exponents_and_says_what_is_not_measured():
+    rows = [
+        {"value": v, "seconds": dict.fromkeys(scaling.QUANTITIES, 0.001 * v**0.5)}
+        for v in (1.0, 4.0, 16.0)
+    ]
+    results = {
+        "volume": "heptane",
+        "procedural": "beechnut_like",
+        "window_size": [64, 36],
+        "max_supersegments": 20,
+        "angle": 10.0,
+        "interpolation": "nearest",
+        "clock": "cpu",
+        "system": {},
+        "axes": {"pixels": rows, "cores": None},
+    }
+    text = scaling.report(results)
+    assert "| pixels | 0.50 ± 0.00 | 0.50 ± 0.00 | 0.50 ± 0.00 |" in text
+    assert "1 to 2 (not measured here)" in text
+    results["axes"]["cores"] = {
+        "ratio": {"VDI frame": 1.9, "render_volume": 1.7, "generation": 1.8}
+    }
+    assert "| 1.90, met | 1.70, missed | 1.80, met |" in scaling.report(results)

@@ -324,6 +324,21 @@ def test_the_estimate_bounds_what_is_taken(runtime, make, monkeypatch, dtype, wi
     assert stated.total == stated.volume + stated.vdi_worst_case + stated.working
 
 
+@pytest.mark.parametrize(("low", "bytes_each"), [(0.0, 2), (60000.0, 4)])
+def test_the_estimate_counts_scalars_taken_relative(runtime, make, monkeypatch, low, bytes_each):
+    volume = Volume((60000 + np.arange(32**3).reshape(32, 32, 32) % 90).astype(np.uint16))
+    function = TransferFunction([[1, 1, 1]] * 2, [0, 0.2], (low, 60090.0))
+    stated = estimate(volume, (16, 16), transfer_function=function)
+    assert stated.volume == bytes_each * 32**3
+    gc.collect()
+    before = runtime.allocated
+    monkeypatch.setattr(runtime._ledger, "peak", before)
+    camera = Camera((15.5, 15.5, 90), (15.5, 15.5, 15.5), (0, 1, 0))
+    generate_vdi(volume, camera, (16, 16), function, device=runtime)
+    taken = runtime.peak_allocated - before
+    assert stated.volume < taken <= stated.volume + stated.working + 2**14
+
+
 # -- giving up -------------------------------------------------------------------------------------
 
 

@@ -54,6 +54,71 @@ def test_aligned_arrays_are_used_in_place_on_a_cpu(runtime):
     assert runtime.allocated == before
 
 
+@pytest.mark.parametrize("shape", [(3, 5), (1000, 7), (0, 4)])
+def test_results_outlive_their_buffers(runtime, shape):
+    """On a CPU the array is the buffer's memory: nothing is copied, and it stays when it goes."""
+    before = runtime.allocated
+    with runtime.result(shape, np.int32) as buffer:
+        assert runtime.allocated - before >= buffer.nbytes
+        runtime.fill(buffer, np.int32(-7))
+        array = runtime.download(buffer)
+        if runtime.is_cpu and 0 not in shape:
+            assert runtime.download(buffer) is array
+        part = runtime.download(buffer, count=0)
+    assert runtime.allocated == before
+    gc.collect()
+    assert array.shape == shape
+    assert array.dtype == np.int32
+    assert array.flags.writeable
+    assert part.shape == (0,)
+    assert (array == -7).all()
+
+
+def test_a_result_that_is_never_read_is_finished_before_its_memory_goes(runtime, monkeypatch):
+    finished = []
+    monkeypatch.setattr(runtime, "_finish", lambda numbers: finished.append(set(numbers)))
+    kernel = runtime.kernel(
+        "grid/volume_blocks.cl",
+        "block_reaches",
+        {"VOXEL_T": "uchar", "INDEX_T": "uint", "BLOCK_SHIFT": 3},
+    )
+    buffer = runtime.result((64,), np.uint8)
+    with runtime.upload(np.ones(64, np.uint8)) as ones:
+        sizes = (np.uint32(64), np.uint32(1), np.int32(64), np.int32(1))
+        runtime.launch(kernel, 64, 64, ones, *sizes, buffer)
+        runtime.finish()
+    finished.clear()
+    buffer.release()
+    assert bool(finished) == runtime.is_cpu
+
+
+@pytest.mark.parametrize("aligned", [True, False])
+def test_a_target_gets_what_kernels_write(runtime, aligned):
+    values = np.arange(1, 2001, dtype=np.float32).reshape(40, 50)
+    array = ocl.aligned_empty((40, 50), np.float32) if aligned else np.empty(2001, np.float32)[1:]
+    array = array.reshape(40, 50)
+    array[...] = -1
+    before = runtime.allocated
+    with runtime.target(array, "values") as buffer:
+        in_place = runtime.is_cpu and aligned
+        assert (buffer.host is array) == in_place
+        assert runtime.allocated - before == (0 if in_place else array.nbytes)
+        for factor in (1, 3):  # also what is written after it was read
+            runtime.write(buffer, factor * values)
+            assert runtime.download(buffer, array) is array
+            np.testing.assert_array_equal(array, factor * values)
+        runtime.fill(buffer, np.float32(0.5))
+        elsewhere = np.empty_like(array)
+        np.testing.assert_array_equal(runtime.download(buffer, elsewhere), np.full((40, 50), 0.5))
+    assert runtime.allocated == before
+    for bad in (array[:, ::2], array.T):
+        with pytest.raises(InvalidArgumentError, match="'values' must be C-contiguous"):
+            runtime.target(bad, "values")
+    array.flags.writeable = False
+    with pytest.raises(InvalidArgumentError, match="writeable=False"):
+        runtime.target(array, "values")
+
+
 def test_write_fill_and_download_into(runtime):
     out = np.empty((2, 3), np.int32)
     with runtime.buffer((2, 3), np.int32, name="six") as buffer:

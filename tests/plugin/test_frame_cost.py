@@ -1,0 +1,266 @@
+"""What a frame costs around the raycast: counted, not timed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista as pv
+from plugin_scenes import LOOKS, opaque_sphere, soft_ball
+from vtkmodules.vtkCommonDataModel import vtkPlane
+from vtkmodules.vtkRenderingOpenGL2 import vtkTextureObject
+
+from pyvista_vdi.opencl_runtime import get_runtime
+from pyvista_vdi.vtk_pipeline import depth as depth_module
+from pyvista_vdi.vtk_pipeline import frame as frame_module
+from pyvista_vdi.vtk_pipeline import painter as painter_module
+from pyvista_vdi.vtk_pipeline import texture as texture_module
+
+pytestmark = pytest.mark.gl
+
+WINDOW = (120, 90)
+
+
+class Counts(dict):
+    """Calls by name."""
+
+    def watch(self, monkeypatch, owner, name):
+        """Count the calls of a function."""
+        function = getattr(owner, name)
+
+        def counted(*args, **keywords):
+            self[name] = self.get(name, 0) + 1
+            return function(*args, **keywords)
+
+        monkeypatch.setattr(owner, name, counted)
+
+
+@pytest.fixture
+def counts(monkeypatch):
+    """Raycasts, uploads, readings of depth, and allocations of images."""
+    found = Counts()
+    found.watch(monkeypatch, painter_module, "render_vdi")
+    found.watch(monkeypatch, painter_module, "aligned_empty")
+    found.watch(monkeypatch, frame_module.Frame, "opaque_z")
+
+    class Texture(vtkTextureObject):
+        def Create2DFromRaw(self, *args):
+            found["upload"] = found.get("upload", 0) + 1
+            return super().Create2DFromRaw(*args)
+
+    monkeypatch.setattr(texture_module, "vtkTextureObject", Texture)
+    return found
+
+
+@pytest.fixture
+def plotter():
+    plotter = pv.Plotter(window_size=WINDOW)
+    plotter.add_vdi(soft_ball(), **LOOKS)
+    plotter.camera_position = ((4, 3, 2), (0, 0, 0), (0, 0, 1))
+    yield plotter
+    plotter.close()
+
+
+@pytest.fixture
+def from_x(plotter):
+    """Seen along -x, y to the right, 22.5 pixels for a unit."""
+    plotter.camera_position = ((8, 0, 0), (0, 0, 0), (0, 0, 1))
+    plotter.enable_parallel_projection()
+    plotter.camera.parallel_scale = 2.0
+    return plotter
+
+
+def picture(plotter):
+    plotter.show(auto_close=False)
+    plotter.render()
+    return np.asarray(plotter.screenshot(return_img=True)).astype(int)
+
+
+def fresh_picture(plotter, *others):
+    """The picture of the same scene by a plotter that has kept nothing."""
+    other = pv.Plotter(window_size=WINDOW)
+    other.add_vdi(plotter.volume.vdi, show_scalar_bar=False)
+    for add in others:
+        add(other)
+    other.camera = plotter.camera.copy()
+    image = picture(other)
+    other.close()
+    return image
+
+
+@pytest.mark.parametrize("opaque", [False, True])
+def test_a_view_that_has_not_changed_costs_nothing(plotter, counts, opaque):
+    if opaque:
+        opaque_sphere(plotter)
+    plotter.show(auto_close=False)
+    once = {"render_vdi": 1, "upload": 1, "aligned_empty": 1}
+    assert counts == ({**once, "opaque_z": 1} if opaque else once)
+    before = dict(counts)
+    plotter.render_window.Render()
+    plotter.render_window.Render()
+    plotter.render()
+    assert counts == before
+
+
+def test_a_view_that_moves_allocates_nothing(plotter, counts):
+    plotter.show(auto_close=False)
+    for _ in range(painter_module._KEPT_IMAGES + 1):
+        plotter.camera.Azimuth(3)
+        plotter.render()
+    allocated = counts["aligned_empty"]
+    raycasts = counts["render_vdi"]
+    for _ in range(6):
+        plotter.camera.Azimuth(3)
+        plotter.render()
+    assert counts["render_vdi"] == raycasts + 6
+    assert counts["aligned_empty"] == allocated == painter_module._KEPT_IMAGES + 1
+    np.testing.assert_array_equal(picture(plotter), fresh_picture(plotter))
+
+
+def test_a_mesh_that_moves_allocates_nothing(plotter, counts):
+    sphere = plotter.add_mesh(pv.Sphere(radius=0.5), reset_camera=False)
+    plotter.show(auto_close=False)
+    for at in np.linspace(0, 0.6, 8):
+        sphere.position = (at, 0, 0)
+        plotter.render()
+    assert counts["render_vdi"] == 8  # the first is where it was
+    assert counts["aligned_empty"] == 2
+
+
+def test_images_that_are_kept_are_not_drawn_over(plotter):
+    """Views come again in another order, while the memory of others is used again."""
+    plotter.show(auto_close=False)
+    views = [30.0 * i for i in range(painter_module._KEPT_IMAGES + 2)]
+    pictures = {}
+    for view in [*views, *views[::-1], *views[::2], *views]:
+        plotter.camera_position = ((4, 3, 2), (0, 0, 0), (0, 0, 1))
+        plotter.camera.Azimuth(view)
+        image = picture(plotter)
+        np.testing.assert_array_equal(pictures.setdefault(view, image), image)
+    assert len({image.tobytes() for image in pictures.values()}) == len(views)
+
+
+# -- depth -----------------------------------------------------------------------------------------
+
+
+def changes_of_what_is_opaque(plotter, sphere):
+    """Named changes of the depth that leave the camera as it is."""
+    mesh = pv.Sphere(radius=0.3, center=(0.3, 0.2, 0.6))
+    yield "position", lambda: sphere.SetPosition(0.1, 0.3, 0)
+    yield "representation", lambda: setattr(sphere.prop, "style", "wireframe")
+    yield "line width", lambda: setattr(sphere.prop, "line_width", 9)
+    yield "matrix", lambda: setattr(sphere, "user_matrix", np.diag([1.4, 0.6, 1, 1]))
+    yield "data", lambda: sphere.mapper.dataset.scale(0.8, inplace=True)
+    yield "another", lambda: plotter.add_mesh(mesh, color="r", reset_camera=False)
+    plane = vtkPlane()
+    plane.SetNormal(0, 0, -1)
+    plane.SetOrigin(0, 0, 0.5)
+    yield "clipping", lambda: sphere.mapper.AddClippingPlane(plane)
+    yield "clipping plane", lambda: plane.SetOrigin(0, 0, 0.4)
+    yield "visibility", lambda: sphere.SetVisibility(False)
+
+
+def test_depth_is_read_again_when_what_is_opaque_changes(plotter, counts):
+    sphere = plotter.add_mesh(
+        pv.Sphere(radius=0.5, center=(0.4, 0.2, 0.5)), color="w", reset_camera=False
+    )
+    before = picture(plotter)
+    for name, change in changes_of_what_is_opaque(plotter, sphere):
+        reads = counts["opaque_z"]
+        change()
+        after = picture(plotter)
+        assert counts["opaque_z"] > reads, name
+        assert (after != before).any(), f"{name} changes nothing"
+        depth_module._of_windows.clear()  # nothing is known, and all of it is read
+        plotter.volume.mapper.painter._images.clear()
+        np.testing.assert_array_equal(picture(plotter), after, err_msg=name)
+        before = after
+
+
+def test_only_what_can_hide_the_vdi_is_read(from_x, monkeypatch):
+    areas = []
+    read = frame_module.Frame.opaque_z
+
+    def watched(self, renderer, area):
+        areas.append(area)
+        return read(self, renderer, area)
+
+    monkeypatch.setattr(frame_module.Frame, "opaque_z", watched)
+    from_x.add_mesh(pv.Cube(center=(1, 0.5, 0)).scale((1, 0.2, 0.2)), reset_camera=False)
+    from_x.show(auto_close=False)
+    ((left, bottom, right, top),) = areas
+    # y from 0 to 0.2 to the right; 5 pixels for points, which are 5 wide, and 2 for rounding
+    places = np.array([60, 45 - 0.1 * 22.5, 60 + 0.2 * 22.5, 45 + 0.1 * 22.5])
+    wider = [1, 1, -1, -1] * (places - [left, bottom, right, top])
+    assert (wider >= 7).all()
+    assert (wider < 8).all()
+    areas.clear()
+    from_x.add_mesh(pv.Sphere(radius=0.2, center=(1, -1.8, 1.8)), reset_camera=False)
+    from_x.render()
+    assert areas[-1][0] < 45 < areas[-1][2]  # around both, but no further than the VDI
+    assert areas[-1][3] <= 45 + 22.5 + 3
+
+
+def test_beside_the_vdi_nothing_is_read(from_x, counts):
+    from_x.add_mesh(pv.Sphere(radius=0.2, center=(1, -1.9, 1.7)), reset_camera=False)
+    from_x.show(auto_close=False)
+    assert "opaque_z" not in counts
+
+
+def test_a_prop_that_nobody_knows_is_always_read(plotter, counts):
+    """A shader of its own may draw elsewhere, and change with what has no time."""
+    opaque_sphere(plotter)
+    sphere = next(a for a in plotter.actors.values() if isinstance(a, pv.Actor))
+    tag = "//VTK::PositionVC::Dec"
+    sphere.GetShaderProperty().AddVertexShaderReplacement(tag, True, f"{tag}\n", False)
+    plotter.show(auto_close=False)
+    reads = counts["opaque_z"]
+    plotter.render()
+    assert counts["opaque_z"] == reads + 1
+    assert counts["render_vdi"] == 1  # it is as it was
+
+
+# -- what VTK does ---------------------------------------------------------------------------------
+
+
+def test_vtk_copies_no_depth(plotter):
+    plotter.show(auto_close=False)
+    painter = plotter.volume.mapper.painter
+    texture = painter._no_depth._texture
+    assert (texture.GetWidth(), texture.GetHeight()) == (1, 1)
+    assert texture.GetReferenceCount() == 2  # ours, and the mapper's
+    painter.release()
+    assert texture.GetHandle() == 0
+    plotter.render()
+    assert texture.GetHandle() != 0
+
+
+def test_two_windows_in_turns():
+    """One actor in two windows, whose viewports differ: each frame says where its image is."""
+    plotters = [pv.Plotter(window_size=size) for size in (WINDOW, (70, 110))]
+    actor = plotters[0].add_vdi(soft_ball(), **LOOKS)
+    plotters[1].add_actor(actor)
+    for plotter in plotters:
+        plotter.camera_position = ((4, 3, 2), (0, 0, 0), (0, 0, 1))
+    first = [picture(plotter) for plotter in plotters]
+    again = [picture(plotter) for plotter in plotters]
+    for one, other in zip(first, again, strict=True):
+        np.testing.assert_array_equal(one, other)
+        assert np.ptp(one) > 40
+    for plotter in plotters:
+        plotter.close()
+
+
+def test_cpu_devices_draw_where_vtk_uploads_from(plotter, monkeypatch):
+    if not get_runtime().is_cpu:
+        pytest.skip("a GPU draws into memory of its own")
+    targets = []
+    target = type(get_runtime()).target
+    monkeypatch.setattr(
+        type(get_runtime()),
+        "target",
+        lambda self, array, name: targets.append(target(self, array, name)) or targets[-1],
+    )
+    plotter.show(auto_close=False)
+    assert [buffer.host is not None for buffer in targets] == [True]
+    assert targets[0].host.base is not None
+    assert np.shares_memory(targets[0].host, plotter.volume.mapper.painter._last.image)
