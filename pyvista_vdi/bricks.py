@@ -260,6 +260,14 @@ class DeviceBricks:
             self.slots = keep(runtime.buffer((layout.n_bricks,), np.int32, "slots of bricks"))
             self._wanted = keep(runtime.buffer((layout.n_bricks,), np.uint32, "wanted bricks"))
 
+    def __enter__(self) -> DeviceBricks:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._runtime.finish()
+        for buffer in (self.pool, self.slots, self._wanted):
+            buffer.release()
+
     def wanted(self, ask: Callable[[DeviceBuffer], None]) -> NDArray[np.intp]:
         """Return the bricks that ``ask`` sets in the buffer it is given, ascending."""
         self._runtime.fill(self._wanted, np.uint32(0))
