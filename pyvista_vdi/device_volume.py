@@ -470,7 +470,7 @@ def _suits_natively(volume: Volume, transfer_function: TransferFunction) -> bool
     return scalars_suit_float32(low, high, dtype, transfer_function.interpolation)
 
 
-def _too_large(runtime: Runtime, volume: Volume, room: Room | None) -> bool:
+def _too_large(runtime: Runtime, volume: Volume, room: Room | None = None) -> bool:
     """Whether differences of a float32 volume's finite voxels may overflow; found once."""
     uploads = _uploads_of(volume)
     if uploads.too_large is None:
