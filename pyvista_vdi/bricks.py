@@ -60,11 +60,13 @@ class Room:
     def holds(self, runtime: Runtime, nbytes: int, others: int, *, uploaded: bool) -> bool:
         """Whether a volume of so many bytes, and others beside, may be on the device as a whole."""
         info = runtime.info
+        if self.limit is None and uploaded:
+            return True
         if nbytes > info.max_allocation:
             return False
         if self.limit is not None:
             return nbytes + others + self.working <= self.limit
-        return uploaded or runtime.allocated + nbytes + others + self.working <= info.global_memory
+        return runtime.allocated + nbytes + others + self.working <= info.global_memory
 
     def in_all(self, runtime: Runtime) -> int:
         """Return the bytes that may be taken, drivers' needs left out."""
