@@ -165,8 +165,12 @@ def raycast_medium(
     cropping: Cropping | None = None,
     opacity_multiplier: float = 1.0,
     early_termination: bool = True,
+    lit_from: Camera | None = None,
 ) -> NDArray[np.float32]:
-    """Render a volume that is on the device already; see :func:`raycast_volume`."""
+    """Render a volume that is on the device already; see :func:`raycast_volume`.
+
+    ``lit_from`` is the view that decides the light of a shaded volume in place of ``camera``.
+    """
     width, height = size
     march = medium.forms(camera, size, clipping_planes)
     ends = rays.checked_opaque_depth(opaque_depth, size, march.rays)
@@ -197,7 +201,7 @@ def raycast_medium(
                 kernel,
                 items,
                 GROUP,
-                *medium.medium_arguments(camera),
+                *medium.medium_arguments(lit_from or camera),
                 *sampled,
                 *begin,
                 np.int32(width),
@@ -222,7 +226,7 @@ def raycast_medium(
                 StepSampler(
                     runtime,
                     medium.bricks,
-                    medium.medium_arguments(camera),
+                    medium.medium_arguments(lit_from or camera),
                     defines,
                     begin,
                     size,
