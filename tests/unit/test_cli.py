@@ -27,6 +27,7 @@ VERBS = (
     "info",
     "compare",
     "benchmark",
+    "tradeoff",
     "convert",
     "paraview",
 )
