@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 from .._version import __version__
 from ..camera import check_window_size
 from ..checks import memory_limit_bytes
+from ..dial import QUALITIES, TARGET_ANGLE
 from ..errors import InvalidArgumentError
 from ..precision import PRECISIONS
 from ..standard_cases import ANGLES, ELEVATION, TRANSFER_FUNCTIONS, WINDOW_SIZE
@@ -130,6 +131,7 @@ def _add_generate(parser: argparse.ArgumentParser) -> None:
     _add_classification(parser)
     _add_occlusion(parser)
     _add_limits(parser)
+    _add_dial(parser)
     _add_file(parser)
     _add_device(parser)
 
@@ -506,6 +508,35 @@ def _add_limits(parser: argparse.ArgumentParser) -> None:
         metavar="SIZE",
         help="most memory to take on the device, like 2GiB; a volume that does not fit goes there "
         "brick by brick (default: what the device has)",
+    )
+
+
+def _add_dial(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group(
+        "dial",
+        "Choose lists, their length and precision from a short measurement on this device; --size "
+        "is then that of the pictures. Not with --max-supersegments, --tolerance or --precision.",
+    )
+    group.add_argument(
+        "--quality",
+        choices=tuple(QUALITIES),
+        help="SSIM of "
+        + ", ".join(f"{ssim:g} ({name})" for name, ssim in QUALITIES.items() if ssim is not None)
+        + " against volume rendering; reference: what is made without a dial",
+    )
+    group.add_argument("--target-ssim", type=float, metavar="S", help="the same by a number")
+    group.add_argument(
+        "--target-fps", type=float, metavar="RATE", help="least full frames per second"
+    )
+    group.add_argument(
+        "--max-bytes", type=float, metavar="N", help="most bytes on the device; files are smaller"
+    )
+    group.add_argument(
+        "--target-angle",
+        type=float,
+        default=TARGET_ANGLE,
+        metavar="DEGREES",
+        help=f"turn of the view for which the SSIM is predicted (default: {TARGET_ANGLE:g})",
     )
 
 
