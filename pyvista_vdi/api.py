@@ -212,6 +212,7 @@ def render(
     model_transforms: Sequence[ArrayLike] | None = None,
     skip_empty: bool = True,
     preview_samples: int | None = None,
+    transmittance_cutoff: float | None = None,
     device: Any = None,
 ) -> NDArray[np.float32]:
     """Raycast a VDI, or several in one scene, from a new view.
@@ -251,6 +252,10 @@ def render(
         An approximation (paper section 5): look the VDI up at so many points of each ray instead
         of intersecting its supersegments. A smaller ``window_size`` is the better one: see
         docs/performance.md, "Previews". For a single VDI only.
+    transmittance_cutoff : float, optional
+        A ray ends where less light than this is left, 0 to below 1; 10⁻⁶ by default. No channel
+        loses more than that: 0.004 changes a picture of 8 bits by one step at most, and saves a
+        fifth to two fifths of the work where things are opaque. For a single VDI only.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
 
@@ -272,6 +277,10 @@ def render(
             raise InvalidArgumentError(
                 "preview_samples is for a single VDI: give several a smaller window_size"
             )
+        if transmittance_cutoff is not None:
+            raise InvalidArgumentError(
+                "transmittance_cutoff is for a single VDI: leave it out for several"
+            )
         from .joint import render_vdis
 
         return render_vdis(
@@ -287,8 +296,9 @@ def render(
             device=device,
         )
     vdi = as_vdi(vdi)
-    from .raycast import render_vdi
+    from .raycast import TRANSMITTANCE_CUTOFF, render_vdi
 
+    cutoff = TRANSMITTANCE_CUTOFF if transmittance_cutoff is None else transmittance_cutoff
     return render_vdi(
         vdi,
         view,
@@ -299,6 +309,7 @@ def render(
         opacity_multiplier=opacity_multiplier,
         skip_empty=skip_empty,
         preview_samples=preview_samples,
+        transmittance_cutoff=cutoff,
         device=device,
     )
 

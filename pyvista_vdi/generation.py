@@ -313,17 +313,20 @@ def generate_vdi(
         ambient_occlusion=occlusion,
         room=slices.room(memory, grid),
     )
-    recorder = _Recorder(
-        runtime, medium, camera, (width, height), slices, limit, criterion, tolerance, hidden_weight
-    )
+    size = (width, height)
     parts = []
-    with recorder:
+    with (
+        medium.giving_bricks_back(),
+        _Recorder(
+            runtime, medium, camera, size, slices, limit, criterion, tolerance, hidden_weight
+        ) as recorder,
+    ):
         for first_row in range(0, height, recorder.slices.rows):
             _report(progress, first_row / height)
             rows = min(recorder.slices.rows, height - first_row)
             recorder.march(first_row, rows)
             parts.append(recorder.packed(first_row, rows))
-            _require_room(parts, (width, height))
+            _require_room(parts, size)
     _report(progress, 1.0)
 
     lengths, front, back, color, optical_depth = _joined(runtime, parts)

@@ -111,17 +111,18 @@ def raycast_volume(
         ambient_occlusion=occlusion,
         room=picture_room(size, memory, grid),
     )
-    return raycast_medium(
-        runtime,
-        medium,
-        camera,
-        size,
-        opaque_depth=opaque_depth,
-        clipping_planes=clipping_planes,
-        cropping=Cropping.from_any(cropping),
-        opacity_multiplier=checked_opacity_multiplier(opacity_multiplier),
-        early_termination=early_termination,
-    )
+    with medium.giving_bricks_back():
+        return raycast_medium(
+            runtime,
+            medium,
+            camera,
+            size,
+            opaque_depth=opaque_depth,
+            clipping_planes=clipping_planes,
+            cropping=Cropping.from_any(cropping),
+            opacity_multiplier=checked_opacity_multiplier(opacity_multiplier),
+            early_termination=early_termination,
+        )
 
 
 def picture_room(size: tuple[int, int], memory_limit: int | None, occlusion: int = 0) -> Room:

@@ -135,7 +135,9 @@ __kernel void raycast(
         const int last_column = list_index(fma(r_end, along.x, deep.x) + half_wide, lists_wide);
         const int last_row = list_index(fma(r_end, along.y, deep.y) + half_high, lists_high);
         PREFETCH(LIST_AT(i, j), i, j);
-        PREFETCH(LIST_AT(last_column, last_row), last_column, last_row);
+        if (last_column != i || last_row != j) {
+            PREFETCH(LIST_AT(last_column, last_row), last_column, last_row);
+        }
     }
 
     // Where planes u = const and v = const are crossed; by a component that does not change, at infinity

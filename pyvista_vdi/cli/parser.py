@@ -16,6 +16,7 @@ from ..dial import QUALITIES, TARGET_ANGLE
 from ..errors import InvalidArgumentError
 from ..precision import PRECISIONS
 from ..standard_cases import ANGLES, ELEVATION, TRANSFER_FUNCTIONS, WINDOW_SIZE
+from .tradeoff_options import add_sweep_options
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
 
@@ -310,6 +311,13 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
     _add_device(parser)
 
 
+def _add_tradeoff(parser: argparse.ArgumentParser) -> None:
+    _add_volume(parser)
+    add_sweep_options(parser, _size, _numbers, _count)
+    _add_classification(parser)
+    _add_device(parser)
+
+
 _VERBS: dict[str, tuple[str, str, str, Any]] = {
     "devices": (
         "files",
@@ -353,6 +361,12 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
         "pyvista-vdi benchmark --profile quick --out quick.json",
         _add_benchmark,
     ),
+    "tradeoff": (
+        "tradeoff",
+        "measure what each setting of a VDI costs and gives, and draw the fronts",
+        "pyvista-vdi tradeoff --example brain --out out",
+        _add_tradeoff,
+    ),
     "convert": (
         "files",
         "write a VDI in another format: .vdi, OpenEXR deep image or VTK's .vti",
@@ -377,8 +391,8 @@ def _add_volume(parser: argparse.ArgumentParser) -> None:
         "volume",
         metavar="VOLUME",
         nargs="?",
-        help="a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), or a "
-        "folder of DICOM slices",
+        help="a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), .npy, "
+        "a raw file named like x_1024x1024x795_uint8.raw, or a folder of DICOM slices",
     )
     source.add_argument("--example", metavar="NAME", help="a volume known by name, e.g. brain")
 

@@ -27,6 +27,7 @@ VERBS = (
     "info",
     "compare",
     "benchmark",
+    "tradeoff",
     "convert",
     "paraview",
 )
@@ -123,6 +124,7 @@ def test_version(capsys):
         (["generate", "-o", "b"], "one of the arguments VOLUME --example is required"),
         (["generate", "a", "--example", "b", "-o", "c"], "not allowed with argument"),
         (["generate", "a", "-o", "b", "--size", "12"], "a size is WIDTHxHEIGHT, like 1280x720"),
+        (["generate", "a", "-o", "b", "--memory-limit", "2 foo"], "a size such as 2GiB .* '2 foo'"),
         (["generate", "a", "-o", "b", "--size", "0x3"], "between 1 and 65536 pixels .* got 0 x 3"),
         (["generate", "a", "-o", "b", "--opacity", "0,x"], "numbers with commas .* got '0,x'"),
         (["generate", "a", "-o", "b", "--tf", "hard"], "invalid choice: 'hard'"),
@@ -371,6 +373,26 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
         expected = io.to_bytes(pvdi.render(vdi, vdi.camera, (30, 10)))
         assert np.array_equal(np.asarray(image), expected)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["b.png", "b.vdi"]
+
+
+def test_generate_within_a_memory_limit(folder, capsys, default_runtime, tmp_path):
+    """The file is that without a limit; one that is too little for a brick is refused."""
+    import nrrd
+
+    array = np.random.default_rng(1).integers(0, 256, (80, 90, 200), dtype=np.uint8)
+    nrrd.write(str(tmp_path / "v.nrrd"), array, index_order="C")
+    arguments = ["generate", tmp_path / "v.nrrd", "--transfer-function", folder / "tf.json"]
+    arguments += ["--size", "12x8"]
+    for name, more in (("whole", []), ("bricks", ["--memory-limit", "2.3 MiB"])):
+        status, _, err = run(capsys, *arguments, "-o", tmp_path / f"{name}.vdi", *more)
+        assert status == 0, err
+    assert "up to 2 MiB" in err
+    assert io.read(tmp_path / "bricks.vdi").equals(io.read(tmp_path / "whole.vdi"))
+    few = [*arguments, "-o", tmp_path / "few.vdi", "--memory-limit", "900KB"]
+    status, _, err = run(capsys, *few)
+    assert status == 1
+    assert "brick by brick" in err
+    assert "memory_limit is 878.91 KiB" in err
 
 
 def test_render_several(capsys, default_runtime, tmp_path):
