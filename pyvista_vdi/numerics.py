@@ -26,7 +26,7 @@ _SMALLEST_RANGE, _LARGEST_SCALAR = 2.0**-100, 2.0**100
 LARGEST_VOXEL = 2.0**126
 
 #: Grid coordinates up to which positions on a ray are computed in float32 alone, from where the
-#: rays are formed: their 16 roundings are a 4000th of a voxel at 256 and a 500th at 2048. Between,
+#: rays are formed: their 16 roundings are a 4000th of a voxel at 256 and a 1000th at 1000. Between,
 #: it is so up to four times the points of the longest axis: what is not much longer than wide never
 #: reaches that, and its positions are rounded nearly as much within it.
 NEAR_ENTRY, FAR_ENTRY, ENTRY_PER_POINT = 256.0, 2048.0, 4.0

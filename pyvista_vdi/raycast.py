@@ -296,13 +296,16 @@ class PreparedVDI:
         self._shifted = not self._parallel and 0 < far <= _LONG_LENS * closest
         # A ray that steps from list to list meets about as many as it crosses borders
         self.media = sum(vdi.window_size) + int(vdi.counts.max(initial=0))
-        self._far = self._is_far(vdi, (near, far))
+        self._far = self._far_entries(vdi, (near, far))
         self._list_rows = self._list_space(camera)
         self._packed = {Packed16: 16, Packed8: 8}.get(type(vdi.packing), 0)
         self._upload(vdi)
 
-    def _is_far(self, vdi: VDI, depths: tuple[float, float]) -> bool:
-        """Whether the lists are thin for where they lie between the depths of the bounds."""
+    def _far_entries(self, vdi: VDI, depths: tuple[float, float]) -> int:
+        """Return ``FAR_ENTRIES``: not 0 if lists are thin for where they lie in the bounds' depths.
+
+        2 if they lie nearer to the least of these depths than to the largest.
+        """
         occupied = np.diff(vdi.offsets) > 0
         first, last = vdi.offsets[:-1][occupied], vdi.offsets[1:][occupied] - 1
         near, far = (depth - self._depth_origin for depth in depths)
@@ -314,7 +317,9 @@ class PreparedVDI:
         if not (self._parallel or self._shifted):
             rounded = back + self._depth_origin
         thickness = (back - front).max(initial=0.0)
-        return lists_are_far(rounded.max(initial=0.0), thickness, far - near)
+        if not lists_are_far(rounded.max(initial=0.0), thickness, far - near):
+            return 0
+        return 2 if back.max() - near < far - front.min() else 1
 
     @property
     def list_bytes(self) -> int:
@@ -332,7 +337,7 @@ class PreparedVDI:
         if self._packed:
             defines["PACKED"] = self._packed
         if self._far:
-            defines["FAR_ENTRIES"] = 1
+            defines["FAR_ENTRIES"] = self._far
         return defines
 
     def render(

@@ -3,10 +3,17 @@
 // r runs along the ray over an interval of length 1 and is 0 at the end that is deeper in V_O, where the interpolated 1/Z is
 // smallest and its rounding matters most.
 //
-// -D CROPPED   see common/cropping.cl
+// -D CROPPED            see common/cropping.cl
+// -D FAR_ENTRIES=2      r is 0 at the other end, `deep` is that one and Z_deep is its depth: the lists lie near it
 #include "common/list_space.cl"
 #include "common/cropping.cl"
 #pragma OPENCL FP_CONTRACT OFF
+
+#if defined(FAR_ENTRIES) && FAR_ENTRIES == 2
+#define DEEP_IS_ZERO false
+#else
+#define DEEP_IS_ZERO true
+#endif
 
 typedef struct {
     float3 start; // where it enters what it is clipped to: u, v, depth coordinate
@@ -95,7 +102,8 @@ inline bool begin_list_ray(ListRay *ray, __global const float *forms, int planes
     const float2 t1 = pair_sum(t0, (float2)(t_length, 0.0f));
     const float2 offset = form_at(forms + DEPTH_FORM * FORM_SIZE, a, b, t0);
     const float2 end_offset = form_at(forms + DEPTH_FORM * FORM_SIZE, a, b, t1);
-    ray->depths.deep = pair_less(end_offset, offset) ? offset : end_offset;
+    const bool end_is_deep = !pair_less(end_offset, offset);
+    ray->depths.deep = end_is_deep == DEEP_IS_ZERO ? end_offset : offset;
     ray->depths.reciprocal = 1.0f / (ray->depths.deep.x + depth_origin);
     ray->depths.depth_origin = depth_origin;
     const float3 start = list_point(forms, a, b, t0, offset, ray->depths);
@@ -113,22 +121,23 @@ inline bool begin_list_ray(ListRay *ray, __global const float *forms, int planes
     ray->start = start;
     ray->along = end - start;
     ray->away = ray->along.z >= 0.0f;
-    ray->deep = ray->away ? end : start;
-    ray->r_begin = ray->away ? -1.0f : 0.0f;
+    const bool ends_at_zero = ray->away == DEEP_IS_ZERO;
+    ray->deep = ends_at_zero ? end : start;
+    ray->r_begin = ends_at_zero ? -1.0f : 0.0f;
     ray->scale = t_length * model_speed(forms, a, b);
 #ifndef PARALLEL
     ray->scale *= reciprocal_depth(start.z, DEPTHS_OF(ray)) * reciprocal_depth(end.z, DEPTHS_OF(ray));
 #endif
 #ifdef SEGMENTS
-    ray->t_deep = LIST_DEPTH(ray->away ? t1 : t0);
+    ray->t_deep = LIST_DEPTH(ends_at_zero ? t1 : t0);
     ray->t_scale = t_length;
 #ifndef PARALLEL
-    ray->t_scale *= reciprocal_depth(ray->away ? start.z : end.z, DEPTHS_OF(ray));
+    ray->t_scale *= reciprocal_depth(ends_at_zero ? start.z : end.z, DEPTHS_OF(ray));
 #endif
 #endif
 #ifdef CROPPED
-    ray->kept = kept_list_parts(forms, planes, a, b, ray->away ? t1 : t0, ray->away ? t0 : t1,
-                                ray->away ? -1.0f : 1.0f, regions);
+    ray->kept = kept_list_parts(forms, planes, a, b, ends_at_zero ? t1 : t0, ends_at_zero ? t0 : t1,
+                                ends_at_zero ? -1.0f : 1.0f, regions);
     return ray->kept.count > 0;
 #else
     return true;

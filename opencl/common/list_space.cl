@@ -10,7 +10,7 @@
 //
 //     -D FAR_ENTRIES   lists hold so little of the depth that float32 has for all of it, that z is relative to Z_deep, where
 //                      a ray is deepest: 1/Z_deep - 1/Z, or Z - Z_deep if PARALLEL; faces are kept as offsets, DEPTH_FORM
-//                      is that of the offset (docs/numerics.md)
+//                      is that of the offset (docs/numerics.md); 2: relative to where it is least deep
 #include "common/rays.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
