@@ -1,16 +1,18 @@
 """Memory while a VDI is made and drawn, over that of the volume and the VDI.
 
-Each volume has a process of its own, which makes and draws a VDI of a small volume of the same
-type first, so that neither Python nor the driver and its programs count. From then on two peaks are
-taken, each while the VDI is generated and while it is drawn: what the process has in memory (its
-resident set; on a CPU device that is all), and what the device holds (``Runtime.peak_allocated``;
-arrays that a CPU device uses in place count nothing there). Linux only. Prints a table, or with
-``--json`` the figures.
+Each volume has a process of its own, which makes and draws a small VDI of a small volume of the
+same type first, so that neither Python nor the driver and its programs count. From then on two
+peaks are taken, each while the VDI is generated and while it is drawn: what the process has in
+memory (its resident set; on a CPU device that is all), and what the device holds
+(``Runtime.peak_allocated``; arrays that a CPU device uses in place count nothing there). Memory
+that was freed is handed back to the system before each. Linux with glibc only. Prints a table, or
+with ``--json`` the figures.
 """
 
 from __future__ import annotations
 
 import argparse
+import ctypes
 import gc
 import json
 import subprocess
@@ -67,24 +69,26 @@ def parsed() -> argparse.Namespace:
 def measured(name: str, options: argparse.Namespace) -> dict[str, Any]:
     """Return the bytes of a volume, its VDI, and the peaks above what was there before."""
     dtype = examples.load_data(name, as_volume=True).array.dtype
-    drawn(Volume(np.indices((40, 40, 40)).sum(axis=0).astype(dtype)), options)
-    gc.collect()
+    drawn(Volume(np.indices((40, 40, 40)).sum(axis=0).astype(dtype)), (64, 48), options)
+    forget_peak()
     before = resident()
     volume = examples.load_data(name, as_volume=True)
-    return {"volume": volume.array.nbytes, **drawn(volume, options, before)}
+    return {"volume": volume.array.nbytes, **drawn(volume, options.size, options, before)}
 
 
-def drawn(volume: Volume, options: argparse.Namespace, before: int = 0) -> dict[str, Any]:
+def drawn(
+    volume: Volume, size: tuple[int, int], options: argparse.Namespace, before: int = 0
+) -> dict[str, Any]:
     """Generate a VDI and draw it from another view; return its bytes and the peaks."""
     runtime = get_runtime(options.device)
     looks = {**TRANSFER_FUNCTIONS[options.tf], "interpolation": options.interpolation}
     classified = Classification(looks, "a benchmark").transfer_function(volume)
-    view = filling_camera(volume.bounds, options.size)
+    view = filling_camera(volume.bounds, size)
     forget_peak()
     vdi = generate_vdi(
         volume,
         view,
-        options.size,
+        size,
         classified,
         memory_limit=options.memory_limit,
         device=runtime,
@@ -116,7 +120,9 @@ def resident(which: str = "VmRSS") -> int:
 
 
 def forget_peak() -> None:
-    """Let the peak begin anew."""
+    """Hand back what was freed, and let the peak begin anew."""
+    gc.collect()
+    ctypes.CDLL("libc.so.6").malloc_trim(0)
     Path("/proc/self/clear_refs").write_text("5")
 
 

@@ -24,6 +24,9 @@ WIDTH = 480
 SHEET_WIDTH = 1280
 LARGEST_FILE = 100 * 1024
 
+#: Examples whose pictures hold text, which must stay readable.
+WIDE = ("tradeoff",)
+
 COMPARISON = ("brain", "steep", "320x180")
 
 
@@ -41,7 +44,8 @@ def main() -> None:
                 continue
             picture = folder / f"{example.stem}.png"
             run(environment, str(example), str(picture))
-            keep(picture, TARGET / picture.name, WIDTH)
+            width = SHEET_WIDTH if example.stem in WIDE else WIDTH
+            keep(picture, TARGET / picture.name, width)
         volume, look, size = COMPARISON
         options = ("--example", volume, "--tf", look, "--size", size, "--repeats", "1")
         run(environment, "-m", "pyvista_vdi", "compare", *options, "--out", name)

@@ -17,6 +17,8 @@ Shared functions:
     Transfer function, extinction, opacity of an optical depth.
 ``common/shading.cl``
     Lights, and gradient opacity: what the steps need of the scalar's gradient.
+``common/samples.cl``
+    Steps that were sampled before they are composited.
 ``common/occlusion.cl``
     Ambient occlusion at a sample.
 ``common/empty_blocks.cl``
@@ -47,6 +49,8 @@ Entry points:
 ``vdi/generate.cl``, with ``vdi/runs.cl``
     ``march_lists``, ``shorten_lists``, ``pack_lists``: volume to lists of supersegments; with
     ``vdi/criteria.cl`` also ``cut_lists``, where another criterion than least error is asked for.
+``vdi/bricks.cl``
+    ``want_bricks``, ``sample_steps``: samples of a volume that is on the device brick by brick.
 ``vdi/prepare.cl``
     ``prepare_lists``: a VDI's arrays to what the raycaster reads.
 ``vdi/raycast.cl``

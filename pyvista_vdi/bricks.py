@@ -60,11 +60,13 @@ class Room:
     def holds(self, runtime: Runtime, nbytes: int, others: int, *, uploaded: bool) -> bool:
         """Whether a volume of so many bytes, and others beside, may be on the device as a whole."""
         info = runtime.info
+        if self.limit is None and uploaded:
+            return True
         if nbytes > info.max_allocation:
             return False
         if self.limit is not None:
             return nbytes + others + self.working <= self.limit
-        return uploaded or runtime.allocated + nbytes + others + self.working <= info.global_memory
+        return runtime.allocated + nbytes + others + self.working <= info.global_memory
 
     def in_all(self, runtime: Runtime) -> int:
         """Return the bytes that may be taken, drivers' needs left out."""
@@ -259,6 +261,14 @@ class DeviceBricks:
             self.pool = keep(pool)
             self.slots = keep(runtime.buffer((layout.n_bricks,), np.int32, "slots of bricks"))
             self._wanted = keep(runtime.buffer((layout.n_bricks,), np.uint32, "wanted bricks"))
+
+    def __enter__(self) -> DeviceBricks:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._runtime.finish()
+        for buffer in (self.pool, self.slots, self._wanted):
+            buffer.release()
 
     def wanted(self, ask: Callable[[DeviceBuffer], None]) -> NDArray[np.intp]:
         """Return the bricks that ``ask`` sets in the buffer it is given, ascending."""

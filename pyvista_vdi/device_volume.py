@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
 import weakref
@@ -183,9 +184,6 @@ class DeviceVolume:
         self._per_scalar = _per_scalar(self._entries, span)
         self._table = runtime.upload(np.ascontiguousarray(table), "transfer function")
         self._visible = self._reaches = self._visibility(runtime, ranges, transfer_function)
-        self.bricks: DeviceBricks | None = None
-        if room is not None and not whole:
-            self._hold_bricks(runtime, scale, transfer_function, room)
         if skip_empty:
             seen = runtime.download(self._visible)
             if 1.0 - float(np.mean(seen)) >= _WORTH_SKIPPING:
@@ -207,7 +205,7 @@ class DeviceVolume:
         self.ambient_occlusion = ambient_occlusion
         self._occlusion: tuple[Any, ...] = ()
         if ambient_occlusion is not None:
-            if self.bricks is not None:
+            if not whole:
                 raise DeviceMemoryError(
                     f"ambient occlusion needs the volume {volume.name!r} in one piece, "
                     f"{bytes_text(_device_bytes(volume, scale))}: raise memory_limit, leave "
@@ -220,6 +218,12 @@ class DeviceVolume:
             shading["OCCLUSION"] = 1
         self.defines.update(shading)
         self.defines.update(compensation(volume.length / self.sample_distance))
+        # Last: nothing that fails then keeps them for as long as somebody looks at the error
+        self.bricks: DeviceBricks | None = None
+        if room is not None and not whole:
+            self.bricks = self._bricks_within(room, scale, transfer_function)
+            self._voxels = self.bricks.pool
+            self.defines["SAMPLED"] = 1
 
     def _look_up_by_scalar(self, runtime: Runtime, first: int, last: int) -> None:
         """Replace the table by one of what each scalar from ``first`` to ``last`` looks like."""
@@ -242,6 +246,10 @@ class DeviceVolume:
         self._table, self._entries, self._low, self._per_scalar = media, n, float(first), 1.0
         self.defines["BY_SCALAR"] = 1
 
+    def giving_bricks_back(self) -> contextlib.AbstractContextManager[object]:
+        """Give back what bricks take at the end of a ``with`` block, also if it fails."""
+        return contextlib.nullcontext() if self.bricks is None else self.bricks
+
     @property
     def most_steps(self) -> int:
         """Steps of the longest ray."""
@@ -259,14 +267,11 @@ class DeviceVolume:
             *self._occlusion,
         )
 
-    def _hold_bricks(
-        self,
-        runtime: Runtime,
-        scale: _Scale | None,
-        transfer_function: TransferFunction,
-        room: Room,
-    ) -> None:
-        """Make room for bricks of the volume, none of which is there yet."""
+    def _bricks_within(
+        self, room: Room, scale: _Scale | None, transfer_function: TransferFunction
+    ) -> DeviceBricks:
+        """Return room for bricks of the volume, none of which is there yet."""
+        runtime = self._runtime
         volume = self.volume
         gradients = (
             transfer_function.shading is not None
@@ -282,7 +287,7 @@ class DeviceVolume:
             least = least_brick_bytes(volume.dimensions, point_bytes, gradients) + others
             whole = _device_bytes(volume, scale) + others
             raise too_small(_described(volume), room, runtime, whole, least)
-        self.bricks = DeviceBricks(
+        return DeviceBricks(
             runtime,
             volume.array,
             _reader(scale),
@@ -292,8 +297,6 @@ class DeviceVolume:
             self._visible,
             volume.name,
         )
-        self._voxels = self.bricks.pool
-        self.defines["SAMPLED"] = 1
 
     def _classified(self, blocks: DeviceBuffer) -> tuple[Any, ...]:
         """Arguments ``voxels`` to ``blocks``, of which ``blocks`` says what may be skipped."""
@@ -467,7 +470,7 @@ def _suits_natively(volume: Volume, transfer_function: TransferFunction) -> bool
     return scalars_suit_float32(low, high, dtype, transfer_function.interpolation)
 
 
-def _too_large(runtime: Runtime, volume: Volume, room: Room | None) -> bool:
+def _too_large(runtime: Runtime, volume: Volume, room: Room | None = None) -> bool:
     """Whether differences of a float32 volume's finite voxels may overflow; found once."""
     uploads = _uploads_of(volume)
     if uploads.too_large is None:

@@ -17,10 +17,12 @@ from .bricks import Room, StepSampler
 from .camera import Camera, check_window_size
 from .checks import as_float, memory_limit_bytes
 from .device_volume import DeviceVolume, volume_bytes, voxel_bytes
+from .dial import Dial, refuse_settings
 from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory
 from .lighting import Lights
 from .opencl_runtime import Runtime, aligned_empty, get_runtime
+from .precision import check_precision
 from .rays import check_list_space
 from .transfer_function import TransferFunction
 from .vdi import VDI
@@ -174,6 +176,8 @@ def generate_vdi(
     sample_distance: float | None = None,
     tolerance: float = 0.0,
     view_cone: float = 60.0,
+    precision: str = "exact",
+    dial: Dial | None = None,
     lights: Any = None,
     ambient_occlusion: Any = None,
     memory_limit: Any = None,
@@ -221,6 +225,11 @@ def generate_vdi(
         Half angle in degrees, 0 to 90, of the cone of views that must be served: what V_O cannot
         see at all counts ``1 - cos(view_cone)`` as much as what it sees when neighbours are merged
         at least error or within ``tolerance``. Other criteria cut without regard to it.
+    precision : {"exact", "16-byte", "8-byte"}
+        What a supersegment takes; see :meth:`VDI.with_precision`.
+    dial : Dial, optional
+        Chooses the lists of the window, max_supersegments and precision in place of those given
+        here, which must have their defaults, as tolerance must; see :mod:`pyvista_vdi.dial`.
     lights : optional
         What a shaded volume is lit by; see :meth:`pyvista_vdi.Lights.from_any`. The light is
         baked into the colours: it stays as it is where V_O has it.
@@ -256,9 +265,37 @@ def generate_vdi(
         even for one brick.
     """
     camera = Camera.from_any(camera)
+    if dial is not None:
+        from .dial_measurement import choose  # it measures VDIs that are made here
+
+        refuse_settings(
+            dial,
+            max_supersegments=(max_supersegments, 20),
+            tolerance=(tolerance, 0.0),
+            precision=(precision, "exact"),
+        )
+        choice = choose(
+            volume,
+            camera,
+            window_size,
+            transfer_function,
+            dial,
+            device=device,
+            progress=progress,
+            criterion=check_criterion(criterion),
+            sample_distance=sample_distance,
+            view_cone=view_cone,
+            lights=lights,
+            ambient_occlusion=ambient_occlusion,
+            memory_limit=memory_limit,
+        )
+        window_size = choice.prediction.window_size
+        max_supersegments = choice.prediction.setting.max_supersegments
+        precision = choice.prediction.setting.precision
+        metadata = {**(metadata or {}), "dial": choice.to_dict()}
     width, height = check_window_size(window_size)
     limit = check_max_supersegments(max_supersegments)
-    criterion = check_criterion(criterion)
+    criterion, precision = check_criterion(criterion), check_precision(precision)
     tolerance, hidden_weight = _check_weights(tolerance, view_cone)
     _require_room((), (width, height))
     runtime = get_runtime(device)
@@ -276,17 +313,20 @@ def generate_vdi(
         ambient_occlusion=occlusion,
         room=slices.room(memory, grid),
     )
-    recorder = _Recorder(
-        runtime, medium, camera, (width, height), slices, limit, criterion, tolerance, hidden_weight
-    )
+    size = (width, height)
     parts = []
-    with recorder:
+    with (
+        medium.giving_bricks_back(),
+        _Recorder(
+            runtime, medium, camera, size, slices, limit, criterion, tolerance, hidden_weight
+        ) as recorder,
+    ):
         for first_row in range(0, height, recorder.slices.rows):
             _report(progress, first_row / height)
             rows = min(recorder.slices.rows, height - first_row)
             recorder.march(first_row, rows)
             parts.append(recorder.packed(first_row, rows))
-            _require_room(parts, (width, height))
+            _require_room(parts, size)
     _report(progress, 1.0)
 
     lengths, front, back, color, optical_depth = _joined(runtime, parts)
@@ -322,7 +362,7 @@ def generate_vdi(
         volume.bounds,
         depth_origin=recorder.depth_origin,
         metadata={**made_by, **(metadata or {})},
-    )
+    ).with_precision(precision)
 
 
 class _Slices:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import weakref
 from collections.abc import Callable, Sequence
@@ -22,7 +23,8 @@ from .picking import DEFAULT_OPACITY, FirstHit
 from .precision import Packed8, Packed16
 from .vdi import VDI
 
-#: A ray ends where less transmittance than this is left: no channel loses more than that.
+#: A ray ends where less transmittance than this is left, unless told otherwise: no channel loses
+#: more than that.
 TRANSMITTANCE_CUTOFF = 1e-6
 #: Most samples of a ray in a preview: each has a half, and float32 counts halves up to 2^24.
 MAX_PREVIEW_SAMPLES = 2**23
@@ -53,6 +55,7 @@ def render_vdi(
     opacity_multiplier: float = 1.0,
     skip_empty: bool = True,
     preview_samples: int | None = None,
+    transmittance_cutoff: float = TRANSMITTANCE_CUTOFF,
     device: Any = None,
     out: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
@@ -80,6 +83,9 @@ def render_vdi(
     preview_samples : int, optional
         Look the VDI up at so many points of each ray instead of intersecting its supersegments
         (paper section 5): an approximation. Fewer pixels are the better one (docs/performance.md).
+    transmittance_cutoff : float
+        A ray ends where less than this is left, 0 to below 1. It bounds what any channel of the
+        image can lose.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
     out : numpy.ndarray, optional
@@ -91,11 +97,6 @@ def render_vdi(
     -------
     numpy.ndarray
         Premultiplied RGBA, float32 (height, width, 4), top row first; ``out`` if it was given.
-
-    Notes
-    -----
-    A ray ends early where its transmittance falls below :data:`TRANSMITTANCE_CUTOFF`, which bounds
-    what any channel can lose.
     """
     if not isinstance(vdi, VDI):
         raise InvalidArgumentError(f"expected a VDI, got {type(vdi).__name__}")
@@ -104,6 +105,7 @@ def render_vdi(
     samples = None if preview_samples is None else check_preview_samples(preview_samples)
     cropping = Cropping.from_any(cropping)
     multiplier = checked_opacity_multiplier(opacity_multiplier)
+    cutoff = check_transmittance_cutoff(transmittance_cutoff)
     runtime = get_runtime(device)
     prepared = prepared_vdi(runtime, vdi)
     shape = (size[1], size[0], 4)
@@ -124,6 +126,7 @@ def render_vdi(
             opacity_multiplier=multiplier,
             skip_empty=skip_empty,
             preview_samples=samples,
+            transmittance_cutoff=cutoff,
         )
         return runtime.download(image, out)
 
@@ -193,6 +196,20 @@ def check_preview_samples(samples: int) -> int:
         raise InvalidArgumentError(
             f"preview_samples must be a whole number from 1 to {MAX_PREVIEW_SAMPLES}; "
             f"got {samples!r}"
+        )
+    return number
+
+
+def check_transmittance_cutoff(cutoff: float) -> float:
+    """Return a transmittance at which rays end, as a float from 0 to below 1."""
+    try:
+        number = float(cutoff)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not 0 <= number < 1:
+        raise InvalidArgumentError(
+            "transmittance_cutoff must be a number from 0 to below 1, such as 0.004 for a "
+            f"difference of 1/255 at most; got {cutoff!r}"
         )
     return number
 
@@ -331,6 +348,7 @@ class PreparedVDI:
         skip_empty: bool = True,
         preview_samples: int | None = None,
         first_hit: FirstHit | None = None,
+        transmittance_cutoff: float = TRANSMITTANCE_CUTOFF,
     ) -> None:
         """Draw a frame into ``image``, float32 (H, W, 4) on the device.
 
@@ -363,7 +381,7 @@ class PreparedVDI:
                 kernel,
                 block_items(width, height),
                 GROUP,
-                *self.walk_arguments(view, form_buffer, depth, TRANSMITTANCE_CUTOFF),
+                *self.walk_arguments(view, form_buffer, depth, transmittance_cutoff),
                 *mode,
                 image,
             )

@@ -111,17 +111,18 @@ def raycast_volume(
         ambient_occlusion=occlusion,
         room=picture_room(size, memory, grid),
     )
-    return raycast_medium(
-        runtime,
-        medium,
-        camera,
-        size,
-        opaque_depth=opaque_depth,
-        clipping_planes=clipping_planes,
-        cropping=Cropping.from_any(cropping),
-        opacity_multiplier=checked_opacity_multiplier(opacity_multiplier),
-        early_termination=early_termination,
-    )
+    with medium.giving_bricks_back():
+        return raycast_medium(
+            runtime,
+            medium,
+            camera,
+            size,
+            opaque_depth=opaque_depth,
+            clipping_planes=clipping_planes,
+            cropping=Cropping.from_any(cropping),
+            opacity_multiplier=checked_opacity_multiplier(opacity_multiplier),
+            early_termination=early_termination,
+        )
 
 
 def picture_room(size: tuple[int, int], memory_limit: int | None, occlusion: int = 0) -> Room:
@@ -164,8 +165,12 @@ def raycast_medium(
     cropping: Cropping | None = None,
     opacity_multiplier: float = 1.0,
     early_termination: bool = True,
+    lit_from: Camera | None = None,
 ) -> NDArray[np.float32]:
-    """Render a volume that is on the device already; see :func:`raycast_volume`."""
+    """Render a volume that is on the device already; see :func:`raycast_volume`.
+
+    ``lit_from`` is the view that decides the light of a shaded volume in place of ``camera``.
+    """
     width, height = size
     march = medium.forms(camera, size, clipping_planes)
     ends = rays.checked_opaque_depth(opaque_depth, size, march.rays)
@@ -196,7 +201,7 @@ def raycast_medium(
                 kernel,
                 items,
                 GROUP,
-                *medium.medium_arguments(camera),
+                *medium.medium_arguments(lit_from or camera),
                 *sampled,
                 *begin,
                 np.int32(width),
@@ -221,7 +226,7 @@ def raycast_medium(
                 StepSampler(
                     runtime,
                     medium.bricks,
-                    medium.medium_arguments(camera),
+                    medium.medium_arguments(lit_from or camera),
                     defines,
                     begin,
                     size,

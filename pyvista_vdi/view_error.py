@@ -347,18 +347,108 @@ class ViewErrorEstimator:
         where = (angle_from_generating_view(vdi, camera), magnification(vdi, camera, size))
         if min(size) < SSIM_WINDOW:
             return ViewError(math.nan, math.nan, *where, 0)
+        tiles = self._sample(scene, vdi, camera, size)
+        if tiles is None:
+            return ViewError(1.0, 0.0, *where, 0)
+        ssim = scene.tiles_ssim(tiles.corners, tiles.size)
+        return ViewError(*tiles.infer(ssim), *where, len(ssim))
+
+    def sample(self, vdi: VDI, camera: Camera, window_size: tuple[int, int]) -> TileSample | None:
+        """Choose the tiles of a view, by a VDI that shows roughly where the error is.
+
+        Parameters
+        ----------
+        vdi : VDI
+            It may have fewer lists than the VDI that is to be judged.
+        camera : Camera
+            The new view V_N.
+        window_size : (int, int)
+            Width and height of the whole picture in pixels, at least 11 each.
+
+        Returns
+        -------
+        TileSample or None
+            ``None`` where the volume is not in view.
+        """
+        scene = _Scene(self, vdi, camera, window_size, None, None, {}, (0.0, 0.0, 0.0), None)
+        return self._sample(scene, vdi, camera, window_size)
+
+    def volume_tile(
+        self, lens: Camera, tile_size: tuple[int, int], **options: Any
+    ) -> NDArray[np.float32]:
+        """Return the volume's picture through the lens of a tile.
+
+        The options are those of :func:`~pyvista_vdi.raycast_volume.raycast_medium`.
+        """
+        return raycast_medium(self._runtime, self._medium, lens, tile_size, **options)
+
+    def _sample(
+        self, scene: _Scene, vdi: VDI, camera: Camera, size: tuple[int, int]
+    ) -> TileSample | None:
         region = _region(camera, size, (vdi.bounds, self._medium.volume.bounds))
         if region is None:
-            return ViewError(1.0, 0.0, *where, 0)
+            return None
         cells = _Cells(region, size, self._edge)
         n = len(cells.corners)
         guess = cells.guess(*scene.coarse(region)) if n > self._tiles else np.ones(n)
         chances = _chances(guess, min(self._tiles, n))
         chosen = _systematic(chances)
-        losses = 1.0 - scene.tiles_ssim(cells.corners[chosen], cells.tile_size)
-        total, error = _ratio_estimate(losses, chances[chosen], guess[chosen], guess.sum())
-        share = cells.area / n / math.prod(edge - 2 * _REACH for edge in size)
-        return ViewError(float(1.0 - share * total), float(share * error), *where, len(losses))
+        return TileSample(
+            cells.corners[chosen],
+            cells.tile_size,
+            chances[chosen],
+            guess[chosen],
+            float(guess.sum()),
+            cells.area / n / math.prod(edge - 2 * _REACH for edge in size),
+        )
+
+
+@dataclass(frozen=True)
+class TileSample:
+    """Tiles of a picture, and how the SSIM of the whole follows from theirs.
+
+    Attributes
+    ----------
+    corners : numpy.ndarray
+        int64 (k, 2): column and row of each tile's first pixel, from the top left.
+    size : (int, int)
+        Width and height of a tile, pixels.
+    chances, guess : numpy.ndarray
+        float64 (k,): probability of each tile to be chosen, and its guessed loss.
+    guessed : float
+        Sum of the guesses for all cells of the picture.
+    share : float
+        Of the picture's pixels that have an SSIM, in one cell.
+    """
+
+    corners: NDArray[np.int64]
+    size: tuple[int, int]
+    chances: Floats
+    guess: Floats
+    guessed: float
+    share: float
+
+    def infer(self, ssim: Floats) -> tuple[float, float]:
+        """Return the SSIM of the whole picture, and its standard error, from the tiles'."""
+        total, error = _ratio_estimate(1.0 - ssim, self.chances, self.guess, self.guessed)
+        return float(1.0 - self.share * total), float(self.share * error)
+
+
+def tiles_ssim(
+    old: Sequence[NDArray[np.float32]],
+    new: Sequence[NDArray[np.float32]],
+    background: Sequence[float] = (0.0, 0.0, 0.0),
+) -> Floats:
+    """Return the mean SSIM of the inner pixels of pairs of tiles of one size, float64 (k,)."""
+    from skimage.metrics import structural_similarity  # loads SciPy
+
+    height, width = new[0].shape[:2]
+    # One above the other: a call for each would take five times as long
+    pair = (over_background(np.concatenate(tiles), background) for tiles in (old, new))
+    _, ssim = structural_similarity(*pair, full=True, **SSIM_ARGUMENTS)
+    inner = slice(_REACH, -_REACH)
+    by_tile = ssim.reshape(len(new), height, width, 3)[:, inner, inner]
+    return np.asarray(by_tile.mean(axis=(1, 2, 3)))
 
 
 class _Scene:
@@ -409,20 +499,14 @@ class _Scene:
 
     def tiles_ssim(self, corners: NDArray[np.int64], tile_size: tuple[int, int]) -> Floats:
         """Return the mean SSIM of each tile's inner pixels, float64 (n,)."""
-        from skimage.metrics import structural_similarity  # loads SciPy
-
         width, height = tile_size
         pairs = []
         for column, row in corners.tolist():
             lens = self._camera.tile(self._size, (column, row), tile_size)
             part = np.s_[row : row + height, column : column + width]
             pairs.append(self._both(lens, tile_size, part))
-        # One above the other: a call for each would take five times as long
-        old, new = (self._blended(np.concatenate(p)) for p in zip(*pairs, strict=True))
-        _, ssim = structural_similarity(old, new, full=True, **SSIM_ARGUMENTS)
-        inner = slice(_REACH, -_REACH)
-        by_tile = ssim.reshape(len(corners), height, width, 3)[:, inner, inner]
-        return np.asarray(by_tile.mean(axis=(1, 2, 3)))
+        old, new = zip(*pairs, strict=True)
+        return tiles_ssim(old, new, self._background)
 
     def _both(
         self, lens: Camera, size: tuple[int, int], part: Any

@@ -29,7 +29,8 @@
 #define MAX_OPTICAL_DEPTH 1e30f
 #endif
 
-// A ray that crosses fewer lists than this is not worth a look at the grid: at V_O it stays in one.
+// A ray that crosses fewer lists than this is not worth a look at the grid: at V_O it stays in one, whose supersegments a
+// loop of their own composites.
 #define FEW_LISTS 2.0f
 // One that crosses fewer than this goes through the whole depth of a list's neighbourhood: worth to be brought close at once.
 #define LISTS_TO_PREFETCH 48.0f
@@ -130,12 +131,15 @@ __kernel void raycast(
     const float half_high = 0.5f * (float)lists_high;
     int i = list_index(start.x + half_wide, lists_wide);
     int j = list_index(start.y + half_high, lists_high);
-    if (fabs(along.x) + fabs(along.y) < LISTS_TO_PREFETCH) {
+    const float lists_crossed = fabs(along.x) + fabs(along.y);
+    if (lists_crossed < LISTS_TO_PREFETCH) {
         // The lists that it begins and ends in: those in between are others' ends
         const int last_column = list_index(fma(r_end, along.x, deep.x) + half_wide, lists_wide);
         const int last_row = list_index(fma(r_end, along.y, deep.y) + half_high, lists_high);
         PREFETCH(LIST_AT(i, j), i, j);
-        PREFETCH(LIST_AT(last_column, last_row), last_column, last_row);
+        if (last_column != i || last_row != j) {
+            PREFETCH(LIST_AT(last_column, last_row), last_column, last_row);
+        }
     }
 
     // Where planes u = const and v = const are crossed; by a component that does not change, at infinity
@@ -171,7 +175,7 @@ __kernel void raycast(
     Search search = begin_search(0);
 #ifdef SKIP_EMPTY
     const int tiles_wide = (lists_wide + TILE - 1) >> TILE_SHIFT;
-    bool enters_tile = fabs(along.x) + fabs(along.y) > FEW_LISTS;
+    bool enters_tile = lists_crossed > FEW_LISTS;
     int turn = 0;
 #endif
     while (true) {
@@ -240,7 +244,8 @@ __kernel void raycast(
         float2 face;
         const bool found = search_on(&search, list, SUPERSEGMENTS_ARGUMENTS depth, away, &face);
         bool stays = !found; // in this list
-        if (found && face.x <= next_depth) {
+        bool meets = found && face.x <= next_depth;
+        while (meets) {
             // Clip to the supersegment by interval: between two faces it never leaves [r, r_next]
             const float r_enters = (face.x - deep_depth) * inverse_depth;
             const float r_leaves = (face.y - deep_depth) * inverse_depth;
@@ -292,6 +297,13 @@ __kernel void raycast(
             // Behind it comes the next one, and nothing is left to search for
             search.n += stays ? 1 : 0;
             search.low = search.n;
+            // Where all lanes stay in their lists, as at V_O, all come to the next one in step
+            meets = stays && lists_crossed <= FEW_LISTS && search.n < list.count;
+            if (meets) {
+                face = face_met(list, SUPERSEGMENTS_ARGUMENTS search.n, away);
+                meets = face.x <= next_depth;
+                stays = meets;
+            }
         }
         if (!stays) {
             if (r_next >= r_end || RAY_IS_DONE)

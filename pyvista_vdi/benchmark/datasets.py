@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from tokenize import TokenError
 from types import MappingProxyType
 from typing import Any
 
@@ -40,6 +41,9 @@ _OPACITIES: MappingProxyType[str, tuple[float, ...]] = MappingProxyType(
         "one of two fluids": (0.0, 0.0, 0.0, 0.01, 0.05, 0.15, 0.05, 0.01, 0.005),
     }
 )
+#: What NumPy raises for files that are no arrays: their header is a Python expression.
+_BAD_ARRAY = (ValueError, TypeError, SyntaxError, OverflowError, RecursionError, TokenError)
+
 #: RGB at equidistant scalars: black, blue-grey, white.
 _COLORS = ((0.0, 0.0, 0.0), (0.25, 0.3, 0.45), (0.7, 0.7, 0.6), (1.0, 1.0, 1.0))
 
@@ -88,12 +92,7 @@ class Dataset:
         if self.source == "procedural":  # its type's whole range, whatever the seed made of it
             limits = np.iinfo(volume.array.dtype.name)
             scalar_range = float(limits.min), float(limits.max)
-        return TransferFunction(
-            np.stack([_resampled(channel) for channel in zip(*_COLORS, strict=True)], axis=1),
-            _resampled(_OPACITIES[self.look]),
-            scalar_range,
-            interpolation=interpolation,
-        )
+        return look(self.look, scalar_range, interpolation)
 
     def describe(self, volume: Volume) -> dict[str, Any]:
         """Return what the results say of it."""
@@ -107,6 +106,16 @@ class Dataset:
             "dtype": volume.array.dtype.name,
             "bytes": volume.array.nbytes,
         }
+
+
+def look(name: str, scalar_range: tuple[float, float], interpolation: str) -> TransferFunction:
+    """Return a transfer function by its name: a key of the opacities above."""
+    return TransferFunction(
+        np.stack([_resampled(channel) for channel in zip(*_COLORS, strict=True)], axis=1),
+        _resampled(_OPACITIES[name]),
+        scalar_range,
+        interpolation=interpolation,
+    )
 
 
 def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
@@ -172,7 +181,8 @@ def read_file(file: Path) -> Volume:
     """Read a volume of any format that can be read here.
 
     Raw files are those of the Open Scientific Visualization Datasets, whose names tell what they
-    hold: ``kingsnake_1024x1024x795_uint8.raw``. NRRD needs no PyVista; other formats do.
+    hold: ``kingsnake_1024x1024x795_uint8.raw``. NumPy's ``.npy`` holds scalars (nz, ny, nx). These
+    and NRRD need no PyVista; other formats do.
 
     Parameters
     ----------
@@ -194,6 +204,8 @@ def read_file(file: Path) -> Volume:
     suffix = file.suffix.lower()
     if suffix == ".raw":
         return _read_raw(file)
+    if suffix == ".npy":
+        return _read_npy(file)
     if suffix in (".nrrd", ".nhdr"):
         return examples.read_nrrd(file, "values")
     from ..api import as_volume
@@ -220,6 +232,19 @@ def _read_raw(file: Path) -> Volume:
     require_free_memory(expected, f"the volume in {file.name}", "take a smaller one")
     array: NDArray[Any] = np.fromfile(file, dtype).reshape(nz, ny, nx)
     return Volume(array.astype(dtype.newbyteorder("="), copy=False))
+
+
+def _read_npy(file: Path) -> Volume:
+    try:
+        with file.open("rb") as stream:
+            array = np.lib.format.read_array(stream, allow_pickle=False)
+    except OSError as error:
+        raise InvalidVolumeError(f"{file} cannot be read: {error.strerror or error}") from error
+    except _BAD_ARRAY as error:
+        raise InvalidVolumeError(
+            f"{file} cannot be read as an array ({error}): write one by numpy.save"
+        ) from error
+    return Volume(array)
 
 
 def _procedural(name: str, kind: Procedural, factor: int, seed: int) -> Dataset:

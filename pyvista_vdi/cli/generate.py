@@ -9,6 +9,7 @@ import time
 from ..api import generate as generate_vdi
 from ..camera import Camera
 from ..classification import Classification
+from ..dial import Dial, describe
 from ..generation import estimate
 from ..io import checked_target
 from ..plotting.progress import DelayedBar
@@ -24,11 +25,17 @@ from .inputs import (
 )
 from .text import printable
 
+#: Options that are arguments of ``generate`` of the same name: what a VDI is to reach.
+_DIAL = ("quality", "target_ssim", "target_fps", "max_bytes", "target_angle")
+
 
 def generate(options: argparse.Namespace) -> int:
     """Generate a VDI and write it."""
     target = checked_target(options.output)
     file_arguments = file_options(options)
+    precision = file_arguments.pop("precision", "exact")
+    asked = {n: getattr(options, n) for n in _DIAL}
+    dial = Dial.of(**asked)  # refused before the volume is read, too
     arguments = classification(options)
     looks = Classification(arguments, "generate")  # refused before the volume is read
     occlusion = ambient_occlusion(options)
@@ -45,9 +52,14 @@ def generate(options: argparse.Namespace) -> int:
         memory_limit=options.memory_limit,
         transfer_function=looks.transfer_function(volume),
     )
+    width, height = options.size
     print(
         f"{volume.dimensions[0]} x {volume.dimensions[1]} x {volume.dimensions[2]} points, "
-        f"{options.size[0]} x {options.size[1]} lists: up to {needed.total / 2**20:.0f} MiB",
+        + (
+            f"{width} x {height} lists: up to {needed.total / 2**20:.0f} MiB"
+            if dial is None
+            else f"pictures of {width} x {height}: settings are chosen by a measurement"
+        ),
         file=sys.stderr,
     )
     bar = DelayedBar()
@@ -62,6 +74,8 @@ def generate(options: argparse.Namespace) -> int:
             sample_distance=options.sample_distance,
             tolerance=options.tolerance,
             view_cone=options.view_cone,
+            precision=precision,
+            **asked,
             ambient_occlusion=occlusion,
             memory_limit=options.memory_limit,
             device=options.device,
@@ -73,9 +87,13 @@ def generate(options: argparse.Namespace) -> int:
     seconds = time.perf_counter() - start
     vdi.save(target, **file_arguments)
     print(
-        f"{printable(options.output)}: {vdi.n_supersegments} supersegments in {options.size[0]} x "
-        f"{options.size[1]} lists, {target.stat().st_size / 2**20:.1f} MiB, {seconds:.1f} s"
+        f"{printable(options.output)}: {vdi.n_supersegments} supersegments in "
+        f"{vdi.window_size[0]} x {vdi.window_size[1]} lists, "
+        f"{target.stat().st_size / 2**20:.1f} MiB, {seconds:.1f} s"
     )
+    chosen = describe(vdi.metadata)
+    if chosen is not None:
+        print(chosen)
     return 0
 
 

@@ -51,6 +51,10 @@ def read_volume(options: argparse.Namespace) -> Volume:
         from ..examples import read_nrrd
 
         volume = read_nrrd(Path(options.volume), "values")
+    elif Path(options.volume).suffix.lower() in (".raw", ".npy"):
+        from ..benchmark.datasets import read_file
+
+        volume = read_file(Path(options.volume))
     else:
         from ..plotting.cli_support import read_volume as read_by_pyvista
 

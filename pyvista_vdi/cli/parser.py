@@ -12,9 +12,11 @@ from typing import Any, NoReturn
 from .._version import __version__
 from ..camera import check_window_size
 from ..checks import memory_limit_bytes
+from ..dial import QUALITIES, TARGET_ANGLE
 from ..errors import InvalidArgumentError
 from ..precision import PRECISIONS
 from ..standard_cases import ANGLES, ELEVATION, TRANSFER_FUNCTIONS, WINDOW_SIZE
+from .tradeoff_options import add_sweep_options
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
 
@@ -129,6 +131,7 @@ def _add_generate(parser: argparse.ArgumentParser) -> None:
     _add_classification(parser)
     _add_occlusion(parser)
     _add_limits(parser)
+    _add_dial(parser)
     _add_file(parser)
     _add_device(parser)
 
@@ -308,6 +311,13 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
     _add_device(parser)
 
 
+def _add_tradeoff(parser: argparse.ArgumentParser) -> None:
+    _add_volume(parser)
+    add_sweep_options(parser, _size, _numbers, _count)
+    _add_classification(parser)
+    _add_device(parser)
+
+
 _VERBS: dict[str, tuple[str, str, str, Any]] = {
     "devices": (
         "files",
@@ -351,6 +361,12 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
         "pyvista-vdi benchmark --profile quick --out quick.json",
         _add_benchmark,
     ),
+    "tradeoff": (
+        "tradeoff",
+        "measure what each setting of a VDI costs and gives, and draw the fronts",
+        "pyvista-vdi tradeoff --example brain --out out",
+        _add_tradeoff,
+    ),
     "convert": (
         "files",
         "write a VDI in another format: .vdi, OpenEXR deep image or VTK's .vti",
@@ -375,8 +391,8 @@ def _add_volume(parser: argparse.ArgumentParser) -> None:
         "volume",
         metavar="VOLUME",
         nargs="?",
-        help="a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), or a "
-        "folder of DICOM slices",
+        help="a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), .npy, "
+        "a raw file named like x_1024x1024x795_uint8.raw, or a folder of DICOM slices",
     )
     source.add_argument("--example", metavar="NAME", help="a volume known by name, e.g. brain")
 
@@ -492,6 +508,35 @@ def _add_limits(parser: argparse.ArgumentParser) -> None:
         metavar="SIZE",
         help="most memory to take on the device, like 2GiB; a volume that does not fit goes there "
         "brick by brick (default: what the device has)",
+    )
+
+
+def _add_dial(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group(
+        "dial",
+        "Choose lists, their length and precision from a short measurement on this device; --size "
+        "is then that of the pictures. Not with --max-supersegments, --tolerance or --precision.",
+    )
+    group.add_argument(
+        "--quality",
+        choices=tuple(QUALITIES),
+        help="SSIM of "
+        + ", ".join(f"{ssim:g} ({name})" for name, ssim in QUALITIES.items() if ssim is not None)
+        + " against volume rendering; reference: what is made without a dial",
+    )
+    group.add_argument("--target-ssim", type=float, metavar="S", help="the same by a number")
+    group.add_argument(
+        "--target-fps", type=float, metavar="RATE", help="least full frames per second"
+    )
+    group.add_argument(
+        "--max-bytes", type=float, metavar="N", help="most bytes on the device; files are smaller"
+    )
+    group.add_argument(
+        "--target-angle",
+        type=float,
+        default=TARGET_ANGLE,
+        metavar="DEGREES",
+        help=f"turn of the view for which the SSIM is predicted (default: {TARGET_ANGLE:g})",
     )
 
 

@@ -13,6 +13,7 @@ from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.classification import DEFAULTS, Classification, refuse_unknown
+from pyvista_vdi.dial import TARGET_ANGLE, Dial, refuse_settings
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.opencl_runtime import get_runtime
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
@@ -41,6 +42,9 @@ from pyvista_vdi.vtk_pipeline.source import VDISource
 #: ``add_volume``'s aliases.
 _ALIASES = {"rng": "clim", "colormap": "cmap", "backface_culling": "culling"}
 
+#: SSIM by which a view may fall below what was asked for before it regenerates.
+_BELOW_GOAL = 0.02
+
 #: What only a volume can honour, with the defaults: refused by name where a VDI is added.
 _OF_VOLUMES = {
     **{name: value for name, value in DEFAULTS.items() if name not in ("diffuse", "specular")},
@@ -54,6 +58,12 @@ _OF_VOLUMES = {
     "sample_distance": None,
     "tolerance": 0.0,
     "view_cone": 60.0,
+    "precision": "exact",
+    "quality": None,
+    "target_ssim": None,
+    "full_fps": None,
+    "max_bytes": None,
+    "target_angle": TARGET_ANGLE,
     "ambient_occlusion": None,
     "memory_limit": None,
     "camera": None,
@@ -114,6 +124,12 @@ class AddVDI:
         sample_distance: float | None = None,
         tolerance: float = 0.0,
         view_cone: float = 60.0,
+        precision: Literal["exact", "16-byte", "8-byte"] = "exact",
+        quality: Literal["reference", "high", "balanced", "fast"] | None = None,
+        target_ssim: float | None = None,
+        full_fps: float | None = None,
+        max_bytes: int | None = None,
+        target_angle: float = TARGET_ANGLE,
         ambient_occlusion: Any = None,
         memory_limit: float | str | None = None,
         interpolation: Literal["nearest", "linear"] = "nearest",
@@ -192,6 +208,19 @@ class AddVDI:
             Error that may be traded for shorter lists.
         view_cone : float
             Half angle of the cone of views that must be served, degrees.
+        precision : {"exact", "16-byte", "8-byte"}
+            What a supersegment takes, see :meth:`pyvista_vdi.VDI.with_precision`.
+        quality : {"reference", "high", "balanced", "fast"}, optional
+            Choose lists, ``max_supersegments`` and ``precision`` by how good pictures are to be,
+            from a short measurement: see :func:`pyvista_vdi.generate`. ``actor.status.dial`` says
+            what was chosen and what it is predicted to give. A view regenerates by itself where
+            its SSIM falls 0.02 below what was asked for, if that is below ``regenerate_below``.
+        target_ssim, max_bytes, target_angle : optional
+            As for :func:`pyvista_vdi.generate`.
+        full_fps : float, optional
+            Least **full** frames per second of the VDI that is chosen: ``target_fps`` of
+            :func:`pyvista_vdi.generate`. ``target_fps`` below is kept by drawing fewer pixels,
+            whatever the VDI.
         ambient_occlusion : bool, float or AmbientOcclusion, optional
             Darken what is hidden from the light around it: ``True``, or the radius up to which
             something hides, model units.
@@ -291,6 +320,12 @@ class AddVDI:
         source.SetSampleDistance(given["sample_distance"])
         source.SetTolerance(given["tolerance"])
         source.SetViewCone(given["view_cone"])
+        source.SetPrecision(given["precision"])
+        source.SetDial(
+            given["quality"],
+            **{k: given[k] for k in ("target_ssim", "max_bytes", "target_angle")},
+            target_fps=given["full_fps"],
+        )
         source.SetAmbientOcclusion(given["ambient_occlusion"])
         source.SetMemoryLimit(given["memory_limit"])
         source.SetCoverage(given["coverage"])
@@ -361,7 +396,7 @@ class AddVDI:
         mapper.SetDevice(given["device"])
         mapper.SetTargetFrameRate(given["target_fps"])
         mapper.SetRegenerate(given["regenerate"])
-        mapper.SetRegenerateBelow(given["regenerate_below"])
+        mapper.SetRegenerateBelow(_bound(given))
         actor = PlotterVDIActor()
         if prop is not None:
             actor.prop = prop
@@ -416,6 +451,19 @@ def _refuse(given: dict[str, Any]) -> None:
         checked_rate("target_fps", given["target_fps"])
     checked_policy(given["regenerate"])
     checked_bound(given["regenerate_below"])
+    chosen_by = {k: given[k] for k in ("quality", "target_ssim", "max_bytes", "target_angle")}
+    refuse_settings(
+        Dial.of(**chosen_by, target_fps=given["full_fps"]),
+        **{k: (given[k], _OF_VOLUMES[k]) for k in ("max_supersegments", "tolerance", "precision")},
+    )
+
+
+def _bound(given: dict[str, Any]) -> float:
+    """Return the SSIM below which views regenerate: not above what the VDI is made for."""
+    goal = Dial.of(given["quality"], given["target_ssim"])
+    if goal is None or goal.ssim is None:
+        return given["regenerate_below"]  # type: ignore[no-any-return]
+    return min(given["regenerate_below"], max(0.0, goal.ssim - _BELOW_GOAL))
 
 
 def _changed(given: dict[str, Any]) -> dict[str, Any]:

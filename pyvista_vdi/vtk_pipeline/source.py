@@ -20,6 +20,7 @@ from pyvista_vdi.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.camera import Camera, check_window_size
 from pyvista_vdi.checks import memory_limit_bytes
 from pyvista_vdi.coverage import bounds_corners, covering_view
+from pyvista_vdi.dial import TARGET_ANGLE, Dial, warn_missed
 from pyvista_vdi.errors import (
     Cancelled,
     InvalidArgumentError,
@@ -29,6 +30,7 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.generation import check_criterion, check_max_supersegments, generate_vdi
 from pyvista_vdi.lighting import Lights
+from pyvista_vdi.precision import check_precision
 from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.volume import Volume
@@ -139,6 +141,8 @@ class VDISource(VTKPythonAlgorithmBase):
             "sample_distance": None,
             "tolerance": 0.0,
             "view_cone": 60.0,
+            "precision": "exact",
+            "dial": None,
             "ambient_occlusion": None,
             "memory_limit": None,
             "device": None,
@@ -385,6 +389,48 @@ class VDISource(VTKPythonAlgorithmBase):
         """Return the half angle of the cone of views, degrees."""
         return self._settings["view_cone"]  # type: ignore[no-any-return]
 
+    def SetPrecision(self, precision: str) -> None:
+        """Choose what a supersegment takes: "exact", "16-byte" or "8-byte".
+
+        As :meth:`pyvista_vdi.VDI.with_precision`.
+        """
+        self._set("precision", check_precision(precision))
+
+    def GetPrecision(self) -> str:
+        """Return what a supersegment takes, where no dial chooses it."""
+        return self._settings["precision"]  # type: ignore[no-any-return]
+
+    def SetDial(
+        self,
+        quality: str | None = None,
+        *,
+        target_ssim: float | None = None,
+        target_fps: float | None = None,
+        max_bytes: int | None = None,
+        target_angle: float = TARGET_ANGLE,
+    ) -> None:
+        """Have settings chosen by what the VDI is to reach; without arguments, no longer.
+
+        It chooses the lists of the window, ``MaxSupersegments`` and ``Precision``, which have to
+        have their defaults, as ``Tolerance`` has to; ``GetVDI().metadata["dial"]`` says what it
+        chose.
+
+        Parameters
+        ----------
+        quality, target_ssim, target_fps, max_bytes, target_angle
+            As for :func:`pyvista_vdi.generate`.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If one is out of range, or they contradict each other.
+        """
+        self._set("dial", Dial.of(quality, target_ssim, target_fps, max_bytes, target_angle))
+
+    def GetDial(self) -> Dial | None:
+        """Return what the VDI is to reach; ``None`` where nothing is to be chosen."""
+        return self._settings["dial"]  # type: ignore[no-any-return]
+
     def SetAmbientOcclusion(self, occlusion: Any) -> None:
         """Choose whether what is hidden from the light around it is darkened.
 
@@ -570,6 +616,9 @@ class VDISource(VTKPythonAlgorithmBase):
             self.SetAbortOutput(isinstance(error, Cancelled))  # then the next update tries again
             return 1
         output.ShallowCopy(vdi_to_image(vdi))
+        if self._settings["dial"] is not None:
+            announce(outputs, vdi.window_size)  # which it has chosen only now
+            ask_for_all([outputs])
         return 1
 
     # -- how -------------------------------------------------------------------------------------
@@ -579,6 +628,7 @@ class VDISource(VTKPythonAlgorithmBase):
         if self._vdi is None or self._request is None or request.key != self._request.key:
             self._vdi = generate_vdi(*request.arguments, progress=self._advance, **request.keywords)
             self._request = request
+            warn_missed(self._vdi, stacklevel=2)
         return self._vdi
 
     def _make_request(

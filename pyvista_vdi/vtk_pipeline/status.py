@@ -9,6 +9,7 @@ from typing import Any, Literal
 from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkRenderingAnnotation import vtkCornerAnnotation
 
+from pyvista_vdi.dial import describe
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vdi import VDI
 
@@ -69,6 +70,14 @@ class VDIStatus:
         """Share of the viewport's pixels that a ray was cast for, 0 to 1."""
         return self.samples / self.full_samples if self.full_samples else 0.0
 
+    @property
+    def dial(self) -> dict[str, Any] | None:
+        """What a dial chose for the VDI, and what it predicts; ``None`` where there is none.
+
+        See ``vdi.metadata["dial"]`` in docs/dial.md.
+        """
+        return None if self.vdi is None else self.vdi.metadata.get("dial")
+
     def __str__(self) -> str:
         if self.mode == "none":
             parts = ["no VDI drawn yet"]
@@ -82,6 +91,9 @@ class VDIStatus:
             parts.append(f"SSIM about {self.ssim:.3f}")
         if self.generation:
             parts.append(f"VDI no. {self.generation}")
+        chosen = None if self.vdi is None else describe(self.vdi.metadata)
+        if chosen is not None:
+            parts.append(chosen)
         if self.progress is not None:
             parts.append(f"making the next: {self.progress:.0%}")
         return ", ".join(parts)

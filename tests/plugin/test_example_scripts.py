@@ -37,6 +37,27 @@ def test_example_writes_a_picture(name, tmp_path):
     assert np.ptp(image.reshape(-1, 3).astype(int), axis=0).max() > 100
 
 
+def test_dial_example_writes_a_picture_of_three_qualities(tmp_path):
+    target = tmp_path / "picture.png"
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / "dial.py"), str(target)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "predicted SSIM 0.9" in done.stdout
+    assert "VDIWarning" not in done.stderr
+    image = imread(target)[100:, :, :3].astype(int)  # below the texts
+    assert image.shape == (260, 900, 3)
+    parts = np.split(image, 3, axis=1)
+    assert all(np.ptp(part.reshape(-1, 3), axis=0).max() > 100 for part in parts)
+    # The best is more like the second than like the cheapest
+    good, balanced, fast = parts[2], parts[1], parts[0]
+    assert 0 < np.abs(good - balanced).mean() < np.abs(good - fast).mean()
+
+
 def test_interactive_example_writes_an_animation_with_a_new_vdi(tmp_path):
     target = tmp_path / "animation.gif"
     done = subprocess.run(

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fresh_python import run_python
+from json_schema import read_checked
 
 from pyvista_vdi import cli, examples
 from pyvista_vdi.benchmark import (
@@ -39,68 +40,10 @@ SCHEMA = Path(__file__).parents[2] / "docs" / "benchmark_schema.json"
 TINY = "kingsnake_like@32"
 TINY_RUN = ("--datasets", TINY, "--sizes", "16x12", "--max-supersegments", "4", "--repeats", "2")
 
-TYPES = {
-    "object": dict,
-    "array": list,
-    "string": str,
-    "boolean": bool,
-    "integer": int,
-    "number": (int, float),
-    "null": type(None),
-}
-
-
-def faults(value, schema, root, at="results"):
-    """Yield where a value breaks a JSON Schema: the keywords that ours uses, and no others."""
-    schema = dict(schema)
-    for name in ("$schema", "$defs", "title", "description"):
-        schema.pop(name, None)
-    if "$ref" in schema:
-        target = root
-        for part in schema.pop("$ref").removeprefix("#/").split("/"):
-            target = target[part]
-        yield from faults(value, target, root, at)
-    if "anyOf" in schema:
-        branches = [list(faults(value, s, root, at)) for s in schema.pop("anyOf")]
-        if all(branches):
-            yield f"{at}: {branches[0][0]}"
-    kinds = schema.pop("type", None)
-    if kinds is not None:
-        kinds = [kinds] if isinstance(kinds, str) else kinds
-        wrong = isinstance(value, bool) and "boolean" not in kinds
-        if wrong or not any(isinstance(value, TYPES[kind]) for kind in kinds):
-            yield f"{at} is {value!r}, not {kinds}"
-            return
-    if "const" in schema and value != schema.pop("const"):
-        yield f"{at} is {value!r}"
-    if "enum" in schema and value not in schema.pop("enum"):
-        yield f"{at} is {value!r}"
-    known, others = schema.pop("properties", {}), schema.pop("additionalProperties", True)
-    required, items = schema.pop("required", []), schema.pop("items", {})
-    least, most = schema.pop("minItems", 0), schema.pop("maxItems", 10**9)
-    assert schema.keys() <= {"const", "enum"}, f"{at}: the check knows no {sorted(schema)}"
-    if isinstance(value, dict):
-        yield from (f"{at} lacks {name}" for name in required if name not in value)
-        for name, item in value.items():
-            if name in known:
-                yield from faults(item, known[name], root, f"{at}.{name}")
-            elif others is False:
-                yield f"{at} has {name}"
-            elif others is not True:
-                yield from faults(item, others, root, f"{at}.{name}")
-    if isinstance(value, list):
-        if not least <= len(value) <= most:
-            yield f"{at} has {len(value)} items"
-        for i, item in enumerate(value):
-            yield from faults(item, items, root, f"{at}[{i}]")
-
 
 def checked(path):
     """Read results after holding them to the schema."""
-    data = json.loads(Path(path).read_text())
-    schema = json.loads(SCHEMA.read_text())
-    assert list(faults(data, schema, schema)) == []
-    return data
+    return read_checked(path, SCHEMA)
 
 
 def benchmark(*arguments):

@@ -337,6 +337,29 @@ def test_progress_can_end_it_and_nothing_stays(runtime, used):
     assert runtime.allocated == before
 
 
+@pytest.mark.parametrize("buffer", ["samples of steps", "recorded runs", "wanted bricks"])
+def test_an_error_that_is_kept_keeps_no_bricks(runtime, used, monkeypatch, buffer):
+    volume = volume_of(np.uint8)
+    function, camera = transfer_for(volume), VIEWS["perspective"]
+    gc.collect()
+    before, take = runtime.allocated, runtime._ledger.take
+
+    def scarce(name, *args):
+        if name == buffer:
+            raise DeviceMemoryError(f"no room for {name}")
+        return take(name, *args)
+
+    monkeypatch.setattr(runtime._ledger, "take", scarce)
+    with pytest.raises(DeviceMemoryError, match="no room for") as kept:
+        make(runtime, volume, camera, function, memory_limit=LIMIT)
+    # Tables and what is known of the blocks may stay for as long as the error does
+    assert runtime.allocated - before < 2**16
+    del kept
+    used.clear()
+    gc.collect()
+    assert runtime.allocated == before
+
+
 # -- what is refused ------------------------------------------------------------------------------
 
 

@@ -27,6 +27,7 @@ VERBS = (
     "info",
     "compare",
     "benchmark",
+    "tradeoff",
     "convert",
     "paraview",
 )
@@ -123,9 +124,11 @@ def test_version(capsys):
         (["generate", "-o", "b"], "one of the arguments VOLUME --example is required"),
         (["generate", "a", "--example", "b", "-o", "c"], "not allowed with argument"),
         (["generate", "a", "-o", "b", "--size", "12"], "a size is WIDTHxHEIGHT, like 1280x720"),
+        (["generate", "a", "-o", "b", "--memory-limit", "2 foo"], "a size such as 2GiB .* '2 foo'"),
         (["generate", "a", "-o", "b", "--size", "0x3"], "between 1 and 65536 pixels .* got 0 x 3"),
         (["generate", "a", "-o", "b", "--opacity", "0,x"], "numbers with commas .* got '0,x'"),
         (["generate", "a", "-o", "b", "--tf", "hard"], "invalid choice: 'hard'"),
+        (["generate", "a", "-o", "b", "--quality", "best"], "invalid choice: 'best'"),
         (["generate", "a", "-o", "b", "--position", "1", "2"], "expected 3 arguments"),
         (["compare", "a", "--angles", "0;5"], "got '0;5'"),
         (["compare", "a", "--repeats", "0"], "a whole number above 0; got '0'"),
@@ -178,6 +181,11 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
             ["generate", "v.nrrd", "-o", "b.vdi", "--occlusion-radius", "0"],
             "radius of ambient occlusion must be a positive length in model units; got 0",
         ),
+        (
+            ["generate", "v.nrrd", "-o", "b.vdi", "--quality", "fast", "--target-ssim", "0.9"],
+            "both say how good pictures are to be",
+        ),
+        (["generate", "v.nrrd", "-o", "b.vdi", "--max-bytes", "0"], "max_bytes must be .* got 0"),
         (["compare", "v.nrrd", "--out", "v.nrrd"], "the folder v.nrrd cannot be made"),
     ],
 )
@@ -313,6 +321,27 @@ def test_devices_fails_where_none_is_usable(capsys, monkeypatch):
     assert run(capsys, "devices")[:2] == (1, "No device.\n")
 
 
+def test_generate_by_a_dial(folder, capsys, default_runtime, tmp_path):
+    target = tmp_path / "b.vdi"
+    arguments = ("generate", folder / "v.nrrd", "--transfer-function", folder / "tf.json")
+    arguments = (*arguments, "--size", "60x40", "-o", target)
+    asked = ("--quality", "fast", "--max-bytes", "1e9", "--target-angle", "20")
+    status, out, err = run(capsys, *arguments, *asked)
+    assert status == 0
+    assert "settings are chosen by a measurement" in err
+    vdi = io.read(target)
+    width, height = vdi.window_size
+    assert f"{width} x {height} lists, " in out
+    assert f"chosen {width} x {height} lists of up to" in out
+    dial = vdi.metadata["dial"]
+    assert dial["asked"] == {"quality": "fast", "max_bytes": 10**9}
+    assert (dial["angle"], dial["window_size"], vdi.precision) == (20, [60, 40], "8-byte")
+    # The precision alone is no dial
+    status, out, _ = run(capsys, *arguments, "--precision", "16-byte")
+    assert (status, io.read(target).precision) == (0, "16-byte")
+    assert "chosen" not in out
+
+
 def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_path):
     target = tmp_path / "b.vdi"
     options = ["--size", "20x12", "--max-supersegments", "7", "--compression", "lz4"]
@@ -344,6 +373,26 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
         expected = io.to_bytes(pvdi.render(vdi, vdi.camera, (30, 10)))
         assert np.array_equal(np.asarray(image), expected)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["b.png", "b.vdi"]
+
+
+def test_generate_within_a_memory_limit(folder, capsys, default_runtime, tmp_path):
+    """The file is that without a limit; one that is too little for a brick is refused."""
+    import nrrd
+
+    array = np.random.default_rng(1).integers(0, 256, (80, 90, 200), dtype=np.uint8)
+    nrrd.write(str(tmp_path / "v.nrrd"), array, index_order="C")
+    arguments = ["generate", tmp_path / "v.nrrd", "--transfer-function", folder / "tf.json"]
+    arguments += ["--size", "12x8"]
+    for name, more in (("whole", []), ("bricks", ["--memory-limit", "2.3 MiB"])):
+        status, _, err = run(capsys, *arguments, "-o", tmp_path / f"{name}.vdi", *more)
+        assert status == 0, err
+    assert "up to 2 MiB" in err
+    assert io.read(tmp_path / "bricks.vdi").equals(io.read(tmp_path / "whole.vdi"))
+    few = [*arguments, "-o", tmp_path / "few.vdi", "--memory-limit", "900KB"]
+    status, _, err = run(capsys, *few)
+    assert status == 1
+    assert "brick by brick" in err
+    assert "memory_limit is 878.91 KiB" in err
 
 
 def test_render_several(capsys, default_runtime, tmp_path):

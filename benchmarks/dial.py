@@ -1,0 +1,419 @@
+"""How well the dial predicts: SSIM, bytes and frames per second of every rung, over all datasets.
+
+The truth of a rung is made whole: its VDI is generated, rendered at the promised angle and compared
+with our volume raycaster's picture. What the dial predicts for it comes from its short measurement.
+What is calibrated is fitted to all volumes but one and tested on that one, for each in turn; the
+tables show these predictions. Writes ``dial_WxH.json`` and ``.md``; a run that is stopped goes on
+where it was.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import statistics
+import sys
+import time
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from standard_table import SOFT_ONLY, window_size  # beside this file
+from tqdm import tqdm
+
+from pyvista_vdi import examples
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.classification import Classification
+from pyvista_vdi.dial import (
+    EXPONENT,
+    FRAME_COST,
+    LADDER,
+    QUALITIES,
+    ROUGH,
+    TARGET_ANGLE,
+    Measurement,
+    Prediction,
+    predictions,
+)
+from pyvista_vdi.dial_measurement import Scene, turned
+from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.io import whole_file
+from pyvista_vdi.metrics import compare_images
+from pyvista_vdi.opencl_runtime import get_runtime
+from pyvista_vdi.raycast import prepared_vdi, render_vdi
+from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.transfer_function import TransferFunction
+from pyvista_vdi.volume import Volume
+
+#: Timed frames of each rung, in turns; and of how many rungs: the larger VDIs take too long.
+FRAMES, TIMED_RUNGS = 6, 8
+
+#: What the issue asks of a prediction: error in 90 % of the cases, and most that is too hopeful.
+WITHIN, TOO_HOPEFUL = 0.01, 0.03
+
+#: Exponents that the calibration tries: the first and the second number of dial.EXPONENT.
+GRID = tuple(product(np.arange(0.4, 1.41, 0.05), np.arange(0.0, 1.01, 0.05)))
+
+Case: TypeAlias = dict[str, Any]
+
+
+def main() -> int:
+    """Measure what is missing, and write what was found."""
+    options = parsed()
+    options.out.mkdir(parents=True, exist_ok=True)
+    width, height = options.size
+    target = options.out / f"dial_{width}x{height}.json"
+    cases: dict[str, Case] = json.loads(target.read_text()) if target.exists() else {}
+    for name, look in tqdm(chosen(options), unit="case"):
+        entry = cases.setdefault(f"{name}/{look}", {})
+        parts = ("frames",) if options.frames else ("truth", "measured")
+        if all(part in entry for part in parts) and not options.redo:
+            continue
+        volume = examples.load_data(name, as_volume=True)
+        table = Classification(dict(TRANSFER_FUNCTIONS[look]), "dial").transfer_function(volume)
+        camera = filling_camera(volume.bounds, options.size)
+        if options.frames:
+            entry["frames"] = frames(volume, table, camera, options)
+        else:
+            entry["measured"] = measured(volume, table, camera, options)
+        if not options.frames and "truth" not in entry:
+            entry["truth"] = list(truth(volume, table, camera, options))
+        with whole_file(target) as stream:
+            stream.write(json.dumps(cases, indent=1).encode() + b"\n")
+    complete = {k: case for k, case in cases.items() if "measured" in case and "truth" in case}
+    with whole_file(target.with_suffix(".md")) as stream:
+        stream.write("\n".join([*tables(complete, options.size), ""]).encode())
+    print(f"Written: {target} and .md beside it")
+    return 0
+
+
+def parsed() -> argparse.Namespace:
+    """Return the options."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--size", type=window_size, default=(640, 360), metavar="WxH")
+    parser.add_argument("--volumes", nargs="+", choices=sorted(examples.VOLUMES), metavar="NAME")
+    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
+    parser.add_argument(
+        "--frames",
+        action="store_true",
+        help="measure what frames of the rungs cost instead, by the process's CPU time: on a CPU",
+    )
+    parser.add_argument(
+        "--redo", action="store_true", help="measure for the dial again; what is true stays"
+    )
+    return parser.parse_args()
+
+
+def chosen(options: argparse.Namespace) -> list[tuple[str, str]]:
+    """Return volumes and transfer functions that are at hand; name the volumes that are not."""
+    at_hand = examples.available()
+    wanted = options.volumes or sorted(examples.VOLUMES)
+    absent = [name for name in wanted if name not in at_hand]
+    if absent:
+        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
+    return [
+        (name, look)
+        for name, look in product([n for n in wanted if n in at_hand], TRANSFER_FUNCTIONS)
+        if look == "soft" or name not in SOFT_ONLY
+    ]
+
+
+# -- measuring -------------------------------------------------------------------------------------
+
+
+def measured(
+    volume: Volume, table: TransferFunction, camera: Camera, options: argparse.Namespace
+) -> Case:
+    """Return what the dial measures, and what that costs in time of the process."""
+    start = time.process_time()
+    scene = Scene(volume, camera, options.size, table, TARGET_ANGLE, options.device, {})
+    found = scene.measure()
+    measuring = time.process_time() - start
+    start = time.process_time()
+    generate_vdi(volume, camera, options.size, table, device=options.device)
+    generating = time.process_time() - start
+    return {
+        "rough": found.rough,
+        "sparse": found.sparse,
+        "dense": found.dense,
+        "least": found.least,
+        "counts": found.counts.tolist(),
+        "measuring_over_generating": measuring / generating,
+    }
+
+
+def truth(
+    volume: Volume, table: TransferFunction, camera: Camera, options: argparse.Namespace
+) -> Iterator[Case]:
+    """Yield what each rung gives."""
+    view = turned(camera, volume.bounds, TARGET_ANGLE)
+    runtime = get_runtime(options.device)
+    picture = raycast_volume(volume, view, options.size, table, device=runtime)
+    for setting in LADDER:
+        vdi = generate_vdi(
+            volume,
+            camera,
+            setting.window_size(options.size),
+            table,
+            max_supersegments=setting.max_supersegments,
+            precision=setting.precision,
+            device=runtime,
+        )
+        seen = render_vdi(vdi, view, options.size, device=runtime)
+        yield {
+            "lists": setting.lists,
+            "max_supersegments": setting.max_supersegments,
+            "ssim": compare_images(seen, picture).ssim,
+            "supersegments": vdi.n_supersegments,
+            "bytes": prepared_vdi(runtime, vdi).list_bytes,
+        }
+
+
+def frames(
+    volume: Volume, table: TransferFunction, camera: Camera, options: argparse.Namespace
+) -> list[float]:
+    """Return what a frame of each of the first rungs takes, over one of the rough VDI."""
+    view = turned(camera, volume.bounds, TARGET_ANGLE)
+    vdis = [
+        generate_vdi(
+            volume,
+            camera,
+            setting.window_size(options.size),
+            table,
+            max_supersegments=setting.max_supersegments,
+            precision=setting.precision,
+            device=options.device,
+        )
+        for setting in (ROUGH, *LADDER[:TIMED_RUNGS])
+    ]
+    seconds: list[list[float]] = [[] for _ in vdis]
+    for _ in range(FRAMES):
+        for of_one, vdi in zip(seconds, vdis, strict=True):
+            start = time.process_time()
+            render_vdi(vdi, view, options.size, device=options.device)
+            of_one.append(time.process_time() - start)
+    rough, *others = (statistics.median(of_one) for of_one in seconds)
+    return [other / rough for other in others]
+
+
+# -- what was found --------------------------------------------------------------------------------
+
+
+def tables(cases: dict[str, Case], size: tuple[int, int]) -> list[str]:
+    """Return the report in Markdown."""
+    rows = predicted(cases, size)
+    errors = [row["error"] for row in rows]
+    kept = [row["error"] for row in rows if row["chosen_by"]]
+    width, height = size
+    looks, volumes = len(cases), len({key.split("/")[0] for key in cases})
+    return [
+        f"# The dial's predictions, {width}x{height}, {TARGET_ANGLE:g} degrees",
+        "",
+        f"{looks} cases (volume and transfer function) of {volumes} volumes, {len(LADDER)} rungs",
+        "each. Error: predicted less true SSIM, so that positive ones are too hopeful. What is",
+        "calibrated is fitted to the other volumes.",
+        "",
+        *_table(
+            ("predictions of", "n", "mean", "90 %", "most hopeful", "least", "bias"),
+            [
+                ("all rungs", *_summary(errors)),
+                ("rungs that a quality chooses", *_summary(kept)),
+                *(
+                    (
+                        f"{s.lists:.3g} lists per pixel, {s.max_supersegments}",
+                        *_summary([r["error"] for r in rows if r["setting"] == s]),
+                    )
+                    for s in LADDER
+                ),
+            ],
+        ),
+        "",
+        f"Asked: 90 % within {WITHIN}, none more than {TOO_HOPEFUL} too hopeful: "
+        + ("reached." if _reached(errors) else "**missed**."),
+        "",
+        "**The worst predictions**",
+        "",
+        *_table(
+            ("case", "lists", "N_S", "true", "predicted", "error"),
+            [
+                (
+                    row["case"],
+                    f"{row['setting'].lists:.3g}",
+                    row["setting"].max_supersegments,
+                    f"{row['true']:.4f}",
+                    f"{row['true'] + row['error']:.4f}",
+                    f"{row['error']:+.4f}",
+                )
+                for row in sorted(rows, key=lambda r: -abs(r["error"]))[:8]
+            ],
+        ),
+        "",
+        "**What a quality gives**: the true SSIM of the rung that is chosen",
+        "",
+        *_table(
+            ("quality", "asked", "cases", "true: mean", "least", "short of it by most", "reached"),
+            [_of_quality(name, goal, rows) for name, goal in QUALITIES.items() if goal is not None],
+        ),
+        "",
+        "**Bytes and frames**, predicted over true. A frame's time is over one of the rough VDI,",
+        f"in the process's CPU time, for {len(_timed(cases, size))} rungs of some cases.",
+        "",
+        *_table(
+            ("of", "median", "5 %", "95 %"),
+            [
+                ("bytes on the device", *_spread([row["bytes"] for row in rows])),
+                ("time of a full frame", *_spread(_timed(cases, size))),
+            ],
+        ),
+        "",
+        "Measuring takes, over generating one list per pixel of 20 supersegments, in the process's",
+        f"CPU time: median {_measuring(cases):.2f}.",
+        "",
+        *_fitted(cases, size),
+    ]
+
+
+def predicted(cases: dict[str, Case], size: tuple[int, int]) -> list[Case]:
+    """Return each rung of each case, predicted by what the other volumes calibrate."""
+    rows = []
+    missed = {key: misses(case, size) for key, case in cases.items()}
+    for volume in sorted({key.split("/")[0] for key in cases}):
+        others = {k: c for k, c in cases.items() if k.split("/")[0] != volume} or cases
+        calibrated = fitted(others, missed)
+        for key, case in cases.items():
+            if key.split("/")[0] != volume:
+                continue
+            ladder = _ladder(case, size, **calibrated)
+            reaching = {
+                _first(ladder, goal): name for name, goal in QUALITIES.items() if goal is not None
+            }
+            for i, (rung, true) in enumerate(zip(ladder, case["truth"], strict=True)):
+                rows.append(
+                    {
+                        "case": key,
+                        "setting": rung.setting,
+                        "ladder": [r.ssim for r in ladder],
+                        "true": true["ssim"],
+                        "error": rung.ssim - true["ssim"],
+                        "bytes": rung.nbytes / true["bytes"],
+                        "chosen_by": reaching.get(i),
+                    }
+                )
+    return rows
+
+
+def misses(case: Case, size: tuple[int, int]) -> NDArray[np.float64]:
+    """Return how far the rungs' predictions are off together, for each exponent of GRID."""
+    true = np.array([one["ssim"] for one in case["truth"]])
+    ladders = (_ladder(case, size, exponent=exponent) for exponent in GRID)
+    return np.array([np.abs([rung.ssim for rung in ladder] - true).sum() for ladder in ladders])
+
+
+def fitted(
+    cases: dict[str, Case], missed: dict[str, NDArray[np.float64]]
+) -> dict[str, tuple[float, float]]:
+    """Return the calibration that fits cases best; ``missed`` is what :func:`misses` gives."""
+    # Times: least squares of logarithms
+    equations, values = [[1.0, 0.0], [0.0, 1.0]], list(FRAME_COST)
+    for case in cases.values():
+        for setting, ratio in zip(LADDER, case.get("frames", ()), strict=False):
+            denser = math.log(setting.lists / ROUGH.lists)
+            longer = math.log(setting.max_supersegments / ROUGH.max_supersegments)
+            equations.append([denser, longer])
+            values.append(math.log(ratio))
+    cost = np.linalg.lstsq(np.array(equations[2:] or equations), np.array(values[2:] or values))[0]
+    first, second = GRID[int(np.sum([missed[key] for key in cases], axis=0).argmin())]
+    return {
+        "exponent": (float(first), float(second)),
+        "frame_cost": (float(cost[0]), float(cost[1])),
+    }
+
+
+def _ladder(case: Case, size: tuple[int, int], **calibrated: Any) -> tuple[Prediction, ...]:
+    found = case["measured"]
+    losses = (found[name] for name in ("rough", "sparse", "dense"))
+    measurement = Measurement(*losses, np.array(found["counts"]), 1.0, found["least"])
+    return predictions(measurement, size, **calibrated)
+
+
+def _timed(cases: dict[str, Case], size: tuple[int, int]) -> list[float]:
+    """Return predicted over true times, in frames of the rough VDI."""
+    return [
+        1 / rung.fps / true
+        for case in cases.values()
+        for rung, true in zip(_ladder(case, size), case.get("frames", ()), strict=False)
+    ]
+
+
+def _first(ladder: tuple[Prediction, ...], goal: float) -> int:
+    reaching = [i for i, rung in enumerate(ladder) if rung.ssim >= goal]
+    return reaching[0] if reaching else len(ladder) - 1
+
+
+def _of_quality(name: str, goal: float, rows: list[Case]) -> tuple[Any, ...]:
+    true = []
+    for case in sorted({row["case"] for row in rows}):
+        of_case = [row for row in rows if row["case"] == case]
+        reaching = [i for i, ssim in enumerate(of_case[0]["ladder"]) if ssim >= goal]
+        true.append(of_case[reaching[0] if reaching else -1]["true"])
+    reached = sum(ssim >= goal for ssim in true)
+    return (
+        name,
+        goal,
+        len(true),
+        f"{statistics.fmean(true):.4f}",
+        f"{min(true):.4f}",
+        f"{max(0.0, goal - min(true)):.4f}",
+        f"{reached / len(true):.0%}",
+    )
+
+
+def _summary(errors: list[float]) -> tuple[Any, ...]:
+    sizes = np.abs(errors)
+    numbers = (np.mean(sizes), np.quantile(sizes, 0.9), max(errors), min(errors), np.mean(errors))
+    mean, most, hopeful, least, bias = (float(n) for n in numbers)
+    return (
+        len(errors),
+        f"{mean:.4f}",
+        f"{most:.4f}",
+        f"{hopeful:+.4f}",
+        f"{least:+.4f}",
+        f"{bias:+.4f}",
+    )
+
+
+def _reached(errors: list[float]) -> bool:
+    within = float(np.quantile(np.abs(errors), 0.9)) <= WITHIN
+    return within and max(errors) <= TOO_HOPEFUL
+
+
+def _spread(ratios: list[float]) -> tuple[str, ...]:
+    return tuple(f"{np.quantile(ratios, q):.3f}" if ratios else "-" for q in (0.5, 0.05, 0.95))
+
+
+def _measuring(cases: dict[str, Case]) -> float:
+    return statistics.median(c["measured"]["measuring_over_generating"] for c in cases.values())
+
+
+def _fitted(cases: dict[str, Case], size: tuple[int, int]) -> list[str]:
+    best = fitted(cases, {key: misses(case, size) for key, case in cases.items()})
+    (a, b), (c, d) = best["exponent"], best["frame_cost"]
+    return [
+        f"Fitted to all volumes: EXPONENT ({a:.2f}, {b:.2f}), FRAME_COST ({c:.2f}, {d:.2f});",
+        f"in use: {EXPONENT} and {FRAME_COST}.",
+    ]
+
+
+def _table(heads: tuple[str, ...], rows: list[tuple[Any, ...]]) -> list[str]:
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    return lines + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,207 @@
+"""What generation costs over volume rendering, and volume rendering over VTK's two mappers.
+
+    python benchmarks/generation.py
+    python benchmarks/generation.py --volumes brain tooth --repeats 5
+
+At steps of half a voxel from V_O, without stopping at what is opaque: generation, and
+``render_volume`` with and without passing by empty blocks. At steps of one voxel, 5 degrees from
+V_O: ``render_volume`` as it is by default, and VTK's mappers. Candidates take turns; a ratio is the
+median over the turns of two candidates' times in the same turn, by wall clock and by the
+process's CPU time, which a machine that does other work distorts less. Writes
+``generation_WxH.json`` (all figures) and ``.md`` (the table). See README.md in this folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from standard_table import INTERPOLATIONS, window_size  # beside this file
+from tqdm import tqdm
+
+from pyvista_vdi import examples
+from pyvista_vdi.classification import Classification
+from pyvista_vdi.compare import describe_system
+from pyvista_vdi.compare.bounds import FRAME_RATIO_ANGLE
+from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.io import whole_file
+from pyvista_vdi.opencl_runtime import get_runtime
+from pyvista_vdi.plotting.cli_support import add_volume_property
+from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
+from pyvista_vdi.volume import Volume
+from pyvista_vdi.vtk_pipeline.peers import MAPPERS, PeerRenderer
+
+#: Ratios: title, what is divided, and by which candidate or by the fastest of which.
+RATIOS: dict[str, tuple[str, str, tuple[str, ...]]] = {
+    "generation": ("generation / render_volume", "generate", ("march",)),
+    "generation_plain": ("the same, over all blocks", "generate", ("march_all",)),
+    "frame": ("render_volume / faster of VTK's", "frame", MAPPERS),
+    "frame_gpu": ("/ GPU mapper", "frame", ("gpu",)),
+    "frame_fixed_point": ("/ fixed-point mapper", "frame", ("fixed_point",)),
+}
+
+LEGEND = (
+    "Ratios of times by wall clock (in brackets by the process's CPU time). The first two at steps "
+    "of half a voxel without stopping at what is opaque; the others at steps of one voxel, "
+    f"{FRAME_RATIO_ANGLE:g} degrees from V_O."
+)
+
+Seconds = dict[str, list[dict[str, float]]]
+
+
+def main() -> int:
+    """Measure what is missing, and write what was found."""
+    options = parsed()
+    if not os.environ.get("VTK_DEFAULT_OPENGL_WINDOW") and not os.environ.get("DISPLAY"):
+        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
+    width, height = options.size
+    options.out.mkdir(parents=True, exist_ok=True)
+    target = options.out / f"generation_{width}x{height}.json"
+    case = {
+        "window_size": [width, height],
+        "transfer_function": options.tf,
+        "interpolation": options.interpolation,
+        "max_supersegments": options.max_supersegments,
+        "system": describe_system(options.device),
+    }
+    results = json.loads(target.read_text()) if target.exists() else {**case, "volumes": {}}
+    if any(results[name] != value for name, value in case.items()):
+        sys.exit(f"{target} was measured otherwise or elsewhere: choose another --out")
+    at_hand = examples.available()
+    absent = [name for name in options.volumes if name not in at_hand]
+    if absent:
+        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
+    for name in tqdm([name for name in options.volumes if name in at_hand], unit="volume"):
+        if name in results["volumes"] and not options.redo:
+            continue
+        results["volumes"][name] = measured(examples.load_data(name, as_volume=True), options)
+        with whole_file(target) as stream:
+            stream.write(json.dumps(results, indent=1).encode() + b"\n")
+    with whole_file(target.with_suffix(".md")) as stream:
+        stream.write(report(results).encode())
+    print(f"Written: {target}, and .md beside it")
+    return 0
+
+
+def parsed() -> argparse.Namespace:
+    """Return the options."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
+    names = sorted(examples.VOLUMES)
+    parser.add_argument("--volumes", nargs="+", choices=names, default=names, metavar="NAME")
+    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
+    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
+    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
+    parser.add_argument("--repeats", type=int, default=7, help="timed turns")
+    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
+    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
+    return parser.parse_args()
+
+
+def measured(volume: Volume, options: argparse.Namespace) -> dict[str, Any]:
+    """Measure one volume: seconds of every turn, and the ratios."""
+    looks = {**TRANSFER_FUNCTIONS[options.tf], "interpolation": options.interpolation}
+    table = Classification(looks, "generation").transfer_function(volume)
+    view = filling_camera(volume.bounds, options.size)
+    turned = view.azimuth(FRAME_RATIO_ANGLE)
+    voxel = min(volume.spacing)
+    runtime = get_runtime(options.device)
+    march = partial(
+        raycast_volume,
+        *(volume, view, options.size, table),
+        sample_distance=voxel / 2,
+        early_termination=False,
+        device=runtime,
+    )
+    generate = partial(
+        generate_vdi,
+        *(volume, view, options.size, table),
+        max_supersegments=options.max_supersegments,
+        sample_distance=voxel / 2,
+        device=runtime,
+    )
+    frame = partial(
+        raycast_volume,
+        *(volume, turned, options.size, table),
+        sample_distance=voxel,
+        device=runtime,
+    )
+    candidates: dict[str, Callable[[], object]] = {
+        "generate": generate,
+        "march": march,
+        "march_all": partial(march, skip_empty=False),
+        "frame": frame,
+    }
+    with ExitStack() as stack:
+        for mapper in MAPPERS:
+            prop = add_volume_property(volume, dict(looks))
+            peer = PeerRenderer(volume, prop, options.size, mapper, voxel)
+            stack.callback(peer.close)
+            candidates[mapper] = partial(peer.render, turned)
+        seconds = in_turns(candidates, options.repeats)
+    return {"seconds": seconds, "ratios": {name: ratio(seconds, name) for name in RATIOS}}
+
+
+def in_turns(candidates: dict[str, Callable[[], object]], repeats: int) -> Seconds:
+    """Time candidates in turns, after one turn that is not counted."""
+    taken: Seconds = {name: [] for name in candidates}
+    for turn in range(repeats + 1):
+        for name, candidate in candidates.items():
+            wall, cpu = time.perf_counter(), time.process_time()
+            candidate()
+            if turn:
+                spent = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
+                taken[name].append(spent)
+    return taken
+
+
+def ratio(seconds: Seconds, name: str) -> dict[str, float]:
+    """Median over the turns of one candidate's time over another's, or over the faster one's."""
+    _, divided, by = RATIOS[name]
+    found = {}
+    for clock in ("wall", "cpu"):
+        medians = {peer: statistics.median(s[clock] for s in seconds[peer]) for peer in by}
+        peer = min(medians, key=lambda p: medians[p])
+        pairs = zip(seconds[divided], seconds[peer], strict=True)
+        found[clock] = statistics.median(a[clock] / max(b[clock], 1e-9) for a, b in pairs)
+    return found
+
+
+def report(results: dict[str, Any]) -> str:
+    """Return the table: a line per volume."""
+    width, height = results["window_size"]
+    case = ", ".join(
+        [
+            results["transfer_function"],
+            f"{results['interpolation']} sampling",
+            f"{results['max_supersegments']} supersegments",
+        ]
+    )
+    lines = [
+        f"# Generation and volume rendering, {width}x{height}, {case}",
+        "",
+        LEGEND,
+        "",
+        f"| volume | {' | '.join(title for title, _, _ in RATIOS.values())} |",
+        f"|---|{'---|' * len(RATIOS)}",
+    ]
+    for name, found in sorted(results["volumes"].items()):
+        cells = [f"{r['wall']:.2f} ({r['cpu']:.2f})" for r in found["ratios"].values()]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    system = ", ".join(f"{k} {v}" for k, v in results["system"].items())
+    return "\n".join([*lines, "", system, ""])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,200 @@
+"""One dial in a plotter and in a pipeline: what is asked reaches the VDI; the status says it."""
+
+from __future__ import annotations
+
+import pytest
+import pyvista as pv
+from plugin_scenes import LOOKS, WINDOW, soft_ball
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import dial_measurement
+from pyvista_vdi.background import BackgroundGeneration
+from pyvista_vdi.dial import LADDER, Dial
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
+from pyvista_vdi.vtk_pipeline.convert import vdi_from_image
+from pyvista_vdi.vtk_pipeline.dense import VDIToDenseImage
+from pyvista_vdi.vtk_pipeline.regeneration import REGENERATE_BELOW
+
+pytestmark = pytest.mark.gl
+
+SIZE = (60, 48)
+
+
+@pytest.fixture
+def plotter():
+    plotter = pv.Plotter(window_size=WINDOW)
+    yield plotter
+    plotter.close()
+
+
+def shown(plotter, **arguments):
+    actor = plotter.add_vdi(soft_ball(12), **LOOKS, **arguments)
+    plotter.show(auto_close=False)
+    return actor
+
+
+def red_property():
+    prop = pv.VolumeProperty(
+        lookup_table=pv.LookupTable("viridis", scalar_range=LOOKS["clim"]),
+        opacity_unit_distance=LOOKS["opacity_unit_distance"],
+    )
+    prop.GetScalarOpacity().RemoveAllPoints()
+    prop.GetScalarOpacity().AddPoint(0, 0)
+    prop.GetScalarOpacity().AddPoint(255, 1)
+    return prop
+
+
+def ready_source():
+    source = pvdi.VDISource()
+    source.SetInputDataObject(soft_ball(12))
+    source.SetVolumeProperty(red_property())
+    source.SetCamera(pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1)))
+    source.SetWindowSize(SIZE)
+    return source
+
+
+# -- a plotter -------------------------------------------------------------------------------------
+
+
+def test_the_status_says_what_was_chosen_and_is_predicted(plotter):
+    actor = shown(plotter, quality="balanced", status=True)
+    status = actor.status
+    assert status.dial == actor.vdi.metadata["dial"]
+    assert status.dial["asked"] == {"quality": "balanced"}
+    assert status.dial["predicted"]["ssim"] >= 0.96
+    width, height = actor.vdi.window_size
+    assert f"chosen {width} x {height} lists of up to" in str(status)
+    assert actor.vdi.precision == "8-byte"
+
+
+def test_without_a_dial_nothing_is_chosen(plotter):
+    actor = shown(plotter)
+    assert actor.status.dial is None
+    assert "chosen" not in str(actor.status)
+    reference = pv.Plotter(window_size=WINDOW)
+    try:
+        assert shown(reference, quality="reference").vdi.equals(actor.vdi)
+    finally:
+        reference.close()
+
+
+def test_precision_and_limits_reach_the_vdi(plotter):
+    assert shown(plotter, precision="16-byte").vdi.precision == "16-byte"
+    with pytest.warns(VDIWarning, match=r"1e\+09 full frames per second cannot be reached"):
+        actor = shown(plotter, full_fps=1e9, name="fast")
+    assert actor.vdi.metadata["max_supersegments"] == LADDER[0].max_supersegments
+
+
+@pytest.mark.parametrize(
+    ("arguments", "bound"),
+    [
+        ({}, REGENERATE_BELOW),
+        ({"quality": "high"}, REGENERATE_BELOW),  # .98 less .02 is above it
+        ({"quality": "fast"}, 0.91),
+        ({"target_ssim": 0.5, "regenerate_below": 0.3}, 0.3),
+        ({"max_bytes": 1e9}, REGENERATE_BELOW),
+    ],
+)
+def test_views_regenerate_below_what_was_asked_for(plotter, arguments, bound):
+    actor = plotter.add_vdi(soft_ball(12), render=False, **arguments)
+    assert actor.mapper.GetRegenerateBelow() == pytest.approx(bound)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "said"),
+    [
+        ({"quality": "best"}, InvalidArgumentError, "quality must be one of"),
+        ({"quality": "fast", "target_ssim": 0.9}, InvalidArgumentError, "give one of them"),
+        ({"quality": "fast", "max_supersegments": 9}, InvalidArgumentError, "max_supersegments=9"),
+        ({"full_fps": -1}, InvalidArgumentError, "target_fps must be"),
+        ({"precision": "half"}, InvalidArgumentError, "precision must be one of"),
+    ],
+)
+def test_what_contradicts_is_refused_when_it_is_added(plotter, arguments, error, said):
+    with pytest.raises(error, match=said):
+        plotter.add_vdi(soft_ball(12), **arguments)
+
+
+def test_a_vdi_has_nothing_to_choose(plotter):
+    vdi = ready_source().GetVDI()
+    with pytest.raises(UnsupportedError, match="quality cannot be given with a VDI"):
+        plotter.add_vdi(vdi, quality="fast")
+
+
+def test_a_vdi_of_another_view_is_chosen_for_again(plotter):
+    actor = shown(plotter, target_ssim=0.97)
+    before = actor.vdi
+    actor.regenerate(pvdi.Camera((3, -4, 1), (0, 0, 0), (0, 0, 1)))
+    assert actor.vdi is not before
+    assert actor.status.dial["asked"] == {"target_ssim": 0.97}
+
+
+# -- a pipeline ------------------------------------------------------------------------------------
+
+
+def test_a_source_makes_what_generate_makes():
+    source = ready_source()
+    source.SetDial("high", max_bytes=10**6, target_angle=20)
+    assert source.GetDial() == Dial.of("high", max_bytes=10**6, target_angle=20)
+    arguments = {"quality": "high", "max_bytes": 10**6, "target_angle": 20}
+    expected = pvdi.generate(
+        soft_ball(12), source.GetCamera(), SIZE, volume_property=red_property(), **arguments
+    )
+    assert source.GetVDI().equals(expected)
+    assert source.GetVDI().metadata["dial"]["chosen"] == expected.metadata["dial"]["chosen"]
+    source.SetDial()
+    assert source.GetDial() is None
+    source.SetPrecision("8-byte")
+    assert source.GetPrecision() == source.GetVDI().precision == "8-byte"
+    assert source.GetVDI().window_size == SIZE
+
+
+def test_an_equal_dial_changes_nothing_and_another_makes_another():
+    source = ready_source()
+    source.SetDial(target_ssim=0.9)
+    first, stamp = source.GetVDI(), source.GetMTime()
+    source.SetDial(target_ssim=0.9)
+    assert source.GetMTime() == stamp
+    source.SetDial(max_bytes=1000)
+    with pytest.warns(VDIWarning, match="max_bytes=1000 cannot be kept"):
+        assert source.GetVDI() is not first
+
+
+@pytest.mark.parametrize("asked", [{"max_bytes": 10**4}, {"target_ssim": 0.9999}])
+def test_what_is_behind_a_source_sees_the_window_that_was_chosen(asked, recwarn):
+    source = ready_source()
+    source.SetDial(**asked)
+    dense = VDIToDenseImage()
+    dense.SetInputConnection(source.GetOutputPort())
+    dense.Update()
+    chosen = source.GetVDI().window_size
+    assert chosen != SIZE
+    assert source.GetOutputDataObject(0).GetDimensions() == (*chosen, 1)
+    assert vdi_from_image(source.GetOutputDataObject(0)).equals(source.GetVDI())
+    assert dense.GetOutputDataObject(0).GetDimensions()[:2] == chosen
+    counted = []
+    source.AddObserver("StartEvent", lambda *_: counted.append(1))
+    dense.Update()
+    assert not counted
+
+
+def test_settings_that_a_dial_chooses_are_refused_in_a_source():
+    source = ready_source()
+    source.SetMaxSupersegments(5)
+    source.SetDial("fast")
+    with pytest.raises(InvalidArgumentError, match="max_supersegments=5"):
+        source.GetVDI()
+
+
+def test_what_is_made_in_the_background_is_chosen_there():
+    source = ready_source()
+    source.SetDial("balanced")
+    request = source.MakeRequest()
+    dial_measurement.forget()
+    keywords = {k: v for k, v in request.keywords.items() if k != "device"}
+    with BackgroundGeneration() as background:
+        background.start(*request.arguments, **keywords)
+        background._desk.join()
+        made = background.take()
+    assert made.equals(source.GetVDI())
+    assert made.metadata["dial"]["asked"] == {"quality": "balanced"}

@@ -1,0 +1,662 @@
+"""The tradeoff: sweeps, tiny runs end to end, going on, refusing, and what figures come to."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fresh_python import run_python
+from json_schema import faults, read_checked
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import cli
+from pyvista_vdi.cli import parser
+from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.tradeoff import AXES, Setting, Tradeoff, measure_tradeoff, session, sweep
+from pyvista_vdi.tradeoff.settings import DEFAULT_AXES, ON_REQUEST, PAIRS, QUICK_AXES
+
+SCHEMA = Path(__file__).parents[2] / "docs" / "tradeoff_schema.json"
+
+TINY_SWEEP = ("max-supersegments=2", "precision=8-byte", "preview=0.5", "skip-empty")
+TINY_RUN = ("--size", "32x24", "--angles", "0,30", "--repeats", "2", "--generations", "1")
+
+
+def shell():
+    """Return a hollow ball in a block, uint8 (14, 18, 20)."""
+    z, y, x = np.mgrid[-1:1:14j, -1:1:18j, -1:1:20j]
+    radius = np.sqrt(x * x + y * y + z * z)
+    return np.rint(255 * np.exp(-(((radius - 0.7) / 0.15) ** 2))).astype(np.uint8)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a volume as NumPy's file and as a raw one."""
+    path = tmp_path_factory.mktemp("tradeoff")
+    np.save(path / "ball.npy", shell())
+    (path / "ball_20x18x14_uint8.raw").write_bytes(shell().tobytes())
+    return path
+
+
+def checked(path):
+    """Read results after holding them to the schema."""
+    return read_checked(path, SCHEMA)
+
+
+def tradeoff(*arguments):
+    return cli.main(["tradeoff", *(str(a) for a in arguments)])
+
+
+def names(entries):
+    return [entry["name"] for entry in entries]
+
+
+# -- sweeps ----------------------------------------------------------------------------------------
+
+
+def test_the_default_is_what_generate_does():
+    setting, defaults = Setting(), pvdi.generate.__kwdefaults__
+    assert setting.max_supersegments == defaults["max_supersegments"]
+    assert setting.tolerance == defaults["tolerance"]
+    assert setting.view_cone == defaults["view_cone"]
+    assert setting.criterion == defaults["criterion"]
+    assert setting.name == "default"
+    assert setting.changes == {}
+
+
+def test_the_default_sweep_changes_one_thing_or_a_pair():
+    settings = sweep()
+    assert settings[0] == Setting()
+    assert len({setting.name for setting in settings}) == len(settings)
+    changes = [setting.changes for setting in settings]
+    alone = {(n, v) for change in changes if len(change) == 1 for n, v in change.items()}
+    assert alone == {(name, value) for name in DEFAULT_AXES for value in AXES[name]}
+    together = [change for change in changes if len(change) > 1]
+    assert together == [dict(pair) for pair in PAIRS]
+    assert set(DEFAULT_AXES) | set(ON_REQUEST) == set(AXES)
+    assert all(set(QUICK_AXES[name]) <= set(AXES[name]) for name in QUICK_AXES)
+
+
+def test_pairs_need_both_axes():
+    settings = sweep({"lists": (2.0,), "precision": ("8-byte",), "tolerance": (0.1,)})
+    assert [setting.name for setting in settings] == [
+        "default",
+        "lists x2",
+        "8-byte",
+        "tolerance 0.1",
+        "lists x2, 8-byte",
+    ]
+    assert len(sweep({"lists": (2.0,), "precision": ("8-byte",)}, pairs=False)) == 3
+
+
+def test_a_product_has_every_combination():
+    settings = sweep({"max_supersegments": (5, 10), "skip_empty": (False,)}, product=True)
+    combinations = {(s.max_supersegments, s.skip_empty) for s in settings}
+    assert combinations == set(itertools.product((20, 5, 10), (True, False)))
+    base = Setting(lists=2.0, precision="8-byte")
+    assert sweep({"tolerance": (0.1,)}, base=base)[1].name == "tolerance 0.1, lists x2, 8-byte"
+    with pytest.raises(InvalidArgumentError, match="has 1001 settings, more than 500"):
+        sweep({"tolerance": [i / 1000 for i in range(1, 1001)]})
+
+
+def test_what_is_chosen_after_generation_shares_a_vdi():
+    one = Setting(max_supersegments=5, precision="8-byte", skip_empty=False, preview=0.5)
+    assert one.generated == Setting(max_supersegments=5)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"max_supersegments": 0}, "from 1 to 4096; got 0"),
+        ({"precision": "4-byte"}, "precision must be one of exact, 16-byte, 8-byte"),
+        ({"criterion": "depth"}, "criterion must be one of least-error"),
+        ({"lists": 0.0}, "lists must be from 0.05 to 8; got 0.0"),
+        ({"preview": 1.5}, "preview must be from 0.02 to 1; got 1.5"),
+        ({"tolerance": math.nan}, "tolerance must be from 0 to 1e"),
+        ({"view_cone": 91.0}, "view_cone must be from 0 to 90"),
+    ],
+)
+def test_settings_are_checked(values, message):
+    with pytest.raises(InvalidArgumentError, match=message):
+        Setting(**values)
+
+
+def test_unknown_axes_are_named():
+    with pytest.raises(InvalidArgumentError, match="no axis 'size': known are max_supersegments"):
+        sweep(["size"])
+
+
+# -- a run -----------------------------------------------------------------------------------------
+
+
+def test_a_tiny_run_writes_what_the_schema_says(runtime, folder, tmp_path, capsys):
+    device = ("--device", runtime.info.selector)
+    run = (folder / "ball.npy", *TINY_RUN, "--sweep", *TINY_SWEEP, "--no-vtk", *device)
+    assert tradeoff(*run, "--out", tmp_path) == 0
+    data = checked(tmp_path / "tradeoff-ball.json")
+    assert names(data["points"]) == ["default", "N_S 2", "8-byte", "preview x0.5", "no skipping"]
+    points = {point["name"]: point for point in data["points"]}
+    for point in points.values():
+        assert point["refused"] is None
+        assert [row["angle"] for row in point["angles"]] == [0, 30]
+        for row in point["angles"]:
+            for taken in (row["seconds"], row["volume_seconds"]):
+                assert len(taken["clock"]) == len(taken["device"]) == 2
+        assert len(point["generation"]["seconds"]["clock"]) == 1
+    # From V_O a VDI loses nothing, whatever the budget
+    for name in ("default", "N_S 2", "no skipping"):
+        assert points[name]["angles"][0]["to_volume"]["ssim"] > 0.9999
+    # Skipping changes no bit
+    for row, other in zip(
+        points["default"]["angles"], points["no skipping"]["angles"], strict=True
+    ):
+        assert row["to_volume"] == other["to_volume"]
+    assert points["N_S 2"]["vdi"]["longest_list"] == 2
+    assert points["8-byte"]["vdi"]["bytes_memory"] < points["default"]["vdi"]["bytes_memory"]
+    assert points["8-byte"]["generation"]["packing"] is not None
+    # What differs only after generation shares a VDI
+    assert points["preview x0.5"]["vdi"] == points["default"]["vdi"]
+    assert points["preview x0.5"]["generation"] == points["default"]["generation"]
+    assert points["N_S 2"]["generation"] != points["default"]["generation"]
+    text = (tmp_path / "tradeoff-ball.md").read_text()
+    assert "| preview x0.5 |" in text
+    assert "Not measured" not in text
+    shown = capsys.readouterr().out
+    assert "bytes on the device against SSIM: N_S 2 (" in shown
+    written = shown.rpartition("Written: ")[2]
+    assert all(str(tmp_path / f"tradeoff-ball.{kind}") in written for kind in ("json", "md"))
+
+
+def test_python_and_the_command_measure_the_same(default_runtime, folder, tmp_path):
+    run = (folder / "ball_20x18x14_uint8.raw", *TINY_RUN, "--sweep", "lists=0.5", "--no-vtk")
+    assert tradeoff(*run, "--out", tmp_path, "--device", default_runtime.info.selector) == 0
+    commanded = Tradeoff.read(tmp_path / "tradeoff-ball_20x18x14_uint8.json")
+    table = pvdi.benchmark.datasets.look("ramp", (0.0, 255.0), "nearest")
+    ours = measure_tradeoff(
+        pvdi.Volume(shell()),
+        sweep({"lists": (0.5,)}),
+        window_size=(32, 24),
+        angles=(0, 30),
+        repeats=1,
+        generations=1,
+        vtk=False,
+        transfer_function=table,
+        device=default_runtime,
+    )
+    assert [one.name for one in ours.points] == ["default", "lists x0.5"]
+    for name in ("default", "lists x0.5"):
+        a, b = commanded.point(name), ours.point(name)
+        assert (a.ssims, a.bytes_memory, a.bytes_file) == (b.ssims, b.bytes_memory, b.bytes_file)
+    assert ours.table().startswith("# Tradeoff: volume, 32x24\n")
+    with pytest.raises(InvalidArgumentError, match=r"no setting 'N_S 3' was measured: .*'default'"):
+        ours.point("N_S 3")
+    with pytest.raises(InvalidArgumentError, match="kind must be one of frame, memory, file, gen"):
+        ours.front("bytes")
+
+
+@pytest.mark.gl
+def test_vtk_takes_part(default_runtime, folder, tmp_path):
+    run = (folder / "ball.npy", *TINY_RUN, "--sweep", "skip-empty", "--interpolation", "linear")
+    assert tradeoff(*run, "--out", tmp_path, "--device", default_runtime.info.selector) == 0
+    data = checked(tmp_path / "tradeoff-ball.json")
+    assert data["left_out"] == {}
+    for row in data["baselines"]:
+        assert {"vtk_gpu", "vtk_fixed_point"} < set(row["seconds"])
+        assert row["volume_to_vtk_gpu"]["ssim"] > 0.95
+    assert data["system"]["opengl"]
+    assert "VTK GPU | VTK fixed point" in (tmp_path / "tradeoff-ball.md").read_text()
+
+
+def test_the_engine_alone_can_run_it(default_runtime, folder, tmp_path):
+    for file in ("ball.npy", "ball_20x18x14_uint8.raw"):
+        out = ["--out", str(tmp_path), "--sweep", "precision=8-byte"]
+        arguments = ["tradeoff", str(folder / file), *TINY_RUN, *out]
+        blocked = ("matplotlib", "pyvista", "vtk", "vtkmodules")
+        result = run_python(
+            "import sys\n"
+            f"sys.modules.update(dict.fromkeys({blocked!r}))\n"
+            "from pyvista_vdi.cli import main\n"
+            f"sys.exit(main({arguments!r}))\n"
+        )
+        assert result.returncode == 0, result.stderr
+        assert "VTK is not installed: its mappers are left out" in result.stderr
+        stem = f"tradeoff-{file.split('.')[0]}"
+        assert checked(tmp_path / f"{stem}.json")["plan"]["vtk"] is False
+        assert not (tmp_path / f"{stem}.png").exists()
+
+
+# -- stopping, going on, refusing ------------------------------------------------------------------
+
+
+def test_an_interrupted_run_can_be_gone_on_with(
+    default_runtime, folder, tmp_path, monkeypatch, capsys
+):
+    sweep_two = ("--sweep", "max-supersegments=2,3", "precision=8-byte", "--name", "two")
+    run = (folder / "ball.npy", *TINY_RUN, *sweep_two, "--no-vtk", "--out", tmp_path)
+    out = tmp_path / "tradeoff-two.json"
+    whole = session._Run._group
+
+    def interrupted(self, generated, settings):
+        if generated.max_supersegments == 3:
+            raise KeyboardInterrupt
+        return whole(self, generated, settings)
+
+    monkeypatch.setattr(session._Run, "_group", interrupted)
+    assert tradeoff(*run) == 130
+    assert "--resume goes on" in capsys.readouterr().err
+    first = checked(out)
+    assert names(first["points"]) == ["default", "N_S 2", "8-byte"]
+    assert first["findings"] is None
+    assert [path.name for path in tmp_path.iterdir()] == [out.name]
+
+    monkeypatch.setattr(session._Run, "_group", whole)
+    assert tradeoff(*run) == 1
+    assert "--resume goes on with it, or choose another --out" in capsys.readouterr().err
+    assert tradeoff(*run, "--resume") == 0
+    second = checked(out)
+    assert names(second["points"]) == ["default", "N_S 2", "N_S 3", "8-byte"]
+    kept = [point for point in second["points"] if point["name"] != "N_S 3"]
+    assert kept == first["points"]
+    assert second["baselines"] == first["baselines"]
+
+    # Nothing is left to do: nothing is measured
+    monkeypatch.setattr(session._Run, "_group", None)
+    assert tradeoff(*run, "--resume") == 0
+    assert checked(out)["points"] == second["points"]
+
+    assert tradeoff(*run, "--resume", "--angles", "0") == 1
+    assert "holds results for angles = [0.0, 30.0], not [0.0]" in capsys.readouterr().err
+    assert tradeoff(*run, "--resume", "--interpolation", "linear") == 1
+    assert "holds results for interpolation = nearest, not linear" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
+def test_ctrl_c_leaves_no_half_file(folder, default_runtime, tmp_path):
+    """The interrupt comes while the results are written: those of the VDI before stay."""
+    code = (
+        "import sys, time\n"
+        "from pyvista_vdi.cli import main\n"
+        "from pyvista_vdi.tradeoff import results, session\n"
+        "save = results.TradeoffFile.save\n"
+        "def slow(self):\n"
+        "    if self.data['points']:\n"
+        "        print('writing', flush=True); time.sleep(60)\n"
+        "    save(self)\n"
+        "results.TradeoffFile.save = slow\n"
+        "sys.exit(main(sys.argv[1:]))\n"
+    )
+    arguments = (str(folder / "ball.npy"), *TINY_RUN, "--no-vtk", "--out", str(tmp_path))
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, "tradeoff", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout.readline() == "writing\n"
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert err.splitlines()[-1] == "pyvista-vdi: error: interrupted; nothing was left half done"
+    assert "Traceback" not in err
+    assert [path.name for path in tmp_path.iterdir()] == ["tradeoff-ball.json"]
+    data = checked(tmp_path / "tradeoff-ball.json")
+    assert (len(data["baselines"]), data["points"]) == (2, [])
+
+
+def test_a_vdi_beyond_the_device_is_a_refused_row(default_runtime, folder, tmp_path, monkeypatch):
+    whole = session.generate_vdi
+
+    def too_large(*arguments, max_supersegments, **others):
+        if max_supersegments == 3:
+            raise DeviceMemoryError("the lists need 9 GiB; 'X' allows 1 GiB")
+        return whole(*arguments, max_supersegments=max_supersegments, **others)
+
+    monkeypatch.setattr(session, "generate_vdi", too_large)
+    run = (*TINY_RUN, "--sweep", "max-supersegments=2,3", "--no-vtk", "--out", tmp_path)
+    assert tradeoff(folder / "ball.npy", *run) == 0
+    data = checked(tmp_path / "tradeoff-ball.json")
+    refused = {point["name"]: point["refused"] for point in data["points"]}
+    assert refused["N_S 3"] == "DeviceMemoryError: the lists need 9 GiB; 'X' allows 1 GiB"
+    assert refused["default"] is None
+    text = (tmp_path / "tradeoff-ball.md").read_text()
+    assert "- N_S 3: DeviceMemoryError: the lists need 9 GiB" in text
+
+
+def test_a_volume_that_is_not_seen_is_refused(default_runtime, tmp_path, capsys):
+    np.save(tmp_path / "zero.npy", np.zeros((4, 4, 4), np.uint8))
+    table = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 0], (0, 1))
+    (tmp_path / "tf.json").write_text(json.dumps(table.to_dict()))
+    looks = ("--transfer-function", tmp_path / "tf.json", "--no-vtk", "--out", tmp_path)
+    assert tradeoff(tmp_path / "zero.npy", *TINY_RUN, *looks) == 1
+    assert "nothing is to be seen at 0 degrees" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--sweep", "size"], "--sweep knows no 'size': known are max-supersegments, tolerance"),
+        (["--sweep", "lists=a"], "--sweep lists takes a number; got 'a'"),
+        (["--sweep", "max-supersegments=1.5"], "takes a whole number; got '1.5'"),
+        (["--sweep", "skip-empty=no"], "--sweep skip-empty takes on or off; got 'no'"),
+        (["--sweep", "precision=4-byte"], "precision must be one of exact, 16-byte, 8-byte"),
+        (["--size", "8x8"], "a window of 8 x 8 has no SSIM: each edge must have 11 pixels"),
+        (["--angles", "5,5"], "an angle is given twice"),
+        (["--angles", "nan"], "angles must be one or more numbers of degrees"),
+        (["--repeats", "2000"], "repeats must be from 1 to 1000; got 2000"),
+        (["--name", "a/b"], "--name becomes a file's, without a folder; got 'a/b'"),
+        (["--out", "ball.npy"], "the folder ball.npy cannot be made"),
+        (["--cmap", "bone", "--transfer-function", "none.json"], "none.json cannot be read"),
+    ],
+)
+def test_mistakes_are_one_line(arguments, message, folder, capsys, monkeypatch, default_runtime):
+    monkeypatch.chdir(folder)
+    before = sorted(folder.iterdir())
+    assert tradeoff("ball.npy", "--no-vtk", *arguments) == 1
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert sorted(folder.iterdir()) == before
+
+
+def test_mistakes_of_the_command_line(capsys):
+    assert tradeoff("a.npy", "--alone", "--product") == 2
+    assert "--product: not allowed with argument --alone" in capsys.readouterr().err
+    assert tradeoff("a.npy", "--window-size", "12") == 2
+    assert "a size is WIDTHxHEIGHT" in capsys.readouterr().err
+
+
+def test_a_file_of_another_kind_is_refused(folder, capsys, tmp_path):
+    (tmp_path / "tradeoff-ball.json").write_text('{"format": "pyvista-vdi benchmark"}')
+    assert tradeoff(folder / "ball.npy", "--no-vtk", "--resume", "--out", tmp_path) == 1
+    assert "holds no results: name a file that pyvista-vdi tradeoff has" in capsys.readouterr().err
+
+
+HEADER = b"\x93NUMPY\x01\x00\x28\x00"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"no array",
+        b"PK\x03\x04",  # an .npz
+        HEADER + b"{'descr': '|u1', 'shape': (3,           ",  # a bracket that is not closed
+        HEADER + b"{'descr': '|u1', b'shape': (3, 4), 2: 1}",  # keys that cannot be sorted
+        HEADER + b"{'descr': '|O', 'fortran_order': 0}     ",
+    ],
+)
+def test_what_is_no_array_is_refused(content, tmp_path, capsys):
+    (tmp_path / "a.npy").write_bytes(content)
+    assert tradeoff(tmp_path / "a.npy", "--no-vtk", "--out", tmp_path) == 1
+    assert "a.npy cannot be read as an array" in capsys.readouterr().err
+
+
+def test_the_options_reach_the_sweep():
+    options = parser.parse(["tradeoff", "a.npy", "--quick", "--window-size", "64x36"])
+    assert options.size == (64, 36)
+    from pyvista_vdi.cli.tradeoff import _settings
+
+    assert {name for s in _settings(options) for name in s.changes} == set(QUICK_AXES)
+    options = parser.parse(["tradeoff", "a.npy", "--sweep", "lists=0.5,2", "view-cone"])
+    expected = ["default", "lists x0.5", "lists x2", "view cone 0", "view cone 30", "view cone 90"]
+    assert [setting.name for setting in _settings(options)] == expected
+
+
+# -- what is made of the figures -------------------------------------------------------------------
+
+
+def made_up(*points, angles=(5.0, 30.0)):
+    """Return results of settings given as (setting, frame ratio, SSIM, bytes, generation ratio)."""
+    steady = np.array([1.0, 1.01, 0.99, 1.02, 0.98])
+
+    def times(median):
+        return {"clock": (median * steady).tolist(), "device": []}
+
+    entries = [
+        {
+            "name": setting.name,
+            "setting": setting.to_dict(),
+            "refused": None,
+            "vdi": {
+                "window_size": [64, 36],
+                "supersegments": 10,
+                "mean_length": 2.0,
+                "longest_list": 4,
+                "bytes_memory": size,
+                "bytes_file": size // 2,
+            },
+            "generation": {
+                "seconds": times(made),
+                "packing": None,
+                "volume_seconds": times(1.0),
+            },
+            "angles": [
+                {
+                    "angle": angle,
+                    "to_volume": {"ssim": ssim, "psnr": 30.0, "worst_pixel": 9.0},
+                    "seconds": times(frame * 0.01),
+                    "volume_seconds": times(0.01),
+                }
+                for angle in angles
+            ],
+        }
+        for setting, frame, ssim, size, made in points
+    ]
+    volume = {"name": "ball", "dimensions": [2, 2, 2], "spacing": [1, 1, 1], "dtype": "uint8"}
+    baseline = {
+        "volume_to_vtk_gpu": None,
+        "seconds": {"volume": times(0.02), "volume_skipping": times(0.01), "vtk_gpu": times(0.03)},
+    }
+    return {
+        "format": "pyvista-vdi tradeoff",
+        "version": 1,
+        "plan": {
+            "volume": {**volume, "bytes": 3 * 10**6},
+            "looks": {"cmap": "bone"},
+            "transfer_function": "0",
+            "interpolation": "nearest",
+            "camera": {},
+            "window_size": [64, 36],
+            "angles": list(angles),
+            "repeats": 5,
+            "generations": 5,
+            "vtk": True,
+            "settings": [setting.to_dict() for setting, *_ in points],
+        },
+        "system": {"device": "a", "driver": "1", "python": "3", "system": "b"},
+        "begun": "x",
+        "changed": "y",
+        "baselines": [{"angle": angle, **baseline} for angle in angles],
+        "left_out": {},
+        "points": entries,
+        "findings": None,
+    }
+
+
+#: One setting that is best at nothing, and three that are best at something.
+FOUR = (
+    (Setting(), 0.50, 0.980, 4_000_000, 5.0),
+    (Setting(max_supersegments=5), 0.40, 0.960, 1_000_000, 4.0),
+    (Setting(lists=2.0), 0.80, 0.990, 16_000_000, 20.0),
+    (Setting(tolerance=0.1), 0.60, 0.979, 4_100_000, 6.0),
+)
+
+
+def test_made_up_figures_are_of_the_schema():
+    schema = json.loads(SCHEMA.read_text())
+    assert list(faults(made_up(*FOUR), schema, schema)) == []
+
+
+def test_fronts_and_dominated_settings():
+    found = Tradeoff(made_up(*FOUR))
+    for kind in ("frame", "memory", "file", "generation"):
+        assert found.front(kind) == ["N_S 5", "default", "lists x2"]
+    assert found.dominated() == {"tolerance 0.1": ["default"]}
+    one = found.point("N_S 5")
+    assert one.frame == pytest.approx(0.4)
+    assert one.frames == {5.0: pytest.approx(0.4), 30.0: pytest.approx(0.4)}
+    assert one.ssim == pytest.approx(0.96)
+    assert one.generation == pytest.approx(4.0)
+    assert one.frame_spread == pytest.approx(0, abs=1e-9)  # the volume's noise is the same
+
+
+def test_worse_at_one_angle_is_worse():
+    data = made_up(*FOUR)
+    (row,) = (row for row in data["points"][3]["angles"] if row["angle"] == 30)
+    row["to_volume"]["ssim"] = 0.9815  # less than the default at 5 degrees, more at 30
+    assert Tradeoff(data).dominated() == {}
+
+
+def test_equal_settings_are_named_once():
+    twin = (Setting(skip_empty=False), *FOUR[0][1:])
+    found = Tradeoff(made_up(*FOUR, twin))
+    assert "no skipping" not in found.front("memory")
+    assert "no skipping" not in found.dominated()
+
+
+def test_what_noise_hides_is_named_once_and_not_dominated():
+    data = made_up(*FOUR, (Setting(precision="8-byte"), 0.55, 0.9799, 4_000_000, 5.0))
+    frames = [row["seconds"] for row in data["points"][-1]["angles"]]
+    for row in frames:
+        row["clock"][0] = 0.004  # once faster than the default, in the median a tenth slower
+    found = Tradeoff(data)
+    assert found.point("8-byte").frame == pytest.approx(0.55)
+    assert "8-byte" not in found.front("frame")
+    assert "8-byte" not in found.dominated()
+    for row in frames:
+        row["clock"][0] = 0.0055
+    assert Tradeoff(data).dominated()["8-byte"] == ["default"]
+
+
+def test_a_slower_machine_in_one_round_changes_nothing():
+    data = made_up(*FOUR)
+    for point in data["points"]:
+        for row in point["angles"]:
+            for name in ("seconds", "volume_seconds"):
+                row[name]["clock"][2] *= 7
+    for ours, theirs in zip(Tradeoff(data).points, Tradeoff(made_up(*FOUR)).points, strict=True):
+        assert ours.frame == pytest.approx(theirs.frame)
+        assert ours.frame_spread == pytest.approx(theirs.frame_spread, abs=1e-12)
+
+
+def test_packing_is_part_of_generation():
+    data = made_up(*FOUR)
+    data["points"][0]["generation"]["packing"] = {"clock": [0.5] * 5, "device": []}
+    found = Tradeoff(data).point("default")
+    assert found.generation == pytest.approx(5.5, rel=0.01)
+
+
+def test_a_file_that_had_no_room_leaves_the_rest():
+    data = made_up(*FOUR)
+    data["points"][2]["vdi"]["bytes_file"] = None
+    found = Tradeoff(data)
+    assert found.front("file") == ["N_S 5", "default"]
+    assert found.front("memory") == ["N_S 5", "default", "lists x2"]
+    assert found.dominated() == {"tolerance 0.1": ["default"]}
+    assert "| - |" in found.table()
+
+
+def test_the_table_says_where_volumes_win():
+    text = Tradeoff(made_up(*FOUR)).table()
+    assert "cmap bone, nearest sampling" in text
+    # Without skipping twice as slow, VTK three times; nobody is slower than either
+    assert "| 5 | 10 | 2.00 | 3.00 | - | 0.50 | 0 of 4 | 0 of 4 |" in text
+    assert "- tolerance 0.1: by default" in text
+    slow = (Setting(lists=4.0), 1.5, 0.995, 64_000_000, 80.0)
+    text = Tradeoff(made_up(*FOUR, slow)).table()
+    assert "| 0.50 | 1 of 5 | 0 of 5 |" in text
+    rows = [line for line in text.splitlines() if line.startswith("| N_S 5 | 0.40")]
+    header = next(line for line in text.splitlines() if line.startswith("| setting | frame /"))
+    assert len(rows) == 2  # in the front, and among all
+    assert max(row.count("|") for row in rows) == max(header.count("|"), rows[-1].count("|"))
+
+
+# -- the plot --------------------------------------------------------------------------------------
+
+
+def labels(figure):
+    """Return the boxes of the names on each panel, without their lines, pixels."""
+    from matplotlib.text import Annotation, Text
+
+    renderer = figure.canvas.get_renderer()
+    return [
+        {
+            text.get_text(): Text.get_window_extent(text, renderer)
+            for text in panel.texts
+            if isinstance(text, Annotation)
+        }
+        for panel in figure.axes
+    ]
+
+
+def test_the_plot_names_the_front_and_no_names_overlap():
+    pytest.importorskip("matplotlib")
+    rng = np.random.default_rng(5)
+    # A front of fifteen settings close together, as a full sweep has it
+    crowd = [
+        (
+            Setting(max_supersegments=n, lists=2.0, precision="8-byte"),
+            0.3 * 1.06**i,
+            0.97 + 0.0011 * i,
+            int(1e6 * 1.1**i),
+            4 * 1.06**i,
+        )
+        for i, n in enumerate(range(2, 17))
+    ]
+    dominated = [
+        (Setting(tolerance=float(t)), 1.0, 0.96, 9_000_000, 9.0) for t in rng.uniform(0, 1, 6)
+    ]
+    found = Tradeoff(made_up(*crowd, *dominated))
+    figure = found.plot()
+    figure.canvas.draw()
+    for panel, kind in zip(labels(figure), ("frame", "memory", "generation"), strict=True):
+        assert list(panel) == found.front(kind)
+        assert len(panel) == 15
+        for (a, one), (b, other) in itertools.combinations(panel.items(), 2):
+            assert not one.overlaps(other), (kind, a, b)
+    for panel in figure.axes:
+        inside = panel.get_window_extent()
+        for box in labels(figure)[figure.axes.index(panel)].values():
+            assert inside.x0 <= box.x0 <= box.x1 <= inside.x1
+            assert inside.y0 <= box.y0 <= box.y1 <= inside.y1
+
+
+def test_the_limits_do_not_overlap_either():
+    pytest.importorskip("matplotlib")
+    data = made_up(*FOUR, (Setting(lists=4.0), 1.5, 0.995, 64_000_000, 80.0))
+    for row in data["baselines"]:  # VTK is nearly as fast as render_volume
+        row["seconds"]["vtk_gpu"]["clock"] = [0.0101] * 5
+    figure = Tradeoff(data).plot()
+    figure.canvas.draw()
+    from matplotlib.text import Annotation
+
+    texts = [text for text in figure.axes[0].texts if not isinstance(text, Annotation)]
+    assert {text.get_text().strip() for text in texts} == {"render_volume", "VTK, faster mapper"}
+    one, other = (text.get_window_extent() for text in texts)
+    assert not one.overlaps(other)
+
+
+def test_the_plot_is_written_whole(tmp_path):
+    pytest.importorskip("matplotlib")
+    path = Tradeoff(made_up(*FOUR)).save_plot(tmp_path / "a.png")
+    assert path.read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(InvalidArgumentError, match="nothing was measured"):
+        Tradeoff({**made_up(*FOUR), "points": []}).plot()
+
+
+def test_exact_pictures_can_be_drawn():
+    pytest.importorskip("matplotlib")
+    exact = [(setting, frame, 1.0, size, made) for setting, frame, _, size, made in FOUR]
+    figure = Tradeoff(made_up(*exact)).plot()
+    figure.canvas.draw()
+    assert all(np.isfinite(panel.get_ylim()).all() for panel in figure.axes)
