@@ -248,8 +248,12 @@ class _LineInterrupt:
             sys.settrace(before)
 
 
+#: A thousand operations, traced: on a busy machine they take longer than a test may by default.
+LONG = [pytest.mark.slow, pytest.mark.timeout(3600)]
+
+
 @every_operation
-@pytest.mark.parametrize("samples", [8, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("samples", [8, pytest.param(1000, marks=LONG)])
 def test_ctrl_c_at_lines_of_the_package(default_runtime, operation, samples):
     """As a signal may come anywhere: at some lines here, at a thousand in the long run."""
     _interrupt_lines(default_runtime, operation, samples)
