@@ -377,6 +377,8 @@ class PreparedVDI:
                 mode = (np.float32(first_hit.optical_depth), np.int32(first_hit.accumulated))
             if skip_empty and grid.worthwhile:
                 defines["SKIP_EMPTY"] = 1
+            if np.array_equal(self._list_space(camera), self._list_rows):
+                defines["ONE_LIST"] = 1
             kernel = runtime.kernel("vdi/raycast.cl", "raycast", defines)
         with (
             runtime.upload(view.forms, "rays") as form_buffer,

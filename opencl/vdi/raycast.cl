@@ -12,6 +12,7 @@
 // -D PACKED             the form of the supersegments, see common/supersegments.cl
 // -D CROPPED            only some regions are drawn, see common/cropping.cl
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
+// -D ONE_LIST           the view is V_O: each ray stays in a list, whose supersegments a loop of its own composites
 // -D SEGMENTS           write what each ray crosses into a pool, to be merged with other VDIs by vdi/merge.cl, in place of
 //                       compositing it; for a band of rays
 // -D FIRST_HIT          in place of a picture, where each ray enters the first supersegment that reaches an opacity
@@ -29,8 +30,7 @@
 #define MAX_OPTICAL_DEPTH 1e30f
 #endif
 
-// A ray that crosses fewer lists than this is not worth a look at the grid: at V_O it stays in one, whose supersegments a
-// loop of their own composites.
+// A ray that crosses fewer lists than this is not worth a look at the grid: at V_O it stays in one.
 #define FEW_LISTS 2.0f
 // One that crosses fewer than this goes through the whole depth of a list's neighbourhood: worth to be brought close at once.
 #define LISTS_TO_PREFETCH 48.0f
@@ -244,8 +244,11 @@ __kernel void raycast(
         float2 face;
         const bool found = search_on(&search, list, SUPERSEGMENTS_ARGUMENTS depth, away, &face);
         bool stays = !found; // in this list
-        bool meets = found && face.x <= next_depth;
-        while (meets) {
+#ifdef ONE_LIST
+        for (bool meets = found && face.x <= next_depth; meets;) {
+#else
+        if (found && face.x <= next_depth) {
+#endif
             // Clip to the supersegment by interval: between two faces it never leaves [r, r_next]
             const float r_enters = (face.x - deep_depth) * inverse_depth;
             const float r_leaves = (face.y - deep_depth) * inverse_depth;
@@ -297,13 +300,15 @@ __kernel void raycast(
             // Behind it comes the next one, and nothing is left to search for
             search.n += stays ? 1 : 0;
             search.low = search.n;
-            // Where all lanes stay in their lists, as at V_O, all come to the next one in step
-            meets = stays && lists_crossed <= FEW_LISTS && search.n < list.count;
+#ifdef ONE_LIST
+            // All lanes stay in their lists, and come to the next one in step
+            meets = stays && search.n < list.count;
             if (meets) {
                 face = face_met(list, SUPERSEGMENTS_ARGUMENTS search.n, away);
                 meets = face.x <= next_depth;
                 stays = meets;
             }
+#endif
         }
         if (!stays) {
             if (r_next >= r_end || RAY_IS_DONE)
