@@ -273,7 +273,8 @@ def test_more_than_2_31_voxels_that_the_host_never_holds(runtime, worst, monkeyp
     assert exact[..., 3].max() > 0.3
     error = np.abs(image - exact).max()
     worst("brick by brick", error)
-    assert error <= max(BOUND, 2.0**-24 * max(volume.dimensions) / 2)  # as for very many voxels
+    # As for very many voxels, and in one voxel the opacity changes by up to 1
+    assert error <= max(BOUND, 2.0**-24 * max(volume.dimensions))
     seen = render_vdi(vdi, camera, device=runtime)
     assert np.abs(seen - image).max() <= BOUND
 
