@@ -302,6 +302,7 @@ __kernel void raycast(
             search.low = search.n;
 #ifdef ONE_LIST
             // All lanes stay in their lists, and come to the next one in step
+            stays = stays && !RAY_IS_DONE;
             meets = stays && search.n < list.count;
             if (meets) {
                 face = face_met(list, SUPERSEGMENTS_ARGUMENTS search.n, away);
