@@ -207,6 +207,13 @@ def _add_render(parser: argparse.ArgumentParser) -> None:
         help="blend over this: a name, #rrggbb or R,G,B from 0 to 1; otherwise the picture is "
         "transparent where the volume is",
     )
+    parser.add_argument(
+        "--transmittance-cutoff",
+        type=float,
+        metavar="LIGHT",
+        help="end rays where less than this is left, 0 to below 1 (0.000001): what a channel may "
+        "lose; VTK's mappers stop at about 0.004. For a single file",
+    )
     _add_camera(parser, "the VDI's generating view")
     _add_device(parser)
 

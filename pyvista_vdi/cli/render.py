@@ -18,13 +18,20 @@ def render(options: argparse.Namespace) -> int:
     first = vdis[0]
     view = camera(options, first.camera)
     if len(vdis) == 1:
-        image = render_vdi(first, view, options.size, device=options.device)
+        image = render_vdi(
+            first,
+            view,
+            options.size,
+            transmittance_cutoff=options.transmittance_cutoff,
+            device=options.device,
+        )
     else:
         image = render_vdi(
             vdis,
             view,
             options.size or first.window_size,
             model_transforms=[vdi.camera.model_transform for vdi in vdis],
+            transmittance_cutoff=options.transmittance_cutoff,
             device=options.device,
         )
     write_png(to_bytes(image, options.background), target)

@@ -8,6 +8,7 @@ from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.picking import Pick
+from pyvista_vdi.raycast import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.vtk_pipeline.frame import as_array
 from pyvista_vdi.vtk_pipeline.mapper import VDIMapperMethods
@@ -68,6 +69,19 @@ class VDIActorMethods:
         if mapper is None:
             raise InvalidArgumentError("this actor has no mapper whose opacity could be set")
         mapper.SetOpacityMultiplier(multiplier)
+
+    @property
+    def transmittance_cutoff(self: Any) -> float:
+        """Light below which rays end: see :meth:`VDIMapper.SetTransmittanceCutoff`."""
+        mapper = self.GetMapper()
+        return TRANSMITTANCE_CUTOFF if mapper is None else mapper.GetTransmittanceCutoff()
+
+    @transmittance_cutoff.setter
+    def transmittance_cutoff(self: Any, cutoff: float) -> None:
+        mapper = self.GetMapper()
+        if mapper is None:
+            raise InvalidArgumentError("this actor has no mapper whose rays could be ended")
+        mapper.SetTransmittanceCutoff(cutoff)
 
     def show_status(self: Any, renderer: Any = None, corner: str = "upper left") -> Any:
         """Show :attr:`status` as a text in a corner, written anew in each frame.

@@ -15,6 +15,7 @@ from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 from pyvista_vdi.cropping import checked_opacity_multiplier
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.picking import checked_opacity
+from pyvista_vdi.raycast import check_transmittance_cutoff
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.vtk_pipeline.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.interaction import checked_rate
@@ -134,6 +135,26 @@ class VDIMapperMethods:
     def GetOpacityMultiplier(self) -> float:
         """Return the factor of the extinction."""
         return self.painter.opacity_multiplier
+
+    def SetTransmittanceCutoff(self: Any, cutoff: float) -> None:
+        """End rays where less light than this is left; 10^-6 by default.
+
+        No channel of the picture loses more than that. VTK's own volume mappers stop at about
+        1/255. VDIs that overlap are merged to the default, whatever is set here.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is not from 0 to below 1.
+        """
+        least = check_transmittance_cutoff(cutoff)
+        if least != self.painter.transmittance_cutoff:
+            self.painter.transmittance_cutoff = least
+            self.Modified()
+
+    def GetTransmittanceCutoff(self) -> float:
+        """Return the light below which rays end."""
+        return self.painter.transmittance_cutoff
 
     # -- while a hand moves ----------------------------------------------------------------------
 

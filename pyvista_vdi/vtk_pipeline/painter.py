@@ -18,7 +18,7 @@ from pyvista_vdi.camera import Camera
 from pyvista_vdi.cropping import Cropping
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, UnsupportedError
 from pyvista_vdi.opencl_runtime import Runtime, aligned_empty, get_runtime
-from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.raycast import TRANSMITTANCE_CUTOFF, render_vdi
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.depth import OpaqueDepths
@@ -58,6 +58,8 @@ class Task:
         Regions of the model frame that are drawn.
     opacity_multiplier : float
         Factor of the extinction.
+    transmittance_cutoff : float
+        Rays end where less light than this is left.
     """
 
     frame: Frame
@@ -66,12 +68,13 @@ class Task:
     full_size: tuple[int, int]
     cropping: Cropping | None = None
     opacity_multiplier: float = 1.0
+    transmittance_cutoff: float = TRANSMITTANCE_CUTOFF
 
     @property
     def key(self) -> Any:
         """What its image is known by; the quality is in it as the two sizes."""
         planes = None if self.planes is None else self.planes.tobytes()
-        looks = (self.cropping, self.opacity_multiplier)
+        looks = (self.cropping, self.opacity_multiplier, self.transmittance_cutoff)
         return (self.frame.camera, self.frame.size, self.full_size, planes, looks)
 
     @property
@@ -126,6 +129,7 @@ class Painter:
     def __init__(self) -> None:
         self.device: Any = None
         self.opacity_multiplier = 1.0
+        self.transmittance_cutoff = TRANSMITTANCE_CUTOFF
         self.interaction = Interaction()
         self.texts = CornerTexts()
         self.selection = Selection()
@@ -201,6 +205,7 @@ class Painter:
     def take_settings(self, other: Painter) -> None:
         """Take over how dense another draws, what it allows and when it regenerates."""
         self.opacity_multiplier = other.opacity_multiplier
+        self.transmittance_cutoff = other.transmittance_cutoff
         vars(self.interaction).update(vars(other.interaction))
         self.selection.take_settings(other.selection)
         self.upkeep.regeneration.policy = other.upkeep.regeneration.policy
@@ -318,7 +323,8 @@ class Painter:
             )
         vdi, frame, clock = sight.vdi, sight.frame, sight.clock
         depth = OpaqueDepths.of(clock).read(renderer, [(frame, vdi.bounds)])
-        task = Task(frame, sight.planes, depth, frame.size, **sight.looks)
+        looks = {**sight.looks, "transmittance_cutoff": self.transmittance_cutoff}
+        task = Task(frame, sight.planes, depth, frame.size, **looks)
         drawn = self._kept(task)
         if drawn is not None:
             return drawn  # however the frame is to be: where it is there, full costs nothing
@@ -327,7 +333,7 @@ class Painter:
             return self._raycast(vdi, task, clock)
         sight = sight.coarser(size)
         depth = None if depth is None else sampled(depth, size)
-        task = Task(sight.frame, sight.planes, depth, task.full_size, **sight.looks)
+        task = Task(sight.frame, sight.planes, depth, task.full_size, **looks)
         return self._kept(task) or self._raycast(vdi, task, clock)
 
     def _sight(self, mapper: Any, renderer: Any) -> Sight | None:
@@ -430,6 +436,7 @@ class Painter:
             clipping_planes=task.planes,
             cropping=task.cropping,
             opacity_multiplier=task.opacity_multiplier,
+            transmittance_cutoff=task.transmittance_cutoff,
             device=self.device,
             out=pixels[: height * width * 4].reshape(height, width, 4),
         )

@@ -198,6 +198,31 @@ def test_multiplier_is_another_unit_distance():
     assert np.abs(draw(add_ours, half) - draw(add_ours, lambda p, a: a(p, soft_ball()))).max() > 10
 
 
+def test_rays_end_earlier_on_request(plotter):
+    """On the next frame, by no more than was allowed; without another VDI."""
+    actor = plotter.add_vdi(soft_ball(), show_scalar_bar=False)
+    actor.opacity_multiplier = 20.0  # so that rays do end
+    shot(plotter)  # makes the VDI; from another view rays cross many lists
+    plotter.camera.azimuth += 40
+    exact, vdi = shot(plotter), actor.vdi
+    actor.transmittance_cutoff = 0.5
+    rough = shot(plotter)
+    assert 1 < np.abs(exact - rough).max() <= 0.5 * 255 + 1
+    assert actor.vdi is vdi
+    other = actor.copy()
+    assert other.transmittance_cutoff == actor.mapper.GetTransmittanceCutoff() == 0.5
+    actor.transmittance_cutoff = 1 / 255
+    assert np.abs(shot(plotter) - exact).max() <= 2  # and rounding to bytes
+    for nonsense in (-1e-9, 1.0, np.nan, "dark"):
+        with pytest.raises(InvalidArgumentError, match="transmittance_cutoff must be a number"):
+            actor.transmittance_cutoff = nonsense
+    assert actor.transmittance_cutoff == 1 / 255
+    bare = pvdi.VDIActor()
+    assert bare.transmittance_cutoff == 1e-6
+    with pytest.raises(InvalidArgumentError, match="no mapper whose rays"):
+        bare.transmittance_cutoff = 0.5
+
+
 def test_multipliers_that_are_none(plotter):
     actor = plotter.add_vdi(vdi_of_one_list())
     for nonsense in (-1.0, np.nan, "thick"):

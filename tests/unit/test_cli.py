@@ -440,6 +440,20 @@ def test_render_over_a_background(folder, capsys, default_runtime, tmp_path):
             assert (np.asarray(image)[0, 0] == corner).all()
 
 
+def test_render_rays_that_end_earlier(folder, capsys, default_runtime, tmp_path):
+    files, picture = folder / "a.vdi", tmp_path / "a.png"
+    status, _, error = run(capsys, "render", files, "-o", picture, "--transmittance-cutoff", "1")
+    assert status == 1
+    assert "transmittance_cutoff must be a number" in error
+    assert not picture.exists()
+    assert run(capsys, "render", files, "-o", picture, "--transmittance-cutoff", "0.01")[0] == 0
+    status, _, error = run(
+        capsys, "render", files, files, "-o", picture, "--transmittance-cutoff", "0.01"
+    )
+    assert status == 1
+    assert "for a single VDI" in error
+
+
 def test_camera_options(folder):
     from pyvista_vdi.cli.inputs import camera
 
