@@ -236,8 +236,8 @@ def _read_raw(file: Path) -> Volume:
 
 def _read_npy(file: Path) -> Volume:
     try:
-        with file.open("rb") as stream:
-            array = np.lib.format.read_array(stream, allow_pickle=False)
+        # In place: what a header declares is held against the file's size, and objects are refused
+        array = np.lib.format.open_memmap(file, mode="r")
     except OSError as error:
         raise InvalidVolumeError(f"{file} cannot be read: {error.strerror or error}") from error
     except _BAD_ARRAY as error:
