@@ -61,19 +61,34 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
         raise UsageError(
             f"there is no verb {arguments[0]!r}: {_suggestion(arguments[0], list(verbs))}"
         )
+    if arguments[0] in verbs:
+        _check_option_names(verbs[arguments[0]], arguments[1:])
     try:
         options, unknown = parser.parse_known_args(arguments)
     except SystemExit:  # after --help and --version
         return None
     if unknown:
-        verb = verbs[options.verb]
-        known = re.findall(r"--[\w-]+", verb.format_help())
-        hint = _suggestion(unknown[0].split("=")[0], known) if unknown[0].startswith("-") else ""
-        raise UsageError(
-            f"{options.verb} takes no argument {unknown[0]!r}"
-            + (f": {hint}" if hint else f"; see {verb.prog} --help")
-        )
+        _refuse_argument(verbs[options.verb], unknown[0])
     return options
+
+
+def _check_option_names(verb: _Parser, arguments: Sequence[str]) -> None:
+    """Name an unknown option before argparse takes the value behind it for a file."""
+    for argument in arguments[: arguments.index("--") if "--" in arguments else None]:
+        name = argument.split("=")[0]
+        if name.startswith("--") and name not in _option_names(verb):
+            _refuse_argument(verb, argument)
+
+
+def _option_names(verb: _Parser) -> list[str]:
+    return ["--help", *re.findall(r"--[\w-]+", verb.format_help())]
+
+
+def _refuse_argument(verb: _Parser, argument: str) -> NoReturn:
+    hint = f"; see {verb.prog} --help"
+    if argument.startswith("-"):
+        hint = f": {_suggestion(argument.split('=')[0], _option_names(verb))}"
+    raise UsageError(f"{verb.prog.split()[-1]} takes no argument {argument!r}{hint}")
 
 
 def run_verb(options: argparse.Namespace) -> int:

@@ -116,6 +116,11 @@ def test_version(capsys):
         (["generat"], "there is no verb 'generat': did you mean 'generate'?"),
         (["zzz"], "there is no verb 'zzz': known are devices, generate, render, view, info, com"),
         (["info"], "the following arguments are required: FILE; see pyvista-vdi info --help"),
+        # Not "argument VOLUME: not allowed with argument --example" for the value behind it
+        (
+            ["generate", "--example", "brain", "--qualty", "high", "-o", "a"],
+            "generate takes no argument '--qualty': did you mean '--quality'?",
+        ),
         (["info", "a", "b"], "info takes no argument 'b'; see pyvista-vdi info --help"),
         (
             ["generate", "a", "-o", "b", "--cmpa=bone"],
