@@ -19,6 +19,7 @@ from .errors import InvalidArgumentError
 from .numerics import compensation, lists_are_far
 from .occupancy import OccupancyGrid
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime, kept_together
+from .packets import COORDINATE_FORMS, LANES, MARGIN, PLANE_FORMS, Packets, epipole_of, packets_of
 from .picking import DEFAULT_OPACITY, FirstHit
 from .precision import Packed8, Packed16
 from .vdi import VDI
@@ -37,6 +38,9 @@ _LIST_TILE = 2
 _FIRST_BITS = 36
 #: Pairs of words before the supersegments of an 8-byte list: that of ``common/supersegments.cl``.
 _LIST_HEADER = 2
+
+#: ``-D`` names of what is drawn ray by ray everywhere; V_O's rays have nothing in common.
+_NOT_IN_PACKETS = {"CROPPED", "FAR_ENTRIES", "FIRST_HIT", "ONE_LIST"}
 
 _Keep: TypeAlias = Callable[[DeviceBuffer], DeviceBuffer]
 
@@ -287,6 +291,7 @@ class PreparedVDI:
         self._bounds = vdi.bounds
         self._depth_origin = vdi.depth_origin
         camera = vdi.camera
+        self._camera = camera
         self._parallel = camera.parallel_projection
         near, far = rays.depth_range(camera, vdi.bounds)
         rays.check_list_space(camera, vdi.bounds)
@@ -365,6 +370,7 @@ class PreparedVDI:
         defines = {**self.defines, **view.defines}
         grid = self.occupancy
         mode: tuple[Any, ...] = ()
+        items, group = block_items(width, height), GROUP
         if preview_samples is not None:
             defines.update(compensation(preview_samples))
             kernel = runtime.kernel("vdi/preview.cl", "preview", defines)
@@ -379,20 +385,40 @@ class PreparedVDI:
                 defines["SKIP_EMPTY"] = 1
             if np.array_equal(self._list_space(camera), self._list_rows):
                 defines["ONE_LIST"] = 1
-            kernel = runtime.kernel("vdi/raycast.cl", "raycast", defines)
+            packets = self._packets(camera, view, defines)
+            if packets is None:
+                kernel = runtime.kernel("vdi/raycast.cl", "raycast", defines)
+            else:
+                defines.update(packets.defines)
+                kernel = runtime.kernel("vdi/raycast_packets.cl", "raycast_packets", defines)
+                items, group = packets.items, LANES
+                mode = (packets.epipole, np.int32(MARGIN))
         with (
             runtime.upload(view.forms, "rays") as form_buffer,
             runtime.upload(view.ends, "opaque depth") as depth,
         ):
             runtime.launch(
                 kernel,
-                block_items(width, height),
-                GROUP,
+                items,
+                group,
                 *self.walk_arguments(view, form_buffer, depth, transmittance_cutoff),
                 *mode,
                 image,
             )
             runtime.finish()  # the buffers above may be host memory in use
+
+    def _packets(
+        self, camera: Camera, view: ListView, defines: dict[str, str | int | None]
+    ) -> Packets | None:
+        """Return how a frame's rays are dealt to packets; None if the kernel is to follow each."""
+        if not self._runtime.is_cpu or _NOT_IN_PACKETS & defines.keys():
+            return None
+        if defines.get("COMPENSATED") == 2:
+            return None
+        forms = view.forms.astype(np.float64)
+        planes = forms[PLANE_FORMS : PLANE_FORMS + view.planes]
+        epipole = epipole_of(self._camera, camera, view.size)
+        return packets_of(view.size, forms[:COORDINATE_FORMS], planes, epipole)
 
     def view(
         self,

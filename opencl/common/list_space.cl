@@ -33,52 +33,46 @@ typedef float Depths; // the depth origin
 #define DEPTHS depth_origin
 #endif
 
+#ifdef FAR_ENTRIES
 inline float depth_coordinate(float offset, Depths depths)
 {
-#if defined(FAR_ENTRIES)
     const float beyond = (offset - depths.deep.x) - depths.deep.y;
 #ifdef PARALLEL
     return beyond;
 #else
     return beyond * depths.reciprocal / (offset + depths.depth_origin);
 #endif
-#elif defined(PARALLEL)
-    return offset;
-#elif defined(SHIFTED)
-    return offset / (offset + depths);
-#else
-    return -1.0f / (offset + depths);
-#endif
 }
 
 inline float depth_offset(float z, Depths depths)
 {
-#if defined(FAR_ENTRIES)
 #ifdef PARALLEL
     return depths.deep.x + z;
 #else
     return depths.deep.x + z / (depths.reciprocal * (depths.reciprocal - z));
-#endif
-#elif defined(PARALLEL)
-    return z;
-#elif defined(SHIFTED)
-    return z * depths / (1.0f - z);
-#else
-    return -1.0f / z - depths;
 #endif
 }
 
 // 1 / Z of a depth coordinate. Not used in parallel projection.
 inline float reciprocal_depth(float z, Depths depths)
 {
-#if defined(FAR_ENTRIES)
     return depths.reciprocal - z;
-#elif defined(SHIFTED)
-    return (1.0f - z) / depths;
-#else
-    return -z;
-#endif
 }
+#else
+// The same for one ray or for a vector of them
+#if defined(PARALLEL)
+#define depth_coordinate(offset, depths) (offset)
+#define depth_offset(z, depths) (z)
+#elif defined(SHIFTED)
+#define depth_coordinate(offset, depths) ((offset) / ((offset) + (depths)))
+#define depth_offset(z, depths) ((z) * (depths) / (1.0f - (z)))
+#define reciprocal_depth(z, depths) ((1.0f - (z)) / (depths))
+#else
+#define depth_coordinate(offset, depths) (-1.0f / ((offset) + (depths)))
+#define depth_offset(z, depths) (-1.0f / (z) - (depths))
+#define reciprocal_depth(z, depths) (-(z))
+#endif
+#endif
 
 #ifndef FAR_ENTRIES
 // Homogeneous list coordinates at t, divided out: (u, v, depth coordinate).

@@ -19,16 +19,19 @@
 #define FORM_SIZE 6
 #endif
 
-// Value of a form at t = 0 for pixel offsets (a, b).
+// Value of a form at t = 0 for pixel offsets (a, b), and its slope along the ray, per unit of t. TYPE: of a and b, float or a
+// vector.
+#define FORM_VALUE(TYPE, form, a, b) fma(b, (TYPE)((form)[2]), fma(a, (TYPE)((form)[1]), (TYPE)((form)[0])))
+#define FORM_SLOPE(TYPE, form, a, b) FORM_VALUE(TYPE, (form) + 3, a, b)
+
 inline float form_value(__global const float *form, float a, float b)
 {
-    return fma(b, form[2], fma(a, form[1], form[0]));
+    return FORM_VALUE(float, form, a, b);
 }
 
-// Slope of a form along the ray, per unit of t.
 inline float form_slope(__global const float *form, float a, float b)
 {
-    return fma(b, form[5], fma(a, form[4], form[3]));
+    return FORM_SLOPE(float, form, a, b);
 }
 
 // Clip [*t0, *t1] to where each of `count` forms is >= 0. Returns whether anything is left.

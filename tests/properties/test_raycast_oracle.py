@@ -8,12 +8,14 @@ the unmoved ray does not explain is reported, and bounded by 2 % over all views 
 from __future__ import annotations
 
 import functools
+import math
 
 import numpy as np
 import pytest
 import strategies
 from oracle import explain, total
 
+from pyvista_vdi import packets
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.vdi import VDI
@@ -25,9 +27,19 @@ MAX_SHARE = 0.02
 N_CASES = 32
 
 
+#: Lists that a ray crosses from which rays are followed in packets: none, and all that can be.
+DEALT = {"one by one": math.inf, "packets": 0.0}
+
+
 @functools.cache
-def compare(runtime, kind):
+def compare(runtime, kind, dealt):
     """All cases of one kind of view on one device; kept for the test of the share."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(packets, "LEAST_LISTS", DEALT[dealt])
+        return compare_cases(runtime, kind)
+
+
+def compare_cases(runtime, kind):
     parts = []
     for case in range(N_CASES):
         seed = [case, strategies.VIEWS.index(kind)]
@@ -41,15 +53,17 @@ def compare(runtime, kind):
     return total(parts)
 
 
+@pytest.mark.parametrize("dealt", DEALT)
 @pytest.mark.parametrize("kind", strategies.VIEWS)
-def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind):
-    result = compare(runtime, kind)
+def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind, dealt):
+    result = compare(runtime, kind, dealt)
     assert not result.failures, "\n".join(result.failures)
     assert result.drawn > result.pixels / 10  # a comparison of nothing with nothing proves nothing
 
 
-def test_few_pixels_need_a_moved_ray(runtime, record_property):
-    results = {kind: compare(runtime, kind) for kind in strategies.VIEWS}
+@pytest.mark.parametrize("dealt", DEALT)
+def test_few_pixels_need_a_moved_ray(runtime, dealt, record_property):
+    results = {kind: compare(runtime, kind, dealt) for kind in strategies.VIEWS}
     for kind, result in results.items():
         print(f"{kind:9s}: {result.moved} of {result.pixels} pixels need a moved ray")
     together = total(results.values())
@@ -62,8 +76,10 @@ def test_few_pixels_need_a_moved_ray(runtime, record_property):
     assert others.moved / others.pixels <= MAX_SHARE / 4
 
 
+@pytest.mark.parametrize("dealt", DEALT)
 @pytest.mark.parametrize("case", range(8))
-def test_rays_end_at_opaque_depth_and_clipping_planes(runtime, case):
+def test_rays_end_at_opaque_depth_and_clipping_planes(runtime, case, dealt, monkeypatch):
+    monkeypatch.setattr(packets, "LEAST_LISTS", DEALT[dealt])
     rng = np.random.default_rng([case, 100])
     vdi = strategies.random_vdi(rng)
     kind = ("around", "parallel", "near", "inside")[case % 4]
@@ -144,8 +160,10 @@ EXTREMES = (
 
 
 @pytest.mark.extremes
+@pytest.mark.parametrize("dealt", DEALT)
 @pytest.mark.parametrize("make", EXTREMES, ids=lambda make: make.__name__)
-def test_extremes_stay_within_the_range(runtime, make):
+def test_extremes_stay_within_the_range(runtime, make, dealt, monkeypatch):
+    monkeypatch.setattr(packets, "LEAST_LISTS", DEALT[dealt])
     parts = []
     for case, kind in enumerate(("same", "half", "near", "around", "behind", "inside", "axis")):
         rng = np.random.default_rng([case, 200])
@@ -160,8 +178,10 @@ def test_extremes_stay_within_the_range(runtime, make):
 
 
 @pytest.mark.extremes
-def test_thin_media_stay_within_the_range(runtime):
+@pytest.mark.parametrize("dealt", DEALT)
+def test_thin_media_stay_within_the_range(runtime, dealt, monkeypatch):
     """Supersegments down to a few ulps of their depth, from transparent to opaque."""
+    monkeypatch.setattr(packets, "LEAST_LISTS", DEALT[dealt])
     parts = []
     for case, kind in enumerate(("same", "near", "around", "behind", "beside", "axis")):
         rng = np.random.default_rng([case, 300])

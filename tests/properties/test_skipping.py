@@ -18,7 +18,7 @@ import pytest
 import strategies
 from real_data import require_data
 
-from pyvista_vdi import examples, generate, occupancy, rays
+from pyvista_vdi import examples, generate, occupancy, packets, rays
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.occupancy import SLABS, TILE
 from pyvista_vdi.raycast import prepared_vdi, render_vdi
@@ -39,6 +39,13 @@ N_CASES = 12
 @pytest.fixture(autouse=True)
 def _skipping_is_forced(monkeypatch):
     monkeypatch.setattr(occupancy, "_WORTHWHILE", math.inf)
+
+
+@pytest.fixture(params=["one by one", "packets"])
+def _dealt(request, monkeypatch):
+    """Rays are followed one by one, or in packets wherever they can be."""
+    least = math.inf if request.param == "one by one" else 0.0
+    monkeypatch.setattr(packets, "LEAST_LISTS", least)
 
 
 def assert_same_bits(runtime, vdi, camera, size, name="", **ends):
@@ -367,6 +374,7 @@ def passed_by(runtime, scene, camera, size, image):
     return Passed(1 - rest.sum() / whole.sum(), (image[meets][:, 3] > 0).mean())
 
 
+@pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize("name", NEW_VIEWS)
 @pytest.mark.parametrize("generating_view", GENERATING_VIEWS)
 def test_sparse_vdis(runtime, generating_view, name):
@@ -410,6 +418,7 @@ def test_rays_that_end_early(runtime, generating_view):
     assert_same_bits(runtime, changed(vdi, optical_depth=tau), camera, size)
 
 
+@pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 def test_random_vdis(runtime, kind):
     """Windows from one list on, supersegments beyond the bounds, any matrix."""

@@ -1,0 +1,322 @@
+// VDI to image from a view that is turned far from V_O: what vdi/raycast.cl does, for packets of rays (common/packet.cl).
+//
+// A packet's rays cross the same lists, if not at the same depth. The work-item sweeps over the lists along one axis of V_O's
+// window, p, from where its first ray begins: in each column of lists, list by list along the other axis, q, all rays that
+// cross the list go on through it together, while rays that are ahead wait. So each list and each supersegment is loaded
+// once for the packet. What a ray does is the same as in vdi/raycast.cl, whatever the others do.
+//
+// -D SWEEP_V            p is v, not u
+// -D UPRIGHT            packets stand on end in the window of V_N
+// -D SKIP_EMPTY         as in vdi/raycast.cl: the picture is the same to the last bit
+// -D OFFSET_T, PARALLEL, SHIFTED, PACKED, COMPENSATED (1)    as there
+#include "common/lists.cl"
+#include "common/occupancy.cl"
+#include "common/packet.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+// Of u's and v's, that of p and that of q; and of p's and q's, those of u and v
+#ifdef SWEEP_V
+#define FIRST_OF(of_u, of_v) (of_v)
+#define SECOND_OF(of_u, of_v) (of_u)
+#else
+#define FIRST_OF(of_u, of_v) (of_u)
+#define SECOND_OF(of_u, of_v) (of_v)
+#endif
+
+// One axis of V_O's window. A place along it is the index of a list times `step`: it grows along the rays.
+typedef struct {
+    Reals start, along, deep;
+    Reals zero, inverse; // of crossings, see there
+    int lists;
+    int step;            // 1 or -1: all lanes that go on together have the same
+    float middle, border; // half of the lists, and from a list's index to its border ahead
+} Axis;
+
+inline Axis axis_of(Reals start, Reals along, Reals deep, int lists)
+{
+    Axis axis;
+    axis.start = start;
+    axis.along = along;
+    axis.deep = deep;
+    // By a component that does not change, borders are crossed at infinity
+    axis.zero = select((Reals)(-INFINITY), deep, along != 0.0f);
+    axis.inverse = select((Reals)(1.0f), 1.0f / along, along != 0.0f);
+    axis.lists = lists;
+    axis.middle = 0.5f * (float)lists;
+    return axis;
+}
+
+inline void take_step(Axis *axis, bool upwards)
+{
+    axis->step = upwards ? 1 : -1;
+    axis->border = (upwards ? 1.0f : 0.0f) - axis->middle;
+}
+
+// Where the rays leave the lists of an index: from the border's number, never accumulated.
+inline Reals crossings(const Axis *axis, Reals index)
+{
+    return ((index + axis->border) - axis->zero) * axis->inverse;
+}
+
+inline Reals crossings_of(const Axis *axis, Ints index)
+{
+    return crossings(axis, convert_float16(index));
+}
+
+// How far the rays have come.
+typedef struct {
+    Ints p, q; // places of their lists; p is NOWHERE if they have ended
+    Reals r;
+    Reals depth; // in their sense, see common/lists.cl
+} Progress;
+
+#ifdef SKIP_EMPTY
+// The index of the list that stepping from `index` would have reached at r_until; see vdi/raycast.cl.
+inline Ints index_reached(const Axis *axis, Ints index, int edge, Reals r_until)
+{
+    Ints reached = convert_int16(floor(fma(r_until, axis->along, axis->deep) + axis->middle));
+    reached = axis->step > 0 ? clamp(reached, index, (Ints)(edge + 1)) : clamp(reached, (Ints)(edge - 1), index);
+    const Ints too_far = reached != index && crossings_of(axis, reached - axis->step) > r_until;
+    const Ints farther = !too_far && crossings_of(axis, reached) <= r_until;
+    reached += select((Ints)(0), (Ints)(axis->step), farther) - select((Ints)(0), (Ints)(axis->step), too_far);
+    return select(index, reached, axis->along != 0.0f);
+}
+
+inline int tile_edge(const Axis *axis, int tile)
+{
+    return axis->step > 0 ? tile << TILE_SHIFT | (TILE - 1) : tile << TILE_SHIFT;
+}
+
+// Pass by what is empty for the lanes that look, which are in column P; a lane that comes to another tile is `fresh` there.
+inline void pass_by(Progress *now, Ints *fresh, Ints looks, int P, const Packet *packet, const Axis *p, const Axis *q,
+                    Reals inverse_depth, float sense, bool away, __global const ulong *masks, int tiles_wide, float first_depth,
+                    float slabs_per_depth, float depth_origin)
+{
+    const int tile_p = P >> TILE_SHIFT;
+    const Reals along_depth = sense * packet->along_z;
+    const Reals deep_depth = sense * packet->deep_z;
+    while (any(looks)) {
+        // Those in one tile; there is seldom a second one
+        const int tile_q = least_of(now->q, looks) * q->step >> TILE_SHIFT;
+        const Ints index_q = now->q * q->step;
+        const Ints here = looks && index_q >> TILE_SHIFT == tile_q;
+        looks = looks && !here;
+        const ulong mask = masks[SECOND_OF(tile_p, tile_q) * tiles_wide + FIRST_OF(tile_p, tile_q)];
+        const Reals offsets = depth_offset(sense * now->depth, depth_origin);
+        const Ints slab = convert_int16(clamp((offsets - first_depth) * slabs_per_depth, 0.0f, (float)(SLABS - 1)));
+        Masks ahead;
+        Ints nearest;
+        if (away) {
+            ahead = mask & ((Masks)(~0UL) << convert_ulong16(slab));
+            nearest = convert_int16(popcount((ahead & -ahead) - 1));
+        } else {
+            ahead = mask & ((Masks)(~0UL) >> convert_ulong16(SLABS - 1 - slab));
+            nearest = SLABS - 1 - convert_int16(clz(ahead));
+        }
+        const Ints nothing = convert_int16(ahead == 0UL);
+        const Ints passes = here && (nothing || nearest != slab);
+        if (!any(passes))
+            continue;
+        const int edge_p = tile_edge(p, tile_p);
+        const int edge_q = tile_edge(q, tile_q);
+        const Reals faces = first_depth + convert_float16(away ? nearest : nearest + 1) / slabs_per_depth;
+        const Reals r_face = (sense * depth_coordinate(faces, depth_origin) - deep_depth) * inverse_depth;
+        Reals r_until = fmin(crossings(p, (Reals)(edge_p)), crossings(q, (Reals)(edge_q)));
+        r_until = select(r_until, fmin(r_until, r_face), !nothing && along_depth != 0.0f);
+        const Ints next_p = index_reached(p, (Ints)(P), edge_p, r_until);
+        const Ints next_q = index_reached(q, index_q, edge_q, r_until);
+        Reals r = now->r;
+        r = select(r, fmax(r, crossings_of(p, next_p - p->step)), next_p != P);
+        r = select(r, fmax(r, crossings_of(q, next_q - q->step)), next_q != index_q);
+        const Ints moves = passes && (next_p != P || next_q != index_q);
+        now->r = select(now->r, r, moves);
+        now->depth = select(now->depth, fma(r, along_depth, deep_depth), moves);
+        const Ints ends = r_until >= packet->r_begin + 1.0f || next_p < 0 || next_p >= p->lists || next_q < 0 ||
+                          next_q >= q->lists;
+        now->q = select(now->q, next_q * q->step, passes);
+        now->p = select(now->p, select(next_p * p->step, (Ints)(NOWHERE), ends), passes);
+        const Ints enters = passes && !ends && ((next_p ^ P) | (next_q ^ index_q)) >> TILE_SHIFT != 0;
+        looks = looks || (enters && next_p == P);
+        *fresh = *fresh || (enters && next_p != P);
+    }
+}
+#endif
+
+__attribute__((vec_type_hint(float16)))
+__kernel void raycast_packets(
+    __global const HEADER_T *headers,   // of the tiles of lists, see common/supersegments.cl
+    SUPERSEGMENTS_PARAMETERS            // see common/supersegments.cl
+    int lists_wide, int lists_high,     // window of V_O
+    float depth_origin,                 // world units
+    __global const float *forms,        // list coordinates, model direction, then `planes` to clip to
+    int planes,
+    int width, int height,              // window of V_N
+    __global const float *opaque_depth, // t at which each pixel's ray ends, top row first, if has_opaque_depth
+    int has_opaque_depth,
+    float transmittance_cutoff,         // the ray ends where less than this is left
+    __global const ulong *masks,        // occupied slabs of each tile of lists, if SKIP_EMPTY
+    float first_depth,                  // where slab 0 begins, view depth less depth_origin
+    float slabs_per_depth,
+    float4 epipole,                     // see common/packet.cl
+    int margin,                         // packets of a strip that begin before the window, and behind it
+    __global float4 *image)             // premultiplied RGBA, top row first
+{
+#ifdef UPRIGHT
+    const int along_size = height, across_size = width;
+#else
+    const int along_size = width, across_size = height;
+#endif
+    // Strips lie side by side in blocks of LANES packets, so that what is close in the window is close in time
+    const int item = (int)get_global_id(0);
+    const int strips = (along_size + LANES - 1) / LANES;
+    const int block = item / LANES;
+    const int first = block % strips * LANES;
+    const int number = block / strips * LANES + item % LANES - margin;
+    const Ints along = first + NUMBERS;
+    const Ints across = across_strip(first, number, along_size, across_size, epipole);
+    const Ints in_window = along < along_size && across >= 0 && across < across_size;
+    if (!any(in_window))
+        return;
+#ifdef UPRIGHT
+    const Ints x = across, y = along;
+#else
+    const Ints x = along, y = across;
+#endif
+    int places[LANES]; // in the image
+    int wanted[LANES];
+    vstore16((height - 1 - y) * width + x, 0, places);
+    vstore16(in_window, 0, wanted);
+    Reals t_end = INFINITY;
+    if (has_opaque_depth) {
+        float ends[LANES];
+        for (int k = 0; k < LANES; ++k)
+            ends[k] = wanted[k] ? opaque_depth[places[k]] : 0.0f;
+        t_end = vload16(0, ends);
+    }
+    const Reals a = convert_float16(x) + 0.5f - 0.5f * (float)width;
+    const Reals b = convert_float16(y) + 0.5f - 0.5f * (float)height;
+    const Packet packet = begin_packet(forms, planes, a, b, t_end, in_window, depth_origin);
+
+    Reals red = 0.0f, green = 0.0f, blue = 0.0f;
+    Reals transmittance = 1.0f;
+#ifdef COMPENSATED
+    Reals opacity = 0.0f; // see common/over.cl
+#endif
+    Axis p = axis_of(FIRST_OF(packet.start_u, packet.start_v), FIRST_OF(packet.along_u, packet.along_v),
+                     FIRST_OF(packet.deep_u, packet.deep_v), FIRST_OF(lists_wide, lists_high));
+    Axis q = axis_of(SECOND_OF(packet.start_u, packet.start_v), SECOND_OF(packet.along_u, packet.along_v),
+                     SECOND_OF(packet.deep_u, packet.deep_v), SECOND_OF(lists_wide, lists_high));
+    const Ints first_p = clamp(convert_int16(floor(p.start + p.middle)), 0, p.lists - 1);
+    const Ints first_q = clamp(convert_int16(floor(q.start + q.middle)), 0, q.lists - 1);
+    const Reals r_end = packet.r_begin + 1.0f;
+    // Rays that step the same way go on together: nearly always, all
+    const Ints ways = (packet.away & 1) | ((p.along > 0.0f) & 2) | ((q.along > 0.0f) & 4);
+    for (Ints waiting = packet.present; any(waiting);) {
+        const int way = least_of(ways, waiting);
+        const Ints going = waiting && ways == way;
+        waiting = waiting && !going;
+        const bool away = way & 1;
+        take_step(&p, way & 2);
+        take_step(&q, way & 4);
+        const float sense = away ? 1.0f : -1.0f;
+        const Reals along_depth = sense * packet.along_z;
+        const Reals deep_depth = sense * packet.deep_z;
+        const Reals inverse_depth = select((Reals)(0.0f), 1.0f / along_depth, packet.along_z != 0.0f);
+        Progress now;
+        now.p = select((Ints)(NOWHERE), first_p * p.step, going);
+        now.q = first_q * q.step;
+        now.r = packet.r_begin;
+        now.depth = sense * packet.start_z;
+        int n = 0; // the supersegment that the last list was left at
+#ifdef SKIP_EMPTY
+        Ints fresh = going; // lanes in a tile that they have not looked at
+#endif
+        for (int place_p = least(now.p); place_p != NOWHERE; place_p = least(now.p)) {
+            const int P = place_p * p.step;
+            Ints column = now.p == place_p;
+#ifdef SKIP_EMPTY
+            const Ints looks = column && fresh;
+            if (any(looks)) {
+                fresh = fresh && !looks;
+                pass_by(&now, &fresh, looks, P, &packet, &p, &q, inverse_depth, sense, away, masks,
+                        (lists_wide + TILE - 1) >> TILE_SHIFT, first_depth, slabs_per_depth, depth_origin);
+                column = now.p == place_p;
+            }
+#endif
+            const Reals r_p = crossings(&p, (Reals)(P));
+            for (int place_q = least_of(now.q, column); any(column); ++place_q) {
+                const Ints here = column && now.q == place_q;
+                if (!any(here))
+                    continue;
+                // They cross list (P, Q) from now.r to r_next
+                const int Q = place_q * q.step;
+                const Reals r_q = crossings(&q, (Reals)(Q));
+                const Reals r_next = HIGHER_OF(now.r, LOWER_OF(r_end, LOWER_OF(r_p, r_q)));
+                const Reals next_depth = fma(r_next, along_depth, deep_depth);
+
+                const List list = LIST_AT(FIRST_OF(P, Q), SECOND_OF(P, Q));
+                n = min(n, list.count);
+                while (n > 0 && any(here && face_met(list, SUPERSEGMENTS_ARGUMENTS n - 1, away).y > now.depth))
+                    --n;
+                for (int k = n; k < list.count; ++k) {
+                    const float2 face = face_met(list, SUPERSEGMENTS_ARGUMENTS k, away);
+                    const Ints come_to = here && face.x <= next_depth;
+                    if (!any(come_to))
+                        break;
+                    const Ints meet = come_to && face.y > now.depth;
+                    if (!any(meet)) {
+                        n = k + 1;
+                        continue;
+                    }
+                    // Clip to the supersegment by interval, as in vdi/raycast.cl
+                    const Reals r_enters = (face.x - deep_depth) * inverse_depth;
+                    const Reals r_leaves = (face.y - deep_depth) * inverse_depth;
+                    const Reals from = select(now.r, LOWER_OF(HIGHER_OF(r_enters, now.r), r_next), face.x > now.depth);
+                    const Reals to = select(r_next, LOWER_OF(HIGHER_OF(r_leaves, from), r_next), face.y < next_depth);
+                    const float4 medium = MEDIUM(list, away ? k : list.count - 1 - k);
+                    const Reals optical_depth = medium.w * lengths_crossed(&packet, from, to);
+                    const Reals weight = select((Reals)(0.0f), transmittance * -expm1(-optical_depth), meet);
+                    red += weight * medium.x;
+                    green += weight * medium.y;
+                    blue += weight * medium.z;
+#ifdef COMPENSATED
+                    opacity += weight;
+                    transmittance = 1.0f - opacity;
+#else
+                    transmittance -= weight;
+#endif
+                }
+                const Ints steps_p = here && r_p <= r_q;
+                const Ints steps_q = here && !(r_p <= r_q);
+                Ints ends = here && (r_next >= r_end || transmittance < transmittance_cutoff);
+                ends = ends || (P + p.step < 0 || P + p.step >= p.lists ? steps_p : (Ints)(0));
+                ends = ends || (Q + q.step < 0 || Q + q.step >= q.lists ? steps_q : (Ints)(0));
+                now.r = select(now.r, r_next, here);
+                now.depth = select(now.depth, next_depth, here);
+                now.p = select(select(now.p, (Ints)(place_p + 1), steps_p), (Ints)(NOWHERE), ends);
+                now.q = select(now.q, (Ints)(place_q + 1), steps_q);
+                column = now.p == place_p;
+#ifdef SKIP_EMPTY
+                if (((P + p.step) ^ P) >> TILE_SHIFT)
+                    fresh = fresh || steps_p;
+                if (((Q + q.step) ^ Q) >> TILE_SHIFT)
+                    fresh = fresh || steps_q;
+#endif
+            }
+        }
+    }
+#ifdef COMPENSATED
+    const Reals alpha = fmin(opacity, 1.0f);
+#else
+    const Reals alpha = 1.0f - transmittance;
+#endif
+    float channels[4][LANES];
+    vstore16(red, 0, channels[0]);
+    vstore16(green, 0, channels[1]);
+    vstore16(blue, 0, channels[2]);
+    vstore16(alpha, 0, channels[3]);
+    for (int k = 0; k < LANES; ++k) {
+        if (wanted[k])
+            image[places[k]] = (float4)(channels[0][k], channels[1][k], channels[2][k], channels[3][k]);
+    }
+}

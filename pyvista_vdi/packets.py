@@ -1,0 +1,118 @@
+"""When rays are followed in packets, and how those lie in the window (docs/performance.md).
+
+Rays of one plane through the eyes of V_O and V_N cross the same lists, if not at the same depth. On
+a CPU a packet of such rays loads each list once. That pays where rays cross many lists.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .camera import Camera
+from .rays import inverse_affine
+
+#: Rays of a packet, side by side: that of ``common/packet.cl``.
+LANES = 16
+#: Packets of a strip that begin before the window, or behind it: the steepest line that a packet
+#: follows (``STEEPEST`` of ``common/packet.cl``, 1.5) rises by less over its length.
+MARGIN = 24
+#: Of a frame's forms: (u, v, depth, denominator), and how many come before the planes to clip to;
+#: those of ``common/list_space.cl``.
+COORDINATE_FORMS, PLANE_FORMS = 4, 7
+#: Lists that a ray crosses on average from which packets are faster (docs/performance.md).
+LEAST_LISTS = 10.0
+#: Rays along each edge of the window that are asked how many lists they cross.
+_PROBES = 7
+
+
+class Packets(NamedTuple):
+    """How a frame's rays are dealt to packets.
+
+    Attributes
+    ----------
+    defines : dict
+        ``-D`` names of the kernel, for the directions.
+    epipole : numpy.ndarray
+        As the kernel takes it, float32 (4,).
+    items : int
+        Work-items: packets.
+    """
+
+    defines: dict[str, str | int | None]
+    epipole: NDArray[np.float32]
+    items: int
+
+
+def packets_of(
+    size: tuple[int, int],
+    coordinates: NDArray[np.float64],
+    planes: NDArray[np.float64],
+    epipole: NDArray[np.float64],
+) -> Packets | None:
+    """Return the packets of a frame, or None if its rays had better be followed one by one.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height of V_N's window in pixels.
+    coordinates, planes : numpy.ndarray
+        Forms of the homogeneous list coordinates (u, v, depth, denominator), float64 (4, 6), and of
+        the planes that rays are clipped to, float64 (n, 6).
+    epipole : numpy.ndarray
+        Where V_N sees V_O's eye, see :func:`epipole_of`.
+    """
+    crossed_u, crossed_v = _lists_crossed(size, coordinates, planes)
+    if crossed_u + crossed_v < LEAST_LISTS:
+        return None
+    # The line through the window's centre leads along the rows, or along the columns
+    upright = abs(epipole[1]) > abs(epipole[0])
+    along, across = size[::-1] if upright else size
+    defines: dict[str, str | int | None] = {}
+    if upright:
+        defines["UPRIGHT"] = 1
+        epipole = epipole[[1, 0, 2]]
+    if crossed_v > crossed_u:
+        defines["SWEEP_V"] = 1
+    numbers = -(-(across + 2 * MARGIN) // LANES) * LANES
+    scaled = epipole / max(np.abs(epipole).max(), np.finfo(np.float64).tiny)
+    return Packets(defines, np.append(scaled, 0.0).astype(np.float32), -(-along // LANES) * numbers)
+
+
+def epipole_of(generating: Camera, view: Camera, size: tuple[int, int]) -> NDArray[np.float64]:
+    """Return where a view sees the eye of V_O: homogeneous pixel offsets from its window's centre.
+
+    The eye of a parallel projection is at infinity, against its direction. float64 (3,).
+    """
+    to_model = inverse_affine(generating.model_to_view)
+    eye = to_model[:, 2] if generating.parallel_projection else to_model[:, 3]
+    u, v, _, denominator = view.viewport_matrix(size) @ view.model_to_view @ eye
+    return np.array([u * size[0] / 2, v * size[1] / 2, denominator])
+
+
+def _lists_crossed(
+    size: tuple[int, int],
+    coordinates: NDArray[np.float64],
+    planes: NDArray[np.float64],
+) -> tuple[float, float]:
+    """Return how many lists a ray crosses along u and along v, the mean of those that meet any."""
+    edges = [(np.arange(_PROBES) + 0.5) / _PROBES * pixels - pixels / 2 for pixels in size]
+    a, b = (offsets.reshape(-1) for offsets in np.meshgrid(*edges))
+    pixels = np.stack([np.ones_like(a), a, b])
+    with np.errstate(all="ignore"):  # rays that miss, and planes that are parallel to a ray
+        clipped = planes.reshape(-1, 2, 3) @ pixels
+        values, slopes = clipped[:, 0], clipped[:, 1]
+        crossings = -values / slopes
+        begins = np.where(slopes > 0, crossings, -np.inf).max(axis=0)
+        ends = np.where(slopes < 0, crossings, np.inf).min(axis=0)
+        outside = ((slopes == 0) & (values < 0)).any(axis=0)
+        forms = coordinates.reshape(-1, 2, 3) @ pixels
+        at_begin = forms[:, 0] + begins * forms[:, 1]
+        at_end = forms[:, 0] + ends * forms[:, 1]
+        crossed = np.abs(at_end[:2] / at_end[3] - at_begin[:2] / at_begin[3])
+        meets = (begins < ends) & ~outside & np.isfinite(crossed).all(axis=0)
+    if not meets.any():
+        return 0.0, 0.0
+    return float(crossed[0, meets].mean()), float(crossed[1, meets].mean())

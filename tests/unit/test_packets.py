@@ -1,0 +1,128 @@
+"""Rays in packets: when they are, how packets lie in the window, and that none is left out.
+
+That they meet what rays that are followed one by one meet is tested where those are:
+``tests/properties/test_raycast_oracle.py`` and ``test_skipping.py``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import strategies
+
+from pyvista_vdi import packets, rays
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.raycast import PreparedVDI
+from pyvista_vdi.vdi import VDI
+
+BOUNDS = (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
+CAMERA = Camera((0, 0, 6), (0, 0, 0), (0, 1, 0), view_angle=30)
+SIZE = (160, 120)
+
+
+def slab_vdi(camera=CAMERA, window=SIZE):
+    """Each list has one supersegment, through the middle of the bounds."""
+    lists = window[0] * window[1]
+    depth = rays.depth_range(camera, BOUNDS)
+    front, back = np.interp([0.4, 0.6], [0, 1], depth)
+    return VDI(
+        camera,
+        window,
+        np.arange(lists + 1),
+        np.full(lists, front),
+        np.full(lists, back),
+        np.full((lists, 3), 0.5),
+        np.full(lists, 0.1),
+        BOUNDS,
+    )
+
+
+def dealt(runtime, vdi, camera, size=SIZE):
+    """The packets of a frame, None if its rays are followed one by one."""
+    prepared = PreparedVDI(runtime, vdi)
+    view = prepared.view(camera, size, None, None)
+    return prepared._packets(camera, view, prepared.defines)
+
+
+def test_rays_that_cross_few_lists_are_followed_one_by_one(runtime):
+    assert dealt(runtime, slab_vdi(), CAMERA) is None
+    assert dealt(runtime, slab_vdi(), CAMERA.azimuth(1)) is None
+    assert dealt(runtime, slab_vdi(window=(8, 6)), CAMERA.azimuth(30)) is None
+    away = CAMERA.replace(focal_point=(0, 0, 12))  # no ray meets anything
+    assert dealt(runtime, slab_vdi(), away) is None
+
+
+@pytest.mark.parametrize(
+    ("turn", "defines"),
+    [
+        (lambda camera: camera.azimuth(30), {}),
+        (lambda camera: camera.azimuth(-60), {}),
+        (lambda camera: camera.elevation(30), {"UPRIGHT": 1, "SWEEP_V": 1}),
+        (lambda camera: camera.azimuth(30).replace(view_up=(1, 0, 0)), {"UPRIGHT": 1}),
+        (lambda camera: camera.elevation(30).replace(view_up=(1, 0, 0)), {"SWEEP_V": 1}),
+    ],
+    ids=["to the right", "to the left", "up", "to the right and rolled", "up and rolled"],
+)
+def test_packets_lie_along_the_lines_that_rays_share(runtime, turn, defines):
+    if not runtime.is_cpu:
+        pytest.skip("packets are for CPU devices")
+    found = dealt(runtime, slab_vdi(), turn(CAMERA))
+    assert found is not None
+    assert found.defines == defines
+
+
+def test_the_epipole_is_where_the_eye_of_the_generating_view_is_seen():
+    u, v, w = packets.epipole_of(CAMERA, CAMERA.azimuth(45), SIZE)
+    half_height = np.tan(np.radians(15))
+    assert v == pytest.approx(0)
+    assert u / w == pytest.approx(-np.tan(np.radians(67.5)) / half_height * SIZE[1] / 2)
+    behind = CAMERA.replace(position=(0, 0, 9))
+    assert packets.epipole_of(CAMERA, behind, SIZE)[:2] == pytest.approx([0, 0])
+    parallel = CAMERA.replace(parallel_projection=True)
+    u, v, w = packets.epipole_of(parallel, parallel.azimuth(30), SIZE)
+    assert (v, w) == (pytest.approx(0), 0)  # at infinity, along the rows
+    assert u != 0
+
+
+@pytest.mark.parametrize(
+    "kind", ["near", "around", "inside", "beside", "behind", "axis", "parallel"]
+)
+@pytest.mark.parametrize("size", [(97, 71), (40, 130)])
+def test_no_pixel_is_left_out(runtime, kind, size, monkeypatch):
+    """Lines draw together towards the epipole: between them is nothing, wherever it lies."""
+    monkeypatch.setattr(packets, "LEAST_LISTS", 0.0)
+    for case in range(12):
+        rng = np.random.default_rng([case, *size])
+        vdi = strategies.random_vdi(rng, max_window=(6, 5), max_supersegments=2)
+        camera, _ = strategies.random_view(rng, vdi, kind)
+        unwritten = np.full((size[1], size[0], 4), np.nan, np.float32)
+        with runtime.upload(unwritten, "image") as image:
+            PreparedVDI(runtime, vdi).render(camera, size, image)
+            written = runtime.download(image)
+        assert not np.isnan(written).any(), f"seed {[case, *size]}, view {kind!r}"
+
+
+@pytest.mark.parametrize(
+    "offset", [(0.0, 0.0), (3.0, 1.0), (20.0, -2.0), (70.0, 50.0), (400.0, 30.0)]
+)
+def test_an_epipole_in_the_window_and_beside_it(runtime, offset, monkeypatch):
+    """The eye of V_O before that of V_N: lists are crossed on lines that spread from a point."""
+    monkeypatch.setattr(packets, "LEAST_LISTS", 0.0)
+    vdi = slab_vdi(window=(40, 30))
+    # From where that eye is a unit in front, to be seen at this pixel offset
+    to_eye = np.array([*np.array(offset) / (SIZE[1] / 2) * np.tan(np.radians(15)), -1.0])
+    position = CAMERA.position - to_eye
+    camera = CAMERA.replace(position=position, focal_point=position - [0, 0, 1])
+    seen = packets.epipole_of(CAMERA, camera, SIZE)
+    assert seen[:2] / seen[2] == pytest.approx(offset, abs=1e-6)
+    prepared = PreparedVDI(runtime, vdi)
+    images = []
+    for least in (np.inf, 0.0):
+        monkeypatch.setattr(packets, "LEAST_LISTS", least)
+        unwritten = np.full((SIZE[1], SIZE[0], 4), np.nan, np.float32)
+        with runtime.upload(unwritten, "image") as image:
+            prepared.render(camera, SIZE, image)
+            images.append(runtime.download(image))
+    assert images[0].any()
+    # Rays are the same; their lengths are computed by other roundings
+    np.testing.assert_allclose(images[1], images[0], rtol=0, atol=2e-6)
