@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import rays
-from .blocks import GROUP, block_items
+from .blocks import GROUP, Rectangle, block_items, part_columns
 from .camera import Camera, check_window_size
 from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
@@ -37,6 +37,9 @@ _LIST_TILE = 2
 _FIRST_BITS = 36
 #: Pairs of words before the supersegments of an 8-byte list: that of ``common/supersegments.cl``.
 _LIST_HEADER = 2
+
+#: Share of a window above which rays are cast through all of it: it is not worth to fill the rest.
+_MOST_DRAWN = 0.9
 
 _Keep: TypeAlias = Callable[[DeviceBuffer], DeviceBuffer]
 
@@ -359,22 +362,29 @@ class PreparedVDI:
 
         With ``first_hit``, t of each ray's first hit in its place, float32 (H, W).
         """
-        width, height = size
         view = self.view(camera, size, opaque_depth, clipping_planes, cropping, opacity_multiplier)
         runtime = self._runtime
         defines = {**self.defines, **view.defines}
         grid = self.occupancy
-        mode: tuple[Any, ...] = ()
+        mode: tuple[Any, ...]
         if preview_samples is not None:
             defines.update(compensation(preview_samples))
             kernel = runtime.kernel("vdi/preview.cl", "preview", defines)
             mode = (grid.counts, np.int32(preview_samples))
+            items = block_items(*size)
         else:
+            part = Rectangle(0, size[0], 0, size[1])
+            if skip_empty:
+                nothing = np.float32(0.0 if first_hit is None else np.inf)
+                part = self._occupied_part(camera, size, image, nothing)
+            columns = part_columns(part)
+            items = GROUP * int(columns[2]) * int(columns[3])
+            mode = (columns,)
             if first_hit is None:
                 defines.update(compensation(self.media))
             else:
                 defines["FIRST_HIT"] = 1
-                mode = (np.float32(first_hit.optical_depth), np.int32(first_hit.accumulated))
+                mode += (np.float32(first_hit.optical_depth), np.int32(first_hit.accumulated))
             if skip_empty and grid.worthwhile:
                 defines["SKIP_EMPTY"] = 1
             if np.array_equal(self._list_space(camera), self._list_rows):
@@ -386,13 +396,24 @@ class PreparedVDI:
         ):
             runtime.launch(
                 kernel,
-                block_items(width, height),
+                items,
                 GROUP,
                 *self.walk_arguments(view, form_buffer, depth, transmittance_cutoff),
                 *mode,
                 image,
             )
             runtime.finish()  # the buffers above may be host memory in use
+
+    def _occupied_part(
+        self, camera: Camera, size: tuple[int, int], image: DeviceBuffer, nothing: np.float32
+    ) -> Rectangle:
+        """Return the part of a window in which rays may meet something, and fill the rest."""
+        width, height = size
+        part = rays.pixels_of_points(camera, size, self.occupancy.corners)
+        if part.pixels > _MOST_DRAWN * width * height:
+            return Rectangle(0, width, 0, height)
+        self._runtime.fill(image, nothing)
+        return part
 
     def view(
         self,
