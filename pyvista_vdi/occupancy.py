@@ -14,6 +14,9 @@ from .vdi import VDI
 TILE = 16
 SLABS = 64
 
+#: Tiles along each edge of the squares for each of which `OccupancyGrid.corners` has a box.
+_CORNER_TILES = 8
+
 #: By how much supersegments count beyond their faces: roundings of 2**-23 of the depths that the
 #: raycaster looks up. At most 17 add up (docs/conventions.md, "Occupancy grid").
 _ROUNDINGS = 32
@@ -62,6 +65,9 @@ class OccupancyGrid:
         uint64 per tile: bit s is set where slab s is occupied.
     occupied : float
         Occupied cells over cells within the volume's bounds; above 1 if borders are crossed.
+    corners : numpy.ndarray
+        Points of the model frame, float64 (n, 3), whose convex hull holds all occupied cells that
+        rays meet, and a list and a slab around them.
     """
 
     def __init__(
@@ -114,6 +120,7 @@ class OccupancyGrid:
                 self.masks,
             )
             masks = runtime.download(self.masks)
+        self.corners = _corners(vdi, masks, near, far)
         cells = _share_in_bounds(vdi, near, far) * masks.size * SLABS
         self.occupied = float(np.unpackbits(masks.view(np.uint8)).sum() / max(cells, 1.0))
 
@@ -121,6 +128,35 @@ class OccupancyGrid:
     def worthwhile(self) -> bool:
         """Whether enough is empty for skipping to gain time."""
         return self.occupied < _WORTHWHILE
+
+
+def _corners(vdi: VDI, masks: NDArray[np.uint64], near: float, far: float) -> NDArray[np.float64]:
+    """Return corners of boxes in list space that hold the occupied cells, in the model frame.
+
+    A box for each square of tiles. ``near`` and ``far`` are the view depths that slabs divide; what
+    counts in the first or the last of them lies within the bounds, too, where a ray meets it.
+    """
+    half = np.asarray(vdi.window_size) / 2
+    pixel_rays = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds)
+    slab = (far - near) / SLABS
+    least = -np.inf if vdi.camera.parallel_projection else 0.0
+    high, wide = masks.shape
+    points = [np.empty((0, 3))]
+    for row in range(0, high, _CORNER_TILES):
+        for column in range(0, wide, _CORNER_TILES):
+            part = masks[row : row + _CORNER_TILES, column : column + _CORNER_TILES]
+            j, i = np.nonzero(part)
+            if not i.size:
+                continue
+            bits = np.unpackbits(part.reshape(-1, 1).view(np.uint8), axis=1, bitorder="little")
+            slabs = np.flatnonzero(bits.any(axis=0))
+            a = (column + np.array([i.min(), i.max() + 1])) * TILE + [-1, 1] - half[0]
+            b = (row + np.array([j.min(), j.max() + 1])) * TILE + [-1, 1] - half[1]
+            depth = np.maximum(near + slab * (slabs[[0, -1]] + [-1, 2]), least)
+            at = np.stack(np.meshgrid(1.0, a, b, depth, indexing="ij"), axis=-1).reshape(-1, 4)
+            t = at[:, 3:] - pixel_rays.reference_depth
+            points.append(at[:, :3] @ pixel_rays.origin + t * (at[:, :3] @ pixel_rays.direction))
+    return np.concatenate(points)
 
 
 def _looked_up(vdi: VDI, near: float, far: float, shifted: bool) -> float:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .blocks import Rectangle
 from .camera import Camera
 from .rays import inverse_affine
 
@@ -37,17 +38,22 @@ class Packets(NamedTuple):
         ``-D`` names of the kernel, for the directions.
     epipole : numpy.ndarray
         As the kernel takes it, float32 (4,).
+    part : numpy.ndarray
+        First strip, how many there are, number of each strip's first packet; int32 (4,), the
+        last one unused.
     items : int
         Work-items: packets.
     """
 
     defines: dict[str, str | int | None]
     epipole: NDArray[np.float32]
+    part: NDArray[np.int32]
     items: int
 
 
 def packets_of(
     size: tuple[int, int],
+    part: Rectangle,
     coordinates: NDArray[np.float64],
     planes: NDArray[np.float64],
     epipole: NDArray[np.float64],
@@ -58,6 +64,8 @@ def packets_of(
     ----------
     size : (int, int)
         Width and height of V_N's window in pixels.
+    part : Rectangle
+        Where rays are cast.
     coordinates, planes : numpy.ndarray
         Forms of the homogeneous list coordinates (u, v, depth, denominator), float64 (4, 6), and of
         the planes that rays are clipped to, float64 (n, 6).
@@ -69,16 +77,24 @@ def packets_of(
         return None
     # The line through the window's centre leads along the rows, or along the columns
     upright = abs(epipole[1]) > abs(epipole[0])
-    along, across = size[::-1] if upright else size
+    along, across = (part.x0, part.x1), (part.y0, part.y1)
     defines: dict[str, str | int | None] = {}
     if upright:
         defines["UPRIGHT"] = 1
+        along, across = across, along
         epipole = epipole[[1, 0, 2]]
     if crossed_v > crossed_u:
         defines["SWEEP_V"] = 1
-    numbers = -(-(across + 2 * MARGIN) // LANES) * LANES
+    first = along[0] // LANES
+    strips = -(-along[1] // LANES) - first
+    numbers = -(-(across[1] - across[0] + 2 * MARGIN) // LANES) * LANES
     scaled = epipole / max(np.abs(epipole).max(), np.finfo(np.float64).tiny)
-    return Packets(defines, np.append(scaled, 0.0).astype(np.float32), -(-along // LANES) * numbers)
+    return Packets(
+        defines,
+        np.append(scaled, 0.0).astype(np.float32),
+        np.array([first, strips, across[0] - MARGIN, 0], np.int32),
+        strips * numbers,
+    )
 
 
 def epipole_of(generating: Camera, view: Camera, size: tuple[int, int]) -> NDArray[np.float64]:

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import rays
-from .blocks import GROUP, block_items
+from .blocks import GROUP, Rectangle, block_items, part_columns
 from .camera import Camera, check_window_size
 from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
 from .numerics import compensation, lists_are_far
 from .occupancy import OccupancyGrid
-from .opencl_runtime import DeviceBuffer, Runtime, get_runtime, kept_together
-from .packets import COORDINATE_FORMS, LANES, MARGIN, PLANE_FORMS, Packets, epipole_of, packets_of
+from .opencl_runtime import DeviceBuffer, Kernel, Runtime, get_runtime, kept_together
+from .packets import COORDINATE_FORMS, LANES, PLANE_FORMS, Packets, epipole_of, packets_of
 from .picking import DEFAULT_OPACITY, FirstHit
 from .precision import Packed8, Packed16
 from .vdi import VDI
@@ -41,6 +41,8 @@ _LIST_HEADER = 2
 
 #: ``-D`` names of what is drawn ray by ray everywhere; V_O's rays have nothing in common.
 _NOT_IN_PACKETS = {"CROPPED", "FAR_ENTRIES", "FIRST_HIT", "ONE_LIST"}
+#: Share of a window above which rays are cast through all of it: it is not worth to fill the rest.
+_MOST_DRAWN = 0.9
 
 _Keep: TypeAlias = Callable[[DeviceBuffer], DeviceBuffer]
 
@@ -267,6 +269,15 @@ class ListView(NamedTuple):
     arguments: tuple[Any, ...]
 
 
+class _Launch(NamedTuple):
+    """A kernel, its work-items and those of a group, and its arguments after the walk's."""
+
+    kernel: Kernel
+    items: int
+    group: int
+    mode: tuple[Any, ...]
+
+
 class PreparedVDI:
     """A VDI on a device, in the form that the raycaster reads.
 
@@ -364,51 +375,74 @@ class PreparedVDI:
 
         With ``first_hit``, t of each ray's first hit in its place, float32 (H, W).
         """
-        width, height = size
         view = self.view(camera, size, opaque_depth, clipping_planes, cropping, opacity_multiplier)
         runtime = self._runtime
-        defines = {**self.defines, **view.defines}
-        grid = self.occupancy
-        mode: tuple[Any, ...] = ()
-        items, group = block_items(width, height), GROUP
         if preview_samples is not None:
-            defines.update(compensation(preview_samples))
-            kernel = runtime.kernel("vdi/preview.cl", "preview", defines)
-            mode = (grid.counts, np.int32(preview_samples))
+            launch = self._preview(view, preview_samples)
         else:
-            if first_hit is None:
-                defines.update(compensation(self.media))
-            else:
-                defines["FIRST_HIT"] = 1
-                mode = (np.float32(first_hit.optical_depth), np.int32(first_hit.accumulated))
-            if skip_empty and grid.worthwhile:
-                defines["SKIP_EMPTY"] = 1
-            if np.array_equal(self._list_space(camera), self._list_rows):
-                defines["ONE_LIST"] = 1
-            packets = self._packets(camera, view, defines)
-            if packets is None:
-                kernel = runtime.kernel("vdi/raycast.cl", "raycast", defines)
-            else:
-                defines.update(packets.defines)
-                kernel = runtime.kernel("vdi/raycast_packets.cl", "raycast_packets", defines)
-                items, group = packets.items, LANES
-                mode = (packets.epipole, np.int32(MARGIN))
+            launch = self._raycast(camera, view, image, first_hit=first_hit, skip_empty=skip_empty)
         with (
             runtime.upload(view.forms, "rays") as form_buffer,
             runtime.upload(view.ends, "opaque depth") as depth,
         ):
             runtime.launch(
-                kernel,
-                items,
-                group,
+                launch.kernel,
+                launch.items,
+                launch.group,
                 *self.walk_arguments(view, form_buffer, depth, transmittance_cutoff),
-                *mode,
+                *launch.mode,
                 image,
             )
             runtime.finish()  # the buffers above may be host memory in use
 
+    def _preview(self, view: ListView, samples: int) -> _Launch:
+        """Return how a frame of so many samples a ray is drawn."""
+        defines = {**self.defines, **view.defines, **compensation(samples)}
+        kernel = self._runtime.kernel("vdi/preview.cl", "preview", defines)
+        return _Launch(
+            kernel, block_items(*view.size), GROUP, (self.occupancy.counts, np.int32(samples))
+        )
+
+    def _raycast(
+        self,
+        camera: Camera,
+        view: ListView,
+        image: DeviceBuffer,
+        *,
+        first_hit: FirstHit | None,
+        skip_empty: bool,
+    ) -> _Launch:
+        """Return how a frame is raycast; pixels of ``image`` that no ray is cast for are filled."""
+        part = Rectangle(0, view.size[0], 0, view.size[1])
+        if skip_empty:
+            nothing = np.float32(0.0 if first_hit is None else np.inf)
+            part = self._occupied_part(camera, view.size, image, nothing)
+        defines = {**self.defines, **view.defines}
+        hit: tuple[Any, ...] = ()
+        if first_hit is None:
+            defines.update(compensation(self.media))
+        else:
+            defines["FIRST_HIT"] = 1
+            hit = (np.float32(first_hit.optical_depth), np.int32(first_hit.accumulated))
+        if skip_empty and self.occupancy.worthwhile:
+            defines["SKIP_EMPTY"] = 1
+        if np.array_equal(self._list_space(camera), self._list_rows):
+            defines["ONE_LIST"] = 1
+        packets = self._packets(camera, view, part, defines)
+        if packets is not None:
+            defines.update(packets.defines)
+            kernel = self._runtime.kernel("vdi/raycast_packets.cl", "raycast_packets", defines)
+            return _Launch(kernel, packets.items, LANES, (packets.epipole, packets.part))
+        columns = part_columns(part)
+        kernel = self._runtime.kernel("vdi/raycast.cl", "raycast", defines)
+        return _Launch(kernel, GROUP * int(columns[2]) * int(columns[3]), GROUP, (columns, *hit))
+
     def _packets(
-        self, camera: Camera, view: ListView, defines: dict[str, str | int | None]
+        self,
+        camera: Camera,
+        view: ListView,
+        part: Rectangle,
+        defines: dict[str, str | int | None],
     ) -> Packets | None:
         """Return how a frame's rays are dealt to packets; None if the kernel is to follow each."""
         if not self._runtime.is_cpu or _NOT_IN_PACKETS & defines.keys():
@@ -418,7 +452,18 @@ class PreparedVDI:
         forms = view.forms.astype(np.float64)
         planes = forms[PLANE_FORMS : PLANE_FORMS + view.planes]
         epipole = epipole_of(self._camera, camera, view.size)
-        return packets_of(view.size, forms[:COORDINATE_FORMS], planes, epipole)
+        return packets_of(view.size, part, forms[:COORDINATE_FORMS], planes, epipole)
+
+    def _occupied_part(
+        self, camera: Camera, size: tuple[int, int], image: DeviceBuffer, nothing: np.float32
+    ) -> Rectangle:
+        """Return the part of a window in which rays may meet something, and fill the rest."""
+        width, height = size
+        part = rays.pixels_of_points(camera, size, self.occupancy.corners)
+        if part.pixels > _MOST_DRAWN * width * height:
+            return Rectangle(0, width, 0, height)
+        self._runtime.fill(image, nothing)
+        return part
 
     def view(
         self,

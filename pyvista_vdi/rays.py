@@ -15,6 +15,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .blocks import Rectangle
 from .camera import Camera, check_window_size
 from .cropping import Cropping
 from .errors import InvalidArgumentError, InvalidCameraError
@@ -319,6 +320,29 @@ def largest_value(
     values, slopes = pixels @ table[:, :3].T, pixels @ table[:, 3:].T
     parts = (table[:, 0], values, values + (far - depth) * slopes)
     return float(max(np.abs(part).max() for part in parts))
+
+
+def pixels_of_points(camera: Camera, window_size: tuple[int, int], points: Floats) -> Rectangle:
+    """Return a part of a window that the convex hull of model points lies in, float64 (n, 3).
+
+    All of the window, if one of them is not in front of the eye; two pixels more than the points
+    reach to otherwise.
+    """
+    width, height = window_size
+    whole = Rectangle(0, width, 0, height)
+    if not len(points):
+        return Rectangle(0, 0, 0, 0)
+    matrix = camera.viewport_matrix(window_size) @ camera.model_to_view
+    x, y, _, d = matrix[:, :3] @ points.T + matrix[:, 3:]
+    if not d.min() > NEAREST_DEPTH * np.abs(d).max():
+        return whole
+    half = np.array([[width / 2], [height / 2]])
+    at = np.stack([x, y]) / d * half + half
+    low = np.clip(np.floor(at.min(axis=1) - 2), 0, window_size)
+    high = np.clip(np.ceil(at.max(axis=1) + 2), 0, window_size)
+    if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        return whole
+    return Rectangle(int(low[0]), int(high[0]), int(low[1]), int(high[1]))
 
 
 def checked_opaque_depth(

@@ -116,3 +116,13 @@ inline int2 strip_pixel(uint item, int width, int height)
     const uint row = strip * STRIP + place - column * high;
     return (int2)((int)(column << 2 | (item & 3)), (int)(row << 2 | (item >> 2 & 3)));
 }
+
+// The same for part of a window: whole columns of strips, a work-group each. `part` is its first column and strip, in columns and
+// strips of the window, how many columns it has in each strip, and how many strips.
+#define COLUMN_ITEMS (16 * STRIP) // GROUP of pyvista_vdi/blocks.py
+inline int2 part_pixel(int group, int item, int4 part)
+{
+    const int strip = group / part.z;
+    const int column = group - strip * part.z;
+    return (int2)((part.x + column) << 2 | (item & 3), (part.y + strip) * (4 * STRIP) + (item >> 2));
+}

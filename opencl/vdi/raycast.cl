@@ -78,12 +78,14 @@ __kernel void raycast(
                                         // meet its bounds, too
 #define RAY_IS_DONE (absorbed > optical_depth_cutoff)
 #elif defined(FIRST_HIT)
+    int4 part,                          // of the window, see common/rays.cl
     float least_optical_depth,          // a hit has some, and at least this much: by itself, or with all before it
     int accumulated,                    // whether what is before it counts
     __global float *image)              // t of the first hit, infinite where there is none, top row first
 #define NOTHING INFINITY
 #define RAY_IS_DONE hit
 #else
+    int4 part,                          // of the window, see common/rays.cl
     __global float4 *image)             // premultiplied RGBA, top row first
 #define NOTHING (float4)(0.0f)
 #define RAY_IS_DONE (transmittance < transmittance_cutoff)
@@ -91,11 +93,12 @@ __kernel void raycast(
 {
 #ifdef SEGMENTS
     const int band_ray = (int)get_global_id(0);
-    const uint item = first_item + (uint)band_ray;
+    const int2 pixel = strip_pixel(first_item + (uint)band_ray, width, height);
 #else
-    const uint item = (uint)get_global_id(0);
+    // By what a work-group has in common, so that it divides once
+    const int item = (int)get_local_id(0);
+    const int2 pixel = part_pixel(((int)get_global_id(0) - item) / COLUMN_ITEMS, item, part);
 #endif
-    const int2 pixel = strip_pixel(item, width, height);
     if (pixel.x >= width || pixel.y >= height)
         return;
     const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
@@ -132,6 +135,11 @@ __kernel void raycast(
     int i = list_index(start.x + half_wide, lists_wide);
     int j = list_index(start.y + half_high, lists_high);
     const float lists_crossed = fabs(along.x) + fabs(along.y);
+#ifdef ONE_LIST
+    // The list four pixels to the right: the next column of blocks comes to it while this one's lists are walked through
+    const int next_i = min(i + 4 * lists_high / height, lists_wide - 1);
+    PREFETCH(LIST_AT(next_i, j), next_i, j);
+#else
     if (lists_crossed < LISTS_TO_PREFETCH) {
         // The lists that it begins and ends in: those in between are others' ends
         const int last_column = list_index(fma(r_end, along.x, deep.x) + half_wide, lists_wide);
@@ -141,6 +149,7 @@ __kernel void raycast(
             PREFETCH(LIST_AT(last_column, last_row), last_column, last_row);
         }
     }
+#endif
 
     // Where planes u = const and v = const are crossed; by a component that does not change, at infinity
     const float deep_u = along.x != 0.0f ? deep.x : -INFINITY;

@@ -158,7 +158,7 @@ __kernel void raycast_packets(
     float first_depth,                  // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,
     float4 epipole,                     // see common/packet.cl
-    int margin,                         // packets of a strip that begin before the window, and behind it
+    int4 part,                          // of the window: first strip, how many, number of each strip's first packet
     __global float4 *image)             // premultiplied RGBA, top row first
 {
 #ifdef UPRIGHT
@@ -168,10 +168,9 @@ __kernel void raycast_packets(
 #endif
     // Strips lie side by side in blocks of LANES packets, so that what is close in the window is close in time
     const int item = (int)get_global_id(0);
-    const int strips = (along_size + LANES - 1) / LANES;
     const int block = item / LANES;
-    const int first = block % strips * LANES;
-    const int number = block / strips * LANES + item % LANES - margin;
+    const int first = (part.x + block % part.y) * LANES;
+    const int number = part.z + block / part.y * LANES + item % LANES;
     const Ints along = first + NUMBERS;
     const Ints across = across_strip(first, number, along_size, across_size, epipole);
     const Ints in_window = along < along_size && across >= 0 && across < across_size;

@@ -39,3 +39,10 @@ __kernel void strip_pixels(int count, int width, int height, __global int2 *pixe
     if (i < count)
         pixels[i] = strip_pixel((uint)i, width, height);
 }
+
+__kernel void part_pixels(int count, __global const int4 *part, __global int2 *pixels)
+{
+    const int i = get_global_id(0);
+    if (i < count)
+        pixels[i] = part_pixel(i / COLUMN_ITEMS, i % COLUMN_ITEMS, *part);
+}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pyvista_vdi.blocks import block_items
+from pyvista_vdi.blocks import GROUP, Rectangle, block_items, part_columns
 
 EPS = 2.0**-24  # unit roundoff of float32
 FILE = "ray_functions.cl"
@@ -157,6 +157,37 @@ def test_strips_are_four_blocks_high(call):
     )
     corners = pixels.reshape(8, 16, 2).min(axis=1)
     assert corners.tolist() == [[4 * (k // 4), 4 * (k % 4)] for k in range(8)]
+
+
+@pytest.mark.parametrize(
+    "part", [(0, 33, 0, 47), (5, 6, 17, 18), (4, 12, 16, 32), (3, 9, 15, 33), (31, 33, 0, 47)]
+)
+def test_every_pixel_of_a_part_has_one_work_item(call, part):
+    part = Rectangle(*part)
+    columns = part_columns(part)
+    items = GROUP * int(columns[2] * columns[3])
+    pixels = call(FILE, "part_pixels", items, columns, call.empty(items, 2, dtype=np.int32))
+    assert len(np.unique(pixels, axis=0)) == items  # no pixel twice
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    # Whole columns of strips, 4 x 16 pixels, and no more of them than hold the part
+    np.testing.assert_array_equal(low, [part.x0 // 4 * 4, part.y0 // 16 * 16])
+    np.testing.assert_array_equal(high, [-(-part.x1 // 4) * 4 - 1, -(-part.y1 // 16) * 16 - 1])
+    assert items == np.prod(high + 1 - low)
+    blocks = pixels.reshape(-1, 16, 2)
+    assert (np.ptp(blocks, axis=1) == 3).all()
+
+
+def test_parts_are_dealt_as_strips_are(call):
+    """A part that is the whole of a window: the same pixel for each work-item."""
+    size = (36, 48)
+    items = block_items(*size)
+    columns = part_columns(Rectangle(0, size[0], 0, size[1]))
+    pixels = call(FILE, "part_pixels", items, columns, call.empty(items, 2, dtype=np.int32))
+    strips = call(
+        FILE, "strip_pixels", items, np.int32(size[0]), np.int32(size[1]),
+        call.empty(items, 2, dtype=np.int32),
+    )  # fmt: skip
+    np.testing.assert_array_equal(pixels, strips)
 
 
 def test_blocks_are_four_by_four(call):

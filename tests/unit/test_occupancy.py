@@ -259,6 +259,85 @@ def test_bounds_behind_the_eye(runtime):
     assert np.isfinite(grid.occupied)
 
 
+# -- where in a window it is -----------------------------------------------------------------------
+
+
+def only_within(rng, vdi):
+    """The VDI with the lists of a random rectangle of its window alone."""
+    width, height = vdi.window_size
+    kept = np.zeros((height, width), bool)
+    (x0, x1), (y0, y1) = (np.sort(rng.integers(0, edge + 1, 2)) for edge in (width, height))
+    kept[y0:y1, x0:x1] = True
+    lengths = np.diff(vdi.offsets).astype(np.int64)
+    own = np.repeat(kept.ravel(), lengths)
+    return VDI(
+        vdi.camera,
+        vdi.window_size,
+        np.concatenate(([0], np.cumsum(np.where(kept.ravel(), lengths, 0)))).astype(np.uint64),
+        vdi.front[own],
+        vdi.back[own],
+        vdi.color[own],
+        vdi.optical_depth[own],
+        vdi.bounds,
+        depth_origin=vdi.depth_origin,
+    )
+
+
+@pytest.mark.parametrize("kind", strategies.VIEWS)
+def test_nothing_is_seen_beside_the_occupied_cells(runtime, kind):
+    """Pictures by all rays, and where the cells' corners are: V_O in all the ways of above."""
+    size = (90, 70)
+    smaller = 0
+    for case, view in enumerate(
+        [perspective, parallel, long_lens, very_long_lens, inside, any_matrix] * 2
+    ):
+        rng = np.random.default_rng([case, 23])
+        bounds = strategies.random_bounds(rng)
+        vdi = only_within(
+            rng,
+            strategies.random_vdi(
+                rng,
+                max_window=(120, 90),
+                max_supersegments=2,
+                camera=view(rng, bounds),
+                bounds=bounds,
+            ),
+        )
+        camera, _ = strategies.random_view(rng, vdi, kind)
+        prepared = PreparedVDI(runtime, vdi)
+        images = []
+        for skip_empty in (False, True):
+            with runtime.buffer((size[1], size[0], 4)) as image:
+                prepared.render(camera, size, image, skip_empty=skip_empty)
+                images.append(runtime.download(image))
+        assert np.array_equal(*images)
+        part = rays.pixels_of_points(camera, size, prepared.occupancy.corners)
+        rows, x = np.nonzero(images[0][..., 3])
+        y = size[1] - 1 - rows
+        assert ((x >= part.x0) & (x < part.x1) & (y >= part.y0) & (y < part.y1)).all()
+        smaller += part.pixels < size[0] * size[1]
+    # An eye inside of V_O's frustum may have a corner behind it: then it is all of the window
+    assert smaller
+
+
+def test_rays_beside_the_occupied_cells_are_not_cast(runtime, monkeypatch):
+    """Both pictures are the same, so that only the choice can be seen: by corners that lie."""
+    prepared = PreparedVDI(runtime, by_hand([[(3.25, 60.75)]] * 1024, (32, 32)))
+    wide = (64, 64)
+
+    def drawn(**options):
+        with runtime.buffer((*wide, 4)) as image:
+            prepared.render(CAMERA, wide, image, **options)
+            return (runtime.download(image)[..., 3] > 0).mean()
+
+    everything = drawn()
+    monkeypatch.setattr(prepared.occupancy, "corners", np.zeros((1, 3)))
+    assert 0 < drawn() < everything / 4  # whole columns of 4 x 16 pixels about the centre
+    assert drawn(skip_empty=False) == everything
+    monkeypatch.setattr(prepared.occupancy, "corners", np.zeros((0, 3)))
+    assert drawn() == 0
+
+
 # -- what is made of it ----------------------------------------------------------------------------
 
 

@@ -303,6 +303,42 @@ def test_eye_plane_is_where_depth_is_zero():
         assert rays.eye_plane(parallel, rays.pixel_rays(parallel, WINDOW, bounds)) == []
 
 
+# -- points in the window --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_pixels_of_points_hold_what_the_points_surround(seed):
+    rng, bounds, camera = scene(seed)
+    points = rays.corners(bounds)
+    part = rays.pixels_of_points(camera, WINDOW, points)
+    inside = np.dot(rng.dirichlet(np.ones(8), 200), points)
+    a, b, _ = direct_pixels(camera, WINDOW, np.vstack([points, inside]))
+    x, y = a + WINDOW[0] / 2, b + WINDOW[1] / 2  # from the window's corner
+    low = np.clip([x.min(), y.min()], 0, WINDOW)
+    high = np.clip([x.max(), y.max()], 0, WINDOW)
+    first, last = (part.x0, part.y0), (part.x1, part.y1)
+    assert (first <= low).all()
+    assert (last >= high).all()
+    # Two pixels more, and whole ones
+    assert (low - first <= 3).all()
+    assert (last - high <= 3).all()
+
+
+def test_pixels_of_points_that_are_not_all_in_front():
+    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
+    whole = (0, WINDOW[0], 0, WINDOW[1])
+    for z in (10.0, 11.0):  # at the eye, and behind it
+        points = np.array([[0.0, 0, 0], [0, 0, z]])
+        assert rays.pixels_of_points(camera, WINDOW, points) == whole
+    parallel = camera.replace(parallel_projection=True, parallel_scale=100)
+    assert rays.pixels_of_points(parallel, WINDOW, points) == (18, 22, 13, 17)
+
+
+def test_pixels_of_no_points():
+    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
+    assert rays.pixels_of_points(camera, WINDOW, np.empty((0, 3))).pixels == 0
+
+
 # -- what float32 cannot hold ----------------------------------------------------------------------
 
 
