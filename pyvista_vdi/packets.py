@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .blocks import Rectangle
 from .camera import Camera
 from .rays import inverse_affine
+from .vdi import VDI
 
 #: Rays of a packet, side by side: that of ``common/packet.cl``.
 LANES = 16
@@ -23,8 +24,13 @@ MARGIN = 24
 #: Of a frame's forms: (u, v, depth, denominator), and how many come before the planes to clip to;
 #: those of ``common/list_space.cl``.
 COORDINATE_FORMS, PLANE_FORMS = 4, 7
-#: Lists that a ray crosses on average from which packets are faster (docs/performance.md).
-LEAST_LISTS = 10.0
+#: Lists that a ray crosses before its light ends, on average, from which packets are faster
+#: (docs/performance.md).
+LEAST_LISTS = 28.0
+#: Lists of a VDI that are asked how far light gets in them.
+_SAMPLED_LISTS = 4096
+#: Optical depth behind which nothing is left of light: -log(1e-6), where rays end by default.
+_DARK = 13.8
 #: Rays along each edge of the window that are asked how many lists they cross.
 _PROBES = 7
 
@@ -57,6 +63,7 @@ def packets_of(
     coordinates: NDArray[np.float64],
     planes: NDArray[np.float64],
     epipole: NDArray[np.float64],
+    lit: float,
 ) -> Packets | None:
     """Return the packets of a frame, or None if its rays had better be followed one by one.
 
@@ -71,9 +78,11 @@ def packets_of(
         the planes that rays are clipped to, float64 (n, 6).
     epipole : numpy.ndarray
         Where V_N sees V_O's eye, see :func:`epipole_of`.
+    lit : float
+        How far light gets, see :func:`share_lit`.
     """
     crossed_u, crossed_v = _lists_crossed(size, coordinates, planes)
-    if crossed_u + crossed_v < LEAST_LISTS:
+    if lit * (crossed_u + crossed_v) < LEAST_LISTS:
         return None
     # The line through the window's centre leads along the rows, or along the columns
     upright = abs(epipole[1]) > abs(epipole[0])
@@ -106,6 +115,31 @@ def epipole_of(generating: Camera, view: Camera, size: tuple[int, int]) -> NDArr
     eye = to_model[:, 2] if generating.parallel_projection else to_model[:, 3]
     u, v, _, denominator = view.viewport_matrix(size) @ view.model_to_view @ eye
     return np.array([u * size[0] / 2, v * size[1] / 2, denominator])
+
+
+def share_lit(vdi: VDI, near: float, far: float) -> float:
+    """Return how much of the depths from ``near`` to ``far`` light gets through, the lists' mean.
+
+    Of some of the lists that are not empty; 1 in a list through which it gets. View depths of V_O.
+    """
+    offsets = vdi.offsets.astype(np.int64)
+    lists = np.flatnonzero(np.diff(offsets))
+    lists = lists[:: -(-len(lists) // _SAMPLED_LISTS) or 1]
+    if not len(lists):
+        return 1.0
+    counts = offsets[lists + 1] - offsets[lists]
+    begins = np.cumsum(counts) - counts
+    places = np.arange(counts.sum()) + np.repeat(offsets[lists] - begins, counts)
+    optical_depth = vdi.optical_depth[places].astype(np.float64)
+    before = np.cumsum(optical_depth) - optical_depth
+    before -= np.repeat(before[begins], counts)
+    last = begins + np.add.reduceat(before < _DARK, begins) - 1  # that light gets to
+    left = (_DARK - before[last]) / np.maximum(optical_depth[last], np.finfo(np.float64).tiny)
+    front, back = (face[places[last]].astype(np.float64) for face in (vdi.front, vdi.back))
+    depth = front + np.minimum(left, 1.0) * (back - front) + vdi.depth_origin
+    through = np.add.reduceat(optical_depth, begins) < _DARK
+    shares = np.where(through, 1.0, (depth - near) / max(far - near, np.finfo(np.float64).tiny))
+    return float(np.clip(shares, 0.0, 1.0).mean())
 
 
 def _lists_crossed(

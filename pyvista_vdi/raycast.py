@@ -19,7 +19,15 @@ from .errors import InvalidArgumentError
 from .numerics import compensation, lists_are_far
 from .occupancy import OccupancyGrid
 from .opencl_runtime import DeviceBuffer, Kernel, Runtime, get_runtime, kept_together
-from .packets import COORDINATE_FORMS, LANES, PLANE_FORMS, Packets, epipole_of, packets_of
+from .packets import (
+    COORDINATE_FORMS,
+    LANES,
+    PLANE_FORMS,
+    Packets,
+    epipole_of,
+    packets_of,
+    share_lit,
+)
 from .picking import DEFAULT_OPACITY, FirstHit
 from .precision import Packed8, Packed16
 from .vdi import VDI
@@ -307,6 +315,7 @@ class PreparedVDI:
         near, far = rays.depth_range(camera, vdi.bounds)
         rays.check_list_space(camera, vdi.bounds)
         self._nearest = rays.nearest_depth(camera, vdi.bounds)
+        self._lit = share_lit(vdi, near, far)
         # An origin much closer than the data costs the coordinate the digits that it is to save
         closest = min(near, self._depth_origin)
         self._shifted = not self._parallel and 0 < far <= _LONG_LENS * closest
@@ -452,7 +461,8 @@ class PreparedVDI:
         forms = view.forms.astype(np.float64)
         planes = forms[PLANE_FORMS : PLANE_FORMS + view.planes]
         epipole = epipole_of(self._camera, camera, view.size)
-        return packets_of(view.size, part, forms[:COORDINATE_FORMS], planes, epipole)
+        coordinates = forms[:COORDINATE_FORMS]
+        return packets_of(view.size, part, coordinates, planes, epipole, self._lit)
 
     def _occupied_part(
         self, camera: Camera, size: tuple[int, int], image: DeviceBuffer, nothing: np.float32

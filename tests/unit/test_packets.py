@@ -11,6 +11,7 @@ import pytest
 import strategies
 
 from pyvista_vdi import packets, rays
+from pyvista_vdi.blocks import Rectangle
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.raycast import PreparedVDI
 from pyvista_vdi.vdi import VDI
@@ -20,11 +21,11 @@ CAMERA = Camera((0, 0, 6), (0, 0, 0), (0, 1, 0), view_angle=30)
 SIZE = (160, 120)
 
 
-def slab_vdi(camera=CAMERA, window=SIZE):
-    """Each list has one supersegment, through the middle of the bounds."""
+def slab_vdi(camera=CAMERA, window=(480, 360), optical_depth=0.1):
+    """Each list has one supersegment, in the front half of the bounds."""
     lists = window[0] * window[1]
     depth = rays.depth_range(camera, BOUNDS)
-    front, back = np.interp([0.4, 0.6], [0, 1], depth)
+    front, back = np.interp([0.1, 0.3], [0, 1], depth)
     return VDI(
         camera,
         window,
@@ -32,7 +33,7 @@ def slab_vdi(camera=CAMERA, window=SIZE):
         np.full(lists, front),
         np.full(lists, back),
         np.full((lists, 3), 0.5),
-        np.full(lists, 0.1),
+        np.full(lists, optical_depth),
         BOUNDS,
     )
 
@@ -41,7 +42,16 @@ def dealt(runtime, vdi, camera, size=SIZE):
     """The packets of a frame, None if its rays are followed one by one."""
     prepared = PreparedVDI(runtime, vdi)
     view = prepared.view(camera, size, None, None)
-    return prepared._packets(camera, view, prepared.defines)
+    whole = Rectangle(0, size[0], 0, size[1])
+    return prepared._packets(camera, view, whole, prepared.defines)
+
+
+def drawn(runtime, prepared, camera, size):
+    """A frame, NaN where nothing was written."""
+    with runtime.buffer((size[1], size[0], 4), name="image") as image:
+        runtime.fill(image, np.float32(np.nan))
+        prepared.render(camera, size, image, skip_empty=False)  # which fills the rest by itself
+        return runtime.download(image).copy()
 
 
 def test_rays_that_cross_few_lists_are_followed_one_by_one(runtime):
@@ -50,6 +60,34 @@ def test_rays_that_cross_few_lists_are_followed_one_by_one(runtime):
     assert dealt(runtime, slab_vdi(window=(8, 6)), CAMERA.azimuth(30)) is None
     away = CAMERA.replace(focal_point=(0, 0, 12))  # no ray meets anything
     assert dealt(runtime, slab_vdi(), away) is None
+
+
+def test_rays_whose_light_ends_soon_are_followed_one_by_one(runtime):
+    assert dealt(runtime, slab_vdi(optical_depth=100.0), CAMERA.azimuth(30)) is None
+
+
+def test_how_far_light_gets():
+    depths = rays.depth_range(CAMERA, BOUNDS)
+    assert packets.share_lit(slab_vdi(), *depths) == 1  # and on, behind the supersegments
+    # A slab from .1 to .3 of the depths, of whose optical depth light gets through 13.8
+    assert packets.share_lit(slab_vdi(optical_depth=138.0), *depths) == pytest.approx(
+        0.12, abs=1e-6
+    )
+    near, far = depths
+    faces = np.interp([0.1, 0.2, 0.3, 0.4, 0.5, 0.6], [0, 1], depths).astype(np.float32)
+    dark = VDI(
+        CAMERA,
+        (1, 2),
+        [0, 3, 3],
+        faces[::2],
+        faces[1::2],
+        np.full((3, 3), 0.5),
+        [1, 128, 1],
+        BOUNDS,
+    )
+    assert packets.share_lit(dark, near, far) == pytest.approx(0.31, abs=1e-6)
+    none = VDI(CAMERA, (1, 1), [0, 0], [], [], [], [], BOUNDS)
+    assert packets.share_lit(none, near, far) == 1
 
 
 @pytest.mark.parametrize(
@@ -95,11 +133,8 @@ def test_no_pixel_is_left_out(runtime, kind, size, monkeypatch):
         rng = np.random.default_rng([case, *size])
         vdi = strategies.random_vdi(rng, max_window=(6, 5), max_supersegments=2)
         camera, _ = strategies.random_view(rng, vdi, kind)
-        unwritten = np.full((size[1], size[0], 4), np.nan, np.float32)
-        with runtime.upload(unwritten, "image") as image:
-            PreparedVDI(runtime, vdi).render(camera, size, image)
-            written = runtime.download(image)
-        assert not np.isnan(written).any(), f"seed {[case, *size]}, view {kind!r}"
+        image = drawn(runtime, PreparedVDI(runtime, vdi), camera, size)
+        assert not np.isnan(image).any(), f"seed {[case, *size]}, view {kind!r}"
 
 
 @pytest.mark.parametrize(
@@ -119,10 +154,7 @@ def test_an_epipole_in_the_window_and_beside_it(runtime, offset, monkeypatch):
     images = []
     for least in (np.inf, 0.0):
         monkeypatch.setattr(packets, "LEAST_LISTS", least)
-        unwritten = np.full((SIZE[1], SIZE[0], 4), np.nan, np.float32)
-        with runtime.upload(unwritten, "image") as image:
-            prepared.render(camera, SIZE, image)
-            images.append(runtime.download(image))
+        images.append(drawn(runtime, prepared, camera, SIZE))
     assert images[0].any()
     # Rays are the same; their lengths are computed by other roundings
     np.testing.assert_allclose(images[1], images[0], rtol=0, atol=2e-6)
