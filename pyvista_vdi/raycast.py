@@ -38,8 +38,10 @@ _FIRST_BITS = 36
 #: Pairs of words before the supersegments of an 8-byte list: that of ``common/supersegments.cl``.
 _LIST_HEADER = 2
 
-#: Share of a window above which rays are cast through all of it: it is not worth to fill the rest.
+#: Share of a window above which rays are cast through all of it: clearing it first costs as much.
 _MOST_DRAWN = 0.9
+#: Work-items per group that clear an image.
+_CLEARING_GROUP = 256
 
 _Keep: TypeAlias = Callable[[DeviceBuffer], DeviceBuffer]
 
@@ -373,10 +375,7 @@ class PreparedVDI:
             mode = (grid.counts, np.int32(preview_samples))
             items = block_items(*size)
         else:
-            part = Rectangle(0, size[0], 0, size[1])
-            if skip_empty:
-                nothing = np.float32(0.0 if first_hit is None else np.inf)
-                part = self._occupied_part(camera, size, image, nothing)
+            part = self._part_to_draw(camera, size, skip_empty)
             columns = part_columns(part)
             items = GROUP * int(columns[2]) * int(columns[3])
             mode = (columns,)
@@ -390,6 +389,11 @@ class PreparedVDI:
             if np.array_equal(self._list_space(camera), self._list_rows):
                 defines["ONE_LIST"] = 1
             kernel = runtime.kernel("vdi/raycast.cl", "raycast", defines)
+            pixels = size[0] * size[1]
+            if part.pixels < pixels:
+                clear = runtime.kernel("vdi/raycast.cl", "clear_image", defines)
+                padded = -(-pixels // _CLEARING_GROUP) * _CLEARING_GROUP
+                runtime.launch(clear, padded, _CLEARING_GROUP, np.uint64(pixels), image)
         with (
             runtime.upload(view.forms, "rays") as form_buffer,
             runtime.upload(view.ends, "opaque depth") as depth,
@@ -404,16 +408,14 @@ class PreparedVDI:
             )
             runtime.finish()  # the buffers above may be host memory in use
 
-    def _occupied_part(
-        self, camera: Camera, size: tuple[int, int], image: DeviceBuffer, nothing: np.float32
-    ) -> Rectangle:
-        """Return the part of a window in which rays may meet something, and fill the rest."""
+    def _part_to_draw(self, camera: Camera, size: tuple[int, int], skip_empty: bool) -> Rectangle:
+        """Return the part of a window in which rays are cast: nothing is met beside it."""
         width, height = size
+        whole = Rectangle(0, width, 0, height)
+        if not skip_empty:
+            return whole
         part = rays.pixels_of_points(camera, size, self.occupancy.corners)
-        if part.pixels > _MOST_DRAWN * width * height:
-            return Rectangle(0, width, 0, height)
-        self._runtime.fill(image, nothing)
-        return part
+        return whole if part.pixels > _MOST_DRAWN * whole.pixels else part
 
     def view(
         self,

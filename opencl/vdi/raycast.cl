@@ -82,11 +82,13 @@ __kernel void raycast(
     float least_optical_depth,          // a hit has some, and at least this much: by itself, or with all before it
     int accumulated,                    // whether what is before it counts
     __global float *image)              // t of the first hit, infinite where there is none, top row first
+#define IMAGE_T float
 #define NOTHING INFINITY
 #define RAY_IS_DONE hit
 #else
     int4 part,                          // of the window, see common/rays.cl
     __global float4 *image)             // premultiplied RGBA, top row first
+#define IMAGE_T float4
 #define NOTHING (float4)(0.0f)
 #define RAY_IS_DONE (transmittance < transmittance_cutoff)
 #endif
@@ -355,3 +357,13 @@ __kernel void raycast(
     image[place] = composited(color, transmittance, rest);
 #endif
 }
+
+#ifndef SEGMENTS
+// NOTHING to all `pixels` of an image of which rays are cast in a part. A driver's own fill of a buffer may run on one core.
+__kernel void clear_image(ulong pixels, __global IMAGE_T *image)
+{
+    const size_t place = get_global_id(0); // in all its bits: a compiler sees that work-items write next to each other
+    if (place < pixels)
+        image[place] = NOTHING;
+}
+#endif
