@@ -55,7 +55,7 @@ Entry points:
     ``prepare_lists``: a VDI's arrays to what the raycaster reads.
 ``vdi/raycast.cl``
     ``raycast``: VDI to image from any view (paper, section 3), to the depth of the first hit, or to
-    what is merged with other VDIs.
+    what is merged with other VDIs; ``clear_image``: nothing where no rays are cast.
 ``vdi/merge.cl``
     ``merge``: what rays cross of several VDIs, to one image.
 ``vdi/preview.cl``

@@ -14,8 +14,8 @@ from .vdi import VDI
 TILE = 16
 SLABS = 64
 
-#: Tiles along each edge of the squares for each of which `OccupancyGrid.corners` has a box.
-_CORNER_TILES = 8
+#: Squares of tiles along the grid's longer edge: `OccupancyGrid.corners` has a box for each.
+_SQUARES = 12
 
 #: By how much supersegments count beyond their faces: roundings of 2**-23 of the depths that the
 #: raycaster looks up. At most 17 add up (docs/conventions.md, "Occupancy grid").
@@ -141,10 +141,11 @@ def _corners(vdi: VDI, masks: NDArray[np.uint64], near: float, far: float) -> ND
     slab = (far - near) / SLABS
     least = -np.inf if vdi.camera.parallel_projection else 0.0
     high, wide = masks.shape
+    edge = -(-max(high, wide) // _SQUARES)
     points = [np.empty((0, 3))]
-    for row in range(0, high, _CORNER_TILES):
-        for column in range(0, wide, _CORNER_TILES):
-            part = masks[row : row + _CORNER_TILES, column : column + _CORNER_TILES]
+    for row in range(0, high, edge):
+        for column in range(0, wide, edge):
+            part = masks[row : row + edge, column : column + edge]
             j, i = np.nonzero(part)
             if not i.size:
                 continue

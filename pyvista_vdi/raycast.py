@@ -49,8 +49,10 @@ _LIST_HEADER = 2
 
 #: ``-D`` names of what is drawn ray by ray everywhere; V_O's rays have nothing in common.
 _NOT_IN_PACKETS = {"CROPPED", "FAR_ENTRIES", "FIRST_HIT", "ONE_LIST"}
-#: Share of a window above which rays are cast through all of it: it is not worth to fill the rest.
+#: Share of a window above which rays are cast through all of it: clearing it first costs as much.
 _MOST_DRAWN = 0.9
+#: Work-items per group that clear an image.
+_CLEARING_GROUP = 256
 
 _Keep: TypeAlias = Callable[[DeviceBuffer], DeviceBuffer]
 
@@ -421,11 +423,10 @@ class PreparedVDI:
         first_hit: FirstHit | None,
         skip_empty: bool,
     ) -> _Launch:
-        """Return how a frame is raycast; pixels of ``image`` that no ray is cast for are filled."""
-        part = Rectangle(0, view.size[0], 0, view.size[1])
-        if skip_empty:
-            nothing = np.float32(0.0 if first_hit is None else np.inf)
-            part = self._occupied_part(camera, view.size, image, nothing)
+        """Return how a frame is raycast; where no ray is cast for a pixel, ``image`` is cleared."""
+        part = self._part_to_draw(camera, view.size, skip_empty)
+        if part.pixels < view.size[0] * view.size[1]:
+            self._clear(image, first_hit is not None)
         defines = {**self.defines, **view.defines}
         hit: tuple[Any, ...] = ()
         if first_hit is None:
@@ -464,16 +465,23 @@ class PreparedVDI:
         coordinates = forms[:COORDINATE_FORMS]
         return packets_of(view.size, part, coordinates, planes, epipole, self._lit)
 
-    def _occupied_part(
-        self, camera: Camera, size: tuple[int, int], image: DeviceBuffer, nothing: np.float32
-    ) -> Rectangle:
-        """Return the part of a window in which rays may meet something, and fill the rest."""
+    def _clear(self, image: DeviceBuffer, of_hits: bool) -> None:
+        """Write into all pixels that nothing is met."""
+        pixels = image.shape[0] * image.shape[1]
+        padded = -(-pixels // _CLEARING_GROUP) * _CLEARING_GROUP
+        kernel = self._runtime.kernel(
+            "vdi/clear.cl", "clear_image", {"FIRST_HIT": 1} if of_hits else {}
+        )
+        self._runtime.launch(kernel, padded, _CLEARING_GROUP, np.uint64(pixels), image)
+
+    def _part_to_draw(self, camera: Camera, size: tuple[int, int], skip_empty: bool) -> Rectangle:
+        """Return the part of a window in which rays are cast: nothing is met beside it."""
         width, height = size
+        whole = Rectangle(0, width, 0, height)
+        if not skip_empty:
+            return whole
         part = rays.pixels_of_points(camera, size, self.occupancy.corners)
-        if part.pixels > _MOST_DRAWN * width * height:
-            return Rectangle(0, width, 0, height)
-        self._runtime.fill(image, nothing)
-        return part
+        return whole if part.pixels > _MOST_DRAWN * whole.pixels else part
 
     def view(
         self,
