@@ -24,9 +24,11 @@ MARGIN = 24
 #: Of a frame's forms: (u, v, depth, denominator), and how many come before the planes to clip to;
 #: those of ``common/list_space.cl``.
 COORDINATE_FORMS, PLANE_FORMS = 4, 7
-#: Lists that a ray crosses before its light ends, on average, from which packets are faster
-#: (docs/performance.md).
-LEAST_LISTS = 28.0
+#: Lists that a ray crosses before its light ends, over those that lie between a packet's first and
+#: last ray, from which packets are faster: what they have in common (docs/performance.md).
+LEAST_IN_COMMON = 1.8
+#: Pixels along the shorter edge of what is drawn from which packets are faster.
+LEAST_PIXELS = 200
 #: Lists of a VDI that are asked how far light gets in them.
 _SAMPLED_LISTS = 4096
 #: Optical depth behind which nothing is left of light: -log(1e-6), where rays end by default.
@@ -81,18 +83,20 @@ def packets_of(
     lit : float
         How far light gets, see :func:`share_lit`.
     """
-    crossed_u, crossed_v = _lists_crossed(size, coordinates, planes)
-    if lit * (crossed_u + crossed_v) < LEAST_LISTS:
+    if min(part.x1 - part.x0, part.y1 - part.y0) < LEAST_PIXELS:
         return None
     # The line through the window's centre leads along the rows, or along the columns
     upright = abs(epipole[1]) > abs(epipole[0])
+    crossed, across_packet = _lists_crossed(size, coordinates, planes, upright)
+    if lit * crossed.sum() < LEAST_IN_COMMON * across_packet.sum():
+        return None
     along, across = (part.x0, part.x1), (part.y0, part.y1)
     defines: dict[str, str | int | None] = {}
     if upright:
         defines["UPRIGHT"] = 1
         along, across = across, along
         epipole = epipole[[1, 0, 2]]
-    if crossed_v > crossed_u:
+    if crossed[1] > crossed[0]:
         defines["SWEEP_V"] = 1
     first = along[0] // LANES
     strips = -(-along[1] // LANES) - first
@@ -146,11 +150,17 @@ def _lists_crossed(
     size: tuple[int, int],
     coordinates: NDArray[np.float64],
     planes: NDArray[np.float64],
-) -> tuple[float, float]:
-    """Return how many lists a ray crosses along u and along v, the mean of those that meet any."""
+    upright: bool,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return how many lists a ray crosses along u and v, and how wide a packet is, float64 (2,).
+
+    Means of the rays that meet what they are clipped to; nothing is crossed if none does. A packet
+    is as wide as where its rays are halfway.
+    """
     edges = [(np.arange(_PROBES) + 0.5) / _PROBES * pixels - pixels / 2 for pixels in size]
     a, b = (offsets.reshape(-1) for offsets in np.meshgrid(*edges))
     pixels = np.stack([np.ones_like(a), a, b])
+    last = pixels + np.array([[0], [0 if upright else LANES], [LANES if upright else 0]])
     with np.errstate(all="ignore"):  # rays that miss, and planes that are parallel to a ray
         clipped = planes.reshape(-1, 2, 3) @ pixels
         values, slopes = clipped[:, 0], clipped[:, 1]
@@ -158,11 +168,19 @@ def _lists_crossed(
         begins = np.where(slopes > 0, crossings, -np.inf).max(axis=0)
         ends = np.where(slopes < 0, crossings, np.inf).min(axis=0)
         outside = ((slopes == 0) & (values < 0)).any(axis=0)
-        forms = coordinates.reshape(-1, 2, 3) @ pixels
-        at_begin = forms[:, 0] + begins * forms[:, 1]
-        at_end = forms[:, 0] + ends * forms[:, 1]
-        crossed = np.abs(at_end[:2] / at_end[3] - at_begin[:2] / at_begin[3])
-        meets = (begins < ends) & ~outside & np.isfinite(crossed).all(axis=0)
+        halfway = 0.5 * (begins + ends)
+        crossed = np.abs(_places(coordinates, pixels, ends) - _places(coordinates, pixels, begins))
+        wide = np.abs(_places(coordinates, last, halfway) - _places(coordinates, pixels, halfway))
+        meets = (begins < ends) & ~outside & np.isfinite(crossed + wide).all(axis=0)
     if not meets.any():
-        return 0.0, 0.0
-    return float(crossed[0, meets].mean()), float(crossed[1, meets].mean())
+        return np.zeros(2), np.ones(2)
+    return crossed[:, meets].mean(axis=1), wide[:, meets].mean(axis=1)
+
+
+def _places(
+    coordinates: NDArray[np.float64], pixels: NDArray[np.float64], t: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return (u, v) of the pixels' rays at t, float64 (2, n)."""
+    values, slopes = np.moveaxis(coordinates.reshape(-1, 2, 3) @ pixels, 1, 0)
+    u, v, _, denominator = values + t * slopes
+    return np.stack([u / denominator, v / denominator])

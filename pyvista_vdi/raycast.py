@@ -496,7 +496,7 @@ class PreparedVDI:
         pixel_rays = rays.pixel_rays(camera, size, self._bounds)
         coordinates = [pixel_rays.form(row[:3], row[3]) for row in self._list_rows]
         # Lengths are all that this is for, and a length times m absorbs as m times the extinction
-        direction = [opacity_multiplier * pixel_rays.form(axis) for axis in np.eye(3)]
+        direction = rays.direction_forms(pixel_rays, size, opacity_multiplier)
         planes = rays.box_planes(pixel_rays, self._bounds)
         planes += self._viewport_planes(coordinates)
         planes += rays.eye_plane(camera, pixel_rays)

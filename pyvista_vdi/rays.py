@@ -262,6 +262,24 @@ def cropped(rays: PixelRays, cropping: Cropping | None, bounds: Sequence[float])
     return CroppedRays(box_planes(rays, within.box.ravel().tolist()), [], 0)
 
 
+def direction_forms(
+    rays: PixelRays, window_size: Sequence[int], multiplier: float = 1.0
+) -> list[Floats]:
+    """Return forms whose slopes are the rays' direction, times a factor, over a power of two.
+
+    With that power as their value, see ``model_speed`` of ``common/list_space.cl``. Slopes are
+    about 1 then, and squares of theirs neither overflow nor vanish in float32, whatever the units.
+    """
+    forms = np.zeros((3, 6))
+    forms[:, 3:] = multiplier * rays.direction.T
+    reach = np.abs(forms[:, 3:]) @ [1.0, *np.asarray(window_size) / 2]
+    _, exponent = np.frexp(reach.max())
+    unit = np.ldexp(1.0, int(np.clip(exponent, -126, 126)))
+    forms[:, 3:] /= unit
+    forms[:, 0] = unit
+    return [*forms]
+
+
 def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
     """Return forms as the kernels read them, float32 (n, 6).
 

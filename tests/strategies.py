@@ -12,6 +12,7 @@ import math
 import numpy as np
 from hypothesis import strategies as st
 
+from pyvista_vdi import packets
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vdi import VDI
@@ -164,6 +165,17 @@ def random_view(rng, vdi, kind):
         camera_around(rng, vdi.bounds, transform, distance=distance, parallel=parallel),
         size,
     )
+
+
+#: How rays may be followed: see :func:`deal_rays`.
+DEALT = ("one by one", "packets")
+
+
+def deal_rays(patch, dealt):
+    """Have rays followed one by one, or in packets wherever they can be; ``patch`` undoes it."""
+    least = {"one by one": math.inf, "packets": 0.0}[dealt]
+    patch.setattr(packets, "LEAST_IN_COMMON", least)
+    patch.setattr(packets, "LEAST_PIXELS", least)
 
 
 # -- VDIs ------------------------------------------------------------------------------------------

@@ -92,10 +92,16 @@ inline float3 list_point(__global const float *forms, float a, float b, float t)
 }
 #endif
 
-// Model length per unit of t along the ray.
+// Model length per unit of t along the ray. The slopes of its forms are about 1, and in units of the value of the first: no
+// square is lost, and `length`, which guards against that by doubles or by divisions, is not needed. TYPE: of a and b.
+#define MODEL_SPEED(TYPE, forms, a, b)                                                    \
+    ((forms)[MODEL_FORM * FORM_SIZE] *                                                    \
+     sqrt(SQUARED_SLOPE(TYPE, (forms) + MODEL_FORM * FORM_SIZE, a, b) +                   \
+          SQUARED_SLOPE(TYPE, (forms) + (MODEL_FORM + 1) * FORM_SIZE, a, b) +             \
+          SQUARED_SLOPE(TYPE, (forms) + (MODEL_FORM + 2) * FORM_SIZE, a, b)))
+#define SQUARED_SLOPE(TYPE, form, a, b) (FORM_SLOPE(TYPE, form, a, b) * FORM_SLOPE(TYPE, form, a, b))
+
 inline float model_speed(__global const float *forms, float a, float b)
 {
-    return length((float3)(form_slope(forms + MODEL_FORM * FORM_SIZE, a, b),
-                           form_slope(forms + (MODEL_FORM + 1) * FORM_SIZE, a, b),
-                           form_slope(forms + (MODEL_FORM + 2) * FORM_SIZE, a, b)));
+    return MODEL_SPEED(float, forms, a, b);
 }

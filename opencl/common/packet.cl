@@ -120,10 +120,7 @@ inline Packet begin_packet(__global const float *forms, int planes, Reals a, Rea
     packet.along_u = select(packet.along_u, (Reals)(0.0f), fabs(packet.along_u) < FLT_MIN);
     packet.along_v = select(packet.along_v, (Reals)(0.0f), fabs(packet.along_v) < FLT_MIN);
 
-    const Reals x = FORM_SLOPE(Reals, forms + MODEL_FORM * FORM_SIZE, a, b);
-    const Reals y = FORM_SLOPE(Reals, forms + (MODEL_FORM + 1) * FORM_SIZE, a, b);
-    const Reals z = FORM_SLOPE(Reals, forms + (MODEL_FORM + 2) * FORM_SIZE, a, b);
-    packet.scale = (t1 - t0) * sqrt(x * x + y * y + z * z);
+    packet.scale = (t1 - t0) * MODEL_SPEED(Reals, forms, a, b);
 #ifndef PARALLEL
     packet.scale *= reciprocal_depth(packet.start_z, depth_origin) * reciprocal_depth(end_z, depth_origin);
     packet.w_deep = reciprocal_depth(packet.deep_z, depth_origin);

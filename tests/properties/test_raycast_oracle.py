@@ -8,14 +8,12 @@ the unmoved ray does not explain is reported, and bounded by 2 % over all views 
 from __future__ import annotations
 
 import functools
-import math
 
 import numpy as np
 import pytest
 import strategies
 from oracle import explain, total
 
-from pyvista_vdi import packets
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.vdi import VDI
@@ -27,15 +25,11 @@ MAX_SHARE = 0.02
 N_CASES = 32
 
 
-#: Lists that a ray crosses from which rays are followed in packets: none, and all that can be.
-DEALT = {"one by one": math.inf, "packets": 0.0}
-
-
 @functools.cache
 def compare(runtime, kind, dealt):
     """All cases of one kind of view on one device; kept for the test of the share."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(packets, "LEAST_LISTS", DEALT[dealt])
+        strategies.deal_rays(patch, dealt)
         return compare_cases(runtime, kind)
 
 
@@ -53,7 +47,7 @@ def compare_cases(runtime, kind):
     return total(parts)
 
 
-@pytest.mark.parametrize("dealt", DEALT)
+@pytest.mark.parametrize("dealt", strategies.DEALT)
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind, dealt):
     result = compare(runtime, kind, dealt)
@@ -61,7 +55,7 @@ def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind, dealt):
     assert result.drawn > result.pixels / 10  # a comparison of nothing with nothing proves nothing
 
 
-@pytest.mark.parametrize("dealt", DEALT)
+@pytest.mark.parametrize("dealt", strategies.DEALT)
 def test_few_pixels_need_a_moved_ray(runtime, dealt, record_property):
     results = {kind: compare(runtime, kind, dealt) for kind in strategies.VIEWS}
     for kind, result in results.items():
@@ -76,10 +70,10 @@ def test_few_pixels_need_a_moved_ray(runtime, dealt, record_property):
     assert others.moved / others.pixels <= MAX_SHARE / 4
 
 
-@pytest.mark.parametrize("dealt", DEALT)
+@pytest.mark.parametrize("dealt", strategies.DEALT)
 @pytest.mark.parametrize("case", range(8))
 def test_rays_end_at_opaque_depth_and_clipping_planes(runtime, case, dealt, monkeypatch):
-    monkeypatch.setattr(packets, "LEAST_LISTS", DEALT[dealt])
+    strategies.deal_rays(monkeypatch, dealt)
     rng = np.random.default_rng([case, 100])
     vdi = strategies.random_vdi(rng)
     kind = ("around", "parallel", "near", "inside")[case % 4]
@@ -160,10 +154,10 @@ EXTREMES = (
 
 
 @pytest.mark.extremes
-@pytest.mark.parametrize("dealt", DEALT)
+@pytest.mark.parametrize("dealt", strategies.DEALT)
 @pytest.mark.parametrize("make", EXTREMES, ids=lambda make: make.__name__)
 def test_extremes_stay_within_the_range(runtime, make, dealt, monkeypatch):
-    monkeypatch.setattr(packets, "LEAST_LISTS", DEALT[dealt])
+    strategies.deal_rays(monkeypatch, dealt)
     parts = []
     for case, kind in enumerate(("same", "half", "near", "around", "behind", "inside", "axis")):
         rng = np.random.default_rng([case, 200])
@@ -178,10 +172,10 @@ def test_extremes_stay_within_the_range(runtime, make, dealt, monkeypatch):
 
 
 @pytest.mark.extremes
-@pytest.mark.parametrize("dealt", DEALT)
+@pytest.mark.parametrize("dealt", strategies.DEALT)
 def test_thin_media_stay_within_the_range(runtime, dealt, monkeypatch):
     """Supersegments down to a few ulps of their depth, from transparent to opaque."""
-    monkeypatch.setattr(packets, "LEAST_LISTS", DEALT[dealt])
+    strategies.deal_rays(monkeypatch, dealt)
     parts = []
     for case, kind in enumerate(("same", "near", "around", "behind", "beside", "axis")):
         rng = np.random.default_rng([case, 300])

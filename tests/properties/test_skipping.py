@@ -18,7 +18,7 @@ import pytest
 import strategies
 from real_data import require_data
 
-from pyvista_vdi import examples, generate, occupancy, packets, rays
+from pyvista_vdi import examples, generate, occupancy, rays
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.occupancy import SLABS, TILE
 from pyvista_vdi.raycast import prepared_vdi, render_vdi
@@ -41,11 +41,9 @@ def _skipping_is_forced(monkeypatch):
     monkeypatch.setattr(occupancy, "_WORTHWHILE", math.inf)
 
 
-@pytest.fixture(params=["one by one", "packets"])
+@pytest.fixture(params=strategies.DEALT)
 def _dealt(request, monkeypatch):
-    """Rays are followed one by one, or in packets wherever they can be."""
-    least = math.inf if request.param == "one by one" else 0.0
-    monkeypatch.setattr(packets, "LEAST_LISTS", least)
+    strategies.deal_rays(monkeypatch, request.param)
 
 
 def assert_same_bits(runtime, vdi, camera, size, name="", **ends):
