@@ -190,14 +190,22 @@ if len(platforms) < wanted:
 PYTHON
 }
 
+# Options of pytest-xdist. A test that uses a device computes on all cores, but most of the time goes
+# into compiling kernels and into the references in Python, which take one core each. The tests of a
+# file stay together: a process makes that file's fixtures and kernels once.
+in_parallel() {
+    local cores
+    cores=$(nproc)
+    printf -- '-n %d --dist loadfile' "${CI_PYTEST_WORKERS:-$((cores < 4 ? cores : 4))}"
+}
+
 # run_tests [more arguments of pytest]; the fixtures of tests/conftest.py run every test that needs
 # a device on each of them
 run_tests() {
     copy_tests
     cd "$work/tests-only"
     local result=0
-    "$work/venv/bin/python" -m pytest -p no:cacheprovider -n "${CI_PYTEST_WORKERS:-0}" "$@" ||
-        result=$?
+    "$work/venv/bin/python" -m pytest -p no:cacheprovider "$@" || result=$?
     # 5: no test was selected, which is fine for a marker that no test carries yet
     ((result == 0 || (result == 5 && $# > 0)))
 }
@@ -251,20 +259,6 @@ run_documented_code() {
         --ignore-glob='/*/pyvista_vdi/paraview/*' --pyargs pyvista_vdi
 }
 
-run_examples() {
-    local example
-    for example in "$work"/source/examples/*.py; do
-        log "$(basename "$example")"
-        mkdir -p "$work/examples/$(basename "$example" .py)"
-        cd "$work/examples/$(basename "$example" .py)"
-        timeout 300 "$work/venv/bin/python" "$example"
-        [[ -n $(find . -type f -size +0) ]] || {
-            log "$(basename "$example") wrote no file"
-            return 1
-        }
-    done
-}
-
 # The commands of the README, to the letter and in full, in a clone of their own.
 run_readme_commands() {
     copy_checkout_to_clone "$work/clone"
@@ -281,7 +275,7 @@ run_readme_commands() {
     rm -rf .venv
     cat "$work/test-command"
     # To the letter and in full: tests that find the installed package elsewhere may not in a checkout
-    bash -euo pipefail "$work/test-command"
+    PYTEST_ADDOPTS=$(in_parallel) bash -euo pipefail "$work/test-command"
 }
 
 copy_checkout_to_clone() {
@@ -320,5 +314,7 @@ run_oldest_tests() {
     cd "$work/tests-only"
     # Old releases warn about what newer ones of their own dependencies deprecate: warnings are
     # errors only with the current versions.
-    "$work/oldest/bin/python" -m pytest -p no:cacheprovider -n "${CI_PYTEST_WORKERS:-0}" -W default
+    local options
+    read -ra options <<<"$(in_parallel)"
+    "$work/oldest/bin/python" -m pytest -p no:cacheprovider "${options[@]}" -W default
 }

@@ -12,7 +12,7 @@ import math
 import numpy as np
 import strategies
 from oracle import explain
-from sampling_uncertainty import Uncertainty
+from sampling_uncertainty import uncertainties
 
 from pyvista_vdi import reference
 from pyvista_vdi.camera import Camera
@@ -137,8 +137,8 @@ def check_scene(
 
 def derived_bound(volume, camera, size, function, sample_distance, lights):
     """What the roundings of samples can do to the worst pixel of a VDI at V_O."""
-    rays = reference.samples(volume, camera, size, function, sample_distance, lights)
-    return 2 * max(Uncertainty(volume, camera, size, function, ray).color for ray in rays)
+    rays = list(reference.samples(volume, camera, size, function, sample_distance, lights))
+    return 2 * max(one.color for one in uncertainties(volume, camera, size, function, rays))
 
 
 def check_views(runtime, worst, vdi, views, *, size=WINDOW, least_drawn=3, **ends):

@@ -40,36 +40,8 @@ class Uncertainty:
         By how much a view depth may be off, world units.
     """
 
-    def __init__(self, volume, camera, window, transfer_function, ray):
-        to_index = np.linalg.inv(volume.index_to_model)
-        reach, per_depth, far = _magnitudes(volume, camera, window, to_index)
-        scalars = np.abs([*transfer_function.scalar_range, *volume.finite_range()]).max()
-        d_position = POSITION_ROUNDINGS * ROUNDOFF * reach
-        d_scalar = SCALAR_ROUNDINGS * ROUNDOFF * scalars
-        self.depth = POSITION_ROUNDINGS * ROUNDOFF * far
-        d_length = self.depth * per_depth
-
-        # The medium at every corner of the box of positions, and at scalars moved either way
-        seen = [(ray.color, ray.optical_depth)]
-        for corner in itertools.product((-1, 1), repeat=3):
-            position = ray.position + d_position * np.array(corner)
-            # An end of the ray may round to either side of the grid's boundary
-            position = np.clip(position, 0, np.array(volume.dimensions) - 1)
-            for shift in (-d_scalar, d_scalar):
-                low, high = transfer_function.scalar_range
-                moved = transfer_function.replace(scalar_range=(low + shift, high + shift))
-                seen.append(medium_at(volume, moved, position, ray.length))
-        colors, taus = (np.array(part) for part in zip(*seen, strict=True))
-        unit = transfer_function.unit_distance or volume.default_unit_distance
-        # d tau / d a = 1 / (1 - a) / U per length, a within its own roundings
-        worst = np.exp(np.minimum(taus.max(axis=0) * unit / np.maximum(ray.length, 1e-300), 40))
-        slack = TABLE_ROUNDINGS * ROUNDOFF * worst * ray.length / unit
-        slack += STEP_ROUNDINGS * ROUNDOFF * taus.max(axis=0)
-        # The entry and exit move, and with them the first and the last step
-        slack += taus.max(axis=0) / np.maximum(ray.length, d_length) * d_length
-        self.low = np.maximum(taus.min(axis=0) - slack, 0)
-        self.high = taus.max(axis=0) + slack
-        self.color_spread = np.ptp(colors, axis=0).max(axis=1) + TABLE_ROUNDINGS * ROUNDOFF
+    def __init__(self, low, high, color_spread, depth):
+        self.low, self.high, self.color_spread, self.depth = low, high, color_spread, depth
 
     @property
     def optical_depth(self):
@@ -88,6 +60,48 @@ class Uncertainty:
         seen = before * -np.expm1(-self.high)
         rounding = (len(self.low) + 4) * ROUNDOFF
         return float(before @ (self.high - self.low) + seen @ self.color_spread + rounding)
+
+
+def uncertainties(volume, camera, window, transfer_function, rays):
+    """The :class:`Uncertainty` of each of the rays of ``reference.samples``, all at once."""
+    to_index = np.linalg.inv(volume.index_to_model)
+    reach, per_depth, far = _magnitudes(volume, camera, window, to_index)
+    scalars = np.abs([*transfer_function.scalar_range, *volume.finite_range()]).max()
+    d_position = POSITION_ROUNDINGS * ROUNDOFF * reach
+    d_scalar = SCALAR_ROUNDINGS * ROUNDOFF * scalars
+    d_depth = POSITION_ROUNDINGS * ROUNDOFF * far
+    d_length = d_depth * per_depth
+
+    # The medium at every corner of the box of positions, and at scalars moved either way
+    length = np.concatenate([ray.length for ray in rays])
+    middle = np.concatenate([ray.position for ray in rays])
+    color = np.concatenate([ray.color for ray in rays])
+    seen = [(color, np.concatenate([ray.optical_depth for ray in rays]))]
+    range_low, range_high = transfer_function.scalar_range
+    for shift in (-d_scalar, d_scalar):
+        moved = transfer_function.replace(scalar_range=(range_low + shift, range_high + shift))
+        for corner in itertools.product((-1, 1), repeat=3):
+            position = middle + d_position * np.array(corner)
+            # An end of the ray may round to either side of the grid's boundary
+            position = np.clip(position, 0, np.array(volume.dimensions) - 1)
+            seen.append(medium_at(volume, moved, position, length))
+    colors, taus = (np.array(part) for part in zip(*seen, strict=True))
+    thickest = taus.max(axis=0)
+    unit = transfer_function.unit_distance or volume.default_unit_distance
+    # d tau / d a = 1 / (1 - a) / U per length, a within its own roundings
+    worst = np.exp(np.minimum(thickest * unit / np.maximum(length, 1e-300), 40))
+    slack = TABLE_ROUNDINGS * ROUNDOFF * worst * length / unit
+    slack += STEP_ROUNDINGS * ROUNDOFF * thickest
+    # The entry and exit move, and with them the first and the last step
+    slack += thickest / np.maximum(length, d_length) * d_length
+    ends = np.cumsum([len(ray.length) for ray in rays])[:-1]
+    parts = (
+        np.maximum(taus.min(axis=0) - slack, 0),
+        thickest + slack,
+        np.ptp(colors, axis=0).max(axis=1) + TABLE_ROUNDINGS * ROUNDOFF,
+    )
+    each = zip(*(np.split(part, ends) for part in parts), strict=True)
+    return [Uncertainty(*part, d_depth) for part in each]
 
 
 def _magnitudes(volume, camera, window, to_index):

@@ -116,18 +116,31 @@ def samples(
         )
     to_index = np.linalg.inv(volume.index_to_model)
     occlusion = node_occlusion(volume, transfer_function, ambient_occlusion, step)
-    for y, x in itertools.product(range(height), range(width)):
-        ray = pixel_ray(camera, (width, height), x, y)
-        start = to_index[:3, :3] @ ray.origin + to_index[:3, 3]
-        slope = to_index[:3, :3] @ ray.direction
-        per_depth = float(np.linalg.norm(ray.direction))  # model units per unit of view depth
-        edges = _steps(start, slope, volume, camera.parallel_projection, step / per_depth)
-        position = start + slope * ((edges[:-1] + edges[1:]) / 2)[:, None]
-        length = np.diff(edges) * per_depth
-        color, tau = medium_at(
-            volume, transfer_function, position, length, camera, lights, occlusion
+    for y in range(height):
+        row = []
+        for x in range(width):
+            ray = pixel_ray(camera, (width, height), x, y)
+            start = to_index[:3, :3] @ ray.origin + to_index[:3, 3]
+            slope = to_index[:3, :3] @ ray.direction
+            per_depth = float(np.linalg.norm(ray.direction))  # model units per unit of view depth
+            edges = _steps(start, slope, volume, camera.parallel_projection, step / per_depth)
+            position = start + slope * ((edges[:-1] + edges[1:]) / 2)[:, None]
+            row.append((edges, position, np.diff(edges) * per_depth))
+        # One call for a row: a ray has few samples, and NumPy's calls take longer than they do
+        _, positions, lengths = zip(*row, strict=True)
+        medium = medium_at(
+            volume,
+            transfer_function,
+            np.concatenate(positions),
+            np.concatenate(lengths),
+            camera,
+            lights,
+            occlusion,
         )
-        yield RaySamples((x, y), edges[:-1], edges[1:], position, length, color, tau)
+        ends = np.cumsum([len(length) for length in lengths])[:-1]
+        media = zip(*(np.split(values, ends) for values in medium), strict=True)
+        for x, ((edges, position, length), (color, tau)) in enumerate(zip(row, media, strict=True)):
+            yield RaySamples((x, y), edges[:-1], edges[1:], position, length, color, tau)
 
 
 def volume_image(

@@ -38,8 +38,8 @@ class Estimation:
 
     @property
     def running(self) -> bool:
-        """Whether an estimate is being made."""
-        return self._job is not None and not self._job.done.is_set()
+        """Whether an estimate is being made, or is made and has not been taken."""
+        return self._job is not None
 
     def start(
         self, vdi: VDI, request: Request, view: View, shown: dict[str, Any] | None = None

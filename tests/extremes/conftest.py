@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 
-MEASURED = pytest.StashKey[dict[tuple[str, str], list[float]]]()
+#: Names the errors among what a report carries, as it does from the process of pytest-xdist, too.
+WORST = "worst error"
 
 
 @pytest.fixture
 def worst(request):
     """Keep an error under what it is an error of; the largest of a test's cases is shown."""
-    measured = request.config.stash.setdefault(MEASURED, {})
-    name = request.node.originalname
+    node = request.node
 
     def keep(what, error):
-        measured.setdefault((name, what), []).append(float(error))
+        node.user_properties.append((WORST, (node.originalname, what, float(error))))
 
     return keep
 
 
-def pytest_terminal_summary(terminalreporter, config):
-    measured = config.stash.get(MEASURED, {})
+def pytest_terminal_summary(terminalreporter):
+    measured: dict[tuple[str, str], list[float]] = {}
+    for report in itertools.chain(*terminalreporter.stats.values()):
+        if getattr(report, "when", None) == "call":
+            for key, value in report.user_properties:
+                if key == WORST:
+                    name, what, error = value
+                    measured.setdefault((name, what), []).append(error)
     if measured:
         terminalreporter.section("worst errors at the extremes")
         for (name, what), errors in sorted(measured.items()):

@@ -23,7 +23,7 @@ from pyvista_vdi import Cropping, Shading, numerics, reference
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.cropping import PRESETS
 from pyvista_vdi.device_volume import DeviceVolume
-from pyvista_vdi.generation import CRITERIA, generate_vdi
+from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.raycast import PreparedVDI, render_vdi
 from pyvista_vdi.raycast_volume import raycast_volume
 from pyvista_vdi.reference.rays import pixel_ray
@@ -102,7 +102,7 @@ def test_needles(runtime, worst):
     check_views(runtime, worst, vdi, turned(camera, volume, (8,), zoom=True), least_drawn=0)
 
 
-@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize("criterion", strategies.criteria())
 def test_supersegments_of_far_entries_are_ordered_and_have_a_thickness(runtime, worst, criterion):
     """Steps of few units in the last place of their depth, which rounding could make nothing."""
     volume = field_volume((1e-3, 1, 1e3))

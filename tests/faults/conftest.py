@@ -12,10 +12,14 @@ def driver(monkeypatch):
     return Driver(monkeypatch)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _all_objects_afterwards():
+    yield
+    gc.unfreeze()
+
+
 @pytest.fixture(autouse=True)
-def _only_new_objects():
+def _only_new_objects(_all_objects_afterwards):
     """Leave what was there before out of garbage collections, of which these tests need many."""
     gc.collect()
     gc.freeze()
-    yield
-    gc.unfreeze()

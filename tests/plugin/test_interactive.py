@@ -632,6 +632,27 @@ def test_the_estimate_is_of_the_picture_that_is_shown(plotter, no_estimates):
     assert actor.vdi is old
 
 
+def test_an_estimate_that_ends_between_two_looks_is_not_asked_for_again(
+    plotter, no_estimates, monkeypatch
+):
+    actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
+    take, missed = estimation.Estimation.take, []
+
+    def too_early(self):
+        job = self._job
+        if job is None or missed:
+            return take(self)
+        assert job.done.wait(LONG)  # it ends right after this look
+        missed.append(job)
+        return None
+
+    monkeypatch.setattr(estimation.Estimation, "take", too_early)
+    plotter.camera.Azimuth(30)
+    frames_until(plotter, lambda: actor.status.ssim is not None)
+    assert len(missed) == 1
+    assert no_estimates.asked == 1
+
+
 def test_auto_bears_more_while_the_view_moves(plotter, no_estimates, gate):
     actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
     no_estimates.ssim = 0.85

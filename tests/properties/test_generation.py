@@ -14,7 +14,7 @@ import itertools
 import numpy as np
 import pytest
 import strategies
-from sampling_uncertainty import Uncertainty
+from sampling_uncertainty import uncertainties
 
 from pyvista_vdi import reference
 from pyvista_vdi.camera import Camera
@@ -43,11 +43,11 @@ def cases(seed, dtype, interpolation, **volume_options):
     return volume, strategies.random_camera(rng, volume.bounds), transfer_function
 
 
-def eye_loss(volume, camera, uncertainties):
+def eye_loss(volume, camera, uncertain):
     """What lies before V_O's near limit and is not drawn, as optical depth: bound per image."""
     if camera.parallel_projection or near_depth(volume.bounds, camera) > 0:
         return 0.0
-    densest = max((u.high.max(initial=0.0) for u in uncertainties), default=0.0)
+    densest = max((u.high.max(initial=0.0) for u in uncertain), default=0.0)
     return densest * NEAR_LIMIT * volume.length * 8 / min(volume.spacing)
 
 
@@ -75,7 +75,7 @@ def check_against_reference(
         device=runtime,
     )
     rays = list(reference.samples(volume, camera, WINDOW, transfer_function))
-    uncertain = [Uncertainty(volume, camera, WINDOW, transfer_function, ray) for ray in rays]
+    uncertain = uncertainties(volume, camera, WINDOW, transfer_function, rays)
 
     # The promise
     assert vdi.counts.max(initial=0) <= budget, name
