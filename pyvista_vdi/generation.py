@@ -44,6 +44,8 @@ CRITERIA = tuple(_CRITERIA)
 
 #: Bytes of one recorded run on the device: eight float32 and its merge error.
 _RUN_BYTES = 9 * 4
+#: Records have room for a multiple of so many runs: ``ERRORS`` of ``vdi/runs.cl``.
+_ERRORS_AT_A_TIME = 8
 #: Bytes of runs that one slice of rays records at a time; also how often progress is reported.
 _SLICE_BYTES = 96 * 2**20
 #: Slices that a memory limit has room for: the volume gets more than they do.
@@ -377,6 +379,7 @@ class _Slices:
         if _CRITERIA[criterion]:
             self.kept = max(self.kept, _UNMERGED_RUNS)
             self.capacity = self.kept + _CHUNK_STEPS + limit  # the kernel cuts into what is free
+        self.capacity = -(-self.capacity // _ERRORS_AT_A_TIME) * _ERRORS_AT_A_TIME
         per_block_row = block_items(width, 4) * self.capacity * _RUN_BYTES
         most = _SLICE_BYTES
         if memory_limit is not None:
