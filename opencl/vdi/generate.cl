@@ -158,6 +158,29 @@ __kernel void march_lists(
     *length_of_list = (uint)count;
 }
 
+// The steps of the longest ray of each slice of rows.
+__kernel void longest_marches(
+    __global const float *forms,
+    int planes,
+    float sample_distance,
+    float unit_distance,
+    int width, int height,
+    int slice_rows,
+    __global int *longest)         // of each slice; 0 at first
+{
+    const int2 pixel = block_pixel((uint)get_global_id(0), width);
+    if (pixel.x >= width || pixel.y >= height)
+        return;
+    const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
+    const float b = (float)pixel.y + 0.5f - 0.5f * (float)height;
+    March march;
+    if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, INFINITY)) {
+        __global int *of_slice = longest + pixel.y / slice_rows;
+        if (march.steps > *of_slice) // an old value is only lower, and does no harm
+            atomic_max(of_slice, march.steps);
+    }
+}
+
 // Shorten records of more than `limit` runs: with `exactly`, at least error; otherwise by raising the ray's threshold.
 __kernel void shorten_lists(
     int limit,
