@@ -7,8 +7,8 @@
 // -D COMPENSATED: see common/over.cl; FAR_ENTRIES: see common/rays.cl
 //
 // A ray's march is cut into chunks of equally many steps. march_lists takes the steps of one chunk and appends what is not
-// homogeneous with the run before; make_room_in_lists then shortens the records that have grown too long, and raises the
-// ray's threshold. After the last chunk merge_lists shortens each record to the budget, and pack_lists writes the arrays.
+// homogeneous with the run before; shorten_lists then shortens the records that have grown too long, and raises the
+// ray's threshold. After the last chunk it shortens each record to the budget, and pack_lists writes the arrays.
 // The march is one kernel and the merging another because they want different vector code on a CPU.
 //
 // Lengths along a ray are t, the view depth of V_O less the VDI's depth origin, world units; with FAR_ENTRIES, less that of
