@@ -44,6 +44,8 @@ CRITERIA = tuple(_CRITERIA)
 
 #: Bytes of one recorded run on the device: eight float32 and its merge error.
 _RUN_BYTES = 9 * 4
+#: Records have room for a multiple of so many runs: ``ERRORS`` of ``vdi/runs.cl``.
+_ERRORS_AT_A_TIME = 8
 #: Bytes of runs that one slice of rays records at a time; also how often progress is reported.
 _SLICE_BYTES = 96 * 2**20
 #: Slices that a memory limit has room for: the volume gets more than they do.
@@ -377,6 +379,7 @@ class _Slices:
         if _CRITERIA[criterion]:
             self.kept = max(self.kept, _UNMERGED_RUNS)
             self.capacity = self.kept + _CHUNK_STEPS + limit  # the kernel cuts into what is free
+        self.capacity = -(-self.capacity // _ERRORS_AT_A_TIME) * _ERRORS_AT_A_TIME
         per_block_row = block_items(width, 4) * self.capacity * _RUN_BYTES
         most = _SLICE_BYTES
         if memory_limit is not None:
@@ -447,7 +450,7 @@ class _Recorder:
         self._grain = _steps_per_voxel(medium.volume, medium.sample_distance)
         items, capacity = self.slices.items, self.slices.capacity
         self._cuts = _CRITERIA[criterion]
-        names = ["march_lists", "shorten_lists", "pack_lists"]
+        names = ["longest_marches", "march_lists", "shorten_lists", "pack_lists"]
         defines = {**medium.defines, **rays.defines}
         if self._cuts:
             names.append("cut_lists")
@@ -473,6 +476,7 @@ class _Recorder:
                 self._sampler = keep(
                     StepSampler(runtime, medium.bricks, of_medium, defines, march, size, steps)
                 )
+            self._longest = self._longest_marches()
             self._buffers = stack.pop_all()
 
     def __enter__(self) -> _Recorder:
@@ -489,7 +493,10 @@ class _Recorder:
         runtime.fill(self._counts, np.uint32(0))
         runtime.fill(self._thresholds, self._threshold)
         capacity = np.int32(self.slices.capacity)
+        longest = int(self._longest[first_row // self.slices.rows])
         for first_step, steps in _chunks(self._most_steps):
+            if first_step >= longest:
+                break
             sampled: tuple[Any, ...] = ()
             if self._sampler is not None:
                 sampled = self._sampler.sample(first_row, rows, first_step, steps)
@@ -511,22 +518,10 @@ class _Recorder:
                 self._records,
                 self._counts,
             )
-            last = first_step + steps >= self._most_steps
-            exactly = last and not self._cuts
-            self._launch(
-                "shorten_lists",
-                items,
-                np.int32(self._limit if exactly else self.slices.kept),
-                np.int32(exactly),
-                *(np.int32(n) for n in (width, height, first_row, rows)),
-                self._forms,
-                capacity,
-                *self._weights,
-                self._thresholds,
-                self._records,
-                self._errors,
-                self._counts,
-            )
+            if self._cuts or first_step + steps < self._most_steps:
+                self._shorten(first_row, rows, self.slices.kept, exactly=False)
+        if not self._cuts:
+            self._shorten(first_row, rows, self._limit, exactly=True)
         if self._cuts:
             self._launch(
                 "cut_lists",
@@ -540,6 +535,40 @@ class _Recorder:
                 self._records,
                 self._counts,
             )
+
+    def _longest_marches(self) -> NDArray[np.int32]:
+        """Return the steps of the longest ray of each slice: chunks behind them have nothing."""
+        runtime, (width, height) = self._runtime, self._size
+        rows = self.slices.rows
+        with runtime.buffer((-(-height // rows),), np.int32, "longest rays") as longest:
+            runtime.fill(longest, np.int32(0))
+            self._launch(
+                "longest_marches",
+                block_items(width, height),
+                self._forms,
+                np.int32(self._planes),
+                np.float32(self._medium.sample_distance),
+                np.float32(self._medium.unit_distance),
+                *(np.int32(n) for n in (width, height, rows)),
+                longest,
+            )
+            return runtime.download(longest)
+
+    def _shorten(self, first_row: int, rows: int, limit: int, *, exactly: bool) -> None:
+        """Bring records to at most so many runs: least error first, or by raised thresholds."""
+        width, height = self._size
+        self._launch(
+            "shorten_lists",
+            block_items(width, rows),
+            *(np.int32(n) for n in (limit, exactly, width, height, first_row, rows)),
+            self._forms,
+            np.int32(self.slices.capacity),
+            *self._weights,
+            self._thresholds,
+            self._records,
+            self._errors,
+            self._counts,
+        )
 
     def packed(self, first_row: int, rows: int) -> tuple[NDArray[Any], ...]:
         """Return lengths, fronts, backs, colours and optical depths of the slice's lists."""

@@ -10,7 +10,6 @@ from pyvista_vdi.compositing import Segment
 EPS = 2.0**-24  # unit roundoff of float32
 FRONT, BACK, TAU, TRANSMITTANCE = range(4)
 COLOR, OPACITY = slice(4, 7), 7
-LANES = 16
 
 
 def as_runs(segments):

@@ -87,16 +87,29 @@ inline float step_face(const March *march, int k)
     return fmin(fma((float)k, march->step, march->t0), march->t1);
 }
 
-// The first step from which on midpoints may lie outside a box that the ray is in, between two index positions.
-inline int first_step_outside(const March *march, float3 lower, float3 upper)
+// Where a ray leaves a slab between two index positions of one axis, in t: past the face ahead, or never.
+inline float leaves_slab(float lower, float upper, float start, float slope, float inverse)
 {
-    // Where the ray leaves the box: past the face ahead on each axis, or never
-    const float3 crossing = ((march->slope > 0.0f ? upper : lower) - march->start) * march->inverse;
-    const float leaves = fmin(march->slope.x != 0.0f ? crossing.x : INFINITY,
-                              fmin(march->slope.y != 0.0f ? crossing.y : INFINITY,
-                                   march->slope.z != 0.0f ? crossing.z : INFINITY));
+    return slope != 0.0f ? ((slope > 0.0f ? upper : lower) - start) * inverse : INFINITY;
+}
+
+// The first step from which on midpoints may lie outside a box that the ray is in. Here and below axes are scalars: compilers
+// that put work-items into the lanes of a vector take a float3 apart and put it together again around each conversion.
+inline int first_step_outside(const March *march, float lower_x, float lower_y, float lower_z, float upper_x, float upper_y,
+                              float upper_z)
+{
+    const float leaves =
+        fmin(leaves_slab(lower_x, upper_x, march->start.x, march->slope.x, march->inverse.x),
+             fmin(leaves_slab(lower_y, upper_y, march->start.y, march->slope.y, march->inverse.y),
+                  leaves_slab(lower_z, upper_z, march->start.z, march->slope.z, march->inverse.z)));
     // Steps with their midpoint before that, less a hundredth of a step for the rounding of positions
     return (int)fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f) + 1;
+}
+
+// Block of an index position on one axis.
+inline int block_of(float position, int blocks)
+{
+    return clamp((int)position >> BLOCK_SHIFT, 0, blocks - 1);
 }
 
 // Steps from step k on whose midpoints lie in transparent blocks around the first one's, in whole groups of `group` steps, so
@@ -106,14 +119,20 @@ inline int empty_steps(const March *march, const Medium *medium, int k, int end,
 {
 #ifdef SKIP_EMPTY
     const float t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
-    const float3 position = march->start + t * march->slope;
-    const int3 block = clamp(convert_int3(position) >> BLOCK_SHIFT, (int3)(0), medium->blocks.xyz - 1);
-    const int reach = medium->reaches[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x];
+    const int i = block_of(fma(t, march->slope.x, march->start.x), medium->blocks.x);
+    const int j = block_of(fma(t, march->slope.y, march->start.y), medium->blocks.y);
+    const int l = block_of(fma(t, march->slope.z, march->start.z), medium->blocks.z);
+    const int reach = medium->reaches[((size_t)l * medium->blocks.y + j) * medium->blocks.x + i];
     if (reach == 0)
         return 0;
-    const float3 lower = convert_float3((block - (reach - 1)) << BLOCK_SHIFT);
-    const float3 upper = convert_float3((block + reach) << BLOCK_SHIFT);
-    return max(min(first_step_outside(march, lower, upper), end) - k, 0) / group * group;
+    const int before = reach - 1;
+    const int outside = first_step_outside(
+        march, (float)((i - before) << BLOCK_SHIFT), (float)((j - before) << BLOCK_SHIFT),
+        (float)((l - before) << BLOCK_SHIFT), (float)((i + reach) << BLOCK_SHIFT), (float)((j + reach) << BLOCK_SHIFT),
+        (float)((l + reach) << BLOCK_SHIFT));
+    const int steps = max(min(outside, end) - k, 0);
+    // A division of whole numbers would be done lane by lane; half a step off, rounding crosses none below 2^23
+    return group * (int)(((float)steps + 0.5f) / (float)group);
 #else
     return 0;
 #endif

@@ -63,8 +63,10 @@ inline Stretch next_stretch(const Walk *walk, const Medium *medium, __global con
     stretch.brick = (brick.z * bricks.y + brick.y) * bricks.x + brick.x;
     stretch.transparent = !seen[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x];
     // Positions never turn back: where the last step is in the block as well, all between are
-    const float3 lower = convert_float3(block << BLOCK_SHIFT);
-    stretch.end = max(min(first_step_outside(march, lower, lower + (float)BLOCK), walk->end), walk->k + 1);
+    const int3 first = block << BLOCK_SHIFT, last = first + BLOCK;
+    const int outside = first_step_outside(march, (float)first.x, (float)first.y, (float)first.z, (float)last.x,
+                                           (float)last.y, (float)last.z);
+    stretch.end = max(min(outside, walk->end), walk->k + 1);
     if (any((cell_of_step(march, medium, stretch.end - 1) >> BLOCK_SHIFT) != block))
         stretch.end = walk->k + 1;
     return stretch;

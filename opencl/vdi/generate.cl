@@ -7,8 +7,8 @@
 // -D COMPENSATED: see common/over.cl; FAR_ENTRIES: see common/rays.cl
 //
 // A ray's march is cut into chunks of equally many steps. march_lists takes the steps of one chunk and appends what is not
-// homogeneous with the run before; make_room_in_lists then shortens the records that have grown too long, and raises the
-// ray's threshold. After the last chunk merge_lists shortens each record to the budget, and pack_lists writes the arrays.
+// homogeneous with the run before; shorten_lists then shortens the records that have grown too long, and raises the
+// ray's threshold. After the last chunk it shortens each record to the budget, and pack_lists writes the arrays.
 // The march is one kernel and the merging another because they want different vector code on a CPU.
 //
 // Lengths along a ray are t, the view depth of V_O less the VDI's depth origin, world units; with FAR_ENTRIES, less that of
@@ -57,82 +57,128 @@ __kernel void march_lists(
     if (!begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, INFINITY))
         return;
     const Medium medium = {voxels, size, table, entries, low, per_scalar, reaches, blocks SHADING_ARGUMENTS};
+    if (march.steps <= first_step)
+        return;
     const float per_reference = march.units * unit_distance / reference_length;
     const float threshold = thresholds[item];
     __global float *record = records + record_start(item, capacity, RUN_WORDS);
 
-    // The record's last run may still grow
+    // The record's last run may still grow. Until it is stored its components are kept one by one, and so is its feature, the
+    // mean of its steps', which is cheaper to keep than its medium's
     int count = (int)*length_of_list;
-    float8 run = (float8)(-INFINITY);
-    float4 feature = (float4)(0.0f);
-#if defined(COMPENSATED) && COMPENSATED > 1
-    float8 rest = (float8)(0.0f); // what the growing run's sums have rounded off in this chunk
-#endif
-    float run_length = 0.0f, seen = 1.0f;
+    float8 run = (float8)(0.0f);
+    run.BACK = -INFINITY;
     float transmittance = 1.0f;
     if (count > 0) {
         run = load_run(record, count - 1);
-        feature = run_feature(run, per_reference);
-        run_length = (run.BACK - run.FRONT) * per_reference;
-        seen = seen_weight(run, hidden_weight);
         transmittance = run.TRANSMITTANCE - run.TRANSMITTANCE * run.OPACITY;
     }
-    // A ray that cannot keep every detail asks about homogeneity once in a voxel only
+    const float4 begun_feature = run_feature(run, per_reference);
+    float front = run.FRONT, back = run.BACK, tau = run.TAU, before = run.TRANSMITTANCE;
+    float red = run.s4, green = run.s5, blue = run.s6, opacity = run.OPACITY;
+    float run_length = count > 0 ? (back - front) * per_reference : 0.0f;
+    float red_feature = begun_feature.x, green_feature = begun_feature.y, blue_feature = begun_feature.z;
+    float density = begun_feature.w;
+#if defined(COMPENSATED) && COMPENSATED > 1
+    float8 rest = (float8)(0.0f); // what the growing run's sums have rounded off in this chunk
+#endif
+    // A ray that cannot keep every detail asks about homogeneity once in a voxel only: the steps of a group are composited
+    // without asking
     const int group = threshold > finest ? grain : 1;
     const int end = min(first_step + steps, march.steps);
     int k = first_step;
+    int left = group; // steps of this group
+    float group_front = step_face(&march, k);
+    float group_tau = 0.0f, group_red = 0.0f, group_green = 0.0f, group_blue = 0.0f, group_opacity = 0.0f;
+    // Every turn does the same for every ray, and what depends on the ray is selected: the lanes of a vector need no masks
     while (k < end) {
-        const int empty = empty_steps(&march, &medium, k, end, group);
-        k += empty;
-        if (empty > 0)
-            continue;
-        // The steps of a group are composited without asking
-        float face = step_face(&march, k);
-        float8 sample = (float8)(face, face, 0.0f, transmittance, 0.0f, 0.0f, 0.0f, 0.0f);
-        for (const int group_end = min(k + group, end); k < group_end; ++k) {
-            const float back = step_face(&march, k + 1);
-            const float4 step = step_medium(&march, &medium, k, face, back);
-            const float opacity = opacity_of(step.w);
-            const float weight = (1.0f - sample.OPACITY) * opacity; // over, front to back
-            sample.TAU += step.w;
-            sample.COLOR += weight * step.xyz;
-            sample.OPACITY += weight;
-            face = back;
-        }
-        sample.BACK = face;
-        if (sample.OPACITY > 0.0f && sample.BACK > sample.FRONT) {
-            const float sample_length = (sample.BACK - sample.FRONT) * per_reference;
-            const float4 sample_feature = run_feature(sample, per_reference);
-            transmittance -= transmittance * sample.OPACITY;
-            // Against the run's mean feature so far, which is cheaper to keep than its medium's; a gap ends a run
-            const float share = sample_length / (run_length + sample_length);
-            const float4 difference = sample_feature - feature;
-            const float error = run_length * share * dot(difference, difference) * seen;
-            if (run.BACK == sample.FRONT && error <= threshold) {
+        const int empty = left == group ? empty_steps(&march, &medium, k, end, group) : 0;
+        const float step_back = step_face(&march, k + 1);
+        const float4 step = step_medium(&march, &medium, k, step_face(&march, k), step_back);
+        // What is passed by is transparent, and so is its first step, which is looked at all the same
+        const float step_tau = empty > 0 ? 0.0f : step.w;
+        const float weight = (1.0f - group_opacity) * opacity_of(step_tau); // over, front to back
+        group_tau += step_tau;
+        group_red += weight * step.x;
+        group_green += weight * step.y;
+        group_blue += weight * step.z;
+        group_opacity += weight;
+        k += max(empty, 1);
+        --left;
+        const bool whole = left == 0 || empty > 0 || k >= end;
+        const bool visible = whole && group_opacity > 0.0f && step_back > group_front;
+
+        // A gap ends a run
+        const float8 sample = (float8)(group_front, step_back, group_tau, transmittance, group_red, group_green, group_blue,
+                                       group_opacity);
+        const float sample_length = (step_back - group_front) * per_reference;
+        const float4 feature = run_feature(sample, per_reference);
+        const float share = sample_length / (run_length + sample_length);
+        const float4 difference = (float4)(feature.x - red_feature, feature.y - green_feature, feature.z - blue_feature,
+                                           feature.w - density);
+        run = (float8)(front, back, tau, before, red, green, blue, opacity);
+        const float error = run_length * share * square_of(difference) * seen_weight(run, hidden_weight);
+        const bool grows = visible && back == group_front && error <= threshold;
+        const bool begins = visible && !grows;
+        if (begins && count > 0)
+            store_run(record, count - 1, run);
 #if defined(COMPENSATED) && COMPENSATED > 1
-                run = merged_runs_with_rest(run, sample, &rest);
+        float8 grown_rest = rest;
+        const float8 grown = merged_runs_with_rest(run, sample, &grown_rest);
+        rest = grows ? grown_rest : begins ? (float8)(0.0f) : rest;
 #else
-                run = merged_runs(run, sample);
+        const float8 grown = merged_runs(run, sample);
 #endif
-                feature += share * difference;
-                run_length += sample_length;
-            } else {
-                if (count > 0)
-                    store_run(record, count - 1, run);
-                ++count;
-                run = sample;
-#if defined(COMPENSATED) && COMPENSATED > 1
-                rest = (float8)(0.0f);
-#endif
-                feature = sample_feature;
-                run_length = sample_length;
-                seen = seen_weight(run, hidden_weight);
-            }
-        }
+        count += begins ? 1 : 0;
+        front = begins ? group_front : front;
+        back = visible ? step_back : back;
+        tau = grows ? grown.TAU : begins ? group_tau : tau;
+        before = begins ? transmittance : before;
+        red = grows ? grown.s4 : begins ? group_red : red;
+        green = grows ? grown.s5 : begins ? group_green : green;
+        blue = grows ? grown.s6 : begins ? group_blue : blue;
+        opacity = grows ? grown.OPACITY : begins ? group_opacity : opacity;
+        run_length = grows ? run_length + sample_length : begins ? sample_length : run_length;
+        red_feature = grows ? red_feature + share * difference.x : begins ? feature.x : red_feature;
+        green_feature = grows ? green_feature + share * difference.y : begins ? feature.y : green_feature;
+        blue_feature = grows ? blue_feature + share * difference.z : begins ? feature.z : blue_feature;
+        density = grows ? density + share * difference.w : begins ? feature.w : density;
+        transmittance = visible ? transmittance - transmittance * group_opacity : transmittance;
+
+        left = whole ? group : left;
+        group_front = whole ? step_face(&march, k) : group_front;
+        group_tau = whole ? 0.0f : group_tau;
+        group_red = whole ? 0.0f : group_red;
+        group_green = whole ? 0.0f : group_green;
+        group_blue = whole ? 0.0f : group_blue;
+        group_opacity = whole ? 0.0f : group_opacity;
     }
     if (count > 0)
-        store_run(record, count - 1, run);
+        store_run(record, count - 1, (float8)(front, back, tau, before, red, green, blue, opacity));
     *length_of_list = (uint)count;
+}
+
+// The steps of the longest ray of each slice of rows.
+__kernel void longest_marches(
+    __global const float *forms,
+    int planes,
+    float sample_distance,
+    float unit_distance,
+    int width, int height,
+    int slice_rows,
+    __global int *longest)         // of each slice; 0 at first
+{
+    const int2 pixel = block_pixel((uint)get_global_id(0), width);
+    if (pixel.x >= width || pixel.y >= height)
+        return;
+    const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
+    const float b = (float)pixel.y + 0.5f - 0.5f * (float)height;
+    March march;
+    if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, INFINITY)) {
+        __global int *of_slice = longest + pixel.y / slice_rows;
+        if (march.steps > *of_slice) // an old value is only lower, and does no harm
+            atomic_max(of_slice, march.steps);
+    }
 }
 
 // Shorten records of more than `limit` runs: with `exactly`, at least error; otherwise by raising the ray's threshold.
@@ -162,7 +208,7 @@ __kernel void shorten_lists(
     const float b = (float)(first_row + pixel.y) + 0.5f - 0.5f * (float)height;
     const float per_reference = length(model_direction(forms, a, b)) / reference_length;
     __global float *record = records + record_start(item, capacity, RUN_WORDS);
-    __global float *errors = all_errors + record_start(item, capacity, 1);
+    __global float *errors = all_errors + errors_start(item, capacity);
     if (exactly) {
         *length_of_list = (uint)merge_to_limit(record, errors, count, limit, per_reference, hidden_weight);
     } else {
@@ -200,7 +246,7 @@ __kernel void cut_lists(
     const float per_reference = length(model_direction(forms, a, b)) / reference_length;
     __global float *record = records + record_start(item, capacity, RUN_WORDS);
     const int cut = cut_to_limit(record, count, limit, per_reference);
-    *length_of_list = (uint)merge_within(record, cut, threshold, per_reference, hidden_weight);
+    *length_of_list = (uint)merge_within(record, 0, cut, threshold, per_reference, hidden_weight);
 }
 #endif
 

@@ -11,7 +11,9 @@
 #include "common/classification.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// A run is a float8, which compilers keep in registers where they put a structure into memory.
+// A run is a float8, which compilers keep in registers where they put a structure into memory. It holds components together,
+// and what is computed is computed from one component at a time: compilers that put work-items into the lanes of a vector then
+// have nothing to take apart and to put together again.
 #define FRONT s0         // t of the ray
 #define BACK s1
 #define TAU s2           // optical depth
@@ -24,7 +26,8 @@ inline float4 run_feature(float8 run, float per_reference)
 {
     const float length = (run.BACK - run.FRONT) * per_reference;
     const float density = run.TAU / (run.TAU + length);
-    return (float4)(run.COLOR * (density / run.OPACITY), density);
+    const float per_color = density / run.OPACITY;
+    return (float4)(run.s4 * per_color, run.s5 * per_color, run.s6 * per_color, density);
 }
 
 // One run from two neighbours; a gap between them is covered by the merged medium.
@@ -34,7 +37,9 @@ inline float8 merged_runs(float8 a, float8 b)
     const float through = 1.0f - a.OPACITY;
     run.BACK = b.BACK;
     run.TAU = a.TAU + b.TAU;
-    run.COLOR = a.COLOR + through * b.COLOR;
+    run.s4 = a.s4 + through * b.s4;
+    run.s5 = a.s5 + through * b.s5;
+    run.s6 = a.s6 + through * b.s6;
     run.OPACITY = a.OPACITY + through * b.OPACITY;
     return run;
 }
@@ -62,6 +67,12 @@ inline float seen_weight(float8 run, float hidden_weight)
     return hidden_weight + (1.0f - hidden_weight) * run.TRANSMITTANCE;
 }
 
+// As dot() of the drivers at hand sums up, so that measure_errors and merge_error give the same on any.
+inline float square_of(float4 v)
+{
+    return (v.x * v.x + v.y * v.y) + (v.z * v.z + v.w * v.w);
+}
+
 // Ward's increase of the sum of squares when neighbours a and b, and the empty gap between them, become one, weighted by
 // how much of it the eye sees.
 inline float merge_error(float8 a, float4 feature_a, float8 b, float4 feature_b, float per_reference, float hidden_weight)
@@ -71,10 +82,10 @@ inline float merge_error(float8 a, float4 feature_a, float8 b, float4 feature_b,
     const float gap = (b.FRONT - a.BACK) * per_reference;
     const float both = length_a + length_b;
     const float4 difference = feature_a - feature_b;
-    float error = length_a * length_b * dot(difference, difference) / both;
+    float error = length_a * length_b * square_of(difference) / both;
     if (gap > 0.0f) {
         const float4 mean = (length_a * feature_a + length_b * feature_b) / both;
-        error += both * gap * dot(mean, mean) / (both + gap);
+        error += both * gap * square_of(mean) / (both + gap);
     }
     // Finite whatever the numbers, so that there always is a least error
     return fmin(error * seen_weight(a, hidden_weight), FLT_MAX);
@@ -82,74 +93,144 @@ inline float merge_error(float8 a, float4 feature_a, float8 b, float4 feature_b,
 
 // -- the record of a ray -------------------------------------------------------------------------------------------------
 //
-// Rays are stored in blocks of 16, component by component, so that neighbouring work-items touch neighbouring words:
-// word ((block * capacity + k) * RUN_WORDS + component) * 16 + lane holds one component of run k.
-#define LANES 16
+// A ray's runs lie one behind the other, and its errors likewise: what shortens them goes from run to run, and rays whose
+// records grow at different places write to one line of the cache each. A run moves as four words of 8 bytes, because the
+// number of loads and stores is what counts where a vector's lanes go to different places.
 #define RUN_WORDS 8
 
 inline size_t record_start(uint item, int capacity, int words)
 {
-    return (size_t)(item / LANES) * (size_t)capacity * (size_t)(words * LANES) + item % LANES;
+    return (size_t)item * (size_t)(capacity * words);
 }
 
 inline float8 load_run(__global const float *record, int k)
 {
-    __global const float *word = record + k * (RUN_WORDS * LANES);
-    return (float8)(word[0], word[LANES], word[2 * LANES], word[3 * LANES], word[4 * LANES], word[5 * LANES],
-                    word[6 * LANES], word[7 * LANES]);
+    __global const ulong *pairs = (__global const ulong *)(record + k * RUN_WORDS);
+    return (float8)(as_float2(pairs[0]), as_float2(pairs[1]), as_float2(pairs[2]), as_float2(pairs[3]));
 }
 
 inline void store_run(__global float *record, int k, float8 run)
 {
-    __global float *word = record + k * (RUN_WORDS * LANES);
-    word[0] = run.s0;
-    word[LANES] = run.s1;
-    word[2 * LANES] = run.s2;
-    word[3 * LANES] = run.s3;
-    word[4 * LANES] = run.s4;
-    word[5 * LANES] = run.s5;
-    word[6 * LANES] = run.s6;
-    word[7 * LANES] = run.s7;
+    __global ulong *pairs = (__global ulong *)(record + k * RUN_WORDS);
+    pairs[0] = as_ulong(run.s01);
+    pairs[1] = as_ulong(run.s23);
+    pairs[2] = as_ulong(run.s45);
+    pairs[3] = as_ulong(run.s67);
 }
 
-// errors[k]: what merging runs k and k + 1 costs.
+// A ray's errors are looked through this many at a time, and end with INFINITY.
+#define ERRORS 8
+
+inline size_t errors_start(uint item, int capacity)
+{
+    return (size_t)item * (size_t)((capacity + ERRORS - 1) / ERRORS * ERRORS);
+}
+
+// errors[k]: what merging runs k and k + 1 costs, merge_error of eight pairs at a time.
 inline void measure_errors(__global const float *record, __global float *errors, int count, float per_reference, float hidden_weight)
 {
-    float8 run = load_run(record, 0);
-    float4 feature = run_feature(run, per_reference);
-    for (int k = 1; k < count; ++k) {
-        const float8 next = load_run(record, k);
-        const float4 next_feature = run_feature(next, per_reference);
-        errors[(k - 1) * LANES] = merge_error(run, feature, next, next_feature, per_reference, hidden_weight);
-        run = next;
-        feature = next_feature;
+    const int last = count - 1;
+    float8 h = load_run(record, 0);
+    for (int k = 0; k < count; k += ERRORS) {
+        const float8 a = h;
+        const float8 b = load_run(record, min(k + 1, last));
+        const float8 c = load_run(record, min(k + 2, last));
+        const float8 d = load_run(record, min(k + 3, last));
+        const float8 e = load_run(record, min(k + 4, last));
+        const float8 f = load_run(record, min(k + 5, last));
+        const float8 g = load_run(record, min(k + 6, last));
+        const float8 i = load_run(record, min(k + 7, last));
+        h = load_run(record, min(k + 8, last));
+#define OF_RUNS(word) (float8)(a.word, b.word, c.word, d.word, e.word, f.word, g.word, i.word)
+#define OF_NEXT(of_runs, next) (float8)(of_runs.s1234, of_runs.s567, next)
+        const float8 fronts = OF_RUNS(s0), backs = OF_RUNS(s1), taus = OF_RUNS(s2);
+        const float8 lengths = (backs - fronts) * per_reference;
+        const float8 densities = taus / (taus + lengths);
+        const float8 per_color = densities / OF_RUNS(s7);
+        const float8 reds = OF_RUNS(s4) * per_color, greens = OF_RUNS(s5) * per_color, blues = OF_RUNS(s6) * per_color;
+        const float4 feature = run_feature(h, per_reference);
+        const float8 next_lengths = OF_NEXT(lengths, (h.BACK - h.FRONT) * per_reference);
+        const float8 next_reds = OF_NEXT(reds, feature.x), next_greens = OF_NEXT(greens, feature.y);
+        const float8 next_blues = OF_NEXT(blues, feature.z), next_densities = OF_NEXT(densities, feature.w);
+        const float8 gaps = (OF_NEXT(fronts, h.FRONT) - backs) * per_reference;
+        const float8 both = lengths + next_lengths;
+        const float8 red = reds - next_reds, green = greens - next_greens, blue = blues - next_blues;
+        const float8 density = densities - next_densities;
+        const float8 squares = (red * red + green * green) + (blue * blue + density * density);
+        const float8 close = lengths * next_lengths * squares / both;
+        const float8 red_mean = (lengths * reds + next_lengths * next_reds) / both;
+        const float8 green_mean = (lengths * greens + next_lengths * next_greens) / both;
+        const float8 blue_mean = (lengths * blues + next_lengths * next_blues) / both;
+        const float8 density_mean = (lengths * densities + next_lengths * next_densities) / both;
+        const float8 mean_squares = (red_mean * red_mean + green_mean * green_mean) +
+                                    (blue_mean * blue_mean + density_mean * density_mean);
+        const float8 error = select(close, close + both * gaps * mean_squares / (both + gaps), gaps > 0.0f);
+        const float8 seen = hidden_weight + (1.0f - hidden_weight) * OF_RUNS(s3);
+        const int8 pair = k + (int8)(0, 1, 2, 3, 4, 5, 6, 7);
+        vstore8(select((float8)(INFINITY), fmin(error * seen, FLT_MAX), pair < last), 0, errors + k);
+#undef OF_RUNS
+#undef OF_NEXT
     }
 }
 
 inline int count_within(__global const float *errors, int count, float threshold)
 {
-    int n = 0;
-    for (int k = 0; k < count; ++k)
-        n += errors[k * LANES] > threshold ? 0 : 1;
-    return n;
+    int8 n = (int8)(0);
+    for (int k = 0; k < count; k += ERRORS)
+        n += vload8(0, errors + k) <= threshold; // -1 where it is so
+    const int4 sums = n.lo + n.hi;
+    return -(sums.x + sums.y + sums.z + sums.w);
+}
+
+// The pair of the least error; of equals the first.
+inline int least_of(__global const float *errors, int count)
+{
+    float8 least = (float8)(INFINITY);
+    int8 at = (int8)(INT_MAX);
+    for (int k = 0; k < count; k += ERRORS) {
+        const float8 error = vload8(0, errors + k);
+        const int8 less = error < least;
+        least = select(least, error, less);
+        at = select(at, k + (int8)(0, 1, 2, 3, 4, 5, 6, 7), less);
+    }
+    const float4 least4 = fmin(least.lo, least.hi);
+    const float2 least2 = fmin(least4.lo, least4.hi);
+    const int8 first = select((int8)(INT_MAX), at, least == fmin(least2.x, least2.y));
+    const int4 first4 = min(first.lo, first.hi);
+    const int2 first2 = min(first4.lo, first4.hi);
+    return min(first2.x, first2.y);
 }
 
 // Merge neighbours whose error is within `threshold`, in one pass from front to back. Returns how many runs are left.
-inline int merge_within(__global float *record, int count, float threshold, float per_reference, float hidden_weight)
+// `errors`: those of the record as it is, or null.
+inline int merge_within(__global float *record, __global const float *errors, int count, float threshold,
+                        float per_reference, float hidden_weight)
 {
     int kept = 0;
     float8 run = load_run(record, 0);
-    float4 feature = run_feature(run, per_reference);
+    float4 feature = (float4)(0.0f);
+    bool as_recorded = errors != 0; // the run: its error is known
+    if (errors == 0)
+        feature = run_feature(run, per_reference);
     for (int k = 1; k < count; ++k) {
         const float8 next = load_run(record, k);
-        const float4 next_feature = run_feature(next, per_reference);
-        if (!(merge_error(run, feature, next, next_feature, per_reference, hidden_weight) > threshold)) {
+        float4 next_feature = (float4)(0.0f);
+        float error;
+        if (as_recorded) {
+            error = errors[k - 1];
+        } else {
+            next_feature = run_feature(next, per_reference);
+            error = merge_error(run, feature, next, next_feature, per_reference, hidden_weight);
+        }
+        if (!(error > threshold)) {
             run = merged_runs(run, next);
             feature = run_feature(run, per_reference);
+            as_recorded = false;
         } else {
             store_run(record, kept++, run);
             run = next;
             feature = next_feature;
+            as_recorded = errors != 0;
         }
     }
     store_run(record, kept++, run);
@@ -162,9 +243,9 @@ inline int make_room(__global float *record, __global float *errors, int count, 
 {
     while (count > limit) {
         measure_errors(record, errors, count, per_reference, hidden_weight);
-        while (count_within(errors, count - 1, *threshold) < count - limit)
+        while (count_within(errors, count, *threshold) < count - limit)
             *threshold *= 4.0f;
-        count = merge_within(record, count, *threshold, per_reference, hidden_weight);
+        count = merge_within(record, errors, count, *threshold, per_reference, hidden_weight);
     }
     return count;
 }
@@ -175,46 +256,37 @@ inline int merge_to_limit(__global float *record, __global float *errors, int co
     if (count <= limit)
         return count;
     measure_errors(record, errors, count, per_reference, hidden_weight);
-    errors[(count - 1) * LANES] = INFINITY; // the last run has no neighbour behind it
     int alive = count;
     while (alive > limit) {
-        int least = 0;
-        float least_error = INFINITY;
-        for (int k = 0; k < count; ++k) {
-            const float error = errors[k * LANES];
-            if (error < least_error) {
-                least_error = error;
-                least = k;
-            }
-        }
+        const int least = least_of(errors, count);
         // Merged-away runs keep a negative optical depth and an infinite error
         int next = least + 1;
-        while (record[(next * RUN_WORDS + 2) * LANES] < 0.0f)
+        while (record[next * RUN_WORDS + 2] < 0.0f)
             ++next;
         const float8 a = load_run(record, least);
         const float8 b = load_run(record, next);
         const float8 run = merged_runs(a, b);
         const float4 feature = run_feature(run, per_reference);
         store_run(record, least, run);
-        record[(next * RUN_WORDS + 2) * LANES] = -1.0f;
-        const bool last = errors[next * LANES] == INFINITY;
-        errors[next * LANES] = INFINITY;
-        errors[least * LANES] = INFINITY;
+        record[next * RUN_WORDS + 2] = -1.0f;
+        const bool last = errors[next] == INFINITY;
+        errors[next] = INFINITY;
+        errors[least] = INFINITY;
         --alive;
         if (!last) {
             int behind = next + 1;
-            while (record[(behind * RUN_WORDS + 2) * LANES] < 0.0f)
+            while (record[behind * RUN_WORDS + 2] < 0.0f)
                 ++behind;
             const float8 other = load_run(record, behind);
-            errors[least * LANES] =
+            errors[least] =
                 merge_error(run, feature, other, run_feature(other, per_reference), per_reference, hidden_weight);
         }
         int before = least - 1;
-        while (before >= 0 && record[(before * RUN_WORDS + 2) * LANES] < 0.0f)
+        while (before >= 0 && record[before * RUN_WORDS + 2] < 0.0f)
             --before;
         if (before >= 0) {
             const float8 other = load_run(record, before);
-            errors[before * LANES] =
+            errors[before] =
                 merge_error(other, run_feature(other, per_reference), run, feature, per_reference, hidden_weight);
         }
     }

@@ -51,13 +51,13 @@ __kernel void shortened(int count, int way, int limit, int capacity, float per_r
     if (i >= count)
         return;
     __global float *record = records + record_start((uint)i, capacity, RUN_WORDS);
-    __global float *errors = all_errors + record_start((uint)i, capacity, 1);
+    __global float *errors = all_errors + errors_start((uint)i, capacity);
     int n = lengths[i];
     for (int k = 0; k < n; ++k)
         store_run(record, k, runs[(size_t)i * capacity + k]);
     float threshold = thresholds[i];
     if (way == WITHIN)
-        n = merge_within(record, n, threshold, per_reference, hidden_weight);
+        n = merge_within(record, 0, n, threshold, per_reference, hidden_weight);
     else if (way == ROOM)
         n = make_room(record, errors, n, limit, &threshold, per_reference, hidden_weight);
     else

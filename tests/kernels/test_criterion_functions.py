@@ -10,7 +10,6 @@ from recorded_runs import (
     EPS,
     EXTREMES,
     FRONT,
-    LANES,
     OPACITY,
     TAU,
     TRANSMITTANCE,
@@ -40,11 +39,11 @@ def cut(call, criterion, records, limit, per_reference=1.0):
     runs = np.full((len(records), capacity, 8), np.nan, np.float32)
     for target, record in zip(runs, records, strict=True):
         target[: len(record)] = record
-    n, blocks = len(records), -(-len(records) // LANES)
+    n = len(records)
     lengths = np.array([len(r) for r in records], np.int32)
     runs, lengths, _ = call(
         FILE, "cut", n, np.int32(limit), np.int32(capacity), np.float32(per_reference),
-        call.out(runs), call.out(lengths), call.empty(blocks * LANES * capacity * 8),
+        call.out(runs), call.out(lengths), call.empty(n * capacity * 8),
         CRITERION=criterion,
     )  # fmt: skip
     return [r[:k] for r, k in zip(runs, lengths, strict=True)]

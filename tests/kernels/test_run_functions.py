@@ -16,7 +16,6 @@ from recorded_runs import (
     EPS,
     EXTREMES,
     FRONT,
-    LANES,
     OPACITY,
     TAU,
     TRANSMITTANCE,
@@ -31,6 +30,7 @@ from pyvista_vdi.compositing import Segment
 
 FILE = "run_functions.cl"
 WITHIN, ROOM, LIMIT = range(3)
+ERRORS_AT_A_TIME = 8  # see vdi/runs.cl
 
 
 # -- float64 reference -----------------------------------------------------------------------------
@@ -82,14 +82,14 @@ def shortened(call, way, records, limit, *, per_reference=1.0, hidden_weight=0.5
     runs = np.full((len(records), capacity, 8), np.nan, np.float32)
     for target, record in zip(runs, records, strict=True):
         target[: len(record)] = record
-    n, blocks = len(records), -(-len(records) // LANES)
+    n = len(records)
+    padded = -(-capacity // ERRORS_AT_A_TIME) * ERRORS_AT_A_TIME
     lengths = np.array([len(r) for r in records], np.int32)
     thresholds = np.full(n, threshold, np.float32)
     runs, lengths, thresholds, *_ = call(
         FILE, "shortened", n, np.int32(way), np.int32(limit), np.int32(capacity),
         np.float32(per_reference), np.float32(hidden_weight), call.out(runs), call.out(lengths),
-        call.out(thresholds), call.empty(blocks * LANES * capacity * 8),
-        call.empty(blocks * LANES * capacity),
+        call.out(thresholds), call.empty(n * capacity * 8), call.empty(n * padded),
     )  # fmt: skip
     return [r[:k] for r, k in zip(runs, lengths, strict=True)], thresholds
 
@@ -271,15 +271,12 @@ def test_the_error_is_finite_whatever_the_runs(call, hidden_weight):
 def test_records_do_not_share_words(call, items, capacity):
     rng = np.random.default_rng(51)
     runs = rng.random((items, capacity, 8)).astype(np.float32)
-    blocks = -(-items // LANES)
     records, back = call(
         FILE, "stored", items, runs, np.int32(capacity),
-        call.empty(blocks * capacity * 8 * LANES), call.empty(items, capacity, 8),
+        call.empty(items, capacity, 8), call.empty(items, capacity, 8),
     )  # fmt: skip
     np.testing.assert_array_equal(back, runs)
-    # Component by component, 16 rays side by side
-    layout = records.reshape(blocks, capacity, 8, LANES).transpose(0, 3, 1, 2)
-    np.testing.assert_array_equal(layout.reshape(-1, capacity, 8)[:items], runs)
+    np.testing.assert_array_equal(records, runs)  # one ray behind the other
 
 
 # -- shortening ------------------------------------------------------------------------------------
