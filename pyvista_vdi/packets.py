@@ -138,7 +138,7 @@ def share_lit(vdi: VDI, near: float, far: float) -> float:
     before = np.cumsum(optical_depth) - optical_depth
     before -= np.repeat(before[begins], counts)
     last = begins + np.add.reduceat(before < _DARK, begins) - 1  # that light gets to
-    left = (_DARK - before[last]) / np.maximum(optical_depth[last], np.finfo(np.float64).tiny)
+    left = (_DARK - before[last]) / np.maximum(optical_depth[last], np.finfo(np.float32).tiny)
     front, back = (face[places[last]].astype(np.float64) for face in (vdi.front, vdi.back))
     depth = front + np.minimum(left, 1.0) * (back - front) + vdi.depth_origin
     through = np.add.reduceat(optical_depth, begins) < _DARK
