@@ -87,6 +87,8 @@ def test_how_far_light_gets():
         BOUNDS,
     )
     assert packets.share_lit(dark, near, far) == pytest.approx(0.31, abs=1e-6)
+    clear = VDI(CAMERA, (1, 1), [0, 1], [faces[0]], [faces[1]], [[0.5] * 3], [0.0], BOUNDS)
+    assert packets.share_lit(clear, near, far) == 1
     none = VDI(CAMERA, (1, 1), [0, 0], [], [], [], [], BOUNDS)
     assert packets.share_lit(none, near, far) == 1
 
