@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import rays
-from .blocks import GROUP, Rectangle, block_items, part_columns
+from .blocks import COLUMN_ITEMS, GROUP, Rectangle, block_items, part_columns
 from .camera import Camera, check_window_size
 from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
@@ -445,7 +445,8 @@ class PreparedVDI:
             return _Launch(kernel, packets.items, LANES, (packets.epipole, packets.part))
         columns = part_columns(part)
         kernel = self._runtime.kernel("vdi/raycast.cl", "raycast", defines)
-        return _Launch(kernel, GROUP * int(columns[2]) * int(columns[3]), GROUP, (columns, *hit))
+        items = COLUMN_ITEMS * int(columns[2]) * int(columns[3])
+        return _Launch(kernel, items, COLUMN_ITEMS, (columns, *hit))
 
     def _packets(
         self,

@@ -66,10 +66,13 @@ inline float reciprocal_depth(float z, Depths depths)
 #elif defined(SHIFTED)
 #define depth_coordinate(offset, depths) ((offset) / ((offset) + (depths)))
 #define depth_offset(z, depths) ((z) * (depths) / (1.0f - (z)))
-#define reciprocal_depth(z, depths) ((1.0f - (z)) / (depths))
 #else
 #define depth_coordinate(offset, depths) (-1.0f / ((offset) + (depths)))
 #define depth_offset(z, depths) (-1.0f / (z) - (depths))
+#endif
+#ifdef SHIFTED
+#define reciprocal_depth(z, depths) ((1.0f - (z)) / (depths))
+#else
 #define reciprocal_depth(z, depths) (-(z))
 #endif
 #endif
