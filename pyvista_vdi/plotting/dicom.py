@@ -33,6 +33,7 @@ _WANTED = {
     (0x0020, 0x0032): "position",
     (0x0020, 0x0037): "orientation",
     (0x0028, 0x0010): "rows",
+    (0x0028, 0x0030): "spacing",
 }
 
 #: Transfer syntaxes whose pixels VTK reads; the first has no value representations.
@@ -67,6 +68,8 @@ class Slice:
         Directions in which columns and rows are counted, float64 (2, 3).
     thickness : float or None
         Of what the slice shows, millimetres.
+    spacing : numpy.ndarray or None
+        Between the centres of rows and of columns, in this order, float64 (2,), millimetres.
     """
 
     path: Path
@@ -76,6 +79,7 @@ class Slice:
     position: NDArray[np.float64] | None
     orientation: NDArray[np.float64] | None
     thickness: float | None
+    spacing: NDArray[np.float64] | None
 
 
 def slices_of(folder: Path) -> list[Slice]:
@@ -136,6 +140,7 @@ def read_slice(path: Path) -> Slice | None:
             _numbers(found, "position", (3,)),
             _numbers(found, "orientation", (2, 3)),
             None if thickness is None else float(thickness),
+            _numbers(found, "spacing", (2,)),
         )
     except (KeyError, ValueError, IndexError, struct.error, RecursionError):
         return None

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from vtkmodules.vtkIOImage import vtkDICOMImageReader, vtkMetaImageReader, vtkNIFTIImageReader
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIWarning
-from pyvista_vdi.plotting.dicom import read_slice, require_uncompressed, slices_of
+from pyvista_vdi.plotting.dicom import Slice, read_slice, require_uncompressed, slices_of
 from pyvista_vdi.vtk_pipeline.convert import is_vdi_image
 
 #: Names of files that hold VDIs, not volumes.
@@ -229,6 +229,14 @@ def _dicom_file(file: Path) -> pv.ImageData:
             f"{file} holds one slice of {data.dimensions[0]} x {data.dimensions[1]} pixels: give "
             "the folder that holds all slices of its series"
         )
+    return data if one is None else _with_spacing(data, one)
+
+
+def _with_spacing(data: pv.ImageData, one: Slice) -> pv.ImageData:
+    """Give a grid its slices' spacing: releases of VTK differ in which number comes first."""
+    if one.spacing is not None and (one.spacing > 0).all():
+        between_rows, between_columns = one.spacing
+        data.spacing = (between_columns, between_rows, data.spacing[2])
     return data
 
 
@@ -241,7 +249,7 @@ def _dicom_series(folder: Path) -> pv.ImageData:
     slices = slices_of(folder)
     reader = vtkDICOMImageReader()
     reader.SetDirectoryName(str(folder))
-    data = _read_whole(reader, folder)
+    data = _with_spacing(_read_whole(reader, folder), slices[0])
     if data.dimensions[2] != len(slices):
         raise InvalidVolumeError(
             f"of the {len(slices)} slices in the folder {folder} VTK's reader takes "
