@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import os
 import re
+import sys
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -268,7 +269,9 @@ def opencl() -> ModuleType:
         If pyopencl or the OpenCL loader that it needs cannot be imported.
     """
     find_candidates()
-    return _import_pyopencl()
+    # Once it is there without the import system, whose locks a finalizer that frees device memory
+    # must not ask for in the middle of an import (Python 3.10 raises KeyError)
+    return sys.modules.get("pyopencl") or _import_pyopencl()
 
 
 def _import_pyopencl() -> ModuleType:
@@ -298,6 +301,8 @@ def find_candidates() -> tuple[list[Candidate], list[str]]:
     """
     global _found
     require_drivers()
+    if _found is not None:
+        return _found  # likewise without a lock
     with _lock:
         if _found is None:
             with drivers_visible() as discovery:

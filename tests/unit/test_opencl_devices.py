@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -278,3 +279,17 @@ def test_search_path_is_left_alone(vendors, monkeypatch, case, note):
         assert dict(os.environ) == before
     assert discovery.added is None
     assert note in discovery.note
+
+
+def test_once_listed_devices_come_without_a_lock():
+    """A finalizer that frees device memory may come here wherever its thread holds one."""
+    devices.find_candidates()
+    found = []
+    with devices._lock:
+        asks = threading.Thread(
+            target=lambda: found.extend([devices.opencl().__name__, *devices.find_candidates()]),
+            daemon=True,
+        )
+        asks.start()
+        asks.join(10)
+    assert found[:1] == ["pyopencl"]
