@@ -117,8 +117,8 @@ inline int2 strip_pixel(uint item, int width, int height)
     return (int2)((int)(column << 2 | (item & 3)), (int)(row << 2 | (item >> 2 & 3)));
 }
 
-// The same for part of a window: whole columns of strips, a work-group each. `part` is its first column and strip, in columns and
-// strips of the window, how many columns it has in each strip, and how many strips.
+// The same for part of a window: whole columns of strips, a work-group each. `part` is its first column and strip, in
+// columns and strips of the window, how many columns it has in each strip, and how many strips.
 #define COLUMN_ITEMS (16 * STRIP) // that of pyvista_vdi/blocks.py, and of every group that draws
 inline int2 part_pixel(int group, int item, int4 part)
 {
