@@ -69,8 +69,9 @@ def test_example_writes_a_picture(name, tmp_path):
 def test_dial_example_writes_a_picture_of_three_qualities(tmp_path):
     said, target = run_example("dial.py", tmp_path)
     assert "predicted SSIM 0.9" in said
-    image = imread(target)[100:, :, :3].astype(int)  # below the texts
-    assert image.shape == (260, 900, 3)
+    # Below the texts, which differ from run to run: eight lines, down to row 107
+    image = imread(target)[120:, :, :3].astype(int)
+    assert image.shape == (240, 900, 3)
     parts = np.split(image, 3, axis=1)
     assert all(np.ptp(part.reshape(-1, 3), axis=0).max() > 100 for part in parts)
     # The best is more like the second than like the cheapest
