@@ -1,7 +1,8 @@
 """When rays are followed in packets, and how those lie in the window (docs/performance.md).
 
 Rays of one plane through the eyes of V_O and V_N cross the same lists, if not at the same depth. On
-a CPU a packet of such rays loads each list once. That pays where rays cross many lists.
+a CPU a packet of such rays loads each list once. That pays where rays cross many lists. At V_O each
+ray goes through a list of its own, and a packet's lists lie side by side.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from .vdi import VDI
 
 #: Rays of a packet, side by side: that of ``common/packet.cl``.
 LANES = 16
+#: Pixels of a packet that is drawn from the pixels' own lists, four tiles of lists side by side:
+#: those of ``vdi/raycast_own_lists.cl``.
+OWN_LISTS_WIDE, OWN_LISTS_HIGH = 8, 2
 #: Packets of a strip that begin before the window, or behind it: the steepest line that a packet
 #: follows (``STEEPEST`` of ``common/packet.cl``, 1.5) rises by less over its length.
 MARGIN = 24
@@ -108,6 +112,15 @@ def packets_of(
         np.array([first, strips, across[0] - MARGIN, 0], np.int32),
         strips * numbers,
     )
+
+
+def own_list_items(size: tuple[int, int]) -> int:
+    """Return the work-items, in whole groups, that draw each pixel from the list of its own.
+
+    ``size`` is the width and height of the window, of V_N and V_O alike; an item is a packet.
+    """
+    packets = -(-size[0] // OWN_LISTS_WIDE) * -(-size[1] // OWN_LISTS_HIGH)
+    return -(-packets // LANES) * LANES
 
 
 def epipole_of(generating: Camera, view: Camera, size: tuple[int, int]) -> NDArray[np.float64]:

@@ -25,6 +25,7 @@ from .packets import (
     PLANE_FORMS,
     Packets,
     epipole_of,
+    own_list_items,
     packets_of,
     share_lit,
 )
@@ -47,8 +48,8 @@ _FIRST_BITS = 36
 #: Pairs of words before the supersegments of an 8-byte list: that of ``common/supersegments.cl``.
 _LIST_HEADER = 2
 
-#: ``-D`` names of what is drawn ray by ray everywhere; V_O's rays have nothing in common.
-_NOT_IN_PACKETS = {"CROPPED", "FAR_ENTRIES", "FIRST_HIT", "ONE_LIST"}
+#: ``-D`` names of what is drawn ray by ray everywhere.
+_RAY_BY_RAY = {"CROPPED", "FAR_ENTRIES", "FIRST_HIT"}
 #: Share of a window above which rays are cast through all of it: clearing it first costs as much.
 _MOST_DRAWN = 0.9
 #: Work-items per group that clear an image.
@@ -424,9 +425,6 @@ class PreparedVDI:
         skip_empty: bool,
     ) -> _Launch:
         """Return how a frame is raycast; where no ray is cast for a pixel, ``image`` is cleared."""
-        part = self._part_to_draw(camera, view.size, skip_empty)
-        if part.pixels < view.size[0] * view.size[1]:
-            self._clear(image, first_hit is not None)
         defines = {**self.defines, **view.defines}
         hit: tuple[Any, ...] = ()
         if first_hit is None:
@@ -434,9 +432,16 @@ class PreparedVDI:
         else:
             defines["FIRST_HIT"] = 1
             hit = (np.float32(first_hit.optical_depth), np.int32(first_hit.accumulated))
+        at_generating_view = np.array_equal(self._list_space(camera), self._list_rows)
+        if at_generating_view and self._draws_own_lists(view, defines):
+            kernel = self._runtime.kernel("vdi/raycast_own_lists.cl", "raycast_own_lists", defines)
+            return _Launch(kernel, own_list_items(view.size), LANES, ())
+        part = self._part_to_draw(camera, view.size, skip_empty)
+        if part.pixels < view.size[0] * view.size[1]:
+            self._clear(image, first_hit is not None)
         if skip_empty and self.occupancy.worthwhile:
             defines["SKIP_EMPTY"] = 1
-        if np.array_equal(self._list_space(camera), self._list_rows):
+        if at_generating_view:
             defines["ONE_LIST"] = 1
         packets = self._packets(camera, view, part, defines)
         if packets is not None:
@@ -448,6 +453,22 @@ class PreparedVDI:
         items = COLUMN_ITEMS * int(columns[2]) * int(columns[3])
         return _Launch(kernel, items, COLUMN_ITEMS, (columns, *hit))
 
+    def _draws_in_vectors(self, defines: dict[str, str | int | None]) -> bool:
+        """Return whether rays may be followed by the kernels that are written in vectors."""
+        return (
+            self._runtime.is_cpu
+            and not _RAY_BY_RAY & defines.keys()
+            and defines.get("COMPENSATED") != 2
+        )
+
+    def _draws_own_lists(self, view: ListView, defines: dict[str, str | int | None]) -> bool:
+        """Return whether each pixel is drawn from its own list alone, for a frame at V_O."""
+        return (
+            view.size == self._window
+            and self._packed != 8  # whose lists do not lie in tiles
+            and self._draws_in_vectors(defines)
+        )
+
     def _packets(
         self,
         camera: Camera,
@@ -456,9 +477,7 @@ class PreparedVDI:
         defines: dict[str, str | int | None],
     ) -> Packets | None:
         """Return how a frame's rays are dealt to packets; None if the kernel is to follow each."""
-        if not self._runtime.is_cpu or _NOT_IN_PACKETS & defines.keys():
-            return None
-        if defines.get("COMPENSATED") == 2:
+        if "ONE_LIST" in defines or not self._draws_in_vectors(defines):
             return None
         forms = view.forms.astype(np.float64)
         planes = forms[PLANE_FORMS : PLANE_FORMS + view.planes]

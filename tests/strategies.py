@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from pyvista_vdi import packets
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.generation import CRITERIA
+from pyvista_vdi.raycast import PreparedVDI
 from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.volume import VOXEL_TYPES, Volume
@@ -174,19 +175,31 @@ DEALT = ("one by one", "packets")
 
 
 def deal_rays(patch, dealt):
-    """Have rays followed one by one, or in packets wherever they can be; ``patch`` undoes it."""
+    """Have rays followed one by one, or in packets wherever they can be; ``patch`` undoes it.
+
+    At V_O, in a picture of the VDI's own size, packets are those of its lists.
+    """
     least = {"one by one": math.inf, "packets": 0.0}[dealt]
     patch.setattr(packets, "LEAST_IN_COMMON", least)
     patch.setattr(packets, "LEAST_PIXELS", least)
+    if dealt == "one by one":
+        patch.setattr(PreparedVDI, "_draws_own_lists", lambda *_: False)
 
 
 # -- VDIs ------------------------------------------------------------------------------------------
 
 
 def random_vdi(
-    rng, *, max_window=(24, 18), max_supersegments=12, camera=None, bounds=None, thinnest=2e-3
+    rng,
+    *,
+    window=None,
+    max_window=(24, 18),
+    max_supersegments=12,
+    camera=None,
+    bounds=None,
+    thinnest=2e-3,
 ):
-    """A valid VDI of random media.
+    """A valid VDI of random media; by default also its window is random.
 
     Lists of 0 to ``max_supersegments``, some touching, some apart, some reaching beyond the
     bounds; optical depths log-uniform from 1e-4 to 1e2. No supersegment is thinner than
@@ -194,7 +207,7 @@ def random_vdi(
     """
     bounds = random_bounds(rng) if bounds is None else bounds
     camera = random_camera(rng, bounds) if camera is None else camera
-    width, height = (int(rng.integers(1, edge + 1)) for edge in max_window)
+    width, height = window or (int(rng.integers(1, edge + 1)) for edge in max_window)
     near, far = view_depths(camera, bounds)
     outside = near > 0 or camera.parallel_projection
     depth_origin = near if outside and rng.random() < 0.8 else 0.0

@@ -84,26 +84,44 @@ inline void list_points(__global const float *forms, Reals a, Reals b, Reals t, 
 #endif
 }
 
-// As begin_list_ray, for pixel offsets (a, b) of lanes that are `wanted`.
-inline Packet begin_packet(__global const float *forms, int planes, Reals a, Reals b, Reals t_end, Ints wanted,
-                           float depth_origin)
+// Depth coordinates at t, as those of list_points.
+inline Reals list_depths(__global const float *forms, Reals a, Reals b, Reals t)
 {
-    Packet packet;
-    Reals t0 = -INFINITY;
-    Reals t1 = t_end;
+#ifdef PARALLEL
+    return values_of_form(forms + DEPTH_FORM * FORM_SIZE, a, b, t);
+#else
+    return values_of_form(forms + DEPTH_FORM * FORM_SIZE, a, b, t) / values_of_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
+#endif
+}
+
+// As clip_to_planes, for pixel offsets (a, b) of lanes that are `wanted`: those that have something left, from *t0 to *t1.
+inline Ints clip_packet(__global const float *forms, int planes, Reals a, Reals b, Reals t_end, Ints wanted, Reals *t0, Reals *t1)
+{
+    Reals begin = -INFINITY;
+    Reals end = t_end;
     for (int k = 0; k < planes; ++k) {
         __global const float *plane = forms + (PLANE_FORMS + k) * FORM_SIZE;
         const Reals value = FORM_VALUE(Reals, plane, a, b);
         const Reals slope = FORM_SLOPE(Reals, plane, a, b);
         const Reals t = -value / slope;
-        t0 = select(t0, fmax(t0, t), slope > 0.0f);
-        t1 = select(t1, fmin(t1, t), slope < 0.0f);
-        t1 = select(t1, (Reals)(-INFINITY), slope == 0.0f && value < 0.0f);
+        begin = select(begin, fmax(begin, t), slope > 0.0f);
+        end = select(end, fmin(end, t), slope < 0.0f);
+        end = select(end, (Reals)(-INFINITY), slope == 0.0f && value < 0.0f);
     }
-    packet.present = wanted && t0 < t1;
+    const Ints present = wanted && begin < end;
     // Where nothing is to be drawn, anything finite
-    t0 = select((Reals)(0.0f), t0, packet.present);
-    t1 = select((Reals)(1.0f), t1, packet.present);
+    *t0 = select((Reals)(0.0f), begin, present);
+    *t1 = select((Reals)(1.0f), end, present);
+    return present;
+}
+
+// As begin_list_ray, for pixel offsets (a, b) of lanes that are `wanted`.
+inline Packet begin_packet(__global const float *forms, int planes, Reals a, Reals b, Reals t_end, Ints wanted,
+                           float depth_origin)
+{
+    Packet packet;
+    Reals t0, t1;
+    packet.present = clip_packet(forms, planes, a, b, t_end, wanted, &t0, &t1);
 
     Reals end_u, end_v, end_z;
     list_points(forms, a, b, t0, &packet.start_u, &packet.start_v, &packet.start_z);

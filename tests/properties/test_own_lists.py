@@ -1,0 +1,228 @@
+"""V_O in a picture of the VDI's own size: each pixel from its own list (vdi/raycast_own_lists.cl).
+
+Against the float64 oracle, as in ``test_raycast_oracle.py``, and against rays that are followed one
+by one. All ways to look at a VDI from V_O: what else ends a ray, the forms of the supersegments,
+windows whose edges cut packets and tiles, lists of none and of thousands.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import strategies
+from oracle import explain
+
+from pyvista_vdi.camera import Camera
+from pyvista_vdi.opencl_runtime import Runtime
+from pyvista_vdi.picking import FirstHit
+from pyvista_vdi.raycast import PreparedVDI, render_vdi
+from pyvista_vdi.vdi import VDI
+
+#: Most that a channel of these random VDIs may differ from rays that are followed one by one, whose
+#: lengths have more roundings. Measured: 2e-6.
+TOLERANCE = 1e-5
+
+#: Windows of VDIs: a list, a tile, a packet of 8 x 2, and one more or less along each edge.
+WINDOWS = [(1, 1), (2, 2), (8, 2), (7, 3), (9, 1), (16, 5), (17, 4), (1, 40), (130, 3)]
+
+#: A slab, and a parallel view that sees nothing beside it in a window of up to 10 by 1.
+SLAB = (-10.0, 10.0, -2.0, 2.0, -1.0, 1.0)
+FACING = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), parallel_projection=True, parallel_scale=1.0)
+
+
+def kernels_used(runtime, monkeypatch):
+    """Names of the kernels that are asked for from now on."""
+    names = []
+    original = Runtime.kernel
+
+    def kernel(self, path, name, defines=None):
+        names.append(name)
+        return original(self, path, name, defines)
+
+    monkeypatch.setattr(Runtime, "kernel", kernel)
+    return names
+
+
+def both_ways(runtime, vdi, monkeypatch, **options):
+    """The picture from V_O: from own lists, and with rays one by one."""
+    image = render_vdi(vdi, vdi.camera, device=runtime, **options)
+    with monkeypatch.context() as patch:
+        strategies.deal_rays(patch, "one by one")
+        return image, render_vdi(vdi, vdi.camera, device=runtime, **options)
+
+
+def random_ends(rng, vdi, planes):
+    """Opaque depths, some infinite and some before everything, and clipping planes."""
+    near, far = strategies.view_depths(vdi.camera, vdi.bounds)
+    depth = rng.uniform(near - 0.1 * (far - near), far, size=vdi.window_size[::-1])
+    depth[rng.random(depth.shape) < 0.3] = np.inf
+    corners = strategies.world_corners(vdi.bounds, vdi.camera.model_transform)
+    points = rng.uniform(corners.min(axis=0), corners.max(axis=0), size=(2, 3))
+    return {
+        "opaque_depth": depth.astype(np.float32),
+        "clipping_planes": np.hstack([points, rng.normal(size=(2, 3))])[:planes],
+    }
+
+
+def test_which_frames_are_drawn_from_own_lists(runtime, monkeypatch):
+    vdi = strategies.random_vdi(np.random.default_rng(0), window=(20, 10))
+    wide, high = vdi.window_size
+    names = kernels_used(runtime, monkeypatch)
+
+    def drawn_by(camera=vdi.camera, size=vdi.window_size, precision="exact", **options):
+        prepared = PreparedVDI(runtime, vdi.with_precision(precision))
+        names.clear()
+        with runtime.buffer((size[1], size[0], 4), name="image") as image:
+            prepared.render(camera, size, image, **options)
+        return names[-1]
+
+    own = "raycast_own_lists" if runtime.is_cpu else "raycast"
+    assert drawn_by() == own
+    assert drawn_by(precision="16-byte") == own
+    assert drawn_by(skip_empty=False) == own
+    assert drawn_by(opaque_depth=np.full((high, wide), np.inf)) == own
+    assert drawn_by(camera=vdi.camera.replace(model_transform=vdi.camera.model_transform)) == own
+    assert drawn_by(precision="8-byte") == "raycast"
+    assert drawn_by(size=(2 * wide, 2 * high)) == "raycast"
+    assert drawn_by(camera=vdi.camera.azimuth(1e-3)) == "raycast"
+    assert drawn_by(first_hit=FirstHit.of(0.5, True)) == "raycast"
+
+
+@pytest.mark.parametrize("precision", ["exact", "16-byte"])
+@pytest.mark.parametrize("window", WINDOWS, ids=lambda window: f"{window[0]}x{window[1]}")
+def test_every_pixel_is_its_own_list(runtime, window, precision, monkeypatch):
+    """By the oracle and by rays one by one; with what ends rays early, and without."""
+    for case in range(4):
+        rng = np.random.default_rng([case, *window])
+        vdi = strategies.random_vdi(rng, window=window, max_supersegments=6).with_precision(
+            precision
+        )
+        ends = random_ends(rng, vdi, planes=case - 1) if case else {}
+        image, one_by_one = both_ways(runtime, vdi, monkeypatch, **ends)
+        result = explain(vdi, vdi.camera, window, image, name=f"seed {[case, *window]}", **ends)
+        assert not result.failures, "\n".join(result.failures)
+        np.testing.assert_allclose(image, one_by_one, rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("kind", ["outside", "far", "parallel", "inside"])
+def test_every_projection(runtime, kind, monkeypatch):
+    """Also a long lens, whose depth is kept relative, and an eye between the supersegments."""
+    drawn = 0
+    how = set()
+    for case in range(4):
+        rng = np.random.default_rng([case, 500])
+        bounds = strategies.random_bounds(rng)
+        transform = strategies.random_transform(rng)
+        if kind == "inside":
+            camera = strategies.camera_inside(rng, bounds, transform)
+        else:
+            camera = strategies.camera_around(
+                rng,
+                bounds,
+                transform,
+                distance={"outside": 2.0, "far": 200.0, "parallel": 2.0}[kind],
+                parallel=kind == "parallel",
+            )
+        vdi = strategies.random_vdi(rng, window=(19, 7), camera=camera, bounds=bounds)
+        ends = random_ends(rng, vdi, planes=1) if case % 2 else {}
+        image, one_by_one = both_ways(runtime, vdi, monkeypatch, **ends)
+        result = explain(vdi, camera, (19, 7), image, name=f"seed {[case, 500]}", **ends)
+        assert not result.failures, "\n".join(result.failures)
+        np.testing.assert_allclose(image, one_by_one, rtol=0, atol=TOLERANCE)
+        drawn += result.drawn
+        how |= PreparedVDI(runtime, vdi).defines.keys()
+    assert drawn
+    assert how >= {"far": {"SHIFTED"}, "parallel": {"PARALLEL"}}.get(kind, set())
+
+
+def test_a_box_and_a_multiplier(runtime, monkeypatch):
+    rng = np.random.default_rng(7)
+    vdi = strategies.random_vdi(rng, window=(21, 9))
+    low, high = np.reshape(vdi.bounds, (3, 2)).T
+    box = np.column_stack([0.8 * low + 0.2 * high, 0.3 * low + 0.7 * high]).ravel()
+    plain, _ = both_ways(runtime, vdi, monkeypatch)
+    image, one_by_one = both_ways(runtime, vdi, monkeypatch, cropping=box, opacity_multiplier=0.25)
+    assert image.any()
+    assert np.abs(image - plain).max() > 0.1
+    np.testing.assert_allclose(image, one_by_one, rtol=0, atol=TOLERANCE)
+
+
+def test_rays_end_where_little_light_is_left(runtime, monkeypatch):
+    rng = np.random.default_rng(8)
+    vdi = strategies.random_vdi(rng, window=(21, 9))
+    exact, _ = both_ways(runtime, vdi, monkeypatch)
+    image, one_by_one = both_ways(runtime, vdi, monkeypatch, transmittance_cutoff=0.3)
+    ends = np.abs(image - exact).max(axis=-1) > 0.01
+    assert ends.any()
+    assert np.abs(image - exact).max() <= 0.3
+    np.testing.assert_allclose(image, one_by_one, rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("compensated", [False, True])
+def test_lists_of_none_and_of_thousands(runtime, compensated, monkeypatch):
+    """Thin media of one optical depth: 1 - exp(-count tau) whatever the list's length."""
+    most = 3000 if compensated else 900  # beyond 1024, sums are made otherwise
+    counts = np.array([[0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 5], [0, 1, most, 0, 7, 0, 0, 0, 0, 0, 300]])
+    faces = np.concatenate([np.linspace(4.5, 5.5, n + 1) for n in counts.ravel()])
+    back = np.delete(faces, np.cumsum(counts.ravel() + 1) - counts.ravel() - 1)
+    front = np.delete(faces, np.cumsum(counts.ravel() + 1) - 1)
+    n = counts.sum()
+    vdi = VDI(
+        FACING,
+        counts.shape[::-1],
+        np.concatenate([[0], np.cumsum(counts)]),
+        front,
+        back,
+        np.full((n, 3), 0.5),
+        np.full(n, 1e-3),
+        SLAB,
+    )
+    image, one_by_one = both_ways(runtime, vdi, monkeypatch)
+    alpha = -np.expm1(-1e-3 * counts[::-1])
+    # An extinction times a length has the roundings of its faces: 1e-3 of a list 3000 thin
+    np.testing.assert_allclose(image[..., 3], alpha, rtol=0, atol=2e-5)
+    np.testing.assert_allclose(image[..., 0], 0.5 * alpha, rtol=0, atol=2e-5)
+    np.testing.assert_allclose(image, one_by_one, rtol=0, atol=5e-5)
+
+
+@pytest.mark.parametrize("precision", ["exact", "16-byte"])
+def test_what_is_beside_the_lists_is_not_drawn(runtime, precision, monkeypatch):
+    """A tile at the window's edge has room for lists beside it, which nothing is written to."""
+    original = Runtime.buffer
+
+    def poisoned(self, *args, **options):
+        buffer = original(self, *args, **options)
+        self.fill(buffer, np.uint32(0x7FC00000))  # NaN
+        return buffer
+
+    monkeypatch.setattr(Runtime, "buffer", poisoned)
+    # Tiles of no entries, and of fewer than the one at the edge
+    counts = np.array([[0, 0, 1, 0, 0, 0, 4], [0, 0, 0, 1, 0, 0, 0], [2, 0, 0, 0, 0, 0, 3]])
+    depth = np.concatenate([np.linspace(4.5, 5.5, 2 * n) for n in counts.ravel()])
+    n = counts.sum()
+    vdi = VDI(
+        FACING,
+        counts.shape[::-1],
+        np.concatenate([[0], np.cumsum(counts)]),
+        depth[::2],
+        depth[1::2],
+        np.full((n, 3), 0.5),
+        np.full(n, 0.7),
+        SLAB,
+    ).with_precision(precision)
+    image = render_vdi(vdi, FACING, device=runtime)
+    np.testing.assert_allclose(image[..., 3], -np.expm1(-0.7 * counts[::-1]), rtol=0, atol=1e-3)
+
+
+def test_offsets_of_64_bits(runtime):
+    """As a VDI of more than 2^30 supersegments has them."""
+    vdi = strategies.random_vdi(np.random.default_rng(3), window=(21, 9))
+    prepared = PreparedVDI(runtime, vdi)
+    images = []
+    for long_offsets in (False, True):
+        prepared._long_offsets = long_offsets
+        with runtime.buffer((9, 21, 4), name="image") as image:
+            prepared.render(vdi.camera, vdi.window_size, image)
+            images.append(runtime.download(image).copy())
+    assert images[0].any()
+    np.testing.assert_array_equal(*images)
