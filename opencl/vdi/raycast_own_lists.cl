@@ -3,8 +3,8 @@
 //
 // A work-item draws a packet (common/packet.cl) of LANES pixels: those of PACKET_TILES tiles of lists side by side. What
 // these hold lies in one piece of memory (common/supersegments.cl), and one packet's behind the other's; so it is loaded in
-// whole vectors, and nothing is gathered, searched for or fetched ahead. Only depth matters: a supersegment is clipped to the
-// ray in the depth coordinate, and a length is a difference of it over the reciprocal depths at both ends.
+// whole vectors, and nothing is gathered or searched for. Only depth matters: a supersegment is clipped to the ray in the
+// depth coordinate, and a length is a difference of it over the reciprocal depths at both ends.
 //
 // -D OFFSET_T, PARALLEL, SHIFTED, PACKED (16), COMPENSATED (1)    as in vdi/raycast.cl
 #include "common/opacity.cl"
@@ -136,6 +136,28 @@ inline Tiles tiles_at(__global const ulong *headers, int x, int y, int lists_wid
     return tiles;
 }
 
+// Bring lines of the cache close.
+inline void fetch_lines(__global const ulong *words, OFFSET_T first, OFFSET_T end)
+{
+    for (OFFSET_T k = first; k < end; k += WORDS_PER_LINE)
+        prefetch(words + k, 1);
+}
+
+// The first `depth` supersegments of all lists.
+inline void fetch(SUPERSEGMENTS_PARAMETERS const Tiles *tiles, int depth)
+{
+    for (int n = 0; n < PACKET_TILES; ++n) {
+        const OFFSET_T first = tiles->first[n];
+        const OFFSET_T end = first + min(depth, tiles->count[n]) * LISTS_PER_TILE;
+#ifdef PACKED
+        fetch_lines(supersegments, 2 * first, 2 * end);
+#else
+        fetch_lines(faces, first, end);
+        fetch_lines(media, 2 * first, 2 * end);
+#endif
+    }
+}
+
 // How many each lane's tile has.
 inline Ints counts_of(const Tiles *tiles)
 {
@@ -199,7 +221,8 @@ __kernel void raycast_own_lists(
 #ifdef COMPENSATED
         Reals opacity = 0.0f; // see common/over.cl
 #endif
-        for (int k = 0; k < tiles.longest; ++k) {
+        int k = 0;
+        for (; k < tiles.longest; ++k) {
             OFFSET_T entries[PACKET_TILES];
             for (int n = 0; n < PACKET_TILES; ++n)
                 entries[n] = tiles.first[n] + (k < tiles.count[n] ? k * LISTS_PER_TILE : 0);
@@ -235,6 +258,9 @@ __kernel void raycast_own_lists(
 #else
         alpha = 1.0f - transmittance;
 #endif
+        // The next packet, which comes to about the same depth: all at once, as loads in the loop are not
+        const Tiles next = tiles_at(headers, x + PACKET_WIDE, y, lists_wide);
+        fetch(SUPERSEGMENTS_ARGUMENTS &next, k + 1);
         // Lanes of a tile without entries have looked at another one's; beside the window there may be anything
         red = select((Reals)(0.0f), red, counts > 0);
         green = select((Reals)(0.0f), green, counts > 0);
