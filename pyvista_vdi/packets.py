@@ -19,9 +19,9 @@ from .vdi import VDI
 
 #: Rays of a packet, side by side: that of ``common/packet.cl``.
 LANES = 16
-#: Pixels of a packet that is drawn from the pixels' own lists, four tiles of lists side by side:
-#: those of ``vdi/raycast_own_lists.cl``.
-OWN_LISTS_WIDE, OWN_LISTS_HIGH = 8, 2
+#: Width and height, in pixels, of a packet that is drawn from the pixels' own lists, if these lie
+#: in tiles and if they do not: those of ``vdi/raycast_own_lists.cl``.
+OWN_LISTS = {True: (8, 2), False: (16, 1)}
 #: Packets of a strip that begin before the window, or behind it: the steepest line that a packet
 #: follows (``STEEPEST`` of ``common/packet.cl``, 1.5) rises by less over its length.
 MARGIN = 24
@@ -114,12 +114,14 @@ def packets_of(
     )
 
 
-def own_list_items(size: tuple[int, int]) -> int:
+def own_list_items(size: tuple[int, int], in_tiles: bool) -> int:
     """Return the work-items, in whole groups, that draw each pixel from the list of its own.
 
-    ``size`` is the width and height of the window, of V_N and V_O alike; an item is a packet.
+    Each draws a packet. ``size`` is the width and height of the window, of V_N and V_O alike;
+    ``in_tiles`` says whether its lists lie in tiles.
     """
-    packets = -(-size[0] // OWN_LISTS_WIDE) * -(-size[1] // OWN_LISTS_HIGH)
+    wide, high = OWN_LISTS[in_tiles]
+    packets = -(-size[0] // wide) * -(-size[1] // high)
     return -(-packets // LANES) * LANES
 
 

@@ -435,7 +435,7 @@ class PreparedVDI:
         at_generating_view = np.array_equal(self._list_space(camera), self._list_rows)
         if at_generating_view and self._draws_own_lists(view, defines):
             kernel = self._runtime.kernel("vdi/raycast_own_lists.cl", "raycast_own_lists", defines)
-            return _Launch(kernel, own_list_items(view.size), LANES, ())
+            return _Launch(kernel, own_list_items(view.size, self._packed != 8), LANES, ())
         part = self._part_to_draw(camera, view.size, skip_empty)
         if part.pixels < view.size[0] * view.size[1]:
             self._clear(image, first_hit is not None)
@@ -463,11 +463,7 @@ class PreparedVDI:
 
     def _draws_own_lists(self, view: ListView, defines: dict[str, str | int | None]) -> bool:
         """Return whether each pixel is drawn from its own list alone, for a frame at V_O."""
-        return (
-            view.size == self._window
-            and self._packed != 8  # whose lists do not lie in tiles
-            and self._draws_in_vectors(defines)
-        )
+        return view.size == self._window and self._draws_in_vectors(defines)
 
     def _packets(
         self,

@@ -3,10 +3,11 @@
 //
 // A work-item draws a packet (common/packet.cl) of LANES pixels: those of PACKET_TILES tiles of lists side by side. What
 // these hold lies in one piece of memory (common/supersegments.cl), and one packet's behind the other's; so it is loaded in
-// whole vectors, and nothing is gathered or searched for. Only depth matters: a supersegment is clipped to the ray in the
-// depth coordinate, and a length is a difference of it over the reciprocal depths at both ends.
+// whole vectors, and nothing is gathered or searched for. (Lists of 8-byte supersegments do not lie in tiles: here, four side
+// by side are called one, and their words are loaded one by one.) Only depth matters: a supersegment is clipped to the ray
+// in the depth coordinate, and a length is a difference of it over the reciprocal depths at both ends.
 //
-// -D OFFSET_T, PARALLEL, SHIFTED, PACKED (16), COMPENSATED (1)    as in vdi/raycast.cl
+// -D OFFSET_T, PARALLEL, SHIFTED, PACKED, COMPENSATED (1)    as in vdi/raycast.cl
 #include "common/opacity.cl"
 #include "common/packet.cl"
 #include "common/supersegments.cl"
@@ -14,11 +15,24 @@
 
 DEFINE_OPACITY_OF(opacities_of, 16)
 
-#define PACKET_TILES (LANES / LISTS_PER_TILE)
-#define PACKET_WIDE (PACKET_TILES * LIST_TILE) // pixels; LIST_TILE high. That of pyvista_vdi/packets.py.
 // Lane p * PACKET_TILES + n has place p in the n-th tile: vectors of tiles become vectors of lanes within each 128 bits
+#define PACKET_TILES 4
+#if defined(PACKED) && PACKED == 8
+#define TILE_WIDE 4
+#define TILE_HIGH 1
+#define LANE_X (Ints)(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15)
+#define LANE_Y (Ints)(0)
+#else
+#define TILE_WIDE LIST_TILE
+#define TILE_HIGH LIST_TILE
 #define LANE_X (Ints)(0, 2, 4, 6, 1, 3, 5, 7, 0, 2, 4, 6, 1, 3, 5, 7)
 #define LANE_Y (Ints)(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1)
+#endif
+#define LISTS_OF_TILE (TILE_WIDE * TILE_HIGH)
+#define PACKET_WIDE (PACKET_TILES * TILE_WIDE) // pixels; TILE_HIGH high. Those of pyvista_vdi/packets.py.
+// The same of one lane, from the packet's first pixel
+#define X_OF(lane) ((lane) % PACKET_TILES * TILE_WIDE + (lane) / PACKET_TILES % TILE_WIDE)
+#define Y_OF(lane) ((lane) / PACKET_TILES / TILE_WIDE)
 
 // Reciprocal depth at a depth coordinate; times the depth origin if SHIFTED
 #ifdef SHIFTED
@@ -51,90 +65,16 @@ inline Quads transposed(Quads x)
     return result;
 }
 
-// Supersegments of all lanes. `entries` are those of the tiles' first lists.
 typedef struct {
     Reals front, back; // depth coordinates
 #ifdef PACKED
-    Reals extinction, color; // as loaded with them
+    uint16 words[2]; // as loaded with them: 16 bytes: extinction, colour; 8 bytes: all
 #endif
 } Faces;
 
 typedef struct {
     Reals red, green, blue, extinction;
 } Media;
-
-// `words` of 8 bytes, two of which an entry takes.
-inline Quads quads_of(__global const ulong *words, const OFFSET_T *entries)
-{
-    Quads of_tiles;
-    for (int n = 0; n < PACKET_TILES; ++n)
-        of_tiles.of[n] = vload16(0, (__global const float *)(words + 2 * entries[n]));
-    return transposed(of_tiles);
-}
-
-#ifdef PACKED
-inline Faces faces_of(SUPERSEGMENTS_PARAMETERS const OFFSET_T *entries)
-{
-    const Quads quads = quads_of(supersegments, entries);
-    const Faces result = {quads.of[0], quads.of[1], quads.of[2], quads.of[3]};
-    return result;
-}
-
-inline Media media_of(SUPERSEGMENTS_PARAMETERS const OFFSET_T *entries, Faces at)
-{
-    const uint16 color = as_uint16(at.color);
-    const Media result = {convert_float16(color & 2047) * (1.0f / 2047.0f),
-                          convert_float16(color >> 11 & 2047) * (1.0f / 2047.0f),
-                          convert_float16(color >> 22) * (1.0f / 1023.0f), at.extinction};
-    return result;
-}
-#else
-inline float8 faces_of_tile(__global const ulong *faces, OFFSET_T entry)
-{
-    return vload8(0, (__global const float *)(faces + entry));
-}
-
-inline Faces faces_of(SUPERSEGMENTS_PARAMETERS const OFFSET_T *entries)
-{
-    const Reals of_01 = (Reals)(faces_of_tile(faces, entries[0]), faces_of_tile(faces, entries[1]));
-    const Reals of_23 = (Reals)(faces_of_tile(faces, entries[2]), faces_of_tile(faces, entries[3]));
-    const Faces result = {((Reals)(of_01.even, of_23.even)).s048c159d26ae37bf,
-                          ((Reals)(of_01.odd, of_23.odd)).s048c159d26ae37bf};
-    return result;
-}
-
-inline Media media_of(SUPERSEGMENTS_PARAMETERS const OFFSET_T *entries, Faces at)
-{
-    const Quads quads = quads_of(media, entries);
-    const Media result = {quads.of[0], quads.of[1], quads.of[2], quads.of[3]};
-    return result;
-}
-#endif
-
-// The tiles of a packet.
-typedef struct {
-    OFFSET_T first[PACKET_TILES]; // entry; of a tile that has none, another one's, if there is one
-    int count[PACKET_TILES];      // entries of each of its lists; 0 beside the window
-    int longest;                  // the most of them
-} Tiles;
-
-inline Tiles tiles_at(__global const ulong *headers, int x, int y, int lists_wide)
-{
-    Tiles tiles;
-    tiles.longest = 0;
-    OFFSET_T any_first = 0;
-    for (int n = 0; n < PACKET_TILES; ++n) {
-        const int i = x + n * LIST_TILE;
-        const ulong header = i < lists_wide ? headers[tile_of_list(i, y, lists_wide)] : 0;
-        tiles.first[n] = (OFFSET_T)(header & ((1UL << FIRST_BITS) - 1));
-        tiles.count[n] = (int)(header >> FIRST_BITS);
-        tiles.longest = max(tiles.longest, tiles.count[n]);
-        any_first = tiles.count[n] > 0 ? tiles.first[n] : any_first;
-    }
-    for (int n = 0; n < PACKET_TILES; ++n)
-        tiles.first[n] = tiles.count[n] > 0 ? tiles.first[n] : any_first;
-    return tiles;
-}
 
 // Bring lines of the cache close.
 inline void fetch_lines(__global const ulong *words, OFFSET_T first, OFFSET_T end)
@@ -143,12 +83,140 @@ inline void fetch_lines(__global const ulong *words, OFFSET_T first, OFFSET_T en
         prefetch(words + k, 1);
 }
 
+#if defined(PACKED) && PACKED == 8
+// The lists of a packet, lane by lane.
+typedef struct {
+    Ints counts; // supersegments; 0 beside the window
+    int longest; // the most of them
+    Ints first;  // behind `begin`; of a list that has none, another one's, if there is one
+    OFFSET_T begin;
+    Ints origin, stride; // see common/supersegments.cl
+    Reals per_code;
+} Lists;
+
+inline Lists lists_at(__global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int x, int y, int lists_wide, int lists_high)
+{
+    Lists lists;
+    lists.longest = 0;
+    const int wide = y < lists_high ? min(lists_wide - x, PACKET_WIDE) : 0;
+    if (wide <= 0)
+        return lists;
+    __global const HEADER_T *const begins = headers + ((size_t)y * lists_wide + x);
+    lists.begin = begins[0];
+    if (begins[wide] == lists.begin)
+        return lists;
+    int counts[LANES], firsts[LANES], origins[LANES], strides[LANES];
+    float per_codes[LANES];
+    int any_lane = 0;
+    for (int lane = 0; lane < LANES; ++lane) {
+        const int dx = X_OF(lane);
+        const int first = dx < wide ? (int)(begins[dx] - lists.begin) + LIST_HEADER : 0;
+        counts[lane] = dx < wide ? max((int)(begins[dx + 1] - lists.begin) - first, 0) : 0;
+        firsts[lane] = first;
+        any_lane = counts[lane] > 0 ? lane : any_lane;
+        lists.longest = max(lists.longest, counts[lane]);
+    }
+    for (int lane = 0; lane < LANES; ++lane) {
+        firsts[lane] = firsts[counts[lane] > 0 ? lane : any_lane];
+        __global const uint2 *const scale = words + lists.begin + firsts[lane] - LIST_HEADER;
+        origins[lane] = as_int(scale[0].x);
+        strides[lane] = as_int(scale[0].y);
+        per_codes[lane] = as_float(scale[1].x);
+    }
+    lists.counts = vload16(0, counts);
+    lists.first = vload16(0, firsts);
+    lists.origin = vload16(0, origins);
+    lists.stride = vload16(0, strides);
+    lists.per_code = vload16(0, per_codes);
+    return lists;
+}
+
 // The first `depth` supersegments of all lists.
-inline void fetch(SUPERSEGMENTS_PARAMETERS const Tiles *tiles, int depth)
+inline void fetch(SUPERSEGMENTS_PARAMETERS const Lists *lists, int depth)
+{
+    int firsts[LANES], ends[LANES];
+    vstore16(lists->first, 0, firsts);
+    vstore16(lists->first + min(lists->counts, depth), 0, ends);
+    for (int lane = 0; lane < LANES; ++lane)
+        fetch_lines((__global const ulong *)words, lists->begin + firsts[lane], lists->begin + ends[lane]);
+}
+
+// As depth_of_code.
+inline Reals depths_of_codes(const Lists *lists, uint16 codes, float step, float nearest, float depth_origin)
+{
+    const Reals offsets = convert_float16(lists->origin + as_int16(codes) * lists->stride) * step;
+#ifdef PARALLEL
+    return offsets;
+#else
+    return depth_coordinate(fmax(offsets, nearest), depth_origin);
+#endif
+}
+
+inline Faces faces_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, float depth_origin)
+{
+    int places[LANES];
+    vstore16(lists->first + select((Ints)(0), (Ints)(k), k < lists->counts), 0, places);
+    __global const ulong *const from = (__global const ulong *)words + lists->begin;
+    const uint16 low_lanes = as_uint16((ulong8)(from[places[0]], from[places[1]], from[places[2]], from[places[3]],
+                                                from[places[4]], from[places[5]], from[places[6]], from[places[7]]));
+    const uint16 high_lanes = as_uint16((ulong8)(from[places[8]], from[places[9]], from[places[10]], from[places[11]],
+                                                 from[places[12]], from[places[13]], from[places[14]], from[places[15]]));
+    Faces at;
+    at.words[0] = (uint16)(low_lanes.even, high_lanes.even);
+    at.words[1] = (uint16)(low_lanes.odd, high_lanes.odd);
+    at.front = depths_of_codes(lists, at.words[0] & DEPTH_CODES, constants[0], constants[1], depth_origin);
+    at.back = depths_of_codes(lists, at.words[0] >> 14 & DEPTH_CODES, constants[0], constants[1], depth_origin);
+    return at;
+}
+
+// As medium_of.
+inline Media media_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, Faces at)
+{
+    const uint16 tau = at.words[0] >> 28 | (at.words[1] & 255) << 4;
+    const uint16 thickness = (at.words[0] >> 14 & DEPTH_CODES) - (at.words[0] & DEPTH_CODES);
+    const Reals optical_depth = select((Reals)(0.0f), as_float16((tau + TAU_BASE - 1) << 16), tau > 0);
+    const Media media = {convert_float16(at.words[1] >> 8 & 255) * (1.0f / 255.0f),
+                         convert_float16(at.words[1] >> 16 & 255) * (1.0f / 255.0f),
+                         convert_float16(at.words[1] >> 24) * (1.0f / 255.0f),
+                         fmin(optical_depth * lists->per_code / convert_float16(thickness), FLT_MAX)};
+    return media;
+}
+
+#else
+// The lists of a packet, tile by tile.
+typedef struct {
+    Ints counts;                  // entries of each lane's list; 0 beside the window
+    int longest;                  // the most of them
+    int tile_counts[PACKET_TILES];
+    OFFSET_T first[PACKET_TILES]; // entry; of a tile that has none, another one's, if there is one
+} Lists;
+
+inline Lists lists_at(__global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int x, int y, int lists_wide, int lists_high)
+{
+    Lists lists;
+    lists.longest = 0;
+    OFFSET_T any_first = 0;
+    for (int n = 0; n < PACKET_TILES; ++n) {
+        const int i = x + n * LIST_TILE;
+        const ulong header = i < lists_wide ? headers[tile_of_list(i, y, lists_wide)] : 0;
+        lists.first[n] = (OFFSET_T)(header & ((1UL << FIRST_BITS) - 1));
+        lists.tile_counts[n] = (int)(header >> FIRST_BITS);
+        lists.longest = max(lists.longest, lists.tile_counts[n]);
+        any_first = lists.tile_counts[n] > 0 ? lists.first[n] : any_first;
+    }
+    for (int n = 0; n < PACKET_TILES; ++n)
+        lists.first[n] = lists.tile_counts[n] > 0 ? lists.first[n] : any_first;
+    const int4 counts = vload4(0, lists.tile_counts);
+    lists.counts = (Ints)(counts, counts, counts, counts);
+    return lists;
+}
+
+// The first `depth` supersegments of all lists.
+inline void fetch(SUPERSEGMENTS_PARAMETERS const Lists *lists, int depth)
 {
     for (int n = 0; n < PACKET_TILES; ++n) {
-        const OFFSET_T first = tiles->first[n];
-        const OFFSET_T end = first + min(depth, tiles->count[n]) * LISTS_PER_TILE;
+        const OFFSET_T first = lists->first[n];
+        const OFFSET_T end = first + min(depth, lists->tile_counts[n]) * LISTS_PER_TILE;
 #ifdef PACKED
         fetch_lines(supersegments, 2 * first, 2 * end);
 #else
@@ -158,16 +226,64 @@ inline void fetch(SUPERSEGMENTS_PARAMETERS const Tiles *tiles, int depth)
     }
 }
 
-// How many each lane's tile has.
-inline Ints counts_of(const Tiles *tiles)
+// Entry of the k-th supersegment of a tile's first list; of any, if the tile has no more.
+inline OFFSET_T entry_at(const Lists *lists, int n, int k)
 {
-    const int4 counts = vload4(0, tiles->count);
-    return (Ints)(counts, counts, counts, counts);
+    return lists->first[n] + (k < lists->tile_counts[n] ? k * LISTS_PER_TILE : 0);
 }
+
+// `words` of 8 bytes, two of which an entry takes.
+inline Quads quads_at(__global const ulong *words, const Lists *lists, int k)
+{
+    Quads of_tiles;
+    for (int n = 0; n < PACKET_TILES; ++n)
+        of_tiles.of[n] = vload16(0, (__global const float *)(words + 2 * entry_at(lists, n, k)));
+    return transposed(of_tiles);
+}
+
+#ifdef PACKED
+inline Faces faces_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, float depth_origin)
+{
+    const Quads quads = quads_at(supersegments, lists, k);
+    const Faces at = {quads.of[0], quads.of[1], {as_uint16(quads.of[2]), as_uint16(quads.of[3])}};
+    return at;
+}
+
+// As medium_of.
+inline Media media_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, Faces at)
+{
+    const uint16 color = at.words[1];
+    const Media media = {convert_float16(color & 2047) * (1.0f / 2047.0f),
+                         convert_float16(color >> 11 & 2047) * (1.0f / 2047.0f),
+                         convert_float16(color >> 22) * (1.0f / 1023.0f), as_float16(at.words[0])};
+    return media;
+}
+#else
+inline float8 faces_of_tile(__global const ulong *faces, const Lists *lists, int n, int k)
+{
+    return vload8(0, (__global const float *)(faces + entry_at(lists, n, k)));
+}
+
+inline Faces faces_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, float depth_origin)
+{
+    const Reals of_01 = (Reals)(faces_of_tile(faces, lists, 0, k), faces_of_tile(faces, lists, 1, k));
+    const Reals of_23 = (Reals)(faces_of_tile(faces, lists, 2, k), faces_of_tile(faces, lists, 3, k));
+    const Faces at = {((Reals)(of_01.even, of_23.even)).s048c159d26ae37bf, ((Reals)(of_01.odd, of_23.odd)).s048c159d26ae37bf};
+    return at;
+}
+
+inline Media media_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, Faces at)
+{
+    const Quads quads = quads_at(media, lists, k);
+    const Media result = {quads.of[0], quads.of[1], quads.of[2], quads.of[3]};
+    return result;
+}
+#endif
+#endif
 
 __attribute__((vec_type_hint(float16)))
 __kernel void raycast_own_lists(
-    __global const ulong *headers,      // of the tiles of lists, see common/supersegments.cl
+    __global const HEADER_T *headers,   // of the tiles of lists, see common/supersegments.cl
     SUPERSEGMENTS_PARAMETERS            // see common/supersegments.cl
     int lists_wide, int lists_high,     // window of V_O, and of V_N
     float depth_origin,                 // world units
@@ -185,29 +301,27 @@ __kernel void raycast_own_lists(
     const int packets_wide = (width + PACKET_WIDE - 1) / PACKET_WIDE;
     const int packet = (int)get_global_id(0);
     const int x = packet % packets_wide * PACKET_WIDE;
-    const int y = packet / packets_wide * LIST_TILE;
+    const int y = packet / packets_wide * TILE_HIGH;
     if (y >= height)
         return;
-    const bool whole = x + PACKET_WIDE <= width && y + LIST_TILE <= height;
+    const bool whole = x + PACKET_WIDE <= width && y + TILE_HIGH <= height;
     const size_t place = (size_t)(height - 1 - y) * width + x; // of the first pixel; row y + 1 is a width before
 
     Reals red = 0.0f, green = 0.0f, blue = 0.0f, alpha = 0.0f;
-    const Tiles tiles = tiles_at(headers, x, y, lists_wide);
-    if (tiles.longest > 0) {
+    const Lists lists = lists_at(headers, SUPERSEGMENTS_ARGUMENTS x, y, lists_wide, lists_high);
+    if (lists.longest > 0) {
         Reals t_end = INFINITY;
         if (has_opaque_depth) {
-            float ends[LANES]; // row by row
-            for (int n = 0; n < LANES; ++n) {
-                const int dx = n % PACKET_WIDE, dy = n / PACKET_WIDE;
-                ends[n] = whole || (x + dx < width && y + dy < height) ? opaque_depth[place + dx - dy * width] : 0.0f;
+            float ends[LANES];
+            for (int lane = 0; lane < LANES; ++lane) {
+                const int dx = X_OF(lane), dy = Y_OF(lane);
+                ends[lane] = whole || (x + dx < width && y + dy < height) ? opaque_depth[place + dx - dy * width] : 0.0f;
             }
-            const Reals rows = vload16(0, ends);
-            t_end = (Reals)(rows.lo.even, rows.lo.odd, rows.hi.even, rows.hi.odd);
+            t_end = vload16(0, ends);
         }
         const Reals a = convert_float16(x + LANE_X) + 0.5f - 0.5f * (float)width;
         const Reals b = convert_float16(y + LANE_Y) + 0.5f - 0.5f * (float)height;
-        const Ints counts = counts_of(&tiles);
-        const Ints wanted = x + LANE_X < width && y + LANE_Y < height && counts > 0;
+        const Ints wanted = x + LANE_X < width && y + LANE_Y < height && lists.counts > 0;
         Reals t0, t1;
         Ints going = clip_packet(forms, planes, a, b, t_end, wanted, &t0, &t1);
         const Reals begin = list_depths(forms, a, b, t0);
@@ -222,12 +336,9 @@ __kernel void raycast_own_lists(
         Reals opacity = 0.0f; // see common/over.cl
 #endif
         int k = 0;
-        for (; k < tiles.longest; ++k) {
-            OFFSET_T entries[PACKET_TILES];
-            for (int n = 0; n < PACKET_TILES; ++n)
-                entries[n] = tiles.first[n] + (k < tiles.count[n] ? k * LISTS_PER_TILE : 0);
-            const Faces at = faces_of(SUPERSEGMENTS_ARGUMENTS entries);
-            going = going && k < counts && at.front < end && !(transmittance < transmittance_cutoff);
+        for (; k < lists.longest; ++k) {
+            const Faces at = faces_at(SUPERSEGMENTS_ARGUMENTS &lists, k, depth_origin);
+            going = going && k < lists.counts && at.front < end && !(transmittance < transmittance_cutoff);
             const Reals from = HIGHER_OF(at.front, begin);
             const Reals to = LOWER_OF(at.back, end);
             const Ints meet = going && from < to;
@@ -236,7 +347,7 @@ __kernel void raycast_own_lists(
                     break;
                 continue;
             }
-            const Media medium = media_of(SUPERSEGMENTS_ARGUMENTS entries, at);
+            const Media medium = media_at(SUPERSEGMENTS_ARGUMENTS &lists, k, at);
 #ifdef PARALLEL
             const Reals lengths = scale * (to - from);
 #else
@@ -259,28 +370,32 @@ __kernel void raycast_own_lists(
         alpha = 1.0f - transmittance;
 #endif
         // The next packet, which comes to about the same depth: all at once, as loads in the loop are not
-        const Tiles next = tiles_at(headers, x + PACKET_WIDE, y, lists_wide);
+        const Lists next = lists_at(headers, SUPERSEGMENTS_ARGUMENTS x + PACKET_WIDE, y, lists_wide, lists_high);
         fetch(SUPERSEGMENTS_ARGUMENTS &next, k + 1);
-        // Lanes of a tile without entries have looked at another one's; beside the window there may be anything
-        red = select((Reals)(0.0f), red, counts > 0);
-        green = select((Reals)(0.0f), green, counts > 0);
-        blue = select((Reals)(0.0f), blue, counts > 0);
+        // Lanes of nothing have looked at others' lists, also beside the window, where there may be anything
+        red = select((Reals)(0.0f), red, lists.counts > 0);
+        green = select((Reals)(0.0f), green, lists.counts > 0);
+        blue = select((Reals)(0.0f), blue, lists.counts > 0);
     }
 
     const Quads channels = {{red, green, blue, alpha}};
-    const Quads pixels = transposed(channels); // of each tile: its lower row, then its upper one
+    const Quads pixels = transposed(channels); // of each tile, row by row
     for (int n = 0; n < PACKET_TILES; ++n) {
-        __global float4 *const target = image + place + n * LIST_TILE;
+        __global float4 *const target = image + place + n * TILE_WIDE;
         if (whole) {
+#if TILE_HIGH == 1
+            vstore16(pixels.of[n], 0, (__global float *)target);
+#else
             vstore8(pixels.of[n].lo, 0, (__global float *)target);
             vstore8(pixels.of[n].hi, 0, (__global float *)(target - width));
+#endif
             continue;
         }
-        float4 colors[LISTS_PER_TILE];
+        float4 colors[LISTS_OF_TILE];
         vstore16(pixels.of[n], 0, (float *)colors);
-        for (int p = 0; p < LISTS_PER_TILE; ++p) {
-            const int dx = p % LIST_TILE, dy = p / LIST_TILE;
-            if (x + n * LIST_TILE + dx < width && y + dy < height)
+        for (int p = 0; p < LISTS_OF_TILE; ++p) {
+            const int dx = p % TILE_WIDE, dy = p / TILE_WIDE;
+            if (x + n * TILE_WIDE + dx < width && y + dy < height)
                 target[dx - dy * width] = colors[p];
         }
     }

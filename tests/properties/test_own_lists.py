@@ -15,6 +15,7 @@ from oracle import explain
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.opencl_runtime import Runtime
 from pyvista_vdi.picking import FirstHit
+from pyvista_vdi.precision import PRECISIONS
 from pyvista_vdi.raycast import PreparedVDI, render_vdi
 from pyvista_vdi.vdi import VDI
 
@@ -79,16 +80,16 @@ def test_which_frames_are_drawn_from_own_lists(runtime, monkeypatch):
     own = "raycast_own_lists" if runtime.is_cpu else "raycast"
     assert drawn_by() == own
     assert drawn_by(precision="16-byte") == own
+    assert drawn_by(precision="8-byte") == own
     assert drawn_by(skip_empty=False) == own
     assert drawn_by(opaque_depth=np.full((high, wide), np.inf)) == own
     assert drawn_by(camera=vdi.camera.replace(model_transform=vdi.camera.model_transform)) == own
-    assert drawn_by(precision="8-byte") == "raycast"
     assert drawn_by(size=(2 * wide, 2 * high)) == "raycast"
     assert drawn_by(camera=vdi.camera.azimuth(1e-3)) == "raycast"
     assert drawn_by(first_hit=FirstHit.of(0.5, True)) == "raycast"
 
 
-@pytest.mark.parametrize("precision", ["exact", "16-byte"])
+@pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize("window", WINDOWS, ids=lambda window: f"{window[0]}x{window[1]}")
 def test_every_pixel_is_its_own_list(runtime, window, precision, monkeypatch):
     """By the oracle and by rays one by one; with what ends rays early, and without."""
@@ -109,7 +110,7 @@ def test_every_projection(runtime, kind, monkeypatch):
     """Also a long lens, whose depth is kept relative, and an eye between the supersegments."""
     drawn = 0
     how = set()
-    for case in range(4):
+    for case in range(6):
         rng = np.random.default_rng([case, 500])
         bounds = strategies.random_bounds(rng)
         transform = strategies.random_transform(rng)
@@ -124,6 +125,7 @@ def test_every_projection(runtime, kind, monkeypatch):
                 parallel=kind == "parallel",
             )
         vdi = strategies.random_vdi(rng, window=(19, 7), camera=camera, bounds=bounds)
+        vdi = vdi.with_precision(PRECISIONS[case % 3])
         ends = random_ends(rng, vdi, planes=1) if case % 2 else {}
         image, one_by_one = both_ways(runtime, vdi, monkeypatch, **ends)
         result = explain(vdi, camera, (19, 7), image, name=f"seed {[case, 500]}", **ends)
@@ -185,7 +187,7 @@ def test_lists_of_none_and_of_thousands(runtime, compensated, monkeypatch):
     np.testing.assert_allclose(image, one_by_one, rtol=0, atol=5e-5)
 
 
-@pytest.mark.parametrize("precision", ["exact", "16-byte"])
+@pytest.mark.parametrize("precision", PRECISIONS)
 def test_what_is_beside_the_lists_is_not_drawn(runtime, precision, monkeypatch):
     """A tile at the window's edge has room for lists beside it, which nothing is written to."""
     original = Runtime.buffer
@@ -214,13 +216,18 @@ def test_what_is_beside_the_lists_is_not_drawn(runtime, precision, monkeypatch):
     np.testing.assert_allclose(image[..., 3], -np.expm1(-0.7 * counts[::-1]), rtol=0, atol=1e-3)
 
 
-def test_offsets_of_64_bits(runtime):
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_offsets_of_64_bits(runtime, precision):
     """As a VDI of more than 2^30 supersegments has them."""
-    vdi = strategies.random_vdi(np.random.default_rng(3), window=(21, 9))
+    rng = np.random.default_rng(3)
+    vdi = strategies.random_vdi(rng, window=(21, 9)).with_precision(precision)
     prepared = PreparedVDI(runtime, vdi)
     images = []
     for long_offsets in (False, True):
         prepared._long_offsets = long_offsets
+        if long_offsets and precision == "8-byte":  # whose headers are offsets
+            headers = runtime.download(prepared._headers).astype(np.int64)
+            prepared._headers = runtime.upload(headers, "list headers")
         with runtime.buffer((9, 21, 4), name="image") as image:
             prepared.render(vdi.camera, vdi.window_size, image)
             images.append(runtime.download(image).copy())
