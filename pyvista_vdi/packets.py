@@ -22,6 +22,10 @@ LANES = 16
 #: Width and height, in pixels, of a packet that is drawn from the pixels' own lists, if these lie
 #: in tiles and if they do not: those of ``vdi/raycast_own_lists.cl``.
 OWN_LISTS = {True: (8, 2), False: (16, 1)}
+#: Lists that a ray may be away from the centre of its own, of the half that it has.
+_FARTHEST_FROM_CENTRE = 0.125
+#: Pixels that list (0, 0) may be away from the window's first one.
+_FARTHEST_ORIGIN = 2**24
 #: Packets of a strip that begin before the window, or behind it: the steepest line that a packet
 #: follows (``STEEPEST`` of ``common/packet.cl``, 1.5) rises by less over its length.
 MARGIN = 24
@@ -114,15 +118,60 @@ def packets_of(
     )
 
 
-def own_list_items(size: tuple[int, int], in_tiles: bool) -> int:
-    """Return the work-items, in whole groups, that draw each pixel from the list of its own.
+class OwnLists(NamedTuple):
+    """How a frame is drawn in which each ray stays in a list of its own.
 
-    Each draws a packet. ``size`` is the width and height of the window, of V_N and V_O alike;
-    ``in_tiles`` says whether its lists lie in tiles.
+    Attributes
+    ----------
+    origin : numpy.ndarray
+        The pixel of list (0, 0), which may lie beside V_N's window, int32 (2,).
+    items : int
+        Work-items, in whole groups: packets.
     """
-    wide, high = OWN_LISTS[in_tiles]
-    packets = -(-size[0] // wide) * -(-size[1] // high)
-    return -(-packets // LANES) * LANES
+
+    origin: NDArray[np.int32]
+    items: int
+
+
+def own_lists_of(
+    size: tuple[int, int],
+    window: tuple[int, int],
+    coordinates: NDArray[np.float64],
+    depths: tuple[float, float],
+    *,
+    parallel: bool,
+    in_tiles: bool,
+) -> OwnLists | None:
+    """Return how each pixel is drawn from a list of its own; None if a ray is in another one, too.
+
+    Parameters
+    ----------
+    size, window : (int, int)
+        Width and height of V_N's window, and of V_O's, in pixels.
+    coordinates : numpy.ndarray
+        Forms of the homogeneous list coordinates (u, v, depth, denominator), float64 (4, 6).
+    depths : (float, float)
+        The least and the largest t at which a ray may meet something.
+    parallel : bool
+        Whether V_O is a parallel projection.
+    in_tiles : bool
+        Whether lists lie in tiles (common/supersegments.cl).
+    """
+    ends = [np.array([0.0, pixels // 2, pixels - 1]) for pixels in size]
+    pixels = np.stack([at.reshape(-1) for at in np.meshgrid(*ends)])
+    middle, lists_middle = (np.reshape(edges, (2, 1)) / 2 for edges in (size, window))
+    offsets = np.vstack([np.ones(pixels.shape[1]), pixels + 0.5 - middle])
+    with np.errstate(all="ignore"):  # what cannot be said, see below
+        places = np.stack([_places(coordinates, offsets, np.array(t)) for t in depths])
+        origins = pixels - (places + lists_middle - 0.5)
+        origin = np.round(origins[0, :, 0])
+        away = np.abs(origins - origin[:, np.newaxis]).max()
+        grows = (coordinates[2 if parallel else 3, 3:] @ offsets).min() > 0
+    if not (away <= _FARTHEST_FROM_CENTRE and grows and np.abs(origin).max() < _FARTHEST_ORIGIN):
+        return None
+    ways = zip(size, origin.astype(int).tolist(), OWN_LISTS[in_tiles], strict=True)
+    wide, high = (-(-(edge - at - -at // step * step) // step) for edge, at, step in ways)
+    return OwnLists(origin.astype(np.int32), -(-wide * high // LANES) * LANES)
 
 
 def epipole_of(generating: Camera, view: Camera, size: tuple[int, int]) -> NDArray[np.float64]:

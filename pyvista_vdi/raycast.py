@@ -23,9 +23,10 @@ from .packets import (
     COORDINATE_FORMS,
     LANES,
     PLANE_FORMS,
+    OwnLists,
     Packets,
     epipole_of,
-    own_list_items,
+    own_lists_of,
     packets_of,
     share_lit,
 )
@@ -432,16 +433,16 @@ class PreparedVDI:
         else:
             defines["FIRST_HIT"] = 1
             hit = (np.float32(first_hit.optical_depth), np.int32(first_hit.accumulated))
-        at_generating_view = np.array_equal(self._list_space(camera), self._list_rows)
-        if at_generating_view and self._draws_own_lists(view, defines):
+        own_lists = self._own_lists(camera, view, defines)
+        if own_lists is not None:
             kernel = self._runtime.kernel("vdi/raycast_own_lists.cl", "raycast_own_lists", defines)
-            return _Launch(kernel, own_list_items(view.size, self._packed != 8), LANES, ())
+            return _Launch(kernel, own_lists.items, LANES, (own_lists.origin,))
         part = self._part_to_draw(camera, view.size, skip_empty)
         if part.pixels < view.size[0] * view.size[1]:
             self._clear(image, first_hit is not None)
         if skip_empty and self.occupancy.worthwhile:
             defines["SKIP_EMPTY"] = 1
-        if at_generating_view:
+        if np.array_equal(self._list_space(camera), self._list_rows):
             defines["ONE_LIST"] = 1
         packets = self._packets(camera, view, part, defines)
         if packets is not None:
@@ -461,9 +462,23 @@ class PreparedVDI:
             and defines.get("COMPENSATED") != 2
         )
 
-    def _draws_own_lists(self, view: ListView, defines: dict[str, str | int | None]) -> bool:
-        """Return whether each pixel is drawn from its own list alone, for a frame at V_O."""
-        return view.size == self._window and self._draws_in_vectors(defines)
+    def _own_lists(
+        self, camera: Camera, view: ListView, defines: dict[str, str | int | None]
+    ) -> OwnLists | None:
+        """Return how each pixel is drawn from a list of its own; None if it cannot be."""
+        if not self._draws_in_vectors(defines):
+            return None
+        near, far = rays.depth_range(camera, self._bounds)
+        if not camera.parallel_projection:
+            near = max(near, rays.nearest_depth(camera, self._bounds))
+        return own_lists_of(
+            view.size,
+            self._window,
+            view.forms[:COORDINATE_FORMS].astype(np.float64),
+            (near - view.reference_depth, far - view.reference_depth),
+            parallel=self._parallel,
+            in_tiles=self._packed != 8,
+        )
 
     def _packets(
         self,

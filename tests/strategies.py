@@ -177,13 +177,13 @@ DEALT = ("one by one", "packets")
 def deal_rays(patch, dealt):
     """Have rays followed one by one, or in packets wherever they can be; ``patch`` undoes it.
 
-    At V_O, in a picture of the VDI's own size, packets are those of its lists.
+    Where each ray stays in a list of its own, packets are those of lists.
     """
     least = {"one by one": math.inf, "packets": 0.0}[dealt]
     patch.setattr(packets, "LEAST_IN_COMMON", least)
     patch.setattr(packets, "LEAST_PIXELS", least)
     if dealt == "one by one":
-        patch.setattr(PreparedVDI, "_draws_own_lists", lambda *_: False)
+        patch.setattr(PreparedVDI, "_own_lists", lambda *_: None)
 
 
 # -- VDIs ------------------------------------------------------------------------------------------

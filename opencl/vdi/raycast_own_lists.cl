@@ -1,5 +1,5 @@
-// VDI to image at V_O, in a picture of the VDI's own size: what vdi/raycast.cl does, where the ray of each pixel is the
-// centre ray of the pixel's own list, which it goes through from front to back.
+// VDI to image at V_O, where the pixels of the picture are those of the VDI's window, or some of them, or more: what
+// vdi/raycast.cl does, where the ray of each pixel goes through a list of its own from front to back, and through no other.
 //
 // A work-item draws a packet (common/packet.cl) of LANES pixels: those of PACKET_TILES tiles of lists side by side. What
 // these hold lies in one piece of memory (common/supersegments.cl), and one packet's behind the other's; so it is loaded in
@@ -33,6 +33,13 @@ DEFINE_OPACITY_OF(opacities_of, 16)
 // The same of one lane, from the packet's first pixel
 #define X_OF(lane) ((lane) % PACKET_TILES * TILE_WIDE + (lane) / PACKET_TILES % TILE_WIDE)
 #define Y_OF(lane) ((lane) / PACKET_TILES / TILE_WIDE)
+
+// The form of V_O's depth, or of that less a number
+#ifdef PARALLEL
+#define Z_FORM DEPTH_FORM
+#else
+#define Z_FORM DENOMINATOR_FORM
+#endif
 
 // Reciprocal depth at a depth coordinate; times the depth origin if SHIFTED
 #ifdef SHIFTED
@@ -94,14 +101,14 @@ typedef struct {
     Reals per_code;
 } Lists;
 
-inline Lists lists_at(__global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int x, int y, int lists_wide, int lists_high)
+inline Lists lists_at(__global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int i, int j, int lists_wide, int lists_high)
 {
     Lists lists;
     lists.longest = 0;
-    const int wide = y < lists_high ? min(lists_wide - x, PACKET_WIDE) : 0;
-    if (wide <= 0)
+    if (i < 0 || i >= lists_wide || j < 0 || j >= lists_high)
         return lists;
-    __global const HEADER_T *const begins = headers + ((size_t)y * lists_wide + x);
+    const int wide = min(lists_wide - i, PACKET_WIDE);
+    __global const HEADER_T *const begins = headers + ((size_t)j * lists_wide + i);
     lists.begin = begins[0];
     if (begins[wide] == lists.begin)
         return lists;
@@ -191,14 +198,16 @@ typedef struct {
     OFFSET_T first[PACKET_TILES]; // entry; of a tile that has none, another one's, if there is one
 } Lists;
 
-inline Lists lists_at(__global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int x, int y, int lists_wide, int lists_high)
+inline Lists lists_at(__global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int i, int j, int lists_wide, int lists_high)
 {
     Lists lists;
     lists.longest = 0;
+    if (i < 0 || j < 0 || j >= lists_high)
+        return lists;
     OFFSET_T any_first = 0;
     for (int n = 0; n < PACKET_TILES; ++n) {
-        const int i = x + n * LIST_TILE;
-        const ulong header = i < lists_wide ? headers[tile_of_list(i, y, lists_wide)] : 0;
+        const int column = i + n * LIST_TILE;
+        const ulong header = column < lists_wide ? headers[tile_of_list(column, j, lists_wide)] : 0;
         lists.first[n] = (OFFSET_T)(header & ((1UL << FIRST_BITS) - 1));
         lists.tile_counts[n] = (int)(header >> FIRST_BITS);
         lists.longest = max(lists.longest, lists.tile_counts[n]);
@@ -285,48 +294,56 @@ __attribute__((vec_type_hint(float16)))
 __kernel void raycast_own_lists(
     __global const HEADER_T *headers,   // of the tiles of lists, see common/supersegments.cl
     SUPERSEGMENTS_PARAMETERS            // see common/supersegments.cl
-    int lists_wide, int lists_high,     // window of V_O, and of V_N
+    int lists_wide, int lists_high,     // window of V_O
     float depth_origin,                 // world units
     __global const float *forms,        // list coordinates, model direction, then `planes` to clip to
     int planes,
-    int width, int height,              // the same as lists_wide and lists_high
+    int width, int height,              // window of V_N
     __global const float *opaque_depth, // t at which each pixel's ray ends, top row first, if has_opaque_depth
     int has_opaque_depth,
     float transmittance_cutoff,         // the ray ends where less than this is left
     __global const ulong *masks,        // this one and the next two are not looked at: lists say by themselves what is empty
     float first_depth,
     float slabs_per_depth,
+    int2 origin,                        // the pixel of list (0, 0); maybe beside the window
     __global float4 *image)             // premultiplied RGBA, top row first
 {
-    const int packets_wide = (width + PACKET_WIDE - 1) / PACKET_WIDE;
+    // Packets begin at multiples of their size, in lists
+    const int first_i = -origin.x & -PACKET_WIDE, first_j = -origin.y & -TILE_HIGH;
+    const int packets_wide = (width - origin.x - first_i + PACKET_WIDE - 1) / PACKET_WIDE;
     const int packet = (int)get_global_id(0);
-    const int x = packet % packets_wide * PACKET_WIDE;
-    const int y = packet / packets_wide * TILE_HIGH;
+    const int i = first_i + packet % packets_wide * PACKET_WIDE;
+    const int j = first_j + packet / packets_wide * TILE_HIGH;
+    const int x = i + origin.x, y = j + origin.y;
     if (y >= height)
         return;
-    const bool whole = x + PACKET_WIDE <= width && y + TILE_HIGH <= height;
-    const size_t place = (size_t)(height - 1 - y) * width + x; // of the first pixel; row y + 1 is a width before
+    const bool whole = x >= 0 && x + PACKET_WIDE <= width && y >= 0 && y + TILE_HIGH <= height;
+    const long place = (long)(height - 1 - y) * width + x; // of the first pixel; row y + 1 is a width before
+// Whether a pixel of the packet is one of the window's
+#define IS_IN_WINDOW(dx, dy) (x + (dx) >= 0 && x + (dx) < width && y + (dy) >= 0 && y + (dy) < height)
 
     Reals red = 0.0f, green = 0.0f, blue = 0.0f, alpha = 0.0f;
-    const Lists lists = lists_at(headers, SUPERSEGMENTS_ARGUMENTS x, y, lists_wide, lists_high);
+    const Lists lists = lists_at(headers, SUPERSEGMENTS_ARGUMENTS i, j, lists_wide, lists_high);
     if (lists.longest > 0) {
         Reals t_end = INFINITY;
         if (has_opaque_depth) {
             float ends[LANES];
             for (int lane = 0; lane < LANES; ++lane) {
                 const int dx = X_OF(lane), dy = Y_OF(lane);
-                ends[lane] = whole || (x + dx < width && y + dy < height) ? opaque_depth[place + dx - dy * width] : 0.0f;
+                ends[lane] = whole || IS_IN_WINDOW(dx, dy) ? opaque_depth[place + dx - dy * width] : 0.0f;
             }
             t_end = vload16(0, ends);
         }
         const Reals a = convert_float16(x + LANE_X) + 0.5f - 0.5f * (float)width;
         const Reals b = convert_float16(y + LANE_Y) + 0.5f - 0.5f * (float)height;
-        const Ints wanted = x + LANE_X < width && y + LANE_Y < height && lists.counts > 0;
+        const Ints wanted = IS_IN_WINDOW(LANE_X, LANE_Y) && i + LANE_X < lists_wide && j + LANE_Y < lists_high &&
+                            lists.counts > 0;
         Reals t0, t1;
         Ints going = clip_packet(forms, planes, a, b, t_end, wanted, &t0, &t1);
         const Reals begin = list_depths(forms, a, b, t0);
         const Reals end = list_depths(forms, a, b, t1);
-        Reals scale = MODEL_SPEED(Reals, forms, a, b);
+        // Model length per unit of V_O's depth
+        Reals scale = MODEL_SPEED(Reals, forms, a, b) / FORM_SLOPE(Reals, forms + Z_FORM * FORM_SIZE, a, b);
 #ifdef SHIFTED
         scale *= depth_origin;
 #endif
@@ -370,12 +387,12 @@ __kernel void raycast_own_lists(
         alpha = 1.0f - transmittance;
 #endif
         // The next packet, which comes to about the same depth: all at once, as loads in the loop are not
-        const Lists next = lists_at(headers, SUPERSEGMENTS_ARGUMENTS x + PACKET_WIDE, y, lists_wide, lists_high);
+        const Lists next = lists_at(headers, SUPERSEGMENTS_ARGUMENTS i + PACKET_WIDE, j, lists_wide, lists_high);
         fetch(SUPERSEGMENTS_ARGUMENTS &next, k + 1);
-        // Lanes of nothing have looked at others' lists, also beside the window, where there may be anything
-        red = select((Reals)(0.0f), red, lists.counts > 0);
-        green = select((Reals)(0.0f), green, lists.counts > 0);
-        blue = select((Reals)(0.0f), blue, lists.counts > 0);
+        // The others have looked at what is not theirs, or lies beside V_O's window, where there may be anything
+        red = select((Reals)(0.0f), red, wanted);
+        green = select((Reals)(0.0f), green, wanted);
+        blue = select((Reals)(0.0f), blue, wanted);
     }
 
     const Quads channels = {{red, green, blue, alpha}};
@@ -395,7 +412,7 @@ __kernel void raycast_own_lists(
         vstore16(pixels.of[n], 0, (float *)colors);
         for (int p = 0; p < LISTS_OF_TILE; ++p) {
             const int dx = p % TILE_WIDE, dy = p / TILE_WIDE;
-            if (x + n * TILE_WIDE + dx < width && y + dy < height)
+            if (IS_IN_WINDOW(n * TILE_WIDE + dx, dy))
                 target[dx - dy * width] = colors[p];
         }
     }

@@ -1,8 +1,9 @@
-"""V_O in a picture of the VDI's own size: each pixel from its own list (vdi/raycast_own_lists.cl).
+"""Rays that stay in a list of their own: each pixel from that list (vdi/raycast_own_lists.cl).
 
-Against the float64 oracle, as in ``test_raycast_oracle.py``, and against rays that are followed one
-by one. All ways to look at a VDI from V_O: what else ends a ray, the forms of the supersegments,
-windows whose edges cut packets and tiles, lists of none and of thousands.
+These are views from V_O whose pixels are those of the VDI's window, more, or some of them. Against
+the float64 oracle, as in ``test_raycast_oracle.py``, and against rays that are followed one by one:
+with what else ends a ray, the forms of the supersegments, windows whose edges cut packets and
+tiles, lists of none and of thousands.
 """
 
 from __future__ import annotations
@@ -44,12 +45,13 @@ def kernels_used(runtime, monkeypatch):
     return names
 
 
-def both_ways(runtime, vdi, monkeypatch, **options):
-    """The picture from V_O: from own lists, and with rays one by one."""
-    image = render_vdi(vdi, vdi.camera, device=runtime, **options)
+def both_ways(runtime, vdi, monkeypatch, camera=None, size=None, **options):
+    """The picture, by default from V_O: from own lists, and with rays one by one."""
+    camera = vdi.camera if camera is None else camera
+    image = render_vdi(vdi, camera, size, device=runtime, **options)
     with monkeypatch.context() as patch:
         strategies.deal_rays(patch, "one by one")
-        return image, render_vdi(vdi, vdi.camera, device=runtime, **options)
+        return image, render_vdi(vdi, camera, size, device=runtime, **options)
 
 
 def random_ends(rng, vdi, planes):
@@ -84,8 +86,11 @@ def test_which_frames_are_drawn_from_own_lists(runtime, monkeypatch):
     assert drawn_by(skip_empty=False) == own
     assert drawn_by(opaque_depth=np.full((high, wide), np.inf)) == own
     assert drawn_by(camera=vdi.camera.replace(model_transform=vdi.camera.model_transform)) == own
+    assert drawn_by(camera=vdi.camera.azimuth(1e-4)) == own  # which no ray leaves its list by
     assert drawn_by(size=(2 * wide, 2 * high)) == "raycast"
-    assert drawn_by(camera=vdi.camera.azimuth(1e-3)) == "raycast"
+    assert drawn_by(camera=vdi.camera.azimuth(1)) == "raycast"
+    assert drawn_by(camera=vdi.camera.replace(window_center=(0.5 / wide, 0))) == "raycast"
+    assert drawn_by(camera=vdi.camera.replace(view_up=np.negative(vdi.camera.view_up))) == "raycast"
     assert drawn_by(first_hit=FirstHit.of(0.5, True)) == "raycast"
 
 
@@ -135,6 +140,60 @@ def test_every_projection(runtime, kind, monkeypatch):
         how |= PreparedVDI(runtime, vdi).defines.keys()
     assert drawn
     assert how >= {"far": {"SHIFTED"}, "parallel": {"PARALLEL"}}.get(kind, set())
+
+
+def in_another_world(rng, camera):
+    """The same view, of a world that is turned, moved and three times as large."""
+    world = strategies.random_transform(rng)
+    world[:3, :3] = 3 * strategies.random_rotation(rng)
+    points = np.stack([camera.position, camera.focal_point]) @ world[:3, :3].T + world[:3, 3]
+    return camera.replace(
+        position=points[0],
+        focal_point=points[1],
+        view_up=world[:3, :3] @ camera.view_up,
+        parallel_scale=3 * camera.parallel_scale,
+        model_transform=world @ camera.model_transform,
+    )
+
+
+@pytest.mark.parametrize(
+    ("corner", "window"),
+    [
+        ((0, 0), (27, 19)),
+        ((5, 3), (13, 9)),
+        ((-3, -5), (40, 30)),
+        ((-11, 8), (20, 20)),
+        ((20, -4), (20, 9)),
+        ((-17, -16), (18, 17)),
+    ],
+)
+@pytest.mark.parametrize("kind", ["perspective", "parallel", "inside"])
+def test_a_vdi_of_another_part_of_the_picture(runtime, kind, corner, window, monkeypatch):
+    """As a plotter makes it, of what the bounds cover; its camera is that of another world."""
+    size = (27, 19)
+    names = kernels_used(runtime, monkeypatch)
+    for case, precision in enumerate(PRECISIONS):
+        rng = np.random.default_rng([case, 600, *window])
+        bounds = strategies.random_bounds(rng)
+        transform = strategies.random_transform(rng)
+        if kind == "inside":
+            camera = strategies.camera_inside(rng, bounds, transform)
+        else:
+            camera = strategies.camera_around(
+                rng, bounds, transform, distance=2.0, parallel=kind == "parallel"
+            )
+        own = camera.tile(size, corner, window)
+        vdi = strategies.random_vdi(rng, window=window, camera=own, bounds=bounds)
+        vdi = vdi.with_precision(precision)
+        view = in_another_world(rng, camera)
+        depth = rng.uniform(*strategies.view_depths(view, bounds), size=size[::-1])
+        ends = {"opaque_depth": depth.astype(np.float32)} if case == 1 else {}
+        names.clear()
+        image, one_by_one = both_ways(runtime, vdi, monkeypatch, view, size, **ends)
+        assert ("raycast_own_lists" in names) == runtime.is_cpu
+        result = explain(vdi, view, size, image, name=f"seed {[case, 600, *window]}", **ends)
+        assert not result.failures, "\n".join(result.failures)
+        np.testing.assert_allclose(image, one_by_one, rtol=0, atol=TOLERANCE)
 
 
 def test_a_box_and_a_multiplier(runtime, monkeypatch):
@@ -212,8 +271,13 @@ def test_what_is_beside_the_lists_is_not_drawn(runtime, precision, monkeypatch):
         np.full(n, 0.7),
         SLAB,
     ).with_precision(precision)
+    expected = -np.expm1(-0.7 * counts[::-1])
     image = render_vdi(vdi, FACING, device=runtime)
-    np.testing.assert_allclose(image[..., 3], -np.expm1(-0.7 * counts[::-1]), rtol=0, atol=1e-3)
+    np.testing.assert_allclose(image[..., 3], expected, rtol=0, atol=1e-3)
+    around = render_vdi(vdi, FACING.tile((7, 3), (-3, -2), (12, 8)), (12, 8), device=runtime)
+    np.testing.assert_allclose(around[2:5, 3:10, 3], expected, rtol=0, atol=1e-3)
+    around[2:5, 3:10] = 0
+    assert not around.any()
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)
