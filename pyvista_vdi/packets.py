@@ -7,6 +7,7 @@ ray goes through a list of its own, and a packet's lists lie side by side.
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -157,21 +158,39 @@ def own_lists_of(
     in_tiles : bool
         Whether lists lie in tiles (common/supersegments.cl).
     """
-    ends = [np.array([0.0, pixels // 2, pixels - 1]) for pixels in size]
-    pixels = np.stack([at.reshape(-1) for at in np.meshgrid(*ends)])
-    middle, lists_middle = (np.reshape(edges, (2, 1)) / 2 for edges in (size, window))
-    offsets = np.vstack([np.ones(pixels.shape[1]), pixels + 0.5 - middle])
-    with np.errstate(all="ignore"):  # what cannot be said, see below
-        places = np.stack([_places(coordinates, offsets, np.array(t)) for t in depths])
-        origins = pixels - (places + lists_middle - 0.5)
-        origin = np.round(origins[0, :, 0])
-        away = np.abs(origins - origin[:, np.newaxis]).max()
-        grows = (coordinates[2 if parallel else 3, 3:] @ offsets).min() > 0
-    if not (away <= _FARTHEST_FROM_CENTRE and grows and np.abs(origin).max() < _FARTHEST_ORIGIN):
-        return None
-    ways = zip(size, origin.astype(int).tolist(), OWN_LISTS[in_tiles], strict=True)
+    u_form, v_form, z_form, w_form = coordinates.tolist()
+    first: list[int] = []
+    # The corners, edges and middle speak for all: places depend on the pixel by a homography
+    for x, y in itertools.product(*((0, pixels // 2, pixels - 1) for pixels in size)):
+        a, b = x + 0.5 - size[0] / 2, y + 0.5 - size[1] / 2
+        for t in depths:
+            w = _value(w_form, a, b, t)
+            if not (w > 0 and _slope(z_form if parallel else w_form, a, b) > 0):
+                return None
+            origin = (
+                x + 0.5 - (_value(u_form, a, b, t) / w + window[0] / 2),
+                y + 0.5 - (_value(v_form, a, b, t) / w + window[1] / 2),
+            )
+            if not first:
+                if not max(map(abs, origin)) < _FARTHEST_ORIGIN:
+                    return None
+                first = [round(at) for at in origin]
+            away = (abs(at - whole) for at, whole in zip(origin, first, strict=True))
+            if not max(away) <= _FARTHEST_FROM_CENTRE:
+                return None
+    ways = zip(size, first, OWN_LISTS[in_tiles], strict=True)
     wide, high = (-(-(edge - at - -at // step * step) // step) for edge, at, step in ways)
-    return OwnLists(origin.astype(np.int32), -(-wide * high // LANES) * LANES)
+    return OwnLists(np.array(first, np.int32), -(-wide * high // LANES) * LANES)
+
+
+def _slope(form: list[float], a: float, b: float) -> float:
+    """Return the slope of a form along the ray at pixel offsets (a, b)."""
+    return form[3] + a * form[4] + b * form[5]
+
+
+def _value(form: list[float], a: float, b: float, t: float) -> float:
+    """Return the value of a form on that ray at t."""
+    return form[0] + a * form[1] + b * form[2] + t * _slope(form, a, b)
 
 
 def epipole_of(generating: Camera, view: Camera, size: tuple[int, int]) -> NDArray[np.float64]:
