@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from pyvista_vdi import packets
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.generation import CRITERIA
+from pyvista_vdi.raycast import PreparedVDI
 from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.volume import VOXEL_TYPES, Volume
@@ -170,14 +171,19 @@ def random_view(rng, vdi, kind):
 
 
 #: How rays may be followed: see :func:`deal_rays`.
-DEALT = ("one by one", "packets")
+DEALT = ("one by one", "blocks", "packets")
 
 
 def deal_rays(patch, dealt):
-    """Have rays followed one by one, or in packets wherever they can be; ``patch`` undoes it."""
-    least = {"one by one": math.inf, "packets": 0.0}[dealt]
-    patch.setattr(packets, "LEAST_IN_COMMON", least)
-    patch.setattr(packets, "LEAST_PIXELS", least)
+    """Have rays followed one by one, or in blocks or packets wherever they can be.
+
+    ``patch`` undoes it. One by one is how a GPU follows all of them.
+    """
+    least = 0.0 if dealt == "packets" else math.inf
+    for name in ("LEAST_IN_COMMON", "LEAST_IN_COMMON_WITHOUT_BLOCKS", "LEAST_PIXELS"):
+        patch.setattr(packets, name, least)
+    if dealt == "one by one":
+        patch.setattr(PreparedVDI, "_in_blocks", lambda self, defines: False)
 
 
 # -- VDIs ------------------------------------------------------------------------------------------
