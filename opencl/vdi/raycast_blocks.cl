@@ -69,7 +69,7 @@ typedef struct {
     Ints i, j; // lists
     Reals r;
     Reals depth; // in their sense, see common/lists.cl
-    Ints guess, low, missed; // see common/lists.cl
+    Ints guess, low, high, missed; // of the search, see common/lists.cl; the answer is `high` at most
     Ints goes; // rays that have not ended
 } Progress;
 
@@ -122,6 +122,7 @@ inline void pass_by(Progress *now, Ints looks, const Axis *u, const Axis *v, Rea
         now->r = select(now->r, r, moves);
         now->depth = select(now->depth, fma(r, along_depth, deep_depth), moves);
         now->low = select(now->low, (Ints)(0), moves);
+        now->high = select(now->high, (Ints)(INT_MAX), moves);
         now->missed = select(now->missed, (Ints)(0), moves);
         const Ints ends = r_until >= r_end || i < 0 || i >= u->lists || j < 0 || j >= v->lists;
         looks = passes && !ends && ((i ^ now->i) | (j ^ now->j)) >> TILE_SHIFT != 0;
@@ -160,6 +161,7 @@ inline void follow(Seen *seen, const Packet *packet, const Axis *u, const Axis *
     now.r = packet->r_begin;
     now.depth = sense * packet->start_z;
     now.guess = now.low = now.missed = 0;
+    now.high = INT_MAX;
     now.goes = going;
 #ifdef SKIP_EMPTY
     Ints fresh = fabs(u->along) + fabs(v->along) > FEW_LISTS; // rays in a tile that they have not looked at
@@ -178,23 +180,8 @@ inline void follow(Seen *seen, const Packet *packet, const Axis *u, const Axis *
         const Ints first = as_int16(header.low) + place;
         const Ints count = as_int16(header.high >> (FIRST_BITS - 32));
 
-        // Search, as in common/lists.cl
-        Ints n = min(now.guess, count);
-        const Ints lost = now.goes && now.missed >= CLOSE_GUESSES;
-        if (ANY(lost)) {
-            Ints low = select(n, now.low, lost);
-            Ints high = select(n, count, lost);
-            while (ANY(low < high)) {
-                const Ints middle = (low + high) >> 1;
-                Reals near, far;
-                faces_met(&near, &far, list_faces, first, count, middle, low < high, away);
-                const Ints before = low < high && far <= now.depth;
-                high = select(middle, high, before || low >= high);
-                low = select(low, middle + 1, before);
-            }
-            n = low;
-            now.low = select(now.low, n, lost);
-        }
+        // Search, as in common/lists.cl; what is halved after some wrong guesses is halved once in each turn
+        const Ints n = min(now.guess, count);
         const Ints there = now.goes && n < count;
         Reals near = INFINITY, far = INFINITY;
         if (ANY(there)) {
@@ -229,10 +216,14 @@ inline void follow(Seen *seen, const Packet *packet, const Axis *u, const Axis *
         }
         const Ints ends_here = meets && far <= next_depth; // behind it comes the next one
         const Ints leaves = found && !ends_here;
-        now.guess = select(select(n, n - 1, beyond), n + 1, passed || ends_here);
         now.low = select(now.low, n + 1, passed || ends_here);
+        now.high = select(now.high, n - 1, beyond);
         now.missed -= passed || beyond;
+        const Ints halves = (passed || beyond) && now.missed >= CLOSE_GUESSES;
+        now.guess = select(select(n, n - 1, beyond), n + 1, passed || ends_here);
+        now.guess = select(now.guess, (now.low + min(now.high, count)) >> 1, halves);
         now.low = select(now.low, (Ints)(0), leaves);
+        now.high = select(now.high, (Ints)(INT_MAX), leaves);
         now.missed = select(now.missed, (Ints)(0), leaves);
         now.r = select(now.r, r_next, leaves);
         now.depth = select(now.depth, next_depth, leaves);
