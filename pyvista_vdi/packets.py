@@ -2,8 +2,8 @@
 
 Rays of one plane through the eyes of V_O and V_N cross the same lists, if not at the same depth. On
 a CPU a packet of such rays loads each list once. That pays where rays cross many lists. Where they
-do not, a CPU follows them one by one, in blocks. At V_O each ray goes through a list of its own, and
-a packet's lists lie side by side.
+do not, a CPU follows them one by one, in blocks. At V_O each ray goes through a list of its own,
+and a packet's lists lie side by side.
 """
 
 from __future__ import annotations

@@ -177,8 +177,8 @@ DEALT = ("one by one", "blocks", "packets")
 def deal_rays(patch, dealt):
     """Have rays followed one by one, or in blocks or packets wherever they can be.
 
-    ``patch`` undoes it. One by one is how a GPU follows all of them; in the other ways what stays in
-    lists of its own is drawn from these.
+    ``patch`` undoes it. One by one is how a GPU follows all of them; in the other ways rays that
+    stay in lists of their own are drawn from these.
     """
     least = 0.0 if dealt == "packets" else math.inf
     for name in ("LEAST_IN_COMMON", "LEAST_IN_COMMON_WITHOUT_BLOCKS", "LEAST_PIXELS"):
