@@ -179,6 +179,8 @@ class DeviceBuffer:
     host : numpy.ndarray or None
         The array whose memory it is and that kernels write, of :meth:`Runtime.result` and
         :meth:`Runtime.target` on a CPU device.
+    identity : object
+        Tells this buffer from every other one for as long as anybody remembers it.
     """
 
     def __init__(
@@ -198,6 +200,7 @@ class DeviceBuffer:
         self.writable = writable
         self.readers: set[int] | None = None
         self.host: NDArray[Any] | None = None
+        self.identity = object()
         self._memory = memory
         self._finalizer = weakref.finalize(self, _release, memory, on_release)
         self._finalizer.atexit = False  # the driver frees everything at exit

@@ -21,8 +21,8 @@ from pyvista_vdi.opencl_runtime.arguments import (
     Size,
     as_size,
     check_host_array,
-    driver_argument,
     preferred_group,
+    set_arguments,
 )
 from pyvista_vdi.opencl_runtime.buffers import (
     DeviceBuffer,
@@ -180,10 +180,9 @@ class Runtime:
             return
 
         with self._driver(f"launching {kernel.name!r} of {kernel.path} on {whole} by {group}"):
-            mine = kernel.object
-            for index, argument in enumerate(args):
-                mine.set_arg(index, driver_argument(kernel, index, argument))
-                if isinstance(argument, DeviceBuffer):
+            set_arguments(kernel, args)
+            for argument in args:
+                if isinstance(argument, DeviceBuffer) and argument.readers is not None:
                     self._note_reader(argument)
             if self._turns.worker is None:
                 self._enqueue(kernel, whole, group)
