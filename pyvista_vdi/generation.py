@@ -21,7 +21,7 @@ from .dial import Dial, refuse_settings
 from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory
 from .lighting import Lights
-from .opencl_runtime import Runtime, aligned_empty, get_runtime
+from .opencl_runtime import DeviceBuffer, GrowingArray, Runtime, get_runtime
 from .precision import check_precision
 from .rays import check_list_space
 from .transfer_function import TransferFunction
@@ -46,6 +46,15 @@ CRITERIA = tuple(_CRITERIA)
 _RUN_BYTES = 9 * 4
 #: Records have room for a multiple of so many runs: ``ERRORS`` of ``vdi/runs.cl``.
 _ERRORS_AT_A_TIME = 8
+#: A VDI's arrays of supersegments, as messages call them, and the shape of an element.
+_LIST_ARRAYS: dict[str, tuple[int, ...]] = {
+    "front depths": (),
+    "back depths": (),
+    "supersegment colours": (3,),
+    "optical depths": (),
+}
+#: Bytes of a supersegment in them.
+_SUPERSEGMENT_BYTES = 24
 #: Bytes of runs that one slice of rays records at a time; also how often progress is reported.
 _SLICE_BYTES = 96 * 2**20
 #: Slices that a memory limit has room for: the volume gets more than they do.
@@ -161,7 +170,7 @@ def estimate(
     on_device, samples = volume_bytes(volume, volume.array.size * item, room)
     return Estimate(
         volume=on_device,
-        vdi_worst_case=lists * (limit * 24 + 8) + 8,
+        vdi_worst_case=lists * (limit * _SUPERSEGMENT_BYTES + 8) + 8,
         working=plan.bytes + samples,
         occlusion=grid,
     )
@@ -299,7 +308,7 @@ def generate_vdi(
     limit = check_max_supersegments(max_supersegments)
     criterion, precision = check_criterion(criterion), check_precision(precision)
     tolerance, hidden_weight = _check_weights(tolerance, view_cone)
-    _require_room((), (width, height))
+    _require_room(0, (width, height))
     runtime = get_runtime(device)
     lights = Lights.from_any(lights)
     occlusion = AmbientOcclusion.from_any(ambient_occlusion)
@@ -316,22 +325,22 @@ def generate_vdi(
         room=slices.room(memory, grid),
     )
     size = (width, height)
-    parts = []
     with (
         medium.giving_bricks_back(),
         _Recorder(
             runtime, medium, camera, size, slices, limit, criterion, tolerance, hidden_weight
         ) as recorder,
     ):
+        lists = _GrowingLists(runtime, size, limit)
         for first_row in range(0, height, recorder.slices.rows):
             _report(progress, first_row / height)
             rows = min(recorder.slices.rows, height - first_row)
             recorder.march(first_row, rows)
-            parts.append(recorder.packed(first_row, rows))
-            _require_room(parts, size)
+            recorder.pack(first_row, rows, lists)
+        recorder.collect()
     _report(progress, 1.0)
 
-    lengths, front, back, color, optical_depth = _joined(runtime, parts)
+    offsets, front, back, color, optical_depth = lists.finished()
     made_by = {
         "generator": f"pyvista-vdi {__version__}",
         "criterion": criterion,
@@ -356,7 +365,7 @@ def generate_vdi(
     return VDI(
         camera,
         (width, height),
-        np.concatenate([np.zeros(1, np.uint64), np.cumsum(lengths, dtype=np.uint64)]),
+        offsets,
         front,
         back,
         color,
@@ -386,7 +395,7 @@ class _Slices:
             most = min(most, memory_limit // _SLICES_IN_LIMIT)
         self.rows = min(height, 4 * max(1, most // per_block_row))
         self.items = block_items(width, self.rows)
-        packed_bytes = self.items * (limit * 24 + 8)
+        packed_bytes = self.items * (limit * _SUPERSEGMENT_BYTES + 8)
         self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + packed_bytes
         self.text = f"{self.rows} rows of {width} lists of up to {limit} supersegments"
 
@@ -478,12 +487,15 @@ class _Recorder:
                 )
             self._longest = self._longest_marches()
             self._buffers = stack.pop_all()
+        self._packing: list[tuple[DeviceBuffer, NDArray[Any]]] = []  # what it goes into
+        self._packed = ExitStack()  # the buffers that this takes
 
     def __enter__(self) -> _Recorder:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._runtime.finish()  # the forms may be host memory that the device still reads
+        self._packed.close()
         self._buffers.close()
 
     def march(self, first_row: int, rows: int) -> None:
@@ -570,23 +582,21 @@ class _Recorder:
             self._counts,
         )
 
-    def packed(self, first_row: int, rows: int) -> tuple[NDArray[Any], ...]:
-        """Return lengths, fronts, backs, colours and optical depths of the slice's lists."""
+    def pack(self, first_row: int, rows: int, lists: _GrowingLists) -> None:
+        """Write the slice's lists behind those made before.
+
+        What is launched next need not wait for that; :meth:`collect` does.
+        """
         runtime, (width, height) = self._runtime, self._size
         entries: tuple[Any, ...] = ()
         if self._far_entries:
             entries = (self._forms, np.int32(self._planes), np.int32(height), np.int32(first_row))
         lengths = runtime.download(self._counts, count=rows * width)
-        offsets = np.zeros(rows * width + 1, np.uint64)
-        np.cumsum(lengths, dtype=np.uint64, out=offsets[1:])
-        n = int(offsets[-1])
-        with (
-            runtime.upload(offsets, "list offsets") as starts,
-            runtime.result((n,), name="front depths") as front,
-            runtime.result((n,), name="back depths") as back,
-            runtime.result((n, 3), name="supersegment colours") as color,
-            runtime.result((n,), name="optical depths") as optical_depth,
-        ):
+        self.collect()
+        starts, arrays = lists.room_for(lengths)
+        with ExitStack() as stack:
+            keep = stack.enter_context
+            targets = [keep(runtime.target(array, name)) for name, array in arrays.items()]
             self._launch(
                 "pack_lists",
                 block_items(width, rows),
@@ -594,15 +604,19 @@ class _Recorder:
                 np.int32(self.slices.capacity),
                 np.int32(width),
                 np.int32(rows),
-                starts,
-                front,
-                back,
-                color,
-                optical_depth,
+                keep(runtime.upload(starts, "list offsets")),
+                *targets,
                 *entries,
             )
-            arrays = [runtime.download(buffer) for buffer in (front, back, color, optical_depth)]
-        return (lengths, *arrays)
+            self._packing = list(zip(targets, arrays.values(), strict=True))
+            self._packed = stack.pop_all()
+
+    def collect(self) -> None:
+        """Wait until the lists that are being packed are in their arrays."""
+        for target, array in self._packing:
+            self._runtime.download(target, array)
+        self._packing = []
+        self._packed.close()
 
     def _launch(self, name: str, items: int, *arguments: Any) -> None:
         self._runtime.launch(self._kernels[name], items, GROUP, *arguments)
@@ -619,31 +633,51 @@ def _check_weights(tolerance: float, view_cone: float) -> tuple[float, float]:
     return difference, float(1 - np.cos(np.radians(angle)))
 
 
-def _joined(runtime: Runtime, parts: list[tuple[NDArray[Any], ...]]) -> list[NDArray[Any]]:
-    """Join the slices' arrays, each kind into one that a CPU device uses in place.
+class _GrowingLists:
+    """A VDI's arrays while slices of lists are written into them, one behind the other.
 
-    ``parts`` are let go of one by one, so that the VDI is not there twice.
+    Room for every list at its longest is asked for at once: systems take memory as it is written,
+    so that what stays unused costs nothing, and nothing is ever copied. :meth:`finished` gives it
+    back.
     """
-    sizes = [sum(len(array) for array in arrays) for arrays in zip(*parts, strict=True)]
-    joined = [
-        aligned_empty((size, *array.shape[1:]), array.dtype)  # taken as it is written
-        for size, array in zip(sizes, parts[0], strict=True)
-    ]
-    ends = sizes
-    while parts:
-        firsts = [end - len(array) for end, array in zip(ends, parts[-1], strict=True)]
-        for whole, array, first, end in zip(joined, parts.pop(), firsts, ends, strict=True):
-            runtime.give_way()
-            whole[first:end] = array
-        ends = firsts
-    return joined
+
+    def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int) -> None:
+        # What a device uses in place may hold the end of the lists before as well
+        self._alignment = runtime.in_place_alignment or 1  # as many elements are aligned, too
+        self._size = size
+        self._most = size[0] * size[1] * limit  # supersegments
+        self._offsets = np.zeros(size[0] * size[1] + 1, np.uint64)
+        self._made = 0  # lists so far
+        self._arrays = {name: GrowingArray(item) for name, item in _LIST_ARRAYS.items()}
+
+    def room_for(
+        self, lengths: NDArray[np.uint32]
+    ) -> tuple[NDArray[np.uint64], dict[str, NDArray[np.float32]]]:
+        """Return where the next lists go: their starts in parts of the arrays, and those parts."""
+        first, last = self._made, self._made + len(lengths)
+        begin = int(self._offsets[first])
+        lead = begin % self._alignment
+        starts = np.full(len(lengths) + 1, lead, np.uint64)
+        starts[1:] += np.cumsum(lengths, dtype=np.uint64)
+        end = begin - lead + int(starts[-1])
+        _require_room(end, self._size)
+        self._offsets[first + 1 : last + 1] = starts[1:] + np.uint64(begin - lead)
+        self._made = last
+        for array in self._arrays.values():
+            array.reserve(end, self._most)
+        parts = {name: array.part(begin - lead, end) for name, array in self._arrays.items()}
+        return starts, parts
+
+    def finished(self) -> list[NDArray[Any]]:
+        """Return offsets, fronts, backs, colours and optical depths."""
+        n = int(self._offsets[-1])
+        return [self._offsets, *(array.finished(n) for array in self._arrays.values())]
 
 
-def _require_room(parts: Sequence[tuple[NDArray[Any], ...]], size: tuple[int, int]) -> None:
-    """Refuse to go on where the host cannot hold the VDI: its arrays, and a slice of them twice."""
-    made = [sum(array.nbytes for array in part) for part in parts]
+def _require_room(supersegments: int, size: tuple[int, int]) -> None:
+    """Refuse to go on where the host cannot hold a VDI of at least so many supersegments."""
     require_host_memory(
-        sum(made) + max(made, default=0) + 8 * size[0] * size[1],
+        supersegments * _SUPERSEGMENT_BYTES + 8 * size[0] * size[1],
         f"a VDI of {size[0]} x {size[1]} lists",
         "lower the window size or max_supersegments, or raise tolerance",
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from pyvista_vdi.opencl_runtime.arguments import padded
 from pyvista_vdi.opencl_runtime.buffers import (
     DeviceBuffer,
+    GrowingArray,
     LocalMemory,
     aligned_empty,
     bytes_text,
@@ -23,6 +24,7 @@ from pyvista_vdi.opencl_runtime.runtime import Runtime
 __all__ = [
     "DeviceBuffer",
     "DeviceInfo",
+    "GrowingArray",
     "Kernel",
     "KernelTime",
     "LocalMemory",

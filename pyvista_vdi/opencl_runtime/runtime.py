@@ -25,6 +25,7 @@ from pyvista_vdi.opencl_runtime.arguments import (
     set_arguments,
 )
 from pyvista_vdi.opencl_runtime.buffers import (
+    HOST_ALIGNMENT,
     DeviceBuffer,
     Ledger,
     aligned_empty,
@@ -374,6 +375,14 @@ class Runtime:
             )
         access = flags.READ_WRITE | flags.USE_HOST_PTR
         return self._allocate(access, array.shape, array.dtype, name, array, writable=True)
+
+    @property
+    def in_place_alignment(self) -> int | None:
+        """Bytes; what begins at a multiple in an :func:`aligned_empty` array is used in place.
+
+        None where a device uses no array in place.
+        """
+        return self._alignment if self.is_cpu and HOST_ALIGNMENT % self._alignment == 0 else None
 
     def _in_place(self, array: NDArray[Any]) -> bool:
         """Whether kernels can use a C-contiguous array where it is."""
