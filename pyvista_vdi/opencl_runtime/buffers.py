@@ -15,9 +15,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
-
-HOST_ALIGNMENT = 4096
-"""Bytes; arrays that begin at a multiple are used in place by CPU drivers instead of copied."""
+from pyvista_vdi.host_memory import HOST_ALIGNMENT
 
 
 @dataclass(frozen=True)
@@ -39,29 +37,6 @@ def bytes_text(nbytes: int) -> str:
         if nbytes >= size:
             return f"{nbytes / size:.2f} {unit} ({nbytes} bytes)"
     return f"{nbytes} bytes"
-
-
-def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Uninitialised C-contiguous array that a CPU device can use without a copy.
-
-    Parameters
-    ----------
-    shape : int or tuple of int
-        Shape.
-    dtype : dtype_like
-        Element type.
-
-    Returns
-    -------
-    numpy.ndarray
-        Its data begin at a multiple of 4096 bytes.
-    """
-    dtype = np.dtype(dtype)
-    shape = (shape,) if isinstance(shape, int) else tuple(shape)
-    nbytes = math.prod(shape) * dtype.itemsize
-    raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
-    start = -raw.ctypes.data % HOST_ALIGNMENT
-    return raw[start : start + nbytes].view(dtype).reshape(shape)
 
 
 class GrowingArray:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.host_memory import HOST_ALIGNMENT, aligned_empty
 from pyvista_vdi.opencl_runtime.arguments import (
     Argument,
     Size,
@@ -25,10 +26,8 @@ from pyvista_vdi.opencl_runtime.arguments import (
     set_arguments,
 )
 from pyvista_vdi.opencl_runtime.buffers import (
-    HOST_ALIGNMENT,
     DeviceBuffer,
     Ledger,
-    aligned_empty,
     bytes_text,
     shape_of,
 )
