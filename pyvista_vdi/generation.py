@@ -21,7 +21,7 @@ from .dial import Dial, refuse_settings
 from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory
 from .lighting import Lights
-from .opencl_runtime import DeviceBuffer, GrowingArray, Runtime, get_runtime
+from .opencl_runtime import DeviceBuffer, GrowingArray, Runtime, aligned_empty, get_runtime
 from .precision import check_precision
 from .rays import check_list_space
 from .transfer_function import TransferFunction
@@ -53,8 +53,8 @@ _LIST_ARRAYS: dict[str, tuple[int, ...]] = {
     "supersegment colours": (3,),
     "optical depths": (),
 }
-#: Bytes of a supersegment in them.
-_SUPERSEGMENT_BYTES = 24
+#: Bytes of a supersegment in them, and in the largest of them.
+_SUPERSEGMENT_BYTES, _LARGEST_ELEMENT = 24, 12
 #: Bytes of runs that one slice of rays records at a time; also how often progress is reported.
 _SLICE_BYTES = 96 * 2**20
 #: Slices that a memory limit has room for: the volume gets more than they do.
@@ -330,17 +330,16 @@ def generate_vdi(
         _Recorder(
             runtime, medium, camera, size, slices, limit, criterion, tolerance, hidden_weight
         ) as recorder,
+        _GrowingLists(runtime, size, limit) as lists,
     ):
-        lists = _GrowingLists(runtime, size, limit)
         for first_row in range(0, height, recorder.slices.rows):
             _report(progress, first_row / height)
             rows = min(recorder.slices.rows, height - first_row)
             recorder.march(first_row, rows)
             recorder.pack(first_row, rows, lists)
-        recorder.collect()
+        offsets, front, back, color, optical_depth = lists.finished()
     _report(progress, 1.0)
 
-    offsets, front, back, color, optical_depth = lists.finished()
     made_by = {
         "generator": f"pyvista-vdi {__version__}",
         "criterion": criterion,
@@ -472,6 +471,7 @@ class _Recorder:
             self._errors = keep(runtime.buffer((items, capacity), name="merge errors"))
             self._thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
             self._counts = keep(runtime.buffer((items,), np.uint32, "list lengths"))
+            self._starts = keep(ExitStack())  # the buffer that says where the lists go
             self._sampler = None
             if medium.bricks is not None:
                 march = (
@@ -487,15 +487,12 @@ class _Recorder:
                 )
             self._longest = self._longest_marches()
             self._buffers = stack.pop_all()
-        self._packing: list[tuple[DeviceBuffer, NDArray[Any]]] = []  # what it goes into
-        self._packed = ExitStack()  # the buffers that this takes
 
     def __enter__(self) -> _Recorder:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._runtime.finish()  # the forms may be host memory that the device still reads
-        self._packed.close()
         self._buffers.close()
 
     def march(self, first_row: int, rows: int) -> None:
@@ -583,40 +580,26 @@ class _Recorder:
         )
 
     def pack(self, first_row: int, rows: int, lists: _GrowingLists) -> None:
-        """Write the slice's lists behind those made before.
-
-        What is launched next need not wait for that; :meth:`collect` does.
-        """
+        """Write the slice's lists behind those made before; what is launched next need not wait."""
         runtime, (width, height) = self._runtime, self._size
         entries: tuple[Any, ...] = ()
         if self._far_entries:
             entries = (self._forms, np.int32(self._planes), np.int32(height), np.int32(first_row))
-        lengths = runtime.download(self._counts, count=rows * width)
-        self.collect()
-        starts, arrays = lists.room_for(lengths)
-        with ExitStack() as stack:
-            keep = stack.enter_context
-            targets = [keep(runtime.target(array, name)) for name, array in arrays.items()]
-            self._launch(
-                "pack_lists",
-                block_items(width, rows),
-                self._records,
-                np.int32(self.slices.capacity),
-                np.int32(width),
-                np.int32(rows),
-                keep(runtime.upload(starts, "list offsets")),
-                *targets,
-                *entries,
-            )
-            self._packing = list(zip(targets, arrays.values(), strict=True))
-            self._packed = stack.pop_all()
-
-    def collect(self) -> None:
-        """Wait until the lists that are being packed are in their arrays."""
-        for target, array in self._packing:
-            self._runtime.download(target, array)
-        self._packing = []
-        self._packed.close()
+        starts, targets = lists.room_for(runtime.download(self._counts, count=rows * width))
+        if starts[-1] == starts[0]:
+            return
+        self._starts.close()  # of the slice before, which is done
+        self._launch(
+            "pack_lists",
+            block_items(width, rows),
+            self._records,
+            np.int32(self.slices.capacity),
+            np.int32(width),
+            np.int32(rows),
+            self._starts.enter_context(runtime.upload(starts, "list offsets")),
+            *targets,
+            *entries,
+        )
 
     def _launch(self, name: str, items: int, *arguments: Any) -> None:
         self._runtime.launch(self._kernels[name], items, GROUP, *arguments)
@@ -638,39 +621,74 @@ class _GrowingLists:
 
     Room for every list at its longest is asked for at once: systems take memory as it is written,
     so that what stays unused costs nothing, and nothing is ever copied. :meth:`finished` gives it
-    back.
+    back. A device that uses arrays in place writes all slices through the same buffers, which
+    reach as far as they may; any other has buffers of a slice, whose values are copied.
     """
 
     def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int) -> None:
-        # What a device uses in place may hold the end of the lists before as well
-        self._alignment = runtime.in_place_alignment or 1  # as many elements are aligned, too
+        self._runtime = runtime
         self._size = size
         self._most = size[0] * size[1] * limit  # supersegments
         self._offsets = np.zeros(size[0] * size[1] + 1, np.uint64)
         self._made = 0  # lists so far
         self._arrays = {name: GrowingArray(item) for name, item in _LIST_ARRAYS.items()}
+        self._begin = self._end = 0  # supersegments that the buffers hold
+        self._targets: list[tuple[DeviceBuffer, NDArray[Any]]] = []  # and what they are to fill
+
+    def __enter__(self) -> _GrowingLists:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for target, _part in self._targets:
+            target.release()
 
     def room_for(
         self, lengths: NDArray[np.uint32]
-    ) -> tuple[NDArray[np.uint64], dict[str, NDArray[np.float32]]]:
-        """Return where the next lists go: their starts in parts of the arrays, and those parts."""
+    ) -> tuple[NDArray[np.uint64], list[DeviceBuffer]]:
+        """Return where the next lists begin in the buffers, and the buffers."""
         first, last = self._made, self._made + len(lengths)
-        begin = int(self._offsets[first])
-        lead = begin % self._alignment
-        starts = np.full(len(lengths) + 1, lead, np.uint64)
-        starts[1:] += np.cumsum(lengths, dtype=np.uint64)
-        end = begin - lead + int(starts[-1])
-        _require_room(end, self._size)
-        self._offsets[first + 1 : last + 1] = starts[1:] + np.uint64(begin - lead)
+        begin = self._offsets[first]
+        ends: NDArray[np.uint64] = self._offsets[first + 1 : last + 1]
+        np.cumsum(lengths, dtype=np.uint64, out=ends)
+        np.add(ends, begin, out=ends)
         self._made = last
+        end = int(self._offsets[last])
+        _require_room(end, self._size)
+        if end > self._end:
+            self._make_room(int(begin), end)
+        starts = aligned_empty(last + 1 - first, np.uint64)
+        np.subtract(self._offsets[first : last + 1], np.uint64(self._begin), out=starts)
+        return starts, [target for target, _part in self._targets]
+
+    def _make_room(self, begin: int, end: int) -> None:
+        """Have buffers of the supersegments from ``begin``, those made so far, to ``end``."""
+        self._collect(begin)
         for array in self._arrays.values():
             array.reserve(end, self._most)
-        parts = {name: array.part(begin - lead, end) for name, array in self._arrays.items()}
-        return starts, parts
+        alignment = self._runtime.in_place_alignment
+        if alignment is not None:
+            begin -= begin % alignment  # so many elements are aligned as well
+            room = min(array.room for array in self._arrays.values())
+            largest = self._runtime.info.max_allocation // _LARGEST_ELEMENT
+            end = max(end, min(room, begin + largest))
+        self._begin, self._end = begin, end
+        for name, array in self._arrays.items():
+            part: NDArray[Any] = array.part(begin, end)
+            self._targets.append((self._runtime.target(part, name), part))
+
+    def _collect(self, made: int) -> None:
+        """Wait until so many supersegments are in the arrays, and let go of the buffers."""
+        while self._targets:
+            target, part = self._targets[-1]
+            filled = part[: made - self._begin]
+            self._runtime.download(target, filled, count=filled.size)
+            target.release()
+            self._targets.pop()
 
     def finished(self) -> list[NDArray[Any]]:
         """Return offsets, fronts, backs, colours and optical depths."""
         n = int(self._offsets[-1])
+        self._collect(n)
         return [self._offsets, *(array.finished(n) for array in self._arrays.values())]
 
 

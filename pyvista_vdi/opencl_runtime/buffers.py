@@ -51,6 +51,11 @@ class GrowingArray:
         Shape of an element.
     dtype : dtype_like
         Element type.
+
+    Attributes
+    ----------
+    room : int
+        Elements that there is room for.
     """
 
     def __init__(self, item: tuple[int, ...] = (), dtype: DTypeLike = np.float32) -> None:
@@ -59,7 +64,7 @@ class GrowingArray:
         self._bytes = math.prod(item) * self._dtype.itemsize
         self._raw = np.empty(0, np.uint8)
         self._start = 0  # where it is aligned as that of aligned_empty
-        self._room = 0  # elements
+        self.room = 0
 
     def reserve(self, n: int, most: int) -> None:
         """Have room for at least n elements, and if it can be had for the most there may be.
@@ -69,7 +74,7 @@ class GrowingArray:
         MemoryError
             If not even that many can be had.
         """
-        if n <= self._room:
+        if n <= self.room:
             return
         for room in (most, 2 * n):
             try:
@@ -82,9 +87,9 @@ class GrowingArray:
     def _move(self, room: int) -> None:
         raw = np.empty(room * self._bytes + HOST_ALIGNMENT, np.uint8)
         start = -raw.ctypes.data % HOST_ALIGNMENT
-        kept = self._room * self._bytes
+        kept = self.room * self._bytes
         raw[start : start + kept] = self._raw[self._start : self._start + kept]
-        self._raw, self._start, self._room = raw, start, room
+        self._raw, self._start, self.room = raw, start, room
 
     def part(self, first: int, last: int) -> NDArray[Any]:
         """Return elements to write, a view that is valid until the next call of another method."""

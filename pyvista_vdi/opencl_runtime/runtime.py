@@ -340,7 +340,7 @@ class Runtime:
         """Memory for kernels to write what an array is to hold; :meth:`download` brings it there.
 
         A CPU device writes into an array that is aligned for it in place, and the download into
-        that very array copies nothing.
+        that very array, or its beginning, copies nothing.
 
         Parameters
         ----------
@@ -440,7 +440,7 @@ class Runtime:
             raise InvalidArgumentError(f"the target for {buffer.name!r} is not writable")
         if out.nbytes:
             with self._driver(f"reading {out.nbytes} bytes of the buffer {buffer.name!r}"):
-                if out is buffer.host:
+                if buffer.host is not None and out.ctypes.data == buffer.host.ctypes.data:
                     self._map(memory, out)
                 else:
                     self._copy("[read]", memory, out, to_host=True)
