@@ -6,25 +6,21 @@ Writes ``ambient_occlusion_WxH.json`` and ``.md``, for the two volumes that are 
 from __future__ import annotations
 
 import argparse
-import json
 import statistics
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import window_size  # beside this file
+from common import add_size, new_parser, save, subject_of, write_text  # beside this file
 from tqdm import tqdm
 
-from pyvista_vdi import AmbientOcclusion, examples
+from pyvista_vdi import AmbientOcclusion
 from pyvista_vdi.ambient_occlusion import OcclusionGrid
 from pyvista_vdi.camera import Camera
-from pyvista_vdi.classification import Classification
 from pyvista_vdi.device_volume import DeviceVolume
 from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.io import whole_file
 from pyvista_vdi.metrics import compare_images
 from pyvista_vdi.opencl_runtime import get_runtime
 from pyvista_vdi.raycast import render_vdi
@@ -32,7 +28,7 @@ from pyvista_vdi.raycast_volume import raycast_volume
 from pyvista_vdi.reference import ambient_transmittance
 from pyvista_vdi.reference.occlusion import _trilinear as trilinear
 from pyvista_vdi.reference.rays import pixel_ray
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.volume import Volume
@@ -52,10 +48,9 @@ raycaster with the same occlusion, and in brackets both without."""
 
 def main() -> int:
     """Measure, and write what was found."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--size", type=window_size, default=(640, 360), metavar="WxH")
-    parser.add_argument("--repeats", type=int, default=5, help="timed rounds")
+    parser = new_parser(__doc__, repeats=5, repeated="timed rounds")
+    add_size(parser, (640, 360))
+    parser.set_defaults(interpolation="linear")
     options = parser.parse_args()
     cases = [(name, look) for name in VOLUMES for look in TRANSFER_FUNCTIONS]
     results = {
@@ -64,21 +59,15 @@ def main() -> int:
         "rows": [measured(*case, options) for case in tqdm(cases, unit="case")],
     }
     width, height = options.size
-    options.out.mkdir(parents=True, exist_ok=True)
     target = options.out / f"ambient_occlusion_{width}x{height}.json"
-    with whole_file(target) as stream:
-        stream.write(json.dumps(results, indent=1).encode() + b"\n")
-    with whole_file(target.with_suffix(".md")) as stream:
-        stream.write("\n".join([*table(results), ""]).encode())
+    save(results, target)
+    write_text(target.with_suffix(".md"), "\n".join([*table(results), ""]))
     return 0
 
 
 def measured(name: str, look: str, options: argparse.Namespace) -> dict[str, Any]:
     """Return a row of the table."""
-    volume = examples.load_data(name, as_volume=True)
-    looks = {**TRANSFER_FUNCTIONS[look], "interpolation": "linear"}
-    classified = Classification(looks, "ambient_occlusion").transfer_function(volume)
-    view = filling_camera(volume.bounds, options.size)
+    volume, classified, view = subject_of(name, options, look)
     occlusion = AmbientOcclusion()
     plain = generate_vdi(volume, view, options.size, classified)
     occluded = generate_vdi(volume, view, options.size, classified, ambient_occlusion=occlusion)

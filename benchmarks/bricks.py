@@ -9,19 +9,19 @@ from __future__ import annotations
 import argparse
 import sys
 
-from common import (
-    INTERPOLATIONS,
+from common import (  # beside this file
+    add_looks,
+    add_size,
+    add_volumes,
     at_hand,
     new_parser,
+    subject_of,
     table,
     timed,
-    window_size,
-)  # beside this file
+)
 
-from pyvista_vdi import VDI, examples
-from pyvista_vdi.classification import Classification
+from pyvista_vdi import VDI
 from pyvista_vdi.generation import estimate, generate_vdi
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 
 
 def main() -> int:
@@ -29,10 +29,7 @@ def main() -> int:
     options = parsed()
     rows = []
     for name in at_hand(options.volumes):
-        volume = examples.load_data(name, as_volume=True)
-        looks = {**TRANSFER_FUNCTIONS[options.tf], "interpolation": options.interpolation}
-        classified = Classification(looks, "a benchmark").transfer_function(volume)
-        view = filling_camera(volume.bounds, options.size)
+        volume, classified, view = subject_of(name, options)
 
         def made(limit: str | None) -> VDI:
             return generate_vdi(
@@ -67,13 +64,11 @@ def main() -> int:
 
 def parsed() -> argparse.Namespace:
     """Return the options."""
-    parser = new_parser(__doc__, repeats=5, repeated="how often each is generated")
-    names = sorted(examples.VOLUMES)
-    parser.add_argument("--volumes", nargs="+", choices=names, default=["brain"], metavar="NAME")
-    parser.add_argument("--size", type=window_size, default=(320, 180), metavar="WxH")
+    parser = new_parser(__doc__, repeats=5, repeated="how often each is generated", writes=False)
+    add_volumes(parser, ["brain"])
+    add_size(parser, (320, 180))
     parser.add_argument("--limits", nargs="+", default=["12 MiB", "14 MiB"], metavar="SIZE")
-    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
-    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
+    add_looks(parser, max_supersegments=None)
     return parser.parse_args()
 
 

@@ -9,16 +9,19 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pyvista_vdi import examples
+from pyvista_vdi.camera import Camera
 from pyvista_vdi.classification import Classification
 from pyvista_vdi.compare.measure import without_infinities
 from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.io import read, whole_file
 from pyvista_vdi.opencl_runtime import Runtime
 from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
+from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vdi import VDI
+from pyvista_vdi.volume import Volume
 
 INTERPOLATIONS = ("nearest", "linear")
 
@@ -35,23 +38,76 @@ def window_size(text: str) -> tuple[int, int]:
     return width, height
 
 
-def new_parser(doc: str | None, *, repeats: int, repeated: str) -> argparse.ArgumentParser:
+class Subject(NamedTuple):
+    """A volume as the options of a script want it seen."""
+
+    volume: Volume
+    classified: TransferFunction
+    view: Camera  # V_O, whose window it fills
+
+
+def new_parser(
+    doc: str | None, *, repeats: int | None = None, repeated: str = "", writes: bool = True
+) -> argparse.ArgumentParser:
     """Return a parser with the options that every script has.
 
     Parameters
     ----------
     doc : str, optional
         The script's docstring; its first line is the description.
-    repeats : int
-        How often things are timed by default.
+    repeats : int, optional
+        How often things are timed by default, if they are.
     repeated : str
         What is.
+    writes : bool
+        Whether results go into a folder.
     """
     parser = argparse.ArgumentParser(description=doc.splitlines()[0] if doc else None)
-    parser.add_argument("--out", type=Path, default=RESULTS, metavar="FOLDER")
-    parser.add_argument("--repeats", type=int, default=repeats, help=repeated)
+    if writes:
+        parser.add_argument("--out", type=Path, default=RESULTS, metavar="FOLDER")
+    if repeats is not None:
+        parser.add_argument("--repeats", type=int, default=repeats, help=repeated)
     parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
     return parser
+
+
+def add_size(parser: argparse.ArgumentParser, size: tuple[int, int] = WINDOW_SIZE) -> None:
+    """Add ``--size``, V_O's window in pixels."""
+    parser.add_argument("--size", type=window_size, default=size, metavar="WxH")
+
+
+def add_volumes(parser: argparse.ArgumentParser, volumes: Sequence[str] | None = None) -> None:
+    """Add ``--volumes``: those by default, or every known one."""
+    names = sorted(examples.VOLUMES)
+    parser.add_argument(
+        "--volumes", nargs="+", choices=names, default=volumes or names, metavar="NAME"
+    )
+
+
+def add_looks(
+    parser: argparse.ArgumentParser,
+    *,
+    tf: str | None = "soft",
+    interpolation: str | None = "nearest",
+    max_supersegments: int | None = 20,
+) -> None:
+    """Add the options of how volumes look and what their VDIs hold, but for those that are None."""
+    if tf is not None:
+        parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default=tf)
+    if interpolation is not None:
+        parser.add_argument("--interpolation", choices=INTERPOLATIONS, default=interpolation)
+    if max_supersegments is not None:
+        parser.add_argument("--max-supersegments", type=int, default=max_supersegments, metavar="N")
+
+
+def add_vdi_cache(parser: argparse.ArgumentParser) -> None:
+    """Add ``--vdi-cache``, see :func:`vdi_of`."""
+    parser.add_argument(
+        "--vdi-cache",
+        type=Path,
+        metavar="FOLDER",
+        help="read VDIs from there that an earlier run has written, and write those it lacks",
+    )
 
 
 def add_vdi_options(
@@ -71,19 +127,10 @@ def add_vdi_options(
     volumes : sequence of str, optional
         Names by default; every known volume if there are none.
     """
-    names = sorted(examples.VOLUMES)
-    parser.add_argument("--size", type=window_size, default=size, metavar="WxH")
-    parser.add_argument(
-        "--volumes", nargs="+", choices=names, default=volumes or names, metavar="NAME"
-    )
-    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
-    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
-    parser.add_argument(
-        "--vdi-cache",
-        type=Path,
-        metavar="FOLDER",
-        help="read VDIs from there that an earlier run has written, and write those it lacks",
-    )
+    add_size(parser, size)
+    add_volumes(parser, volumes)
+    add_looks(parser, interpolation=None)
+    add_vdi_cache(parser)
     add_redo(parser)
 
 
@@ -123,6 +170,7 @@ def begun(target: Path, case: Mapping[str, Any], parts: str = "volumes") -> dict
 
 def save(results: Mapping[str, Any], target: Path) -> None:
     """Write a file of results; a run that is stopped meanwhile leaves the old one."""
+    target.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(target) as stream:
         stream.write(json.dumps(without_infinities(dict(results)), indent=1).encode() + b"\n")
 
@@ -142,6 +190,20 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
 def system_line(system: Mapping[str, str]) -> str:
     """Return in one line what a figure depends on."""
     return ", ".join(f"{name} {value}" for name, value in system.items())
+
+
+def looks_of(options: argparse.Namespace, look: str | None = None) -> dict[str, Any]:
+    """Return the arguments of ``add_volume`` that the options stand for, or another look's."""
+    chosen = TRANSFER_FUNCTIONS[options.tf if look is None else look]
+    return {**chosen, "interpolation": options.interpolation}
+
+
+def subject_of(name: str, options: argparse.Namespace, look: str | None = None) -> Subject:
+    """Return a volume with the options' transfer function, or another, and interpolation."""
+    volume = examples.load_data(name, as_volume=True)
+    looks = looks_of(options, look)
+    classified = Classification(looks, "a benchmark").transfer_function(volume)
+    return Subject(volume, classified, filling_camera(volume.bounds, options.size))
 
 
 def vdi_of(name: str, options: argparse.Namespace) -> VDI:

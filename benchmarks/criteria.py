@@ -6,26 +6,32 @@ Writes ``criteria_WxH.json`` (all figures) and ``.md`` (tables). See README.md i
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from statistics import mean
 from typing import Any
 
-from common import INTERPOLATIONS, window_size  # beside this file
+from common import (  # beside this file
+    add_looks,
+    add_redo,
+    add_size,
+    add_volumes,
+    at_hand,
+    begun,
+    new_parser,
+    save,
+    subject_of,
+    write_text,
+)
 from tqdm import tqdm
 
-from pyvista_vdi import examples
-from pyvista_vdi.classification import Classification
 from pyvista_vdi.compare import describe_system
 from pyvista_vdi.generation import CRITERIA, generate_vdi
-from pyvista_vdi.io import whole_file
 from pyvista_vdi.metrics import compare_images
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.vdi import VDI
 
 ANGLES = (0.0, 5.0, 15.0, 30.0, 60.0, 90.0)
@@ -46,7 +52,6 @@ def main() -> int:
     """Measure what is missing, and write what was found."""
     options = parsed()
     width, height = options.size
-    options.out.mkdir(parents=True, exist_ok=True)
     target = options.out / f"criteria_{width}x{height}.json"
     case = {
         "window_size": [width, height],
@@ -54,17 +59,10 @@ def main() -> int:
         "angles": list(ANGLES),
         "system": describe_system(options.device),
     }
-    results = json.loads(target.read_text()) if target.exists() else {**case, "cases": {}}
-    if any(results[name] != value for name, value in case.items()):
-        sys.exit(f"{target} was measured otherwise or elsewhere: choose another --out")
-    at_hand = examples.available()
-    absent = [name for name in options.volumes if name not in at_hand]
-    if absent:
-        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
-    names = [name for name in options.volumes if name in at_hand]
+    results = begun(target, case, parts="cases")
     wanted = [
         (name, look)
-        for name in names
+        for name in at_hand(options.volumes)
         for look in options.tf
         if options.redo or f"{name}, {look}" not in results["cases"]
     ]
@@ -75,26 +73,21 @@ def main() -> int:
                 rows.append(row)
                 bar.update(row["way"] != EQUAL_BUDGET)
             results["cases"][f"{name}, {look}"] = rows
-            with whole_file(target) as stream:
-                stream.write(json.dumps(results, indent=1).encode() + b"\n")
-    with whole_file(target.with_suffix(".md")) as stream:
-        stream.write("\n".join([*report(results), ""]).encode())
+            save(results, target)
+    write_text(target.with_suffix(".md"), "\n".join([*report(results), ""]))
     print(f"Written: {target}, and .md beside it")
     return 0
 
 
 def parsed() -> argparse.Namespace:
     """Return the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--size", type=window_size, default=(480, 270), metavar="WxH")
-    names = sorted(examples.VOLUMES)
-    parser.add_argument("--volumes", nargs="+", choices=names, default=VOLUMES, metavar="NAME")
+    parser = new_parser(__doc__)
+    add_size(parser, (480, 270))
+    add_volumes(parser, VOLUMES)
     looks = tuple(TRANSFER_FUNCTIONS)
     parser.add_argument("--tf", nargs="+", choices=looks, default=looks, metavar="NAME")
-    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
-    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
-    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
+    add_looks(parser, tf=None, max_supersegments=None)
+    add_redo(parser)
     return parser.parse_args()
 
 
@@ -110,12 +103,9 @@ class Case:
     """
 
     def __init__(self, name: str, look: str, options: argparse.Namespace) -> None:
-        self._volume = examples.load_data(name, as_volume=True)
-        looks = {**TRANSFER_FUNCTIONS[look], "interpolation": options.interpolation}
-        self._classified = Classification(looks, "criteria").transfer_function(self._volume)
+        self._volume, self._classified, self._view = subject_of(name, options, look)
         self._size = tuple(options.size)
         self._device = options.device
-        self._view = filling_camera(self._volume.bounds, self._size)
         self._references = [
             raycast_volume(
                 self._volume,

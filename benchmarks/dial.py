@@ -17,12 +17,12 @@ import sys
 import time
 from collections.abc import Iterator
 from itertools import product
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+from common import add_size, add_volumes, at_hand, new_parser, save, write_text  # beside this file
 from numpy.typing import NDArray
-from standard_table import SOFT_ONLY, window_size  # beside this file
+from standard_table import SOFT_ONLY
 from tqdm import tqdm
 
 from pyvista_vdi import examples
@@ -41,7 +41,6 @@ from pyvista_vdi.dial import (
 )
 from pyvista_vdi.dial_measurement import Scene, turned
 from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.io import whole_file
 from pyvista_vdi.metrics import compare_images
 from pyvista_vdi.opencl_runtime import get_runtime
 from pyvista_vdi.raycast import prepared_vdi, render_vdi
@@ -65,7 +64,6 @@ Case: TypeAlias = dict[str, Any]
 def main() -> int:
     """Measure what is missing, and write what was found."""
     options = parsed()
-    options.out.mkdir(parents=True, exist_ok=True)
     width, height = options.size
     target = options.out / f"dial_{width}x{height}.json"
     cases: dict[str, Case] = json.loads(target.read_text()) if target.exists() else {}
@@ -83,22 +81,18 @@ def main() -> int:
             entry["measured"] = measured(volume, table, camera, options)
         if not options.frames and "truth" not in entry:
             entry["truth"] = list(truth(volume, table, camera, options))
-        with whole_file(target) as stream:
-            stream.write(json.dumps(cases, indent=1).encode() + b"\n")
+        save(cases, target)
     complete = {k: case for k, case in cases.items() if "measured" in case and "truth" in case}
-    with whole_file(target.with_suffix(".md")) as stream:
-        stream.write("\n".join([*tables(complete, options.size), ""]).encode())
+    write_text(target.with_suffix(".md"), "\n".join([*tables(complete, options.size), ""]))
     print(f"Written: {target} and .md beside it")
     return 0
 
 
 def parsed() -> argparse.Namespace:
     """Return the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--size", type=window_size, default=(640, 360), metavar="WxH")
-    parser.add_argument("--volumes", nargs="+", choices=sorted(examples.VOLUMES), metavar="NAME")
-    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
+    parser = new_parser(__doc__)
+    add_size(parser, (640, 360))
+    add_volumes(parser)
     parser.add_argument(
         "--frames",
         action="store_true",
@@ -112,14 +106,9 @@ def parsed() -> argparse.Namespace:
 
 def chosen(options: argparse.Namespace) -> list[tuple[str, str]]:
     """Return volumes and transfer functions that are at hand; name the volumes that are not."""
-    at_hand = examples.available()
-    wanted = options.volumes or sorted(examples.VOLUMES)
-    absent = [name for name in wanted if name not in at_hand]
-    if absent:
-        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
     return [
         (name, look)
-        for name, look in product([n for n in wanted if n in at_hand], TRANSFER_FUNCTIONS)
+        for name, look in product(at_hand(options.volumes), TRANSFER_FUNCTIONS)
         if look == "soft" or name not in SOFT_ONLY
     ]
 

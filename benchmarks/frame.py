@@ -20,12 +20,17 @@ from pathlib import Path
 from typing import Any
 
 import pyvista as pv
-from skipping import vdi_of  # beside this file
-from standard_table import window_size
+from common import (  # beside this file
+    add_looks,
+    add_size,
+    add_vdi_cache,
+    new_parser,
+    vdi_of,
+    window_size,
+)
 
 from pyvista_vdi.compare import describe_system
 from pyvista_vdi.opencl_runtime import Runtime, get_runtime
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE
 from pyvista_vdi.vdi import VDI
 
 #: Degrees by which the camera turns from frame to frame where it moves.
@@ -278,23 +283,17 @@ def ratio(
 
 def parsed() -> argparse.Namespace:
     """Return the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser = new_parser(__doc__, repeats=15, repeated="frames of each kind")
     parser.add_argument("--frame", type=window_size, default=(1920, 1080), metavar="WxH")
     parser.add_argument("--volume", default="rayleigh_taylor")
-    parser.add_argument("--tf", choices=sorted(TRANSFER_FUNCTIONS), default="soft")
-    parser.add_argument(
-        "--size", type=window_size, default=WINDOW_SIZE, metavar="WxH", help="of the VDI"
-    )
-    parser.add_argument("--max-supersegments", type=int, default=20)
+    add_looks(parser, interpolation=None)
+    add_size(parser)
     parser.add_argument(
         "--multi-samples", type=int, nargs="+", default=(-1, 0), help="-1: PyVista's default"
     )
-    parser.add_argument("--repeats", type=int, default=15, help="frames of each kind")
     parser.add_argument("--first-repeats", type=int, default=5, help="processes of each kind")
     parser.add_argument("--no-first", action="store_true", help="leave the processes out")
-    parser.add_argument("--device")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--vdi-cache", type=Path, help="folder of VDIs, read or written")
+    add_vdi_cache(parser)
     options = parser.parse_args()
     get_runtime(options.device)  # a missing device is said at once
     return options

@@ -7,7 +7,6 @@ this folder for what is judged.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import statistics
 import sys
@@ -18,18 +17,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import INTERPOLATIONS, window_size  # beside this file
+from common import add_looks, add_size, looks_of, new_parser, save, subject_of  # beside this file
 from tqdm import tqdm
 
 from pyvista_vdi import examples
 from pyvista_vdi.camera import Camera
-from pyvista_vdi.classification import Classification
 from pyvista_vdi.compare import describe_system
 from pyvista_vdi.frame_rate import FLOOR, RECENT_FRAMES, FrameRateController
 from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.io import whole_file
 from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
 from pyvista_vdi.vdi import VDI
 
 #: Frames between those whose time at the floor and in full quality is measured beforehand.
@@ -45,10 +41,7 @@ AZIMUTH, ELEVATION = 60.0, 25.0
 def main() -> int:
     """Measure, write and plot."""
     options = parsed()
-    volume = examples.load_data(options.volume, as_volume=True)
-    looks = {**TRANSFER_FUNCTIONS[options.tf], "interpolation": options.interpolation}
-    classified = Classification(looks, "frame_rate").transfer_function(volume)
-    view = filling_camera(volume.bounds, options.size)
+    volume, classified, view = subject_of(options.volume, options)
     vdi = generate_vdi(volume, view, options.size, classified, device=options.device)
     path = camera_path(options.frames)
     cameras = [view.azimuth(azimuth).elevation(elevation) for azimuth, elevation in path]
@@ -63,7 +56,7 @@ def main() -> int:
     results = {
         "window_size": list(options.size),
         "volume": options.volume,
-        **{name: looks[name] for name in ("cmap", "opacity", "interpolation")},
+        **looks_of(options),
         "system": describe_system(options.device),
         "target_fps": target,
         "full_fps": 1 / full_seconds,
@@ -78,9 +71,7 @@ def main() -> int:
     }
     width, height = options.size
     target_file = options.out / f"frame_rate_{width}x{height}.json"
-    options.out.mkdir(parents=True, exist_ok=True)
-    with whole_file(target_file) as stream:
-        stream.write(json.dumps(results, indent=1).encode() + b"\n")
+    save(results, target_file)
     write_plot(results, target_file.with_suffix(".png"))
     print(f"{target:.1f} frames per second aimed at; {1 / full_seconds:.1f} in full quality")
     for name, value in results["judged"].items():
@@ -91,12 +82,10 @@ def main() -> int:
 
 def parsed() -> argparse.Namespace:
     """Return the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
+    parser = new_parser(__doc__, repeats=3, repeated="of each frame, for its median time")
+    add_size(parser)
     parser.add_argument("--volume", choices=sorted(examples.VOLUMES), default="brain")
-    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
-    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
+    add_looks(parser, max_supersegments=None)
     parser.add_argument("--frames", type=int, default=360)
     aim = parser.add_mutually_exclusive_group()
     aim.add_argument("--target-fps", type=float, metavar="FPS")
@@ -107,8 +96,6 @@ def parsed() -> argparse.Namespace:
         help="target, as a multiple of the rate in full quality (the path's median)",
     )
     parser.add_argument("--threshold", type=float, default=0.1)
-    parser.add_argument("--repeats", type=int, default=3, help="of each frame, for its median time")
-    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
     return parser.parse_args()
 
 

@@ -14,7 +14,6 @@ process's CPU time, which a machine that does other work distorts less. Writes
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import statistics
 import sys
@@ -22,23 +21,30 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
-from pathlib import Path
 from typing import Any
 
-from standard_table import INTERPOLATIONS, window_size  # beside this file
+from common import (  # beside this file
+    Subject,
+    add_looks,
+    add_redo,
+    add_size,
+    add_volumes,
+    at_hand,
+    begun,
+    looks_of,
+    new_parser,
+    save,
+    subject_of,
+    write_text,
+)
 from tqdm import tqdm
 
-from pyvista_vdi import examples
-from pyvista_vdi.classification import Classification
 from pyvista_vdi.compare import describe_system
 from pyvista_vdi.compare.bounds import FRAME_RATIO_ANGLE
 from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.io import whole_file
 from pyvista_vdi.opencl_runtime import get_runtime
 from pyvista_vdi.plotting.cli_support import add_volume_property
 from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
-from pyvista_vdi.volume import Volume
 from pyvista_vdi.vtk_pipeline.peers import MAPPERS, PeerRenderer
 
 #: Ratios: title, what is divided, and by which candidate or by the fastest of which.
@@ -65,7 +71,6 @@ def main() -> int:
     if not os.environ.get("VTK_DEFAULT_OPENGL_WINDOW") and not os.environ.get("DISPLAY"):
         os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
     width, height = options.size
-    options.out.mkdir(parents=True, exist_ok=True)
     target = options.out / f"generation_{width}x{height}.json"
     case = {
         "window_size": [width, height],
@@ -74,46 +79,30 @@ def main() -> int:
         "max_supersegments": options.max_supersegments,
         "system": describe_system(options.device),
     }
-    results = json.loads(target.read_text()) if target.exists() else {**case, "volumes": {}}
-    if any(results[name] != value for name, value in case.items()):
-        sys.exit(f"{target} was measured otherwise or elsewhere: choose another --out")
-    at_hand = examples.available()
-    absent = [name for name in options.volumes if name not in at_hand]
-    if absent:
-        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
-    for name in tqdm([name for name in options.volumes if name in at_hand], unit="volume"):
+    results = begun(target, case)
+    for name in tqdm(at_hand(options.volumes), unit="volume"):
         if name in results["volumes"] and not options.redo:
             continue
-        results["volumes"][name] = measured(examples.load_data(name, as_volume=True), options)
-        with whole_file(target) as stream:
-            stream.write(json.dumps(results, indent=1).encode() + b"\n")
-    with whole_file(target.with_suffix(".md")) as stream:
-        stream.write(report(results).encode())
+        results["volumes"][name] = measured(subject_of(name, options), options)
+        save(results, target)
+    write_text(target.with_suffix(".md"), report(results))
     print(f"Written: {target}, and .md beside it")
     return 0
 
 
 def parsed() -> argparse.Namespace:
     """Return the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
-    names = sorted(examples.VOLUMES)
-    parser.add_argument("--volumes", nargs="+", choices=names, default=names, metavar="NAME")
-    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
-    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
-    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
-    parser.add_argument("--repeats", type=int, default=7, help="timed turns")
-    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
-    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
+    parser = new_parser(__doc__, repeats=7, repeated="timed turns")
+    add_size(parser)
+    add_volumes(parser)
+    add_looks(parser)
+    add_redo(parser)
     return parser.parse_args()
 
 
-def measured(volume: Volume, options: argparse.Namespace) -> dict[str, Any]:
+def measured(subject: Subject, options: argparse.Namespace) -> dict[str, Any]:
     """Measure one volume: seconds of every turn, and the ratios."""
-    looks = {**TRANSFER_FUNCTIONS[options.tf], "interpolation": options.interpolation}
-    table = Classification(looks, "generation").transfer_function(volume)
-    view = filling_camera(volume.bounds, options.size)
+    volume, table, view = subject
     turned = view.azimuth(FRAME_RATIO_ANGLE)
     voxel = min(volume.spacing)
     runtime = get_runtime(options.device)
@@ -145,7 +134,7 @@ def measured(volume: Volume, options: argparse.Namespace) -> dict[str, Any]:
     }
     with ExitStack() as stack:
         for mapper in MAPPERS:
-            prop = add_volume_property(volume, dict(looks))
+            prop = add_volume_property(volume, looks_of(options))
             peer = PeerRenderer(volume, prop, options.size, mapper, voxel)
             stack.callback(peer.close)
             candidates[mapper] = partial(peer.render, turned)

@@ -18,16 +18,16 @@ from pathlib import Path
 from typing import Any
 
 from common import (  # beside this file
-    INTERPOLATIONS,
     add_clock,
+    add_looks,
     add_redo,
+    add_size,
     begun,
     clock_of,
     new_parser,
     save,
     system_line,
     table,
-    window_size,
     write_text,
 )
 from machine import Rates
@@ -51,7 +51,7 @@ from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.opencl_runtime import Runtime, get_runtime
 from pyvista_vdi.raycast import PreparedVDI
 from pyvista_vdi.raycast_volume import raycast_medium
-from pyvista_vdi.standard_cases import ANGLES, WINDOW_SIZE, filling_camera
+from pyvista_vdi.standard_cases import ANGLES, filling_camera
 from pyvista_vdi.vdi import VDI
 
 #: What volumes stand for, and which they are.
@@ -367,12 +367,11 @@ def main() -> int:
 def parsed() -> argparse.Namespace:
     """Return the options."""
     parser = new_parser(__doc__, repeats=5, repeated="timed frames of each candidate and view")
-    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
+    add_size(parser)
     parser.add_argument(
         "--volumes", nargs="+", metavar="NAME", help="only these of the groups' volumes"
     )
-    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
-    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
+    add_looks(parser, tf=None)
     parser.add_argument("--generations", type=int, default=3, help="timed generations of each VDI")
     parser.add_argument("--quick", action="store_true", help="one volume a group, two repeats")
     parser.add_argument("--no-vtk", dest="vtk", action="store_false", help="leave VTK out")

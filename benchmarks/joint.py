@@ -14,15 +14,13 @@ import argparse
 import statistics
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
-from common import vdi_of, window_size  # beside this file
+from common import add_looks, add_size, add_vdi_cache, new_parser, vdi_of  # beside this file
 from numpy.typing import NDArray
 
 from pyvista_vdi.joint import render_vdis
 from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE
 from pyvista_vdi.vdi import VDI
 
 #: Azimuths from the first VDI's generating view, degrees.
@@ -88,14 +86,11 @@ def beside(first: VDI, second: VDI) -> NDArray[np.float64]:
 
 def parsed() -> argparse.Namespace:
     """Return the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser = new_parser(__doc__, repeats=7, repeated="timed frames of each kind", writes=False)
     parser.add_argument("--volumes", nargs=2, default=("brain", "rayleigh_taylor"))
-    parser.add_argument("--tf", choices=sorted(TRANSFER_FUNCTIONS), default="soft")
-    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
-    parser.add_argument("--max-supersegments", type=int, default=20)
-    parser.add_argument("--repeats", type=int, default=7)
-    parser.add_argument("--device")
-    parser.add_argument("--vdi-cache", type=Path, help="folder of VDIs, read or written")
+    add_size(parser)
+    add_looks(parser, interpolation=None)
+    add_vdi_cache(parser)
     return parser.parse_args()
 
 

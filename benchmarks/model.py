@@ -18,16 +18,16 @@ from typing import Any
 
 import numpy as np
 from common import (  # beside this file
-    INTERPOLATIONS,
     add_clock,
+    add_looks,
     add_redo,
+    add_size,
     begun,
     clock_of,
     new_parser,
     save,
     system_line,
     table,
-    window_size,
     write_text,
 )
 from counting import (
@@ -53,7 +53,7 @@ from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.opencl_runtime import Profile, Runtime, get_runtime
 from pyvista_vdi.raycast import PreparedVDI
 from pyvista_vdi.raycast_volume import raycast_medium
-from pyvista_vdi.standard_cases import ANGLES, WINDOW_SIZE, filling_camera
+from pyvista_vdi.standard_cases import ANGLES, filling_camera
 from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.volume import Volume
@@ -645,7 +645,7 @@ def main() -> int:
 def parsed() -> argparse.Namespace:
     """Return the options."""
     parser = new_parser(__doc__, repeats=3, repeated="timed runs of each stage")
-    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
+    add_size(parser)
     parser.add_argument(
         "--volumes",
         nargs="+",
@@ -653,8 +653,7 @@ def parsed() -> argparse.Namespace:
         metavar="NAME",
         help="as for pyvista-vdi benchmark --datasets",
     )
-    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
-    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
+    add_looks(parser, tf=None)
     parser.add_argument("--angles", nargs="+", type=float, default=list(ANGLES), metavar="DEGREES")
     parser.add_argument(
         "--every", type=int, default=EVERY, help="count one block of rays in so many pixels"

@@ -6,23 +6,26 @@ Writes ``parameters_WxH.json`` and ``.md``; SSIM is against our volume raycaster
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import INTERPOLATIONS, window_size  # beside this file
+from common import (  # beside this file
+    add_looks,
+    add_size,
+    add_volumes,
+    at_hand,
+    new_parser,
+    save,
+    subject_of,
+    write_text,
+)
 from tqdm import tqdm
 
-from pyvista_vdi import examples
-from pyvista_vdi.classification import Classification
 from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.io import whole_file
 from pyvista_vdi.metrics import compare_images
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.volume import Volume
 
@@ -40,15 +43,13 @@ ANGLES = (5.0, 30.0, 60.0)
 
 def main() -> int:
     """Measure, and write what was found."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
-    parser.add_argument("--volumes", nargs="+", choices=sorted(examples.VOLUMES), metavar="NAME")
-    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="nearly-opaque")
-    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
+    parser = new_parser(__doc__)
+    add_size(parser)
+    add_volumes(parser, ["brain", "rayleigh_taylor"])
+    add_looks(parser, tf="nearly-opaque", max_supersegments=None)
     options = parser.parse_args()
     rows = []
-    names = options.volumes or ["brain", "rayleigh_taylor"]
+    names = at_hand(options.volumes)
     with tqdm(total=len(names) * len(VARIANTS), unit="VDI") as bar:
         for name in names:
             for row in measured(name, options):
@@ -56,26 +57,20 @@ def main() -> int:
                 bar.update()
     width, height = options.size
     target = options.out / f"parameters_{width}x{height}.json"
-    options.out.mkdir(parents=True, exist_ok=True)
     results = {
         "window_size": [width, height],
         "transfer_function": options.tf,
         "interpolation": options.interpolation,
         "rows": rows,
     }
-    with whole_file(target) as stream:
-        stream.write(json.dumps(results, indent=1).encode() + b"\n")
-    with whole_file(target.with_suffix(".md")) as stream:
-        stream.write("\n".join([*table(results), ""]).encode())
+    save(results, target)
+    write_text(target.with_suffix(".md"), "\n".join([*table(results), ""]))
     return 0
 
 
 def measured(name: str, options: argparse.Namespace) -> Any:
     """Yield a row for each variant."""
-    volume = examples.load_data(name, as_volume=True)
-    looks = {**TRANSFER_FUNCTIONS[options.tf], "interpolation": options.interpolation}
-    classified = Classification(looks, "parameters").transfer_function(volume)
-    view = filling_camera(volume.bounds, options.size)
+    volume, classified, view = subject_of(name, options)
     references = {
         angle: raycast_volume(volume, view.azimuth(angle), options.size, classified)
         for angle in ANGLES

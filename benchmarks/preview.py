@@ -7,7 +7,6 @@ default case is the paper's for its Table 2: 1920x1080, 15 supersegments, 30 deg
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import statistics
 import sys
@@ -17,22 +16,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import INTERPOLATIONS, window_size  # beside this file
+from common import (  # beside this file
+    add_looks,
+    add_size,
+    add_volumes,
+    at_hand,
+    new_parser,
+    save,
+    subject_of,
+    write_text,
+)
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from pyvista_vdi import examples
 from pyvista_vdi.benchmark.preview import enlarged
 from pyvista_vdi.camera import Camera
-from pyvista_vdi.classification import Classification
 from pyvista_vdi.compare import describe_system
 from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.io import whole_file
 from pyvista_vdi.metrics import compare_images
 from pyvista_vdi.opencl_runtime import get_runtime
 from pyvista_vdi.raycast import prepared_vdi
 from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 from pyvista_vdi.vdi import VDI
 
 #: Speeds, as multiples of the full frame's, at which the ways are compared.
@@ -55,12 +59,8 @@ def main() -> int:
     """Measure, and write what was found."""
     options = parsed()
     rows = []
-    at_hand = examples.available()
-    for name in tqdm([n for n in options.volumes if n in at_hand], unit="volume"):
+    for name in tqdm(at_hand(options.volumes), unit="volume"):
         rows += measured(name, options)
-    absent = [name for name in options.volumes if name not in at_hand]
-    if absent:
-        print(f"Left out, not in {examples.DATA_VARIABLE}: {', '.join(absent)}", file=sys.stderr)
     width, height = options.size
     results = {
         "window_size": [width, height],
@@ -71,12 +71,9 @@ def main() -> int:
         "system": describe_system(options.device),
         "rows": rows,
     }
-    options.out.mkdir(parents=True, exist_ok=True)
     target = options.out / f"preview_{width}x{height}.json"
-    with whole_file(target) as stream:
-        stream.write(json.dumps(results, indent=1).encode() + b"\n")
-    with whole_file(target.with_suffix(".md")) as stream:
-        stream.write(report(results).encode())
+    save(results, target)
+    write_text(target.with_suffix(".md"), report(results))
     write_plot(results, target.with_suffix(".png"))
     print(f"Written: {target}, and .md and .png beside it")
     return 0
@@ -84,31 +81,17 @@ def main() -> int:
 
 def parsed() -> argparse.Namespace:
     """Return the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--size", type=window_size, default=(1920, 1080), metavar="WxH")
-    parser.add_argument(
-        "--volumes",
-        nargs="+",
-        choices=sorted(examples.VOLUMES),
-        metavar="NAME",
-        default=["brain", "rayleigh_taylor", "aneurism", "heptane", "visible_female_head"],
-    )
-    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
-    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
+    parser = new_parser(__doc__, repeats=5, repeated="timed frames of each setting")
+    add_size(parser, (1920, 1080))
+    add_volumes(parser, ["brain", "rayleigh_taylor", "aneurism", "heptane", "visible_female_head"])
+    add_looks(parser, max_supersegments=15)
     parser.add_argument("--angle", type=float, default=30.0, help="azimuth from V_O, degrees")
-    parser.add_argument("--max-supersegments", type=int, default=15, metavar="N")
-    parser.add_argument("--repeats", type=int, default=5, help="timed frames of each setting")
-    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
     return parser.parse_args()
 
 
 def measured(name: str, options: argparse.Namespace) -> list[dict[str, Any]]:
     """Draw one frame of a volume in every way, and hold each picture against the full one."""
-    volume = examples.load_data(name, as_volume=True)
-    looks = {**TRANSFER_FUNCTIONS[options.tf], "interpolation": options.interpolation}
-    table = Classification(looks, "preview").transfer_function(volume)
-    view = filling_camera(volume.bounds, options.size)
+    volume, table, view = subject_of(name, options)
 
     def generated(size: tuple[int, int]) -> VDI:
         limit = options.max_supersegments

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import gc
-import json
 import statistics
 import sys
 import threading
@@ -17,22 +16,24 @@ import time
 from pathlib import Path
 from typing import Any
 
-from common import INTERPOLATIONS, window_size  # beside this file
+from common import (  # beside this file
+    add_looks,
+    add_size,
+    add_volumes,
+    new_parser,
+    save,
+    subject_of,
+)
 from tqdm import tqdm
 
-from pyvista_vdi import examples
 from pyvista_vdi.background import BackgroundGeneration
 from pyvista_vdi.camera import Camera
-from pyvista_vdi.classification import Classification
 from pyvista_vdi.compare import describe_system
 from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.io import whole_file
 from pyvista_vdi.opencl_runtime import get_runtime
 from pyvista_vdi.raycast import prepared_vdi
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
-from pyvista_vdi.transfer_function import TransferFunction
+from pyvista_vdi.standard_cases import filling_camera
 from pyvista_vdi.vdi import VDI
-from pyvista_vdi.volume import Volume
 
 VOLUMES = ("aneurism", "brain", "heptane", "rayleigh_taylor")
 
@@ -72,9 +73,7 @@ def main() -> int:
         results["row"] = row(options)
     width, height = options.size
     target = options.out / f"regeneration_{width}x{height}.json"
-    options.out.mkdir(parents=True, exist_ok=True)
-    with whole_file(target) as stream:
-        stream.write(json.dumps(results, indent=1).encode() + b"\n")
+    save(results, target)
     write_plot(results, target.with_suffix(".png"))
     report(results)
     print(f"Written: {target}, and .png beside it")
@@ -83,18 +82,12 @@ def main() -> int:
 
 def parsed() -> argparse.Namespace:
     """Return the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
-    parser.add_argument(
-        "--volumes", nargs="+", choices=sorted(examples.VOLUMES), default=VOLUMES, metavar="NAME"
-    )
-    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
-    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
-    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
+    parser = new_parser(__doc__)
+    add_size(parser)
+    add_volumes(parser, VOLUMES)
+    add_looks(parser)
     parser.add_argument("--rounds", type=int, default=3, help="regenerations of each volume")
     parser.add_argument("--times", type=int, default=200, help="regenerations in a row; 0: none")
-    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
     return parser.parse_args()
 
 
@@ -114,11 +107,7 @@ class Bench:
     def __init__(
         self, name: str, options: argparse.Namespace, size: tuple[int, int] | None = None
     ) -> None:
-        self._volume: Volume = examples.load_data(name, as_volume=True)
-        looks = {**TRANSFER_FUNCTIONS[options.tf], "interpolation": options.interpolation}
-        self._classified: TransferFunction = Classification(looks, name).transfer_function(
-            self._volume
-        )
+        self._volume, self._classified, _ = subject_of(name, options)
         self._size = options.size if size is None else size
         self._limit = options.max_supersegments
         self._runtime = get_runtime(options.device)

@@ -23,16 +23,16 @@ from typing import Any
 
 import numpy as np
 from common import (  # beside this file
-    INTERPOLATIONS,
     add_clock,
+    add_looks,
     add_redo,
+    add_size,
     begun,
     clock_of,
     new_parser,
     save,
     system_line,
     table,
-    window_size,
     write_text,
 )
 from tqdm import tqdm
@@ -416,10 +416,9 @@ def parsed() -> argparse.Namespace:
         metavar="NAME",
         help="volume that is made at several sizes",
     )
-    parser.add_argument("--size", type=window_size, default=(640, 360), metavar="WxH")
-    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
+    add_size(parser, (640, 360))
+    add_looks(parser, tf=None)
     parser.add_argument("--angle", type=float, default=10.0, help="of frames, from V_O")
-    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
     parser.add_argument("--quick", action="store_true", help="fewer points on each axis")
     add_clock(parser)
     add_redo(parser)

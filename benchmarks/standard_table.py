@@ -12,10 +12,18 @@ import os
 import sys
 from dataclasses import asdict, dataclass
 from itertools import product
-from pathlib import Path
 from typing import Any
 
-from common import INTERPOLATIONS, at_hand, save, window_size  # beside this file
+from common import (  # beside this file
+    INTERPOLATIONS,
+    add_looks,
+    add_redo,
+    add_size,
+    add_volumes,
+    at_hand,
+    new_parser,
+    save,
+)
 from standard_report import write_plot, write_tables
 from tqdm import tqdm
 
@@ -23,7 +31,7 @@ from pyvista_vdi import examples
 from pyvista_vdi.compare import Report, Settings, judge_times, judge_vdi, judge_vtk, measure
 from pyvista_vdi.compare.bounds import CONVERGED_STEPS, FRAME_RATIO_ANGLE
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.standard_cases import ANGLES, TRANSFER_FUNCTIONS, WINDOW_SIZE
+from pyvista_vdi.standard_cases import ANGLES, TRANSFER_FUNCTIONS
 
 #: Volumes for which one transfer function has to do, because of their size.
 SOFT_ONLY = ("allen_mouse_brain",)
@@ -49,7 +57,6 @@ def main(arguments: list[str] | None = None) -> int:
     if not os.environ.get("VTK_DEFAULT_OPENGL_WINDOW") and not os.environ.get("DISPLAY"):
         os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
     width, height = options.size
-    options.out.mkdir(parents=True, exist_ok=True)
     target = options.out / f"standard_{width}x{height}.json"
     results = json.loads(target.read_text()) if target.exists() else new_results(options)
     if results["max_supersegments"] != options.max_supersegments:
@@ -78,15 +85,14 @@ def main(arguments: list[str] | None = None) -> int:
 
 def parsed(arguments: list[str] | None) -> argparse.Namespace:
     """Return the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--size", type=window_size, default=WINDOW_SIZE, metavar="WxH")
-    parser.add_argument("--volumes", nargs="+", choices=sorted(examples.VOLUMES), metavar="NAME")
+    parser = new_parser(__doc__, repeats=5, repeated="timed runs of each kind")
+    add_size(parser)
+    add_volumes(parser)
     parser.add_argument("--tf", nargs="+", choices=TRANSFER_FUNCTIONS, default=TRANSFER_FUNCTIONS)
     parser.add_argument(
         "--interpolation", nargs="+", choices=INTERPOLATIONS, default=INTERPOLATIONS
     )
-    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
+    add_looks(parser, tf=None, interpolation=None)
     parts = parser.add_mutually_exclusive_group()
     parts.add_argument(
         "--timings",
@@ -103,16 +109,14 @@ def parsed(arguments: list[str] | None) -> argparse.Namespace:
         help=f"where a bound against VTK was missed: compare at {CONVERGED_STEPS} steps a voxel",
     )
     parser.set_defaults(part="accuracy")
-    parser.add_argument("--repeats", type=int, default=5, help="timed runs of each kind")
-    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
-    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
+    add_redo(parser)
     parser.add_argument("--tables-only", action="store_true", help="write tables and plot anew")
     return parser.parse_args(arguments)
 
 
 def chosen(options: argparse.Namespace) -> list[Case]:
     """Return the cases to be measured whose volume is at hand; name those that are not."""
-    volumes = at_hand(options.volumes or sorted(examples.VOLUMES))
+    volumes = at_hand(options.volumes)
     combinations = product(options.interpolation, volumes, options.tf)
     return [
         Case(interpolation, volume, look)

@@ -22,19 +22,25 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from common import INTERPOLATIONS, window_size  # beside this file
+from common import (  # beside this file
+    add_looks,
+    add_redo,
+    add_size,
+    add_volumes,
+    new_parser,
+    save,
+    subject_of,
+    write_text,
+)
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from pyvista_vdi import examples
 from pyvista_vdi.camera import Camera
-from pyvista_vdi.classification import Classification
 from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.io import whole_file
 from pyvista_vdi.metrics import compare_images
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.standard_cases import filling_camera
 from pyvista_vdi.transfer_function import TransferFunction
 from pyvista_vdi.vdi import VDI
 from pyvista_vdi.view_error import TILE_SIZE, TILES, ViewErrorEstimator
@@ -90,15 +96,11 @@ VIEWS = (
 
 def main() -> int:
     """Measure what is missing, and write what was found."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
-    parser.add_argument("--size", type=window_size, default=(640, 360), metavar="WxH")
-    parser.add_argument(
-        "--volumes", nargs="+", choices=sorted(examples.VOLUMES), default=VOLUMES, metavar="NAME"
-    )
-    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
-    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
-    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
+    parser = new_parser(__doc__)
+    add_size(parser, (640, 360))
+    add_volumes(parser, VOLUMES)
+    add_looks(parser, tf=None, max_supersegments=None)
+    add_redo(parser)
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     width, height = options.size
@@ -108,11 +110,9 @@ def main() -> int:
         key = "/".join((volume, look, options.interpolation))
         if key not in cases or options.redo:
             cases[key] = list(measured(volume, look, options))
-            with whole_file(target) as stream:
-                stream.write(json.dumps(cases, indent=1).encode() + b"\n")
+            save(cases, target)
     rows = [{"case": key, "volume": key.split("/")[0], **r} for key in cases for r in cases[key]]
-    with whole_file(target.with_suffix(".md")) as stream:
-        stream.write("\n".join([*tables(rows, options.size), ""]).encode())
+    write_text(target.with_suffix(".md"), "\n".join([*tables(rows, options.size), ""]))
     plot(rows, target.with_suffix(".png"))
     print(f"Written: {target}, and .md and .png beside it")
     return 0
@@ -123,9 +123,7 @@ def main() -> int:
 
 def measured(name: str, look: str, options: argparse.Namespace) -> Iterator[dict[str, Any]]:
     """Yield what was found in each view of one volume."""
-    volume = examples.load_data(name, as_volume=True)
-    looks = {**TRANSFER_FUNCTIONS[look], "interpolation": options.interpolation}
-    classified = Classification(looks, "view_error").transfer_function(volume)
+    volume, classified, _ = subject_of(name, options, look)
     estimators = {
         (tiles, edge): ViewErrorEstimator(
             volume, classified, tiles=tiles, tile_size=edge, device=options.device

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import math
-import threading
-import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +18,6 @@ from .bricks import (
     DeviceBricks,
     Room,
     fitting_layout,
-    in_parts,
     least_brick_bytes,
     too_small,
 )
@@ -30,58 +27,45 @@ from .device_occlusion import ambient_transmittances
 from .errors import DeviceMemoryError, InvalidArgumentError
 from .lighting import Lights
 from .numerics import (
-    LARGEST_VOXEL,
     MOST_STEPS,
     compensation,
     entries,
     held_unit_distance,
-    scalars_suit_float32,
 )
 from .opencl_runtime import (
     DeviceBuffer,
     Runtime,
-    aligned_empty,
     bytes_text,
-    kept_together,
     padded,
 )
 from .rays import Floats, PixelRays, packed, packed_pairs
 from .shading import gradient_table, lighting_table, shading_defines
 from .transfer_function import TransferFunction
 from .volume import Volume
+from .voxels import (
+    BLOCK_BYTES,
+    TABLE_BYTES,
+    Scale,
+    blocks_over,
+    described,
+    device_bytes,
+    fits_whole,
+    integer_ends,
+    reads_natively,
+    scale_of,
+    upload_ranges,
+    upload_voxels,
+    uploads_of,
+    voxel_defines,
+    voxel_reader,
+)
 
-#: Voxel types that the kernels read as they are; the others are scaled to float32 on the host.
-_DEVICE_TYPES = {
-    "uint8": "uchar",
-    "int8": "char",
-    "uint16": "ushort",
-    "int16": "short",
-    "float32": "float",
-}
-#: Logarithm to base 2 of the points along each edge of a block that can be skipped.
-_BLOCK_SHIFT = 3
 #: Blocks: farther than this no march looks for what is not transparent.
 _FARTHEST = 16
-#: Most bytes of a volume that are looked through at a time for the ranges of its blocks, and how
-#: many such parts there must be room for.
-_PART_BYTES, _PARTS = 64 * 2**20, 4
-#: Bytes on the device of what is known of a block: its scalar range, whether it is visible, and its
-#: reach, which is made from another one.
-_BLOCK_BYTES = 11
-#: Bytes that are kept for tables: transfer functions, lights, rays. They may be a tenth of it.
-_TABLE_BYTES = 2**20
 #: Share of transparent blocks from which on looking for them pays. Measured (docs/performance.md):
 #: where none is, a picture takes 1.2 to 1.35 times as long with the look as without; from .32 on it
 #: takes .4 to .85.
 _WORTH_SKIPPING = 0.15
-#: Scalars of 16 bits that are looked up and not classified at each sample: 64 KiB of media.
-_MOST_LOOKED_UP = 4096
-#: Where scaled voxels end, in ranges of the transfer function.
-_BEYOND = 2.0**60
-#: Scaled voxels that are above the only scalar of a range are so by this at least.
-_ABOVE = 2.0**-60
-_uploads: weakref.WeakKeyDictionary[Volume, _Uploads] = weakref.WeakKeyDictionary()
-_uploads_lock = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -172,14 +156,14 @@ class DeviceVolume:
             transfer_function.unit_distance or volume.default_unit_distance, self.sample_distance
         )
         low, high = transfer_function.scalar_range
-        native = _reads_natively(runtime, volume, transfer_function, room)
-        scale = None if native else _scale_of(volume, low, high)
-        self.defines = _voxel_defines(volume, native)
-        whole = room is None or _fits(runtime, volume, scale, room)
+        native = reads_natively(runtime, volume, transfer_function, room)
+        scale = None if native else scale_of(volume, low, high)
+        self.defines = voxel_defines(volume, native)
+        whole = room is None or fits_whole(runtime, volume, scale, room)
         if room is None or whole:
-            self._voxels, ranges = _upload(runtime, volume, scale, self.defines)
+            self._voxels, ranges = upload_voxels(runtime, volume, scale, self.defines)
         else:
-            ranges = _upload_ranges(runtime, volume, scale, self.defines, room)
+            ranges = upload_ranges(runtime, volume, scale, self.defines, room)
         self._low, span = (low, high - low) if native else (0.0, 1.0 if high > low else 0.0)
         table = np.column_stack([transfer_function.colors, transfer_function.opacities])
         self._entries = len(table)
@@ -193,7 +177,7 @@ class DeviceVolume:
                 self._reaches = self._reaches_of(runtime, seen)
         if transfer_function.interpolation == "nearest":
             self.defines["NEAREST"] = 1
-            if native and (ends := _integer_ends(runtime, volume, ranges)):
+            if native and (ends := integer_ends(runtime, volume, ranges)):
                 self._look_up_by_scalar(runtime, *ends)
         self._runtime = runtime
         self._shading = transfer_function.shading
@@ -210,7 +194,7 @@ class DeviceVolume:
             if not whole:
                 raise DeviceMemoryError(
                     f"ambient occlusion needs the volume {volume.name!r} in one piece, "
-                    f"{bytes_text(_device_bytes(volume, scale))}: raise memory_limit, leave "
+                    f"{bytes_text(device_bytes(volume, scale))}: raise memory_limit, leave "
                     "ambient_occlusion out, or use another device"
                 )
             unlit = {k: v for k, v in shading.items() if k == "GRADIENT_OPACITY"}
@@ -270,7 +254,7 @@ class DeviceVolume:
         )
 
     def _bricks_within(
-        self, room: Room, scale: _Scale | None, transfer_function: TransferFunction
+        self, room: Room, scale: Scale | None, transfer_function: TransferFunction
     ) -> DeviceBricks:
         """Return room for bricks of the volume, none of which is there yet."""
         runtime = self._runtime
@@ -281,18 +265,18 @@ class DeviceVolume:
         )
         dtype = volume.array.dtype if scale is None else np.dtype(np.float32)
         point_bytes = dtype.itemsize * math.prod(volume.array.shape[3:])
-        others = math.prod(_blocks(volume)) * _BLOCK_BYTES + _TABLE_BYTES
+        others = math.prod(blocks_over(volume)) * BLOCK_BYTES + TABLE_BYTES
         left = room.for_bricks(runtime, others)
         largest = runtime.info.max_allocation
         found = fitting_layout(volume.dimensions, point_bytes, gradients, left, largest)
         if found is None:
             least = least_brick_bytes(volume.dimensions, point_bytes, gradients) + others
-            whole = _device_bytes(volume, scale) + others
-            raise too_small(_described(volume), room, runtime, whole, least)
+            whole = device_bytes(volume, scale) + others
+            raise too_small(described(volume), room, runtime, whole, least)
         return DeviceBricks(
             runtime,
             volume.array,
-            _reader(scale),
+            voxel_reader(scale),
             dtype,
             *found,
             room.limit,
@@ -310,7 +294,7 @@ class DeviceVolume:
             np.float32(self._low),
             np.float32(self._per_scalar),
             blocks,
-            np.array([*_blocks(self.volume), 0], dtype=np.int32),
+            np.array([*blocks_over(self.volume), 0], dtype=np.int32),
         )
 
     def _occluded(
@@ -327,7 +311,7 @@ class DeviceVolume:
         )
         radius, directions = occlusion.radius_in(self.volume), occlusion.directions
         key = (opacity, radius, directions, self.sample_distance)
-        uploads = _uploads_of(self.volume)
+        uploads = uploads_of(self.volume)
         with self._runtime.holding(uploads.lock):
             kept = uploads.occlusions.get(self._runtime)
             if kept is None or kept[0] != key:
@@ -363,7 +347,7 @@ class DeviceVolume:
         self, runtime: Runtime, ranges: DeviceBuffer, transfer_function: TransferFunction
     ) -> DeviceBuffer:
         """Return which blocks hold anything that is not transparent, uint8 on the device."""
-        n = int(np.prod(_blocks(self.volume)))
+        n = int(np.prod(blocks_over(self.volume)))
         visible = runtime.buffer((n,), np.uint8, "visible blocks")
         before = np.zeros(self._entries + 1, np.uint32)
         np.cumsum(transfer_function.opacities > 0, out=before[1:])
@@ -391,7 +375,7 @@ class DeviceVolume:
         far = np.where(seen > 0, 0, _FARTHEST).astype(np.uint8)
         reaches = runtime.upload(far, "empty blocks")
         apart = 1
-        for along in _blocks(self.volume):
+        for along in blocks_over(self.volume):
             with reaches as before:
                 reaches = runtime.buffer((seen.size,), np.uint8, "reaches of empty blocks")
                 runtime.launch(
@@ -429,87 +413,6 @@ class DeviceVolume:
         return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), defines)
 
 
-def _voxel_defines(volume: Volume, native: bool) -> dict[str, str | int | None]:
-    """Return the ``-D`` names by which kernels find and read a voxel."""
-    defines: dict[str, str | int | None] = {
-        "VOXEL_T": _DEVICE_TYPES[volume.array.dtype.name] if native else "float",
-        "INDEX_T": "ulong" if volume.array.size >= 2**32 else "uint",
-        "BLOCK_SHIFT": _BLOCK_SHIFT,
-    }
-    if volume.rgba:
-        defines["RGBA"] = 1
-    return defines
-
-
-def voxel_bytes(volume: Volume, transfer_function: TransferFunction | None = None) -> int:
-    """Return the bytes of a scalar, or of a colour's component, on the device.
-
-    Scalars are taken to be read as they are where it is not known what for.
-    """
-    native = volume.array.dtype.name in _DEVICE_TYPES
-    if transfer_function is not None:
-        native = _suits_natively(volume, transfer_function)
-    return volume.array.dtype.itemsize if native else np.dtype(np.float32).itemsize
-
-
-def _reads_natively(
-    runtime: Runtime, volume: Volume, transfer_function: TransferFunction, room: Room | None
-) -> bool:
-    """Whether kernels read the voxels as they are, or scaled to the transfer function's range."""
-    if not _suits_natively(volume, transfer_function):
-        return False
-    return volume.array.dtype.kind != "f" or not _too_large(runtime, volume, room)
-
-
-def _suits_natively(volume: Volume, transfer_function: TransferFunction) -> bool:
-    """Whether type and range let kernels read the voxels as they are."""
-    dtype = volume.array.dtype
-    if dtype.name not in _DEVICE_TYPES:
-        return False
-    if volume.rgba:  # a byte is exact, and colours have no such range
-        return True
-    low, high = transfer_function.scalar_range
-    return scalars_suit_float32(low, high, dtype, transfer_function.interpolation)
-
-
-def _too_large(runtime: Runtime, volume: Volume, room: Room | None = None) -> bool:
-    """Whether differences of a float32 volume's finite voxels may overflow; found once."""
-    uploads = _uploads_of(volume)
-    if uploads.too_large is None:
-        defines = _voxel_defines(volume, True)
-        if room is None or _fits(runtime, volume, None, room):
-            ends = runtime.download(_upload(runtime, volume, None, defines)[1])
-        else:
-            ends = _ranges_in_parts(runtime, volume, None, defines, room)
-        largest = np.abs(ends).max(initial=0.0, where=np.isfinite(ends))
-        uploads.too_large = bool(largest > LARGEST_VOXEL)
-    return uploads.too_large
-
-
-def _uploads_of(volume: Volume) -> _Uploads:
-    with _uploads_lock:
-        return _uploads.setdefault(volume, _Uploads())
-
-
-class _Uploads:
-    """What is on devices of one volume; its lock lets the thread that uploads it be the only one.
-
-    Voxels and the scalar range of each block, by device and scaling; the last classification's
-    ambient occlusion, by device, with what it was computed from.
-    """
-
-    def __init__(self) -> None:
-        self.lock = threading.Lock()
-        self.made: dict[Any, tuple[DeviceBuffer, DeviceBuffer]] = {}
-        #: Scalar range of each block of a volume that no device holds in one piece, by scaling.
-        self.ranges: dict[Any, NDArray[np.float32]] = {}
-        #: Whether float32 cannot hold the voxels' differences; None before anyone has asked.
-        self.too_large: bool | None = None
-        #: The least and the largest voxel of 16 bits; None before anyone has asked.
-        self.ends: tuple[int, int] | None = None
-        self.occlusions: dict[Runtime, tuple[Any, DeviceBuffer]] = {}
-
-
 def checked_sample_distance(volume: Volume, sample_distance: float | None) -> float:
     """Return the length of a step in model units; half the smallest spacing by default."""
     least = volume.length / MOST_STEPS
@@ -538,215 +441,3 @@ def _per_scalar(entries: int, span: float) -> float:
         return 0.0
     largest = float(np.finfo(np.float32).max)
     return min((entries - 1) / span, largest) if span > 0 else largest
-
-
-def _blocks(volume: Volume) -> tuple[int, int, int]:
-    """Blocks along x, y and z that cover the cells of a volume."""
-    return _blocks_of(volume.dimensions)
-
-
-def _blocks_of(dimensions: Sequence[int]) -> tuple[int, int, int]:
-    """Blocks along x, y and z that cover the cells of a grid of so many points."""
-    x, y, z = (-(-(points - 1) // 2**_BLOCK_SHIFT) for points in dimensions)
-    return x, y, z
-
-
-def _device_bytes(volume: Volume, scale: _Scale | None) -> int:
-    """Bytes of the volume on a device."""
-    return volume.array.nbytes if scale is None else 4 * volume.array.size
-
-
-def _described(volume: Volume) -> str:
-    nx, ny, nz = volume.dimensions
-    return f"the volume {volume.name!r}, {nx} x {ny} x {nz} of {volume.array.dtype}"
-
-
-def _fits(runtime: Runtime, volume: Volume, scale: _Scale | None, room: Room) -> bool:
-    """Whether there is room for a volume in one piece."""
-    uploaded = (runtime, scale) in _uploads_of(volume).made
-    nbytes, blocks = _device_bytes(volume, scale), math.prod(_blocks(volume))
-    return room.holds(runtime, nbytes, blocks * _BLOCK_BYTES + _TABLE_BYTES, uploaded=uploaded)
-
-
-def volume_bytes(volume: Volume, nbytes: int, room: Room) -> tuple[int, int]:
-    """Return what a volume of ``nbytes`` on the device takes there, and its rays' samples, bytes.
-
-    What its blocks and tables take is in it where there is a limit.
-    """
-    if room.limit is None:
-        return nbytes, 0
-    others = math.prod(_blocks(volume)) * _BLOCK_BYTES + _TABLE_BYTES
-    if nbytes + others + room.working <= room.limit:
-        return nbytes + others, 0
-    return room.limit - room.working - room.sample_bytes, room.sample_bytes
-
-
-def _reader(scale: _Scale | None) -> Callable[[NDArray[Any]], NDArray[Any]]:
-    """Return what makes of voxels what the kernels read."""
-    return (lambda part: part) if scale is None else (lambda part: _scaled(part, scale))
-
-
-def _upload(
-    runtime: Runtime,
-    volume: Volume,
-    scale: _Scale | None,
-    defines: dict[str, str | int | None],
-) -> tuple[DeviceBuffer, DeviceBuffer]:
-    """Return voxels and the scalar range of each block, made once per device and scaling."""
-    uploads = _uploads_of(volume)
-    with runtime.holding(uploads.lock):
-        made = uploads.made
-        for other in [key for key in made if key[0] is runtime and key[1] != scale]:
-            del made[other]  # one copy per device: the last classification's
-        key = (runtime, scale)
-        if key not in made:
-            _require_a_number(runtime, volume)
-            array = volume.array if scale is None else _all_scaled(runtime, volume.array, scale)
-            with kept_together() as keep:
-                voxels = keep(runtime.upload(array, f"volume {volume.name!r}"))
-                ranges = keep(_block_ranges(runtime, volume.dimensions, voxels, defines))
-                runtime.finish()  # a thread with another queue may use them next
-            made[key] = (voxels, ranges)
-        return made[key]
-
-
-def _upload_ranges(
-    runtime: Runtime,
-    volume: Volume,
-    scale: _Scale | None,
-    defines: dict[str, str | int | None],
-    room: Room,
-) -> DeviceBuffer:
-    """Return the scalar range of each block of a volume that the device holds brick by brick."""
-    uploads = _uploads_of(volume)
-    with runtime.holding(uploads.lock):
-        for other in [key for key in uploads.made if key[0] is runtime]:
-            del uploads.made[other]  # its memory goes to the bricks
-        if scale not in uploads.ranges:
-            _require_a_number(runtime, volume)
-            uploads.ranges = {scale: _ranges_in_parts(runtime, volume, scale, defines, room)}
-        return runtime.upload(uploads.ranges[scale], "ranges of blocks")
-
-
-def _ranges_in_parts(
-    runtime: Runtime,
-    volume: Volume,
-    scale: _Scale | None,
-    defines: dict[str, str | int | None],
-    room: Room,
-) -> NDArray[np.float32]:
-    """Return the scalar range of each block, float32 (n, 2), from parts of the volume."""
-    blocks, read = _blocks(volume), _reader(scale)
-    ranges = aligned_empty((*reversed(blocks), 2), np.float32)
-    point_bytes = _device_bytes(volume, scale) // math.prod(volume.dimensions)
-    nbytes = min(_PART_BYTES, room.in_all(runtime) // _PARTS, runtime.info.max_allocation)
-    for place, points in in_parts(blocks, 2**_BLOCK_SHIFT, point_bytes, nbytes):
-        runtime.give_way()
-        part = np.ascontiguousarray(read(volume.array[points]))
-        nz, ny, nx = part.shape[:3]
-        with (
-            runtime.upload(part, f"part of volume {volume.name!r}") as voxels,
-            _block_ranges(runtime, (nx, ny, nz), voxels, defines) as found,
-        ):
-            ranges[place] = runtime.download(found).reshape(ranges[place].shape)
-    return ranges.reshape(-1, 2)
-
-
-def _block_ranges(
-    runtime: Runtime,
-    dimensions: Sequence[int],
-    voxels: DeviceBuffer,
-    defines: dict[str, str | int | None],
-) -> DeviceBuffer:
-    """Return the scalar range of each block of a grid of so many points along x, y and z."""
-    blocks = _blocks_of(dimensions)
-    n = int(np.prod(blocks))
-    ranges = runtime.buffer((n, 2), name="ranges of blocks")
-    runtime.launch(
-        runtime.kernel("grid/volume_blocks.cl", "block_ranges", defines),
-        padded(n, GROUP),
-        GROUP,
-        voxels,
-        np.array([*dimensions, 0], dtype=np.int32),
-        np.array([*blocks, 0], dtype=np.int32),
-        ranges,
-    )
-    return ranges
-
-
-def _integer_ends(runtime: Runtime, volume: Volume, ranges: DeviceBuffer) -> tuple[int, int] | None:
-    """Return the least and the largest scalar that voxels may have, if they are few enough."""
-    dtype = volume.array.dtype
-    if dtype.kind not in "iu":
-        return None
-    if dtype.itemsize == 1:
-        return (0, 255) if dtype.kind == "u" else (-128, 127)
-    uploads = _uploads_of(volume)
-    if uploads.ends is None:
-        blocks = runtime.download(ranges)
-        uploads.ends = int(blocks[:, 0].min()), int(blocks[:, 1].max())
-    least, largest = uploads.ends
-    return uploads.ends if largest - least < _MOST_LOOKED_UP else None
-
-
-def _require_a_number(runtime: Runtime, volume: Volume) -> None:
-    """Refuse a volume that is NaN throughout; nearly every other is known by its first plane."""
-    if volume.array.dtype.kind != "f":
-        return
-    for plane in volume.array:
-        runtime.give_way()
-        if not np.isnan(plane).all():
-            return
-    volume.finite_range()  # says what is wrong
-
-
-class _Scale(NamedTuple):
-    """How voxels are taken relative to a transfer function's range.
-
-    Attributes
-    ----------
-    low : float
-        The scalar that becomes 0.
-    unit : float
-        Scalars per unit of the device's voxels.
-    step : bool
-        Whether ``low`` is the whole range, so that being above it is what counts.
-    """
-
-    low: float
-    unit: float
-    step: bool
-
-
-def _scale_of(volume: Volume, low: float, high: float) -> _Scale:
-    if high > low:
-        return _Scale(low, high - low, False)
-    farthest = 0.0
-    for plane in volume.scalars:
-        finite = plane[np.isfinite(plane)].astype(np.float64)
-        farthest = max(farthest, float(np.abs(finite / 2 - low / 2).max(initial=0.0)))
-    return _Scale(low, 2 * farthest or 1.0, True)
-
-
-def _all_scaled(runtime: Runtime, array: NDArray[Any], scale: _Scale) -> NDArray[np.float32]:
-    """Scale a volume plane by plane, see :func:`_scaled`."""
-    scaled = aligned_empty(array.shape, np.float32)
-    for plane, target in zip(array, scaled, strict=True):
-        runtime.give_way()
-        target[...] = _scaled(plane, scale)
-    return scaled
-
-
-def _scaled(array: NDArray[Any], scale: _Scale) -> NDArray[np.float32]:
-    """32-bit integers and float64 to float32, taken relative to the transfer function's range.
-
-    float32 holds 24 bits: of a value far from zero compared with the range little would be left,
-    of its place in the range everything that the table can tell apart is.
-    """
-    scaled = (array.astype(np.float64) - scale.low) / scale.unit
-    if scale.step:  # what is above stays above, however little
-        scaled = np.where(scaled > 0, np.maximum(scaled, _ABOVE), scaled)
-    # Beyond any table anyway: their differences and the squares of these stay finite. An infinite
-    # voxel stays one
-    finite = np.clip(scaled, -_BEYOND, _BEYOND)
-    return np.where(np.isinf(array), scaled, finite).astype(np.float32)

@@ -32,10 +32,11 @@ from .generation import generate_vdi
 from .lighting import Lights
 from .metrics import SSIM_WINDOW
 from .opencl_runtime import Runtime, get_runtime
+from .picture_tiles import TileSample, tiles_ssim
 from .raycast import render_vdi
 from .transfer_function import TransferFunction
 from .vdi import VDI
-from .view_error import TileSample, ViewErrorEstimator, tiles_ssim
+from .view_error import ViewErrorEstimator
 from .volume import Volume
 
 #: Tiles that are measured, and their edge in pixels: benchmarks/dial.py.

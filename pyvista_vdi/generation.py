@@ -16,7 +16,7 @@ from .blocks import GROUP, block_items
 from .bricks import Room, StepSampler
 from .camera import Camera, check_window_size
 from .checks import as_float, memory_limit_bytes
-from .device_volume import DeviceVolume, volume_bytes, voxel_bytes
+from .device_volume import DeviceVolume
 from .dial import Dial, refuse_settings
 from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory
@@ -27,6 +27,7 @@ from .rays import check_list_space
 from .transfer_function import TransferFunction
 from .vdi import VDI
 from .volume import Volume
+from .voxels import volume_bytes, voxel_bytes
 
 #: Most supersegments that a list may be allowed.
 MAX_SUPERSEGMENTS = 4096

@@ -24,34 +24,23 @@ from .cropping import Cropping, checked_opacity_multiplier
 from .device_volume import DeviceVolume
 from .errors import Cancelled, InvalidArgumentError
 from .lighting import Lights
-from .metrics import SSIM_ARGUMENTS, SSIM_WINDOW, over_background
+from .metrics import SSIM_WINDOW, over_background
 from .opencl_runtime import get_runtime
+from .picture_tiles import COARSE, REACH, Cells, Floats, Region, TileSample, seen_region, tiles_ssim
 from .raycast import render_vdi
 from .raycast_volume import picture_room, raycast_medium
 from .transfer_function import TransferFunction
 from .vdi import VDI
 from .volume import Volume
 
-Floats: TypeAlias = NDArray[np.float64]
 Pause: TypeAlias = Callable[[], object]
 
 #: Tiles of an estimate, and their edge in pixels: benchmarks/view_error.py.
 TILES = 16
 TILE_SIZE = 24
 
-#: Pixels that an SSIM window reaches to each side of its centre.
-_REACH = SSIM_WINDOW // 2
-#: Pixels of the picture along the edge of one pixel of the coarse pictures.
-_COARSE = 5
 #: Most pixels of a coarse picture in one launch, so that a frame does not wait long for its end.
 _COARSE_LAUNCH = 2048
-#: Arguments of ``structural_similarity`` for the coarse pictures: a window of 5 of their pixels.
-_COARSE_SSIM = {**SSIM_ARGUMENTS, "sigma": 0.7}
-_COARSE_WINDOW = 5
-#: Weight of a difference between the coarse pictures against detail within one.
-_DIFFERENCE_WEIGHT = 3.0
-#: Share of the tiles that are spread evenly, whatever the coarse pictures show.
-_EVEN_SHARE = 0.1
 #: Distance of an eye from the centre, in diagonals of the bounds, below which it has no direction.
 _AT_CENTRE = 1e-6
 
@@ -263,7 +252,7 @@ class ViewErrorEstimator:
         device: Any = None,
     ) -> None:
         self._tiles = _whole("tiles", tiles, 2)
-        self._edge = _whole("tile_size", tile_size, SSIM_WINDOW) - 2 * _REACH
+        self._edge = _whole("tile_size", tile_size, SSIM_WINDOW) - 2 * REACH
         self._runtime = get_runtime(device)
         edge = max(int(tile_size), math.isqrt(2 * _COARSE_LAUNCH))  # of what is rendered at a time
         self._medium = DeviceVolume(
@@ -385,70 +374,13 @@ class ViewErrorEstimator:
     def _sample(
         self, scene: _Scene, vdi: VDI, camera: Camera, size: tuple[int, int]
     ) -> TileSample | None:
-        region = _region(camera, size, (vdi.bounds, self._medium.volume.bounds))
+        region = seen_region(camera, size, (vdi.bounds, self._medium.volume.bounds))
         if region is None:
             return None
-        cells = _Cells(region, size, self._edge)
+        cells = Cells(region, size, self._edge)
         n = len(cells.corners)
         guess = cells.guess(*scene.coarse(region)) if n > self._tiles else np.ones(n)
-        chances = _chances(guess, min(self._tiles, n))
-        chosen = _systematic(chances)
-        return TileSample(
-            cells.corners[chosen],
-            cells.tile_size,
-            chances[chosen],
-            guess[chosen],
-            float(guess.sum()),
-            cells.area / n / math.prod(edge - 2 * _REACH for edge in size),
-        )
-
-
-@dataclass(frozen=True)
-class TileSample:
-    """Tiles of a picture, and how the SSIM of the whole follows from theirs.
-
-    Attributes
-    ----------
-    corners : numpy.ndarray
-        int64 (k, 2): column and row of each tile's first pixel, from the top left.
-    size : (int, int)
-        Width and height of a tile, pixels.
-    chances, guess : numpy.ndarray
-        float64 (k,): probability of each tile to be chosen, and its guessed loss.
-    guessed : float
-        Sum of the guesses for all cells of the picture.
-    share : float
-        Of the picture's pixels that have an SSIM, in one cell.
-    """
-
-    corners: NDArray[np.int64]
-    size: tuple[int, int]
-    chances: Floats
-    guess: Floats
-    guessed: float
-    share: float
-
-    def infer(self, ssim: Floats) -> tuple[float, float]:
-        """Return the SSIM of the whole picture, and its standard error, from the tiles'."""
-        total, error = _ratio_estimate(1.0 - ssim, self.chances, self.guess, self.guessed)
-        return float(1.0 - self.share * total), float(self.share * error)
-
-
-def tiles_ssim(
-    old: Sequence[NDArray[np.float32]],
-    new: Sequence[NDArray[np.float32]],
-    background: Sequence[float] = (0.0, 0.0, 0.0),
-) -> Floats:
-    """Return the mean SSIM of the inner pixels of pairs of tiles of one size, float64 (k,)."""
-    from skimage.metrics import structural_similarity  # loads SciPy
-
-    height, width = new[0].shape[:2]
-    # One above the other: a call for each would take five times as long
-    pair = (over_background(np.concatenate(tiles), background) for tiles in (old, new))
-    _, ssim = structural_similarity(*pair, full=True, **SSIM_ARGUMENTS)
-    inner = slice(_REACH, -_REACH)
-    by_tile = ssim.reshape(len(new), height, width, 3)[:, inner, inner]
-    return np.asarray(by_tile.mean(axis=(1, 2, 3)))
+        return cells.sample(guess, self._tiles)
 
 
 class _Scene:
@@ -477,21 +409,21 @@ class _Scene:
         self._background = background
         self._pause = pause
 
-    def coarse(self, region: _Region) -> tuple[Floats, Floats]:
+    def coarse(self, region: Region) -> tuple[Floats, Floats]:
         """Return coarse pictures of a region by VDI and volume, float64 (rows, columns, 3)."""
-        columns, rows = (-(-extent // _COARSE) for extent in region.extent)
+        columns, rows = (-(-extent // COARSE) for extent in region.extent)
         left, top = region.first
         # The last may lie beyond the window, which has no depth and no picture there
         across, down = (
-            np.minimum(first + _COARSE * np.arange(n) + _COARSE // 2, edge - 1)
+            np.minimum(first + COARSE * np.arange(n) + COARSE // 2, edge - 1)
             for first, n, edge in zip(region.first, (columns, rows), self._size, strict=True)
         )
         bands = []
         band = max(1, _COARSE_LAUNCH // columns)
         for row in range(0, rows, band):
             n = min(band, rows - row)
-            corner = (left, top + row * _COARSE)
-            lens = self._camera.tile(self._size, corner, (columns * _COARSE, n * _COARSE))
+            corner = (left, top + row * COARSE)
+            lens = self._camera.tile(self._size, corner, (columns * COARSE, n * COARSE))
             part = np.ix_(down[row : row + n], across)
             bands.append(self._both(lens, (columns, n), part))
         old, new = (self._blended(np.concatenate(b)) for b in zip(*bands, strict=True))
@@ -544,74 +476,6 @@ class _Scene:
         return over_background(picture, self._background)
 
 
-@dataclass(frozen=True)
-class _Region:
-    """A rectangle of pixels: first column and row from the top left, and how many."""
-
-    first: tuple[int, int]
-    extent: tuple[int, int]
-
-
-class _Cells:
-    """A region cut into cells, each the part of a tile whose SSIM the tile tells.
-
-    Parameters
-    ----------
-    region : _Region
-        What they cover.
-    size : (int, int)
-        The window, pixels.
-    edge : int
-        Of a cell, pixels; less where the window has fewer.
-
-    Attributes
-    ----------
-    corners : numpy.ndarray
-        int64 (n, 2), column and row of each **tile's** first pixel, along a space-filling curve.
-    tile_size : (int, int)
-        Width and height of a tile, pixels.
-    area : int
-        Pixels that the cells cover together.
-    """
-
-    def __init__(self, region: _Region, size: tuple[int, int], edge: int) -> None:
-        self._region = region
-        self._edges = [min(edge, s - 2 * _REACH) for s in size]
-        self._starts = [
-            _cell_starts(first, extent, e, s - _REACH)
-            for first, extent, e, s in zip(
-                region.first, region.extent, self._edges, size, strict=True
-            )
-        ]
-        columns, rows = self._starts
-        self._order = _along_curve(len(columns), len(rows))
-        column, row = self._order.T
-        self.corners = np.stack([columns[column], rows[row]], axis=1) - _REACH
-        self.tile_size = (self._edges[0] + 2 * _REACH, self._edges[1] + 2 * _REACH)
-        self.area = math.prod(max(n, e) for n, e in zip(region.extent, self._edges, strict=True))
-
-    def guess(self, old: Floats, new: Floats) -> Floats:
-        """Guess each cell's loss, up to a factor, from coarse pictures of the region.
-
-        The loss of the coarse pictures' own SSIM, and the root of the detail that is to be seen:
-        contrast between neighbours in either picture, and the pictures' difference.
-        """
-        contrast = np.maximum(_contrast(old), _contrast(new))
-        detail = contrast + _DIFFERENCE_WEIGHT * np.abs(old - new).max(axis=2)
-        return np.asarray(self._averages(_coarse_loss(old, new)) + np.sqrt(self._averages(detail)))
-
-    def _averages(self, coarse: Floats) -> Floats:
-        """Mean over each cell of values at coarse pixels of the region, float64 (n,)."""
-        across, down = (
-            _overlaps(*along)
-            for along in zip(
-                self._starts, self._edges, self._region.first, coarse.shape[::-1], strict=True
-            )
-        )
-        column, row = self._order.T
-        return np.asarray((down @ coarse @ across.T)[row, column])
-
-
 def _towards_eye(camera: Camera, bounds: Sequence[float]) -> Floats:
     """Direction in which the eye stands, seen from the centre of the bounds; model frame."""
     matrix = camera.model_transform
@@ -635,143 +499,6 @@ def _pixel_width(camera: Camera, size: tuple[int, int], bounds: Sequence[float])
     t = (near + far) / 2 - pixel_rays.reference_depth
     _, across, up = pixel_rays.origin + t * pixel_rays.direction
     return math.sqrt(float(np.linalg.norm(np.cross(across, up))))
-
-
-def _region(
-    camera: Camera, size: tuple[int, int], boxes: Sequence[Sequence[float]]
-) -> _Region | None:
-    """Pixels whose SSIM the boxes can change; None if there are none.
-
-    The whole picture where a box reaches behind the eye. SSIM is not told within five pixels of
-    the picture's border.
-    """
-    corners = np.concatenate([rays.corners(box) for box in boxes])
-    points = np.column_stack([corners, np.ones(len(corners))]) @ camera.model_to_view.T
-    depth = points[:, 2]
-    if not camera.parallel_projection and depth.max() <= 0:
-        return None
-    edges = np.asarray(size)
-    first, last = np.zeros(2), edges.astype(np.float64)
-    if camera.parallel_projection or depth.min() > rays.NEAREST_DEPTH * depth.max():
-        viewport = points @ camera.viewport_matrix(size).T
-        u, v = viewport[:, :2].T / viewport[:, 3]
-        pixels = (np.stack([u, -v], axis=1) + 1) / 2 * edges
-        first, last = np.floor(pixels.min(axis=0)), np.ceil(pixels.max(axis=0))
-    low = np.clip(first - _REACH, _REACH, edges - _REACH).astype(int)
-    high = np.clip(last + _REACH, _REACH, edges - _REACH).astype(int)
-    if (high <= low).any():
-        return None
-    width, height = (high - low).tolist()
-    left, top = low.tolist()
-    return _Region((left, top), (width, height))
-
-
-def _cell_starts(first: int, extent: int, edge: int, end: int) -> NDArray[np.int64]:
-    """Where cells begin that cover ``extent`` pixels evenly and end before ``end``."""
-    if extent <= edge:
-        return np.array([min(first, end - edge)])
-    count = -(-extent // edge)
-    return np.rint(np.linspace(first, first + extent - edge, count)).astype(np.int64)
-
-
-def _along_curve(columns: int, rows: int) -> NDArray[np.int64]:
-    """All (column, row) of a grid along Hilbert's curve, int64 (columns * rows, 2).
-
-    Neighbours along the curve are neighbours in the grid, so that a sample evenly spaced along it
-    is spread over the grid.
-    """
-    row, column = np.divmod(np.arange(columns * rows), columns)
-    cells = np.stack([column, row], axis=1)
-    x, y = cells.T.copy()
-    place = np.zeros_like(x)
-    for bit in reversed(range(max(columns, rows).bit_length())):
-        right, up = x >> bit & 1, y >> bit & 1
-        place = place << 2 | (3 * right ^ up)
-        # Turn the quadrant so that its curve runs as the whole does
-        low = (1 << bit) - 1
-        x, y = x & low, y & low
-        flipped = (up == 0) & (right == 1)
-        x, y = np.where(flipped, low - x, x), np.where(flipped, low - y, y)
-        x, y = np.where(up == 0, y, x), np.where(up == 0, x, y)
-    return np.asarray(cells[np.argsort(place)])
-
-
-def _overlaps(starts: NDArray[np.int64], edge: int, first: int, count: int) -> Floats:
-    """Shares of coarse pixels in cells along one axis, float64 (cells, count), rows sum to 1."""
-    begin = first + _COARSE * np.arange(count)
-    low = np.maximum(begin[None], starts[:, None])
-    high = np.minimum(begin[None] + _COARSE, starts[:, None] + edge)
-    share = np.maximum(high - low, 0.0)
-    return np.asarray(share / share.sum(axis=1, keepdims=True))
-
-
-def _contrast(picture: Floats) -> Floats:
-    """Largest difference of a channel from the four neighbours, float64 (rows, columns)."""
-    contrast = np.zeros(picture.shape[:2])
-    across = np.abs(np.diff(picture, axis=1)).max(axis=2)
-    down = np.abs(np.diff(picture, axis=0)).max(axis=2)
-    for part, difference in (
-        (contrast[:, 1:], across),
-        (contrast[:, :-1], across),
-        (contrast[1:], down),
-        (contrast[:-1], down),
-    ):
-        np.maximum(part, difference, out=part)
-    return contrast
-
-
-def _coarse_loss(old: Floats, new: Floats) -> Floats:
-    """1 - SSIM around each coarse pixel, float64 (rows, columns); 0 where there are too few."""
-    from skimage.metrics import structural_similarity  # loads SciPy
-
-    if min(old.shape[:2]) < _COARSE_WINDOW:
-        return np.zeros(old.shape[:2])
-    _, ssim = structural_similarity(old, new, full=True, **_COARSE_SSIM)
-    # SSIM is never above 1, but for rounding
-    return np.asarray(np.maximum(1.0 - ssim.mean(axis=2), 0.0))
-
-
-def _chances(guess: Floats, tiles: int) -> Floats:
-    """Probability of each cell to be chosen, float64 (n,), that add up to ``tiles``."""
-    mean = guess.mean()
-    weight = _EVEN_SHARE + (1 - _EVEN_SHARE) * guess / mean if mean > 0 else np.ones(len(guess))
-    chances = np.ones(len(guess))
-    certain = np.zeros(len(guess), dtype=bool)  # to be chosen
-    while not certain.all():
-        left = tiles - np.count_nonzero(certain)
-        chances[~certain] = left * weight[~certain] / weight[~certain].sum()
-        beyond = ~certain & (chances >= 1)
-        if not beyond.any():
-            break
-        chances[beyond] = 1.0
-        certain |= beyond
-    return chances
-
-
-def _systematic(chances: Floats) -> NDArray[np.int64]:
-    """Indices of a systematic sample, as many as the chances add up to (Madow 1949)."""
-    turns = np.floor(np.concatenate([[0.0], np.cumsum(chances)]) + 0.5)
-    return np.flatnonzero(np.diff(turns) > 0)
-
-
-def _ratio_estimate(
-    losses: Floats, chances: Floats, guess: Floats, guessed: float
-) -> tuple[float, float]:
-    """Total loss of all cells, and its standard error, from those that were chosen.
-
-    Parameters
-    ----------
-    losses, chances, guess : numpy.ndarray
-        Of the chosen cells, float64 (k,).
-    guessed : float
-        Sum of the guesses for all cells.
-    """
-    seen, expected = float((losses / chances).sum()), float((guess / chances).sum())
-    ratio = seen / expected if expected > 0 else 0.0
-    residuals = (losses - ratio * guess) / chances
-    n = len(losses)
-    variance = n / max(1, n - 1) * float(((1 - chances) * residuals**2).sum())
-    return seen + ratio * (guessed - expected), math.sqrt(variance)
 
 
 def _of_window(name: str, values: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[Any] | None:

@@ -10,12 +10,23 @@ from importlib import import_module
 from typing import Any, NoReturn
 
 from .._version import __version__
-from ..camera import check_window_size
-from ..checks import memory_limit_bytes
-from ..dial import QUALITIES, TARGET_ANGLE
-from ..errors import InvalidArgumentError
 from ..precision import PRECISIONS
-from ..standard_cases import ANGLES, ELEVATION, TRANSFER_FUNCTIONS, WINDOW_SIZE
+from ..standard_cases import ANGLES, ELEVATION, WINDOW_SIZE
+from .options import (
+    add_camera,
+    add_classification,
+    add_device,
+    add_dial,
+    add_limits,
+    add_occlusion,
+    add_size,
+    add_volume,
+    parse_color,
+    parse_count,
+    parse_numbers,
+    parse_rate,
+    parse_size,
+)
 from .tradeoff_options import add_sweep_options
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
@@ -139,16 +150,16 @@ def _add_info(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_generate(parser: argparse.ArgumentParser) -> None:
-    _add_volume(parser)
+    add_volume(parser)
     parser.add_argument("-o", "--output", metavar="FILE", required=True, help=_VDI_TARGET)
-    _add_size(parser, WINDOW_SIZE)
-    _add_camera(parser, f"the view that the volume fills, {ELEVATION:g} degrees above its middle")
-    _add_classification(parser)
-    _add_occlusion(parser)
-    _add_limits(parser)
-    _add_dial(parser)
+    add_size(parser, WINDOW_SIZE)
+    add_camera(parser, f"the view that the volume fills, {ELEVATION:g} degrees above its middle")
+    add_classification(parser)
+    add_occlusion(parser)
+    add_limits(parser)
+    add_dial(parser)
     _add_file(parser)
-    _add_device(parser)
+    add_device(parser)
 
 
 def _add_convert(parser: argparse.ArgumentParser) -> None:
@@ -214,10 +225,10 @@ def _add_render(parser: argparse.ArgumentParser) -> None:
         "view and the size are those of the first unless they are given",
     )
     parser.add_argument("-o", "--output", metavar="FILE", required=True, help=".png to write")
-    _add_size(parser, None)
+    add_size(parser, None)
     parser.add_argument(
         "--background",
-        type=_color,
+        type=parse_color,
         metavar="COLOR",
         help="blend over this: a name, #rrggbb or R,G,B from 0 to 1; otherwise the picture is "
         "transparent where the volume is",
@@ -229,18 +240,18 @@ def _add_render(parser: argparse.ArgumentParser) -> None:
         help="end rays where less than this is left, 0 to below 1 (0.000001): what a channel may "
         "lose; VTK's mappers stop at about 0.004. For a single file",
     )
-    _add_camera(parser, "the VDI's generating view")
-    _add_device(parser)
+    add_camera(parser, "the VDI's generating view")
+    add_device(parser)
 
 
 def _add_view(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help=_VDI_FILE)
-    _add_size(parser, None)
+    add_size(parser, None)
     parser.add_argument("--screenshot", metavar="FILE", help="write this .png, open no window")
     group = parser.add_argument_group("while the view moves")
     group.add_argument(
         "--target-fps",
-        type=_rate,
+        type=parse_rate,
         metavar="RATE",
         default=30.0,
         help="frames per second to keep, by fewer pixels; 0: every frame is full (default: 30)",
@@ -261,24 +272,24 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_compare(parser: argparse.ArgumentParser) -> None:
-    _add_volume(parser)
+    add_volume(parser)
     parser.add_argument("--out", metavar="FOLDER", default=".", help="where the files go")
-    _add_size(parser, WINDOW_SIZE)
+    add_size(parser, WINDOW_SIZE)
     parser.add_argument(
         "--angles",
-        type=_numbers,
+        type=parse_numbers,
         metavar="A,B,...",
         default=ANGLES,
         help=f"degrees from V_O (default: {','.join(f'{a:g}' for a in ANGLES)})",
     )
     parser.add_argument(
-        "--repeats", type=_count, default=3, help="timed frames of each kind (default: 3)"
+        "--repeats", type=parse_count, default=3, help="timed frames of each kind (default: 3)"
     )
     parser.add_argument("--no-vtk", action="store_true", help="leave out VTK's mappers")
-    _add_classification(parser, tables=False)
+    add_classification(parser, tables=False)
     parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
     parser.add_argument("--sample-distance", type=float, metavar="LENGTH")
-    _add_device(parser)
+    add_device(parser)
 
 
 def _add_benchmark(parser: argparse.ArgumentParser) -> None:
@@ -318,26 +329,26 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
         help="a file, may be repeated; a NAME of kingsnake, beechnut or richtmyer_meshkov says "
         "that it is the paper's; raw files are named like x_1024x1024x795_uint8.raw",
     )
-    group.add_argument("--sizes", nargs="+", type=_size, metavar="WxH", help="windows, pixels")
-    group.add_argument("--max-supersegments", nargs="+", type=_count, metavar="N")
-    group.add_argument("--angles", type=_numbers, metavar="A,B,...", help="degrees from V_O")
+    group.add_argument("--sizes", nargs="+", type=parse_size, metavar="WxH", help="windows, pixels")
+    group.add_argument("--max-supersegments", nargs="+", type=parse_count, metavar="N")
+    group.add_argument("--angles", type=parse_numbers, metavar="A,B,...", help="degrees from V_O")
     group.add_argument(
-        "--repeats", type=_count, metavar="N", help="timed frames of each kind and view (5)"
+        "--repeats", type=parse_count, metavar="N", help="timed frames of each kind and view (5)"
     )
     group.add_argument("--interpolation", choices=("nearest", "linear"), help="(nearest)")
-    group.add_argument("--seed", type=_count, metavar="N", help="of the made volumes (1)")
+    group.add_argument("--seed", type=parse_count, metavar="N", help="of the made volumes (1)")
     group.add_argument(
         "--tables", nargs="+", type=int, choices=(1, 2), help="which of the paper's tables (both)"
     )
     parser.add_argument("--no-vtk", action="store_true", help="leave out VTK's mappers")
-    _add_device(parser)
+    add_device(parser)
 
 
 def _add_tradeoff(parser: argparse.ArgumentParser) -> None:
-    _add_volume(parser)
-    add_sweep_options(parser, _size, _numbers, _count)
-    _add_classification(parser)
-    _add_device(parser)
+    add_volume(parser)
+    add_sweep_options(parser)
+    add_classification(parser)
+    add_device(parser)
 
 
 _VERBS: dict[str, tuple[str, str, str, Any]] = {
@@ -402,233 +413,3 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
         _add_paraview,
     ),
 }
-
-
-# -- groups of options -----------------------------------------------------------------------------
-
-
-def _add_volume(parser: argparse.ArgumentParser) -> None:
-    source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument(
-        "volume",
-        metavar="VOLUME",
-        nargs="?",
-        help="a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), .npy, "
-        "a raw file named like x_1024x1024x795_uint8.raw, or a folder of DICOM slices",
-    )
-    source.add_argument("--example", metavar="NAME", help="a volume known by name, e.g. brain")
-
-
-def _add_size(parser: argparse.ArgumentParser, default: tuple[int, int] | None) -> None:
-    shown = "the VDI's" if default is None else f"{default[0]}x{default[1]}"
-    parser.add_argument(
-        "--size",
-        type=_size,
-        metavar="WxH",
-        default=default,
-        help=f"window size in pixels (default: {shown})",
-    )
-
-
-def _add_camera(parser: argparse.ArgumentParser, default: str) -> None:
-    group = parser.add_argument_group("camera", f"By default {default}.")
-    triple: dict[str, Any] = {"nargs": 3, "type": float, "metavar": ("X", "Y", "Z")}
-    group.add_argument("--position", **triple, help="eye, world coordinates")
-    group.add_argument("--focal-point", **triple, help="point looked at, world coordinates")
-    group.add_argument("--view-up", **triple, help="direction that is up")
-    group.add_argument("--view-angle", type=float, metavar="DEGREES", help="vertical, full")
-    group.add_argument(
-        "--parallel-scale",
-        type=float,
-        metavar="LENGTH",
-        help="half the viewport's height in world units; makes the projection parallel",
-    )
-    group.add_argument("--camera-json", metavar="FILE", help="Camera.to_dict() as JSON")
-    group.add_argument("--azimuth", type=float, default=0.0, metavar="DEGREES", help="turn by")
-    group.add_argument("--elevation", type=float, default=0.0, metavar="DEGREES", help="lift by")
-
-
-def _add_classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> None:
-    group = parser.add_argument_group(
-        "classification", "Names, defaults and meaning are those of PyVista's add_volume."
-    )
-    group.add_argument(
-        "--tf",
-        choices=tuple(TRANSFER_FUNCTIONS),
-        help="a standard transfer function; --cmap and --opacity change parts of it",
-    )
-    group.add_argument("--cmap", metavar="NAME", help="colour map")
-    group.add_argument(
-        "--opacity", type=_opacity, metavar="NAME|A,B,...", help="name, or values from 0 to 1"
-    )
-    group.add_argument("--clim", nargs=2, type=float, metavar=("LOW", "HIGH"))
-    group.add_argument("--n-colors", type=int, metavar="N")
-    group.add_argument("--flip-scalars", action="store_true", default=None)
-    group.add_argument("--log-scale", action="store_true", default=None)
-    group.add_argument("--opacity-unit-distance", type=float, metavar="LENGTH")
-    group.add_argument("--scalars", metavar="NAME", help="which array")
-    group.add_argument("--preference", choices=("point", "cell"))
-    group.add_argument("--interpolation", choices=("nearest", "linear"))
-    group.add_argument("--shade", action="store_true", default=None, help="lit by a headlight")
-    for name in ("--ambient", "--diffuse", "--specular", "--specular-power"):
-        group.add_argument(name, type=float, metavar="X", help="of a shaded volume")
-    if tables:
-        group.add_argument(
-            "--transfer-function",
-            metavar="FILE",
-            help="TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista",
-        )
-
-
-def _add_occlusion(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("ambient occlusion", "Either option below turns it on, too.")
-    group.add_argument(
-        "--ambient-occlusion",
-        action="store_true",
-        help="darken what is hidden from the light around it",
-    )
-    group.add_argument(
-        "--occlusion-radius",
-        type=float,
-        metavar="LENGTH",
-        help="how far something hides, model units (default: 0.05 of the bounds' diagonal)",
-    )
-    group.add_argument(
-        "--occlusion-strength", type=float, metavar="S", help="0 to 1 (default: 0.1; 1 is darkest)"
-    )
-
-
-def _add_limits(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("limits")
-    group.add_argument(
-        "--max-supersegments", type=int, default=20, metavar="N", help="longest list (default: 20)"
-    )
-    group.add_argument(
-        "--criterion",
-        default="least-error",
-        metavar="NAME",
-        help="where lists are cut: least-error (default), homogeneity, length, "
-        "transmittance or optical-depth",
-    )
-    group.add_argument(
-        "--sample-distance",
-        type=float,
-        metavar="LENGTH",
-        help="step along the ray, model units (default: half the smallest spacing)",
-    )
-    group.add_argument("--tolerance", type=float, default=0.0, help="error traded for length")
-    group.add_argument(
-        "--view-cone",
-        type=float,
-        default=60.0,
-        metavar="DEGREES",
-        help="half angle of the cone of new views to serve (default: 60)",
-    )
-    group.add_argument(
-        "--memory-limit",
-        type=_bytes,
-        metavar="SIZE",
-        help="most memory to take on the device, like 2GiB; a volume that does not fit goes there "
-        "brick by brick (default: what the device has)",
-    )
-
-
-def _add_dial(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group(
-        "dial",
-        "Choose lists, their length and precision from a short measurement on this device; --size "
-        "is then that of the pictures. Not with --max-supersegments, --tolerance or --precision.",
-    )
-    group.add_argument(
-        "--quality",
-        choices=tuple(QUALITIES),
-        help="SSIM of "
-        + ", ".join(f"{ssim:g} ({name})" for name, ssim in QUALITIES.items() if ssim is not None)
-        + " against volume rendering; reference: what is made without a dial",
-    )
-    group.add_argument("--target-ssim", type=float, metavar="S", help="the same by a number")
-    group.add_argument(
-        "--target-fps", type=float, metavar="RATE", help="least full frames per second"
-    )
-    group.add_argument(
-        "--max-bytes", type=float, metavar="N", help="most bytes on the device; files are smaller"
-    )
-    group.add_argument(
-        "--target-angle",
-        type=float,
-        default=TARGET_ANGLE,
-        metavar="DEGREES",
-        help=f"turn of the view for which the SSIM is predicted (default: {TARGET_ANGLE:g})",
-    )
-
-
-def _add_device(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--device", metavar="NAME", help="OpenCL device, see pyvista-vdi devices")
-
-
-# -- types of options ------------------------------------------------------------------------------
-
-
-def _size(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(\d+)[xX](\d+)", text)
-    if not match:
-        raise argparse.ArgumentTypeError(f"a size is WIDTHxHEIGHT, like 1280x720; got {text!r}")
-    try:
-        return check_window_size((int(match[1]), int(match[2])), name="the size")
-    except InvalidArgumentError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
-
-
-def _numbers(text: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(
-            f"expected numbers with commas between them, like 0,5,30; got {text!r}"
-        ) from error
-
-
-def _bytes(text: str) -> int | None:
-    try:
-        return memory_limit_bytes(text)
-    except InvalidArgumentError:
-        raise argparse.ArgumentTypeError(
-            f"expected a size such as 2GiB or 800MB; got {text!r}"
-        ) from None
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number above 0; got {text!r}")
-    return int(text)
-
-
-def _rate(text: str) -> float:
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = -1.0
-    if not 0 <= rate < float("inf"):
-        raise argparse.ArgumentTypeError(f"expected frames per second, 0 or above; got {text!r}")
-    return rate
-
-
-def _opacity(text: str) -> str | list[float]:
-    return list(_numbers(text)) if re.match(r"[-+.\d]", text) else text
-
-
-def _color(text: str) -> tuple[float, ...]:
-    if re.match(r"[-+.\d]", text):
-        color = _numbers(text)
-        if len(color) != 3 or not all(0 <= c <= 1 for c in color):
-            raise argparse.ArgumentTypeError(f"expected R,G,B from 0 to 1; got {text!r}")
-        return color
-    from PIL import ImageColor
-
-    try:
-        red, green, blue = ImageColor.getrgb(text)[:3]
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is no colour: give a name, #rrggbb or R,G,B from 0 to 1"
-        ) from error
-    return red / 255, green / 255, blue / 255

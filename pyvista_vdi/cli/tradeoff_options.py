@@ -1,31 +1,18 @@
-"""The options of the verb ``tradeoff``; imports nothing but the standard library."""
+"""The options of the verb ``tradeoff``; their types are those of other verbs."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from typing import Any
+
+from .options import parse_count, parse_numbers, parse_size
 
 #: Frames and views, without and with ``--quick``.
 SIZES = ((640, 360), (320, 180))
 ANGLES = ((5.0, 30.0, 60.0), (5.0, 30.0))
 
 
-def add_sweep_options(
-    parser: argparse.ArgumentParser,
-    size: Callable[[str], Any],
-    numbers: Callable[[str], Any],
-    count: Callable[[str], Any],
-) -> None:
-    """Add what is measured and where it goes.
-
-    Parameters
-    ----------
-    parser : argparse.ArgumentParser
-        The verb's.
-    size, numbers, count : callable
-        Types of the options that other verbs have, too.
-    """
+def add_sweep_options(parser: argparse.ArgumentParser) -> None:
+    """Add what is measured and where it goes."""
     parser.add_argument(
         "--out",
         metavar="FOLDER",
@@ -40,13 +27,13 @@ def add_sweep_options(
     parser.add_argument(
         "--size",
         "--window-size",
-        type=size,
+        type=parse_size,
         metavar="WxH",
         help="of all frames, pixels (default: 640x360; with --quick 320x180)",
     )
     parser.add_argument(
         "--angles",
-        type=numbers,
+        type=parse_numbers,
         metavar="A,B,...",
         help="degrees from V_O (default: 5,30,60; with --quick 5,30)",
     )
@@ -64,11 +51,11 @@ def add_sweep_options(
     )
     among.add_argument("--product", action="store_true", help="measure every combination")
     parser.add_argument(
-        "--repeats", type=count, default=5, metavar="N", help="timed frames (default: 5)"
+        "--repeats", type=parse_count, default=5, metavar="N", help="timed frames (default: 5)"
     )
     parser.add_argument(
         "--generations",
-        type=count,
+        type=parse_count,
         default=5,
         metavar="N",
         help="timed generations of each VDI (default: 5)",

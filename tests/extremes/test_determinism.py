@@ -62,7 +62,7 @@ def test_across_work_group_sizes(runtime, monkeypatch, group):
     expected = digest(runtime)
     for module in (generation, raycast, raycast_volume, occupancy):
         monkeypatch.setattr(module, "GROUP", group)
-    for module in ("blocks", "device_volume"):
+    for module in ("blocks", "device_volume", "voxels"):
         monkeypatch.setattr(f"pyvista_vdi.{module}.GROUP", group)
     assert digest(runtime) == expected
 

@@ -293,10 +293,10 @@ def test_gradients_see_scalars_taken_relative(runtime, worst):
 
 
 def test_a_volume_beyond_float32_is_found_once(runtime, monkeypatch):
-    from pyvista_vdi import device_volume
+    from pyvista_vdi import voxels
 
     volume = Volume(((FIELD - 0.5) * 6e38).astype(np.float32))
-    assert device_volume._too_large(runtime, volume)
-    monkeypatch.setattr(device_volume, "_upload", None)
-    assert device_volume._too_large(runtime, volume)
-    assert not device_volume._uploads_of(field_volume()).too_large
+    assert voxels._too_large(runtime, volume)
+    monkeypatch.setattr(voxels, "upload_voxels", None)
+    assert voxels._too_large(runtime, volume)
+    assert not voxels.uploads_of(field_volume()).too_large

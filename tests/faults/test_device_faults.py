@@ -26,7 +26,7 @@ from pyvista_vdi.opencl_runtime import devices, programs
 #: Buffers of a volume and of a VDI that are on the device, and those that are always small.
 VOLUME = {"volume 'values'", "ranges of blocks"}
 VDI = {
-    *("list offsets", "supersegment faces", "supersegment media"),
+    *("list headers", "supersegment faces", "supersegment media"),
     *("occupancy counts", "occupancy masks"),
 }
 SMALL = {"transfer function", "visible blocks"}

@@ -19,8 +19,8 @@ from pyvista_vdi import (
     TransferFunction,
     Volume,
     background,
-    device_volume,
     generation,
+    voxels,
 )
 from pyvista_vdi.background import BackgroundGeneration
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
@@ -460,7 +460,7 @@ def test_a_volume_that_both_threads_need_first(runtime, generator, monkeypatch):
         transfer = TRANSFER.replace(scalar_range=(0, 1))
         camera = Camera((50, 50, 300), (50, 50, 50), (0, 1, 0))
         generator.start(volume, camera, WINDOW, transfer)
-        uploads = device_volume._uploads
+        uploads = voxels._uploads
         while generator.running and not (volume in uploads and uploads[volume].lock.locked()):
             pass  # the worker comes first, or not at all
         image = None

@@ -12,17 +12,19 @@ from pyvista_vdi import VDI, Camera, TransferFunction, Volume
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.metrics import compare_images
+from pyvista_vdi.picture_tiles import (
+    _along_curve,
+    _cell_starts,
+    _chances,
+    _ratio_estimate,
+    _systematic,
+)
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.raycast_volume import raycast_volume
 from pyvista_vdi.standard_cases import filling_camera
 from pyvista_vdi.view_error import (
     TILES,
     ViewErrorEstimator,
-    _along_curve,
-    _cell_starts,
-    _chances,
-    _ratio_estimate,
-    _systematic,
     angle_from_generating_view,
     estimate_view_error,
     magnification,
