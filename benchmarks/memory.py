@@ -27,6 +27,7 @@ from pyvista_vdi import Volume, examples
 from pyvista_vdi.classification import Classification
 from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.opencl_runtime import get_runtime
+from pyvista_vdi.precision import PRECISIONS
 from pyvista_vdi.raycast import render_vdi
 from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 
@@ -59,6 +60,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--size", type=window_size, default=(1280, 720), metavar="WxH")
     parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
     parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
+    parser.add_argument("--precision", choices=PRECISIONS, default="exact")
     parser.add_argument("--memory-limit", metavar="SIZE", help="as of pyvista-vdi generate")
     parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
     parser.add_argument("--json", action="store_true", help="print all figures")
@@ -90,6 +92,7 @@ def drawn(
         view,
         size,
         classified,
+        precision=options.precision,
         memory_limit=options.memory_limit,
         device=runtime,
     )

@@ -21,7 +21,7 @@ from .dial import Dial, refuse_settings
 from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory
 from .lighting import Lights
-from .opencl_runtime import Runtime, aligned_empty, get_runtime
+from .opencl_runtime import DeviceBuffer, GrowingArray, Runtime, aligned_empty, get_runtime
 from .precision import check_precision
 from .rays import check_list_space
 from .transfer_function import TransferFunction
@@ -47,6 +47,15 @@ CRITERIA = tuple(_CRITERIA)
 _RUN_BYTES = 9 * 4
 #: Records have room for a multiple of so many runs: ``ERRORS`` of ``vdi/runs.cl``.
 _ERRORS_AT_A_TIME = 8
+#: A VDI's arrays of supersegments, as messages call them, and the shape of an element.
+_LIST_ARRAYS: dict[str, tuple[int, ...]] = {
+    "front depths": (),
+    "back depths": (),
+    "supersegment colours": (3,),
+    "optical depths": (),
+}
+#: Bytes of a supersegment in them, and in the largest of them.
+_SUPERSEGMENT_BYTES, _LARGEST_ELEMENT = 24, 12
 #: Bytes of runs that one slice of rays records at a time; also how often progress is reported.
 _SLICE_BYTES = 96 * 2**20
 #: Slices that a memory limit has room for: the volume gets more than they do.
@@ -162,7 +171,7 @@ def estimate(
     on_device, samples = volume_bytes(volume, volume.array.size * item, room)
     return Estimate(
         volume=on_device,
-        vdi_worst_case=lists * (limit * 24 + 8) + 8,
+        vdi_worst_case=lists * (limit * _SUPERSEGMENT_BYTES + 8) + 8,
         working=plan.bytes + samples,
         occlusion=grid,
     )
@@ -300,7 +309,7 @@ def generate_vdi(
     limit = check_max_supersegments(max_supersegments)
     criterion, precision = check_criterion(criterion), check_precision(precision)
     tolerance, hidden_weight = _check_weights(tolerance, view_cone)
-    _require_room((), (width, height))
+    _require_room(0, (width, height))
     runtime = get_runtime(device)
     lights = Lights.from_any(lights)
     occlusion = AmbientOcclusion.from_any(ambient_occlusion)
@@ -317,22 +326,21 @@ def generate_vdi(
         room=slices.room(memory, grid),
     )
     size = (width, height)
-    parts = []
     with (
         medium.giving_bricks_back(),
         _Recorder(
             runtime, medium, camera, size, slices, limit, criterion, tolerance, hidden_weight
         ) as recorder,
+        _GrowingLists(runtime, size, limit) as lists,
     ):
         for first_row in range(0, height, recorder.slices.rows):
             _report(progress, first_row / height)
             rows = min(recorder.slices.rows, height - first_row)
             recorder.march(first_row, rows)
-            parts.append(recorder.packed(first_row, rows))
-            _require_room(parts, size)
+            recorder.pack(first_row, rows, lists)
+        offsets, front, back, color, optical_depth = lists.finished()
     _report(progress, 1.0)
 
-    lengths, front, back, color, optical_depth = _joined(runtime, parts)
     made_by = {
         "generator": f"pyvista-vdi {__version__}",
         "criterion": criterion,
@@ -357,7 +365,7 @@ def generate_vdi(
     return VDI(
         camera,
         (width, height),
-        np.concatenate([np.zeros(1, np.uint64), np.cumsum(lengths, dtype=np.uint64)]),
+        offsets,
         front,
         back,
         color,
@@ -387,7 +395,7 @@ class _Slices:
             most = min(most, memory_limit // _SLICES_IN_LIMIT)
         self.rows = min(height, 4 * max(1, most // per_block_row))
         self.items = block_items(width, self.rows)
-        packed_bytes = self.items * (limit * 24 + 8)
+        packed_bytes = self.items * (limit * _SUPERSEGMENT_BYTES + 8)
         self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + packed_bytes
         self.text = f"{self.rows} rows of {width} lists of up to {limit} supersegments"
 
@@ -464,6 +472,7 @@ class _Recorder:
             self._errors = keep(runtime.buffer((items, capacity), name="merge errors"))
             self._thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
             self._counts = keep(runtime.buffer((items,), np.uint32, "list lengths"))
+            self._starts = keep(ExitStack())  # the buffer that says where the lists go
             self._sampler = None
             if medium.bricks is not None:
                 march = (
@@ -571,39 +580,27 @@ class _Recorder:
             self._counts,
         )
 
-    def packed(self, first_row: int, rows: int) -> tuple[NDArray[Any], ...]:
-        """Return lengths, fronts, backs, colours and optical depths of the slice's lists."""
+    def pack(self, first_row: int, rows: int, lists: _GrowingLists) -> None:
+        """Write the slice's lists behind those made before; what is launched next need not wait."""
         runtime, (width, height) = self._runtime, self._size
         entries: tuple[Any, ...] = ()
         if self._far_entries:
             entries = (self._forms, np.int32(self._planes), np.int32(height), np.int32(first_row))
-        lengths = runtime.download(self._counts, count=rows * width)
-        offsets = np.zeros(rows * width + 1, np.uint64)
-        np.cumsum(lengths, dtype=np.uint64, out=offsets[1:])
-        n = int(offsets[-1])
-        with (
-            runtime.upload(offsets, "list offsets") as starts,
-            runtime.result((n,), name="front depths") as front,
-            runtime.result((n,), name="back depths") as back,
-            runtime.result((n, 3), name="supersegment colours") as color,
-            runtime.result((n,), name="optical depths") as optical_depth,
-        ):
-            self._launch(
-                "pack_lists",
-                block_items(width, rows),
-                self._records,
-                np.int32(self.slices.capacity),
-                np.int32(width),
-                np.int32(rows),
-                starts,
-                front,
-                back,
-                color,
-                optical_depth,
-                *entries,
-            )
-            arrays = [runtime.download(buffer) for buffer in (front, back, color, optical_depth)]
-        return (lengths, *arrays)
+        starts, targets = lists.room_for(runtime.download(self._counts, count=rows * width))
+        if starts[-1] == starts[0]:
+            return
+        self._starts.close()  # of the slice before, which is done
+        self._launch(
+            "pack_lists",
+            block_items(width, rows),
+            self._records,
+            np.int32(self.slices.capacity),
+            np.int32(width),
+            np.int32(rows),
+            self._starts.enter_context(runtime.upload(starts, "list offsets")),
+            *targets,
+            *entries,
+        )
 
     def _launch(self, name: str, items: int, *arguments: Any) -> None:
         self._runtime.launch(self._kernels[name], items, GROUP, *arguments)
@@ -620,31 +617,86 @@ def _check_weights(tolerance: float, view_cone: float) -> tuple[float, float]:
     return difference, float(1 - np.cos(np.radians(angle)))
 
 
-def _joined(runtime: Runtime, parts: list[tuple[NDArray[Any], ...]]) -> list[NDArray[Any]]:
-    """Join the slices' arrays, each kind into one that a CPU device uses in place.
+class _GrowingLists:
+    """A VDI's arrays while slices of lists are written into them, one behind the other.
 
-    ``parts`` are let go of one by one, so that the VDI is not there twice.
+    Room for every list at its longest is asked for at once: systems take memory as it is written,
+    so that what stays unused costs nothing, and nothing is ever copied. :meth:`finished` gives it
+    back. A device that uses arrays in place writes all slices through the same buffers, which
+    reach as far as they may; any other has buffers of a slice, whose values are copied.
     """
-    sizes = [sum(len(array) for array in arrays) for arrays in zip(*parts, strict=True)]
-    joined = [
-        aligned_empty((size, *array.shape[1:]), array.dtype)  # taken as it is written
-        for size, array in zip(sizes, parts[0], strict=True)
-    ]
-    ends = sizes
-    while parts:
-        firsts = [end - len(array) for end, array in zip(ends, parts[-1], strict=True)]
-        for whole, array, first, end in zip(joined, parts.pop(), firsts, ends, strict=True):
-            runtime.give_way()
-            whole[first:end] = array
-        ends = firsts
-    return joined
+
+    def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int) -> None:
+        self._runtime = runtime
+        self._size = size
+        self._most = size[0] * size[1] * limit  # supersegments
+        self._offsets = np.zeros(size[0] * size[1] + 1, np.uint64)
+        self._made = 0  # lists so far
+        self._arrays = {name: GrowingArray(item) for name, item in _LIST_ARRAYS.items()}
+        self._begin = self._end = 0  # supersegments that the buffers hold
+        self._targets: list[tuple[DeviceBuffer, NDArray[Any]]] = []  # and what they are to fill
+
+    def __enter__(self) -> _GrowingLists:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for target, _part in self._targets:
+            target.release()
+
+    def room_for(
+        self, lengths: NDArray[np.uint32]
+    ) -> tuple[NDArray[np.uint64], list[DeviceBuffer]]:
+        """Return where the next lists begin in the buffers, and the buffers."""
+        first, last = self._made, self._made + len(lengths)
+        begin = self._offsets[first]
+        ends: NDArray[np.uint64] = self._offsets[first + 1 : last + 1]
+        np.cumsum(lengths, dtype=np.uint64, out=ends)
+        np.add(ends, begin, out=ends)
+        self._made = last
+        end = int(self._offsets[last])
+        _require_room(end, self._size)
+        if end > self._end:
+            self._make_room(int(begin), end)
+        starts = aligned_empty(last + 1 - first, np.uint64)
+        np.subtract(self._offsets[first : last + 1], np.uint64(self._begin), out=starts)
+        return starts, [target for target, _part in self._targets]
+
+    def _make_room(self, begin: int, end: int) -> None:
+        """Have buffers of the supersegments from ``begin``, those made so far, to ``end``."""
+        self._collect(begin)
+        for array in self._arrays.values():
+            array.reserve(end, self._most)
+        alignment = self._runtime.in_place_alignment
+        if alignment is not None:
+            begin -= begin % alignment  # so many elements are aligned as well
+            room = min(array.room for array in self._arrays.values())
+            largest = self._runtime.info.max_allocation // _LARGEST_ELEMENT
+            end = max(end, min(room, begin + largest))
+        self._begin, self._end = begin, end
+        for name, array in self._arrays.items():
+            part: NDArray[Any] = array.part(begin, end)
+            self._targets.append((self._runtime.target(part, name), part))
+
+    def _collect(self, made: int) -> None:
+        """Wait until so many supersegments are in the arrays, and let go of the buffers."""
+        while self._targets:
+            target, part = self._targets[-1]
+            filled = part[: made - self._begin]
+            self._runtime.download(target, filled, count=filled.size)
+            target.release()
+            self._targets.pop()
+
+    def finished(self) -> list[NDArray[Any]]:
+        """Return offsets, fronts, backs, colours and optical depths."""
+        n = int(self._offsets[-1])
+        self._collect(n)
+        return [self._offsets, *(array.finished(n) for array in self._arrays.values())]
 
 
-def _require_room(parts: Sequence[tuple[NDArray[Any], ...]], size: tuple[int, int]) -> None:
-    """Refuse to go on where the host cannot hold the VDI: its arrays, and a slice of them twice."""
-    made = [sum(array.nbytes for array in part) for part in parts]
+def _require_room(supersegments: int, size: tuple[int, int]) -> None:
+    """Refuse to go on where the host cannot hold a VDI of at least so many supersegments."""
     require_host_memory(
-        sum(made) + max(made, default=0) + 8 * size[0] * size[1],
+        supersegments * _SUPERSEGMENT_BYTES + 8 * size[0] * size[1],
         f"a VDI of {size[0]} x {size[1]} lists",
         "lower the window size or max_supersegments, or raise tolerance",
     )

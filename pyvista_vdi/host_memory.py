@@ -1,12 +1,43 @@
-"""How much memory the host has, so that what cannot fit is refused before it is taken."""
+"""The host's memory: how much there is, so that what cannot fit is refused; aligned arrays."""
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from .errors import DeviceMemoryError
+
+HOST_ALIGNMENT = 4096
+"""Bytes; arrays that begin at a multiple are used in place by CPU drivers instead of copied."""
+
+
+def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+    """Uninitialised C-contiguous array that a CPU device can use without a copy.
+
+    Parameters
+    ----------
+    shape : int or tuple of int
+        Shape.
+    dtype : dtype_like
+        Element type.
+
+    Returns
+    -------
+    numpy.ndarray
+        Its data begin at a multiple of 4096 bytes.
+    """
+    dtype = np.dtype(dtype)
+    shape = (shape,) if isinstance(shape, int) else tuple(shape)
+    nbytes = math.prod(shape) * dtype.itemsize
+    raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
+    start = -raw.ctypes.data % HOST_ALIGNMENT
+    return raw[start : start + nbytes].view(dtype).reshape(shape)
 
 
 def physical_memory() -> int | None:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InvalidArgumentError, InvalidVDIError
+from .host_memory import aligned_empty
 
 if TYPE_CHECKING:
     from .vdi import VDI
@@ -31,6 +32,9 @@ _GRID = (1 << 24) - (1 << 15)
 
 #: No step is shorter: devices may take what is nearer to 0 than float32's normal numbers for 0.
 _LEAST_STEP_EXPONENT = -126
+
+#: Supersegments that are packed or unpacked at a time: what this takes is small beside a VDI.
+_PIECE = 2**16
 
 #: Codes of optical depth: 0 is 0; from 1 on the upper half of a float32's bits, from 2^-18.
 TAU_CODES = (1 << 12) - 1
@@ -115,21 +119,21 @@ class Packed8:
 
     def media(self, counts: NDArray[np.int64]) -> dict[str, NDArray[np.float32]]:
         """Return front, back, color and optical_depth; ``counts`` are the lists' lengths."""
-        origins = np.repeat(self.origins, counts)
-        strides = np.repeat(self.strides.astype(np.int32), counts)
-        step = np.float32(self.step)
-        front, back = (
-            (origins + code.view(np.int32) * strides).astype(np.float32) * step
-            for code in self.depth_codes()
-        )
-        tau = self.tau_codes()
-        bits = np.where(tau > 0, tau + np.uint32(TAU_BASE - 1) << np.uint32(16), 0)
-        return {
-            "front": front,
-            "back": back,
-            "color": unpacked_color(self.words[:, 1], _COLOR_8),
-            "optical_depth": bits.astype(np.uint32).view(np.float32),
-        }
+        n = len(self.words)
+        media = {name: aligned_empty(n, np.float32) for name in ("front", "back", "optical_depth")}
+        media["color"] = aligned_empty((n, 3), np.float32)
+        for lists, part in _pieces(counts):
+            origins = np.repeat(self.origins[lists], counts[lists])
+            strides = np.repeat(self.strides[lists].astype(np.int32), counts[lists])
+            faces = self.depth_codes(part.start, part.stop)
+            for name, codes in zip(("front", "back"), faces, strict=True):
+                whole = (origins + codes.view(np.int32) * strides).astype(np.float32)
+                media[name][part] = whole * np.float32(self.step)
+            tau = self.tau_codes(part.start, part.stop)
+            bits = np.where(tau > 0, tau + np.uint32(TAU_BASE - 1) << np.uint32(16), 0)
+            media["optical_depth"][part] = bits.astype(np.uint32).view(np.float32)
+            media["color"][part] = unpacked_color(self.words[part, 1], _COLOR_8)
+        return media
 
     @classmethod
     def of_codes(
@@ -143,10 +147,7 @@ class Packed8:
         color: NDArray[np.uint32],
     ) -> Packed8:
         """Put codes together; ``color`` has red, green and blue in bits 8 to 31."""
-        words = np.empty((len(front), 2), np.uint32)
-        words[:, 0] = front | back << np.uint32(14) | tau << np.uint32(28)
-        words[:, 1] = tau >> np.uint32(4) | color
-        return cls(step, origins, strides, words)
+        return cls(step, origins, strides, _words(front, back, tau, color))
 
 
 Packing = Packed16 | Packed8
@@ -172,23 +173,52 @@ def packing_of(vdi: VDI, precision: str) -> Packing:
     """
     if precision == "16-byte":
         return Packed16(packed_color(vdi.color, _COLOR_16))
-    step, origins, strides, front, back = _depths(vdi)
-    return Packed8.of_codes(
-        step,
-        origins,
-        strides,
-        front,
-        back,
-        _tau_codes(vdi.optical_depth),
-        packed_color(vdi.color, _COLOR_8),
-    )
+    counts = vdi.counts.reshape(-1)
+    if counts.max() > DEPTH_CODES:
+        raise InvalidArgumentError(
+            f"a list of {counts.max()} supersegments cannot be packed into 8 bytes each: at most "
+            f"{DEPTH_CODES} have depths of their own; use the precision '16-byte'"
+        )
+    origins, strides = np.zeros(len(counts), np.int32), np.zeros(len(counts), np.uint16)
+    words = np.empty((vdi.n_supersegments, 2), np.uint32)
+    step = _grid_step(vdi)
+    for lists, part in _pieces(counts):
+        origins[lists], strides[lists], front, back = _depths(vdi, step, counts[lists], part)
+        tau, color = _tau_codes(vdi.optical_depth[part]), packed_color(vdi.color[part], _COLOR_8)
+        words[part] = _words(front, back, tau, color)
+    return Packed8(step, origins, strides, words)
+
+
+def _pieces(counts: NDArray[np.int64]) -> Iterator[tuple[slice, slice]]:
+    """Lists one after the other and their supersegments, in pieces of about :data:`_PIECE`."""
+    ends = np.cumsum(counts)
+    first_list = first = 0
+    while first_list < len(counts):
+        last_list = max(int(np.searchsorted(ends, first + _PIECE, side="right")), first_list + 1)
+        last = int(ends[last_list - 1])
+        yield slice(first_list, last_list), slice(first, last)
+        first_list, first = last_list, last
+
+
+def _words(
+    front: NDArray[np.uint32],
+    back: NDArray[np.uint32],
+    tau: NDArray[np.uint32],
+    color: NDArray[np.uint32],
+) -> NDArray[np.uint32]:
+    """Return the two words of each supersegment, see :class:`Packed8`."""
+    words = np.empty((len(front), 2), np.uint32)
+    words[:, 0] = front | back << np.uint32(14) | tau << np.uint32(28)
+    words[:, 1] = tau >> np.uint32(4) | color
+    return words
 
 
 def packed_color(
     color: NDArray[np.float32], channels: tuple[tuple[int, int], ...]
 ) -> NDArray[np.uint32]:
     """Return straight RGB, float32 (n, 3), in whole steps; uint32 (n,)."""
-    packed = np.zeros(len(color), np.uint32)
+    packed = aligned_empty(len(color), np.uint32)
+    packed[...] = 0
     for channel, (steps, first_bit) in enumerate(channels):
         code = np.rint(color[:, channel] * np.float32(steps)).astype(np.uint32)
         packed |= code << np.uint32(first_bit)
@@ -199,7 +229,7 @@ def unpacked_color(
     packed: NDArray[np.uint32], channels: tuple[tuple[int, int], ...]
 ) -> NDArray[np.float32]:
     """Return straight RGB, float32 (n, 3); one multiplication, which every device rounds alike."""
-    color = np.empty((len(packed), 3), np.float32)
+    color = aligned_empty((len(packed), 3), np.float32)
     for channel, (steps, first_bit) in enumerate(channels):
         code = packed >> np.uint32(first_bit) & np.uint32(steps)
         color[:, channel] = code.astype(np.float32) * (np.float32(1) / np.float32(steps))
@@ -215,26 +245,18 @@ def _tau_codes(tau: NDArray[np.float32]) -> NDArray[np.uint32]:
 
 
 def _depths(
-    vdi: VDI,
-) -> tuple[float, NDArray[np.int32], NDArray[np.uint16], NDArray[np.uint32], NDArray[np.uint32]]:
-    """Return step, origins, strides and the codes of fronts and backs."""
-    counts = vdi.counts.reshape(-1)
+    vdi: VDI, step: float, counts: NDArray[np.int64], part: slice
+) -> tuple[NDArray[np.int32], NDArray[np.uint16], NDArray[np.uint32], NDArray[np.uint32]]:
+    """Return some lists' origins, strides and codes of fronts and backs.
+
+    ``counts`` are their lengths, and ``part`` their supersegments.
+    """
     origins, strides = np.zeros(len(counts), np.int32), np.zeros(len(counts), np.uint16)
-    n = vdi.n_supersegments
-    if n == 0:
-        nothing = np.zeros(0, np.uint32)
-        return 1.0, origins, strides, nothing, nothing
-    if counts.max() > DEPTH_CODES:
-        raise InvalidArgumentError(
-            f"a list of {counts.max()} supersegments cannot be packed into 8 bytes each: at most "
-            f"{DEPTH_CODES} have depths of their own; use the precision '16-byte'"
-        )
-    step = _grid_step(vdi)
     occupied = np.flatnonzero(counts)
     lengths = counts[occupied]
-    first = vdi.offsets[:-1][occupied].astype(np.int64)
+    first = np.cumsum(lengths) - lengths
     # Whole steps, exactly: a division by a power of two
-    faces = np.stack([vdi.front, vdi.back], axis=1).astype(np.float64) / step
+    faces = np.stack([vdi.front[part], vdi.back[part]], axis=1).astype(np.float64) / step
     if not vdi.camera.parallel_projection:
         # What is in front of the eye stays there
         np.maximum(faces, np.ceil(max(-vdi.depth_origin / step, -(2.0**30))), out=faces)
@@ -246,11 +268,13 @@ def _depths(
     codes = np.rint((faces - origin[own, np.newaxis]) / stride[own, np.newaxis]).astype(np.int64)
     codes = _kept_apart(np.maximum(codes, 0), own, first, lengths)
     front, back = codes.astype(np.uint32).T
-    return step, origins, strides, np.ascontiguousarray(front), np.ascontiguousarray(back)
+    return origins, strides, front, back
 
 
 def _grid_step(vdi: VDI) -> float:
     """Return the shortest power of two of which at most :data:`_GRID` reach every depth."""
+    if vdi.n_supersegments == 0:
+        return 1.0
     farthest = max(-float(vdi.front.min()), float(vdi.back.max()))
     exponent = math.frexp(farthest / _GRID)[1]  # farthest / _GRID < 2^exponent
     if farthest / 2.0 ** (exponent - 1) <= _GRID:

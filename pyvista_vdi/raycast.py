@@ -18,7 +18,14 @@ from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
 from .numerics import compensation, lists_are_far
 from .occupancy import OccupancyGrid
-from .opencl_runtime import DeviceBuffer, Kernel, Runtime, get_runtime, kept_together
+from .opencl_runtime import (
+    DeviceBuffer,
+    Kernel,
+    Runtime,
+    aligned_empty,
+    get_runtime,
+    kept_together,
+)
 from .packets import (
     COORDINATE_FORMS,
     LANES,
@@ -725,13 +732,14 @@ class PreparedVDI:
         headers = np.zeros(len(counts) + 1, np.uint64)
         headers[1:] = np.cumsum(counts > 0) * _LIST_HEADER
         first = (vdi.offsets + headers)[:-1][occupied].astype(np.int64)
-        words = np.empty((vdi.n_supersegments + len(occupied) * _LIST_HEADER, 2), np.uint32)
+        words = aligned_empty((vdi.n_supersegments + len(occupied) * _LIST_HEADER, 2), np.uint32)
         words[first, 0] = packing.origins[occupied].view(np.uint32)
         words[first, 1] = packing.strides[occupied]
         words[first + 1, 0] = self._per_code(vdi, packing, occupied).view(np.uint32)
         words[first + 1, 1] = 0
-        own = np.repeat(np.arange(1, len(occupied) + 1) * _LIST_HEADER, counts[occupied])
-        words[np.arange(vdi.n_supersegments) + own] = packing.words
+        behind = np.ones(len(words), bool)
+        behind[first] = behind[first + 1] = False
+        words[behind] = packing.words
         return (keep(runtime.upload(words, "supersegments")), keep(self._constants(packing.step)))
 
     def _per_code(

@@ -6,11 +6,12 @@ when a device is first asked for.
 
 from __future__ import annotations
 
+from pyvista_vdi.host_memory import aligned_empty
 from pyvista_vdi.opencl_runtime.arguments import padded
 from pyvista_vdi.opencl_runtime.buffers import (
     DeviceBuffer,
+    GrowingArray,
     LocalMemory,
-    aligned_empty,
     bytes_text,
     kept_together,
 )
@@ -23,6 +24,7 @@ from pyvista_vdi.opencl_runtime.runtime import Runtime
 __all__ = [
     "DeviceBuffer",
     "DeviceInfo",
+    "GrowingArray",
     "Kernel",
     "KernelTime",
     "LocalMemory",

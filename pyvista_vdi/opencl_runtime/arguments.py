@@ -46,6 +46,38 @@ def as_size(size: Size) -> tuple[int, ...]:
     return tuple(int(n) for n in size) if isinstance(size, tuple) else (int(size),)
 
 
+def set_arguments(kernel: Kernel, arguments: tuple[Argument, ...]) -> None:
+    """Give the calling thread's kernel object those arguments that it does not have yet.
+
+    A launch is often one of many that differ in a few, and drivers keep the others. The arguments
+    are those of :meth:`Runtime.launch`; TypeError if one is untyped, and DeviceError if a buffer
+    was released.
+    """
+    mine, known = kernel.object, kernel.arguments_set
+    for index, argument in enumerate(arguments):
+        if _same_to_driver(known.get(index), argument):
+            continue
+        known.pop(index, None)
+        mine.set_arg(index, driver_argument(kernel, index, argument))
+        if isinstance(argument, DeviceBuffer):
+            known[index] = argument.identity
+        elif isinstance(argument, np.ndarray):
+            known[index] = argument.copy()  # the caller's may change
+        else:
+            known[index] = argument
+
+
+def _same_to_driver(known: Any, argument: Argument) -> bool:
+    """Whether an argument is sure to be what was given before; what is rare is given anew."""
+    if isinstance(argument, DeviceBuffer):
+        return known is argument.identity and not argument.released
+    if not isinstance(argument, (np.generic, np.ndarray)) or type(known) is not type(argument):
+        return False
+    if known is argument:
+        return True
+    return bool(known.tobytes() == argument.tobytes())  # 0 is not -0, and NaN is NaN
+
+
 def driver_argument(kernel: Kernel, index: int, argument: Argument) -> Any:
     """What the driver takes for an argument of :meth:`Runtime.launch`; TypeError if untyped."""
     if isinstance(argument, DeviceBuffer):

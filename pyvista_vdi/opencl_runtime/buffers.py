@@ -15,9 +15,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
-
-HOST_ALIGNMENT = 4096
-"""Bytes; arrays that begin at a multiple are used in place by CPU drivers instead of copied."""
+from pyvista_vdi.host_memory import HOST_ALIGNMENT
 
 
 @dataclass(frozen=True)
@@ -41,27 +39,67 @@ def bytes_text(nbytes: int) -> str:
     return f"{nbytes} bytes"
 
 
-def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Uninitialised C-contiguous array that a CPU device can use without a copy.
+class GrowingArray:
+    """An array whose number of elements is known when the last one is written.
+
+    Systems take memory as it is written, so room for the most that there may be costs nothing.
+    Only where that is refused do its elements move when it grows.
 
     Parameters
     ----------
-    shape : int or tuple of int
-        Shape.
+    item : tuple of int
+        Shape of an element.
     dtype : dtype_like
         Element type.
 
-    Returns
-    -------
-    numpy.ndarray
-        Its data begin at a multiple of 4096 bytes.
+    Attributes
+    ----------
+    room : int
+        Elements that there is room for.
     """
-    dtype = np.dtype(dtype)
-    shape = (shape,) if isinstance(shape, int) else tuple(shape)
-    nbytes = math.prod(shape) * dtype.itemsize
-    raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
-    start = -raw.ctypes.data % HOST_ALIGNMENT
-    return raw[start : start + nbytes].view(dtype).reshape(shape)
+
+    def __init__(self, item: tuple[int, ...] = (), dtype: DTypeLike = np.float32) -> None:
+        self._item = item
+        self._dtype = np.dtype(dtype)
+        self._bytes = math.prod(item) * self._dtype.itemsize
+        self._raw = np.empty(0, np.uint8)
+        self._start = 0  # where it is aligned as that of aligned_empty
+        self.room = 0
+
+    def reserve(self, n: int, most: int) -> None:
+        """Have room for at least n elements, and if it can be had for the most there may be.
+
+        Raises
+        ------
+        MemoryError
+            If not even that many can be had.
+        """
+        if n <= self.room:
+            return
+        for room in (most, 2 * n):
+            try:
+                self._move(room)
+            except MemoryError:
+                continue
+            return
+        self._move(n)
+
+    def _move(self, room: int) -> None:
+        raw = np.empty(room * self._bytes + HOST_ALIGNMENT, np.uint8)
+        start = -raw.ctypes.data % HOST_ALIGNMENT
+        kept = self.room * self._bytes
+        raw[start : start + kept] = self._raw[self._start : self._start + kept]
+        self._raw, self._start, self.room = raw, start, room
+
+    def part(self, first: int, last: int) -> NDArray[Any]:
+        """Return elements to write, a view that is valid until the next call of another method."""
+        begin, end = (self._start + n * self._bytes for n in (first, last))
+        return self._raw[begin:end].view(self._dtype).reshape(last - first, *self._item)
+
+    def finished(self, n: int) -> NDArray[Any]:
+        """Return the first n elements; the room for others is given back."""
+        self._raw.resize(self._start + n * self._bytes, refcheck=False)
+        return self.part(0, n)
 
 
 class Reservation:
@@ -179,6 +217,8 @@ class DeviceBuffer:
     host : numpy.ndarray or None
         The array whose memory it is and that kernels write, of :meth:`Runtime.result` and
         :meth:`Runtime.target` on a CPU device.
+    identity : object
+        Tells this buffer from every other one for as long as anybody remembers it.
     """
 
     def __init__(
@@ -198,6 +238,7 @@ class DeviceBuffer:
         self.writable = writable
         self.readers: set[int] | None = None
         self.host: NDArray[Any] | None = None
+        self.identity = object()
         self._memory = memory
         self._finalizer = weakref.finalize(self, _release, memory, on_release)
         self._finalizer.atexit = False  # the driver frees everything at exit

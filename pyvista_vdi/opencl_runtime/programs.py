@@ -106,6 +106,14 @@ class Kernel:
             found = self._local.kernel = opencl().Kernel(self._program, self.name)
         return found
 
+    @property
+    def arguments_set(self) -> dict[int, Any]:
+        """By index, what the calling thread's kernel object was given last, for who gives it."""
+        found: dict[int, Any] | None = getattr(self._local, "arguments", None)
+        if found is None:
+            found = self._local.arguments = {}
+        return found
+
     def __repr__(self) -> str:
         return f"<Kernel {self.name!r} of {self.path}>"
 

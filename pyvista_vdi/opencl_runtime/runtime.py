@@ -16,18 +16,18 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.host_memory import HOST_ALIGNMENT, aligned_empty
 from pyvista_vdi.opencl_runtime.arguments import (
     Argument,
     Size,
     as_size,
     check_host_array,
-    driver_argument,
     preferred_group,
+    set_arguments,
 )
 from pyvista_vdi.opencl_runtime.buffers import (
     DeviceBuffer,
     Ledger,
-    aligned_empty,
     bytes_text,
     shape_of,
 )
@@ -180,10 +180,9 @@ class Runtime:
             return
 
         with self._driver(f"launching {kernel.name!r} of {kernel.path} on {whole} by {group}"):
-            mine = kernel.object
-            for index, argument in enumerate(args):
-                mine.set_arg(index, driver_argument(kernel, index, argument))
-                if isinstance(argument, DeviceBuffer):
+            set_arguments(kernel, args)
+            for argument in args:
+                if isinstance(argument, DeviceBuffer) and argument.readers is not None:
                     self._note_reader(argument)
             if self._turns.worker is None:
                 self._enqueue(kernel, whole, group)
@@ -341,7 +340,7 @@ class Runtime:
         """Memory for kernels to write what an array is to hold; :meth:`download` brings it there.
 
         A CPU device writes into an array that is aligned for it in place, and the download into
-        that very array copies nothing.
+        that very array, or its beginning, copies nothing.
 
         Parameters
         ----------
@@ -375,6 +374,14 @@ class Runtime:
             )
         access = flags.READ_WRITE | flags.USE_HOST_PTR
         return self._allocate(access, array.shape, array.dtype, name, array, writable=True)
+
+    @property
+    def in_place_alignment(self) -> int | None:
+        """Bytes; what begins at a multiple in an :func:`aligned_empty` array is used in place.
+
+        None where a device uses no array in place.
+        """
+        return self._alignment if self.is_cpu and HOST_ALIGNMENT % self._alignment == 0 else None
 
     def _in_place(self, array: NDArray[Any]) -> bool:
         """Whether kernels can use a C-contiguous array where it is."""
@@ -433,7 +440,7 @@ class Runtime:
             raise InvalidArgumentError(f"the target for {buffer.name!r} is not writable")
         if out.nbytes:
             with self._driver(f"reading {out.nbytes} bytes of the buffer {buffer.name!r}"):
-                if out is buffer.host:
+                if buffer.host is not None and out.ctypes.data == buffer.host.ctypes.data:
                     self._map(memory, out)
                 else:
                     self._copy("[read]", memory, out, to_host=True)

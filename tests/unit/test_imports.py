@@ -39,6 +39,7 @@ CORE = {
     "compositing",
     "cropping",
     "errors",
+    "host_memory",
     "lighting",
     "numerics",
     "precision",

@@ -54,6 +54,40 @@ def test_aligned_arrays_are_used_in_place_on_a_cpu(runtime):
     assert runtime.allocated == before
 
 
+@pytest.mark.parametrize("refused", [0, 1, 2])
+@pytest.mark.parametrize("item", [(), (3,)])
+def test_a_growing_array_keeps_what_was_written(monkeypatch, item, refused):
+    """Also where the system does not give room for the most, or for twice what is needed."""
+    most, total = 10**6, 0
+    array = ocl.GrowingArray(item)
+    take, rooms = array._move, []
+
+    def counted(room):
+        rooms.append(room)
+        if room > (most, 2 * total, total)[refused]:
+            raise MemoryError
+        take(room)
+
+    monkeypatch.setattr(array, "_move", counted)
+    for n in (1000, 1, 0, 30000):
+        first, total = total, total + n
+        array.reserve(total, most)
+        part = array.part(first, total)
+        assert part.shape == (n, *item)
+        part[...] = np.arange(first, total).reshape(-1, *(1 for _ in item))
+    whole = array.finished(total)
+    assert (len(rooms) == 1) == (refused == 0)
+    assert whole.ctypes.data % 4096 == 0 or refused
+    np.testing.assert_array_equal(whole.reshape(total, -1).T[0], np.arange(total))
+    np.testing.assert_array_equal(whole.reshape(total, -1).T[-1], np.arange(total))
+
+
+def test_a_growing_array_may_stay_empty():
+    array = ocl.GrowingArray((3,))
+    array.reserve(0, 100)
+    assert array.finished(0).shape == (0, 3)
+
+
 @pytest.mark.parametrize("shape", [(3, 5), (1000, 7), (0, 4)])
 def test_results_outlive_their_buffers(runtime, shape):
     """On a CPU the array is the buffer's memory: nothing is copied, and it stays when it goes."""

@@ -217,6 +217,25 @@ def test_every_kind_of_argument(runtime, scale_file):
         np.testing.assert_array_equal(runtime.download(y), np.full(8, 4))
 
 
+def test_a_launch_takes_the_arguments_of_its_own_and_not_of_the_launch_before(runtime, scale_file):
+    """Only what changes is given to the driver: also signs of 0, arrays changed in place."""
+    kernel = runtime.kernel(scale_file, "spread", {"ADD": 0})
+    vector = np.array([1, 2, 3, 4], np.float32)
+    with runtime.upload(np.zeros(4, np.float32)) as x, runtime.buffer(x.shape) as y:
+        for last in (4.0, 0.0, -0.0, np.nan, 7.0):
+            vector[3] = last
+            runtime.launch(kernel, 4, 4, None, y, vector, ocl.LocalMemory(16))
+            assert runtime.download(y).tobytes() == np.full(4, last, np.float32).tobytes()
+        runtime.launch(kernel, 4, 4, x, y, vector, ocl.LocalMemory(16))
+        np.testing.assert_array_equal(runtime.download(y), np.zeros(4))
+    scale = runtime.kernel(scale_file, "scale", {"ADD": 0})
+    for value in range(1, 6):  # a buffer that takes the place of one that has gone
+        with runtime.buffer((3,)) as x:
+            runtime.fill(x, np.float32(value))
+            runtime.launch(scale, 3, None, x, np.float32(2), np.uint32(3))
+            assert np.all(runtime.download(x) == value * 2)
+
+
 def test_bad_launches_name_the_kernel(runtime, scale_file):
     kernel = runtime.kernel(scale_file, "scale", {"ADD": 0})
     with runtime.buffer((8,), name="eight") as x:

@@ -1,0 +1,47 @@
+"""Slices of lists go into the VDI's arrays one behind the other, whatever memory there is."""
+
+from __future__ import annotations
+
+import pytest
+
+from pyvista_vdi import Camera, generation
+from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.opencl_runtime import GrowingArray, Runtime
+from tests.faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
+
+#: Looks past the volume, so that first all and then no lists have something in them.
+HALF_BESIDE = Camera((3.5, -4.0, 30), (3.5, -4.0, 3.5), (0, 1, 0))
+
+
+@pytest.fixture
+def make(runtime):
+    volume = fresh_volume()
+    return lambda camera: generate_vdi(
+        volume, camera, WINDOW, TRANSFER, max_supersegments=3, device=runtime
+    )
+
+
+@pytest.mark.parametrize("camera", [CAMERA, HALF_BESIDE], ids=["inside", "half beside"])
+@pytest.mark.parametrize("memory", ["as it is", "copied", "small buffers", "little", "least"])
+def test_slices_make_the_same_vdi_however_memory_is_had(monkeypatch, make, camera, memory):
+    whole = make(camera)
+    assert whole.n_supersegments > 100
+    monkeypatch.setattr(generation, "_SLICE_BYTES", 1)  # four rows each
+    moved = []
+    if memory == "copied":  # as by a device with memory of its own
+        monkeypatch.setattr(Runtime, "in_place_alignment", None)
+    elif memory == "small buffers":  # a slice is all that one may hold
+        monkeypatch.setattr(generation, "_LARGEST_ELEMENT", 2**62)
+    elif memory != "as it is":
+        most = whole.n_supersegments * (2 if memory == "little" else 1)
+        move = GrowingArray._move
+
+        def limited(self, room):
+            if room > most:
+                raise MemoryError
+            moved.append(room)
+            move(self, room)
+
+        monkeypatch.setattr(GrowingArray, "_move", limited)
+    assert make(camera).equals(whole)
+    assert (len(moved) >= 4) == (memory in ("little", "least"))
