@@ -14,7 +14,9 @@ Shared functions:
 ``common/volume_sampling.cl``
     Samples of a uniform grid, nearest or trilinear, of scalars or RGBA.
 ``common/classification.cl``
-    Transfer function, extinction, opacity of an optical depth.
+    Transfer function and extinction.
+``common/opacity.cl``
+    Opacity of an optical depth, for one number or for vectors.
 ``common/shading.cl``
     Lights, and gradient opacity: what the steps need of the scalar's gradient.
 ``common/samples.cl``
@@ -39,6 +41,8 @@ Shared functions:
     How a list's supersegments are read: as they were made, or packed.
 ``common/occupancy.cl``
     Tiles and slabs of the occupancy grid.
+``common/packet.cl``, ``common/packet_light.cl``, ``common/slabs_ahead.cl``
+    Sixteen rays in vectors: where they are, what they see, and which slabs are ahead of them.
 ``common/segments.cl``
     What rays cross of several VDIs, as segments in a pool.
 
@@ -56,6 +60,9 @@ Entry points:
 ``vdi/raycast.cl``
     ``raycast``: VDI to image from any view (paper, section 3), to the depth of the first hit, or to
     what is merged with other VDIs; ``clear_image``: nothing where no rays are cast.
+``vdi/raycast_blocks.cl``, ``vdi/raycast_packets.cl``
+    ``raycast_blocks``, ``raycast_packets``: VDI to image on a CPU, in vectors that are written out:
+    of 4 x 4 pixels near V_O, along epipolar lines far from it.
 ``vdi/merge.cl``
     ``merge``: what rays cross of several VDIs, to one image.
 ``vdi/preview.cl``

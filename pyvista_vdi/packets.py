@@ -1,8 +1,9 @@
 """When rays are followed in packets, and how those lie in the window (docs/performance.md).
 
 Rays of one plane through the eyes of V_O and V_N cross the same lists, if not at the same depth. On
-a CPU a packet of such rays loads each list once. That pays where rays cross many lists. At V_O each
-ray goes through a list of its own, and a packet's lists lie side by side.
+a CPU a packet of such rays loads each list once. That pays where rays cross many lists. Where they
+do not, a CPU follows them one by one, in blocks. At V_O each ray goes through a list of its own,
+and a packet's lists lie side by side.
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ MARGIN = 24
 COORDINATE_FORMS, PLANE_FORMS = 4, 7
 #: Lists that a ray crosses before its light ends, over those that lie between a packet's first and
 #: last ray, from which packets are faster: what they have in common (docs/performance.md).
-LEAST_IN_COMMON = 1.8
+LEAST_IN_COMMON = 4.5
+#: The same where rays that are not in packets cannot be in blocks, either.
+LEAST_IN_COMMON_WITHOUT_BLOCKS = 1.8
 #: Pixels along the shorter edge of what is drawn from which packets are faster.
 LEAST_PIXELS = 200
 #: Lists of a VDI that are asked how far light gets in them.
@@ -75,6 +78,8 @@ def packets_of(
     planes: NDArray[np.float64],
     epipole: NDArray[np.float64],
     lit: float,
+    *,
+    or_blocks: bool,
 ) -> Packets | None:
     """Return the packets of a frame, or None if its rays had better be followed one by one.
 
@@ -91,13 +96,16 @@ def packets_of(
         Where V_N sees V_O's eye, see :func:`epipole_of`.
     lit : float
         How far light gets, see :func:`share_lit`.
+    or_blocks : bool
+        Whether rays that are followed one by one are so in blocks.
     """
     if min(part.x1 - part.x0, part.y1 - part.y0) < LEAST_PIXELS:
         return None
     # The line through the window's centre leads along the rows, or along the columns
     upright = abs(epipole[1]) > abs(epipole[0])
     crossed, across_packet = _lists_crossed(size, coordinates, planes, upright)
-    if lit * crossed.sum() < LEAST_IN_COMMON * across_packet.sum():
+    least = LEAST_IN_COMMON if or_blocks else LEAST_IN_COMMON_WITHOUT_BLOCKS
+    if lit * crossed.sum() < least * across_packet.sum():
         return None
     along, across = (part.x0, part.x1), (part.y0, part.y1)
     defines: dict[str, str | int | None] = {}

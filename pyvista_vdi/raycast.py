@@ -49,8 +49,8 @@ _FIRST_BITS = 36
 #: Pairs of words before the supersegments of an 8-byte list: that of ``common/supersegments.cl``.
 _LIST_HEADER = 2
 
-#: ``-D`` names of what is drawn ray by ray everywhere.
-_RAY_BY_RAY = {"CROPPED", "FAR_ENTRIES", "FIRST_HIT"}
+#: ``-D`` names of what no kernel that is written in vectors can draw.
+_NOT_IN_VECTORS = {"CROPPED", "FAR_ENTRIES", "FIRST_HIT"}
 #: Share of a window above which rays are cast through all of it: clearing it first costs as much.
 _MOST_DRAWN = 0.9
 #: Work-items per group that clear an image.
@@ -450,23 +450,35 @@ class PreparedVDI:
             kernel = self._runtime.kernel("vdi/raycast_packets.cl", "raycast_packets", defines)
             return _Launch(kernel, packets.items, LANES, (packets.epipole, packets.part))
         columns = part_columns(part)
-        kernel = self._runtime.kernel("vdi/raycast.cl", "raycast", defines)
         items = COLUMN_ITEMS * int(columns[2]) * int(columns[3])
+        if self._in_blocks(defines):
+            kernel = self._runtime.kernel("vdi/raycast_blocks.cl", "raycast_blocks", defines)
+            return _Launch(kernel, items // LANES, COLUMN_ITEMS // LANES, (columns,))
+        kernel = self._runtime.kernel("vdi/raycast.cl", "raycast", defines)
         return _Launch(kernel, items, COLUMN_ITEMS, (columns, *hit))
 
-    def _draws_in_vectors(self, defines: dict[str, str | int | None]) -> bool:
-        """Return whether rays may be followed by the kernels that are written in vectors."""
+    def _in_vectors(self, defines: dict[str, str | int | None]) -> bool:
+        """Return whether there are kernels for a frame that follow rays in vectors."""
         return (
             self._runtime.is_cpu
-            and not _RAY_BY_RAY & defines.keys()
+            and not _NOT_IN_VECTORS & defines.keys()
             and defines.get("COMPENSATED") != 2
+        )
+
+    def _in_blocks(self, defines: dict[str, str | int | None]) -> bool:
+        """Return whether rays that are not in packets are followed in blocks."""
+        return (
+            "ONE_LIST" not in defines  # whose loop is another one
+            and self._in_vectors(defines)
+            and not self._packed
+            and not self._long_offsets
         )
 
     def _own_lists(
         self, camera: Camera, view: ListView, defines: dict[str, str | int | None]
     ) -> OwnLists | None:
         """Return how each pixel is drawn from a list of its own; None if it cannot be."""
-        if not self._draws_in_vectors(defines):
+        if not self._in_vectors(defines):
             return None
         near, far = rays.depth_range(camera, self._bounds)
         if not camera.parallel_projection:
@@ -488,13 +500,21 @@ class PreparedVDI:
         defines: dict[str, str | int | None],
     ) -> Packets | None:
         """Return how a frame's rays are dealt to packets; None if the kernel is to follow each."""
-        if "ONE_LIST" in defines or not self._draws_in_vectors(defines):
+        if "ONE_LIST" in defines or not self._in_vectors(defines):
             return None
         forms = view.forms.astype(np.float64)
         planes = forms[PLANE_FORMS : PLANE_FORMS + view.planes]
         epipole = epipole_of(self._camera, camera, view.size)
         coordinates = forms[:COORDINATE_FORMS]
-        return packets_of(view.size, part, coordinates, planes, epipole, self._lit)
+        return packets_of(
+            view.size,
+            part,
+            coordinates,
+            planes,
+            epipole,
+            self._lit,
+            or_blocks=self._in_blocks(defines),
+        )
 
     def _clear(self, image: DeviceBuffer, of_hits: bool) -> None:
         """Write into all pixels that nothing is met."""

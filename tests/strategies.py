@@ -171,18 +171,20 @@ def random_view(rng, vdi, kind):
 
 
 #: How rays may be followed: see :func:`deal_rays`.
-DEALT = ("one by one", "packets")
+DEALT = ("one by one", "blocks", "packets")
 
 
 def deal_rays(patch, dealt):
-    """Have rays followed one by one, or in packets wherever they can be; ``patch`` undoes it.
+    """Have rays followed one by one, or in blocks or packets wherever they can be.
 
-    Where each ray stays in a list of its own, packets are those of lists.
+    ``patch`` undoes it. One by one is how a GPU follows all of them. Otherwise, where each ray
+    stays in a list of its own, it is drawn from that.
     """
-    least = {"one by one": math.inf, "packets": 0.0}[dealt]
-    patch.setattr(packets, "LEAST_IN_COMMON", least)
-    patch.setattr(packets, "LEAST_PIXELS", least)
+    least = 0.0 if dealt == "packets" else math.inf
+    for name in ("LEAST_IN_COMMON", "LEAST_IN_COMMON_WITHOUT_BLOCKS", "LEAST_PIXELS"):
+        patch.setattr(packets, name, least)
     if dealt == "one by one":
+        patch.setattr(PreparedVDI, "_in_blocks", lambda self, defines: False)
         patch.setattr(PreparedVDI, "_own_lists", lambda *_: None)
 
 

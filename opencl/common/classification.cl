@@ -2,6 +2,7 @@
 //
 // The table holds `entries` (R, G, B, opacity) at equidistant scalars; opacity is that of a slab of one opacity unit
 // distance. It is interpolated first and converted to optical depth then, as VTK does.
+#include "common/opacity.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Optical depth of a step through an opaque sample, whatever the unit distance: exp(-30) is 1e-13.
@@ -36,10 +37,4 @@ inline float scaled_to_step(float of_unit, float units)
 inline float step_optical_depth(float opacity, float units)
 {
     return scaled_to_step(unit_optical_depth(opacity), units);
-}
-
-// Opacity of an optical depth: 1 - exp(-tau) without cancellation.
-inline float opacity_of(float tau)
-{
-    return -expm1(-tau);
 }

@@ -13,6 +13,17 @@ inline float2 face_met(List list, SUPERSEGMENTS_PARAMETERS int n, bool away)
     return (float2)(away ? face.x : -face.y, away ? face.y : -face.x);
 }
 
+// Each of them by itself.
+inline float near_face(List list, SUPERSEGMENTS_PARAMETERS int n, bool away)
+{
+    return away ? FRONT(list, n) : -BACK(list, list.count - 1 - n);
+}
+
+inline float far_face(List list, SUPERSEGMENTS_PARAMETERS int n, bool away)
+{
+    return away ? BACK(list, n) : -FRONT(list, list.count - 1 - n);
+}
+
 // Guesses by one more or less before the rest is halved.
 #define CLOSE_GUESSES 4
 

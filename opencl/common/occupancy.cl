@@ -21,3 +21,8 @@ inline ulong slabs_to(int slab)
 {
     return ~0UL >> (SLABS - 1 - slab);
 }
+
+// A ray that crosses fewer lists than this is not worth a look at the grid: at V_O it stays in one.
+#define FEW_LISTS 2.0f
+// Turns of a loop from one look at the grid to the next: lanes that come to a new tile one after another look together.
+#define TURNS_PER_TEST 4

@@ -9,12 +9,14 @@
 #define LANES 16 // those of pyvista_vdi/packets.py
 typedef float16 Reals;
 typedef int16 Ints; // also truth values: all bits or none
-typedef ulong16 Masks;
 #define NUMBERS (Ints)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 #define NOWHERE INT_MAX
 // One instruction each; for what is never NaN
 #define LOWER_OF(x, y) select(y, x, (x) < (y))
 #define HIGHER_OF(x, y) select(y, x, (x) > (y))
+
+// Whether a truth value is true in any lane. By the sign, which compilers know how to ask a mask for.
+#define ANY(chosen) any((chosen) < 0)
 
 inline int least(Ints x)
 {

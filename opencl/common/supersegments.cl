@@ -13,6 +13,7 @@
 //     LIST_AT(i, j)     the list, from `headers`, in a window `lists_wide` lists wide; list.count: its supersegments, with
 //                       what it is filled up with
 //     FACE(list, k)     of supersegment k, 0 <= k < list.count
+//     FRONT(list, k), BACK(list, k)   one of its faces by itself
 //     MEDIUM(list, k)   likewise; undefined for NO_FACE
 //     PREFETCH(list, i, j)   bring list (i, j) close; each list of a tile brings its share
 #include "common/list_space.cl"
@@ -97,6 +98,10 @@ inline float2 face_on_ray(const List *list, float2 offsets)
 #define face_on_ray(list, face) (face)
 #endif
 
+// A ray that crosses fewer lists than this goes through the whole depth of a list's neighbourhood: worth to be brought close
+// at once.
+#define LISTS_TO_PREFETCH 48.0f
+
 // Prefetch every LISTS_PER_TILE-th cache line of a list's tile, whose entries take so many words, from the share-th line on.
 inline void prefetch_share(__global const ulong *words, List list, int words_per_entry, int share)
 {
@@ -113,6 +118,10 @@ inline void prefetch_share(__global const ulong *words, List list, int words_per
     __global const ulong *media, /* straight RG, then B and extinction per length */
 #define SUPERSEGMENTS_ARGUMENTS faces, media,
 #define FACE(list, k) face_on_ray(&(list), two_floats(faces[entry_of(&(list), k)]))
+#ifndef FAR_ENTRIES
+#define FRONT(list, k) ((__global const float *)faces)[2 * entry_of(&(list), k)]
+#define BACK(list, k) ((__global const float *)faces)[2 * entry_of(&(list), k) + 1]
+#endif
 #define MEDIUM(list, k) medium_at(media, entry_of(&(list), k))
 #define PREFETCH(list, i, j)                              \
     prefetch_share(faces, list, 1, place_in_tile(i, j));  \
@@ -203,4 +212,9 @@ inline float4 medium_of(const List *list, uint2 word)
                     fmin(optical_depth * list->per_code / (float)thickness, FLT_MAX));
 }
 
+#endif
+
+#ifndef FRONT
+#define FRONT(list, k) FACE(list, k).x
+#define BACK(list, k) FACE(list, k).y
 #endif

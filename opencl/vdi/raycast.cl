@@ -30,12 +30,6 @@
 #define MAX_OPTICAL_DEPTH 1e30f
 #endif
 
-// A ray that crosses fewer lists than this is not worth a look at the grid: at V_O it stays in one.
-#define FEW_LISTS 2.0f
-// One that crosses fewer than this goes through the whole depth of a list's neighbourhood: worth to be brought close at once.
-#define LISTS_TO_PREFETCH 48.0f
-// Turns of the loop from one look at the grid to the next: lanes that come to a new tile one after another look together.
-#define TURNS_PER_TEST 4
 // As fmin and fmax for what is never NaN: one instruction each
 #define LOWER(x, y) ((x) < (y) ? (x) : (y))
 #define HIGHER(x, y) ((x) > (y) ? (x) : (y))

@@ -10,9 +10,10 @@
 // -D SKIP_EMPTY         as in vdi/raycast.cl: the picture is the same to the last bit
 // -D OFFSET_T, PARALLEL, SHIFTED, PACKED, COMPENSATED (1)    as there
 #include "common/lists.cl"
-#include "common/occupancy.cl"
-#include "common/packet.cl"
+#include "common/packet_light.cl"
+#include "common/slabs_ahead.cl"
 #pragma OPENCL FP_CONTRACT OFF
+
 
 // Of u's and v's, that of p and that of q; and of p's and q's, those of u and v
 #ifdef SWEEP_V
@@ -95,7 +96,7 @@ inline void pass_by(Progress *now, Ints *fresh, Ints looks, int P, const Packet 
     const int tile_p = P >> TILE_SHIFT;
     const Reals along_depth = sense * packet->along_z;
     const Reals deep_depth = sense * packet->deep_z;
-    while (any(looks)) {
+    while (ANY(looks)) {
         // Those in one tile; there is seldom a second one
         const int tile_q = least_of(now->q, looks) * q->step >> TILE_SHIFT;
         const Ints index_q = now->q * q->step;
@@ -104,30 +105,22 @@ inline void pass_by(Progress *now, Ints *fresh, Ints looks, int P, const Packet 
         const ulong mask = masks[SECOND_OF(tile_p, tile_q) * tiles_wide + FIRST_OF(tile_p, tile_q)];
         const Reals offsets = depth_offset(sense * now->depth, depth_origin);
         const Ints slab = convert_int16(clamp((offsets - first_depth) * slabs_per_depth, 0.0f, (float)(SLABS - 1)));
-        Masks ahead;
-        Ints nearest;
-        if (away) {
-            ahead = mask & ((Masks)(~0UL) << convert_ulong16(slab));
-            nearest = convert_int16(popcount((ahead & -ahead) - 1));
-        } else {
-            ahead = mask & ((Masks)(~0UL) >> convert_ulong16(SLABS - 1 - slab));
-            nearest = SLABS - 1 - convert_int16(clz(ahead));
-        }
-        const Ints nothing = convert_int16(ahead == 0UL);
+        Ints nothing;
+        const Ints nearest = nearest_slabs((uint16)((uint)mask), (uint16)((uint)(mask >> HALF_SLABS)), slab, away, &nothing);
         const Ints passes = here && (nothing || nearest != slab);
-        if (!any(passes))
+        if (!ANY(passes))
             continue;
         const int edge_p = tile_edge(p, tile_p);
         const int edge_q = tile_edge(q, tile_q);
         const Reals faces = first_depth + convert_float16(away ? nearest : nearest + 1) / slabs_per_depth;
         const Reals r_face = (sense * depth_coordinate(faces, depth_origin) - deep_depth) * inverse_depth;
-        Reals r_until = fmin(crossings(p, (Reals)(edge_p)), crossings(q, (Reals)(edge_q)));
-        r_until = select(r_until, fmin(r_until, r_face), !nothing && along_depth != 0.0f);
+        Reals r_until = LOWER_OF(crossings(p, (Reals)(edge_p)), crossings(q, (Reals)(edge_q)));
+        r_until = select(r_until, LOWER_OF(r_until, r_face), !nothing && along_depth != 0.0f);
         const Ints next_p = index_reached(p, (Ints)(P), edge_p, r_until);
         const Ints next_q = index_reached(q, index_q, edge_q, r_until);
         Reals r = now->r;
-        r = select(r, fmax(r, crossings_of(p, next_p - p->step)), next_p != P);
-        r = select(r, fmax(r, crossings_of(q, next_q - q->step)), next_q != index_q);
+        r = select(r, HIGHER_OF(r, crossings_of(p, next_p - p->step)), next_p != P);
+        r = select(r, HIGHER_OF(r, crossings_of(q, next_q - q->step)), next_q != index_q);
         const Ints moves = passes && (next_p != P || next_q != index_q);
         now->r = select(now->r, r, moves);
         now->depth = select(now->depth, fma(r, along_depth, deep_depth), moves);
@@ -141,6 +134,120 @@ inline void pass_by(Progress *now, Ints *fresh, Ints looks, int P, const Packet 
     }
 }
 #endif
+
+// The supersegment that each ray has met last and that is not composited yet: that takes as long for one ray as for all, and
+// few of them are in the same supersegment at a time.
+typedef struct {
+    Ints waits; // rays that have one
+    Reals near, far, r, r_next; // its faces in their sense, and from where to where they cross the list
+    Reals red, green, blue, extinction;
+} Met;
+
+// Composite what waits.
+inline void composite_met(Seen *seen, Met *met, const Packet *packet, Reals along_depth, Reals deep_depth, Reals inverse_depth)
+{
+    const Reals depth = fma(met->r, along_depth, deep_depth);
+    const Reals next_depth = fma(met->r_next, along_depth, deep_depth);
+    const Reals length_crossed = lengths_between(packet, met->near, met->far, met->r, met->r_next, depth, next_depth,
+                                                 deep_depth, inverse_depth);
+    composite_medium(seen, met->extinction * length_crossed, met->red, met->green, met->blue, met->waits);
+    met->waits = 0;
+}
+
+// Follow the rays that are `going`, which step the same way, through all lists that they cross.
+__attribute__((always_inline))
+inline void sweep(Seen *seen, const Packet *packet, const Axis *p, const Axis *q, Ints going, Ints first_p, Ints first_q,
+                  bool away, __global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int lists_wide, float depth_origin,
+                  float transmittance_cutoff, __global const ulong *masks, float first_depth, float slabs_per_depth)
+{
+    const float sense = away ? 1.0f : -1.0f;
+    const Reals along_depth = sense * packet->along_z;
+    const Reals deep_depth = sense * packet->deep_z;
+    const Reals inverse_depth = select((Reals)(0.0f), 1.0f / along_depth, packet->along_z != 0.0f);
+    const Reals r_end = packet->r_begin + 1.0f;
+    Met met;
+    met.waits = 0;
+    met.near = met.far = met.r = met.r_next = met.red = met.green = met.blue = met.extinction = 0.0f;
+    Progress now;
+    now.p = select((Ints)(NOWHERE), first_p * p->step, going);
+    now.q = first_q * q->step;
+    now.r = packet->r_begin;
+    now.depth = sense * packet->start_z;
+    int n = 0; // the supersegment that the last list was left at
+#ifdef SKIP_EMPTY
+    Ints fresh = going; // lanes in a tile that they have not looked at
+#endif
+    for (int place_p = least(now.p); place_p != NOWHERE; place_p = least(now.p)) {
+        const int P = place_p * p->step;
+        Ints column = now.p == place_p;
+#ifdef SKIP_EMPTY
+        const Ints looks = column && fresh;
+        if (ANY(looks)) {
+            fresh = fresh && !looks;
+            pass_by(&now, &fresh, looks, P, packet, p, q, inverse_depth, sense, away, masks,
+                    (lists_wide + TILE - 1) >> TILE_SHIFT, first_depth, slabs_per_depth, depth_origin);
+            column = now.p == place_p;
+        }
+#endif
+        const Reals r_p = crossings(p, (Reals)(P));
+        for (int place_q = least_of(now.q, column); ANY(column); ++place_q) {
+            const Ints here = column && now.q == place_q;
+            if (!ANY(here))
+                continue;
+            // They cross list (P, Q) from now.r to r_next
+            const int Q = place_q * q->step;
+            const Reals r_q = crossings(q, (Reals)(Q));
+            const Reals r_next = HIGHER_OF(now.r, LOWER_OF(r_end, LOWER_OF(r_p, r_q)));
+            const Reals next_depth = fma(r_next, along_depth, deep_depth);
+
+            const List list = LIST_AT(FIRST_OF(P, Q), SECOND_OF(P, Q));
+            n = min(n, list.count);
+            while (n > 0 && ANY(here && far_face(list, SUPERSEGMENTS_ARGUMENTS n - 1, away) > now.depth))
+                --n;
+            for (int k = n; k < list.count; ++k) {
+                const float near = near_face(list, SUPERSEGMENTS_ARGUMENTS k, away);
+                const Ints come_to = here && near <= next_depth;
+                if (!ANY(come_to))
+                    break;
+                const float far = far_face(list, SUPERSEGMENTS_ARGUMENTS k, away);
+                const Ints meet = come_to && far > now.depth;
+                if (!ANY(meet)) {
+                    n = k + 1;
+                    continue;
+                }
+                if (ANY(meet && met.waits))
+                    composite_met(seen, &met, packet, along_depth, deep_depth, inverse_depth);
+                const float4 medium = MEDIUM(list, away ? k : list.count - 1 - k);
+                met.near = select(met.near, (Reals)(near), meet);
+                met.far = select(met.far, (Reals)(far), meet);
+                met.r = select(met.r, now.r, meet);
+                met.r_next = select(met.r_next, r_next, meet);
+                met.red = select(met.red, (Reals)(medium.x), meet);
+                met.green = select(met.green, (Reals)(medium.y), meet);
+                met.blue = select(met.blue, (Reals)(medium.z), meet);
+                met.extinction = select(met.extinction, (Reals)(medium.w), meet);
+                met.waits = met.waits || meet;
+            }
+            const Ints steps_p = here && r_p <= r_q;
+            const Ints steps_q = here && !(r_p <= r_q);
+            Ints ends = here && (r_next >= r_end || seen->transmittance < transmittance_cutoff);
+            ends = ends || (P + p->step < 0 || P + p->step >= p->lists ? steps_p : (Ints)(0));
+            ends = ends || (Q + q->step < 0 || Q + q->step >= q->lists ? steps_q : (Ints)(0));
+            now.r = select(now.r, r_next, here);
+            now.depth = select(now.depth, next_depth, here);
+            now.p = select(select(now.p, (Ints)(place_p + 1), steps_p), (Ints)(NOWHERE), ends);
+            now.q = select(now.q, (Ints)(place_q + 1), steps_q);
+            column = now.p == place_p;
+#ifdef SKIP_EMPTY
+            if (((P + p->step) ^ P) >> TILE_SHIFT)
+                fresh = fresh || steps_p;
+            if (((Q + q->step) ^ Q) >> TILE_SHIFT)
+                fresh = fresh || steps_q;
+#endif
+        }
+    }
+    composite_met(seen, &met, packet, along_depth, deep_depth, inverse_depth);
+}
 
 __attribute__((vec_type_hint(float16)))
 __kernel void raycast_packets(
@@ -174,148 +281,43 @@ __kernel void raycast_packets(
     const Ints along = first + NUMBERS;
     const Ints across = across_strip(first, number, along_size, across_size, epipole);
     const Ints in_window = along < along_size && across >= 0 && across < across_size;
-    if (!any(in_window))
+    if (!ANY(in_window))
         return;
 #ifdef UPRIGHT
     const Ints x = across, y = along;
 #else
     const Ints x = along, y = across;
 #endif
-    int places[LANES]; // in the image
-    int wanted[LANES];
-    vstore16((height - 1 - y) * width + x, 0, places);
-    vstore16(in_window, 0, wanted);
-    Reals t_end = INFINITY;
-    if (has_opaque_depth) {
-        float ends[LANES];
-        for (int k = 0; k < LANES; ++k)
-            ends[k] = wanted[k] ? opaque_depth[places[k]] : 0.0f;
-        t_end = vload16(0, ends);
-    }
+    const Pixels pixels = pixels_at(x, y, in_window, width, height);
+    const Reals t_end = has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Reals)(INFINITY);
     const Reals a = convert_float16(x) + 0.5f - 0.5f * (float)width;
     const Reals b = convert_float16(y) + 0.5f - 0.5f * (float)height;
     const Packet packet = begin_packet(forms, planes, a, b, t_end, in_window, depth_origin);
 
-    Reals red = 0.0f, green = 0.0f, blue = 0.0f;
-    Reals transmittance = 1.0f;
-#ifdef COMPENSATED
-    Reals opacity = 0.0f; // see common/over.cl
-#endif
+    Seen seen = nothing_seen();
     Axis p = axis_of(FIRST_OF(packet.start_u, packet.start_v), FIRST_OF(packet.along_u, packet.along_v),
                      FIRST_OF(packet.deep_u, packet.deep_v), FIRST_OF(lists_wide, lists_high));
     Axis q = axis_of(SECOND_OF(packet.start_u, packet.start_v), SECOND_OF(packet.along_u, packet.along_v),
                      SECOND_OF(packet.deep_u, packet.deep_v), SECOND_OF(lists_wide, lists_high));
     const Ints first_p = clamp(convert_int16(floor(p.start + p.middle)), 0, p.lists - 1);
     const Ints first_q = clamp(convert_int16(floor(q.start + q.middle)), 0, q.lists - 1);
-    const Reals r_end = packet.r_begin + 1.0f;
     // Rays that step the same way go on together: nearly always, all
     const Ints ways = (packet.away & 1) | ((p.along > 0.0f) & 2) | ((q.along > 0.0f) & 4);
-    for (Ints waiting = packet.present; any(waiting);) {
+    for (Ints waiting = packet.present; ANY(waiting);) {
         const int way = least_of(ways, waiting);
         const Ints going = waiting && ways == way;
         waiting = waiting && !going;
         const bool away = way & 1;
         take_step(&p, way & 2);
         take_step(&q, way & 4);
-        const float sense = away ? 1.0f : -1.0f;
-        const Reals along_depth = sense * packet.along_z;
-        const Reals deep_depth = sense * packet.deep_z;
-        const Reals inverse_depth = select((Reals)(0.0f), 1.0f / along_depth, packet.along_z != 0.0f);
-        Progress now;
-        now.p = select((Ints)(NOWHERE), first_p * p.step, going);
-        now.q = first_q * q.step;
-        now.r = packet.r_begin;
-        now.depth = sense * packet.start_z;
-        int n = 0; // the supersegment that the last list was left at
-#ifdef SKIP_EMPTY
-        Ints fresh = going; // lanes in a tile that they have not looked at
-#endif
-        for (int place_p = least(now.p); place_p != NOWHERE; place_p = least(now.p)) {
-            const int P = place_p * p.step;
-            Ints column = now.p == place_p;
-#ifdef SKIP_EMPTY
-            const Ints looks = column && fresh;
-            if (any(looks)) {
-                fresh = fresh && !looks;
-                pass_by(&now, &fresh, looks, P, &packet, &p, &q, inverse_depth, sense, away, masks,
-                        (lists_wide + TILE - 1) >> TILE_SHIFT, first_depth, slabs_per_depth, depth_origin);
-                column = now.p == place_p;
-            }
-#endif
-            const Reals r_p = crossings(&p, (Reals)(P));
-            for (int place_q = least_of(now.q, column); any(column); ++place_q) {
-                const Ints here = column && now.q == place_q;
-                if (!any(here))
-                    continue;
-                // They cross list (P, Q) from now.r to r_next
-                const int Q = place_q * q.step;
-                const Reals r_q = crossings(&q, (Reals)(Q));
-                const Reals r_next = HIGHER_OF(now.r, LOWER_OF(r_end, LOWER_OF(r_p, r_q)));
-                const Reals next_depth = fma(r_next, along_depth, deep_depth);
-
-                const List list = LIST_AT(FIRST_OF(P, Q), SECOND_OF(P, Q));
-                n = min(n, list.count);
-                while (n > 0 && any(here && face_met(list, SUPERSEGMENTS_ARGUMENTS n - 1, away).y > now.depth))
-                    --n;
-                for (int k = n; k < list.count; ++k) {
-                    const float2 face = face_met(list, SUPERSEGMENTS_ARGUMENTS k, away);
-                    const Ints come_to = here && face.x <= next_depth;
-                    if (!any(come_to))
-                        break;
-                    const Ints meet = come_to && face.y > now.depth;
-                    if (!any(meet)) {
-                        n = k + 1;
-                        continue;
-                    }
-                    // Clip to the supersegment by interval, as in vdi/raycast.cl
-                    const Reals r_enters = (face.x - deep_depth) * inverse_depth;
-                    const Reals r_leaves = (face.y - deep_depth) * inverse_depth;
-                    const Reals from = select(now.r, LOWER_OF(HIGHER_OF(r_enters, now.r), r_next), face.x > now.depth);
-                    const Reals to = select(r_next, LOWER_OF(HIGHER_OF(r_leaves, from), r_next), face.y < next_depth);
-                    const float4 medium = MEDIUM(list, away ? k : list.count - 1 - k);
-                    const Reals optical_depth = medium.w * lengths_crossed(&packet, from, to);
-                    const Reals weight = select((Reals)(0.0f), transmittance * -expm1(-optical_depth), meet);
-                    red += weight * medium.x;
-                    green += weight * medium.y;
-                    blue += weight * medium.z;
-#ifdef COMPENSATED
-                    opacity += weight;
-                    transmittance = 1.0f - opacity;
-#else
-                    transmittance -= weight;
-#endif
-                }
-                const Ints steps_p = here && r_p <= r_q;
-                const Ints steps_q = here && !(r_p <= r_q);
-                Ints ends = here && (r_next >= r_end || transmittance < transmittance_cutoff);
-                ends = ends || (P + p.step < 0 || P + p.step >= p.lists ? steps_p : (Ints)(0));
-                ends = ends || (Q + q.step < 0 || Q + q.step >= q.lists ? steps_q : (Ints)(0));
-                now.r = select(now.r, r_next, here);
-                now.depth = select(now.depth, next_depth, here);
-                now.p = select(select(now.p, (Ints)(place_p + 1), steps_p), (Ints)(NOWHERE), ends);
-                now.q = select(now.q, (Ints)(place_q + 1), steps_q);
-                column = now.p == place_p;
-#ifdef SKIP_EMPTY
-                if (((P + p.step) ^ P) >> TILE_SHIFT)
-                    fresh = fresh || steps_p;
-                if (((Q + q.step) ^ Q) >> TILE_SHIFT)
-                    fresh = fresh || steps_q;
-#endif
-            }
-        }
+        if (away)
+            sweep(&seen, &packet, &p, &q, going, first_p, first_q, true, headers,
+                  SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin, transmittance_cutoff, masks, first_depth,
+                  slabs_per_depth);
+        else
+            sweep(&seen, &packet, &p, &q, going, first_p, first_q, false, headers,
+                  SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin, transmittance_cutoff, masks, first_depth,
+                  slabs_per_depth);
     }
-#ifdef COMPENSATED
-    const Reals alpha = fmin(opacity, 1.0f);
-#else
-    const Reals alpha = 1.0f - transmittance;
-#endif
-    float channels[4][LANES];
-    vstore16(red, 0, channels[0]);
-    vstore16(green, 0, channels[1]);
-    vstore16(blue, 0, channels[2]);
-    vstore16(alpha, 0, channels[3]);
-    for (int k = 0; k < LANES; ++k) {
-        if (wanted[k])
-            image[places[k]] = (float4)(channels[0][k], channels[1][k], channels[2][k], channels[3][k]);
-    }
+    write_pixels(image, &pixels, &seen);
 }

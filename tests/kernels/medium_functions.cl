@@ -1,4 +1,4 @@
-// Entry points to opencl/common/classification.cl, one work-item per case.
+// Entry points to opencl/common/classification.cl and opacity.cl, one work-item per case.
 #include "common/classification.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -23,4 +23,14 @@ __kernel void opacities(int count, __global const float *optical_depths, __globa
     const int i = get_global_id(0);
     if (i < count)
         results[i] = opacity_of(optical_depths[i]);
+}
+
+DEFINE_OPACITY_OF(opacities_of, 16)
+
+// 16 of them for each work-item
+__kernel void opacities_in_vectors(int count, __global const float *optical_depths, __global float *results)
+{
+    const int i = get_global_id(0);
+    if (i < count)
+        vstore16(opacities_of(vload16(i, optical_depths)), i, results);
 }

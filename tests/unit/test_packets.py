@@ -1,4 +1,4 @@
-"""Rays in packets: when they are, how packets lie in the window, and that none is left out.
+"""Rays in packets and blocks: when they are, how those lie in the window, that none is left out.
 
 That they meet what rays that are followed one by one meet is tested where those are:
 ``tests/properties/test_raycast_oracle.py`` and ``test_skipping.py``.
@@ -13,6 +13,7 @@ import strategies
 from pyvista_vdi import packets, rays
 from pyvista_vdi.blocks import Rectangle
 from pyvista_vdi.camera import Camera
+from pyvista_vdi.cropping import Cropping
 from pyvista_vdi.raycast import PreparedVDI
 from pyvista_vdi.vdi import VDI
 
@@ -46,6 +47,15 @@ def dealt(runtime, vdi, camera, size=SIZE):
     return prepared._packets(camera, view, whole, prepared.defines)
 
 
+def kernel_of(runtime, vdi, camera, size=SIZE, **options):
+    """The name of the kernel that draws a frame."""
+    prepared = PreparedVDI(runtime, vdi)
+    view = prepared.view(camera, size, None, None, **options)
+    with runtime.buffer((size[1], size[0], 4), name="image") as image:
+        launch = prepared._raycast(camera, view, image, first_hit=None, skip_empty=False)
+    return launch.kernel.name
+
+
 def drawn(runtime, prepared, camera, size):
     """A frame, NaN where nothing was written."""
     with runtime.buffer((size[1], size[0], 4), name="image") as image:
@@ -58,13 +68,30 @@ def test_rays_that_cross_few_lists_are_followed_one_by_one(runtime):
     assert dealt(runtime, slab_vdi(), CAMERA) is None
     assert dealt(runtime, slab_vdi(), CAMERA.azimuth(1)) is None
     # Nor is a small picture worth it, whose rays have less in common
-    assert dealt(runtime, slab_vdi(), CAMERA.azimuth(30), (64, 48)) is None
+    assert dealt(runtime, slab_vdi(), CAMERA.azimuth(60), (64, 48)) is None
     away = CAMERA.replace(focal_point=(0, 0, 12))  # no ray meets anything
     assert dealt(runtime, slab_vdi(), away) is None
 
 
 def test_rays_whose_light_ends_soon_are_followed_one_by_one(runtime):
-    assert dealt(runtime, slab_vdi(optical_depth=100.0), CAMERA.azimuth(30)) is None
+    assert dealt(runtime, slab_vdi(optical_depth=100.0), CAMERA.azimuth(60)) is None
+
+
+@pytest.mark.parametrize("precision", ["exact", "16-byte", "8-byte"])
+def test_which_kernel_follows_rays(runtime, precision):
+    """Blocks near V_O, packets far from it; where there are no blocks, packets from nearer on."""
+    if not runtime.is_cpu:
+        pytest.skip("packets and blocks are for CPU devices")
+    vdi = slab_vdi().with_precision(precision)
+    near = "raycast_blocks" if precision == "exact" else "raycast"
+    between = "raycast_blocks" if precision == "exact" else "raycast_packets"
+    assert kernel_of(runtime, vdi, CAMERA) == "raycast"  # V_O
+    assert kernel_of(runtime, vdi, CAMERA.azimuth(1)) == near
+    assert kernel_of(runtime, vdi, CAMERA.azimuth(20)) == between
+    assert kernel_of(runtime, vdi, CAMERA.azimuth(60)) == "raycast_packets"
+    planes = (-0.5, 0.5, -0.5, 0.5, -0.5, 0.5)
+    cropping = Cropping(planes, regions="fence")
+    assert kernel_of(runtime, vdi, CAMERA.azimuth(60), cropping=cropping) == "raycast"
 
 
 def test_how_far_light_gets():
@@ -104,9 +131,10 @@ def test_how_far_light_gets():
     ],
     ids=["to the right", "to the left", "up", "to the right and rolled", "up and rolled"],
 )
-def test_packets_lie_along_the_lines_that_rays_share(runtime, turn, defines):
+def test_packets_lie_along_the_lines_that_rays_share(runtime, turn, defines, monkeypatch):
     if not runtime.is_cpu:
         pytest.skip("packets are for CPU devices")
+    strategies.deal_rays(monkeypatch, "packets")
     found = dealt(runtime, slab_vdi(), turn(CAMERA))
     assert found is not None
     assert found.defines == defines
@@ -129,9 +157,10 @@ def test_the_epipole_is_where_the_eye_of_the_generating_view_is_seen():
     "kind", ["near", "around", "inside", "beside", "behind", "axis", "parallel"]
 )
 @pytest.mark.parametrize("size", [(97, 71), (40, 130)])
-def test_no_pixel_is_left_out(runtime, kind, size, monkeypatch):
+@pytest.mark.parametrize("dealt", ["blocks", "packets"])
+def test_no_pixel_is_left_out(runtime, kind, size, dealt, monkeypatch):
     """Lines draw together towards the epipole: between them is nothing, wherever it lies."""
-    strategies.deal_rays(monkeypatch, "packets")
+    strategies.deal_rays(monkeypatch, dealt)
     for case in range(12):
         rng = np.random.default_rng([case, *size])
         vdi = strategies.random_vdi(rng, max_window=(6, 5), max_supersegments=2)
@@ -159,4 +188,5 @@ def test_an_epipole_in_the_window_and_beside_it(runtime, offset, monkeypatch):
         images.append(drawn(runtime, prepared, camera, SIZE))
     assert images[0].any()
     # Rays are the same; their lengths are computed by other roundings
-    np.testing.assert_allclose(images[1], images[0], rtol=0, atol=2e-6)
+    for image in images[1:]:
+        np.testing.assert_allclose(image, images[0], rtol=0, atol=2e-6)

@@ -1,0 +1,319 @@
+// VDI to image, ray by ray as in vdi/raycast.cl, but in vectors that are written out: a work-item follows a block of 4 x 4 rays.
+//
+// In each turn of one loop every ray of the block makes a guess, composites a supersegment or leaves its list, as there. What
+// a compiler makes of that kernel for a CPU takes longer: it takes structures apart and puts them together by shuffles, keeps
+// masks and registers in memory around branches, and gathers.
+//
+// -D SKIP_EMPTY         as in vdi/raycast.cl: the picture is the same to the last bit
+// -D PARALLEL, SHIFTED, COMPENSATED (1)    as there; OFFSET_T is int, and supersegments are not packed
+#include "common/lists.cl"
+#include "common/packet_light.cl"
+#include "common/slabs_ahead.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+#define BLOCK 4 // rays along each edge
+#define BLOCKS_PER_COLUMN (COLUMN_ITEMS / LANES)
+
+// Words of 64 bits, in two halves.
+typedef struct {
+    uint16 low, high;
+} Words;
+
+// One load each, as gathers are slow where these kernels run. The places are read from memory: to take each out of a register
+// costs two operations more.
+inline Words words_at(__global const ulong *words, Ints places)
+{
+    volatile Ints in_memory = places;
+    const volatile int *at = (const volatile int *)&in_memory;
+    const ulong16 found = (ulong16)(words[at[0]], words[at[1]], words[at[2]], words[at[3]], words[at[4]], words[at[5]],
+                                    words[at[6]], words[at[7]], words[at[8]], words[at[9]], words[at[10]], words[at[11]],
+                                    words[at[12]], words[at[13]], words[at[14]], words[at[15]]);
+    Words halves;
+    halves.low = convert_uint16(found);
+    halves.high = convert_uint16(found >> 32);
+    return halves;
+}
+
+// One axis of V_O's window.
+typedef struct {
+    Reals along, deep;
+    Reals zero, inverse; // of crossings, see there
+    Reals middle, border; // half of the lists, and from a list's index to its border ahead
+    Ints step;            // 1 or -1
+    int lists;
+} Axis;
+
+inline Axis axis_of(Reals along, Reals deep, int lists)
+{
+    Axis axis;
+    axis.along = along;
+    axis.deep = deep;
+    // By a component that does not change, borders are crossed at infinity
+    axis.zero = select((Reals)(-INFINITY), deep, along != 0.0f);
+    axis.inverse = select((Reals)(1.0f), 1.0f / along, along != 0.0f);
+    axis.middle = 0.5f * (float)lists;
+    axis.border = select((Reals)(0.0f), (Reals)(1.0f), along > 0.0f) - axis.middle;
+    axis.step = select((Ints)(-1), (Ints)(1), along > 0.0f);
+    axis.lists = lists;
+    return axis;
+}
+
+// Where the rays leave the lists of an index: from the border's number, never accumulated.
+inline Reals crossings(const Axis *axis, Ints index)
+{
+    return ((convert_float16(index) + axis->border) - axis->zero) * axis->inverse;
+}
+
+// What the rays have come to.
+typedef struct {
+    Ints i, j; // lists
+    Reals r;
+    Reals depth; // in their sense, see common/lists.cl
+    Ints guess, low, high, missed; // of the search, see common/lists.cl; the answer is `high` at most
+    Ints goes; // rays that have not ended
+} Progress;
+
+#ifdef SKIP_EMPTY
+inline Ints tile_edges(const Axis *axis, Ints index)
+{
+    return select(index & ~(TILE - 1), index | (TILE - 1), axis->along > 0.0f);
+}
+
+// The index of the list that stepping from `index` would have reached at r_until; see vdi/raycast.cl.
+inline Ints index_reached(const Axis *axis, Ints index, Ints edge, Reals r_until)
+{
+    Ints reached = convert_int16(floor(fma(r_until, axis->along, axis->deep) + axis->middle));
+    const Ints behind = edge + axis->step;
+    reached = clamp(reached, min(index, behind), max(index, behind));
+    const Ints too_far = reached != index && crossings(axis, reached - axis->step) > r_until;
+    const Ints farther = !too_far && crossings(axis, reached) <= r_until;
+    reached += select((Ints)(0), axis->step, farther) - select((Ints)(0), axis->step, too_far);
+    return select(index, reached, axis->along != 0.0f);
+}
+
+// Pass by what is empty for the rays that look.
+inline void pass_by(Progress *now, Ints looks, const Axis *u, const Axis *v, Reals r_end, Reals along_depth, Reals deep_depth,
+                    Reals inverse_depth, float sense, bool away, __global const ulong *masks, int tiles_wide,
+                    float first_depth, float slabs_per_depth, float depth_origin)
+{
+    while (ANY(looks)) {
+        const Ints tile = (now->j >> TILE_SHIFT) * tiles_wide + (now->i >> TILE_SHIFT);
+        const Words mask = words_at(masks, select((Ints)(0), tile, looks));
+        const Reals offsets = depth_offset(sense * now->depth, depth_origin);
+        const Ints slab = convert_int16(clamp((offsets - first_depth) * slabs_per_depth, 0.0f, (float)(SLABS - 1)));
+        Ints nothing;
+        const Ints nearest = nearest_slabs(mask.low, mask.high, slab, away, &nothing);
+        const Ints passes = looks && (nothing || nearest != slab);
+        looks = 0;
+        if (!ANY(passes))
+            break;
+        const Ints edge_i = tile_edges(u, now->i);
+        const Ints edge_j = tile_edges(v, now->j);
+        const Reals faces = first_depth + convert_float16(away ? nearest : nearest + 1) / slabs_per_depth;
+        const Reals r_face = (sense * depth_coordinate(faces, depth_origin) - deep_depth) * inverse_depth;
+        Reals r_until = fmin(crossings(u, edge_i), crossings(v, edge_j));
+        r_until = select(r_until, fmin(r_until, r_face), !nothing && along_depth != 0.0f);
+        const Ints i = index_reached(u, now->i, edge_i, r_until);
+        const Ints j = index_reached(v, now->j, edge_j, r_until);
+        Reals r = now->r;
+        r = select(r, fmax(r, crossings(u, i - u->step)), i != now->i);
+        r = select(r, fmax(r, crossings(v, j - v->step)), j != now->j);
+        const Ints moves = passes && (i != now->i || j != now->j);
+        now->r = select(now->r, r, moves);
+        now->depth = select(now->depth, fma(r, along_depth, deep_depth), moves);
+        now->low = select(now->low, (Ints)(0), moves);
+        now->high = select(now->high, (Ints)(INT_MAX), moves);
+        now->missed = select(now->missed, (Ints)(0), moves);
+        const Ints ends = r_until >= r_end || i < 0 || i >= u->lists || j < 0 || j >= v->lists;
+        looks = passes && !ends && ((i ^ now->i) | (j ^ now->j)) >> TILE_SHIFT != 0;
+        now->i = select(now->i, i, passes);
+        now->j = select(now->j, j, passes);
+        now->goes = now->goes && !(passes && ends);
+    }
+}
+#endif
+
+// Where the rays enter and leave the n-th supersegment of their lists, in their sense; for rays that `ask`.
+inline void faces_met(Reals *near, Reals *far, __global const ulong *faces, Ints first, Ints count, Ints n, Ints ask, bool away)
+{
+    const Ints entries = first + ((away ? n : count - 1 - n) << 2 * LIST_TILE_SHIFT);
+    const Words face = words_at(faces, select((Ints)(0), entries, ask));
+    *near = away ? as_float16(face.low) : -as_float16(face.high);
+    *far = away ? as_float16(face.high) : -as_float16(face.low);
+}
+
+// Follow the rays that are `going`, of which all go away or come back.
+__attribute__((always_inline))
+inline void follow(Seen *seen, const Packet *packet, const Axis *u, const Axis *v, Ints going, bool away,
+                   __global const ulong *headers, __global const ulong *list_faces, __global const ulong *media,
+                   int lists_wide, float depth_origin, float transmittance_cutoff, __global const ulong *masks,
+                   float first_depth, float slabs_per_depth)
+{
+    const float sense = away ? 1.0f : -1.0f;
+    const Reals along_depth = sense * packet->along_z;
+    const Reals deep_depth = sense * packet->deep_z;
+    const Reals inverse_depth = select((Reals)(0.0f), 1.0f / along_depth, packet->along_z != 0.0f);
+    const Reals r_end = packet->r_begin + 1.0f;
+    const int tiles_of_lists = (lists_wide + LIST_TILE - 1) >> LIST_TILE_SHIFT;
+    Progress now;
+    now.i = clamp(convert_int16(floor(packet->start_u + u->middle)), 0, u->lists - 1);
+    now.j = clamp(convert_int16(floor(packet->start_v + v->middle)), 0, v->lists - 1);
+    now.r = packet->r_begin;
+    now.depth = sense * packet->start_z;
+    now.guess = now.low = now.missed = 0;
+    now.high = INT_MAX;
+    now.goes = going;
+#ifdef SKIP_EMPTY
+    Ints fresh = fabs(u->along) + fabs(v->along) > FEW_LISTS; // rays in a tile that they have not looked at
+#endif
+    for (int turn = 0; ANY(now.goes); ++turn) {
+#ifdef SKIP_EMPTY
+        if (turn % TURNS_PER_TEST == 0 && ANY(fresh && now.goes)) {
+            pass_by(&now, fresh && now.goes, u, v, r_end, along_depth, deep_depth, inverse_depth, sense, away, masks,
+                    (lists_wide + TILE - 1) >> TILE_SHIFT, first_depth, slabs_per_depth, depth_origin);
+            fresh = 0;
+        }
+#endif
+        const Ints tile = (now.j >> LIST_TILE_SHIFT) * tiles_of_lists + (now.i >> LIST_TILE_SHIFT);
+        const Words header = words_at(headers, select((Ints)(0), tile, now.goes));
+        const Ints place = (now.j & (LIST_TILE - 1)) << LIST_TILE_SHIFT | (now.i & (LIST_TILE - 1));
+        const Ints first = as_int16(header.low) + place;
+        const Ints count = as_int16(header.high >> (FIRST_BITS - 32));
+
+        // Search, as in common/lists.cl; what is halved after some wrong guesses is halved once in each turn
+        const Ints n = min(now.guess, count);
+        const Ints there = now.goes && n < count;
+        Reals near = INFINITY, far = INFINITY;
+        if (ANY(there)) {
+            faces_met(&near, &far, list_faces, first, count, n, there, away);
+            near = select((Reals)(INFINITY), near, there);
+            far = select((Reals)(INFINITY), far, there);
+        }
+        const Ints passed = far <= now.depth;
+        Ints beyond = now.goes && near > now.depth && n > now.low;
+        if (ANY(beyond)) {
+            Reals near_before, far_before;
+            faces_met(&near_before, &far_before, list_faces, first, count, n - 1, beyond, away);
+            beyond = beyond && far_before > now.depth;
+        }
+        const Ints found = now.goes && !passed && !beyond;
+
+        // They cross their lists from now.r to r_next
+        const Reals r_u = crossings(u, now.i);
+        const Reals r_v = crossings(v, now.j);
+        const Reals r_next = HIGHER_OF(now.r, LOWER_OF(r_end, LOWER_OF(r_u, r_v)));
+        const Reals next_depth = fma(r_next, along_depth, deep_depth);
+        const Ints meets = found && near <= next_depth;
+        if (ANY(meets)) {
+            const Ints entries = first + ((away ? n : count - 1 - n) << 2 * LIST_TILE_SHIFT);
+            const Ints places = select((Ints)(0), 2 * entries, there);
+            const Words red_green = words_at(media, places);
+            const Words blue_extinction = words_at(media + 1, places);
+            const Reals length_crossed = lengths_between(packet, near, far, now.r, r_next, now.depth, next_depth,
+                                                         deep_depth, inverse_depth);
+            composite_medium(seen, as_float16(blue_extinction.high) * length_crossed, as_float16(red_green.low),
+                             as_float16(red_green.high), as_float16(blue_extinction.low), meets);
+        }
+        const Ints ends_here = meets && far <= next_depth; // behind it comes the next one
+        const Ints leaves = found && !ends_here;
+        now.low = select(now.low, n + 1, passed || ends_here);
+        now.high = select(now.high, n - 1, beyond);
+        now.missed -= passed || beyond;
+        const Ints halves = (passed || beyond) && now.missed >= CLOSE_GUESSES;
+        now.guess = select(select(n, n - 1, beyond), n + 1, passed || ends_here);
+        now.guess = select(now.guess, (now.low + min(now.high, count)) >> 1, halves);
+        now.low = select(now.low, (Ints)(0), leaves);
+        now.high = select(now.high, (Ints)(INT_MAX), leaves);
+        now.missed = select(now.missed, (Ints)(0), leaves);
+        now.r = select(now.r, r_next, leaves);
+        now.depth = select(now.depth, next_depth, leaves);
+        const Ints in_u = r_u <= r_v;
+        const Ints i = now.i + select((Ints)(0), u->step, leaves && in_u);
+        const Ints j = now.j + select((Ints)(0), v->step, leaves && !in_u);
+        const Ints dark = seen->transmittance < transmittance_cutoff;
+        now.goes = now.goes && !(leaves && (r_next >= r_end || dark || i < 0 || i >= u->lists || j < 0 || j >= v->lists));
+#ifdef SKIP_EMPTY
+        fresh = fresh || ((i ^ now.i) | (j ^ now.j)) >> TILE_SHIFT != 0;
+#endif
+        now.i = i;
+        now.j = j;
+    }
+}
+
+// The indices of the lists at r.
+inline Ints indices_at(const Axis *axis, Reals r, int shift)
+{
+    const Ints indices = convert_int16(floor(fma(r, axis->along, axis->deep) + axis->middle));
+    return clamp(indices + shift, 0, axis->lists - 1);
+}
+
+// Bring the lists (i, j) of rays that are chosen close; each list of a tile brings its share.
+inline void prefetch_lists(Ints i, Ints j, Ints chosen, __global const ulong *headers, SUPERSEGMENTS_PARAMETERS int lists_wide)
+{
+    int columns[LANES], rows[LANES], wanted[LANES];
+    vstore16(i, 0, columns);
+    vstore16(j, 0, rows);
+    vstore16(chosen, 0, wanted);
+    for (int k = 0; k < LANES; ++k) {
+        if (wanted[k]) {
+            const List list = LIST_AT(columns[k], rows[k]);
+            PREFETCH(list, columns[k], rows[k]);
+        }
+    }
+}
+
+__attribute__((vec_type_hint(float16)))
+__kernel void raycast_blocks(
+    __global const ulong *headers,      // of the tiles of lists, see common/supersegments.cl
+    SUPERSEGMENTS_PARAMETERS            // see common/supersegments.cl
+    int lists_wide, int lists_high,     // window of V_O
+    float depth_origin,                 // world units
+    __global const float *forms,        // list coordinates, model direction, then `planes` to clip to
+    int planes,
+    int width, int height,              // window of V_N
+    __global const float *opaque_depth, // t at which each pixel's ray ends, top row first, if has_opaque_depth
+    int has_opaque_depth,
+    float transmittance_cutoff,         // the ray ends where less than this is left
+    __global const ulong *masks,        // occupied slabs of each tile of lists, if SKIP_EMPTY
+    float first_depth,                  // where slab 0 begins, view depth less depth_origin
+    float slabs_per_depth,
+    int4 part,                          // of the window, see common/rays.cl
+    __global float4 *image)             // premultiplied RGBA, top row first
+{
+    const int item = (int)get_global_id(0);
+    const int column = item / BLOCKS_PER_COLUMN;
+    const int2 corner = part_pixel(column, (item - column * BLOCKS_PER_COLUMN) * LANES, part);
+    const Ints x = corner.x + (NUMBERS & (BLOCK - 1));
+    const Ints y = corner.y + (NUMBERS / BLOCK);
+    const Ints in_window = x < width && y < height;
+    if (!ANY(in_window))
+        return;
+    const Pixels pixels = pixels_at(x, y, in_window, width, height);
+    const Reals t_end = has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Reals)(INFINITY);
+    const Reals a = convert_float16(x) + 0.5f - 0.5f * (float)width;
+    const Reals b = convert_float16(y) + 0.5f - 0.5f * (float)height;
+    const Packet packet = begin_packet(forms, planes, a, b, t_end, in_window, depth_origin);
+    const Axis u = axis_of(packet.along_u, packet.deep_u, lists_wide);
+    const Axis v = axis_of(packet.along_v, packet.deep_v, lists_high);
+    Seen seen = nothing_seen();
+    const Ints crosses_few = packet.present && fabs(packet.along_u) + fabs(packet.along_v) < LISTS_TO_PREFETCH;
+    if (ANY(crosses_few)) {
+        // Those of the next column of blocks: they come while this one's are walked through
+        const int shift = BLOCK * lists_high / height;
+        const Ints first_i = indices_at(&u, packet.r_begin, shift), first_j = indices_at(&v, packet.r_begin, 0);
+        const Ints last_i = indices_at(&u, packet.r_begin + 1.0f, shift);
+        const Ints last_j = indices_at(&v, packet.r_begin + 1.0f, 0);
+        prefetch_lists(first_i, first_j, crosses_few, headers, SUPERSEGMENTS_ARGUMENTS lists_wide);
+        prefetch_lists(last_i, last_j, crosses_few && (first_i != last_i || first_j != last_j), headers,
+                       SUPERSEGMENTS_ARGUMENTS lists_wide);
+    }
+    const Ints away = packet.present && packet.away;
+    const Ints back = packet.present && !packet.away;
+    if (ANY(away))
+        follow(&seen, &packet, &u, &v, away, true, headers, SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin,
+               transmittance_cutoff, masks, first_depth, slabs_per_depth);
+    if (ANY(back))
+        follow(&seen, &packet, &u, &v, back, false, headers, SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin,
+               transmittance_cutoff, masks, first_depth, slabs_per_depth);
+    write_pixels(image, &pixels, &seen);
+}
