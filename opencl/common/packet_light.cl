@@ -53,6 +53,15 @@ inline void composite_medium(Seen *seen, Reals optical_depth, Reals red, Reals g
 #endif
 }
 
+inline Reals alpha_seen(const Seen *seen)
+{
+#ifdef COMPENSATED
+    return fmin(seen->opacity, 1.0f);
+#else
+    return 1.0f - seen->transmittance;
+#endif
+}
+
 // The pixels of a packet.
 typedef struct {
     int places[LANES]; // in the image
@@ -78,16 +87,11 @@ inline Reals ends_at(const Pixels *pixels, __global const float *opaque_depth)
 
 inline void write_pixels(__global float4 *image, const Pixels *pixels, const Seen *seen)
 {
-#ifdef COMPENSATED
-    const Reals alpha = fmin(seen->opacity, 1.0f);
-#else
-    const Reals alpha = 1.0f - seen->transmittance;
-#endif
     float channels[4][LANES];
     vstore16(seen->red, 0, channels[0]);
     vstore16(seen->green, 0, channels[1]);
     vstore16(seen->blue, 0, channels[2]);
-    vstore16(alpha, 0, channels[3]);
+    vstore16(alpha_seen(seen), 0, channels[3]);
     for (int k = 0; k < LANES; ++k) {
         if (pixels->wanted[k])
             image[pixels->places[k]] = (float4)(channels[0][k], channels[1][k], channels[2][k], channels[3][k]);

@@ -8,12 +8,9 @@
 // in the depth coordinate, and a length is a difference of it over the reciprocal depths at both ends.
 //
 // -D OFFSET_T, PARALLEL, SHIFTED, PACKED, COMPENSATED (1)    as in vdi/raycast.cl
-#include "common/opacity.cl"
-#include "common/packet.cl"
+#include "common/packet_light.cl"
 #include "common/supersegments.cl"
 #pragma OPENCL FP_CONTRACT OFF
-
-DEFINE_OPACITY_OF(opacities_of, 16)
 
 // Lane p * PACKET_TILES + n has place p in the n-th tile: vectors of tiles become vectors of lanes within each 128 bits
 #define PACKET_TILES 4
@@ -322,7 +319,7 @@ __kernel void raycast_own_lists(
 // Whether a pixel of the packet is one of the window's
 #define IS_IN_WINDOW(dx, dy) (x + (dx) >= 0 && x + (dx) < width && y + (dy) >= 0 && y + (dy) < height)
 
-    Reals red = 0.0f, green = 0.0f, blue = 0.0f, alpha = 0.0f;
+    Seen seen = nothing_seen();
     const Lists lists = lists_at(headers, SUPERSEGMENTS_ARGUMENTS i, j, lists_wide, lists_high);
     if (lists.longest > 0) {
         Reals t_end = INFINITY;
@@ -347,20 +344,15 @@ __kernel void raycast_own_lists(
 #ifdef SHIFTED
         scale *= depth_origin;
 #endif
-
-        Reals transmittance = 1.0f;
-#ifdef COMPENSATED
-        Reals opacity = 0.0f; // see common/over.cl
-#endif
         int k = 0;
         for (; k < lists.longest; ++k) {
             const Faces at = faces_at(SUPERSEGMENTS_ARGUMENTS &lists, k, depth_origin);
-            going = going && k < lists.counts && at.front < end && !(transmittance < transmittance_cutoff);
+            going = going && k < lists.counts && at.front < end && !(seen.transmittance < transmittance_cutoff);
             const Reals from = HIGHER_OF(at.front, begin);
             const Reals to = LOWER_OF(at.back, end);
             const Ints meet = going && from < to;
-            if (!any(meet)) {
-                if (!any(going))
+            if (!ANY(meet)) {
+                if (!ANY(going))
                     break;
                 continue;
             }
@@ -370,32 +362,18 @@ __kernel void raycast_own_lists(
 #else
             const Reals lengths = scale * (to - from) / (NEARNESS(from) * NEARNESS(to));
 #endif
-            const Reals weight = select((Reals)(0.0f), transmittance * opacities_of(medium.extinction * lengths), meet);
-            red += weight * medium.red;
-            green += weight * medium.green;
-            blue += weight * medium.blue;
-#ifdef COMPENSATED
-            opacity += weight;
-            transmittance = 1.0f - opacity;
-#else
-            transmittance -= weight;
-#endif
+            composite_medium(&seen, medium.extinction * lengths, medium.red, medium.green, medium.blue, meet);
         }
-#ifdef COMPENSATED
-        alpha = fmin(opacity, 1.0f);
-#else
-        alpha = 1.0f - transmittance;
-#endif
         // The next packet, which comes to about the same depth: all at once, as loads in the loop are not
         const Lists next = lists_at(headers, SUPERSEGMENTS_ARGUMENTS i + PACKET_WIDE, j, lists_wide, lists_high);
         fetch(SUPERSEGMENTS_ARGUMENTS &next, k + 1);
         // The others have looked at what is not theirs, or lies beside V_O's window, where there may be anything
-        red = select((Reals)(0.0f), red, wanted);
-        green = select((Reals)(0.0f), green, wanted);
-        blue = select((Reals)(0.0f), blue, wanted);
+        seen.red = select((Reals)(0.0f), seen.red, wanted);
+        seen.green = select((Reals)(0.0f), seen.green, wanted);
+        seen.blue = select((Reals)(0.0f), seen.blue, wanted);
     }
 
-    const Quads channels = {{red, green, blue, alpha}};
+    const Quads channels = {{seen.red, seen.green, seen.blue, alpha_seen(&seen)}};
     const Quads pixels = transposed(channels); // of each tile, row by row
     for (int n = 0; n < PACKET_TILES; ++n) {
         __global float4 *const target = image + place + n * TILE_WIDE;
