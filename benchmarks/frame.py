@@ -130,9 +130,9 @@ class Raycasts:
         self._began: tuple[float, float] | None = None
         launch, finish = Runtime.launch, Runtime.finish
 
-        def launched(runtime: Runtime, *args: Any) -> None:
+        def launched(runtime: Runtime, *args: Any, **options: Any) -> None:
             self._began = self._began or (time.process_time(), time.perf_counter())
-            launch(runtime, *args)
+            launch(runtime, *args, **options)
 
         def finished(runtime: Runtime) -> None:
             finish(runtime)

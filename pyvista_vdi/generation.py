@@ -603,7 +603,7 @@ class _Recorder:
         )
 
     def _launch(self, name: str, items: int, *arguments: Any) -> None:
-        self._runtime.launch(self._kernels[name], items, GROUP, *arguments)
+        self._runtime.launch(self._kernels[name], items, GROUP, *arguments, any_group=True)
 
 
 def _check_weights(tolerance: float, view_cone: float) -> tuple[float, float]:

@@ -289,12 +289,16 @@ class ListView(NamedTuple):
 
 
 class _Launch(NamedTuple):
-    """A kernel, its work-items and those of a group, and its arguments after the walk's."""
+    """A kernel, its work-items and those of a group, and its arguments after the walk's.
+
+    ``any_group`` as for :meth:`Runtime.launch`.
+    """
 
     kernel: Kernel
     items: int
     group: int
     mode: tuple[Any, ...]
+    any_group: bool = False
 
 
 class PreparedVDI:
@@ -412,6 +416,7 @@ class PreparedVDI:
                 *self.walk_arguments(view, form_buffer, depth, transmittance_cutoff),
                 *launch.mode,
                 image,
+                any_group=launch.any_group,
             )
             runtime.finish()  # the buffers above may be host memory in use
 
@@ -419,9 +424,8 @@ class PreparedVDI:
         """Return how a frame of so many samples a ray is drawn."""
         defines = {**self.defines, **view.defines, **compensation(samples)}
         kernel = self._runtime.kernel("vdi/preview.cl", "preview", defines)
-        return _Launch(
-            kernel, block_items(*view.size), GROUP, (self.occupancy.counts, np.int32(samples))
-        )
+        mode = (self.occupancy.counts, np.int32(samples))
+        return _Launch(kernel, block_items(*view.size), GROUP, mode, any_group=True)
 
     def _raycast(
         self,
@@ -461,8 +465,10 @@ class PreparedVDI:
         if self._in_blocks(defines):
             kernel = self._runtime.kernel("vdi/raycast_blocks.cl", "raycast_blocks", defines)
             return _Launch(kernel, items // LANES, COLUMN_ITEMS // LANES, (columns,))
+        if self._runtime.tunes_groups:
+            defines["ANY_GROUP"] = 1
         kernel = self._runtime.kernel("vdi/raycast.cl", "raycast", defines)
-        return _Launch(kernel, items, COLUMN_ITEMS, (columns, *hit))
+        return _Launch(kernel, items, COLUMN_ITEMS, (columns, *hit), any_group=True)
 
     def _in_vectors(self, defines: dict[str, str | int | None]) -> bool:
         """Return whether there are kernels for a frame that follow rays in vectors."""

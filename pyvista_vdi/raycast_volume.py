@@ -213,6 +213,7 @@ def raycast_medium(
                 *multiplier,
                 *part,
                 image,
+                any_group=True,
             )
 
         if medium.bricks is None:

@@ -119,7 +119,7 @@ inline int2 strip_pixel(uint item, int width, int height)
 
 // The same for part of a window: whole columns of strips, a work-group each. `part` is its first column and strip, in
 // columns and strips of the window, how many columns it has in each strip, and how many strips.
-#define COLUMN_ITEMS (16 * STRIP) // that of pyvista_vdi/blocks.py, and of every group that draws
+#define COLUMN_ITEMS (16 * STRIP) // that of pyvista_vdi/blocks.py, and of every group that draws, unless it may be of any size
 inline int2 part_pixel(int group, int item, int4 part)
 {
     const int strip = group / part.z;

@@ -14,6 +14,7 @@ from pyvista_vdi.opencl_runtime import devices
 from pyvista_vdi.opencl_runtime.buffers import LocalMemory, bytes_text
 from pyvista_vdi.opencl_runtime.devices import Candidate, DeviceInfo
 from pyvista_vdi.opencl_runtime.runtime import Runtime
+from pyvista_vdi.opencl_runtime.tuning import tuned_sizes
 
 PROBE_COUNT = 256
 PROBE_GROUP = 32
@@ -145,11 +146,13 @@ def _device_lines(info: DeviceInfo, is_default: bool) -> list[str]:
     memory = (
         f"{bytes_text(info.global_memory)} memory, {bytes_text(info.max_allocation)} per buffer"
     )
+    tuned = ", ".join(f"{kernel} {size}" for kernel, size in tuned_sizes(info).items())
     return [
         f"{mark} [{info.platform_index}:{info.device_index}] {info.full_name}",
         f"    {info.kind}, {info.compute_units} compute units, {memory}, {precision}",
         f"    {info.version}, driver {info.driver}, selector {info.selector!r}",
         "    usable" if info.usable else f"    not used: {info.reason}",
+        *([f"    work-group sizes found: {tuned}"] if tuned else []),
     ]
 
 

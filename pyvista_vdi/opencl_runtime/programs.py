@@ -88,12 +88,15 @@ class Kernel:
     divisible : bool
         Whether several launches with offsets do what one launch does: nothing in the program asks
         where in the whole its work-group is.
+    source : str
+        The program's text, with all that it includes.
     """
 
-    def __init__(self, program: Any, path: str, name: str) -> None:
+    def __init__(self, program: Any, path: str, name: str, source: str) -> None:
         self.name = name
         self.path = path
-        self.divisible = True
+        self.source = source
+        self.divisible = _PLACE_OF_GROUP.search(source) is None
         self._program = program
         self._local = threading.local()
         self.argument_count = int(self.object.num_args)
@@ -174,8 +177,7 @@ class ProgramCache:
             kernel = self._kernels.get(key)
             if kernel is None:
                 program = self._program(str(path), source, options)
-                kernel = self._find(program, str(path), name, options)
-                kernel.divisible = _PLACE_OF_GROUP.search(source) is None
+                kernel = self._find(program, str(path), name, source, options)
                 self._kernels[key] = kernel
             return kernel
 
@@ -190,9 +192,11 @@ class ProgramCache:
             self._programs[key] = program
         return program
 
-    def _find(self, program: Any, path: str, name: str, options: tuple[str, ...]) -> Kernel:
+    def _find(
+        self, program: Any, path: str, name: str, source: str, options: tuple[str, ...]
+    ) -> Kernel:
         try:
-            return Kernel(program, path, name)
+            return Kernel(program, path, name, source)
         except opencl().Error as exc:
             names = program.kernel_names.replace(";", ", ") or "none"
             raise KernelBuildError(

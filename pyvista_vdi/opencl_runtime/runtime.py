@@ -22,6 +22,7 @@ from pyvista_vdi.opencl_runtime.arguments import (
     Size,
     as_size,
     check_host_array,
+    padded,
     preferred_group,
     set_arguments,
 )
@@ -34,6 +35,7 @@ from pyvista_vdi.opencl_runtime.buffers import (
 from pyvista_vdi.opencl_runtime.devices import Candidate, DeviceInfo, drivers_lost, opencl
 from pyvista_vdi.opencl_runtime.profiling import KernelTime, Profile, profiling_wanted, table
 from pyvista_vdi.opencl_runtime.programs import Define, Kernel, ProgramCache
+from pyvista_vdi.opencl_runtime.tuning import tuner_of
 from pyvista_vdi.opencl_runtime.turns import Turns, Worker
 
 #: Bytes that background work copies at a time: about a millisecond at a host memory's pace.
@@ -85,6 +87,7 @@ class Runtime:
         self._queues: dict[int, Any] = {}  # those that exist, numbered as they were made
         self._queues_made = 0
         self._queues_lock = threading.RLock()
+        self._tuner = tuner_of(self._device, self.info)
         self._profile: Profile | None = None
         if profiling_wanted():
             self._profile = Profile()
@@ -131,8 +134,18 @@ class Runtime:
         with self._turns.aside():  # compilers take seconds, and not the device
             return self._programs.kernel(path, name, defines)
 
+    @property
+    def tunes_groups(self) -> bool:
+        """Whether launches with ``any_group`` may get work-groups of other sizes than they ask."""
+        return self._tuner is not None
+
     def launch(
-        self, kernel: Kernel, global_size: Size, local_size: Size | None, *args: Argument
+        self,
+        kernel: Kernel,
+        global_size: Size,
+        local_size: Size | None,
+        *args: Argument,
+        any_group: bool = False,
     ) -> None:
         """Enqueue a kernel and return at once; inside :meth:`background`, run it in pieces.
 
@@ -148,6 +161,10 @@ class Runtime:
         *args : DeviceBuffer, LocalMemory, numpy scalar, numpy.ndarray or None
             In the kernel's order. Numbers carry their type (``np.float32(x)``); a small array is
             passed by value, as a vector (``float4``) or a structure; None is a null pointer.
+        any_group : bool, default: False
+            That the kernel, of one dimension, does the same in work-groups of any power of two, and
+            leaves out surplus work items itself: the size that is fastest on this device is found
+            and used (:mod:`pyvista_vdi.opencl_runtime.tuning`), the global size rounded up to it.
 
         Raises
         ------
@@ -178,6 +195,11 @@ class Runtime:
             )
         if 0 in whole:
             return
+        turn = None
+        if any_group and group is not None and self._tuner is not None:
+            undivided = self._turns.worker is None
+            size, turn = self._tuner.size(kernel, whole[0], group[0], timed=undivided)
+            group, whole = (size,), padded(whole, size)
 
         with self._driver(f"launching {kernel.name!r} of {kernel.path} on {whole} by {group}"):
             set_arguments(kernel, args)
@@ -185,7 +207,9 @@ class Runtime:
                 if isinstance(argument, DeviceBuffer) and argument.readers is not None:
                     self._note_reader(argument)
             if self._turns.worker is None:
-                self._enqueue(kernel, whole, group)
+                event = self._enqueue(kernel, whole, group)
+                if turn is not None and self._tuner is not None:
+                    self._tuner.timed(turn, event)
             else:
                 self._run_in_pieces(self._turns.worker, kernel, whole, group)
 
@@ -195,11 +219,12 @@ class Runtime:
         size: tuple[int, ...],
         group: tuple[int, ...] | None,
         offset: tuple[int, ...] | None = None,
-    ) -> None:
+    ) -> Any:
         event = opencl().enqueue_nd_range_kernel(
             self._queue, kernel.object, size, group, global_work_offset=offset
         )
         self._record(kernel.name, event)
+        return event
 
     def _run_in_pieces(
         self, worker: Worker, kernel: Kernel, whole: tuple[int, ...], group: tuple[int, ...] | None
@@ -667,7 +692,7 @@ class Runtime:
 
     def _new_queue(self, *, profiled: bool = False) -> int:
         cl = opencl()
-        wanted = profiled or self._profile is not None
+        wanted = profiled or self._profile is not None or self._tuner is not None
         properties = cl.command_queue_properties.PROFILING_ENABLE if wanted else 0
         with self._driver("making a command queue"):
             queue = cl.CommandQueue(self._context, self._device, properties)
