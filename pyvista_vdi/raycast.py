@@ -691,12 +691,14 @@ class PreparedVDI:
         packed = isinstance(vdi.packing, Packed16)
         colors = vdi.packing.color if isinstance(vdi.packing, Packed16) else vdi.color
         lists: tuple[DeviceBuffer, ...]
+        # On a CPU device memory of our own, which systems give in large pages: a driver's comes in
+        # pages of 4 KiB, each of which the kernel is interrupted for where it first writes
         if packed:
-            lists = (keep(runtime.buffer((entries, 4), np.uint32, "supersegments")),)
+            lists = (keep(runtime.result((entries, 4), np.uint32, "supersegments")),)
         else:
             lists = (
-                keep(runtime.buffer((entries, 2), name="supersegment faces")),
-                keep(runtime.buffer((entries, 4), name="supersegment media")),
+                keep(runtime.result((entries, 2), name="supersegment faces")),
+                keep(runtime.result((entries, 4), name="supersegment media")),
             )
         # Direction of a centre ray per unit of view depth, in the model frame
         centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from .._version import __version__
 from ..camera import Camera, check_window_size
 from ..errors import InvalidVDIError, VDIError, VDIFileError
+from ..host_memory import aligned_empty
 from ..precision import Packed16, Packing, check_precision, packed_8
 from ..vdi import VDI
 from .chunks import CODECS, DamagedChunkError, PackedArray, chunk_sizes, workers
@@ -357,8 +358,9 @@ class _OpenFile:
         """Return front, back, color and optical depth, each decompressed where it will stay."""
         n, names = self.info.n_supersegments, ("front", "back", "color", "optical_depth")
         color = self._layouts["color"]
-        media = {name: np.empty(n, "<f4") for name in names}
-        media["color"] = np.empty((n, *color.row_shape), color.dtype)
+        # Where a CPU device uses them in place
+        media = {name: aligned_empty(n, "<f4") for name in names}
+        media["color"] = aligned_empty((n, *color.row_shape), color.dtype)
         decode_depths = _DEPTHS[self.info.format_version]
 
         def decode(first: int, last: int) -> None:
