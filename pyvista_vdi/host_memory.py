@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import mmap
 import os
 import sys
 from pathlib import Path
@@ -16,8 +18,15 @@ from .errors import DeviceMemoryError
 HOST_ALIGNMENT = 4096
 """Bytes; arrays that begin at a multiple are used in place by CPU drivers instead of copied."""
 
+#: Bytes of a huge page; on other processors than x86 it is at least a whole number of pages.
+_HUGE_PAGE = 2**21
+#: Bytes from which lasting arrays have mappings of their own.
+_LARGE = 2**22
 
-def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+
+def aligned_empty(
+    shape: int | tuple[int, ...], dtype: DTypeLike, *, lasting: bool = False
+) -> NDArray[Any]:
     """Uninitialised C-contiguous array that a CPU device can use without a copy.
 
     Parameters
@@ -26,6 +35,8 @@ def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any
         Shape.
     dtype : dtype_like
         Element type.
+    lasting : bool, default: False
+        Whether it is made seldom and kept for long, so that memory of its own pays.
 
     Returns
     -------
@@ -35,9 +46,25 @@ def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any
     dtype = np.dtype(dtype)
     shape = (shape,) if isinstance(shape, int) else tuple(shape)
     nbytes = math.prod(shape) * dtype.itemsize
-    raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
-    start = -raw.ctypes.data % HOST_ALIGNMENT
+    if lasting and nbytes >= _LARGE and hasattr(mmap, "MADV_HUGEPAGE"):
+        raw, start = _in_huge_pages(nbytes)
+    else:
+        raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
+        start = -raw.ctypes.data % HOST_ALIGNMENT
     return raw[start : start + nbytes].view(dtype).reshape(shape)
+
+
+def _in_huge_pages(nbytes: int) -> tuple[NDArray[np.uint8], int]:
+    """Return memory that Linux may give in huge pages, and where in it to begin; bytes.
+
+    NumPy asks for them as well, but also where it uses a part of one, which then takes all of it.
+    """
+    memory = mmap.mmap(-1, nbytes + _HUGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    raw = np.frombuffer(memory, np.uint8)  # holds the mapping
+    start = -raw.ctypes.data % _HUGE_PAGE
+    with contextlib.suppress(OSError):  # a kernel without them
+        memory.madvise(mmap.MADV_HUGEPAGE, start, nbytes // _HUGE_PAGE * _HUGE_PAGE)
+    return raw, start
 
 
 def physical_memory() -> int | None:

@@ -217,7 +217,7 @@ def share_lit(vdi: VDI, near: float, far: float) -> float:
 
     Of some of the lists that are not empty; 1 in a list through which it gets. View depths of V_O.
     """
-    offsets = vdi.offsets.astype(np.int64)
+    offsets = vdi.offsets.view(np.int64)
     lists = np.flatnonzero(np.diff(offsets))
     lists = lists[:: -(-len(lists) // _SAMPLED_LISTS) or 1]
     if not len(lists):

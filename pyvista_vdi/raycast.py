@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import threading
 import weakref
@@ -346,8 +347,8 @@ class PreparedVDI:
 
         2 if they lie nearer to the least of these depths than to the largest.
         """
-        occupied = np.diff(vdi.offsets) > 0
-        first, last = vdi.offsets[:-1][occupied], vdi.offsets[1:][occupied] - 1
+        offsets, occupied = vdi.offsets.view(np.int64), np.flatnonzero(vdi.counts)
+        first, last = offsets[occupied], offsets[occupied + 1] - 1
         near, far = (depth - self._depth_origin for depth in depths)
         front, back = (
             np.clip(face.astype(np.float64), near, far)
@@ -694,11 +695,11 @@ class PreparedVDI:
         # On a CPU device memory of our own, which systems give in large pages: a driver's comes in
         # pages of 4 KiB, each of which the kernel is interrupted for where it first writes
         if packed:
-            lists = (keep(runtime.result((entries, 4), np.uint32, "supersegments")),)
+            lists = (keep(runtime.result((entries, 4), np.uint32, "supersegments", lasting=True)),)
         else:
             lists = (
-                keep(runtime.result((entries, 2), name="supersegment faces")),
-                keep(runtime.result((entries, 4), name="supersegment media")),
+                keep(runtime.result((entries, 2), name="supersegment faces", lasting=True)),
+                keep(runtime.result((entries, 4), name="supersegment media", lasting=True)),
             )
         # Direction of a centre ray per unit of view depth, in the model frame
         centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
@@ -769,7 +770,6 @@ class PreparedVDI:
 def _longest(counts: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the length of the longest list of each tile; ``counts`` are (height, width)."""
     height, width = counts.shape
-    padded = np.pad(counts, ((0, -height % _LIST_TILE), (0, -width % _LIST_TILE)))
-    rows, columns = padded.shape
-    tiles = padded.reshape(rows // _LIST_TILE, _LIST_TILE, columns // _LIST_TILE, _LIST_TILE)
-    return np.asarray(tiles.max(axis=(1, 3)))
+    longest = np.pad(counts, ((0, -height % _LIST_TILE), (0, -width % _LIST_TILE)))
+    longest = functools.reduce(np.maximum, (longest[n::_LIST_TILE] for n in range(_LIST_TILE)))
+    return functools.reduce(np.maximum, (longest[:, n::_LIST_TILE] for n in range(_LIST_TILE)))

@@ -106,7 +106,7 @@ class VDI:
     def counts(self) -> NDArray[np.int64]:
         """Supersegments per list, int64 (H, W), bottom row first."""
         width, height = self.window_size
-        starts = self.offsets.astype(np.int64)
+        starts = self.offsets.view(np.int64)
         counts = starts[1:] - starts[:-1]
         return counts.reshape(height, width)
 

@@ -5,7 +5,8 @@
 #include "common/occupancy.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// One work-item per list. Counts are sums of whole numbers, so that their order changes nothing.
+// One work-item per list. Each supersegment adds 1 where it begins and takes 1 away behind its end, whatever it spans;
+// `occupied_slabs` sums up. Counts are sums of whole numbers, so that their order changes nothing.
 __kernel void count_supersegments(
     __global const OFFSET_T *offsets, // width * height + 1
     __global const float *fronts,     // view depth less depth_origin
@@ -15,30 +16,35 @@ __kernel void count_supersegments(
     float first_depth,                // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,            // per world unit
     float margin,                     // by which supersegments count beyond their faces, world units
-    __global uint *counts)            // tiles_high, tiles_wide, SLABS; all 0
+    __global uint *changes)           // of the counts along each tile: tiles_high, tiles_wide, SLABS; all 0
 {
     const size_t list = get_global_id(0);
     if (list >= (size_t)width * (size_t)height)
         return;
     const size_t i = (list % (size_t)width) >> TILE_SHIFT;
     const size_t j = (list / (size_t)width) >> TILE_SHIFT;
-    __global uint *cells = counts + (j * (size_t)tiles_wide + i) * SLABS;
+    __global uint *cells = changes + (j * (size_t)tiles_wide + i) * SLABS;
     for (OFFSET_T k = offsets[list]; k < offsets[list + 1]; ++k) {
         const int first = slab_of(fronts[k] - margin, first_depth, slabs_per_depth);
         const int last = slab_of(backs[k] + margin, first_depth, slabs_per_depth);
-        for (int slab = first; slab <= last; ++slab)
-            atomic_inc(cells + slab);
+        atomic_inc(cells + first);
+        if (last + 1 < SLABS)
+            atomic_dec(cells + last + 1);
     }
 }
 
-// One work-item per tile.
-__kernel void occupied_slabs(__global const uint *counts, uint tiles, __global ulong *masks)
+// One work-item per tile: its changes become counts.
+__kernel void occupied_slabs(__global uint *counts, uint tiles, __global ulong *masks)
 {
     const size_t tile = get_global_id(0);
     if (tile >= tiles)
         return;
     ulong mask = 0;
-    for (int slab = 0; slab < SLABS; ++slab)
-        mask |= (ulong)(counts[tile * SLABS + slab] > 0) << slab;
+    uint count = 0;
+    for (int slab = 0; slab < SLABS; ++slab) {
+        count += counts[tile * SLABS + slab];
+        counts[tile * SLABS + slab] = count;
+        mask |= (ulong)(count > 0) << slab;
+    }
     masks[tile] = mask;
 }

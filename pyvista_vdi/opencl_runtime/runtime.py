@@ -291,7 +291,12 @@ class Runtime:
         return self._allocate(access, shape, dtype, name, None, writable=True)
 
     def result(
-        self, shape: tuple[int, ...], dtype: DTypeLike = np.float32, name: str = "result"
+        self,
+        shape: tuple[int, ...],
+        dtype: DTypeLike = np.float32,
+        name: str = "result",
+        *,
+        lasting: bool = False,
     ) -> DeviceBuffer:
         """Uninitialised memory for kernels to write, downloaded when they have.
 
@@ -306,6 +311,8 @@ class Runtime:
             Element type.
         name : str, default: "result"
             What it holds; messages say it.
+        lasting : bool, default: False
+            As for :func:`aligned_empty`.
 
         Returns
         -------
@@ -322,9 +329,8 @@ class Runtime:
         if not self.is_cpu or 0 in shape:
             return self.buffer(shape, dtype, name)
         flags = opencl().mem_flags
-        return self._allocate(
-            flags.READ_WRITE | flags.USE_HOST_PTR, shape, dtype, name, None, writable=True
-        )
+        access = flags.READ_WRITE | flags.USE_HOST_PTR
+        return self._allocate(access, shape, dtype, name, None, writable=True, lasting=lasting)
 
     def upload(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
         """An array's values on the device, for kernels to read.
@@ -560,6 +566,7 @@ class Runtime:
         host: NDArray[Any] | None,
         *,
         writable: bool,
+        lasting: bool = False,
     ) -> DeviceBuffer:
         cl = opencl()
         nbytes = int(np.prod(shape, dtype=object)) * dtype.itemsize
@@ -572,7 +579,7 @@ class Runtime:
         reserved = self._ledger.take(name, taken, self.info.max_allocation, self.info.global_memory)
         try:
             if in_place and host is None:
-                host = aligned_empty(shape, dtype)
+                host = aligned_empty(shape, dtype, lasting=lasting)
             with self._driver(f"allocating {bytes_text(nbytes)} for the buffer {name!r}"):
                 if host is None or nbytes == 0:
                     flags &= ~cl.mem_flags.COPY_HOST_PTR
