@@ -59,7 +59,10 @@ def _in_huge_pages(nbytes: int) -> tuple[NDArray[np.uint8], int]:
 
     NumPy asks for them as well, but also where it uses a part of one, which then takes all of it.
     """
-    memory = mmap.mmap(-1, nbytes + _HUGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    try:
+        memory = mmap.mmap(-1, nbytes + _HUGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    except OSError as exc:
+        raise MemoryError(f"no memory for an array of {nbytes} bytes: {exc}") from exc
     raw = np.frombuffer(memory, np.uint8)  # holds the mapping
     start = -raw.ctypes.data % _HUGE_PAGE
     with contextlib.suppress(OSError):  # a kernel without them

@@ -579,7 +579,14 @@ class Runtime:
         reserved = self._ledger.take(name, taken, self.info.max_allocation, self.info.global_memory)
         try:
             if in_place and host is None:
-                host = aligned_empty(shape, dtype, lasting=lasting)
+                try:
+                    host = aligned_empty(shape, dtype, lasting=lasting)
+                except MemoryError as exc:
+                    raise DeviceMemoryError(
+                        f"there is no host memory for the buffer {name!r} of "
+                        f"{bytes_text(nbytes)}: close other programs, or use a smaller volume, "
+                        "window size or max_supersegments"
+                    ) from exc
             with self._driver(f"allocating {bytes_text(nbytes)} for the buffer {name!r}"):
                 if host is None or nbytes == 0:
                     flags &= ~cl.mem_flags.COPY_HOST_PTR

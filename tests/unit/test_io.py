@@ -143,6 +143,15 @@ def test_negative_depths_and_signed_zeros(tmp_path):
         assert getattr(back, name).tobytes() == getattr(vdi, name).tobytes()
 
 
+@pytest.mark.parametrize("precision", ["exact", "16-byte", "8-byte"])
+def test_what_is_read_lies_where_a_cpu_device_uses_it_in_place(tmp_path, precision):
+    vdi = large_vdi().with_precision(precision)
+    read = io.read(vdi.save(tmp_path / "large.vdi"))
+    assert read.equals(vdi)
+    for name in ("front", "back", "color", "optical_depth"):
+        assert getattr(read, name).ctypes.data % 4096 == 0, name
+
+
 def test_the_same_vdi_gives_the_same_bytes(tmp_path, monkeypatch):
     vdi = large_vdi()
     first = io.write(vdi, tmp_path / "a.vdi").read_bytes()

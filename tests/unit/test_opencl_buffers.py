@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import gc
+import mmap
 import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from pyvista_vdi import host_memory
 from pyvista_vdi import opencl_runtime as ocl
 from pyvista_vdi.errors import (
     DeviceError,
@@ -51,6 +53,48 @@ def test_aligned_arrays_are_used_in_place_on_a_cpu(runtime):
         del array
         gc.collect()
         assert np.all(runtime.download(buffer) == 1)
+    assert runtime.allocated == before
+
+
+@pytest.mark.parametrize("n", [1000, 2**20, 3 * 2**19 + 5])
+def test_lasting_arrays_are_as_others(runtime, n):
+    """4 KB, as everywhere; 4 MiB and 6 MiB and a little: 2 and 3 pages of 2 MiB, and a rest."""
+    array = ocl.aligned_empty((n,), np.float32, lasting=True)
+    assert (array.shape, array.dtype, array.flags.writeable) == ((n,), np.float32, True)
+    assert array.ctypes.data % 4096 == 0
+    before, values = runtime.allocated, np.arange(n, dtype=np.float32)
+    with runtime.result((n,), np.float32, "lists", lasting=True) as buffer:
+        assert runtime.allocated - before == 4 * n
+        runtime.write(buffer, values)
+        np.testing.assert_array_equal(runtime.download(buffer), values)
+    assert runtime.allocated == before
+    assert len(bytearray(array)) == 4 * n  # from its first byte to its last it is there
+
+
+def test_lasting_arrays_where_the_system_knows_no_huge_pages(monkeypatch):
+    class Refused(mmap.mmap):
+        def madvise(self, *_):
+            raise OSError(22, "Invalid argument")
+
+    monkeypatch.setattr(host_memory.mmap, "mmap", Refused)
+    array = ocl.aligned_empty(2**21, np.float32, lasting=True)
+    array[...] = 2
+    assert array.sum() == 2**22
+    monkeypatch.delattr(host_memory.mmap, "MADV_HUGEPAGE", raising=False)
+    assert ocl.aligned_empty(2**21, np.float32, lasting=True).ctypes.data % 4096 == 0
+
+
+def test_a_host_without_memory_for_an_array_says_so(runtime, monkeypatch):
+    if not runtime.is_cpu:
+        pytest.skip("the device has memory of its own")
+
+    def refused(*_, **__):
+        raise OSError(12, "Cannot allocate memory")
+
+    monkeypatch.setattr(host_memory.mmap, "mmap", refused)
+    before = runtime.allocated
+    with pytest.raises(DeviceMemoryError, match=r"no host memory .* 'lists' of 4\.00 MiB"):
+        runtime.result((2**20,), np.float32, "lists", lasting=True)
     assert runtime.allocated == before
 
 
