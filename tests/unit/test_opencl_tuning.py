@@ -300,7 +300,7 @@ def _looks(volume):
 def tuned(runtime, monkeypatch, tmp_path, _plain_driver):
     """A second runtime on the device, that tunes."""
     _plain_driver(False)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(tuning, "cache_folder", lambda: tmp_path)
     monkeypatch.setenv(tuning.TUNING_VARIABLE, "on")
     tuned = Runtime(Candidate(runtime.info, runtime._device))
     assert tuned.tunes_groups
