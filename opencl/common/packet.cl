@@ -36,7 +36,7 @@ inline int least_of(Ints x, Ints chosen)
 // through both eyes cross the same lists, one after another. `epipole` is where V_N sees V_O's eye: homogeneous pixel offsets
 // along the strips' width, across it, and their denominator. A strip is LANES pixels wide; its packets are numbered by where
 // they meet that of its edges that is farther from the epipole, from before the window on. Lines draw together towards the
-// epipole: a pixel may be in two packets, and is in one at least.
+// epipole: a pixel may be in two packets or more, whose numbers follow one another, and is in one at least.
 #define STEEPEST 1.5f // pixels across by pixels along; the margin of pyvista_vdi/packets.py allows for it
 inline Ints across_strip(int first, int number, int along_size, int across_size, float4 epipole)
 {

@@ -287,7 +287,9 @@ __kernel void raycast_packets(
     const int number = part.z + block / part.y * LANES + item % LANES;
     const Ints along = first + NUMBERS;
     const Ints across = across_strip(first, number, along_size, across_size, epipole);
-    const Ints in_window = along < along_size && across >= 0 && across < across_size;
+    // A pixel of two packets is the former's: how it is rounded depends on what the packet's other rays meet
+    const Ints is_own = across != across_strip(first, number - 1, along_size, across_size, epipole);
+    const Ints in_window = is_own && along < along_size && across >= 0 && across < across_size;
     if (!ANY(in_window))
         return;
 #ifdef UPRIGHT

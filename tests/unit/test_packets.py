@@ -56,10 +56,10 @@ def kernel_of(runtime, vdi, camera, size=SIZE, **options):
     return launch.kernel.name
 
 
-def drawn(runtime, prepared, camera, size):
-    """A frame, NaN where nothing was written."""
+def drawn(runtime, prepared, camera, size, unwritten=np.nan):
+    """A frame, `unwritten` where nothing was."""
     with runtime.buffer((size[1], size[0], 4), name="image") as image:
-        runtime.fill(image, np.float32(np.nan))
+        runtime.fill(image, np.float32(unwritten))
         prepared.render(camera, size, image, skip_empty=False)  # which fills the rest by itself
         return runtime.download(image).copy()
 
@@ -167,6 +167,40 @@ def test_no_pixel_is_left_out(runtime, kind, size, dealt, monkeypatch):
         camera, _ = strategies.random_view(rng, vdi, kind)
         image = drawn(runtime, PreparedVDI(runtime, vdi), camera, size)
         assert not np.isnan(image).any(), f"seed {[case, *size]}, view {kind!r}"
+
+
+@pytest.mark.parametrize("kind", ["near", "around", "inside", "axis"])
+def test_each_pixel_is_drawn_by_one_packet(runtime, kind, monkeypatch):
+    """When a ray ends depends on its packet, in the last bits: two that draw a pixel would race."""
+    strategies.deal_rays(monkeypatch, "packets")
+    if not runtime.is_cpu:
+        pytest.skip("packets are for CPU devices")
+    enqueue = runtime._enqueue
+
+    def written(prepared, camera, packets_wanted):
+        def some(kernel, size, group):
+            if kernel.name != "raycast_packets":
+                return enqueue(kernel, size, group)
+            for first in range(size[0])[packets_wanted]:
+                enqueue(kernel, (1,), (1,), (first,))
+            return None
+
+        with monkeypatch.context() as patch:
+            patch.setattr(runtime, "_enqueue", some)
+            return drawn(runtime, prepared, camera, SIZE, unwritten=-1)[..., 3] >= 0
+
+    for case in range(3):
+        rng = np.random.default_rng([case, 5])
+        vdi = strategies.random_vdi(rng, max_window=(24, 20), max_supersegments=2)
+        camera, _ = strategies.random_view(rng, vdi, kind)
+        prepared = PreparedVDI(runtime, vdi)
+        cleared = written(prepared, camera, slice(0))  # what no packet draws
+        even, odd = (
+            written(prepared, camera, slice(first, None, 2)) & ~cleared for first in (0, 1)
+        )
+        assert even.any(), case
+        assert odd.any(), case
+        assert not (even & odd).any(), case  # lines that draw together have numbers side by side
 
 
 @pytest.mark.parametrize(
