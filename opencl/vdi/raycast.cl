@@ -13,8 +13,8 @@
 // -D CROPPED            only some regions are drawn, see common/cropping.cl
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
 // -D ONE_LIST           the view is V_O: each ray stays in a list, whose supersegments a loop of its own composites
-// -D SEGMENTS           write what each ray crosses into a pool, to be merged with other VDIs by vdi/merge.cl, in place of
-//                       compositing it; for a band of rays
+// -D SEGMENTS           write what each ray crosses into a pool (common/segments.cl), to be merged with other VDIs by
+//                       vdi/merge.cl or vdi/merge_blocks.cl, in place of compositing it; for a band of rays
 // -D FIRST_HIT          in place of a picture, where each ray enters the first supersegment that reaches an opacity
 #include "common/list_ray.cl"
 #include "common/lists.cl"
@@ -23,12 +23,6 @@
 #include "common/over.cl"
 #include "common/segments.cl"
 #pragma OPENCL FP_CONTRACT OFF
-
-#ifdef SEGMENTS
-#define BOX_PLANES 6 // of the VDI's bounds: the first of `forms`' planes
-// More cannot be told from opaque, and a part of it is still a number
-#define MAX_OPTICAL_DEPTH 1e30f
-#endif
 
 // As fmin and fmax for what is never NaN: one instruction each
 #define LOWER(x, y) ((x) < (y) ? (x) : (y))
@@ -60,7 +54,8 @@ __kernel void raycast(
     float slabs_per_depth,
     CROPPING_PARAMETER                  // regions that are kept
 #if defined(SEGMENTS)
-    uint first_item,                    // work-item of the band's first ray
+    __global const int2 *cells,         // see common/rays.cl
+    int first_cell,                     // the band's
     int stream,                         // of this VDI
     int rays,                           // in the band
     float depth_shift,                  // this VDI's reference depth less the frame's
@@ -87,7 +82,7 @@ __kernel void raycast(
 {
 #ifdef SEGMENTS
     const int band_ray = (int)get_global_id(0);
-    const int2 pixel = strip_pixel(first_item + (uint)band_ray, width, height);
+    const int2 pixel = cell_pixel(cells + first_cell, band_ray);
 #else
     // By what a work-group has in common, so that it divides once
     const int item = (int)get_local_id(0);
@@ -276,13 +271,12 @@ __kernel void raycast(
                 const float begins = fmax(ray_depth(&ray, r_from, z_from, DEPTHS) + depth_shift, t_reached);
                 t_reached = fmax(ray_depth(&ray, r_to, z_to, DEPTHS) + depth_shift, begins);
                 if (slot < capacity) {
-                    __global float *segment = pool + segment_place(band_ray, slot, capacity, 0);
-                    segment[SEGMENT_FROM * RAY_BLOCK] = begins;
-                    segment[SEGMENT_TO * RAY_BLOCK] = t_reached;
-                    segment[SEGMENT_OPTICAL_DEPTH * RAY_BLOCK] = optical_depth;
-                    segment[SEGMENT_COLOR * RAY_BLOCK] = medium.x;
-                    segment[(SEGMENT_COLOR + 1) * RAY_BLOCK] = medium.y;
-                    segment[(SEGMENT_COLOR + 2) * RAY_BLOCK] = medium.z;
+                    SEGMENT(pool, band_ray, slot, capacity, SEGMENT_FROM) = begins;
+                    SEGMENT(pool, band_ray, slot, capacity, SEGMENT_TO) = t_reached;
+                    SEGMENT(pool, band_ray, slot, capacity, SEGMENT_OPTICAL_DEPTH) = optical_depth;
+                    SEGMENT(pool, band_ray, slot, capacity, SEGMENT_COLOR) = medium.x;
+                    SEGMENT(pool, band_ray, slot, capacity, SEGMENT_COLOR + 1) = medium.y;
+                    SEGMENT(pool, band_ray, slot, capacity, SEGMENT_COLOR + 2) = medium.z;
                 }
                 ++slot;
                 absorbed += optical_depth;
