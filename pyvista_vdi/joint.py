@@ -42,14 +42,14 @@ _SEGMENT_BYTES = 24
 #: Slots that a ray has to spare where segments lie in rows: those of ``opencl/common/segments.cl``.
 _SPARE_ROWS = 2
 #: Bytes of the pool, unless the segments of a cell need more. A GPU needs more rays at a time.
-_POOL_BYTES_CPU = 64 * 2**20
+_POOL_BYTES_CPU = 16 * 2**20
 _POOL_BYTES = 256 * 2**20
+#: Cells of a work-group, of which each work-item has a row.
+_CELLS_OF_GROUP = 16
 #: Segments of a ray that the first frame has room for; later ones go by the frame before.
 _FIRST_SLOTS = 64
-#: Room for so many times what this share of the cells of the frame before needed; to draw the others
-#: again takes less than to have room for them everywhere.
+#: Room for so many times what the frame before needed.
 _SPARE_SLOTS = 1.1
-_SHARE_WITH_ROOM = 0.95
 
 _slots: weakref.WeakKeyDictionary[VDI, int] = weakref.WeakKeyDictionary()
 _digests: weakref.WeakKeyDictionary[VDI, bytes] = weakref.WeakKeyDictionary()
@@ -213,15 +213,14 @@ def joint_image(
     cells = _Cells.of(streams, size)
     with contextlib.ExitStack() as stack:
         on_device = [stack.enter_context(stream.on(runtime)) for stream in streams]
-        image = stack.enter_context(runtime.buffer((height, width, 4), name="image"))
-        owner = stack.enter_context(runtime.buffer((height, width), np.int16, "owners"))
+        image = stack.enter_context(runtime.result((height, width, 4), name="image"))
+        owner = stack.enter_context(runtime.result((height, width), np.int16, "owners"))
         _draw_alone(runtime, streams, on_device, cells, image, owner)
         if len(cells.shared):
             frame = _JointFrame(runtime, streams, on_device, order, margin)
             needed = frame.draw(cells.shared, _slots_for(placed), image, owner)
-            slots = math.ceil(_SPARE_SLOTS * np.quantile(needed, _SHARE_WITH_ROOM))
             for one in placed:
-                _slots[one.vdi] = max(slots, 1)
+                _slots[one.vdi] = math.ceil(_SPARE_SLOTS * max(needed, 1))
         result = JointImage(runtime.download(image), runtime.download(owner))
         runtime.finish()  # arrays on the device may be host memory in use
         return result
@@ -331,12 +330,14 @@ def _draw_alone(
 ) -> None:
     """Draw the cells in which no two VDIs are met, as each would be by itself."""
     width, height = size = streams[0].view.size
-    items = (-(-width // GROUP) * GROUP, height)
+    wide = cells.alone.shape[1]
+    group = (_CELLS_OF_GROUP, 1)
+    items = (-(-wide // _CELLS_OF_GROUP) * _CELLS_OF_GROUP, height)
     ends_kernel = runtime.kernel("vdi/joint_cells.cl", "alone_ends")
     take = runtime.kernel("vdi/joint_cells.cl", "take_cells")
     with contextlib.ExitStack() as stack:
         alone = stack.enter_context(runtime.upload(cells.alone, "cells"))
-        window = (np.int32(cells.alone.shape[1]), np.int32(width), np.int32(height))
+        window = (np.int32(wide), np.int32(width), np.int32(height))
         picture, ends = image, None  # others are drawn over the first one's picture
         for number, (stream, arrays) in enumerate(zip(streams, on_device, strict=True)):
             part = cells.part(number, size)
@@ -344,12 +345,12 @@ def _draw_alone(
                 continue
             vdi = np.int32(number)
             if ends is None:
-                ends = stack.enter_context(runtime.buffer((height, width), name="ends of rays"))
+                ends = stack.enter_context(runtime.result((height, width), name="ends of rays"))
             elif picture is image:
-                picture = stack.enter_context(runtime.buffer(image.shape, name="one's picture"))
+                picture = stack.enter_context(runtime.result(image.shape, name="one's picture"))
             has_ends = np.int32(stream.view.has_ends)
             runtime.launch(
-                ends_kernel, items, (GROUP, 1), alone, vdi, *window, arrays.ends, has_ends, ends
+                ends_kernel, items, group, alone, vdi, *window, arrays.ends, has_ends, ends
             )
             stream.prepared.render_part(
                 stream.placed.camera,
@@ -360,10 +361,10 @@ def _draw_alone(
                 part,
                 skip_empty=stream.skip_empty,
             )
-            runtime.launch(take, items, (GROUP, 1), alone, vdi, *window, picture, image, owner)
+            runtime.launch(take, items, group, alone, vdi, *window, picture, image, owner)
         if (cells.alone == cells.NOBODY).any():
             nobody = np.int32(cells.NOBODY)
-            runtime.launch(take, items, (GROUP, 1), alone, nobody, *window, image, image, owner)
+            runtime.launch(take, items, group, alone, nobody, *window, image, image, owner)
         runtime.finish()  # the buffers above may be host memory in use
 
 
@@ -424,20 +425,21 @@ class _JointFrame:
 
     def draw(
         self, cells: NDArray[np.int32], slots: int, image: DeviceBuffer, owner: DeviceBuffer
-    ) -> NDArray[np.int32]:
-        """Draw cells, and return how many slots a ray of each has needed.
+    ) -> int:
+        """Draw cells, and return how many slots their rays have needed at most.
 
         Those with rays that have more segments than there are ``slots`` are drawn again.
         """
         needed = self._pass(cells, slots, image, owner)
-        full = np.flatnonzero(needed > slots)
-        if len(full):
-            needed[full] = self._pass(cells[full], int(needed.max()), image, owner)
-        return needed
+        most = int(needed.max())
+        if most > slots:
+            self._pass(cells[needed > slots], most, image, owner)
+        return most
 
     def _pass(
         self, cells: NDArray[np.int32], slots: int, image: DeviceBuffer, owner: DeviceBuffer
     ) -> NDArray[np.int32]:
+        """Draw cells whose rays have room, and return how many slots those of each have needed."""
         runtime = self._runtime
         width, height = self._size
         streams = len(self._walks)
@@ -446,9 +448,9 @@ class _JointFrame:
         most = min(max(1, room // (CELL_ITEMS * ray_bytes)), len(cells))  # cells of a band
         rays = np.int32(most * CELL_ITEMS)
         with (
-            runtime.buffer(int(rays) * ray_bytes, name="segments") as segments,
-            runtime.buffer((streams, int(rays)), np.int32, "ends of the streams") as ends,
-            runtime.buffer((streams, int(rays)), np.uint8, "VDIs met") as contributes,
+            runtime.result((int(rays) * ray_bytes // 4,), name="segments") as segments,
+            runtime.result((streams, int(rays)), np.int32, "ends of the streams") as ends,
+            runtime.result((streams, int(rays)), np.uint8, "VDIs met") as contributes,
             runtime.buffer((len(cells),), np.int32, "slots needed") as needed,
             runtime.upload(cells, "cells") as of_cells,
             runtime.upload(self._streams_of, "order of the VDIs") as streams_of,

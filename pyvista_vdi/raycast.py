@@ -498,7 +498,8 @@ class PreparedVDI:
                 self._clear(image, first_hit is not None)
         if skip_empty and self.occupancy.worthwhile:
             defines["SKIP_EMPTY"] = 1
-        if np.array_equal(self._list_space(camera), self._list_rows):
+        in_blocks = _AT_MOST_IN_BLOCKS & defines.keys() and self._in_blocks(defines)
+        if not in_blocks and np.array_equal(self._list_space(camera), self._list_rows):
             defines["ONE_LIST"] = 1
         packets = self._packets(camera, view, part, defines)
         if packets is not None:
