@@ -356,12 +356,17 @@ inline void begin_segments(Outcome *outcome, const Packet *packet, Reals t0, Rea
 #endif
 }
 
-// Which rays meet the VDI's bounds, and would, too, `margin` pixels to each side.
+// Which of a block's rays, which meet the VDI's bounds, would so, too, `margin` pixels to each side.
 inline Ints surely_covered(__global const float *forms, Reals a, Reals b, float margin, Ints present)
 {
     if (margin == 0.0f)
         return present;
+    // The bounds' image is convex: mostly the block's corners speak for all
     Reals t0, t1;
+    const Reals corners_a = select((Reals)(a.s0 - margin), (Reals)(a.sf + margin), (NUMBERS & 1) != 0);
+    const Reals corners_b = select((Reals)(b.s0 - margin), (Reals)(b.sf + margin), (NUMBERS & 2) != 0);
+    if (!ANY(!clip_packet(forms, BOX_PLANES, corners_a, corners_b, (Reals)(INFINITY), (Ints)(-1), &t0, &t1)))
+        return present;
     Ints inside = present;
     for (int corner = 0; corner < 4; ++corner)
         inside = clip_packet(forms, BOX_PLANES, a + (corner & 1 ? margin : -margin), b + (corner & 2 ? margin : -margin),
