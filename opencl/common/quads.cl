@@ -1,9 +1,8 @@
-// Transposition of vectors, by which what lies together in memory for each lane becomes vectors of lanes.
+// Four numbers for each of LANES lanes (common/packet.cl): as they lie in memory, and as one vector of each number.
 #include "common/packet.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Four numbers of each lane of a packet (common/packet.cl): each vector has one of them, of all lanes; or vector n has all four
-// of lanes n, 4 + n, 8 + n and 12 + n, in its four parts of 128 bits.
+// Each vector has four lanes' numbers side by side, or each has one of all lanes.
 typedef struct {
     Reals of[4];
 } Quads;
@@ -15,7 +14,7 @@ typedef struct {
 #define IN_TURNS s08192a3b4c5d6e7f
 #define JOINED s018923ab45cd67ef
 
-// From the one to the other: each 4 x 4 of a part.
+// From one to the other: in the g-th 128 bits of the n-th vector stand the numbers of lane 4 g + n, and the other way round.
 inline Quads transposed(Quads x)
 {
     const Reals first_01 = FIRST_HALVES(x.of[0], x.of[1]).IN_TURNS;

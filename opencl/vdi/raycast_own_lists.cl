@@ -13,7 +13,7 @@
 #include "common/supersegments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Lane p * PACKET_TILES + n has place p in the n-th tile: vectors of tiles become vectors of lanes, see common/quads.cl
+// Lane p * PACKET_TILES + n has place p in the n-th tile: vectors of tiles become vectors of lanes within each 128 bits
 #define PACKET_TILES 4
 #if defined(PACKED) && PACKED == 8
 #define TILE_WIDE 4
