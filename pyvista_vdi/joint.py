@@ -41,8 +41,9 @@ from .vdi import VDI
 _SEGMENT_BYTES = 24
 #: Slots that a ray has to spare where segments lie in rows: those of ``opencl/common/segments.cl``.
 _SPARE_ROWS = 2
-#: Bytes of the pool, unless the segments of a cell need more. A GPU needs more rays at a time.
-_POOL_BYTES_CPU = 16 * 2**20
+#: Bytes of the pool, unless the segments of a cell need more. A GPU needs more rays at a time; on a CPU
+#: what is below 32 MiB comes from memory that the process has freed, without page faults (glibc).
+_POOL_BYTES_CPU = 24 * 2**20
 _POOL_BYTES = 256 * 2**20
 #: Cells of a work-group, of which each work-item has a row.
 _CELLS_OF_GROUP = 16
