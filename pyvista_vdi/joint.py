@@ -41,8 +41,8 @@ from .vdi import VDI
 _SEGMENT_BYTES = 24
 #: Slots that a ray has to spare where segments lie in rows: those of ``opencl/common/segments.cl``.
 _SPARE_ROWS = 2
-#: Bytes of the pool, unless the segments of a cell need more. A GPU needs more rays at a time; on a CPU
-#: what is below 32 MiB comes from memory that the process has freed, without page faults (glibc).
+#: Bytes of the pool, unless the segments of a cell need more. A GPU needs more rays at a time; on a
+#: CPU what is below 32 MiB is memory that the process has freed, without page faults (glibc).
 _POOL_BYTES_CPU = 24 * 2**20
 _POOL_BYTES = 256 * 2**20
 #: Cells of a work-group, of which each work-item has a row.
@@ -205,11 +205,11 @@ def joint_image(
         The same picture, to the last bit, in whatever order the VDIs are given.
     """
     runtime = get_runtime(device)
-    order = _canonical_order(placed)
     streams = [
         _Stream.of(prepared_vdi(runtime, one.vdi), one, size, opaque_depth, skip_empty)
         for one in placed
     ]
+    order = _canonical_order(placed, [stream.view.reference_depth for stream in streams])
     width, height = size
     cells = _Cells.of(streams, size)
     with contextlib.ExitStack() as stack:
@@ -381,7 +381,7 @@ class _JointFrame:
     on_device : sequence of _OnDevice
         Their arrays.
     order : sequence of int
-        In which their streams of segments lie, and sums are formed.
+        In which their streams of segments are written, and sums are formed.
     margin : float
         See :func:`joint_image`.
     """
@@ -452,6 +452,7 @@ class _JointFrame:
             runtime.result((int(rays) * ray_bytes // 4,), name="segments") as segments,
             runtime.result((streams, int(rays)), np.int32, "ends of the streams") as ends,
             runtime.result((streams, int(rays)), np.uint8, "VDIs met") as contributes,
+            runtime.result((int(rays),), name="ends of light") as dark,
             runtime.buffer((len(cells),), np.int32, "slots needed") as needed,
             runtime.upload(cells, "cells") as of_cells,
             runtime.upload(self._streams_of, "order of the VDIs") as streams_of,
@@ -475,6 +476,7 @@ class _JointFrame:
                         segments,
                         ends,
                         contributes,
+                        dark,
                     )
                 runtime.launch(
                     self._merge.kernel,
@@ -516,15 +518,15 @@ def _slots_for(placed: Sequence[PlacedVDI]) -> int:
     return max(_slots.get(one.vdi, _FIRST_SLOTS) for one in placed)
 
 
-def _canonical_order(placed: Sequence[PlacedVDI]) -> list[int]:
+def _canonical_order(placed: Sequence[PlacedVDI], depths: Sequence[float]) -> list[int]:
     """Return the indices of VDIs in an order that does not depend on the one they are given in.
 
-    Sums of floats depend on it where there are more than two; the order of two does not matter.
+    Sums of floats depend on it where there are more than two, and so does where light is known to
+    have ended: that of ``depths``, so that those behind end where those before are opaque.
     """
-    indices = range(len(placed))
-    if len(placed) < 3:
-        return list(indices)
-    return sorted(indices, key=lambda i: _key(placed[i]))
+    tied = len(set(depths)) < len(depths)
+    keys = [_key(one) if tied else () for one in placed]
+    return sorted(range(len(placed)), key=lambda i: (depths[i], keys[i]))
 
 
 def _key(placed: PlacedVDI) -> tuple[bytes, ...]:

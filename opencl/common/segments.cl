@@ -15,6 +15,10 @@
 // More cannot be told from opaque, and a part of it is still a number
 #define MAX_OPTICAL_DEPTH 1e30f
 
+// t behind which nothing is seen because of the VDIs before, as a VDI's own t: not less, by what `dark` and `depth_shift` are
+// rounded
+#define DARK_FROM(dark, depth_shift) ((dark) - (depth_shift) + 5e-7f * (fabs(dark) + fabs(depth_shift)))
+
 #define SEGMENT_FROM 0
 #define SEGMENT_TO 1
 #define SEGMENT_OPTICAL_DEPTH 2

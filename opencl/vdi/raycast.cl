@@ -63,8 +63,9 @@ __kernel void raycast(
     int capacity,                       // slots of a ray
     __global float *pool,               // see common/segments.cl
     __global int *ends,                 // (streams, rays): slot behind each stream's last, beyond the capacity if it was full
-    __global uchar *contributes)        // (streams, rays): 1 if a ray meets the VDI, 2 if its neighbours at `margin` pixels
+    __global uchar *contributes,        // (streams, rays): 1 if a ray meets the VDI, 2 if its neighbours at `margin` pixels
                                         // meet its bounds, too
+    __global float *dark)               // (rays): t where light has ended in one of the VDIs so far, or infinity
 #define RAY_IS_DONE (absorbed > optical_depth_cutoff)
 #elif defined(FIRST_HIT)
     int4 part,                          // of the window, see common/rays.cl
@@ -100,11 +101,17 @@ __kernel void raycast(
     float absorbed = 0.0f;       // optical depth
     ends[stream * rays + band_ray] = slot;
     contributes[stream * rays + band_ray] = 0;
+    const float dark_before = stream > 0 ? dark[band_ray] : INFINITY;
+    dark[band_ray] = dark_before;
 #endif
 
     ListRay ray;
-    if (!begin_list_ray(&ray, forms, planes, CROPPING_ARGUMENT a, b, has_opaque_depth ? opaque_depth[place] : INFINITY,
-                        depth_origin)) {
+    float t_end = has_opaque_depth ? opaque_depth[place] : INFINITY;
+#ifdef SEGMENTS
+    if (dark_before < INFINITY)
+        t_end = fmin(t_end, DARK_FROM(dark_before, depth_shift));
+#endif
+    if (!begin_list_ray(&ray, forms, planes, CROPPING_ARGUMENT a, b, t_end, depth_origin)) {
 #ifndef SEGMENTS
         image[place] = NOTHING;
 #endif
@@ -325,6 +332,8 @@ __kernel void raycast(
     }
 #if defined(SEGMENTS)
     ends[stream * rays + band_ray] = slot;
+    if (RAY_IS_DONE)
+        dark[band_ray] = fmin(dark_before, t_reached);
     if (slot > first_slot) {
         bool inside = true;
         for (int corner = 0; corner < 4; ++corner) {

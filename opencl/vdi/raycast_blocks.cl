@@ -420,7 +420,8 @@ __kernel void raycast_blocks(
     int capacity,
     __global float *pool,
     __global int *ends,
-    __global uchar *contributes)
+    __global uchar *contributes,
+    __global float *dark)
 #else
     int4 part,                          // of the window, see common/rays.cl
     __global float4 *image)             // premultiplied RGBA, top row first
@@ -440,7 +441,11 @@ __kernel void raycast_blocks(
     if (!ANY(in_window))
         return;
     const Pixels pixels = pixels_at(x, y, in_window, width, height);
-    const Reals t_end = has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Reals)(INFINITY);
+    Reals t_end = has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Reals)(INFINITY);
+#ifdef SEGMENTS
+    const Reals dark_before = stream > 0 ? vload16(0, dark + first_ray) : (Reals)(INFINITY);
+    t_end = select(t_end, fmin(t_end, DARK_FROM(dark_before, depth_shift)), dark_before < INFINITY);
+#endif
     const Reals a = convert_float16(x) + 0.5f - 0.5f * (float)width;
     const Reals b = convert_float16(y) + 0.5f - 0.5f * (float)height;
     const Packet packet = begin_packet(forms, planes, a, b, t_end, in_window, depth_origin);
@@ -486,6 +491,8 @@ __kernel void raycast_blocks(
                first_depth, slabs_per_depth);
 #ifdef SEGMENTS
     vstore16(outcome.slots, 0, ends + stream * rays + first_ray);
+    const Ints done = ARE_DONE(&outcome, cutoff);
+    vstore16(select(dark_before, fmin(dark_before, outcome.reached), done), 0, dark + first_ray);
     const Ints meets = outcome.slots > first_slots;
     const Ints covered = ANY(meets) ? surely_covered(forms, a, b, margin, meets) : (Ints)(0);
     vstore16(convert_uchar16(-meets - covered), 0, contributes + stream * rays + first_ray);
