@@ -43,8 +43,10 @@ Shared functions:
     Tiles and slabs of the occupancy grid.
 ``common/packet.cl``, ``common/packet_light.cl``, ``common/slabs_ahead.cl``
     Sixteen rays in vectors: where they are, what they see, and which slabs are ahead of them.
-``common/segments.cl``
-    What rays cross of several VDIs, as segments in a pool.
+``common/quads.cl``, ``common/packet_cropping.cl``
+    Vectors of theirs transposed, and the parts of them that cropping keeps.
+``common/segments.cl``, ``common/segment_rows.cl``
+    What rays cross of several VDIs, as segments in a pool; sixteen of them at a time.
 
 Entry points:
 
@@ -63,8 +65,10 @@ Entry points:
 ``vdi/raycast_blocks.cl``, ``vdi/raycast_packets.cl``
     ``raycast_blocks``, ``raycast_packets``: VDI to image on a CPU, in vectors that are written out:
     of 4 x 4 pixels near V_O, along epipolar lines far from it.
-``vdi/merge.cl``
-    ``merge``: what rays cross of several VDIs, to one image.
+``vdi/merge.cl``, ``vdi/merge_blocks.cl``
+    ``merge``, ``merge_blocks``: what rays cross of several VDIs, to one image; on a CPU in vectors.
+``vdi/joint_cells.cl``
+    ``alone_ends``, ``take_cells``: where only one of several VDIs is met.
 ``vdi/preview.cl``
     ``preview``: VDI to image by a given number of samples per ray (paper, section 5).
 ``vdi/render_volume.cl``

@@ -14,6 +14,9 @@ _BLOCK = 4
 _STRIP = 16
 #: Work-items of a column of a strip, which a group draws: that of ``common/rays.cl``.
 COLUMN_ITEMS = _BLOCK * _STRIP
+#: Pixels along the edges of a cell, and all of them: those of ``common/rays.cl``.
+CELL = _STRIP
+CELL_ITEMS = CELL * CELL
 
 
 class Rectangle(NamedTuple):

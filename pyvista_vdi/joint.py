@@ -2,7 +2,8 @@
 
 Each VDI's raycaster writes what a ray crosses into a pool, as segments between two view depths of
 the new view; then the rays' streams of segments are merged and composited (docs/conventions.md,
-"Several VDIs"). Rays are taken in bands, so that the pool stays small.
+"Several VDIs"). Rays are taken in bands, so that the pool stays small. Where no two of the VDIs can
+be met, each is drawn as it would be by itself.
 """
 
 from __future__ import annotations
@@ -13,25 +14,39 @@ import math
 import weakref
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .blocks import GROUP, block_items
+from .blocks import CELL, CELL_ITEMS, GROUP, Rectangle
 from .camera import Camera, check_window_size
 from .cropping import Cropping, checked_opacity_multiplier
 from .errors import InvalidArgumentError
 from .numerics import compensation
 from .opencl_runtime import DeviceBuffer, Runtime, get_runtime
-from .raycast import TRANSMITTANCE_CUTOFF, ListView, PreparedVDI, prepared_vdi, render_vdi
+from .packets import LANES
+from .raycast import (
+    TRANSMITTANCE_CUTOFF,
+    ListView,
+    PreparedVDI,
+    SegmentsKernel,
+    prepared_vdi,
+    render_vdi,
+)
+from .rays import cells_of_points
 from .vdi import VDI
 
 #: Bytes of a segment: those of ``opencl/common/segments.cl``.
 _SEGMENT_BYTES = 24
-#: Bytes of the pool, unless the segments of 64 rays need more. A GPU needs more rays at a time.
-_POOL_BYTES_CPU = 64 * 2**20
+#: Slots that a ray has to spare where segments lie in rows: those of ``opencl/common/segments.cl``.
+_SPARE_ROWS = 2
+#: Bytes of the pool, unless the segments of a cell need more. A GPU needs more rays at a time; on a
+#: CPU what is below 32 MiB is memory that the process has freed, without page faults (glibc).
+_POOL_BYTES_CPU = 24 * 2**20
 _POOL_BYTES = 256 * 2**20
+#: Cells of a work-group, of which each work-item has a row.
+_CELLS_OF_GROUP = 16
 #: Segments of a ray that the first frame has room for; later ones go by the frame before.
 _FIRST_SLOTS = 64
 #: Room for so many times what the frame before needed.
@@ -190,80 +205,33 @@ def joint_image(
         The same picture, to the last bit, in whatever order the VDIs are given.
     """
     runtime = get_runtime(device)
-    order = _canonical_order(placed)
-    streams_of = np.argsort(order).astype(np.int32)
     streams = [
         _Stream.of(prepared_vdi(runtime, one.vdi), one, size, opaque_depth, skip_empty)
-        for one in (placed[i] for i in order)
+        for one in placed
     ]
+    order = _canonical_order(placed, [stream.view.reference_depth for stream in streams])
     width, height = size
+    cells = _Cells.of(streams, size)
     with contextlib.ExitStack() as stack:
-        walks = [stack.enter_context(stream.on(runtime)) for stream in streams]
-        image = stack.enter_context(runtime.buffer((height, width, 4), name="image"))
-        owner = stack.enter_context(runtime.buffer((height, width), np.int16, "owners"))
-        numbers = stack.enter_context(runtime.upload(streams_of, "order of the VDIs"))
-        nearest = min(stream.view.reference_depth for stream in streams)
-        shifts = [np.float32(stream.view.reference_depth - nearest) for stream in streams]
-        media = sum(prepared_vdi(runtime, one.vdi).media for one in placed)
-        defines: dict[str, str | int | None] = {"STREAMS": len(streams), **compensation(media)}
-        merge = runtime.kernel("vdi/merge.cl", "merge", defines)
-        slots = max(_slots.get(one.vdi, _FIRST_SLOTS) for one in placed)
-        most = 1
-        left = [_Band(0, block_items(width, height))]
-        while left:
-            with _Pool(runtime, len(streams), slots, left) as pool:
-                for number, band in enumerate(pool.bands):
-                    for stream, (walk, shift) in enumerate(zip(walks, shifts, strict=True)):
-                        runtime.launch(
-                            walk.kernel,
-                            band.rays,
-                            GROUP,
-                            *walk.arguments,
-                            np.uint32(band.first),
-                            np.int32(stream),
-                            np.int32(band.rays),
-                            shift,
-                            np.float32(margin),
-                            np.int32(slots),
-                            pool.segments,
-                            pool.ends,
-                            pool.contributes,
-                        )
-                    runtime.launch(
-                        merge,
-                        band.rays,
-                        GROUP,
-                        pool.segments,
-                        np.int32(slots),
-                        pool.ends,
-                        pool.contributes,
-                        np.int32(band.rays),
-                        np.uint32(band.first),
-                        np.int32(width),
-                        np.int32(height),
-                        np.float32(TRANSMITTANCE_CUTOFF),
-                        numbers,
-                        np.int32(number),
-                        pool.needed,
-                        image,
-                        owner,
-                    )
-                needed = runtime.download(pool.needed)
-            # Bands with rays of more segments are drawn again, with room for them
-            left = [band for band, n in zip(pool.bands, needed, strict=True) if n > slots]
-            most = max(most, int(needed.max()))
-            slots = max(slots, most)
-        for one in placed:
-            _slots[one.vdi] = math.ceil(_SPARE_SLOTS * most)
-        return JointImage(runtime.download(image), runtime.download(owner))
+        on_device = [stack.enter_context(stream.on(runtime)) for stream in streams]
+        image = stack.enter_context(runtime.result((height, width, 4), name="image"))
+        owner = stack.enter_context(runtime.result((height, width), np.int16, "owners"))
+        _draw_alone(runtime, streams, on_device, cells, image, owner)
+        if len(cells.shared):
+            frame = _JointFrame(runtime, streams, on_device, order, margin)
+            needed = frame.draw(cells.shared, _slots_for(placed), image, owner)
+            for one in placed:
+                _slots[one.vdi] = math.ceil(_SPARE_SLOTS * max(needed, 1))
+        result = JointImage(runtime.download(image), runtime.download(owner))
+        runtime.finish()  # arrays on the device may be host memory in use
+        return result
 
 
-@dataclass(frozen=True)
-class _Walk:
-    """A kernel that writes a VDI's segments, and the arguments that do not change per band."""
+class _OnDevice(NamedTuple):
+    """A frame's arrays of a VDI."""
 
-    kernel: Any
-    arguments: tuple[Any, ...]
+    forms: DeviceBuffer
+    ends: DeviceBuffer
 
 
 @dataclass(frozen=True)
@@ -271,6 +239,7 @@ class _Stream:
     """A VDI on the device, as seen in the frame."""
 
     prepared: PreparedVDI
+    placed: PlacedVDI
     view: ListView
     skip_empty: bool
 
@@ -291,86 +260,273 @@ class _Stream:
             placed.cropping,
             placed.opacity_multiplier,
         )
-        return cls(prepared, view, skip_empty and prepared.occupancy.worthwhile)
+        return cls(prepared, placed, view, skip_empty)
 
     @contextlib.contextmanager
-    def on(self, runtime: Runtime) -> Iterator[_Walk]:
+    def on(self, runtime: Runtime) -> Iterator[_OnDevice]:
         """Have the frame's arrays on the device."""
-        defines = {**self.prepared.defines, **self.view.defines, "SEGMENTS": 1}
-        if self.skip_empty:
-            defines["SKIP_EMPTY"] = 1
         with (
             runtime.upload(self.view.forms, "rays") as forms,
             runtime.upload(self.view.ends, "opaque depth") as ends,
         ):
-            yield _Walk(
-                runtime.kernel("vdi/raycast.cl", "raycast", defines),
-                self.prepared.walk_arguments(
-                    self.view, forms, ends, -math.log(TRANSMITTANCE_CUTOFF)
-                ),
+            yield _OnDevice(forms, ends)
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """The cells of a window, by which VDIs may be met in them.
+
+    Attributes
+    ----------
+    alone : numpy.ndarray
+        int16 (high, wide), bottom row first: the VDI that is the only one, or ``SHARED`` or
+        ``NOBODY``.
+    shared : numpy.ndarray
+        Column and row of each in which several may be met, int32 (n, 2), row by row.
+    """
+
+    SHARED: ClassVar[int] = -1
+    #: That of ``opencl/vdi/joint_cells.cl``.
+    NOBODY: ClassVar[int] = -2
+
+    alone: NDArray[np.int16]
+    shared: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, streams: Sequence[_Stream], size: tuple[int, int]) -> _Cells:
+        # Whether or not rays pass by what is empty: the picture is the same
+        met = np.array(
+            [
+                cells_of_points(stream.placed.camera, size, stream.prepared.occupancy.corners)
+                for stream in streams
+            ]
+        )
+        count = met.sum(axis=0)
+        alone = np.choose(
+            np.minimum(count, 2), [np.full_like(count, cls.NOBODY), met.argmax(axis=0), cls.SHARED]
+        )
+        shared = np.argwhere(count > 1)[:, ::-1]
+        return cls(alone.astype(np.int16), np.ascontiguousarray(shared, dtype=np.int32))
+
+    def part(self, vdi: int, size: tuple[int, int]) -> Rectangle:
+        """Return the part of the window in which a VDI's cells are."""
+        rows, columns = np.nonzero(self.alone == vdi)
+        if not len(rows):
+            return Rectangle(0, 0, 0, 0)
+        return Rectangle(
+            int(columns.min()) * CELL,
+            min((int(columns.max()) + 1) * CELL, size[0]),
+            int(rows.min()) * CELL,
+            min((int(rows.max()) + 1) * CELL, size[1]),
+        )
+
+
+def _draw_alone(
+    runtime: Runtime,
+    streams: Sequence[_Stream],
+    on_device: Sequence[_OnDevice],
+    cells: _Cells,
+    image: DeviceBuffer,
+    owner: DeviceBuffer,
+) -> None:
+    """Draw the cells in which no two VDIs are met, as each would be by itself."""
+    width, height = size = streams[0].view.size
+    wide = cells.alone.shape[1]
+    group = (_CELLS_OF_GROUP, 1)
+    items = (-(-wide // _CELLS_OF_GROUP) * _CELLS_OF_GROUP, height)
+    ends_kernel = runtime.kernel("vdi/joint_cells.cl", "alone_ends")
+    take = runtime.kernel("vdi/joint_cells.cl", "take_cells")
+    with contextlib.ExitStack() as stack:
+        alone = stack.enter_context(runtime.upload(cells.alone, "cells"))
+        window = (np.int32(wide), np.int32(width), np.int32(height))
+        picture, ends = image, None  # others are drawn over the first one's picture
+        for number, (stream, arrays) in enumerate(zip(streams, on_device, strict=True)):
+            part = cells.part(number, size)
+            if not part.pixels:
+                continue
+            vdi = np.int32(number)
+            if ends is None:
+                ends = stack.enter_context(runtime.result((height, width), name="ends of rays"))
+            elif picture is image:
+                picture = stack.enter_context(runtime.result(image.shape, name="one's picture"))
+            has_ends = np.int32(stream.view.has_ends)
+            runtime.launch(
+                ends_kernel, items, group, alone, vdi, *window, arrays.ends, has_ends, ends
             )
-            runtime.finish()  # the buffers above may be host memory in use
+            stream.prepared.render_part(
+                stream.placed.camera,
+                stream.view,
+                arrays.forms,
+                ends,
+                picture,
+                part,
+                skip_empty=stream.skip_empty,
+            )
+            runtime.launch(take, items, group, alone, vdi, *window, picture, image, owner)
+        if (cells.alone == cells.NOBODY).any():
+            nobody = np.int32(cells.NOBODY)
+            runtime.launch(take, items, group, alone, nobody, *window, image, image, owner)
+        runtime.finish()  # the buffers above may be host memory in use
 
 
-class _Band(NamedTuple):
-    """Rays that are drawn at a time: work-items of the frame, in multiples of ``GROUP``."""
-
-    first: int
-    rays: int
-
-
-class _Pool:
-    """Room for the segments of a band's rays; the bands into which rays are divided for it.
+class _JointFrame:
+    """What a frame's cells are drawn with in which several VDIs are met.
 
     Parameters
     ----------
     runtime : Runtime
         The device.
-    streams : int
-        VDIs.
-    slots : int
-        Segments of a ray that there is room for.
-    rays : sequence of _Band
-        All that are to be drawn.
+    streams : sequence of _Stream
+        The VDIs, in the order in which owners are numbered.
+    on_device : sequence of _OnDevice
+        Their arrays.
+    order : sequence of int
+        In which their streams of segments are written, and sums are formed.
+    margin : float
+        See :func:`joint_image`.
     """
 
-    def __init__(self, runtime: Runtime, streams: int, slots: int, rays: Sequence[_Band]) -> None:
-        room = _POOL_BYTES_CPU if runtime.is_cpu else _POOL_BYTES
-        groups = max(1, room // (GROUP * slots * _SEGMENT_BYTES))
-        most = min(groups * GROUP, max(band.rays for band in rays))
-        self.bands = [
-            _Band(first, min(most, band.first + band.rays - first))
-            for band in rays
-            for first in range(band.first, band.first + band.rays, most)
+    def __init__(
+        self,
+        runtime: Runtime,
+        streams: Sequence[_Stream],
+        on_device: Sequence[_OnDevice],
+        order: Sequence[int],
+        margin: float,
+    ) -> None:
+        self._runtime = runtime
+        self._size = streams[0].view.size
+        self._streams_of = np.argsort(order).astype(np.int32)
+        self._margin = np.float32(margin)
+        nearest = min(stream.view.reference_depth for stream in streams)
+        self._in_rows = _in_rows(runtime)
+        self._walks = [
+            _Walk(
+                streams[i].prepared.segments_kernel(
+                    streams[i].view, skip_empty=streams[i].skip_empty, in_rows=self._in_rows
+                ),
+                streams[i].prepared.walk_arguments(
+                    streams[i].view, *on_device[i], -math.log(TRANSMITTANCE_CUTOFF)
+                ),
+                np.float32(streams[i].view.reference_depth - nearest),
+            )
+            for i in order
         ]
-        with contextlib.ExitStack() as stack:
+        media = sum(stream.prepared.media for stream in streams)
+        defines: dict[str, str | int | None] = {
+            "STREAMS": len(streams),
+            "SEGMENTS": 2 if self._in_rows else 1,
+            **compensation(media),
+        }
+        if self._in_rows and defines.get("COMPENSATED") != 2:
+            merge = runtime.kernel("vdi/merge_blocks.cl", "merge_blocks", defines)
+            self._merge = SegmentsKernel(merge, LANES)
+        else:
+            self._merge = SegmentsKernel(runtime.kernel("vdi/merge.cl", "merge", defines), 1)
 
-            def make(shape: tuple[int, ...], dtype: Any, name: str) -> DeviceBuffer:
-                return stack.enter_context(runtime.buffer(shape, dtype, name))
+    def draw(
+        self, cells: NDArray[np.int32], slots: int, image: DeviceBuffer, owner: DeviceBuffer
+    ) -> int:
+        """Draw cells, and return how many slots their rays have needed at most.
 
-            self.segments = make((most * slots * _SEGMENT_BYTES // 4,), np.float32, "segments")
-            self.ends = make((streams, most), np.int32, "ends of the streams")
-            self.contributes = make((streams, most), np.uint8, "VDIs met")
-            self.needed = make((len(self.bands),), np.int32, "slots needed")
-            runtime.fill(self.needed, np.int32(0))
-            self._stack = stack.pop_all()
+        Those with rays that have more segments than there are ``slots`` are drawn again.
+        """
+        needed = self._pass(cells, slots, image, owner)
+        most = int(needed.max())
+        if most > slots:
+            self._pass(cells[needed > slots], most, image, owner)
+        return most
 
-    def __enter__(self) -> _Pool:
-        return self
+    def _pass(
+        self, cells: NDArray[np.int32], slots: int, image: DeviceBuffer, owner: DeviceBuffer
+    ) -> NDArray[np.int32]:
+        """Draw cells whose rays have room, and return how many slots those of each have needed."""
+        runtime = self._runtime
+        width, height = self._size
+        streams = len(self._walks)
+        room = _POOL_BYTES_CPU if runtime.is_cpu else _POOL_BYTES
+        ray_bytes = _SEGMENT_BYTES * (slots + (_SPARE_ROWS if self._in_rows else 0))
+        most = min(max(1, room // (CELL_ITEMS * ray_bytes)), len(cells))  # cells of a band
+        rays = np.int32(most * CELL_ITEMS)
+        with (
+            runtime.result((int(rays) * ray_bytes // 4,), name="segments") as segments,
+            runtime.result((streams, int(rays)), np.int32, "ends of the streams") as ends,
+            runtime.result((streams, int(rays)), np.uint8, "VDIs met") as contributes,
+            runtime.result((int(rays),), name="ends of light") as dark,
+            runtime.buffer((len(cells),), np.int32, "slots needed") as needed,
+            runtime.upload(cells, "cells") as of_cells,
+            runtime.upload(self._streams_of, "order of the VDIs") as streams_of,
+        ):
+            runtime.fill(needed, np.int32(0))
+            for first in range(0, len(cells), most):
+                items = min(most, len(cells) - first) * CELL_ITEMS
+                for number, walk in enumerate(self._walks):
+                    runtime.launch(
+                        walk.kernel.kernel,
+                        items // walk.kernel.rays,
+                        GROUP // walk.kernel.rays,
+                        *walk.arguments,
+                        of_cells,
+                        np.int32(first),
+                        np.int32(number),
+                        rays,
+                        walk.depth_shift,
+                        self._margin,
+                        np.int32(slots),
+                        segments,
+                        ends,
+                        contributes,
+                        dark,
+                    )
+                runtime.launch(
+                    self._merge.kernel,
+                    items // self._merge.rays,
+                    GROUP // self._merge.rays,
+                    segments,
+                    np.int32(slots),
+                    ends,
+                    contributes,
+                    rays,
+                    of_cells,
+                    np.int32(first),
+                    np.int32(width),
+                    np.int32(height),
+                    np.float32(TRANSMITTANCE_CUTOFF),
+                    streams_of,
+                    needed,
+                    image,
+                    owner,
+                )
+            return runtime.download(needed)
 
-    def __exit__(self, *_: object) -> None:
-        self._stack.close()
+
+@dataclass(frozen=True)
+class _Walk:
+    """A kernel that writes a VDI's segments, and the arguments that do not change per band."""
+
+    kernel: SegmentsKernel
+    arguments: tuple[Any, ...]
+    depth_shift: np.float32
 
 
-def _canonical_order(placed: Sequence[PlacedVDI]) -> list[int]:
+def _in_rows(runtime: Runtime) -> bool:
+    """Return whether segments lie ray by ray, for kernels in vectors: see common/segments.cl."""
+    return runtime.is_cpu
+
+
+def _slots_for(placed: Sequence[PlacedVDI]) -> int:
+    return max(_slots.get(one.vdi, _FIRST_SLOTS) for one in placed)
+
+
+def _canonical_order(placed: Sequence[PlacedVDI], depths: Sequence[float]) -> list[int]:
     """Return the indices of VDIs in an order that does not depend on the one they are given in.
 
-    Sums of floats depend on it where there are more than two; the order of two does not matter.
+    Sums of floats depend on it where there are more than two, and so does where light is known to
+    have ended: that of ``depths``, so that those behind end where those before are opaque.
     """
-    indices = range(len(placed))
-    if len(placed) < 3:
-        return list(indices)
-    return sorted(indices, key=lambda i: _key(placed[i]))
+    tied = len(set(depths)) < len(depths)
+    keys = [_key(one) if tied else () for one in placed]
+    return sorted(range(len(placed)), key=lambda i: (depths[i], keys[i]))
 
 
 def _key(placed: PlacedVDI) -> tuple[bytes, ...]:

@@ -58,7 +58,9 @@ _FIRST_BITS = 36
 _LIST_HEADER = 2
 
 #: ``-D`` names of what is drawn ray by ray everywhere; V_O's rays then have a loop of their own.
-_RAY_BY_RAY = {"CROPPED", "FAR_ENTRIES", "FIRST_HIT", "ONE_LIST"}
+_RAY_BY_RAY = {"FAR_ENTRIES", "FIRST_HIT", "ONE_LIST"}
+#: The same of what is drawn in blocks at most, not in packets or from own lists.
+_AT_MOST_IN_BLOCKS = {"CROPPED"}
 #: Share of a window above which rays are cast through all of it: clearing it first costs as much.
 _MOST_DRAWN = 0.9
 #: Work-items per group that clear an image.
@@ -289,6 +291,13 @@ class ListView(NamedTuple):
     arguments: tuple[Any, ...]
 
 
+class SegmentsKernel(NamedTuple):
+    """A kernel that writes segments, and how many rays each work-item follows."""
+
+    kernel: Kernel
+    rays: int
+
+
 class _Launch(NamedTuple):
     """A kernel, its work-items and those of a group, and its arguments after the walk's.
 
@@ -421,6 +430,41 @@ class PreparedVDI:
             )
             runtime.finish()  # the buffers above may be host memory in use
 
+    def render_part(
+        self,
+        camera: Camera,
+        view: ListView,
+        forms: DeviceBuffer,
+        ends: DeviceBuffer,
+        image: DeviceBuffer,
+        part: Rectangle,
+        *,
+        skip_empty: bool,
+    ) -> None:
+        """Enqueue the drawing of a part of the window into ``image``, which keeps the rest or not.
+
+        ``forms`` and ``ends`` are on the device, and every ray ends at the latter.
+        """
+        launch = self._raycast(
+            camera, view, image, first_hit=None, skip_empty=skip_empty, part=part
+        )
+        arguments = self.walk_arguments(
+            view._replace(has_ends=True), forms, ends, TRANSMITTANCE_CUTOFF
+        )
+        self._runtime.launch(
+            launch.kernel, launch.items, launch.group, *arguments, *launch.mode, image
+        )
+
+    def segments_kernel(self, view: ListView, *, skip_empty: bool, in_rows: bool) -> SegmentsKernel:
+        """Return what writes the segments that a frame's rays cross; see ``common/segments.cl``."""
+        defines = {**self.defines, **view.defines, "SEGMENTS": 2 if in_rows else 1}
+        if skip_empty and self.occupancy.worthwhile:
+            defines["SKIP_EMPTY"] = 1
+        if in_rows and self._in_blocks(defines):
+            kernel = self._runtime.kernel("vdi/raycast_blocks.cl", "raycast_blocks", defines)
+            return SegmentsKernel(kernel, LANES)
+        return SegmentsKernel(self._runtime.kernel("vdi/raycast.cl", "raycast", defines), 1)
+
     def _preview(self, view: ListView, samples: int) -> _Launch:
         """Return how a frame of so many samples a ray is drawn."""
         defines = {**self.defines, **view.defines, **compensation(samples)}
@@ -436,8 +480,12 @@ class PreparedVDI:
         *,
         first_hit: FirstHit | None,
         skip_empty: bool,
+        part: Rectangle | None = None,
     ) -> _Launch:
-        """Return how a frame is raycast; where no ray is cast for a pixel, ``image`` is cleared."""
+        """Return how a frame is raycast, or what of it is in a part of the window.
+
+        Without ``part``, ``image`` is cleared where no ray is cast for a pixel.
+        """
         defines = {**self.defines, **view.defines}
         hit: tuple[Any, ...] = ()
         if first_hit is None:
@@ -449,12 +497,14 @@ class PreparedVDI:
         if own_lists is not None:
             kernel = self._runtime.kernel("vdi/raycast_own_lists.cl", "raycast_own_lists", defines)
             return _Launch(kernel, own_lists.items, LANES, (own_lists.origin,))
-        part = self._part_to_draw(camera, view.size, skip_empty)
-        if part.pixels < view.size[0] * view.size[1]:
-            self._clear(image, first_hit is not None)
+        if part is None:
+            part = self._part_to_draw(camera, view.size, skip_empty)
+            if part.pixels < view.size[0] * view.size[1]:
+                self._clear(image, first_hit is not None)
         if skip_empty and self.occupancy.worthwhile:
             defines["SKIP_EMPTY"] = 1
-        if np.array_equal(self._list_space(camera), self._list_rows):
+        in_blocks = _AT_MOST_IN_BLOCKS & defines.keys() and self._in_blocks(defines)
+        if not in_blocks and np.array_equal(self._list_space(camera), self._list_rows):
             defines["ONE_LIST"] = 1
         packets = self._packets(camera, view, part, defines)
         if packets is not None:
@@ -487,7 +537,7 @@ class PreparedVDI:
         self, camera: Camera, view: ListView, defines: dict[str, str | int | None]
     ) -> OwnLists | None:
         """Return how each pixel is drawn from a list of its own; None if it cannot be."""
-        if not self._in_vectors(defines):
+        if _AT_MOST_IN_BLOCKS & defines.keys() or not self._in_vectors(defines):
             return None
         near, far = rays.depth_range(camera, self._bounds)
         if not camera.parallel_projection:
@@ -509,7 +559,7 @@ class PreparedVDI:
         defines: dict[str, str | int | None],
     ) -> Packets | None:
         """Return how a frame's rays are dealt to packets; None if the kernel is to follow each."""
-        if not self._in_vectors(defines):
+        if _AT_MOST_IN_BLOCKS & defines.keys() or not self._in_vectors(defines):
             return None
         forms = view.forms.astype(np.float64)
         planes = forms[PLANE_FORMS : PLANE_FORMS + view.planes]

@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .blocks import Rectangle
+from .blocks import CELL, Rectangle
 from .camera import Camera, check_window_size
 from .cropping import Cropping
 from .errors import InvalidArgumentError, InvalidCameraError
@@ -25,6 +25,9 @@ Floats: TypeAlias = NDArray[np.float64]
 
 #: Depth before which nothing is looked up in perspective, in diagonals of the bounds (DESIGN 3).
 NEAREST_DEPTH = 1e-6
+
+#: Tangents of a hull between which :func:`cells_of_points` looks for cells.
+_TANGENTS = 32
 
 #: Lengths times reciprocal depths beyond which, or below whose reciprocal, float32 loses digits.
 LARGEST_PRODUCT = 1e36
@@ -350,17 +353,59 @@ def pixels_of_points(camera: Camera, window_size: tuple[int, int], points: Float
     whole = Rectangle(0, width, 0, height)
     if not len(points):
         return Rectangle(0, 0, 0, 0)
+    at = _pixels_at(camera, window_size, points)
+    if at is None:
+        return whole
+    low = np.clip(np.floor(at.min(axis=1) - 2), 0, window_size)
+    high = np.clip(np.ceil(at.max(axis=1) + 2), 0, window_size)
+    return Rectangle(int(low[0]), int(high[0]), int(low[1]), int(high[1]))
+
+
+def _pixels_at(camera: Camera, window_size: tuple[int, int], points: Floats) -> Floats | None:
+    """Return where model points are seen, in pixels, float64 (2, n).
+
+    None if one of them is not in front of the eye.
+    """
     matrix = camera.viewport_matrix(window_size) @ camera.model_to_view
     x, y, _, d = matrix[:, :3] @ points.T + matrix[:, 3:]
     if not d.min() > NEAREST_DEPTH * np.abs(d).max():
-        return whole
-    half = np.array([[width / 2], [height / 2]])
+        return None
+    half = np.array([[window_size[0] / 2], [window_size[1] / 2]])
     at = np.stack([x, y]) / d * half + half
-    low = np.clip(np.floor(at.min(axis=1) - 2), 0, window_size)
-    high = np.clip(np.ceil(at.max(axis=1) + 2), 0, window_size)
-    if not (np.isfinite(low).all() and np.isfinite(high).all()):
-        return whole
-    return Rectangle(int(low[0]), int(high[0]), int(low[1]), int(high[1]))
+    return at if np.isfinite(at).all() else None
+
+
+def cells_of_points(
+    camera: Camera, window_size: tuple[int, int], points: Floats
+) -> NDArray[np.bool_]:
+    """Return which cells of a window the convex hull of model points may lie in.
+
+    Parameters
+    ----------
+    camera, window_size, points
+        As for :func:`pixels_of_points`.
+
+    Returns
+    -------
+    numpy.ndarray
+        bool (high, wide), bottom row first, of squares of :data:`~pyvista_vdi.blocks.CELL` pixels.
+        All of them, if a point is not in front of the eye; those that two pixels more reach into
+        otherwise.
+    """
+    wide, high = (-(-edge // CELL) for edge in window_size)
+    if not len(points):
+        return np.zeros((high, wide), np.bool_)
+    at = _pixels_at(camera, window_size, points)
+    if at is None:
+        return np.ones((high, wide), np.bool_)
+    # Between tangents of the hull in some directions
+    angles = np.arange(_TANGENTS) * (2 * np.pi / _TANGENTS)
+    normals = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    reach = (normals @ at).max(axis=1) + 2
+    x, y = (np.arange(n) * CELL + CELL / 2 for n in (wide, high))
+    nearest = np.abs(normals).sum(axis=1) * CELL / 2  # a cell's corner, from its centre
+    beyond = normals[:, 0, None, None] * x + normals[:, 1, None, None] * y[:, None]
+    return np.asarray((beyond - nearest[:, None, None] <= reach[:, None, None]).all(axis=0))
 
 
 def checked_opaque_depth(

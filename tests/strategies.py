@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from pyvista_vdi import packets
+from pyvista_vdi import joint, packets
 from pyvista_vdi.camera import Camera
 from pyvista_vdi.generation import CRITERIA
 from pyvista_vdi.raycast import PreparedVDI
@@ -177,8 +177,8 @@ DEALT = ("one by one", "blocks", "packets")
 def deal_rays(patch, dealt):
     """Have rays followed one by one, or in blocks or packets wherever they can be.
 
-    ``patch`` undoes it. One by one is how a GPU follows all of them; in the other ways rays that
-    stay in lists of their own are drawn from these.
+    ``patch`` undoes it. One by one is how a GPU follows all of them, and merges what they cross of
+    several VDIs; in the other ways rays that stay in lists of their own are drawn from these.
     """
     least = 0.0 if dealt == "packets" else math.inf
     for name in ("LEAST_IN_COMMON", "LEAST_IN_COMMON_WITHOUT_BLOCKS", "LEAST_PIXELS"):
@@ -186,6 +186,7 @@ def deal_rays(patch, dealt):
     if dealt == "one by one":
         patch.setattr(PreparedVDI, "_in_blocks", lambda self, defines: False)
         patch.setattr(PreparedVDI, "_own_lists", lambda *_: None)
+        patch.setattr(joint, "_in_rows", lambda runtime: False)
 
 
 # -- VDIs ------------------------------------------------------------------------------------------

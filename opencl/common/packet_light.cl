@@ -26,15 +26,23 @@ inline Seen nothing_seen()
     return seen;
 }
 
-// Model lengths from r to r_next, where depths are `depth` and `next_depth`, between depths `near` and `far`: clipped to the
-// supersegment by interval, as in vdi/raycast.cl. Depths grow along the rays.
-inline Reals lengths_between(const Packet *packet, Reals near, Reals far, Reals r, Reals r_next, Reals depth,
-                             Reals next_depth, Reals deep_depth, Reals inverse_depth)
+// What lies between depths `near` and `far` of the rays from r to r_next, where depths are `depth` and `next_depth`: clipped to
+// the supersegment by interval, as in vdi/raycast.cl. Depths grow along the rays.
+inline void clip_to_faces(Reals *from, Reals *to, Reals near, Reals far, Reals r, Reals r_next, Reals depth, Reals next_depth,
+                          Reals deep_depth, Reals inverse_depth)
 {
     const Reals r_enters = (near - deep_depth) * inverse_depth;
     const Reals r_leaves = (far - deep_depth) * inverse_depth;
-    const Reals from = select(r, LOWER_OF(HIGHER_OF(r_enters, r), r_next), near > depth);
-    const Reals to = select(r_next, LOWER_OF(HIGHER_OF(r_leaves, from), r_next), far < next_depth);
+    *from = select(r, LOWER_OF(HIGHER_OF(r_enters, r), r_next), near > depth);
+    *to = select(r_next, LOWER_OF(HIGHER_OF(r_leaves, *from), r_next), far < next_depth);
+}
+
+// The model lengths of that.
+inline Reals lengths_between(const Packet *packet, Reals near, Reals far, Reals r, Reals r_next, Reals depth,
+                             Reals next_depth, Reals deep_depth, Reals inverse_depth)
+{
+    Reals from, to;
+    clip_to_faces(&from, &to, near, far, r, r_next, depth, next_depth, deep_depth, inverse_depth);
     return lengths_crossed(packet, from, to);
 }
 

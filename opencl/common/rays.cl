@@ -101,28 +101,24 @@ inline int2 block_pixel(uint item, int width)
     return (int2)((int)((block % columns) << 2 | (item & 3)), (int)((block / columns) << 2 | (item >> 2 & 3)));
 }
 
-// The same in strips STRIP blocks high, each from left to right, so that one work-item's lists are still cached when those
-// above and below come to them.
+// The same for part of a window, in strips STRIP blocks high, each from left to right, so that one work-item's lists are still
+// cached when those above and below come to them: whole columns of strips, a work-group each. `part` is its first column and
+// strip, in columns and strips of the window, how many columns it has in each strip, and how many strips.
 #define STRIP 4
-inline int2 strip_pixel(uint item, int width, int height)
-{
-    const uint block = item >> 4;
-    const uint columns = (uint)(width + 3) >> 2;
-    const uint rows = (uint)(height + 3) >> 2;
-    const uint strip = block / (STRIP * columns);
-    const uint place = block - strip * STRIP * columns;
-    const uint high = clamp((int)rows - (int)(strip * STRIP), 1, STRIP); // blocks; the last strip may be lower
-    const uint column = place / high;
-    const uint row = strip * STRIP + place - column * high;
-    return (int2)((int)(column << 2 | (item & 3)), (int)(row << 2 | (item >> 2 & 3)));
-}
-
-// The same for part of a window: whole columns of strips, a work-group each. `part` is its first column and strip, in
-// columns and strips of the window, how many columns it has in each strip, and how many strips.
 #define COLUMN_ITEMS (16 * STRIP) // that of pyvista_vdi/blocks.py, and of every group that draws, unless it may be of any size
 inline int2 part_pixel(int group, int item, int4 part)
 {
     const int strip = group / part.z;
     const int column = group - strip * part.z;
     return (int2)((part.x + column) << 2 | (item & 3), (part.y + strip) * (4 * STRIP) + (item >> 2));
+}
+
+// The same for some of a window's cells, squares of STRIP x STRIP blocks; `cells` are their columns and rows.
+#define CELL_ITEMS (STRIP * COLUMN_ITEMS) // that of pyvista_vdi/blocks.py
+inline int2 cell_pixel(__global const int2 *cells, int item)
+{
+    const int2 cell = cells[item / CELL_ITEMS];
+    const int place = item % CELL_ITEMS;
+    return (int2)((cell.x * STRIP + place / COLUMN_ITEMS) << 2 | (place & 3),
+                  cell.y * (4 * STRIP) + (place % COLUMN_ITEMS >> 2));
 }

@@ -5,6 +5,7 @@
 // together from boundary to boundary. The sums are formed in the order of the streams.
 //
 // -D STREAMS      how many VDIs
+// -D SEGMENTS     see common/segments.cl
 // -D COMPENSATED  see common/over.cl
 #include "common/rays.cl"
 #include "common/classification.cl"
@@ -18,23 +19,24 @@ __kernel void merge(
     __global const int *ends,           // (streams, rays)
     __global const uchar *contributes,  // (streams, rays), see vdi/raycast.cl
     int rays,                           // in the band
-    uint first_item,                    // work-item of the band's first ray
+    __global const int2 *cells,         // see common/rays.cl
+    int first_cell,                     // the band's
     int width, int height,              // window of V_N
     float transmittance_cutoff,         // the ray ends where less than this is left
     __global const int *streams_of,     // (VDIs): the stream of each, in the order in which owners are numbered
-    int band,                           // its number
-    __global int *needed,               // slots that a ray of each band needs; over the capacity, the ray is not drawn
+    __global int *needed,               // slots that a ray of each cell needs; over the capacity, the ray is not drawn
     __global float4 *image,             // premultiplied RGBA, top row first
     __global short *owner)              // the VDI to which each pixel belongs, top row first; -1: to none
 {
     const int ray = (int)get_global_id(0);
-    const int2 pixel = strip_pixel(first_item + (uint)ray, width, height);
+    const int2 pixel = cell_pixel(cells + first_cell, ray);
     if (pixel.x >= width || pixel.y >= height)
         return;
     const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
     const int used = ends[(STREAMS - 1) * rays + ray];
-    if (used > needed[band]) // an old value is only lower, and does no harm
-        atomic_max(needed + band, used);
+    __global int *const needed_here = needed + first_cell + ray / CELL_ITEMS;
+    if (used > *needed_here) // an old value is only lower, and does no harm
+        atomic_max(needed_here, used);
     if (used > capacity)
         return;
 
@@ -55,8 +57,8 @@ __kernel void merge(
     for (int j = 0; j < STREAMS; ++j) {
         slot[j] = j > 0 ? ends[(j - 1) * rays + ray] : 0;
         const bool left = slot[j] < ends[j * rays + ray];
-        from[j] = left ? pool[segment_place(ray, slot[j], capacity, SEGMENT_FROM)] : INFINITY;
-        to[j] = left ? pool[segment_place(ray, slot[j], capacity, SEGMENT_TO)] : INFINITY;
+        from[j] = left ? SEGMENT(pool, ray, slot[j], capacity, SEGMENT_FROM) : INFINITY;
+        to[j] = left ? SEGMENT(pool, ray, slot[j], capacity, SEGMENT_TO) : INFINITY;
     }
     float3 color = (float3)(0.0f);
     float transmittance = 1.0f;
@@ -81,21 +83,21 @@ __kernel void merge(
         for (int j = 0; j < STREAMS; ++j) {
             if (from[j] > begin)
                 continue;
-            const size_t segment = segment_place(ray, slot[j], capacity, 0);
             const bool ends_here = to[j] <= end;
             // A segment that nothing cuts keeps its optical depth, however short it is in t
             const float share = ends_here && from[j] >= begin ? 1.0f : (end - begin) / (to[j] - from[j]);
-            const float part = pool[segment + SEGMENT_OPTICAL_DEPTH * RAY_BLOCK] * share;
-            single = (float3)(pool[segment + SEGMENT_COLOR * RAY_BLOCK], pool[segment + (SEGMENT_COLOR + 1) * RAY_BLOCK],
-                              pool[segment + (SEGMENT_COLOR + 2) * RAY_BLOCK]);
+            const float part = SEGMENT(pool, ray, slot[j], capacity, SEGMENT_OPTICAL_DEPTH) * share;
+            single = (float3)(SEGMENT(pool, ray, slot[j], capacity, SEGMENT_COLOR),
+                              SEGMENT(pool, ray, slot[j], capacity, SEGMENT_COLOR + 1),
+                              SEGMENT(pool, ray, slot[j], capacity, SEGMENT_COLOR + 2));
             weighted += part * single;
             optical_depth += part;
             ++covering;
             if (ends_here) {
                 ++slot[j];
                 const bool left = slot[j] < ends[j * rays + ray];
-                from[j] = left ? pool[segment_place(ray, slot[j], capacity, SEGMENT_FROM)] : INFINITY;
-                to[j] = left ? pool[segment_place(ray, slot[j], capacity, SEGMENT_TO)] : INFINITY;
+                from[j] = left ? SEGMENT(pool, ray, slot[j], capacity, SEGMENT_FROM) : INFINITY;
+                to[j] = left ? SEGMENT(pool, ray, slot[j], capacity, SEGMENT_TO) : INFINITY;
             }
         }
         if (optical_depth > 0.0f) {

@@ -13,8 +13,8 @@
 // -D CROPPED            only some regions are drawn, see common/cropping.cl
 // -D SKIP_EMPTY         pass by what the occupancy grid says is empty; the picture is the same to the last bit
 // -D ONE_LIST           the view is V_O: each ray stays in a list, whose supersegments a loop of its own composites
-// -D SEGMENTS           write what each ray crosses into a pool, to be merged with other VDIs by vdi/merge.cl, in place of
-//                       compositing it; for a band of rays
+// -D SEGMENTS           write what each ray crosses into a pool (common/segments.cl), to be merged with other VDIs by
+//                       vdi/merge.cl or vdi/merge_blocks.cl, in place of compositing it; for a band of rays
 // -D ANY_GROUP          work-groups need not be a column of a strip each; any power of two will do
 // -D FIRST_HIT          in place of a picture, where each ray enters the first supersegment that reaches an opacity
 #include "common/list_ray.cl"
@@ -24,12 +24,6 @@
 #include "common/over.cl"
 #include "common/segments.cl"
 #pragma OPENCL FP_CONTRACT OFF
-
-#ifdef SEGMENTS
-#define BOX_PLANES 6 // of the VDI's bounds: the first of `forms`' planes
-// More cannot be told from opaque, and a part of it is still a number
-#define MAX_OPTICAL_DEPTH 1e30f
-#endif
 
 // As fmin and fmax for what is never NaN: one instruction each
 #define LOWER(x, y) ((x) < (y) ? (x) : (y))
@@ -61,7 +55,8 @@ __kernel void raycast(
     float slabs_per_depth,
     CROPPING_PARAMETER                  // regions that are kept
 #if defined(SEGMENTS)
-    uint first_item,                    // work-item of the band's first ray
+    __global const int2 *cells,         // see common/rays.cl
+    int first_cell,                     // the band's
     int stream,                         // of this VDI
     int rays,                           // in the band
     float depth_shift,                  // this VDI's reference depth less the frame's
@@ -69,8 +64,9 @@ __kernel void raycast(
     int capacity,                       // slots of a ray
     __global float *pool,               // see common/segments.cl
     __global int *ends,                 // (streams, rays): slot behind each stream's last, beyond the capacity if it was full
-    __global uchar *contributes)        // (streams, rays): 1 if a ray meets the VDI, 2 if its neighbours at `margin` pixels
+    __global uchar *contributes,        // (streams, rays): 1 if a ray meets the VDI, 2 if its neighbours at `margin` pixels
                                         // meet its bounds, too
+    __global float *dark)               // (rays): t where light has ended in one of the VDIs so far, or infinity
 #define RAY_IS_DONE (absorbed > optical_depth_cutoff)
 #elif defined(FIRST_HIT)
     int4 part,                          // of the window, see common/rays.cl
@@ -88,7 +84,7 @@ __kernel void raycast(
 {
 #ifdef SEGMENTS
     const int band_ray = (int)get_global_id(0);
-    const int2 pixel = strip_pixel(first_item + (uint)band_ray, width, height);
+    const int2 pixel = cell_pixel(cells + first_cell, band_ray);
 #elif defined(ANY_GROUP)
     const int item = (int)get_global_id(0) % COLUMN_ITEMS;
     const int2 pixel = part_pixel((int)get_global_id(0) / COLUMN_ITEMS, item, part);
@@ -109,11 +105,17 @@ __kernel void raycast(
     float absorbed = 0.0f;       // optical depth
     ends[stream * rays + band_ray] = slot;
     contributes[stream * rays + band_ray] = 0;
+    const float dark_before = stream > 0 ? dark[band_ray] : INFINITY;
+    dark[band_ray] = dark_before;
 #endif
 
     ListRay ray;
-    if (!begin_list_ray(&ray, forms, planes, CROPPING_ARGUMENT a, b, has_opaque_depth ? opaque_depth[place] : INFINITY,
-                        depth_origin)) {
+    float t_end = has_opaque_depth ? opaque_depth[place] : INFINITY;
+#ifdef SEGMENTS
+    if (dark_before < INFINITY)
+        t_end = fmin(t_end, DARK_FROM(dark_before, depth_shift));
+#endif
+    if (!begin_list_ray(&ray, forms, planes, CROPPING_ARGUMENT a, b, t_end, depth_origin)) {
 #ifndef SEGMENTS
         image[place] = NOTHING;
 #endif
@@ -280,13 +282,12 @@ __kernel void raycast(
                 const float begins = fmax(ray_depth(&ray, r_from, z_from, DEPTHS) + depth_shift, t_reached);
                 t_reached = fmax(ray_depth(&ray, r_to, z_to, DEPTHS) + depth_shift, begins);
                 if (slot < capacity) {
-                    __global float *segment = pool + segment_place(band_ray, slot, capacity, 0);
-                    segment[SEGMENT_FROM * RAY_BLOCK] = begins;
-                    segment[SEGMENT_TO * RAY_BLOCK] = t_reached;
-                    segment[SEGMENT_OPTICAL_DEPTH * RAY_BLOCK] = optical_depth;
-                    segment[SEGMENT_COLOR * RAY_BLOCK] = medium.x;
-                    segment[(SEGMENT_COLOR + 1) * RAY_BLOCK] = medium.y;
-                    segment[(SEGMENT_COLOR + 2) * RAY_BLOCK] = medium.z;
+                    SEGMENT(pool, band_ray, slot, capacity, SEGMENT_FROM) = begins;
+                    SEGMENT(pool, band_ray, slot, capacity, SEGMENT_TO) = t_reached;
+                    SEGMENT(pool, band_ray, slot, capacity, SEGMENT_OPTICAL_DEPTH) = optical_depth;
+                    SEGMENT(pool, band_ray, slot, capacity, SEGMENT_COLOR) = medium.x;
+                    SEGMENT(pool, band_ray, slot, capacity, SEGMENT_COLOR + 1) = medium.y;
+                    SEGMENT(pool, band_ray, slot, capacity, SEGMENT_COLOR + 2) = medium.z;
                 }
                 ++slot;
                 absorbed += optical_depth;
@@ -335,6 +336,8 @@ __kernel void raycast(
     }
 #if defined(SEGMENTS)
     ends[stream * rays + band_ray] = slot;
+    if (RAY_IS_DONE)
+        dark[band_ray] = fmin(dark_before, t_reached);
     if (slot > first_slot) {
         bool inside = true;
         for (int corner = 0; corner < 4; ++corner) {

@@ -5,10 +5,13 @@
 // masks and registers in memory around branches, and gathers.
 //
 // -D SKIP_EMPTY         as in vdi/raycast.cl: the picture is the same to the last bit
-// -D PARALLEL, SHIFTED, COMPENSATED (1)    as there; OFFSET_T is int, and supersegments are not packed
+// -D SEGMENTS (2)       write what the rays cross, as there; vdi/merge_blocks.cl or vdi/merge.cl merges it
+// -D PARALLEL, SHIFTED, CROPPED, COMPENSATED (1)    as there; OFFSET_T is int, and supersegments are not packed
 #include "common/lists.cl"
+#include "common/packet_cropping.cl"
 #include "common/packet_light.cl"
 #include "common/quads.cl"
+#include "common/segment_rows.cl"
 #include "common/slabs_ahead.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -155,6 +158,83 @@ inline void pass_by(Progress *now, Ints looks, const Axis *u, const Axis *v, Rea
 }
 #endif
 
+// What comes of the rays.
+typedef struct {
+#ifdef CROPPED
+    KeptOfRays kept;
+#endif
+#ifdef SEGMENTS
+    __global float *rows; // see common/segment_rows.cl
+    int capacity;
+    Ints slots;           // behind the last segments
+    Reals reached;        // t, so that rounding puts no segment before the end of another
+    Reals absorbed;       // optical depth
+    Reals t_deep;         // t where r is 0
+    Reals t_scale;        // t per unit of r, but for the division by w(r) in perspective
+    float depth_shift;    // this VDI's reference depth less the frame's
+#else
+    Seen seen;
+#endif
+} Outcome;
+
+#ifdef SEGMENTS
+#define ARE_DONE(outcome, cutoff) ((outcome)->absorbed > (cutoff))
+
+// As ray_depth, from the frame's reference depth.
+inline Reals ray_depths(const Outcome *outcome, const Packet *packet, Reals r)
+{
+#ifdef PARALLEL
+    return fma(r, outcome->t_scale, outcome->t_deep) + outcome->depth_shift;
+#else
+    return outcome->t_deep + r * outcome->t_scale / fma(r, packet->w_along, packet->w_deep) + outcome->depth_shift;
+#endif
+}
+
+// Write what the rays that are chosen cross of a medium, from `from` to `to`.
+inline void write_segments(Outcome *outcome, const Packet *packet, Reals from, Reals to, Reals red, Reals green, Reals blue,
+                           Reals extinction, Ints chosen)
+{
+    const Reals optical_depth = fmin(extinction * lengths_crossed(packet, from, to), MAX_OPTICAL_DEPTH);
+    chosen = chosen && from < to && optical_depth > 0.0f;
+    Segments segments = {HIGHER_OF(ray_depths(outcome, packet, from), outcome->reached), 0.0f, optical_depth, red, green, blue};
+    segments.to = HIGHER_OF(ray_depths(outcome, packet, to), segments.from);
+    store_segments(outcome->rows, outcome->slots, outcome->capacity, &segments);
+    outcome->reached = select(outcome->reached, segments.to, chosen);
+    outcome->absorbed += select((Reals)(0.0f), optical_depth, chosen);
+    outcome->slots -= chosen;
+}
+#else
+#define ARE_DONE(outcome, cutoff) ((outcome)->seen.transmittance < (cutoff))
+#endif
+
+// The rays that are chosen cross a medium between depths `near` and `far` on their way from r to r_next.
+inline void cross_medium(Outcome *outcome, const Packet *packet, Reals near, Reals far, Reals r, Reals r_next, Reals depth,
+                         Reals next_depth, Reals deep_depth, Reals inverse_depth, Reals red, Reals green, Reals blue,
+                         Reals extinction, Ints chosen)
+{
+    Reals from, to;
+    clip_to_faces(&from, &to, near, far, r, r_next, depth, next_depth, deep_depth, inverse_depth);
+#ifdef CROPPED
+    Reals lengths = 0.0f;
+    for (int n = 0; n < MOST_KEPT && ANY(chosen && outcome->kept.counts > n); ++n) {
+        const Reals kept_from = fmax(from, outcome->kept.from[n]);
+        const Reals kept_to = fmin(to, outcome->kept.to[n]);
+#ifdef SEGMENTS
+        write_segments(outcome, packet, kept_from, kept_to, red, green, blue, extinction, chosen);
+#else
+        lengths += select((Reals)(0.0f), lengths_crossed(packet, kept_from, kept_to), kept_from < kept_to);
+#endif
+    }
+#elif defined(SEGMENTS)
+    write_segments(outcome, packet, from, to, red, green, blue, extinction, chosen);
+#else
+    const Reals lengths = lengths_crossed(packet, from, to);
+#endif
+#ifndef SEGMENTS
+    composite_medium(&outcome->seen, extinction * lengths, red, green, blue, chosen);
+#endif
+}
+
 // Where the rays enter and leave the n-th supersegment of their lists, in their sense; for rays that `ask`.
 inline void faces_met(Reals *near, Reals *far, __global const ulong *faces, Ints first, Ints count, Ints n, Ints ask, bool away)
 {
@@ -166,9 +246,9 @@ inline void faces_met(Reals *near, Reals *far, __global const ulong *faces, Ints
 
 // Follow the rays that are `going`, of which all go away or come back.
 __attribute__((always_inline))
-inline void follow(Seen *seen, const Packet *packet, const Axis *u, const Axis *v, Ints going, bool away,
+inline void follow(Outcome *outcome, const Packet *packet, const Axis *u, const Axis *v, Ints going, bool away,
                    __global const ulong *headers, __global const ulong *list_faces, __global const ulong *media,
-                   int lists_wide, float depth_origin, float transmittance_cutoff, __global const ulong *masks,
+                   int lists_wide, float depth_origin, float cutoff, __global const ulong *masks,
                    float first_depth, float slabs_per_depth)
 {
     const float sense = away ? 1.0f : -1.0f;
@@ -228,9 +308,8 @@ inline void follow(Seen *seen, const Packet *packet, const Axis *u, const Axis *
         if (ANY(meets)) {
             const Ints entries = first + ((away ? n : count - 1 - n) << 2 * LIST_TILE_SHIFT);
             const Quads medium = media_at(media, select((Ints)(0), entries, there));
-            const Reals length_crossed = lengths_between(packet, near, far, now.r, r_next, now.depth, next_depth,
-                                                         deep_depth, inverse_depth);
-            composite_medium(seen, medium.of[3] * length_crossed, medium.of[0], medium.of[1], medium.of[2], meets);
+            cross_medium(outcome, packet, near, far, now.r, r_next, now.depth, next_depth, deep_depth, inverse_depth,
+                         medium.of[0], medium.of[1], medium.of[2], medium.of[3], meets);
         }
         const Ints ends_here = meets && far <= next_depth; // behind it comes the next one
         const Ints leaves = found && !ends_here;
@@ -248,8 +327,8 @@ inline void follow(Seen *seen, const Packet *packet, const Axis *u, const Axis *
         const Ints in_u = r_u <= r_v;
         const Ints i = now.i + select((Ints)(0), u->step, leaves && in_u);
         const Ints j = now.j + select((Ints)(0), v->step, leaves && !in_u);
-        const Ints dark = seen->transmittance < transmittance_cutoff;
-        now.goes = now.goes && !(leaves && (r_next >= r_end || dark || i < 0 || i >= u->lists || j < 0 || j >= v->lists));
+        const Ints done = ARE_DONE(outcome, cutoff);
+        now.goes = now.goes && !(leaves && (r_next >= r_end || done || i < 0 || i >= u->lists || j < 0 || j >= v->lists));
 #ifdef SKIP_EMPTY
         fresh = fresh || ((i ^ now.i) | (j ^ now.j)) >> TILE_SHIFT != 0;
 #endif
@@ -280,6 +359,40 @@ inline void prefetch_lists(Ints i, Ints j, Ints chosen, __global const ulong *he
     }
 }
 
+#ifdef SEGMENTS
+// The rays' streams begin behind those before them.
+inline void begin_segments(Outcome *outcome, const Packet *packet, Reals t0, Reals t1, float depth_shift)
+{
+    outcome->reached = -INFINITY;
+    outcome->absorbed = 0.0f;
+    outcome->depth_shift = depth_shift;
+    outcome->t_deep = select(t0, t1, packet->away);
+    outcome->t_scale = t1 - t0;
+#ifndef PARALLEL
+    const Reals other_end = select((Reals)(1.0f), (Reals)(-1.0f), packet->away);
+    outcome->t_scale *= fma(other_end, packet->w_along, packet->w_deep);
+#endif
+}
+
+// Which of a block's rays, which meet the VDI's bounds, would so, too, `margin` pixels to each side.
+inline Ints surely_covered(__global const float *forms, Reals a, Reals b, float margin, Ints present)
+{
+    if (margin == 0.0f)
+        return present;
+    // The bounds' image is convex: mostly the block's corners speak for all
+    Reals t0, t1;
+    const Reals corners_a = select((Reals)(a.s0 - margin), (Reals)(a.sf + margin), (NUMBERS & 1) != 0);
+    const Reals corners_b = select((Reals)(b.s0 - margin), (Reals)(b.sf + margin), (NUMBERS & 2) != 0);
+    if (!ANY(!clip_packet(forms, BOX_PLANES, corners_a, corners_b, (Reals)(INFINITY), (Ints)(-1), &t0, &t1)))
+        return present;
+    Ints inside = present;
+    for (int corner = 0; corner < 4; ++corner)
+        inside = clip_packet(forms, BOX_PLANES, a + (corner & 1 ? margin : -margin), b + (corner & 2 ? margin : -margin),
+                             (Reals)(INFINITY), inside, &t0, &t1);
+    return inside;
+}
+#endif
+
 __attribute__((vec_type_hint(float16)))
 __kernel void raycast_blocks(
     __global const ulong *headers,      // of the tiles of lists, see common/supersegments.cl
@@ -291,30 +404,73 @@ __kernel void raycast_blocks(
     int width, int height,              // window of V_N
     __global const float *opaque_depth, // t at which each pixel's ray ends, top row first, if has_opaque_depth
     int has_opaque_depth,
-    float transmittance_cutoff,         // the ray ends where less than this is left
+    float cutoff,                       // the ray ends where less transmittance than this is left; SEGMENTS: behind this much
+                                        // optical depth
     __global const ulong *masks,        // occupied slabs of each tile of lists, if SKIP_EMPTY
     float first_depth,                  // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,
+    CROPPING_PARAMETER                  // regions that are kept
+#ifdef SEGMENTS
+    __global const int2 *cells,         // this and the rest as in vdi/raycast.cl
+    int first_cell,
+    int stream,
+    int rays,
+    float depth_shift,
+    float margin,
+    int capacity,
+    __global float *pool,
+    __global int *ends,
+    __global uchar *contributes,
+    __global float *dark)
+#else
     int4 part,                          // of the window, see common/rays.cl
     __global float4 *image)             // premultiplied RGBA, top row first
+#endif
 {
     const int item = (int)get_global_id(0);
+#ifdef SEGMENTS
+    const int first_ray = item * LANES;
+    const int2 corner = cell_pixel(cells + first_cell, first_ray);
+#else
     const int column = item / BLOCKS_PER_COLUMN;
     const int2 corner = part_pixel(column, (item - column * BLOCKS_PER_COLUMN) * LANES, part);
+#endif
     const Ints x = corner.x + (NUMBERS & (BLOCK - 1));
     const Ints y = corner.y + (NUMBERS / BLOCK);
     const Ints in_window = x < width && y < height;
     if (!ANY(in_window))
         return;
     const Pixels pixels = pixels_at(x, y, in_window, width, height);
-    const Reals t_end = has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Reals)(INFINITY);
+    Reals t_end = has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Reals)(INFINITY);
+#ifdef SEGMENTS
+    const Reals dark_before = stream > 0 ? vload16(0, dark + first_ray) : (Reals)(INFINITY);
+    t_end = select(t_end, fmin(t_end, DARK_FROM(dark_before, depth_shift)), dark_before < INFINITY);
+#endif
     const Reals a = convert_float16(x) + 0.5f - 0.5f * (float)width;
     const Reals b = convert_float16(y) + 0.5f - 0.5f * (float)height;
     const Packet packet = begin_packet(forms, planes, a, b, t_end, in_window, depth_origin);
+    Ints present = packet.present;
+    Outcome outcome;
+#if defined(SEGMENTS) || defined(CROPPED)
+    Reals t0, t1;
+    clip_packet(forms, planes, a, b, t_end, in_window, &t0, &t1);
+#endif
+#ifdef CROPPED
+    outcome.kept = kept_of_rays(&packet, forms, planes, a, b, t0, t1, regions);
+    present = present && outcome.kept.counts > 0;
+#endif
+#ifdef SEGMENTS
+    const Ints first_slots = stream > 0 ? vload16(0, ends + (stream - 1) * rays + first_ray) : (Ints)(0);
+    outcome.rows = POOL_OF(pool, first_ray, capacity);
+    outcome.capacity = capacity;
+    outcome.slots = first_slots;
+    begin_segments(&outcome, &packet, t0, t1, depth_shift);
+#else
+    outcome.seen = nothing_seen();
+#endif
     const Axis u = axis_of(packet.along_u, packet.deep_u, lists_wide);
     const Axis v = axis_of(packet.along_v, packet.deep_v, lists_high);
-    Seen seen = nothing_seen();
-    const Ints crosses_few = packet.present && fabs(packet.along_u) + fabs(packet.along_v) < LISTS_TO_PREFETCH;
+    const Ints crosses_few = present && fabs(packet.along_u) + fabs(packet.along_v) < LISTS_TO_PREFETCH;
     if (ANY(crosses_few)) {
         // Those of the next column of blocks: they come while this one's are walked through
         const int shift = BLOCK * lists_high / height;
@@ -325,13 +481,22 @@ __kernel void raycast_blocks(
         prefetch_lists(last_i, last_j, crosses_few && (first_i != last_i || first_j != last_j), headers,
                        SUPERSEGMENTS_ARGUMENTS lists_wide);
     }
-    const Ints away = packet.present && packet.away;
-    const Ints back = packet.present && !packet.away;
+    const Ints away = present && packet.away;
+    const Ints back = present && !packet.away;
     if (ANY(away))
-        follow(&seen, &packet, &u, &v, away, true, headers, SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin,
-               transmittance_cutoff, masks, first_depth, slabs_per_depth);
+        follow(&outcome, &packet, &u, &v, away, true, headers, SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin, cutoff, masks,
+               first_depth, slabs_per_depth);
     if (ANY(back))
-        follow(&seen, &packet, &u, &v, back, false, headers, SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin,
-               transmittance_cutoff, masks, first_depth, slabs_per_depth);
-    write_pixels(image, &pixels, &seen);
+        follow(&outcome, &packet, &u, &v, back, false, headers, SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin, cutoff, masks,
+               first_depth, slabs_per_depth);
+#ifdef SEGMENTS
+    vstore16(outcome.slots, 0, ends + stream * rays + first_ray);
+    const Ints done = ARE_DONE(&outcome, cutoff);
+    vstore16(select(dark_before, fmin(dark_before, outcome.reached), done), 0, dark + first_ray);
+    const Ints meets = outcome.slots > first_slots;
+    const Ints covered = ANY(meets) ? surely_covered(forms, a, b, margin, meets) : (Ints)(0);
+    vstore16(convert_uchar16(-meets - covered), 0, contributes + stream * rays + first_ray);
+#else
+    write_pixels(image, &pixels, &outcome.seen);
+#endif
 }

@@ -33,11 +33,11 @@ __kernel void block_pixels(int count, int width, uint first, __global int2 *pixe
         pixels[i] = block_pixel(first + (uint)i, width);
 }
 
-__kernel void strip_pixels(int count, int width, int height, __global int2 *pixels)
+__kernel void cell_pixels(int count, __global const int2 *cells, __global int2 *pixels)
 {
     const int i = get_global_id(0);
     if (i < count)
-        pixels[i] = strip_pixel((uint)i, width, height);
+        pixels[i] = cell_pixel(cells, i);
 }
 
 __kernel void part_pixels(int count, __global const int4 *part, __global int2 *pixels)

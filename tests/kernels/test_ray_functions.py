@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pyvista_vdi.blocks import GROUP, Rectangle, block_items, part_columns
+from pyvista_vdi.blocks import CELL, CELL_ITEMS, GROUP, Rectangle, block_items, part_columns
 
 EPS = 2.0**-24  # unit roundoff of float32
 FILE = "ray_functions.cl"
@@ -134,29 +134,16 @@ def test_every_pixel_has_one_work_item(call, width):
         assert inside.sum() == width * height
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-def test_every_pixel_has_one_work_item_in_strips(call, width):
-    for height in (1, 2, 4, 5, 9, 15, 16, 17, 31, 33, 64):
-        items = block_items(width, height)
-        pixels = call(
-            FILE, "strip_pixels", items, np.int32(width), np.int32(height),
-            call.empty(items, 2, dtype=np.int32),
-        )  # fmt: skip
-        assert (pixels >= 0).all()
-        inside = (pixels[:, 0] < width) & (pixels[:, 1] < height)
-        assert inside.sum() == width * height
-        assert len(np.unique(pixels[inside], axis=0)) == width * height  # no pixel twice
-        blocks = pixels[: len(pixels) // 16 * 16].reshape(-1, 16, 2)
-        assert (np.ptp(blocks, axis=1) == 3).all()
-        assert (blocks.min(axis=1) % 4 == 0).all()
-
-
-def test_strips_are_four_blocks_high(call):
-    pixels = call(
-        FILE, "strip_pixels", 128, np.int32(9), np.int32(33), call.empty(128, 2, dtype=np.int32)
-    )
-    corners = pixels.reshape(8, 16, 2).min(axis=1)
-    assert corners.tolist() == [[4 * (k // 4), 4 * (k % 4)] for k in range(8)]
+def test_every_pixel_of_a_cell_has_one_work_item(call):
+    cells = np.int32([[3, 0], [0, 2], [7, 5]])
+    items = len(cells) * CELL_ITEMS
+    pixels = call(FILE, "cell_pixels", items, cells, call.empty(items, 2, dtype=np.int32))
+    assert len(np.unique(pixels, axis=0)) == items  # no pixel twice
+    owner = np.repeat(cells, CELL_ITEMS, axis=0)
+    np.testing.assert_array_equal(pixels // CELL, owner)
+    blocks = pixels.reshape(-1, 16, 2)
+    assert (np.ptp(blocks, axis=1) == 3).all()
+    assert (blocks.min(axis=1) % 4 == 0).all()
 
 
 @pytest.mark.parametrize(
@@ -177,17 +164,16 @@ def test_every_pixel_of_a_part_has_one_work_item(call, part):
     assert (np.ptp(blocks, axis=1) == 3).all()
 
 
-def test_parts_are_dealt_as_strips_are(call):
-    """A part that is the whole of a window: the same pixel for each work-item."""
-    size = (36, 48)
-    items = block_items(*size)
-    columns = part_columns(Rectangle(0, size[0], 0, size[1]))
-    pixels = call(FILE, "part_pixels", items, columns, call.empty(items, 2, dtype=np.int32))
-    strips = call(
-        FILE, "strip_pixels", items, np.int32(size[0]), np.int32(size[1]),
-        call.empty(items, 2, dtype=np.int32),
-    )  # fmt: skip
-    np.testing.assert_array_equal(pixels, strips)
+def test_columns_of_strips_are_four_blocks_high(call):
+    """And lie side by side; so do those of cells."""
+    columns = part_columns(Rectangle(0, 16, 0, 32))
+    pixels = call(FILE, "part_pixels", 512, columns, call.empty(512, 2, dtype=np.int32))
+    corners = pixels.reshape(32, 16, 2).min(axis=1)
+    expected = [[4 * (k // 4 % 4), 4 * (k % 4) + 16 * (k // 16)] for k in range(32)]
+    assert corners.tolist() == expected
+    cells = np.int32([[0, 0], [0, 1]])
+    of_cells = call(FILE, "cell_pixels", 512, cells, call.empty(512, 2, dtype=np.int32))
+    np.testing.assert_array_equal(of_cells, pixels)
 
 
 def test_blocks_are_four_by_four(call):

@@ -39,6 +39,12 @@ def case(seed, **options):
     return rng, vdi, camera, size, f"seed {[seed, 600]}, view {kind!r}"
 
 
+@pytest.fixture(params=["one by one", "blocks"])
+def _dealt(request, monkeypatch):
+    strategies.deal_rays(monkeypatch, request.param)
+
+
+@pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize("kind", ["flags", *PRESETS])
 def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind):
     parts = []
@@ -60,6 +66,7 @@ def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind):
     assert result.drawn > result.pixels / 50
 
 
+@pytest.mark.usefixtures("_dealt")
 def test_with_opaque_depth_and_clipping_planes(runtime):
     for seed in range(4):
         rng, vdi, camera, size, name = case(seed)
@@ -76,6 +83,7 @@ def test_with_opaque_depth_and_clipping_planes(runtime):
         assert not result.failures, "\n".join(result.failures)
 
 
+@pytest.mark.usefixtures("_dealt")
 def test_what_is_kept_and_what_is_not_absorb_together_what_everything_does(runtime):
     drawn = 0
     for seed in range(10):
@@ -91,6 +99,7 @@ def test_what_is_kept_and_what_is_not_absorb_together_what_everything_does(runti
     assert drawn > 50
 
 
+@pytest.mark.usefixtures("_dealt")
 def test_all_regions_are_everything_and_none_is_nothing(runtime):
     rng, vdi, camera, size, _ = case(2)
     planes = planes_in(rng, vdi.bounds)

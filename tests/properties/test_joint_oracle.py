@@ -21,7 +21,8 @@ from pyvista_vdi.camera import Camera
 from pyvista_vdi.cropping import Cropping
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.joint import PlacedVDI, joint_image, render_vdis
-from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.raycast import prepared_vdi, render_vdi
+from pyvista_vdi.rays import cells_of_points
 from pyvista_vdi.vdi import VDI
 
 #: Largest difference per channel from the oracle; see above.
@@ -89,9 +90,24 @@ def failures(vdis, cameras, size, image, name, **ends):
     return said, int(differs.sum()), int((exact[..., 3] > TOLERANCE).sum())
 
 
+#: Ways in which rays are followed that differ where several VDIs are drawn together.
+DEALT = ("one by one", "blocks")
+
+
+@pytest.fixture(params=DEALT)
+def _dealt(request, monkeypatch):
+    strategies.deal_rays(monkeypatch, request.param)
+
+
 @functools.cache
-def compare(runtime, kind):
+def compare(runtime, kind, dealt):
     """All cases of one kind of view: failures, pixels that need moved rays, seen, and all."""
+    with pytest.MonkeyPatch.context() as patch:
+        strategies.deal_rays(patch, dealt)
+        return compare_cases(runtime, kind)
+
+
+def compare_cases(runtime, kind):
     said, moved, seen, pixels = [], 0, 0, 0
     for case in range(N_CASES):
         seed = [case, strategies.VIEWS.index(kind), 7]
@@ -107,21 +123,24 @@ def compare(runtime, kind):
     return said, moved, seen, pixels
 
 
+@pytest.mark.parametrize("dealt", DEALT)
 @pytest.mark.parametrize("kind", strategies.VIEWS)
-def test_every_pixel_is_within_the_range_of_the_moved_rays(runtime, kind):
-    said, _, seen, pixels = compare(runtime, kind)
+def test_every_pixel_is_within_the_range_of_the_moved_rays(runtime, kind, dealt):
+    said, _, seen, pixels = compare(runtime, kind, dealt)
     assert not said, "\n".join(said)
     assert seen > pixels / 10  # a comparison of nothing with nothing proves nothing
 
 
-def test_few_pixels_need_moved_rays(runtime):
-    results = {kind: compare(runtime, kind) for kind in strategies.VIEWS}
+@pytest.mark.parametrize("dealt", DEALT)
+def test_few_pixels_need_moved_rays(runtime, dealt):
+    results = {kind: compare(runtime, kind, dealt) for kind in strategies.VIEWS}
     for kind, (_, moved, _, pixels) in results.items():
         print(f"{kind:9s}: {moved} of {pixels} pixels need moved rays")
     moved, pixels = (sum(r[i] for r in results.values()) for i in (1, 3))
     assert moved / pixels <= 0.04  # twice the bound of a single VDI: two rays may be moved
 
 
+@pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize("case", range(4))
 def test_opaque_depth_and_each_vdi_s_own_clipping_planes(runtime, case):
     rng = np.random.default_rng([case, 8])
@@ -142,6 +161,7 @@ def test_opaque_depth_and_each_vdi_s_own_clipping_planes(runtime, case):
     assert seen
 
 
+@pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize("case", range(4))
 def test_each_vdi_s_own_cropping_and_density(runtime, case):
     rng = np.random.default_rng([case, 16])
@@ -176,6 +196,7 @@ def test_planes_for_all_are_each_one_s_planes(runtime):
     assert not np.array_equal(image, draw(runtime, vdis, cameras, size))
 
 
+@pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize("count", [2, 3, 4])
 def test_the_order_of_the_vdis_changes_no_bit(runtime, count):
     vdis, cameras, size = scene(np.random.default_rng([count, 10]), "near", count)
@@ -193,6 +214,7 @@ def test_the_order_of_the_vdis_changes_no_bit(runtime, count):
     assert len(set(images)) == 1
 
 
+@pytest.mark.usefixtures("_dealt")
 def test_passing_by_what_is_empty_changes_no_bit(runtime, monkeypatch):
     monkeypatch.setattr("pyvista_vdi.occupancy._WORTHWHILE", np.inf)
     vdis, cameras, size = scene(np.random.default_rng(11), "beside", 2)
@@ -200,13 +222,14 @@ def test_passing_by_what_is_empty_changes_no_bit(runtime, monkeypatch):
     assert np.array_equal(image, draw(runtime, vdis, cameras, size, skip_empty=False))
 
 
+@pytest.mark.usefixtures("_dealt")
 def test_bands_and_room_for_segments_change_no_bit(runtime, monkeypatch):
     vdis, cameras, _ = scene(np.random.default_rng(12), "near", 3)
     size = (61, 37)
     image = draw(runtime, vdis, cameras, size)
     monkeypatch.setattr(joint, "_FIRST_SLOTS", 1)
     for room in ("_POOL_BYTES", "_POOL_BYTES_CPU"):
-        monkeypatch.setattr(joint, room, 1)  # 64 rays in a band
+        monkeypatch.setattr(joint, room, 1)  # a cell in a band
     joint._slots.clear()
     assert np.array_equal(image, draw(runtime, vdis, cameras, size))
     assert joint._slots[vdis[0]] > 1
@@ -230,6 +253,7 @@ def with_lists(vdi, keep, share=1.0):
     )
 
 
+@pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 def test_a_vdi_in_parts_is_the_whole(runtime, kind):
     """Disjoint halves; the same medium twice, half as dense; itself and nothing."""
@@ -265,6 +289,7 @@ def test_one_vdi_is_drawn_as_ever(runtime):
     )
 
 
+@pytest.mark.usefixtures("_dealt")
 def test_a_far_one_keeps_its_picture_beside_a_near_one(runtime):
     """Their depths differ by 1e6 of their sizes, where float32 has no digits left for segments."""
     rng = np.random.default_rng(15)
@@ -289,6 +314,7 @@ def test_a_far_one_keeps_its_picture_beside_a_near_one(runtime):
     assert np.abs(both - over).max() <= SAME
 
 
+@pytest.mark.usefixtures("_dealt")
 def test_owners_are_the_first_that_surely_cover(runtime):
     """A pixel whose square a box does not cover wholly is the other's, if that one does."""
     camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), parallel_projection=True, parallel_scale=1.0)
@@ -311,6 +337,74 @@ def test_owners_are_the_first_that_surely_cover(runtime):
     assert (joint_image([left, right], size, device=runtime).owner[:, 8] == 0).all()
     assert (joint_image([left, left], size, device=runtime).owner[:, 9:] == -1).all()
     assert (first.owner[:, 0] == 0).all()
+
+
+def side_by_side(rng, count, precisions=("exact",)):
+    """VDIs that overlap one after the other, in a window of many cells."""
+    camera = Camera((0, 0, 9), (0, 0, 0), (0, 1, 0), view_angle=40)
+    bounds = (-1, 1, -1, 1, -1, 1)
+    placed = []
+    for k in range(count):
+        matrix = np.eye(4)
+        matrix[:3, 3] = (1.9 * k - 0.95 * (count - 1), 0.9 * k - 0.9, -0.2 * k)
+        own = Camera((rng.uniform(-2, 2), rng.uniform(-2, 2), 6), (0, 0, 0), (0, 1, 0))
+        vdi = strategies.random_vdi(rng, window=(96, 72), camera=own, bounds=bounds)
+        vdi = vdi.with_precision(precisions[k % len(precisions)])
+        placed.append(PlacedVDI(vdi, camera.replace(model_transform=matrix)))
+    return placed, (323, 187)
+
+
+@pytest.mark.parametrize("dealt", strategies.DEALT)
+@pytest.mark.parametrize("precisions", [("exact",), ("exact", "16-byte", "8-byte")])
+def test_where_no_two_are_met_each_is_drawn_as_by_itself(runtime, dealt, precisions, monkeypatch):
+    strategies.deal_rays(monkeypatch, dealt)
+    placed, size = side_by_side(np.random.default_rng(17), 3, precisions)
+    depth = np.full(size[::-1], np.inf, np.float32)
+    depth[60:110] = 8.5
+    found = []
+    of_cells = joint._Cells.of.__func__
+    monkeypatch.setattr(
+        joint._Cells,
+        "of",
+        classmethod(lambda cls, *args: found.append(of_cells(cls, *args)) or found[-1]),
+    )
+    drawn = joint_image(placed, size, opaque_depth=depth, margin=0.5, device=runtime)
+    alone = np.repeat(np.repeat(found[0].alone, 16, axis=0), 16, axis=1)[: size[1], : size[0]][::-1]
+    assert set(np.unique(alone)) == {-2, -1, 0, 1, 2}
+    met = 0
+    for number, one in enumerate(placed):
+        here = alone == number
+        if dealt != "packets":  # whose rays two packets may share: those of another part differ
+            own = render_vdi(one.vdi, one.camera, size, opaque_depth=depth, device=runtime)
+            np.testing.assert_array_equal(drawn.image[here], own[here])
+        seen = drawn.image.any(axis=-1)
+        np.testing.assert_array_equal(drawn.owner[here], np.where(seen, number, -1)[here])
+        met += (here & seen).any()
+    assert met >= 2
+    assert not drawn.image[alone == -2].any()
+    assert (drawn.owner[alone == -2] == -1).all()
+    # What several are met in is drawn as if several were met everywhere, and so is the rest
+    monkeypatch.setattr(joint, "cells_of_points", lambda *_: np.ones_like(found[0].alone, bool))
+    whole = joint_image(placed, size, opaque_depth=depth, margin=0.5, device=runtime)
+    np.testing.assert_array_equal(whole.image[alone == -1], drawn.image[alone == -1])
+    assert np.abs(whole.image - drawn.image).max() <= SAME
+    np.testing.assert_array_equal(whole.owner, drawn.owner)
+    turned = joint_image(placed[::-1], size, opaque_depth=depth, margin=0.5, device=runtime)
+    np.testing.assert_array_equal(turned.image, whole.image)
+
+
+def test_nothing_is_met_beside_a_vdi_s_cells(default_runtime):
+    for seed in range(40):
+        rng = np.random.default_rng([seed, 18])
+        vdi = strategies.random_vdi(rng)
+        camera, _ = strategies.random_view(rng, vdi, strategies.VIEWS[seed % len(strategies.VIEWS)])
+        size = (int(rng.integers(1, 150)), int(rng.integers(1, 120)))
+        corners = prepared_vdi(default_runtime, vdi).occupancy.corners
+        met = cells_of_points(camera, size, corners)
+        assert met.shape == (-(-size[1] // 16), -(-size[0] // 16))
+        image = render_vdi(vdi, camera, size, skip_empty=False, device=default_runtime)[::-1]
+        cells = np.repeat(np.repeat(met, 16, axis=0), 16, axis=1)[: size[1], : size[0]]
+        assert not image[~cells].any(), seed
 
 
 def test_what_cannot_be_drawn_is_refused(default_runtime):
