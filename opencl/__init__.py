@@ -53,6 +53,8 @@ Entry points:
 ``vdi/generate.cl``, with ``vdi/runs.cl``
     ``march_lists``, ``shorten_lists``, ``pack_lists``: volume to lists of supersegments; with
     ``vdi/criteria.cl`` also ``cut_lists``, where another criterion than least error is asked for.
+``vdi/offsets.cl``
+    ``sum_lengths``, ``list_offsets``: where each list begins in a VDI's arrays.
 ``vdi/bricks.cl``
     ``want_bricks``, ``sample_steps``: samples of a volume that is on the device brick by brick.
 ``vdi/prepare.cl``
