@@ -56,6 +56,8 @@ CRITERIA = tuple(_CRITERIA)
 _RUN_BYTES = 9 * 4
 #: Records have room for a multiple of so many runs: ``ERRORS`` of ``vdi/runs.cl``.
 _ERRORS_AT_A_TIME = 8
+#: Rays whose records a work-item shortens on a CPU: ``LANES`` of ``vdi/shorten_blocks.cl``.
+_BLOCK_RAYS = 16
 #: Lists whose lengths a work-item sums up: that of ``vdi/offsets.cl``.
 _LISTS_PER_ITEM = 16
 #: A VDI's arrays of supersegments, as messages call them, and the shape of an element.
@@ -475,12 +477,18 @@ class _Recorder:
         self._grain = _steps_per_voxel(medium.volume, medium.sample_distance)
         items, capacity = self.slices.items, self.slices.capacity
         self._cuts = _CRITERIA[criterion]
-        names = ["longest_marches", "march_lists", "shorten_lists", "pack_lists"]
+        names = ["longest_marches", "march_lists", "pack_lists"]
         defines = {**medium.defines, **rays.defines}
         if self._cuts:
             names.append("cut_lists")
             defines["CRITERION"] = self._cuts
+        self._in_blocks = runtime.is_cpu
+        if not self._in_blocks:
+            names.append("shorten_lists")
         self._kernels = {name: runtime.kernel("vdi/generate.cl", name, defines) for name in names}
+        if self._in_blocks:
+            kernel = runtime.kernel("vdi/shorten_blocks.cl", "shorten_blocks", rays.defines)
+            self._kernels["shorten_lists"] = kernel
         with ExitStack() as stack:
             keep = stack.enter_context
             self._forms = keep(runtime.upload(rays.packed(), "rays"))
@@ -582,9 +590,13 @@ class _Recorder:
     def _shorten(self, first_row: int, rows: int, limit: int, *, exactly: bool) -> None:
         """Bring records to at most so many runs: least error first, or by raised thresholds."""
         width, height = self._size
-        self._launch(
-            "shorten_lists",
-            block_items(width, rows),
+        items, group = block_items(width, rows), GROUP
+        if self._in_blocks:
+            items, group = items // _BLOCK_RAYS, group // _BLOCK_RAYS
+        self._runtime.launch(
+            self._kernels["shorten_lists"],
+            items,
+            group,
             *(np.int32(n) for n in (limit, exactly, width, height, first_row, rows)),
             self._forms,
             np.int32(self.slices.capacity),
