@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ._version import __version__
 from .ambient_occlusion import AmbientOcclusion, OcclusionGrid
-from .blocks import GROUP, block_items
+from .blocks import BLOCK_RAYS, GROUP, block_items
 from .bricks import Room, StepSampler
 from .camera import Camera, check_window_size
 from .checks import as_float, memory_limit_bytes
@@ -25,6 +25,7 @@ from .lighting import Lights
 from .opencl_runtime import (
     DeviceBuffer,
     GrowingArray,
+    Kernel,
     LocalMemory,
     Runtime,
     aligned_empty,
@@ -56,8 +57,8 @@ CRITERIA = tuple(_CRITERIA)
 _RUN_BYTES = 9 * 4
 #: Records have room for a multiple of so many runs: ``ERRORS`` of ``vdi/runs.cl``.
 _ERRORS_AT_A_TIME = 8
-#: Rays whose records a work-item shortens on a CPU: ``LANES`` of ``vdi/shorten_blocks.cl``.
-_BLOCK_RAYS = 16
+#: ``-D`` names that ``vdi/march_blocks.cl`` knows; ``COMPENSATED=1`` changes no march.
+_IN_BLOCKS = {"VOXEL_T", "INDEX_T", "NEAREST", "BY_SCALAR", "SKIP_EMPTY", "BLOCK_SHIFT"}
 #: Lists whose lengths a work-item sums up: that of ``vdi/offsets.cl``.
 _LISTS_PER_ITEM = 16
 #: A VDI's arrays of supersegments, as messages call them, and the shape of an element.
@@ -84,6 +85,7 @@ _CHUNK_STEPS = 128
 _FIRST_CHUNK_STEPS = 64
 
 Progress = Callable[[float], object]
+Defines = Mapping[str, str | int | None]
 
 
 @dataclass(frozen=True)
@@ -477,18 +479,8 @@ class _Recorder:
         self._grain = _steps_per_voxel(medium.volume, medium.sample_distance)
         items, capacity = self.slices.items, self.slices.capacity
         self._cuts = _CRITERIA[criterion]
-        names = ["longest_marches", "march_lists", "pack_lists"]
         defines = {**medium.defines, **rays.defines}
-        if self._cuts:
-            names.append("cut_lists")
-            defines["CRITERION"] = self._cuts
-        self._in_blocks = runtime.is_cpu
-        if not self._in_blocks:
-            names.append("shorten_lists")
-        self._kernels = {name: runtime.kernel("vdi/generate.cl", name, defines) for name in names}
-        if self._in_blocks:
-            kernel = runtime.kernel("vdi/shorten_blocks.cl", "shorten_blocks", rays.defines)
-            self._kernels["shorten_lists"] = kernel
+        self._kernels = self._kernels_of(defines, rays.defines)
         with ExitStack() as stack:
             keep = stack.enter_context
             self._forms = keep(runtime.upload(rays.packed(), "rays"))
@@ -511,6 +503,27 @@ class _Recorder:
                 )
             self._longest = self._longest_marches()
             self._buffers = stack.pop_all()
+
+    def _kernels_of(self, defines: Defines, of_rays: Defines) -> dict[str, tuple[Kernel, int]]:
+        """Return kernels by what they do, with the rays that a work-item of theirs follows."""
+        path = "vdi/generate.cl"
+        used: dict[str, tuple[str, str, Defines, int]] = {
+            name: (path, name, defines, 1)
+            for name in ("longest_marches", "march_lists", "shorten_lists", "pack_lists")
+        }
+        if self._cuts:
+            used["cut_lists"] = (path, "cut_lists", {**defines, "CRITERION": self._cuts}, 1)
+        if self._runtime.is_cpu:
+            path = "vdi/shorten_blocks.cl"
+            used["shorten_lists"] = (path, "shorten_blocks", of_rays, BLOCK_RAYS)
+            known = {k: v for k, v in defines.items() if (k, v) != ("COMPENSATED", 1)}
+            if "BY_SCALAR" in known and known["INDEX_T"] == "uint" and known.keys() <= _IN_BLOCKS:
+                path = "vdi/march_blocks.cl"
+                used["march_lists"] = (path, "march_blocks", known, BLOCK_RAYS)
+        return {
+            name: (self._runtime.kernel(path, kernel, given), rays)
+            for name, (path, kernel, given, rays) in used.items()
+        }
 
     def __enter__(self) -> _Recorder:
         return self
@@ -590,13 +603,9 @@ class _Recorder:
     def _shorten(self, first_row: int, rows: int, limit: int, *, exactly: bool) -> None:
         """Bring records to at most so many runs: least error first, or by raised thresholds."""
         width, height = self._size
-        items, group = block_items(width, rows), GROUP
-        if self._in_blocks:
-            items, group = items // _BLOCK_RAYS, group // _BLOCK_RAYS
-        self._runtime.launch(
-            self._kernels["shorten_lists"],
-            items,
-            group,
+        self._launch(
+            "shorten_lists",
+            block_items(width, rows),
             *(np.int32(n) for n in (limit, exactly, width, height, first_row, rows)),
             self._forms,
             np.int32(self.slices.capacity),
@@ -625,7 +634,8 @@ class _Recorder:
         )
 
     def _launch(self, name: str, items: int, *arguments: Any) -> None:
-        self._runtime.launch(self._kernels[name], items, GROUP, *arguments)
+        kernel, rays = self._kernels[name]
+        self._runtime.launch(kernel, items // rays, GROUP // rays, *arguments)
 
 
 def _check_weights(tolerance: float, view_cone: float) -> tuple[float, float]:
