@@ -8,6 +8,7 @@
 // -D PARALLEL, SHIFTED, COMPENSATED (1)    as there; OFFSET_T is int, and supersegments are not packed
 #include "common/lists.cl"
 #include "common/packet_light.cl"
+#include "common/quads.cl"
 #include "common/slabs_ahead.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -19,19 +20,40 @@ typedef struct {
     uint16 low, high;
 } Words;
 
+// Words on their way from memory to vectors: as doubles, where there are any, they take an instruction less.
+#ifdef cl_khr_fp64
+typedef double Word;
+typedef double8 Words8;
+#else
+typedef ulong Word;
+typedef ulong8 Words8;
+#endif
+
 // One load each, as gathers are slow where these kernels run. The places are read from memory: to take each out of a register
-// costs two operations more.
+// costs two operations more. Words come in an order from which two shuffles within 128 bits make the halves of all.
 inline Words words_at(__global const ulong *words, Ints places)
 {
-    volatile Ints in_memory = places;
+    const volatile Ints in_memory = places;
     const volatile int *at = (const volatile int *)&in_memory;
-    const ulong16 found = (ulong16)(words[at[0]], words[at[1]], words[at[2]], words[at[3]], words[at[4]], words[at[5]],
-                                    words[at[6]], words[at[7]], words[at[8]], words[at[9]], words[at[10]], words[at[11]],
-                                    words[at[12]], words[at[13]], words[at[14]], words[at[15]]);
+    __global const Word *of = (__global const Word *)words;
+    const Reals p = as_float16((Words8)(of[at[0]], of[at[1]], of[at[4]], of[at[5]], of[at[8]], of[at[9]], of[at[12]], of[at[13]]));
+    const Reals q = as_float16((Words8)(of[at[2]], of[at[3]], of[at[6]], of[at[7]], of[at[10]], of[at[11]], of[at[14]], of[at[15]]));
     Words halves;
-    halves.low = convert_uint16(found);
-    halves.high = convert_uint16(found >> 32);
+    halves.low = as_uint16(((Reals)(p.even, q.even)).JOINED);
+    halves.high = as_uint16(((Reals)(p.odd, q.odd)).JOINED);
     return halves;
+}
+
+// The media of entries: red, green, blue, extinction. Pairs of words, which compilers shuffle less than vectors of four floats.
+inline Quads media_at(__global const ulong *media, Ints entries)
+{
+    const volatile Ints in_memory = entries;
+    const volatile int *at = (const volatile int *)&in_memory;
+    __global const ulong2 *of = (__global const ulong2 *)media;
+    Quads rows;
+    for (int n = 0; n < 4; ++n)
+        rows.of[n] = as_float16((ulong8)(of[at[n]], of[at[n + 4]], of[at[n + 8]], of[at[n + 12]]));
+    return transposed(rows);
 }
 
 // One axis of V_O's window.
@@ -190,12 +212,11 @@ inline void follow(Seen *seen, const Packet *packet, const Axis *u, const Axis *
             far = select((Reals)(INFINITY), far, there);
         }
         const Ints passed = far <= now.depth;
-        Ints beyond = now.goes && near > now.depth && n > now.low;
-        if (ANY(beyond)) {
-            Reals near_before, far_before;
-            faces_met(&near_before, &far_before, list_faces, first, count, n - 1, beyond, away);
-            beyond = beyond && far_before > now.depth;
-        }
+        // Loaded in every turn, as a processor cannot foresee whether any ray asks
+        const Ints asks = now.goes && near > now.depth && n > now.low;
+        Reals near_before, far_before;
+        faces_met(&near_before, &far_before, list_faces, first, count, n - 1, asks, away);
+        const Ints beyond = asks && far_before > now.depth;
         const Ints found = now.goes && !passed && !beyond;
 
         // They cross their lists from now.r to r_next
@@ -206,13 +227,10 @@ inline void follow(Seen *seen, const Packet *packet, const Axis *u, const Axis *
         const Ints meets = found && near <= next_depth;
         if (ANY(meets)) {
             const Ints entries = first + ((away ? n : count - 1 - n) << 2 * LIST_TILE_SHIFT);
-            const Ints places = select((Ints)(0), 2 * entries, there);
-            const Words red_green = words_at(media, places);
-            const Words blue_extinction = words_at(media + 1, places);
+            const Quads medium = media_at(media, select((Ints)(0), entries, there));
             const Reals length_crossed = lengths_between(packet, near, far, now.r, r_next, now.depth, next_depth,
                                                          deep_depth, inverse_depth);
-            composite_medium(seen, as_float16(blue_extinction.high) * length_crossed, as_float16(red_green.low),
-                             as_float16(red_green.high), as_float16(blue_extinction.low), meets);
+            composite_medium(seen, medium.of[3] * length_crossed, medium.of[0], medium.of[1], medium.of[2], meets);
         }
         const Ints ends_here = meets && far <= next_depth; // behind it comes the next one
         const Ints leaves = found && !ends_here;

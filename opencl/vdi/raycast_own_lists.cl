@@ -9,6 +9,7 @@
 //
 // -D OFFSET_T, PARALLEL, SHIFTED, PACKED, COMPENSATED (1)    as in vdi/raycast.cl
 #include "common/packet_light.cl"
+#include "common/quads.cl"
 #include "common/supersegments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -44,30 +45,6 @@
 #else
 #define NEARNESS(z) (-(z))
 #endif
-
-// Four numbers of each list, or pixel: each vector has those of one tile, or each has one of all lanes.
-typedef struct {
-    Reals of[4];
-} Quads;
-
-// The first halves, or the second ones, of each 128 bits of two vectors; and their numbers in turns, or half behind half.
-// Swizzles of whole vectors: of vectors put together by single numbers a compiler makes as many instructions.
-#define FIRST_HALVES(p, q) ((Reals)((p).s014589cd, (q).s014589cd))
-#define SECOND_HALVES(p, q) ((Reals)((p).s2367abef, (q).s2367abef))
-#define IN_TURNS s08192a3b4c5d6e7f
-#define JOINED s018923ab45cd67ef
-
-// From tiles to lanes, or back: each 4 x 4 of a place in the tiles.
-inline Quads transposed(Quads x)
-{
-    const Reals first_01 = FIRST_HALVES(x.of[0], x.of[1]).IN_TURNS;
-    const Reals first_23 = FIRST_HALVES(x.of[2], x.of[3]).IN_TURNS;
-    const Reals second_01 = SECOND_HALVES(x.of[0], x.of[1]).IN_TURNS;
-    const Reals second_23 = SECOND_HALVES(x.of[2], x.of[3]).IN_TURNS;
-    const Quads result = {{FIRST_HALVES(first_01, first_23).JOINED, SECOND_HALVES(first_01, first_23).JOINED,
-                           FIRST_HALVES(second_01, second_23).JOINED, SECOND_HALVES(second_01, second_23).JOINED}};
-    return result;
-}
 
 typedef struct {
     Reals front, back; // depth coordinates

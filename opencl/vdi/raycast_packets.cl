@@ -190,7 +190,11 @@ inline void sweep(Seen *seen, const Packet *packet, const Axis *p, const Axis *q
         }
 #endif
         const Reals r_p = crossings(p, (Reals)(P));
-        for (int place_q = least_of(now.q, column); ANY(column); ++place_q) {
+        // By the columns before: where a ray goes does not wait for what it sees in this one
+        const Ints dark = seen->transmittance < transmittance_cutoff;
+        if (!ANY(column))
+            continue;
+        for (int place_q = least_of(now.q, column);; ++place_q) {
             const Ints here = column && now.q == place_q;
             if (!ANY(here))
                 continue;
@@ -230,7 +234,7 @@ inline void sweep(Seen *seen, const Packet *packet, const Axis *p, const Axis *q
             }
             const Ints steps_p = here && r_p <= r_q;
             const Ints steps_q = here && !(r_p <= r_q);
-            Ints ends = here && (r_next >= r_end || seen->transmittance < transmittance_cutoff);
+            Ints ends = here && (r_next >= r_end || dark);
             ends = ends || (P + p->step < 0 || P + p->step >= p->lists ? steps_p : (Ints)(0));
             ends = ends || (Q + q->step < 0 || Q + q->step >= q->lists ? steps_q : (Ints)(0));
             now.r = select(now.r, r_next, here);
@@ -238,12 +242,15 @@ inline void sweep(Seen *seen, const Packet *packet, const Axis *p, const Axis *q
             now.p = select(select(now.p, (Ints)(place_p + 1), steps_p), (Ints)(NOWHERE), ends);
             now.q = select(now.q, (Ints)(place_q + 1), steps_q);
             column = now.p == place_p;
+            const bool goes_on = ANY(column); // here, where it is one instruction, as the comparison has just made a mask
 #ifdef SKIP_EMPTY
             if (((P + p->step) ^ P) >> TILE_SHIFT)
                 fresh = fresh || steps_p;
             if (((Q + q->step) ^ Q) >> TILE_SHIFT)
                 fresh = fresh || steps_q;
 #endif
+            if (!goes_on)
+                break;
         }
     }
     composite_met(seen, &met, packet, along_depth, deep_depth, inverse_depth);
