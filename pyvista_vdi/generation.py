@@ -839,6 +839,7 @@ class _CopiedLists(_GrowingLists):
                 for name, item in _LIST_ARRAYS.items()
             ]
         self._first = 0  # list of the last slice
+        self._copies: list[Callable[[], None]] = []
 
     def _buffers(self) -> Iterator[DeviceBuffer]:
         yield from (*self._targets, self._sums, self._places)
@@ -859,10 +860,12 @@ class _CopiedLists(_GrowingLists):
     def _learned(self, begin: int) -> None:
         if any(self._known > array.room for array in self._arrays.values()):
             self._runtime.finish()  # what is being copied would not move with the array
+        copies = []
         for target, array in zip(self._targets, self._arrays.values(), strict=True):
             array.reserve(self._known, self._most)
             part: NDArray[Any] = array.part(begin, self._known)
-            self._runtime.download_later(target, part)
+            copies.append(self._runtime.download_later(target, part))
+        self._copies = copies  # a copy that nobody remembers is waited for; those before are done
 
     def _room_for(self, n: int) -> tuple[int, list[DeviceBuffer]]:
         return 0, self._targets
