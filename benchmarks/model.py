@@ -479,7 +479,7 @@ def stage_of(kernel: str) -> str:
     """Return which of generation's stages a kernel belongs to, by its name."""
     if "march" in kernel or "record" in kernel:
         return "march"
-    return "pack" if any(word in kernel for word in ("pack", "scan", "compact")) else "shorten"
+    return "pack" if any(word in kernel for word in ("pack", "lengths", "offsets")) else "shorten"
 
 
 def profiled(watch: Stopwatch, work: Callable[[], Any]) -> list[dict[str, float]]:

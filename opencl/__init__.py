@@ -55,6 +55,11 @@ Entry points:
 ``vdi/generate.cl``, with ``vdi/runs.cl``
     ``march_lists``, ``shorten_lists``, ``pack_lists``: volume to lists of supersegments; with
     ``vdi/criteria.cl`` also ``cut_lists``, where another criterion than least error is asked for.
+``vdi/march_blocks.cl``, ``vdi/shorten_blocks.cl``, with ``vdi/run_blocks.cl``
+    ``march_blocks``, ``shorten_blocks``: ``march_lists`` and ``shorten_lists`` on a CPU, in vectors
+    that are written out.
+``vdi/offsets.cl``
+    ``sum_lengths``, ``list_offsets``: where each list begins in a VDI's arrays.
 ``vdi/bricks.cl``
     ``want_bricks``, ``sample_steps``: samples of a volume that is on the device brick by brick.
 ``vdi/prepare.cl``

@@ -12,6 +12,8 @@ GROUP = 64
 #: Pixels along the edges of a block, and up a strip of them: those of ``common/rays.cl``.
 _BLOCK = 4
 _STRIP = 16
+#: Rays of a block, which kernels written out in vectors follow in one work-item.
+BLOCK_RAYS = _BLOCK * _BLOCK
 #: Work-items of a column of a strip, which a group draws: that of ``common/rays.cl``.
 COLUMN_ITEMS = _BLOCK * _STRIP
 #: Pixels along the edges of a cell, and all of them: those of ``common/rays.cl``.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from ._version import __version__
 from .ambient_occlusion import AmbientOcclusion, OcclusionGrid
-from .blocks import GROUP, block_items
+from .blocks import BLOCK_RAYS, GROUP, block_items
 from .bricks import Room, StepSampler
 from .camera import Camera, check_window_size
 from .checks import as_float, memory_limit_bytes
@@ -21,7 +22,16 @@ from .dial import Dial, refuse_settings
 from .errors import Cancelled, InvalidArgumentError
 from .host_memory import require_host_memory
 from .lighting import Lights
-from .opencl_runtime import DeviceBuffer, GrowingArray, Runtime, aligned_empty, get_runtime
+from .opencl_runtime import (
+    DeviceBuffer,
+    GrowingArray,
+    Kernel,
+    LocalMemory,
+    Runtime,
+    aligned_empty,
+    get_runtime,
+    kept_together,
+)
 from .precision import check_precision
 from .rays import check_list_space
 from .transfer_function import TransferFunction
@@ -47,6 +57,10 @@ CRITERIA = tuple(_CRITERIA)
 _RUN_BYTES = 9 * 4
 #: Records have room for a multiple of so many runs: ``ERRORS`` of ``vdi/runs.cl``.
 _ERRORS_AT_A_TIME = 8
+#: ``-D`` names that ``vdi/march_blocks.cl`` knows; ``COMPENSATED=1`` changes no march.
+_IN_BLOCKS = {"VOXEL_T", "INDEX_T", "NEAREST", "BY_SCALAR", "SKIP_EMPTY", "BLOCK_SHIFT"}
+#: Lists whose lengths a work-item sums up: that of ``vdi/offsets.cl``.
+_LISTS_PER_ITEM = 16
 #: A VDI's arrays of supersegments, as messages call them, and the shape of an element.
 _LIST_ARRAYS: dict[str, tuple[int, ...]] = {
     "front depths": (),
@@ -71,6 +85,7 @@ _CHUNK_STEPS = 128
 _FIRST_CHUNK_STEPS = 64
 
 Progress = Callable[[float], object]
+Defines = Mapping[str, str | int | None]
 
 
 @dataclass(frozen=True)
@@ -331,12 +346,15 @@ def generate_vdi(
         _Recorder(
             runtime, medium, camera, size, slices, limit, criterion, tolerance, hidden_weight
         ) as recorder,
-        _GrowingLists(runtime, size, limit) as lists,
+        _growing_lists(runtime, size, limit, slices.rows * width) as lists,
     ):
-        for first_row in range(0, height, recorder.slices.rows):
-            _report(progress, first_row / height)
-            rows = min(recorder.slices.rows, height - first_row)
+        _report(progress, 0.0)
+        for first_row in range(0, height, slices.rows):
+            rows = min(slices.rows, height - first_row)
             recorder.march(first_row, rows)
+            if first_row > 0:
+                lists.wait()  # for the slice before: the device has this one to go on with
+                _report(progress, first_row / height)
             recorder.pack(first_row, rows, lists)
         offsets, front, back, color, optical_depth = lists.finished()
     _report(progress, 1.0)
@@ -395,7 +413,9 @@ class _Slices:
             most = min(most, memory_limit // _SLICES_IN_LIMIT)
         self.rows = min(height, 4 * max(1, most // per_block_row))
         self.items = block_items(width, self.rows)
-        packed_bytes = self.items * (limit * _SUPERSEGMENT_BYTES + 8)
+        lists = self.rows * width
+        sums_bytes = 8 * _blocks_to_sum(lists)
+        packed_bytes = lists * (limit * _SUPERSEGMENT_BYTES + 8) + 8 + sums_bytes
         self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + packed_bytes
         self.text = f"{self.rows} rows of {width} lists of up to {limit} supersegments"
 
@@ -459,12 +479,8 @@ class _Recorder:
         self._grain = _steps_per_voxel(medium.volume, medium.sample_distance)
         items, capacity = self.slices.items, self.slices.capacity
         self._cuts = _CRITERIA[criterion]
-        names = ["longest_marches", "march_lists", "shorten_lists", "pack_lists"]
         defines = {**medium.defines, **rays.defines}
-        if self._cuts:
-            names.append("cut_lists")
-            defines["CRITERION"] = self._cuts
-        self._kernels = {name: runtime.kernel("vdi/generate.cl", name, defines) for name in names}
+        self._kernels = self._kernels_of(defines, rays.defines)
         with ExitStack() as stack:
             keep = stack.enter_context
             self._forms = keep(runtime.upload(rays.packed(), "rays"))
@@ -472,7 +488,6 @@ class _Recorder:
             self._errors = keep(runtime.buffer((items, capacity), name="merge errors"))
             self._thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
             self._counts = keep(runtime.buffer((items,), np.uint32, "list lengths"))
-            self._starts = keep(ExitStack())  # the buffer that says where the lists go
             self._sampler = None
             if medium.bricks is not None:
                 march = (
@@ -488,6 +503,27 @@ class _Recorder:
                 )
             self._longest = self._longest_marches()
             self._buffers = stack.pop_all()
+
+    def _kernels_of(self, defines: Defines, of_rays: Defines) -> dict[str, tuple[Kernel, int]]:
+        """Return kernels by what they do, with the rays that a work-item of theirs follows."""
+        path = "vdi/generate.cl"
+        used: dict[str, tuple[str, str, Defines, int]] = {
+            name: (path, name, defines, 1)
+            for name in ("longest_marches", "march_lists", "shorten_lists", "pack_lists")
+        }
+        if self._cuts:
+            used["cut_lists"] = (path, "cut_lists", {**defines, "CRITERION": self._cuts}, 1)
+        if self._runtime.is_cpu:
+            path = "vdi/shorten_blocks.cl"
+            used["shorten_lists"] = (path, "shorten_blocks", of_rays, BLOCK_RAYS)
+            known = {k: v for k, v in defines.items() if (k, v) != ("COMPENSATED", 1)}
+            if "BY_SCALAR" in known and known["INDEX_T"] == "uint" and known.keys() <= _IN_BLOCKS:
+                path = "vdi/march_blocks.cl"
+                used["march_lists"] = (path, "march_blocks", known, BLOCK_RAYS)
+        return {
+            name: (self._runtime.kernel(path, kernel, given), rays)
+            for name, (path, kernel, given, rays) in used.items()
+        }
 
     def __enter__(self) -> _Recorder:
         return self
@@ -582,14 +618,10 @@ class _Recorder:
 
     def pack(self, first_row: int, rows: int, lists: _GrowingLists) -> None:
         """Write the slice's lists behind those made before; what is launched next need not wait."""
-        runtime, (width, height) = self._runtime, self._size
+        width, height = self._size
         entries: tuple[Any, ...] = ()
         if self._far_entries:
             entries = (self._forms, np.int32(self._planes), np.int32(height), np.int32(first_row))
-        starts, targets = lists.room_for(runtime.download(self._counts, count=rows * width))
-        if starts[-1] == starts[0]:
-            return
-        self._starts.close()  # of the slice before, which is done
         self._launch(
             "pack_lists",
             block_items(width, rows),
@@ -597,13 +629,13 @@ class _Recorder:
             np.int32(self.slices.capacity),
             np.int32(width),
             np.int32(rows),
-            self._starts.enter_context(runtime.upload(starts, "list offsets")),
-            *targets,
+            *lists.follow(self._counts, rows * width),
             *entries,
         )
 
     def _launch(self, name: str, items: int, *arguments: Any) -> None:
-        self._runtime.launch(self._kernels[name], items, GROUP, *arguments, any_group=True)
+        kernel, rays = self._kernels[name]
+        self._runtime.launch(kernel, items // rays, GROUP // rays, *arguments, any_group=rays == 1)
 
 
 def _check_weights(tolerance: float, view_cone: float) -> tuple[float, float]:
@@ -617,61 +649,154 @@ def _check_weights(tolerance: float, view_cone: float) -> tuple[float, float]:
     return difference, float(1 - np.cos(np.radians(angle)))
 
 
-class _GrowingLists:
+class _GrowingLists(ABC):
     """A VDI's arrays while slices of lists are written into them, one behind the other.
 
     Room for every list at its longest is asked for at once: systems take memory as it is written,
     so that what stays unused costs nothing, and nothing is ever copied. :meth:`finished` gives it
-    back. A device that uses arrays in place writes all slices through the same buffers, which
-    reach as far as they may; any other has buffers of a slice, whose values are copied.
+    back. The device sums up the lists' lengths itself; the host learns the sum of a slice when it
+    has launched the march of the next, and waits for nothing else.
     """
 
-    def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int) -> None:
+    def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int):
         self._runtime = runtime
         self._size = size
+        self._limit = limit
         self._most = size[0] * size[1] * limit  # supersegments
-        self._offsets = np.zeros(size[0] * size[1] + 1, np.uint64)
-        self._made = 0  # lists so far
+        self._offsets = aligned_empty(size[0] * size[1] + 1, np.uint64)
+        self._offsets[0] = 0
+        self._made = 0  # lists, those of the last slice included
+        self._known = 0  # supersegments of all lists whose sum is known here
+        self._summing: Callable[[], None] | None = None  # waits for the sum of the last slice
         self._arrays = {name: GrowingArray(item) for name, item in _LIST_ARRAYS.items()}
-        self._begin = self._end = 0  # supersegments that the buffers hold
-        self._targets: list[tuple[DeviceBuffer, NDArray[Any]]] = []  # and what they are to fill
+        self._kernels = [
+            runtime.kernel("vdi/offsets.cl", name) for name in ("sum_lengths", "list_offsets")
+        ]
+        self._sums = runtime.buffer((_blocks_to_sum(slice_lists),), np.uint64, "sums of lengths")
 
     def __enter__(self) -> _GrowingLists:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for target, _part in self._targets:
-            target.release()
+        try:
+            self._runtime.finish()  # the arrays may go when nothing is copied into them any more
+        finally:
+            for buffer in self._buffers():
+                buffer.release()
 
-    def room_for(
-        self, lengths: NDArray[np.uint32]
-    ) -> tuple[NDArray[np.uint64], list[DeviceBuffer]]:
-        """Return where the next lists begin in the buffers, and the buffers."""
-        first, last = self._made, self._made + len(lengths)
-        begin = self._offsets[first]
-        ends: NDArray[np.uint64] = self._offsets[first + 1 : last + 1]
-        np.cumsum(lengths, dtype=np.uint64, out=ends)
-        np.add(ends, begin, out=ends)
-        self._made = last
-        end = int(self._offsets[last])
-        _require_room(end, self._size)
-        if end > self._end:
-            self._make_room(int(begin), end)
-        starts = aligned_empty(last + 1 - first, np.uint64)
-        np.subtract(self._offsets[first : last + 1], np.uint64(self._begin), out=starts)
-        return starts, [target for target, _part in self._targets]
+    def follow(self, lengths: DeviceBuffer, n: int) -> tuple[Any, ...]:
+        """Have the device find where the next n lists go, of which there are so many lengths.
+
+        Returns
+        -------
+        tuple
+            Arguments ``offsets`` to ``optical_depths`` of the kernel ``pack_lists``.
+        """
+        self.wait()
+        blocks = _blocks_to_sum(n)
+        shared = (np.uint32(n), lengths, LocalMemory(8 * GROUP), self._sums)
+        made, offsets = self._offsets_of_slice()
+        places = (np.uint32(made), offsets)
+        for kernel, arguments in zip(self._kernels, (shared, shared + places), strict=True):
+            self._runtime.launch(kernel, blocks * GROUP, GROUP, *arguments)
+        self._summing = self._sum_later(n)
+        self._made += n
+        held, targets = self._room_for(n)
+        return offsets, np.uint32(made), np.uint64(held), *targets
+
+    def wait(self) -> None:
+        """Wait until the lengths of the last slice are summed up."""
+        if self._summing is None:
+            return
+        self._summing()
+        self._summing = None
+        begin, self._known = self._known, self._sum()
+        _require_room(self._known, self._size)
+        self._learned(begin)
+
+    @abstractmethod
+    def finished(self) -> list[NDArray[Any]]:
+        """Return offsets, fronts, backs, colours and optical depths."""
+
+    @abstractmethod
+    def _buffers(self) -> Iterator[DeviceBuffer]:
+        """All buffers, to be released."""
+
+    @abstractmethod
+    def _offsets_of_slice(self) -> tuple[int, DeviceBuffer]:
+        """Return where in a buffer of offsets that of the next slice is, and the buffer."""
+
+    @abstractmethod
+    def _sum_later(self, n: int) -> Callable[[], None]:
+        """Let the host have the sum of the n lists that follow those made."""
+
+    @abstractmethod
+    def _sum(self) -> int:
+        """Return the supersegments of all lists, whose sum has come to the host."""
+
+    @abstractmethod
+    def _learned(self, begin: int) -> None:
+        """Do what can be done now that it is known which supersegments the last slice has."""
+
+    @abstractmethod
+    def _room_for(self, n: int) -> tuple[int, list[DeviceBuffer]]:
+        """Return the supersegments before those that the buffers for n lists hold, and these."""
+
+
+class _ListsInPlace(_GrowingLists):
+    """Of a device that uses the arrays in place: all slices are written through the same buffers.
+
+    These reach as far as they may; where the lists might pass their end, the host waits for the
+    lengths of the slice, and makes others.
+    """
+
+    def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int):
+        super().__init__(runtime, size, limit, slice_lists)
+        self._begin = self._end = 0  # supersegments that the buffers hold
+        self._targets: list[tuple[DeviceBuffer, NDArray[Any]]] = []  # and what they are to fill
+        self._last = np.zeros(1, np.uint64)
+        with kept_together() as keep:
+            keep(self._sums)
+            self._places = keep(runtime.target(self._offsets, "list offsets"))
+            runtime.write(self._places, np.zeros(1, np.uint64), first=0)
+            try:
+                self._make_room(0, 1)
+            except BaseException:
+                self._release_targets()
+                raise
+
+    def _buffers(self) -> Iterator[DeviceBuffer]:
+        yield from (target for target, _part in self._targets)
+        yield from (self._sums, self._places)
+
+    def _offsets_of_slice(self) -> tuple[int, DeviceBuffer]:
+        return self._made, self._places
+
+    def _sum_later(self, n: int) -> Callable[[], None]:
+        return self._runtime.download_later(self._places, self._last, first=self._made + n)
+
+    def _sum(self) -> int:
+        return int(self._last[0])
+
+    def _learned(self, begin: int) -> None:
+        if self._known > self._end:
+            self._make_room(begin, self._known)
+
+    def _room_for(self, n: int) -> tuple[int, list[DeviceBuffer]]:
+        if self._known + n * self._limit > self._end:
+            self.wait()
+        return self._begin, [target for target, _part in self._targets]
 
     def _make_room(self, begin: int, end: int) -> None:
         """Have buffers of the supersegments from ``begin``, those made so far, to ``end``."""
         self._collect(begin)
         for array in self._arrays.values():
             array.reserve(end, self._most)
-        alignment = self._runtime.in_place_alignment
-        if alignment is not None:
-            begin -= begin % alignment  # so many elements are aligned as well
-            room = min(array.room for array in self._arrays.values())
-            largest = self._runtime.info.max_allocation // _LARGEST_ELEMENT
-            end = max(end, min(room, begin + largest))
+        alignment = self._runtime.in_place_alignment or 1
+        begin -= begin % alignment  # so many elements are aligned as well
+        room = min(array.room for array in self._arrays.values())
+        largest = self._runtime.info.max_allocation // _LARGEST_ELEMENT
+        end = max(end, min(room, begin + largest))
         self._begin, self._end = begin, end
         for name, array in self._arrays.items():
             part: NDArray[Any] = array.part(begin, end)
@@ -679,18 +804,93 @@ class _GrowingLists:
 
     def _collect(self, made: int) -> None:
         """Wait until so many supersegments are in the arrays, and let go of the buffers."""
-        while self._targets:
-            target, part = self._targets[-1]
+        for target, part in self._targets:
             filled = part[: made - self._begin]
             self._runtime.download(target, filled, count=filled.size)
-            target.release()
+        self._release_targets()
+
+    def _release_targets(self) -> None:
+        while self._targets:
+            self._targets[-1][0].release()
             self._targets.pop()
 
     def finished(self) -> list[NDArray[Any]]:
-        """Return offsets, fronts, backs, colours and optical depths."""
-        n = int(self._offsets[-1])
-        self._collect(n)
-        return [self._offsets, *(array.finished(n) for array in self._arrays.values())]
+        self.wait()
+        self._collect(self._known)
+        self._runtime.download(self._places, self._offsets)
+        arrays = [array.finished(self._known) for array in self._arrays.values()]
+        return [self._offsets, *arrays]
+
+
+class _CopiedLists(_GrowingLists):
+    """Of any other device, which has buffers of a slice at its longest.
+
+    What a slice has is copied from there while the next one is marched, before it is packed.
+    """
+
+    def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int):
+        super().__init__(runtime, size, limit, slice_lists)
+        with kept_together() as keep:
+            keep(self._sums)
+            self._places = keep(runtime.buffer((slice_lists + 1,), np.uint64, "list offsets"))
+            runtime.write(self._places, np.zeros(1, np.uint64), first=0)
+            self._targets = [
+                keep(runtime.buffer((slice_lists * limit, *item), name=name))
+                for name, item in _LIST_ARRAYS.items()
+            ]
+        self._first = 0  # list of the last slice
+        self._copies: list[Callable[[], None]] = []
+
+    def _buffers(self) -> Iterator[DeviceBuffer]:
+        yield from (*self._targets, self._sums, self._places)
+
+    def _offsets_of_slice(self) -> tuple[int, DeviceBuffer]:
+        return 0, self._places
+
+    def _sum_later(self, n: int) -> Callable[[], None]:
+        self._first = self._made
+        ends = self._offsets[self._made + 1 : self._made + n + 1]
+        return self._runtime.download_later(self._places, ends, first=1)
+
+    def _sum(self) -> int:
+        ends = self._offsets[self._first + 1 : self._made + 1]
+        np.add(ends, self._offsets[self._first], out=ends)
+        return int(ends[-1])
+
+    def _learned(self, begin: int) -> None:
+        if any(self._known > array.room for array in self._arrays.values()):
+            self._runtime.finish()  # what is being copied would not move with the array
+        copies = []
+        for target, array in zip(self._targets, self._arrays.values(), strict=True):
+            array.reserve(self._known, self._most)
+            part: NDArray[Any] = array.part(begin, self._known)
+            copies.append(self._runtime.download_later(target, part))
+        self._copies = copies  # a copy that nobody remembers is waited for; those before are done
+
+    def _room_for(self, n: int) -> tuple[int, list[DeviceBuffer]]:
+        return 0, self._targets
+
+    def finished(self) -> list[NDArray[Any]]:
+        self.wait()
+        self._runtime.finish()
+        arrays = [array.finished(self._known) for array in self._arrays.values()]
+        return [self._offsets, *arrays]
+
+
+def _growing_lists(
+    runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int
+) -> _GrowingLists:
+    """Return the arrays of a VDI of so many lists, for slices of up to ``slice_lists``."""
+    offsets_bytes = 8 * (size[0] * size[1] + 1)
+    in_place = runtime.in_place_alignment is not None
+    if in_place and offsets_bytes <= runtime.info.max_allocation:
+        return _ListsInPlace(runtime, size, limit, slice_lists)
+    return _CopiedLists(runtime, size, limit, slice_lists)
+
+
+def _blocks_to_sum(lists: int) -> int:
+    """Return the work-groups that sum up the lengths of so many lists."""
+    return -(-lists // (GROUP * _LISTS_PER_ITEM))
 
 
 def _require_room(supersegments: int, size: tuple[int, int]) -> None:

@@ -47,13 +47,6 @@ inline float march_value(const March *march, __global const float *form, float a
 #endif
 }
 
-// Model-frame direction of the ray per unit of t.
-inline float3 model_direction(__global const float *forms, float a, float b)
-{
-    return (float3)(form_slope(forms + 3 * FORM_SIZE, a, b), form_slope(forms + 4 * FORM_SIZE, a, b),
-                    form_slope(forms + 5 * FORM_SIZE, a, b));
-}
-
 // Set up the march of pixel offsets (a, b). `forms`: 3 index positions, 3 model directions, then `planes` to clip to.
 // `sample_distance` and `unit_distance` in model units. Returns false where the ray misses.
 inline bool begin_march(March *march, __global const float *forms, int planes, float a, float b,

@@ -34,6 +34,13 @@ inline float form_slope(__global const float *form, float a, float b)
     return FORM_SLOPE(float, form, a, b);
 }
 
+// Model-frame direction of a ray that is marched, per unit of t. `forms`: 3 index positions, then 3 model directions.
+inline float3 model_direction(__global const float *forms, float a, float b)
+{
+    return (float3)(form_slope(forms + 3 * FORM_SIZE, a, b), form_slope(forms + 4 * FORM_SIZE, a, b),
+                    form_slope(forms + 5 * FORM_SIZE, a, b));
+}
+
 // Clip [*t0, *t1] to where each of `count` forms is >= 0. Returns whether anything is left.
 inline bool clip_to_planes(__global const float *planes, int count, float a, float b, float *t0, float *t1)
 {

@@ -8,7 +8,8 @@
 //
 // A ray's march is cut into chunks of equally many steps. march_lists takes the steps of one chunk and appends what is not
 // homogeneous with the run before; shorten_lists then shortens the records that have grown too long, and raises the
-// ray's threshold. After the last chunk it shortens each record to the budget, and pack_lists writes the arrays.
+// ray's threshold. After the last chunk it shortens each record to the budget, vdi/offsets.cl sums up the lists' lengths, and
+// pack_lists writes the arrays.
 // The march is one kernel and the merging another because they want different vector code on a CPU.
 //
 // Lengths along a ray are t, the view depth of V_O less the VDI's depth origin, world units; with FAR_ENTRIES, less that of
@@ -255,7 +256,9 @@ __kernel void pack_lists(
     __global const float *records,
     int capacity,
     int width, int rows,            // of the slice
-    __global const ulong *offsets,  // where each list begins in the arrays; width * rows + 1
+    __global const ulong *offsets,  // where each list begins, and the last one ends
+    uint made,                      // lists before the slice's
+    ulong held,                     // supersegments before those that the arrays hold
     __global float *fronts,         // view depth less the depth origin, world units
     __global float *backs,
     __global float *colors,         // straight RGB, 3 per supersegment
@@ -272,9 +275,9 @@ __kernel void pack_lists(
     if (pixel.x >= width || pixel.y >= rows)
         return;
     __global const float *record = records + record_start(item, capacity, RUN_WORDS);
-    const size_t list = (size_t)pixel.y * width + pixel.x;
-    const ulong begin = offsets[list];
-    const int count = (int)(offsets[list + 1] - begin);
+    const size_t list = made + (size_t)pixel.y * width + pixel.x;
+    const ulong begin = offsets[list] - held;
+    const int count = (int)(offsets[list + 1] - offsets[list]);
 #ifdef FAR_ENTRIES
     const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
     const float b = (float)(first_row + pixel.y) + 0.5f - 0.5f * (float)height;

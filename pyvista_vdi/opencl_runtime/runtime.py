@@ -477,6 +477,56 @@ class Runtime:
                     self._copy("[read]", memory, out, to_host=True)
         return out
 
+    def download_later(
+        self, buffer: DeviceBuffer, out: NDArray[Any], *, first: int = 0
+    ) -> Callable[[], None]:
+        """Copy part of a buffer into an array when all that was enqueued before is done.
+
+        Inside :meth:`background` the copy is done when this returns.
+
+        Parameters
+        ----------
+        buffer : DeviceBuffer
+            The source.
+        out : numpy.ndarray
+            C-contiguous target of the buffer's dtype; leave it alone until then.
+        first : int
+            The first element that is copied; as many follow as the array has.
+
+        Returns
+        -------
+        callable
+            Returns when the values are there, and raises DeviceError if the driver failed.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If the elements are not all in the buffer, or the array does not fit.
+        DeviceError
+            If the driver fails.
+        """
+        memory = buffer.memory
+        self._check_part(buffer, out, first)
+        if not out.flags.writeable:
+            raise InvalidArgumentError(f"the target for {buffer.name!r} is not writable")
+        if not out.nbytes:
+            return lambda: None
+        reading = f"reading {out.nbytes} bytes of the buffer {buffer.name!r}"
+        with self._driver(reading):
+            if self._turns.worker is not None:
+                self._copy("[read]", memory, out, to_host=True, offset=first * out.itemsize)
+                return lambda: None
+            event = opencl().enqueue_copy(
+                self._queue, out, memory, src_offset=first * out.itemsize, is_blocking=False
+            )
+            self._record("[read]", event)
+
+        def wait() -> None:
+            with self._driver(reading):
+                event.wait()
+
+        return wait
+
     def write(self, buffer: DeviceBuffer, array: NDArray[Any], *, first: int | None = None) -> None:
         """Copy an array into a buffer; the array is free to change when this returns.
 
@@ -498,13 +548,10 @@ class Runtime:
         """
         memory = self._writable_memory(buffer)
         array = np.ascontiguousarray(array)
-        elements = buffer.nbytes // buffer.dtype.itemsize
-        if first is not None and not 0 <= first <= elements - array.size:
-            raise InvalidArgumentError(
-                f"{array.size} elements from {first} on are not all in the buffer "
-                f"{buffer.name!r}, which has {elements}"
-            )
-        check_host_array(array, buffer, elements if first is None else array.size)
+        if first is None:
+            check_host_array(array, buffer, buffer.nbytes // buffer.dtype.itemsize)
+        else:
+            self._check_part(buffer, array, first)
         if array.nbytes:
             with self._driver(f"writing {array.nbytes} bytes to the buffer {buffer.name!r}"):
                 self._copy("[write]", memory, array, offset=(first or 0) * array.itemsize)
@@ -646,6 +693,17 @@ class Runtime:
         )
         self._record("[map]", event)
         mapped.base.release(self._queue)
+
+    @staticmethod
+    def _check_part(buffer: DeviceBuffer, array: NDArray[Any], first: int) -> None:
+        """Refuse an array that does not fit a buffer's elements from one on."""
+        elements = buffer.nbytes // buffer.dtype.itemsize
+        if not 0 <= first <= elements - array.size:
+            raise InvalidArgumentError(
+                f"{array.size} elements from {first} on are not all in the buffer "
+                f"{buffer.name!r}, which has {elements}"
+            )
+        check_host_array(array, buffer, array.size)
 
     def _writable_memory(self, buffer: DeviceBuffer) -> Any:
         if not buffer.writable:

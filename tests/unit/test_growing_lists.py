@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from pyvista_vdi import Camera, generation
@@ -45,3 +47,45 @@ def test_slices_make_the_same_vdi_however_memory_is_had(monkeypatch, make, camer
         monkeypatch.setattr(GrowingArray, "_move", limited)
     assert make(camera).equals(whole)
     assert (len(moved) >= 4) == (memory in ("little", "least"))
+
+
+@pytest.mark.parametrize("copied", [False, True], ids=["in place", "copied"])
+def test_a_slice_is_marched_before_the_sum_of_the_one_before_is_waited_for(
+    monkeypatch, runtime, make, copied
+):
+    monkeypatch.setattr(generation, "_SLICE_BYTES", 1)
+    if copied:
+        monkeypatch.setattr(Runtime, "in_place_alignment", None)
+    elif runtime.in_place_alignment is None:
+        pytest.skip("the device copies")
+    done = []
+    march, later = generation._Recorder.march, Runtime.download_later
+
+    def noted_march(self, first_row, rows):
+        done.append("march")
+        march(self, first_row, rows)
+
+    def noted_later(self, buffer, out, *, first=0):
+        wait = later(self, buffer, out, first=first)
+
+        def noted_wait():
+            done.append("wait")
+            wait()
+
+        return noted_wait
+
+    monkeypatch.setattr(generation._Recorder, "march", noted_march)
+    monkeypatch.setattr(Runtime, "download_later", noted_later)
+    make(CAMERA)
+    slices = -(-WINDOW[1] // 4)
+    assert done == ["march", *["march", "wait"] * (slices - 1), "wait"]
+
+
+def test_offsets_that_no_buffer_holds_are_copied(monkeypatch, runtime):
+    kinds = []
+    for most in (80007, 80008):
+        monkeypatch.setattr(runtime, "info", replace(runtime.info, max_allocation=most))
+        with generation._growing_lists(runtime, (1000, 10), 2, 16) as lists:
+            kinds.append(type(lists).__name__)
+    in_place = runtime.in_place_alignment is not None
+    assert kinds == ["_CopiedLists", "_ListsInPlace" if in_place else "_CopiedLists"]

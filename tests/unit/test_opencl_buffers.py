@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import mmap
 import threading
@@ -220,6 +221,28 @@ def test_write_fill_and_download_into(runtime):
             runtime.fill(buffer, np.zeros((), "f8")[()].astype("c16"))
         with pytest.raises(InvalidArgumentError, match="7 elements were asked"):
             runtime.download(buffer, count=7)
+
+
+@pytest.mark.parametrize("behind_frames", [False, True])
+def test_download_later(runtime, behind_frames):
+    values = np.arange(20, dtype=np.float32).reshape(5, 4)
+    out = np.zeros(6, np.float32)
+    with (
+        runtime.background() if behind_frames else contextlib.nullcontext(),
+        runtime.upload(values, "values") as buffer,
+    ):
+        wait = runtime.download_later(buffer, out, first=3)
+        wait()
+        np.testing.assert_array_equal(out, np.arange(3, 9))
+        runtime.download_later(buffer, out[:0], first=20)()
+        for first in (-1, 15):
+            with pytest.raises(InvalidArgumentError, match=f"6 elements from {first} on"):
+                runtime.download_later(buffer, out, first=first)
+        with pytest.raises(InvalidArgumentError, match="float32"):
+            runtime.download_later(buffer, out.astype(np.float64))
+        out.flags.writeable = False
+        with pytest.raises(InvalidArgumentError, match="not writable"):
+            runtime.download_later(buffer, out)
 
 
 def test_sizes_are_bytes_or_shapes(runtime):

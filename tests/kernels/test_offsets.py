@@ -1,0 +1,72 @@
+"""opencl/vdi/offsets.cl: where lists begin, against NumPy's running sum, slice behind slice."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pyvista_vdi.opencl_runtime import LocalMemory
+
+LISTS_PER_ITEM = 16  # see vdi/offsets.cl
+UNTOUCHED = np.uint64(0xA5A5A5A5A5A5A5A5)
+
+
+def lengths_of(kind, n, seed):
+    rng = np.random.default_rng(seed)
+    if kind == "empty":
+        return np.zeros(n, np.uint32)
+    if kind == "longest":  # sums beyond 2^32 from the second on
+        return np.full(n, 2**32 - 1, np.uint32)
+    return (rng.integers(0, 4097, n) * (rng.random(n) < 0.7)).astype(np.uint32)
+
+
+def summed(runtime, slices, group):
+    """Offsets that the device makes of slices of lengths, one behind the other."""
+    kernels = [runtime.kernel("vdi/offsets.cl", name) for name in ("sum_lengths", "list_offsets")]
+    total = sum(map(len, slices))
+    most = max(map(len, slices))
+    room = np.full(total + 3, UNTOUCHED)
+    room[0] = 0
+    with (
+        runtime.buffer(room.shape, np.uint64) as offsets,
+        runtime.buffer((-(-most // (group * LISTS_PER_ITEM)),), np.uint64) as sums,
+    ):
+        runtime.write(offsets, room)
+        made = 0
+        for lengths in slices:
+            blocks = -(-len(lengths) // (group * LISTS_PER_ITEM))
+            with runtime.upload(lengths) as given:
+                shared = (np.uint32(len(lengths)), given, LocalMemory(8 * group), sums)
+                runtime.launch(kernels[0], blocks * group, group, *shared)
+                runtime.launch(kernels[1], blocks * group, group, *shared, np.uint32(made), offsets)
+            made += len(lengths)
+        return runtime.download(offsets)
+
+
+@pytest.fixture(params=[1, 3, 64, 100, "most"])
+def group(request, runtime):
+    allowed = runtime._device
+    most = min(allowed.max_work_group_size, allowed.max_work_item_sizes[0], 1024)
+    return most if request.param == "most" else min(request.param, most)
+
+
+@pytest.mark.parametrize("kind", ["mixed", "empty", "longest"])
+@pytest.mark.parametrize(
+    "sizes", [(1,), (15, 16, 17), (1024, 1, 1023, 1025), (2**16 + 7, 3, 70001)], ids=str
+)
+def test_offsets_are_the_running_sum(runtime, group, kind, sizes):
+    slices = [lengths_of(kind, n, 70 + n) for n in sizes]
+    found = summed(runtime, slices, group)
+    n = sum(sizes)
+    np.testing.assert_array_equal(found[n + 1 :], UNTOUCHED)
+    expected = np.cumsum(np.concatenate(slices), dtype=np.uint64)
+    np.testing.assert_array_equal(found[: n + 1], np.concatenate([[0], expected]).astype(np.uint64))
+
+
+def test_offsets_in_pieces(runtime):
+    """Behind frames a launch is cut into several with offsets."""
+    slices = [lengths_of("mixed", n, n) for n in (30011, 2049)]
+    with runtime.background():
+        found = summed(runtime, slices, 64)
+    expected = np.cumsum(np.concatenate(slices), dtype=np.uint64)
+    np.testing.assert_array_equal(found[1 : len(expected) + 1], expected)
