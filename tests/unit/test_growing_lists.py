@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from pyvista_vdi import Camera, generation
+from pyvista_vdi import Camera, generation, growing_lists
 from pyvista_vdi.generation import generate_vdi
 from pyvista_vdi.opencl_runtime import GrowingArray, Runtime
 from tests.faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
@@ -33,7 +33,7 @@ def test_slices_make_the_same_vdi_however_memory_is_had(monkeypatch, make, camer
     if memory == "copied":  # as by a device with memory of its own
         monkeypatch.setattr(Runtime, "in_place_alignment", None)
     elif memory == "small buffers":  # a slice is all that one may hold
-        monkeypatch.setattr(generation, "_LARGEST_ELEMENT", 2**62)
+        monkeypatch.setattr(growing_lists, "_LARGEST_ELEMENT", 2**62)
     elif memory != "as it is":
         most = whole.n_supersegments * (2 if memory == "little" else 1)
         move = GrowingArray._move
@@ -85,7 +85,7 @@ def test_offsets_that_no_buffer_holds_are_copied(monkeypatch, runtime):
     kinds = []
     for most in (80007, 80008):
         monkeypatch.setattr(runtime, "info", replace(runtime.info, max_allocation=most))
-        with generation._growing_lists(runtime, (1000, 10), 2, 16) as lists:
+        with growing_lists.growing_lists(runtime, (1000, 10), 2, 16) as lists:
             kinds.append(type(lists).__name__)
     in_place = runtime.in_place_alignment is not None
     assert kinds == ["_CopiedLists", "_ListsInPlace" if in_place else "_CopiedLists"]
