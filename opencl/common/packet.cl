@@ -3,20 +3,14 @@
 // What common/list_ray.cl says of a ray holds for each lane. Written in vectors, and not left to a compiler that makes a
 // vector of work-items, because what lies in a list is the same for all lanes that cross it: it is loaded once, as a scalar,
 // where lanes that compilers make gather it sixteen times.
+#include "common/lanes.cl"
 #include "common/list_space.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#define LANES 16 // those of pyvista_vdi/packets.py
-typedef float16 Reals;
-typedef int16 Ints; // also truth values: all bits or none
-#define NUMBERS (Ints)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 #define NOWHERE INT_MAX
 // One instruction each; for what is never NaN
 #define LOWER_OF(x, y) select(y, x, (x) < (y))
 #define HIGHER_OF(x, y) select(y, x, (x) > (y))
-
-// Whether a truth value is true in any lane. By the sign, which compilers know how to ask a mask for.
-#define ANY(chosen) any((chosen) < 0)
 
 inline int least(Ints x)
 {

@@ -1,5 +1,5 @@
-// Four numbers for each of LANES lanes (common/packet.cl): as they lie in memory, and as one vector of each number.
-#include "common/packet.cl"
+// Four numbers for each lane (common/lanes.cl): as they lie in memory, and as one vector of each number.
+#include "common/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Each vector has four lanes' numbers side by side, or each has one of all lanes.

@@ -10,8 +10,7 @@ typedef struct {
     Reals from, to, optical_depth, red, green, blue;
 } Segments;
 
-// Where, in their part of the pool, rays keep the segments of their slots. In memory: as in words_at, registers would have to be
-// taken apart.
+// Where, in their part of the pool, rays keep the segments of their slots.
 #define ROWS_OF(slots, capacity) ((NUMBERS * ((capacity) + SPARE_SLOTS) + (slots)) * SEGMENT_SIZE)
 
 // The part of the pool that a packet of rays has, from its first one on.
@@ -21,8 +20,8 @@ typedef struct {
 // where there is no room is stored in the first of them.
 inline void store_segments(__global float *rows, Ints slots, int capacity, const Segments *segments)
 {
-    volatile Ints in_memory = ROWS_OF(min(slots, capacity), capacity);
-    const volatile int *at = (const volatile int *)&in_memory;
+    const Places in_memory = {ROWS_OF(min(slots, capacity), capacity)};
+    const volatile int *at = in_memory.each;
     const Quads first = {{segments->from, segments->to, segments->optical_depth, segments->red}};
     const Quads second = {{segments->green, segments->blue, segments->green, segments->blue}};
     const Quads of_first = transposed(first);
@@ -46,8 +45,8 @@ inline void store_segments(__global float *rows, Ints slots, int capacity, const
 // The segment of each ray in its slot, which is below the capacity.
 inline Segments load_segments(__global const float *rows, Ints slots, int capacity)
 {
-    volatile Ints in_memory = ROWS_OF(slots, capacity);
-    const volatile int *at = (const volatile int *)&in_memory;
+    const Places in_memory = {ROWS_OF(slots, capacity)};
+    const volatile int *at = in_memory.each;
 #define LOAD_ROWS(n, half)                                                                        \
     (Reals)(vload4(0, rows + at[n] + (half)), vload4(0, rows + at[4 + (n)] + (half)),             \
             vload4(0, rows + at[8 + (n)] + (half)), vload4(0, rows + at[12 + (n)] + (half)))

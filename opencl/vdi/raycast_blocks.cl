@@ -32,12 +32,12 @@ typedef ulong Word;
 typedef ulong8 Words8;
 #endif
 
-// One load each, as gathers are slow where these kernels run. The places are read from memory: to take each out of a register
-// costs two operations more. Words come in an order from which two shuffles within 128 bits make the halves of all.
+// One load each, as gathers are slow where these kernels run. Words come in an order from which two shuffles within 128 bits
+// make the halves of all.
 inline Words words_at(__global const ulong *words, Ints places)
 {
-    const volatile Ints in_memory = places;
-    const volatile int *at = (const volatile int *)&in_memory;
+    const Places in_memory = {places};
+    const volatile int *at = in_memory.each;
     __global const Word *of = (__global const Word *)words;
     const Reals p = as_float16((Words8)(of[at[0]], of[at[1]], of[at[4]], of[at[5]], of[at[8]], of[at[9]], of[at[12]], of[at[13]]));
     const Reals q = as_float16((Words8)(of[at[2]], of[at[3]], of[at[6]], of[at[7]], of[at[10]], of[at[11]], of[at[14]], of[at[15]]));
@@ -50,8 +50,8 @@ inline Words words_at(__global const ulong *words, Ints places)
 // The media of entries: red, green, blue, extinction. Pairs of words, which compilers shuffle less than vectors of four floats.
 inline Quads media_at(__global const ulong *media, Ints entries)
 {
-    const volatile Ints in_memory = entries;
-    const volatile int *at = (const volatile int *)&in_memory;
+    const Places in_memory = {entries};
+    const volatile int *at = in_memory.each;
     __global const ulong2 *of = (__global const ulong2 *)media;
     Quads rows;
     for (int n = 0; n < 4; ++n)

@@ -1,19 +1,7 @@
 // Runs of a block of 4 x 4 rays, in vectors that are written out: what vdi/runs.cl says of a run holds for each lane.
+#include "common/quads.cl"
 #include "vdi/runs.cl"
 #pragma OPENCL FP_CONTRACT OFF
-
-#define LANES 16 // rays of a block
-typedef float16 Reals;
-typedef int16 Ints; // also truth values: all bits or none
-#define NUMBERS (Ints)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
-// Whether a truth value is true in any lane. By the sign, which compilers know how to ask a mask for.
-#define ANY(chosen) any((chosen) < 0)
-
-// Sixteen numbers that are read one by one: from memory, as to take each out of a register costs more.
-typedef union {
-    Ints all;
-    int each[LANES];
-} Places;
 
 // A run of each ray.
 typedef struct {
@@ -25,25 +13,15 @@ typedef struct {
     Reals red, green, blue, density;
 } Features;
 
-// In each quarter of four vectors four rows of four words: rows become columns, and columns rows.
+// In place, see common/quads.cl.
 inline void transpose(Reals *a, Reals *b, Reals *c, Reals *d)
 {
-#define LOWER(x, y)                                                                                                   \
-    (Reals)(x.s0, y.s0, x.s1, y.s1, x.s4, y.s4, x.s5, y.s5, x.s8, y.s8, x.s9, y.s9, x.sc, y.sc, x.sd, y.sd)
-#define UPPER(x, y)                                                                                                   \
-    (Reals)(x.s2, y.s2, x.s3, y.s3, x.s6, y.s6, x.s7, y.s7, x.sa, y.sa, x.sb, y.sb, x.se, y.se, x.sf, y.sf)
-#define FIRST_PAIRS(x, y) (Reals)(x.s01, y.s01, x.s45, y.s45, x.s89, y.s89, x.scd, y.scd)
-#define SECOND_PAIRS(x, y) (Reals)(x.s23, y.s23, x.s67, y.s67, x.sab, y.sab, x.sef, y.sef)
-    const Reals lower_ab = LOWER((*a), (*b)), upper_ab = UPPER((*a), (*b));
-    const Reals lower_cd = LOWER((*c), (*d)), upper_cd = UPPER((*c), (*d));
-    *a = FIRST_PAIRS(lower_ab, lower_cd);
-    *b = SECOND_PAIRS(lower_ab, lower_cd);
-    *c = FIRST_PAIRS(upper_ab, upper_cd);
-    *d = SECOND_PAIRS(upper_ab, upper_cd);
-#undef LOWER
-#undef UPPER
-#undef FIRST_PAIRS
-#undef SECOND_PAIRS
+    const Quads rows = {{*a, *b, *c, *d}};
+    const Quads columns = transposed(rows);
+    *a = columns.of[0];
+    *b = columns.of[1];
+    *c = columns.of[2];
+    *d = columns.of[3];
 }
 
 // The runs at some words of the records of a block.

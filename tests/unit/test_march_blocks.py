@@ -57,10 +57,10 @@ def ways(monkeypatch, runtime):
     launches = {"march_blocks": 0, "march_lists": 0}
     launch = Runtime.launch
 
-    def counted(self, kernel, *arguments):
+    def counted(self, kernel, *arguments, **options):
         if kernel.name in launches:
             launches[kernel.name] += 1
-        launch(self, kernel, *arguments)
+        launch(self, kernel, *arguments, **options)
 
     monkeypatch.setattr(Runtime, "launch", counted)
 
