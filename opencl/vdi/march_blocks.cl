@@ -187,10 +187,12 @@ __kernel void march_blocks(
     // The growing runs, and their features, see march_lists
     Ints count = many.all;
     const Ints starts = NUMBERS * (capacity * RUN_WORDS);
-    Places places;
-    places.all = starts + max(count - 1, 0) * RUN_WORDS;
     const Ints some = count > 0;
+    Places places;
+    places.all = select((Ints)(0), starts + (count - 1) * RUN_WORDS, some);
     Runs run = load_runs(records, places.each);
+    // Records of rays that meet nothing are not touched: a system makes memory of them page by page
+    places.all = select((Ints)(-1), places.all, some);
     run.front = select((Reals)(0.0f), run.front, some);
     run.back = select((Reals)(-INFINITY), run.back, some);
     run.tau = select((Reals)(0.0f), run.tau, some);
@@ -247,7 +249,7 @@ __kernel void march_blocks(
             if (ANY(begins))
                 store_runs(records, places.each, run);
             count -= begins;
-            places.all = starts + max(count - 1, 0) * RUN_WORDS;
+            places.all = select((Ints)(-1), starts + (count - 1) * RUN_WORDS, count > 0);
             const Runs grown = merged_of(run, sample);
             run.front = select(run.front, group_front, begins);
             run.back = select(run.back, back, visible);

@@ -45,6 +45,7 @@ inline Runs load_runs(__global const float *records, const volatile int *at)
 #undef ODD_QUARTERS
 }
 
+// The same back, but of rays whose place is negative.
 inline void store_runs(__global float *records, const volatile int *at, Runs runs)
 {
 #define STORE(first, a, b, c, d)                                                                                      \
@@ -54,8 +55,10 @@ inline void store_runs(__global float *records, const volatile int *at, Runs run
     STORE_ROW(first + 2, c)                                                                                           \
     STORE_ROW(first + 3, d)
 #define STORE_ROW(n, row)                                                                                             \
-    vstore8((float8)(row.s0123, row.s89ab), 0, records + at[n]);                                                      \
-    vstore8((float8)(row.s4567, row.scdef), 0, records + at[(n) + 4]);
+    if (at[n] >= 0)                                                                                                   \
+        vstore8((float8)(row.s0123, row.s89ab), 0, records + at[n]);                                                  \
+    if (at[(n) + 4] >= 0)                                                                                             \
+        vstore8((float8)(row.s4567, row.scdef), 0, records + at[(n) + 4]);
     Reals a = (Reals)(runs.front.lo, runs.red.lo), b = (Reals)(runs.back.lo, runs.green.lo);
     Reals c = (Reals)(runs.tau.lo, runs.blue.lo), d = (Reals)(runs.transmittance.lo, runs.opacity.lo);
     STORE(0, a, b, c, d)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import ClassVar
@@ -296,25 +297,35 @@ def _looks(volume):
     )
 
 
+def _like_a_gpu(runtime):
+    """A second runtime on the device, whose kernels follow rays one by one, as a GPU's.
+
+    Kernels that follow blocks of rays, a CPU's, leave no choice of a size.
+    """
+    return Runtime(Candidate(replace(runtime.info, kind="GPU"), runtime._device))
+
+
 @pytest.fixture
 def tuned(runtime, monkeypatch, tmp_path, _plain_driver):
-    """A second runtime on the device, that tunes."""
+    """One that tunes."""
     _plain_driver(False)
     monkeypatch.setattr(tuning, "cache_folder", lambda: tmp_path)
     monkeypatch.setenv(tuning.TUNING_VARIABLE, "on")
-    tuned = Runtime(Candidate(runtime.info, runtime._device))
+    tuned = _like_a_gpu(runtime)
     assert tuned.tunes_groups
     return tuned
 
 
-def test_every_size_makes_the_same_bits(runtime, tuned):
+def test_every_size_makes_the_same_bits(tuned, monkeypatch):
     """97 x 63 pixels: no size divides them, so each has surplus work-items."""
+    monkeypatch.setenv(tuning.TUNING_VARIABLE, "off")
+    untuned = _like_a_gpu(tuned)
     tuned._tuner = _EachInTurn(tuned._device, tuned.info)
     rng = np.random.default_rng(5)
     volume = pvdi.Volume(rng.integers(0, 255, (20, 30, 24), dtype=np.uint8))
     looks = _looks(volume)
     view = filling_camera(volume.bounds, (97, 63))
-    vdi = generate_vdi(volume, view, (97, 63), looks, device=runtime)
+    vdi = generate_vdi(volume, view, (97, 63), looks, device=untuned)
     turned = view.azimuth(20)
     cropping = (3, 20, 3, 20, 3, 15)
 
@@ -326,7 +337,7 @@ def test_every_size_makes_the_same_bits(runtime, tuned):
 
     for _ in tuning.SIZES:  # each kernel comes to all of its own
         assert vdi.equals(generate_vdi(volume, view, (97, 63), looks, device=tuned))
-        for one, other in zip(drawn(runtime), drawn(tuned), strict=True):
+        for one, other in zip(drawn(untuned), drawn(tuned), strict=True):
             np.testing.assert_array_equal(one, other)
     for name in ("raycast", "render_volume", "preview", "march_lists", "shorten_lists"):
         assert len(set(tuned._tuner.used[name])) > 2, name
