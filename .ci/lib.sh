@@ -177,7 +177,7 @@ check_opencl_implementations() {
     PYVISTA_VDI_MIN_PLATFORMS=${PYVISTA_VDI_MIN_PLATFORMS:-2} "$work/venv/bin/python" - <<'PYTHON'
 import os
 
-from pyvista_vdi.opencl_runtime import list_devices
+from pyvista_vdi.device import list_devices
 
 wanted = int(os.environ["PYVISTA_VDI_MIN_PLATFORMS"])
 platforms = sorted({device.platform for device in list_devices() if device.usable})

@@ -17,21 +17,21 @@ from common import add_size, new_parser, save, subject_of, write_text  # beside 
 from tqdm import tqdm
 
 from pyvista_vdi import AmbientOcclusion
-from pyvista_vdi.ambient_occlusion import OcclusionGrid
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.device_volume import DeviceVolume
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.metrics import compare_images
-from pyvista_vdi.opencl_runtime import get_runtime
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.reference import ambient_transmittance
 from pyvista_vdi.reference.occlusion import _trilinear as trilinear
 from pyvista_vdi.reference.rays import pixel_ray
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS
-from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.vdi import VDI
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.render import raycast_volume
 
 VOLUMES = ("brain", "rayleigh_taylor")
 ANGLES = (0.0, 5.0, 30.0)

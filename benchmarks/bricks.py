@@ -21,7 +21,7 @@ from common import (  # beside this file
 )
 
 from pyvista_vdi import VDI
-from pyvista_vdi.generation import estimate, generate_vdi
+from pyvista_vdi.generation.generate import estimate, generate_vdi
 
 
 def main() -> int:

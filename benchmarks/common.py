@@ -12,16 +12,16 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pyvista_vdi import examples
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.classification import Classification
-from pyvista_vdi.compare.measure import without_infinities
-from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.device import Runtime
+from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.io import read, whole_file
-from pyvista_vdi.opencl_runtime import Runtime
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
-from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.vdi import VDI
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.measure.compare.measure import without_infinities
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
 
 INTERPOLATIONS = ("nearest", "linear")
 

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.occupancy import SLABS, TILE
-from pyvista_vdi.raycast import TRANSMITTANCE_CUTOFF
-from pyvista_vdi.rays import depth_range
+from pyvista_vdi.device.ray_forms import depth_range
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.occupancy import SLABS, TILE
+from pyvista_vdi.raycasting.raycast import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.reference.raycast import centre_ray_scale, near_limit
-from pyvista_vdi.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
-from pyvista_vdi.vdi import VDI
-from pyvista_vdi.volume import Volume
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -26,13 +26,13 @@ from common import (  # beside this file
 )
 from tqdm import tqdm
 
-from pyvista_vdi.compare import describe_system
-from pyvista_vdi.generation import CRITERIA, generate_vdi
-from pyvista_vdi.metrics import compare_images
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.generation.generate import CRITERIA, generate_vdi
+from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 ANGLES = (0.0, 5.0, 15.0, 30.0, 60.0, 90.0)
 BUDGETS = (15, 30)

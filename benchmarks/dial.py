@@ -26,9 +26,15 @@ from standard_table import SOFT_ONLY
 from tqdm import tqdm
 
 from pyvista_vdi import examples
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.classification import Classification
-from pyvista_vdi.dial import (
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.quality.dial import (
     EXPONENT,
     FRAME_COST,
     LADDER,
@@ -39,15 +45,9 @@ from pyvista_vdi.dial import (
     Prediction,
     predictions,
 )
-from pyvista_vdi.dial_measurement import Scene, turned
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.metrics import compare_images
-from pyvista_vdi.opencl_runtime import get_runtime
-from pyvista_vdi.raycast import prepared_vdi, render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
-from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.quality.probe import Scene, turned
+from pyvista_vdi.raycasting.raycast import prepared_vdi, render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 #: Timed frames of each rung, in turns; and of how many rungs: the larger VDIs take too long.
 FRAMES, TIMED_RUNGS = 6, 8

@@ -30,9 +30,9 @@ from common import (  # beside this file
 )
 from tqdm import tqdm
 
-from pyvista_vdi.compare import describe_system
 from pyvista_vdi.io import FORMAT_VERSION, read, read_info
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.model.vdi import VDI
 
 #: Bytes of a supersegment in the dense form: two depths, four colour components, float32.
 DENSE_BYTES = 24

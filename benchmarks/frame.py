@@ -29,9 +29,9 @@ from common import (  # beside this file
     window_size,
 )
 
-from pyvista_vdi.compare import describe_system
-from pyvista_vdi.opencl_runtime import Runtime, get_runtime
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.device import Runtime, get_runtime
+from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.model.vdi import VDI
 
 #: Degrees by which the camera turns from frame to frame where it moves.
 TURN = 0.01

@@ -21,12 +21,12 @@ from common import add_looks, add_size, looks_of, new_parser, save, subject_of  
 from tqdm import tqdm
 
 from pyvista_vdi import examples
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.compare import describe_system
-from pyvista_vdi.frame_rate import FLOOR, RECENT_FRAMES, FrameRateController
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.frame_rate import FLOOR, RECENT_FRAMES, FrameRateController
+from pyvista_vdi.raycasting.raycast import render_vdi
 
 #: Frames between those whose time at the floor and in full quality is measured beforehand.
 STRIDE = 6

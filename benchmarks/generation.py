@@ -39,13 +39,13 @@ from common import (  # beside this file
 )
 from tqdm import tqdm
 
-from pyvista_vdi.compare import describe_system
-from pyvista_vdi.compare.bounds import FRAME_RATIO_ANGLE
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.opencl_runtime import get_runtime
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.measure.compare.bounds import FRAME_RATIO_ANGLE
+from pyvista_vdi.measure.vtk_baselines import MAPPERS, PeerRenderer
 from pyvista_vdi.plotting.cli_support import add_volume_property
-from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.vtk_pipeline.peers import MAPPERS, PeerRenderer
+from pyvista_vdi.volume.render import raycast_volume
 
 #: Ratios: title, what is divided, and by which candidate or by the fastest of which.
 RATIOS: dict[str, tuple[str, str, tuple[str, ...]]] = {

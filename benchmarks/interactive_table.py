@@ -35,24 +35,24 @@ from model import Model, around_work, hosted_work
 from scaling import QUANTITIES, core_rows
 from tqdm import tqdm
 
-from pyvista_vdi.benchmark import find_dataset
-from pyvista_vdi.benchmark.candidates import (
+from pyvista_vdi.device import Runtime, get_runtime
+from pyvista_vdi.errors import VDIError
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.benchmark import find_dataset
+from pyvista_vdi.measure.benchmark.candidates import (
     CANDIDATES,
     VDIRenderer,
     VolumeRenderers,
     median,
     take_turns,
 )
-from pyvista_vdi.benchmark.datasets import label_of, require_allocation
-from pyvista_vdi.compare import describe_system
-from pyvista_vdi.device_volume import DeviceVolume
-from pyvista_vdi.errors import VDIError
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.opencl_runtime import Runtime, get_runtime
-from pyvista_vdi.raycast import PreparedVDI
-from pyvista_vdi.raycast_volume import raycast_medium
-from pyvista_vdi.standard_cases import ANGLES, filling_camera
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.measure.benchmark.datasets import label_of, require_allocation
+from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.model.standard_cases import ANGLES, filling_camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.render import raycast_medium
 
 #: What volumes stand for, and which they are.
 GROUPS: dict[str, tuple[str, ...]] = {

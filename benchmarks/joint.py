@@ -19,9 +19,9 @@ import numpy as np
 from common import add_looks, add_size, add_vdi_cache, new_parser, vdi_of  # beside this file
 from numpy.typing import NDArray
 
-from pyvista_vdi.joint import render_vdis
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.multi_vdi import render_vdis
+from pyvista_vdi.raycasting.raycast import render_vdi
 
 #: Azimuths from the first VDI's generating view, degrees.
 ANGLES = (0.0, 5.0, 30.0, 90.0)

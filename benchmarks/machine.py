@@ -22,8 +22,8 @@ import numpy as np
 from common import add_clock, clock_of, new_parser, save, table  # beside this file
 from tqdm import tqdm
 
-from pyvista_vdi.compare import describe_system
-from pyvista_vdi.opencl_runtime import Runtime, aligned_empty, get_runtime
+from pyvista_vdi.device import Runtime, aligned_empty, get_runtime
+from pyvista_vdi.measure.compare import describe_system
 
 KERNELS = Path(__file__).with_name("machine.cl")
 

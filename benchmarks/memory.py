@@ -24,12 +24,12 @@ import numpy as np
 from common import INTERPOLATIONS, at_hand, table, window_size  # beside this file
 
 from pyvista_vdi import Volume, examples
-from pyvista_vdi.classification import Classification
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.opencl_runtime import get_runtime
-from pyvista_vdi.precision import PRECISIONS
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.packing import PRECISIONS
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.raycasting.raycast import render_vdi
 
 VOLUMES = ("visible_female_head", "heptane", "rayleigh_taylor")
 

@@ -44,19 +44,19 @@ from counting import (
 from machine import Rates, Stopwatch, cache_of
 from tqdm import tqdm
 
-from pyvista_vdi.benchmark import find_dataset
-from pyvista_vdi.benchmark.candidates import VDIRenderer
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.compare import describe_system
-from pyvista_vdi.device_volume import DeviceVolume
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.opencl_runtime import Profile, Runtime, get_runtime
-from pyvista_vdi.raycast import PreparedVDI
-from pyvista_vdi.raycast_volume import raycast_medium
-from pyvista_vdi.standard_cases import ANGLES, filling_camera
-from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.vdi import VDI
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.device import Profile, Runtime, get_runtime
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.benchmark import find_dataset
+from pyvista_vdi.measure.benchmark.candidates import VDIRenderer
+from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.standard_cases import ANGLES, filling_camera
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.render import raycast_medium
 
 LEGEND = (
     "`floor`: the slowest of memory, gathers and arithmetic at the rates that `machine.py` has "

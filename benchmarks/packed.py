@@ -28,12 +28,12 @@ from common import (  # beside this file
 from files import DENSE_BYTES, mebibytes
 from tqdm import tqdm
 
-from pyvista_vdi.compare import describe_system
-from pyvista_vdi.metrics import compare_images
-from pyvista_vdi.opencl_runtime import get_runtime
-from pyvista_vdi.precision import PRECISIONS
-from pyvista_vdi.raycast import PreparedVDI
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.packing import PRECISIONS
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.raycast import PreparedVDI
 
 #: Degrees about the centre, from V_O.
 ANGLES = (0, 5, 30)

@@ -22,12 +22,12 @@ from common import (  # beside this file
 )
 from tqdm import tqdm
 
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.metrics import compare_images
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.vdi import VDI
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 #: What is changed; the first row is the default. ``lists`` is the VDI's window over the frame's.
 VARIANTS: tuple[dict[str, float], ...] = (

@@ -29,15 +29,15 @@ from common import (  # beside this file
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from pyvista_vdi.benchmark.preview import enlarged
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.compare import describe_system
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.metrics import compare_images
-from pyvista_vdi.opencl_runtime import get_runtime
-from pyvista_vdi.raycast import prepared_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.benchmark.preview import enlarged
+from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.raycast import prepared_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 #: Speeds, as multiples of the full frame's, at which the ways are compared.
 SPEEDS = (2.0, 3.0, 4.0)

@@ -22,8 +22,8 @@ from pathlib import Path
 WORKER = """
 import hashlib, sys, time
 import pyvista_vdi
-from pyvista_vdi.opencl_runtime import get_runtime
-from pyvista_vdi.raycast import PreparedVDI
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.raycasting.raycast import PreparedVDI
 
 runtime = get_runtime(sys.argv[1] or None)
 size = None

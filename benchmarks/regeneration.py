@@ -26,14 +26,14 @@ from common import (  # beside this file
 )
 from tqdm import tqdm
 
-from pyvista_vdi.background import BackgroundGeneration
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.compare import describe_system
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.opencl_runtime import get_runtime
-from pyvista_vdi.raycast import prepared_vdi
-from pyvista_vdi.standard_cases import filling_camera
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.background import BackgroundGeneration
+from pyvista_vdi.raycasting.raycast import prepared_vdi
 
 VOLUMES = ("aneurism", "brain", "heptane", "rayleigh_taylor")
 

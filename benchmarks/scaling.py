@@ -37,19 +37,19 @@ from common import (  # beside this file
 )
 from tqdm import tqdm
 
-from pyvista_vdi.benchmark import find_dataset
-from pyvista_vdi.benchmark.candidates import VDIRenderer, take_turns
-from pyvista_vdi.benchmark.procedural import PROCEDURAL
-from pyvista_vdi.compare import describe_system
-from pyvista_vdi.device_volume import DeviceVolume
-from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.device import Runtime, get_runtime
+from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.io import whole_file
-from pyvista_vdi.opencl_runtime import Runtime, get_runtime
-from pyvista_vdi.raycast import PreparedVDI
-from pyvista_vdi.raycast_volume import raycast_medium
-from pyvista_vdi.standard_cases import filling_camera
-from pyvista_vdi.vdi import VDI
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.measure.benchmark import find_dataset
+from pyvista_vdi.measure.benchmark.candidates import VDIRenderer, take_turns
+from pyvista_vdi.measure.benchmark.procedural import PROCEDURAL
+from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.render import raycast_medium
 
 LEGEND = (
     "Exponents of power laws, fitted by least squares of logarithms, with their 95 % confidence "

@@ -25,12 +25,12 @@ from common import (  # beside this file
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.compare import describe_system
-from pyvista_vdi.occupancy import OccupancyGrid
-from pyvista_vdi.opencl_runtime import Runtime, get_runtime
-from pyvista_vdi.raycast import PreparedVDI
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.device import Runtime, get_runtime
+from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.occupancy import OccupancyGrid
+from pyvista_vdi.raycasting.raycast import PreparedVDI
 
 #: Azimuths from V_O, degrees.
 ANGLES = (0.0, 5.0, 30.0, 60.0, 90.0, 180.0)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi.compare.bounds import CONVERGED_STEPS, SSIM_FROM_NEW_VIEWS
+from pyvista_vdi.measure.compare.bounds import CONVERGED_STEPS, SSIM_FROM_NEW_VIEWS
 
 Results = dict[str, Any]
 

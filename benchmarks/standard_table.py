@@ -1,7 +1,7 @@
 """Every standard case: volumes x transfer functions x interpolation, measured and judged.
 
-What is measured is ``pyvista_vdi.compare``'s; what must be reached, ``pyvista_vdi.compare.bounds``.
-See README.md in this folder for how to run it.
+What is measured is ``pyvista_vdi.measure.compare``'s; what must be reached,
+``pyvista_vdi.measure.compare.bounds``. See README.md in this folder for how to run it.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from standard_report import write_plot, write_tables
 from tqdm import tqdm
 
 from pyvista_vdi import examples
-from pyvista_vdi.compare import Report, Settings, judge_times, judge_vdi, judge_vtk, measure
-from pyvista_vdi.compare.bounds import CONVERGED_STEPS, FRAME_RATIO_ANGLE
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.standard_cases import ANGLES, TRANSFER_FUNCTIONS
+from pyvista_vdi.measure.compare import Report, Settings, judge_times, judge_vdi, judge_vtk, measure
+from pyvista_vdi.measure.compare.bounds import CONVERGED_STEPS, FRAME_RATIO_ANGLE
+from pyvista_vdi.model.standard_cases import ANGLES, TRANSFER_FUNCTIONS
 
 #: Volumes for which one transfer function has to do, because of their size.
 SOFT_ONLY = ("allen_mouse_brain",)

@@ -17,8 +17,8 @@ from pathlib import Path
 
 from pyvista_vdi.cli import main as command
 from pyvista_vdi.io import whole_file
-from pyvista_vdi.tradeoff import Point, Tradeoff
-from pyvista_vdi.tradeoff.findings import faster_vtk
+from pyvista_vdi.measure.tradeoff import Point, Tradeoff
+from pyvista_vdi.measure.tradeoff.findings import faster_vtk
 
 RESULTS = Path(__file__).resolve().parent / "results"
 

@@ -35,16 +35,16 @@ from common import (  # beside this file
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.metrics import compare_images
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.standard_cases import filling_camera
-from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.vdi import VDI
-from pyvista_vdi.view_error import TILE_SIZE, TILES, ViewErrorEstimator
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.quality.view_error import TILE_SIZE, TILES, ViewErrorEstimator
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 VOLUMES = ("aneurism", "bonsai", "brain", "heptane", "rayleigh_taylor", "tooth")
 LOOKS = ("soft", "steep")

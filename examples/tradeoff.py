@@ -15,7 +15,7 @@ from __future__ import annotations
 import sys
 
 from pyvista_vdi import examples
-from pyvista_vdi.tradeoff import measure_tradeoff, sweep
+from pyvista_vdi.measure.tradeoff import measure_tradeoff, sweep
 
 
 def main() -> None:

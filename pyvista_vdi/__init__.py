@@ -10,15 +10,14 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from ._version import __version__
+from pyvista_vdi import _moved
+from pyvista_vdi._version import __version__
 
 if TYPE_CHECKING:
-    from . import errors, examples
-    from .ambient_occlusion import AmbientOcclusion
-    from .api import estimate, generate, pick, read, render, render_depth, render_volume
-    from .camera import Camera
-    from .cropping import Cropping
-    from .errors import (
+    from pyvista_vdi import errors, examples
+    from pyvista_vdi.api import estimate, generate, pick, read, render, render_depth, render_volume
+    from pyvista_vdi.device import describe_devices, list_devices
+    from pyvista_vdi.errors import (
         Cancelled,
         DeviceError,
         DeviceMemoryError,
@@ -34,15 +33,17 @@ if TYPE_CHECKING:
         VDIFileError,
         VDIWarning,
     )
-    from .generation import Estimate
-    from .lighting import Light, Lights, Shading
-    from .metrics import compare_images
-    from .opencl_runtime import describe_devices, list_devices
-    from .picking import Pick
-    from .transfer_function import TransferFunction
-    from .vdi import VDI
-    from .volume import Volume
-    from .vtk_pipeline import VDIActor, VDIMapper, VDISource
+    from pyvista_vdi.generation.generate import Estimate
+    from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
+    from pyvista_vdi.model.camera import Camera
+    from pyvista_vdi.model.cropping import Cropping
+    from pyvista_vdi.model.lighting import Light, Lights, Shading
+    from pyvista_vdi.model.metrics import compare_images
+    from pyvista_vdi.model.transfer_function import TransferFunction
+    from pyvista_vdi.model.vdi import VDI
+    from pyvista_vdi.model.volume import Volume
+    from pyvista_vdi.raycasting.picking import Pick
+    from pyvista_vdi.vtk_pipeline import VDIActor, VDIMapper, VDISource
 
 _ERRORS = (
     "Cancelled",
@@ -63,25 +64,25 @@ _ERRORS = (
 
 #: Where each public name lives; loaded when it is first used (PEP 562).
 _HOMES = {
-    "AmbientOcclusion": "ambient_occlusion",
-    "Camera": "camera",
-    "Cropping": "cropping",
-    "Estimate": "generation",
-    "Light": "lighting",
-    "Lights": "lighting",
-    "Pick": "picking",
-    "Shading": "lighting",
-    "TransferFunction": "transfer_function",
-    "VDI": "vdi",
+    "AmbientOcclusion": "model.ambient_occlusion",
+    "Camera": "model.camera",
+    "Cropping": "model.cropping",
+    "Estimate": "generation.generate",
+    "Light": "model.lighting",
+    "Lights": "model.lighting",
+    "Pick": "raycasting.picking",
+    "Shading": "model.lighting",
+    "TransferFunction": "model.transfer_function",
+    "VDI": "model.vdi",
     "VDIActor": "vtk_pipeline",
     "VDIMapper": "vtk_pipeline",
     "VDISource": "vtk_pipeline",
-    "Volume": "volume",
-    "compare_images": "metrics",
-    "describe_devices": "opencl_runtime",
+    "Volume": "model.volume",
+    "compare_images": "model.metrics",
+    "describe_devices": "device",
     "estimate": "api",
     "generate": "api",
-    "list_devices": "opencl_runtime",
+    "list_devices": "device",
     "pick": "api",
     "read": "api",
     "render": "api",
@@ -91,6 +92,9 @@ _HOMES = {
 }
 
 __all__ = ["__version__", "errors", "examples", *sorted(_HOMES)]
+
+
+_moved.install()
 
 
 def __getattr__(name: str) -> Any:

@@ -6,7 +6,7 @@ import sys
 
 
 def _run() -> int:
-    from .cli import main
+    from pyvista_vdi.cli import main
 
     return main()
 

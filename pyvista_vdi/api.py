@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .camera import Camera
-from .classification import DEFAULTS, IN_PLACE, Classification
-from .dial import TARGET_ANGLE, Dial, warn_missed
-from .errors import InvalidArgumentError, InvalidVDIError, InvalidVolumeError
-from .picking import DEFAULT_OPACITY
-from .vdi import VDI
-from .volume import Volume
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, InvalidVolumeError
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.classification import DEFAULTS, IN_PLACE, Classification
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, warn_missed
+from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY
 
 if TYPE_CHECKING:
-    from .generation import Estimate
-    from .picking import Pick
+    from pyvista_vdi.generation.generate import Estimate
+    from pyvista_vdi.raycasting.picking import Pick
 
 __all__ = ["estimate", "generate", "pick", "read", "render", "render_depth", "render_volume"]
 
@@ -88,7 +88,7 @@ def generate(
         What decides where a list that must be shortened is cut: merging at least error, or, to
         compare with, a threshold on differences, equal depths, or equal shares of the light that
         V_O loses, by differences or, with ``"optical-depth"``, by ratios. See
-        :func:`pyvista_vdi.generation.generate_vdi`.
+        :func:`pyvista_vdi.generation.generate.generate_vdi`.
     sample_distance : float, optional
         Length of a step along the ray, model units; half the smallest spacing by default.
     tolerance : float
@@ -166,7 +166,7 @@ def generate(
     Examples
     --------
     >>> import pyvista_vdi as pvdi
-    >>> from pyvista_vdi.standard_cases import filling_camera
+    >>> from pyvista_vdi.model.standard_cases import filling_camera
     >>> volume = pvdi.examples.load_brain(as_volume=True)
     >>> camera = filling_camera(volume.bounds, (640, 360))
     >>> vdi = pvdi.generate(volume, camera, (640, 360), cmap="bone")  # doctest: +SKIP
@@ -175,7 +175,7 @@ def generate(
     view = Camera.from_any(camera)
     dial = Dial.of(quality, target_ssim, target_fps, max_bytes, target_angle)
     volume = as_volume(volume, looks.scalars, looks.preference)
-    from .generation import generate_vdi
+    from pyvista_vdi.generation.generate import generate_vdi
 
     vdi = generate_vdi(
         volume,
@@ -281,7 +281,7 @@ def render(
             raise InvalidArgumentError(
                 "transmittance_cutoff is for a single VDI: leave it out for several"
             )
-        from .joint import render_vdis
+        from pyvista_vdi.raycasting.multi_vdi import render_vdis
 
         return render_vdis(
             [as_vdi(one) for one in vdi] if isinstance(vdi, list | tuple) else [as_vdi(vdi)],
@@ -296,7 +296,7 @@ def render(
             device=device,
         )
     vdi = as_vdi(vdi)
-    from .raycast import TRANSMITTANCE_CUTOFF, render_vdi
+    from pyvista_vdi.raycasting.raycast import TRANSMITTANCE_CUTOFF, render_vdi
 
     cutoff = TRANSMITTANCE_CUTOFF if transmittance_cutoff is None else transmittance_cutoff
     return render_vdi(
@@ -354,7 +354,7 @@ def render_depth(
     """
     view = Camera.from_any(camera)
     vdi = as_vdi(vdi)
-    from .raycast import render_first_hits
+    from pyvista_vdi.raycasting.raycast import render_first_hits
 
     return render_first_hits(
         vdi,
@@ -427,7 +427,7 @@ def pick(
     """
     view = Camera.from_any(camera)
     vdi = as_vdi(vdi)
-    from .picking import pick_vdi
+    from pyvista_vdi.raycasting.picking import pick_vdi
 
     return pick_vdi(
         vdi,
@@ -512,7 +512,7 @@ def render_volume(
     looks = Classification(classification, "render_volume", _keywords(render_volume))
     view = Camera.from_any(camera)
     volume = as_volume(volume, looks.scalars, looks.preference)
-    from .raycast_volume import raycast_volume
+    from pyvista_vdi.volume.render import raycast_volume
 
     return raycast_volume(
         volume,
@@ -565,7 +565,7 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
     VDIWarning
         If an ``.exr`` file of ours was changed by another program, or has colours outside 0 to 1.
     """
-    from .io import read as read_file
+    from pyvista_vdi.io import read as read_file
 
     return read_file(path, **options)
 
@@ -613,7 +613,7 @@ def estimate(
     """
     looks = Classification(classification, "estimate", _keywords(estimate))
     volume = as_volume(volume, looks.scalars, looks.preference)
-    from .generation import estimate as estimate_bytes
+    from pyvista_vdi.generation.generate import estimate as estimate_bytes
 
     return estimate_bytes(
         volume,
@@ -646,10 +646,10 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
     if isinstance(volume, Volume):
         return _with_scalars(volume, scalars)
     if hasattr(volume, "GetClassName"):
-        from .vtk_pipeline.convert import volume_from_vtk
+        from pyvista_vdi.vtk_pipeline.filters.convert import volume_from_vtk
 
         if scalars is not None and not isinstance(scalars, str):
-            from .plotting.volumes import as_image
+            from pyvista_vdi.plotting.volumes import as_image
 
             volume, scalars = as_image(volume, scalars, None)
         return volume_from_vtk(volume, scalars=scalars, preference=preference)
@@ -693,7 +693,7 @@ def as_vdi(vdi: Any) -> VDI:
     if isinstance(vdi, VDI):
         return vdi
     if hasattr(vdi, "GetClassName"):
-        from .vtk_pipeline.convert import vdi_from_image
+        from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
 
         return vdi_from_image(vdi)
     hint = ": read it by pyvista_vdi.read(path)" if isinstance(vdi, str | os.PathLike) else ""

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import (
+from pyvista_vdi.errors import (
     DataNotFoundError,
     InvalidArgumentError,
     InvalidVolumeError,
@@ -28,7 +28,7 @@ from .errors import (
 if TYPE_CHECKING:
     import pyvista as pv
 
-    from .volume import Volume
+    from pyvista_vdi.model.volume import Volume
 
 #: Environment variable that names the folder with the volumes that are not shipped.
 DATA_VARIABLE = "PYVISTA_VDI_DATA"
@@ -220,7 +220,7 @@ def load_data(name: str, *, as_volume: bool = False) -> pv.ImageData | Volume:
     volume = read_nrrd(file, VOLUMES[name].quantity)
     if as_volume:
         return volume
-    from .plotting.convert import to_image_data
+    from pyvista_vdi.plotting.convert import to_image_data
 
     return to_image_data(volume, VOLUMES[name].quantity)
 
@@ -297,8 +297,8 @@ def read_nrrd(file: Path, quantity: str) -> Volume:
     """Read a three-dimensional NRRD file; axes as stored, so that x is the fastest."""
     import nrrd
 
-    from .opencl_runtime import aligned_empty
-    from .volume import Volume
+    from pyvista_vdi.device import aligned_empty
+    from pyvista_vdi.model.volume import Volume
 
     try:
         array, header = nrrd.read(str(file), index_order="C")

@@ -26,8 +26,8 @@ import pytest
 from hypothesis import settings
 
 import pyvista_vdi
+from pyvista_vdi.device import DeviceInfo, Runtime, get_runtime, list_devices
 from pyvista_vdi.errors import MissingDependencyError, NoDeviceError
-from pyvista_vdi.opencl_runtime import DeviceInfo, Runtime, get_runtime, list_devices
 
 # Compiling a kernel inside the first example takes seconds, so no example has a deadline.
 settings.register_profile("default", deadline=None, print_blob=True)

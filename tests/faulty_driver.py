@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pyvista_vdi import Camera, TransferFunction, Volume
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.opencl_runtime import DeviceBuffer, devices
-from pyvista_vdi.raycast import prepared_vdi, render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.device import DeviceBuffer, devices
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.raycasting.raycast import prepared_vdi, render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 #: The driver's functions that the runtime calls, by what they are for.
 ALLOCATIONS = ("Buffer",)

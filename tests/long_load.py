@@ -26,7 +26,7 @@ import pyvista as pv
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import reference
-from pyvista_vdi.opencl_runtime import get_runtime
+from pyvista_vdi.device import get_runtime
 
 #: Largest error that a channel may have beyond the oracle's range (DESIGN section 6).
 BOUND = 5e-5

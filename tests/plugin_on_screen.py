@@ -18,7 +18,7 @@ from plugin_scenes import LOOKS, soft_ball
 from vtkmodules.util.misc import calldata_type
 from vtkmodules.vtkCommonCore import VTK_INT
 
-from pyvista_vdi.frame_rate import FrameRateController
+from pyvista_vdi.quality.frame_rate import FrameRateController
 
 LONG = 60.0
 

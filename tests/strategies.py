@@ -13,13 +13,14 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from pyvista_vdi import joint, packets
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.generation import CRITERIA
-from pyvista_vdi.raycast import PreparedVDI
-from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.vdi import VDI
-from pyvista_vdi.volume import VOXEL_TYPES, Volume
+from pyvista_vdi.generation.generate import CRITERIA
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
+from pyvista_vdi.raycasting import multi_vdi as joint
+from pyvista_vdi.raycasting import packets
+from pyvista_vdi.raycasting.raycast import PreparedVDI
 
 #: Views of a VDI that :func:`random_view` draws; the hard ones by name.
 VIEWS = (

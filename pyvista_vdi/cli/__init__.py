@@ -6,9 +6,9 @@ import os
 import sys
 from collections.abc import Sequence
 
-from ..errors import VDIError
-from .parser import UsageError, parse
-from .text import printable
+from pyvista_vdi.cli.parser import UsageError, parse
+from pyvista_vdi.cli.text import printable
+from pyvista_vdi.errors import VDIError
 
 #: Set to 1, it lets errors through with their traceback.
 DEBUG_VARIABLE = "PYVISTA_VDI_DEBUG"

@@ -8,8 +8,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from .. import examples
-from ..benchmark import (
+from pyvista_vdi import examples
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.io import check_writable, whole_file
+from pyvista_vdi.measure.benchmark import (
     PROFILES,
     Plan,
     Results,
@@ -19,11 +21,9 @@ from ..benchmark import (
     read_results,
     run,
 )
-from ..benchmark.plot import write_plot
-from ..compare import describe_system
-from ..errors import InvalidArgumentError
-from ..io import check_writable, whole_file
-from ..plotting.progress import DelayedBar
+from pyvista_vdi.measure.benchmark.plot import write_plot
+from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.plotting.progress import DelayedBar
 
 
 def benchmark(options: argparse.Namespace) -> int:

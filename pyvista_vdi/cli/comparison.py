@@ -8,15 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..classification import Classification
-from ..compare import Report, Settings, contact_sheet, measure, table
-from ..errors import VDIFileError
-from ..io import check_writable, whole_file, write_png
-from ..plotting.progress import DelayedBar
-from ..standard_cases import TRANSFER_FUNCTIONS
-from ..vdi import VDI
-from .inputs import classification, read_volume, volume_name
-from .text import printable
+from pyvista_vdi.cli.inputs import classification, read_volume, volume_name
+from pyvista_vdi.cli.text import printable
+from pyvista_vdi.errors import VDIFileError
+from pyvista_vdi.io import check_writable, whole_file, write_png
+from pyvista_vdi.measure.compare import Report, Settings, contact_sheet, measure, table
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.plotting.progress import DelayedBar
 
 #: The transfer function that is compared where none is named.
 _DEFAULT = "soft"

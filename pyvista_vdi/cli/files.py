@@ -7,12 +7,12 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from .text import printable
+from pyvista_vdi.cli.text import printable
 
 
 def devices(options: argparse.Namespace) -> int:
     """Print every OpenCL device; exit status 1 if none is usable."""
-    from ..opencl_runtime import describe_devices, list_devices
+    from pyvista_vdi.device import describe_devices, list_devices
 
     infos = list_devices()
     if options.json:
@@ -24,7 +24,7 @@ def devices(options: argparse.Namespace) -> int:
 
 def info(options: argparse.Namespace) -> int:
     """Print what a file says about itself."""
-    from ..io import FileInfo, read_info
+    from pyvista_vdi.io import FileInfo, read_info
 
     about: FileInfo = read_info(options.file)
     print(json.dumps(_plain(about), indent=1) if options.json else _text(about))
@@ -33,9 +33,9 @@ def info(options: argparse.Namespace) -> int:
 
 def convert(options: argparse.Namespace) -> int:
     """Read a VDI and write it in the format of another name."""
-    from ..api import read
-    from ..io import checked_target
-    from .inputs import file_options, given_camera
+    from pyvista_vdi.api import read
+    from pyvista_vdi.cli.inputs import file_options, given_camera
+    from pyvista_vdi.io import checked_target
 
     target = checked_target(options.output)
     file_arguments = file_options(options)

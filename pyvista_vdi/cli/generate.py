@@ -6,16 +6,8 @@ import argparse
 import sys
 import time
 
-from ..api import generate as generate_vdi
-from ..camera import Camera
-from ..classification import Classification
-from ..dial import Dial, describe
-from ..generation import estimate
-from ..io import checked_target
-from ..plotting.progress import DelayedBar
-from ..standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
-from ..volume import Volume
-from .inputs import (
+from pyvista_vdi.api import generate as generate_vdi
+from pyvista_vdi.cli.inputs import (
     ambient_occlusion,
     camera,
     classification,
@@ -23,7 +15,15 @@ from .inputs import (
     has_own_place,
     read_volume,
 )
-from .text import printable
+from pyvista_vdi.cli.text import printable
+from pyvista_vdi.generation.generate import estimate
+from pyvista_vdi.io import checked_target
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.plotting.progress import DelayedBar
+from pyvista_vdi.quality.dial import Dial, describe
 
 #: Options that are arguments of ``generate`` of the same name: what a VDI is to reach.
 _DIAL = ("quality", "target_ssim", "target_fps", "max_bytes", "target_angle")

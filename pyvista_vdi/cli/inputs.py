@@ -8,14 +8,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..ambient_occlusion import AmbientOcclusion
-from ..api import as_volume
-from ..camera import Camera
-from ..errors import InvalidArgumentError
-from ..io import check_write_options
-from ..standard_cases import TRANSFER_FUNCTIONS
-from ..transfer_function import TransferFunction
-from ..volume import Volume
+from pyvista_vdi.api import as_volume
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.io import check_write_options
+from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.volume import Volume
 
 _T = TypeVar("_T")
 
@@ -42,21 +42,21 @@ _CLASSIFICATION = (
 def read_volume(options: argparse.Namespace) -> Volume:
     """Return the volume that VOLUME or ``--example`` names, with the scalars asked for."""
     if options.example is not None:
-        from .. import examples
+        from pyvista_vdi import examples
 
         volume: Any = examples.load_data(options.example, as_volume=True)
     elif Path(options.volume).suffix.lower() in (".nrrd", ".nhdr"):
         # By pynrrd: it needs no PyVista, and VTK takes the first axis for components in files
         # that do not say what their axes are
-        from ..examples import read_nrrd
+        from pyvista_vdi.examples import read_nrrd
 
         volume = read_nrrd(Path(options.volume), "values")
     elif Path(options.volume).suffix.lower() in (".raw", ".npy"):
-        from ..benchmark.datasets import read_file
+        from pyvista_vdi.measure.benchmark.datasets import read_file
 
         volume = read_file(Path(options.volume))
     else:
-        from ..plotting.cli_support import read_volume as read_by_pyvista
+        from pyvista_vdi.plotting.cli_support import read_volume as read_by_pyvista
 
         volume = read_by_pyvista(options.volume)
     return as_volume(volume, options.scalars, options.preference or "point")

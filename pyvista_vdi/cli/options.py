@@ -6,11 +6,11 @@ import argparse
 import re
 from typing import Any
 
-from ..camera import check_window_size
-from ..checks import memory_limit_bytes
-from ..dial import QUALITIES, TARGET_ANGLE
-from ..errors import InvalidArgumentError
-from ..standard_cases import TRANSFER_FUNCTIONS
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.camera import check_window_size
+from pyvista_vdi.model.checks import memory_limit_bytes
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
+from pyvista_vdi.quality.dial import QUALITIES, TARGET_ANGLE
 
 
 def add_volume(parser: argparse.ArgumentParser) -> None:

@@ -7,7 +7,7 @@ import shlex
 import sysconfig
 from pathlib import Path
 
-from ..errors import UnsupportedError
+from pyvista_vdi.errors import UnsupportedError
 
 #: The package, and the plugin in it.
 _PACKAGE = Path(__file__).resolve().parents[1]

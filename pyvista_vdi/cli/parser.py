@@ -9,10 +9,8 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any, NoReturn
 
-from .._version import __version__
-from ..precision import PRECISIONS
-from ..standard_cases import ANGLES, ELEVATION, WINDOW_SIZE
-from .options import (
+from pyvista_vdi._version import __version__
+from pyvista_vdi.cli.options import (
     add_camera,
     add_classification,
     add_device,
@@ -27,7 +25,9 @@ from .options import (
     parse_rate,
     parse_size,
 )
-from .tradeoff_options import add_sweep_options
+from pyvista_vdi.cli.tradeoff_options import add_sweep_options
+from pyvista_vdi.model.packing import PRECISIONS
+from pyvista_vdi.model.standard_cases import ANGLES, ELEVATION, WINDOW_SIZE
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
 

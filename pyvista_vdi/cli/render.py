@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 
-from ..api import read
-from ..api import render as render_vdi
-from ..io import checked_png_target, to_bytes, write_png
-from .inputs import camera
-from .text import printable
+from pyvista_vdi.api import read
+from pyvista_vdi.api import render as render_vdi
+from pyvista_vdi.cli.inputs import camera
+from pyvista_vdi.cli.text import printable
+from pyvista_vdi.io import checked_png_target, to_bytes, write_png
 
 
 def render(options: argparse.Namespace) -> int:
@@ -45,7 +45,7 @@ def view(options: argparse.Namespace) -> int:
     if options.screenshot is not None:
         screenshot = str(checked_png_target(options.screenshot))
     vdi = read(options.file)
-    from ..plotting.cli_support import show
+    from pyvista_vdi.plotting.cli_support import show
 
     show(
         vdi,

@@ -8,18 +8,18 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ..benchmark.datasets import look
-from ..classification import Classification
-from ..errors import InvalidArgumentError, VDIFileError
-from ..io import check_writable, whole_file
-from ..plotting.progress import DelayedBar
-from ..tradeoff import AXES, Setting, Tradeoff, measure_tradeoff, sweep
-from ..tradeoff.report import describe, summary
-from ..tradeoff.settings import DEFAULT_AXES, QUICK_AXES
-from ..volume import Volume
-from .inputs import classification, read_volume, volume_name
-from .text import printable
-from .tradeoff_options import ANGLES, SIZES
+from pyvista_vdi.cli.inputs import classification, read_volume, volume_name
+from pyvista_vdi.cli.text import printable
+from pyvista_vdi.cli.tradeoff_options import ANGLES, SIZES
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.io import check_writable, whole_file
+from pyvista_vdi.measure.benchmark.datasets import look
+from pyvista_vdi.measure.tradeoff import AXES, Setting, Tradeoff, measure_tradeoff, sweep
+from pyvista_vdi.measure.tradeoff.report import describe, summary
+from pyvista_vdi.measure.tradeoff.settings import DEFAULT_AXES, QUICK_AXES
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.plotting.progress import DelayedBar
 
 #: How the volume looks where nothing is said: a ramp from transparent black to opaque white, which
 #: needs no PyVista.

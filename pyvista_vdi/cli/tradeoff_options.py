@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from .options import parse_count, parse_numbers, parse_size
+from pyvista_vdi.cli.options import parse_count, parse_numbers, parse_size
 
 #: Frames and views, without and with ``--quick``.
 SIZES = ((640, 360), (320, 180))

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from .files import SUFFIXES, check_write_options, checked_target, read, read_info, write
-from .layout import FORMAT_VERSION, SUFFIX
-from .png import checked_png_target, to_bytes, write_png
-from .reader import FileInfo
-from .whole_file import check_writable, whole_file
+from pyvista_vdi.io.files import (
+    SUFFIXES,
+    check_write_options,
+    checked_target,
+    read,
+    read_info,
+    write,
+)
+from pyvista_vdi.io.png import checked_png_target, to_bytes, write_png
+from pyvista_vdi.io.vdi_file.layout import FORMAT_VERSION, SUFFIX
+from pyvista_vdi.io.vdi_file.reader import FileInfo
+from pyvista_vdi.io.whole_file import check_writable, whole_file
 
 __all__ = [
     "FORMAT_VERSION",

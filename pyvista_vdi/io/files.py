@@ -7,13 +7,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import InvalidArgumentError, MissingDependencyError, VDIFileError
-from ..precision import check_precision
-from ..vdi import VDI
-from . import exr, layout, reader, writer
-from .chunks import CODECS
-from .reader import FileInfo
-from .whole_file import check_writable, with_suffix
+from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDIFileError
+from pyvista_vdi.io.deep_exr import files as exr
+from pyvista_vdi.io.vdi_file import layout, reader, writer
+from pyvista_vdi.io.vdi_file.chunks import CODECS
+from pyvista_vdi.io.vdi_file.reader import FileInfo
+from pyvista_vdi.io.whole_file import check_writable, with_suffix
+from pyvista_vdi.model.packing import check_precision
+from pyvista_vdi.model.vdi import VDI
 
 #: What the name of a file may end in; the first is our own format.
 VTI_SUFFIX = ".vti"
@@ -37,8 +38,8 @@ def write(vdi: VDI, path: str | os.PathLike[str], **options: Any) -> Path:
     **options
         ``compression`` and ``level`` for all; ``precision`` for ``.vdi``, ``exact`` for ``.exr``.
         See
-        :func:`pyvista_vdi.io.writer.write`, :func:`pyvista_vdi.io.exr.write` and
-        :func:`pyvista_vdi.vtk_pipeline.vti.write`.
+        :func:`pyvista_vdi.io.vdi_file.writer.write`, :func:`pyvista_vdi.io.deep_exr.files.write`
+        and :func:`pyvista_vdi.vtk_pipeline.filters.vti.write`.
 
     Returns
     -------
@@ -75,7 +76,7 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
     path : path-like
         The file; a name that ends in ``.exr`` makes it an OpenEXR file, ``.vti`` one of VTK.
     **options
-        ``camera`` and ``thickness`` for ``.exr``: see :func:`pyvista_vdi.io.exr.read`.
+        ``camera`` and ``thickness`` for ``.exr``: see :func:`pyvista_vdi.io.deep_exr.files.read`.
 
     Returns
     -------
@@ -181,7 +182,7 @@ def _is_vti(path: Any) -> bool:
 def _vti() -> Any:
     """Return the module that has VTK write and read."""
     try:
-        from ..vtk_pipeline import vti
+        from pyvista_vdi.vtk_pipeline.filters import vti
     except ImportError as error:
         raise MissingDependencyError(
             f".vti files need VTK, which cannot be loaded ({error}): install it by "

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InvalidArgumentError
-from ..metrics import over_background
-from .whole_file import check_writable, whole_file, with_suffix
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.io.whole_file import check_writable, whole_file, with_suffix
+from pyvista_vdi.model.metrics import over_background
 
 #: The name that a picture's name ends in.
 PNG_SUFFIX = ".png"

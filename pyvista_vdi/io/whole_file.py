@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from ..errors import VDIFileError
+from pyvista_vdi.errors import VDIFileError
 
 
 @contextlib.contextmanager

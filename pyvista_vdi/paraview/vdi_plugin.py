@@ -25,10 +25,10 @@ except ImportError as error:
         f"{Path(__file__).resolve().parents[2]}"
     ) from error
 
-from pyvista_vdi.camera import Camera
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.standard_cases import ELEVATION, filling_camera
-from pyvista_vdi.vtk_pipeline.convert import scalars_of, volume_from_vtk
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
+from pyvista_vdi.vtk_pipeline.filters.convert import scalars_of, volume_from_vtk
 
 #: What ParaView's plugin manager shows.
 paraview_plugin_name = "VDI"

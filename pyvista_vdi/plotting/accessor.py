@@ -8,8 +8,8 @@ from typing import Any
 import pyvista as pv
 
 from pyvista_vdi.api import generate
-from pyvista_vdi.vdi import VDI
-from pyvista_vdi.vtk_pipeline.convert import require_image
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.vtk_pipeline.filters.convert import require_image
 
 
 @pv.register_dataset_accessor("vdi", pv.DataSet)

@@ -7,8 +7,8 @@ from typing import Any
 from pyvista.plotting.mapper import OpenGLGPUVolumeRayCastMapper
 from pyvista.plotting.volume import Volume
 
-from pyvista_vdi.vtk_pipeline.actor import VDIActorMethods
-from pyvista_vdi.vtk_pipeline.mapper import VDIMapperMethods
+from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
+from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 
 
 class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):

@@ -11,16 +11,19 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.checks import as_float
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVolumeError,
     MissingDependencyError,
     VDIWarning,
 )
-from pyvista_vdi.lighting import Shading
-from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.vtk_pipeline.properties import RGBA_OPACITY, transfer_function_from_property
+from pyvista_vdi.model.checks import as_float
+from pyvista_vdi.model.lighting import Shading
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.vtk_pipeline.filters.properties import (
+    RGBA_OPACITY,
+    transfer_function_from_property,
+)
 
 #: Most entries of a table: building it takes PyVista time by the square, a second from here on.
 _MAX_COLORS = 4096

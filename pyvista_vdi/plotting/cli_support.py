@@ -14,8 +14,8 @@ from pyvista_vdi.io import write_png
 from pyvista_vdi.plotting.convert import to_image_data
 
 if TYPE_CHECKING:
-    from pyvista_vdi.vdi import VDI
-    from pyvista_vdi.volume import Volume
+    from pyvista_vdi.model.vdi import VDI
+    from pyvista_vdi.model.volume import Volume
 
 
 def read_volume(path: str | os.PathLike[str]) -> Any:
@@ -136,7 +136,7 @@ def _pyvista() -> Any:
     try:
         import pyvista as pv
     except ImportError as error:
-        from pyvista_vdi.vtk_pipeline.peers import explain_import_error
+        from pyvista_vdi.measure.vtk_baselines import explain_import_error
 
         if error.name == "pyvista":
             raise MissingDependencyError(

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkRenderingCore import vtkVolume
 
-from pyvista_vdi.classification import DEFAULTS, Classification, refuse_unknown
-from pyvista_vdi.dial import TARGET_ANGLE, Dial, refuse_settings
+from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
-from pyvista_vdi.opencl_runtime import get_runtime
+from pyvista_vdi.model.classification import DEFAULTS, Classification, refuse_unknown
+from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.classify import (
     depend_on_alpha,
@@ -26,18 +26,18 @@ from pyvista_vdi.plotting.classify import (
 )
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.volumes import as_image
-from pyvista_vdi.vdi import VDI
-from pyvista_vdi.vtk_pipeline.convert import is_vdi_image, vdi_from_image
-from pyvista_vdi.vtk_pipeline.frame import as_array
-from pyvista_vdi.vtk_pipeline.interaction import checked_rate
-from pyvista_vdi.vtk_pipeline.painter import make_proxy_rgba
-from pyvista_vdi.vtk_pipeline.regeneration import (
+from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, refuse_settings
+from pyvista_vdi.vtk_pipeline.drawing.frame import as_array
+from pyvista_vdi.vtk_pipeline.drawing.painter import make_proxy_rgba
+from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
+from pyvista_vdi.vtk_pipeline.filters.source import VDISource
+from pyvista_vdi.vtk_pipeline.interaction.motion import checked_rate
+from pyvista_vdi.vtk_pipeline.interaction.regeneration import (
     REGENERATE_BELOW,
     Policy,
     checked_bound,
     checked_policy,
 )
-from pyvista_vdi.vtk_pipeline.source import VDISource
 
 #: ``add_volume``'s aliases.
 _ALIASES = {"rng": "clim", "colormap": "cmap", "backface_culling": "culling"}

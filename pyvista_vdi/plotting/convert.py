@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     import pyvista as pv
 
-    from pyvista_vdi.volume import Volume
+    from pyvista_vdi.model.volume import Volume
 
 
 def to_image_data(volume: Volume, name: str | None = None) -> pv.ImageData:

@@ -7,7 +7,7 @@ from typing import Any
 import pyvista as pv
 
 from pyvista_vdi.io import read
-from pyvista_vdi.vtk_pipeline.convert import vdi_to_image
+from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
 
 
 def read_vdi(path: str, **options: Any) -> pv.ImageData:
@@ -24,7 +24,7 @@ def read_vdi(path: str, **options: Any) -> pv.ImageData:
     -------
     pyvista.ImageData
         The canonical VTK form, which ``add_vdi``, ``pyvista_vdi.render`` and ``VDIMapper`` take:
-        see :func:`pyvista_vdi.vtk_pipeline.convert.vdi_to_image`.
+        see :func:`pyvista_vdi.vtk_pipeline.filters.convert.vdi_to_image`.
 
     Raises
     ------

@@ -18,7 +18,7 @@ from vtkmodules.vtkIOImage import vtkDICOMImageReader, vtkMetaImageReader, vtkNI
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIWarning
 from pyvista_vdi.plotting.dicom import Slice, read_slice, require_uncompressed, slices_of
-from pyvista_vdi.vtk_pipeline.convert import is_vdi_image
+from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
 
 #: Names of files that hold VDIs, not volumes.
 _VDI_SUFFIXES = (".vdi", ".exr")

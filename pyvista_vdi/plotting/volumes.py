@@ -8,9 +8,9 @@ import numpy as np
 import pyvista as pv
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, UnsupportedError
+from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.convert import to_image_data
-from pyvista_vdi.volume import Volume
-from pyvista_vdi.vtk_pipeline.convert import require_image
+from pyvista_vdi.vtk_pipeline.filters.convert import require_image
 
 #: What ``add_volume`` calls scalars that are given as an array.
 _UNNAMED = "Data"

@@ -6,7 +6,7 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.io import write
-from pyvista_vdi.vtk_pipeline.convert import is_vdi_image, vdi_from_image
+from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 
 
 def write_vdi(dataset: Any, path: str, **options: Any) -> None:

@@ -9,10 +9,16 @@ ray, :func:`volume_image` the direct volume rendering, :func:`build_vdi` a plain
 
 from __future__ import annotations
 
-from .generate import RaySamples, ambient_transmittance, build_vdi, samples, volume_image
-from .joint import render_joint, render_joint_range
-from .ranges import render_range
-from .raycast import render, render_pixels
+from pyvista_vdi.reference.generate import (
+    RaySamples,
+    ambient_transmittance,
+    build_vdi,
+    samples,
+    volume_image,
+)
+from pyvista_vdi.reference.joint import render_joint, render_joint_range
+from pyvista_vdi.reference.ranges import render_range
+from pyvista_vdi.reference.raycast import render, render_pixels
 
 __all__ = [
     "RaySamples",

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compositing import Segment, merge, opacity, split
+from pyvista_vdi.model.compositing import Segment, merge, opacity, split
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ def cut_at_equal_lengths(
         N_S. Stretches that are empty throughout make no supersegment; the others begin and end
         where their medium does.
     weighting : {"transmittance", "optical_depth"}
-        Of the colours; see :func:`pyvista_vdi.compositing.merge`.
+        Of the colours; see :func:`pyvista_vdi.model.compositing.merge`.
 
     Returns
     -------

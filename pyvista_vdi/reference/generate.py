@@ -10,23 +10,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ambient_occlusion import AmbientOcclusion, OcclusionGrid
-from ..camera import Camera, check_window_size
-from ..compositing import Segment, composite, merge
-from ..errors import InvalidArgumentError
-from ..lighting import Lights
-from ..transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
-from ..vdi import VDI
-from ..volume import Volume
-from .criteria import (
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.compositing import Segment, composite, merge
+from pyvista_vdi.model.lighting import Lights
+from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.reference.criteria import (
     cut_at_equal_lengths,
     cut_at_equal_optical_depths,
     cut_at_equal_transmittance,
     cut_where_unlike,
 )
-from .occlusion import NodeOcclusion, mean_transmittance
-from .rays import HalfSpace, Ray, clip, inside_box, pixel_ray
-from .shading import gradient_factors, lit_colors
+from pyvista_vdi.reference.occlusion import NodeOcclusion, mean_transmittance
+from pyvista_vdi.reference.rays import HalfSpace, Ray, clip, inside_box, pixel_ray
+from pyvista_vdi.reference.shading import gradient_factors, lit_colors
 
 Array = NDArray[np.float64]
 
@@ -206,7 +206,7 @@ def build_vdi(
     criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
         What decides where a list is cut; see :mod:`pyvista_vdi.reference.criteria`.
     weighting : {"transmittance", "optical_depth"}
-        Of the colours; see :func:`pyvista_vdi.compositing.merge`.
+        Of the colours; see :func:`pyvista_vdi.model.compositing.merge`.
 
     Returns
     -------

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..camera import Camera
-from ..compositing import composite, optical_depth_over_length
-from ..vdi import VDI
-from .ranges import (
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.compositing import composite, optical_depth_over_length
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.reference.ranges import (
     FACE_ROUNDINGS,
     RAY_ROUNDINGS,
     ROUNDOFF,
@@ -26,7 +26,7 @@ from .ranges import (
     _Move,
     _window_nudges,
 )
-from .raycast import Line, Lists, crossings, lines_of_pixel
+from pyvista_vdi.reference.raycast import Line, Lists, crossings, lines_of_pixel
 
 Array = NDArray[np.float64]
 

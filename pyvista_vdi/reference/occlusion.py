@@ -10,8 +10,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ambient_occlusion import OcclusionGrid, spread_directions
-from ..volume import Volume
+from pyvista_vdi.model.ambient_occlusion import OcclusionGrid, spread_directions
+from pyvista_vdi.model.volume import Volume
 
 Array = NDArray[np.float64]
 

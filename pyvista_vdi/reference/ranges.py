@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..camera import Camera
-from ..errors import InvalidArgumentError
-from ..vdi import VDI
-from .raycast import Line, Lists, composite_lines, lines_of_pixel, near_limit
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.reference.raycast import Line, Lists, composite_lines, lines_of_pixel, near_limit
 
 Array = NDArray[np.float64]
 

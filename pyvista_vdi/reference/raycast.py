@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..camera import Camera, check_window_size
-from ..compositing import composite, optical_depth_over_length
-from ..cropping import Cropping
-from ..errors import InvalidArgumentError
-from ..vdi import VDI
-from .rays import HalfSpace, Ray, clip, inside_box, inside_planes, pixel_ray
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.compositing import composite, optical_depth_over_length
+from pyvista_vdi.model.cropping import Cropping
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.reference.rays import HalfSpace, Ray, clip, inside_box, inside_planes, pixel_ray
 
 Array = NDArray[np.float64]
 

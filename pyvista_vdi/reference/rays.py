@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..camera import Camera
-from ..errors import InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.camera import Camera
 
 Array = NDArray[np.float64]
 

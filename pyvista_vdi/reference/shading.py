@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Camera
-from ..lighting import Light, Lights, Shading
-from ..transfer_function import TransferFunction
-from ..volume import Volume
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.lighting import Light, Lights, Shading
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.volume import Volume
 
 Array = NDArray[np.float64]
 

@@ -6,36 +6,40 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pyvista_vdi.vtk_pipeline.actor import VDIActor
-    from pyvista_vdi.vtk_pipeline.convert import vdi_from_image, vdi_to_image, volume_from_vtk
-    from pyvista_vdi.vtk_pipeline.dense import (
+    from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActor
+    from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapper
+    from pyvista_vdi.vtk_pipeline.filters.convert import (
+        vdi_from_image,
+        vdi_to_image,
+        volume_from_vtk,
+    )
+    from pyvista_vdi.vtk_pipeline.filters.dense import (
         VDIToDenseImage,
         vdi_from_dense_image,
         vdi_to_dense_image,
     )
-    from pyvista_vdi.vtk_pipeline.files import VDIReader, VDIWriter
-    from pyvista_vdi.vtk_pipeline.image import VDIToImage
-    from pyvista_vdi.vtk_pipeline.mapper import VDIMapper
-    from pyvista_vdi.vtk_pipeline.properties import transfer_function_from_property
-    from pyvista_vdi.vtk_pipeline.source import VDISource
-    from pyvista_vdi.vtk_pipeline.status import VDIStatus
+    from pyvista_vdi.vtk_pipeline.filters.files import VDIReader, VDIWriter
+    from pyvista_vdi.vtk_pipeline.filters.image import VDIToImage
+    from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
+    from pyvista_vdi.vtk_pipeline.filters.source import VDISource
+    from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 
 #: Public name to module. Loaded when asked for: converters must not load VTK's OpenGL modules.
 _MODULES = {
-    "VDIActor": "actor",
-    "VDIMapper": "mapper",
-    "VDIReader": "files",
-    "VDISource": "source",
-    "VDIStatus": "status",
-    "VDIToDenseImage": "dense",
-    "VDIToImage": "image",
-    "VDIWriter": "files",
-    "transfer_function_from_property": "properties",
-    "vdi_from_dense_image": "dense",
-    "vdi_from_image": "convert",
-    "vdi_to_dense_image": "dense",
-    "vdi_to_image": "convert",
-    "volume_from_vtk": "convert",
+    "VDIActor": "drawing.actor",
+    "VDIMapper": "drawing.mapper",
+    "VDIReader": "filters.files",
+    "VDISource": "filters.source",
+    "VDIStatus": "interaction.status",
+    "VDIToDenseImage": "filters.dense",
+    "VDIToImage": "filters.image",
+    "VDIWriter": "filters.files",
+    "transfer_function_from_property": "filters.properties",
+    "vdi_from_dense_image": "filters.dense",
+    "vdi_from_image": "filters.convert",
+    "vdi_to_dense_image": "filters.dense",
+    "vdi_to_image": "filters.convert",
+    "volume_from_vtk": "filters.convert",
 }
 
 __all__ = [

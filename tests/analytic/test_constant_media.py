@@ -12,14 +12,14 @@ import pytest
 import strategies
 
 from pyvista_vdi import reference
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.compositing import composite
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.vdi import VDI
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.compositing import composite
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (12, 9)
 OPACITY = 0.35

@@ -14,11 +14,13 @@ import strategies
 from extreme_scenes import BOUND, TURNS, field_volume, transfer, turned, view
 from oracle import explain, total
 
-from pyvista_vdi import generation, occupancy, raycast, raycast_volume
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.opencl_runtime import get_runtime, list_devices
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.device import get_runtime, list_devices
+from pyvista_vdi.generation import generate as generation
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting import occupancy, raycast
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume import render as raycast_volume
 
 pytestmark = pytest.mark.extremes
 
@@ -27,7 +29,7 @@ SIZE = (45, 37)
 
 def volume():
     """Enough detail that lists are full and records have to make room."""
-    from pyvista_vdi.volume import Volume
+    from pyvista_vdi.model.volume import Volume
 
     return Volume(np.random.default_rng(4).random((24, 25, 26)).astype(np.float32))
 
@@ -84,7 +86,7 @@ if threads != "all":
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[: int(threads)])
 import test_determinism
-from pyvista_vdi.opencl_runtime import get_runtime, list_devices
+from pyvista_vdi.device import get_runtime, list_devices
 info = next(info for info in list_devices() if info.full_name == wanted)
 print(test_determinism.digest(get_runtime(info)))
 """

@@ -19,16 +19,17 @@ from extreme_scenes import (
 )
 from oracle import explain
 
-from pyvista_vdi import Cropping, Shading, numerics, reference
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.cropping import PRESETS
-from pyvista_vdi.device_volume import DeviceVolume
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.raycast import PreparedVDI, render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi import Cropping, Shading, reference
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model import float32_limits as numerics
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.cropping import PRESETS
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.raycast import PreparedVDI, render_vdi
 from pyvista_vdi.reference.rays import pixel_ray
-from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.render import raycast_volume
 
 pytestmark = pytest.mark.extremes
 
@@ -216,7 +217,7 @@ def test_any_vdi_may_be_drawn_by_depths_relative_to_the_ray(
     rng = np.random.default_rng([4, 901])
     vdi = strategies.random_vdi(rng, max_window=(9, 7)).with_precision(precision)
     camera, size = strategies.random_view(rng, vdi, kind)
-    monkeypatch.setattr("pyvista_vdi.raycast.lists_are_far", lambda *_: True)
+    monkeypatch.setattr("pyvista_vdi.raycasting.raycast.lists_are_far", lambda *_: True)
     assert "FAR_ENTRIES" in PreparedVDI(runtime, vdi).defines
     image = render_vdi(vdi, camera, size, device=runtime)
     result = explain(vdi, camera, size, image, name=kind)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from extreme_scenes import WINDOW, field_volume, transfer, view
 
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.raycasting.raycast import render_vdi
 
 pytestmark = pytest.mark.extremes
 

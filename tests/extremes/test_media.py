@@ -20,16 +20,16 @@ from extreme_scenes import (
 )
 
 from pyvista_vdi import reference
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.compositing import composite
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.joint import render_vdis
-from pyvista_vdi.numerics import MANY_MEDIA, MOST_STEPS, VERY_MANY_MEDIA
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.compositing import composite
+from pyvista_vdi.model.float32_limits import MANY_MEDIA, MOST_STEPS, VERY_MANY_MEDIA
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.multi_vdi import render_vdis
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 pytestmark = pytest.mark.extremes
 

@@ -7,11 +7,11 @@ import pytest
 from extreme_scenes import WINDOW, check_views, field_volume, slabs_vdi, transfer, turned, view
 
 from pyvista_vdi import reference
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.vdi import VDI
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.raycast import render_vdi
 
 pytestmark = pytest.mark.extremes
 

@@ -18,9 +18,9 @@ from extreme_scenes import (
     view,
 )
 
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.occupancy import TILE
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.raycasting.occupancy import TILE
 
 pytestmark = pytest.mark.extremes
 
@@ -202,7 +202,7 @@ def test_both_depth_coordinates_at_the_border_of_their_choice(runtime, worst, di
 
 def test_both_depth_coordinates_within_the_bound_on_the_same_vdi(runtime, worst, monkeypatch):
     """At a ratio of 2 either will do: forced, they agree with the oracle, too."""
-    from pyvista_vdi import raycast
+    from pyvista_vdi.raycasting import raycast
 
     for long_lens in (1.5, 2.5):
         monkeypatch.setattr(raycast, "_LONG_LENS", long_lens)

@@ -19,16 +19,16 @@ from extreme_scenes import (
 )
 
 from pyvista_vdi import Shading, reference
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.device_volume import DeviceVolume
 from pyvista_vdi.errors import DeviceMemoryError, InvalidVolumeError
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.numerics import scalars_suit_float32
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.shading import GRADIENT_SHARE
-from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.float32_limits import scalars_suit_float32
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.light_tables import GRADIENT_SHARE
+from pyvista_vdi.volume.render import raycast_volume
 
 pytestmark = pytest.mark.extremes
 
@@ -293,7 +293,7 @@ def test_gradients_see_scalars_taken_relative(runtime, worst):
 
 
 def test_a_volume_beyond_float32_is_found_once(runtime, monkeypatch):
-    from pyvista_vdi import voxels
+    from pyvista_vdi.volume import upload as voxels
 
     volume = Volume(((FIELD - 0.5) * 6e38).astype(np.float32))
     assert voxels._too_large(runtime, volume)

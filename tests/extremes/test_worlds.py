@@ -10,9 +10,9 @@ from extreme_scenes import BOUND, WINDOW, check_scene, field_volume, transfer, t
 
 from pyvista_vdi import reference
 from pyvista_vdi.errors import InvalidCameraError
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 pytestmark = pytest.mark.extremes
 

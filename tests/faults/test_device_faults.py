@@ -20,8 +20,8 @@ from faulty_driver import (
 )
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.device import devices, programs
 from pyvista_vdi.errors import Cancelled, DeviceError, DeviceMemoryError, KernelBuildError
-from pyvista_vdi.opencl_runtime import devices, programs
 
 #: Buffers of a volume and of a VDI that are on the device, and those that are always small.
 VOLUME = {"volume 'values'", "ranges of blocks"}
@@ -158,15 +158,22 @@ def test_a_frame_and_background_work_go_on_after_a_loss(runtime, driver):
 @pytest.mark.parametrize(
     ("operation", "broken"),
     [
-        *((0, name) for name in ("grid/volume_blocks.cl", "vdi/generate.cl")),
-        *((2, name) for name in ("vdi/prepare.cl", "grid/occupancy.cl", "vdi/raycast.cl")),
-        (3, "vdi/render_volume.cl"),
+        *((0, name) for name in ("volume/volume_blocks.cl", "generation/generate.cl")),
+        *(
+            (2, name)
+            for name in (
+                "raycasting/prepare.cl",
+                "raycasting/occupancy.cl",
+                "raycasting/raycast.cl",
+            )
+        ),
+        (3, "volume/render_volume.cl"),
     ],
 )
 def test_a_kernel_that_does_not_compile(runtime, operation, broken, monkeypatch):
     """The message names the file and shows the compiler's log; nothing half made is kept."""
-    if broken == "vdi/raycast.cl" and runtime.is_cpu:
-        broken = "vdi/raycast_blocks.cl"  # near V_O
+    if broken == "raycasting/raycast.cl" and runtime.is_cpu:
+        broken = "raycasting/blocks.cl"  # near V_O
     operation = OPERATIONS[operation]
     expected = operation(runtime)
     before = state_of(runtime)
@@ -286,10 +293,10 @@ def test_cancelling_at_each_report(runtime, monkeypatch):
     """``progress`` that returns False, at every call."""
     from faulty_driver import TRANSFER, fresh_volume
 
-    monkeypatch.setattr("pyvista_vdi.generation._SLICE_BYTES", 1)
+    monkeypatch.setattr("pyvista_vdi.generation.generate._SLICE_BYTES", 1)
     fractions = []
     arguments = (fresh_volume(), CAMERA, WINDOW, TRANSFER)
-    pvdi.generation.generate_vdi(*arguments, device=runtime, progress=fractions.append)
+    pvdi.generation.generate.generate_vdi(*arguments, device=runtime, progress=fractions.append)
     before = state_of(runtime)
     for last in range(len(fractions)):
         calls = []
@@ -299,5 +306,5 @@ def test_cancelling_at_each_report(runtime, monkeypatch):
             return len(calls) <= last
 
         with pytest.raises(Cancelled):
-            pvdi.generation.generate_vdi(*arguments, device=runtime, progress=progress)
+            pvdi.generation.generate.generate_vdi(*arguments, device=runtime, progress=progress)
         assert state_of(runtime) == before

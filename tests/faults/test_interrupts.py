@@ -15,7 +15,7 @@ from faulty_driver import ALLOCATIONS, LAUNCHES, state_of
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
-from pyvista_vdi.standard_cases import filling_camera
+from pyvista_vdi.model.standard_cases import filling_camera
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
 
@@ -40,11 +40,14 @@ ON_A_DEVICE = {
 }
 #: Verbs that do not, or not any more in this process; a function that each calls.
 ON_THE_HOST = {
-    "devices": (("devices",), "pyvista_vdi.opencl_runtime.describe_devices"),
-    "info": (("info", "a.vdi"), "pyvista_vdi.io.reader.from_json"),
-    "info of an .exr": (("info", "a.exr"), "pyvista_vdi.io.exr.media"),
-    "convert": (("convert", "a.vdi", "-o", "out.exr"), "pyvista_vdi.io.exr.write_image"),
-    "convert back": (("convert", "a.exr", "-o", "out.vdi"), "pyvista_vdi.io.exr.read_image"),
+    "devices": (("devices",), "pyvista_vdi.device.describe_devices"),
+    "info": (("info", "a.vdi"), "pyvista_vdi.io.vdi_file.reader.from_json"),
+    "info of an .exr": (("info", "a.exr"), "pyvista_vdi.io.deep_exr.files.media"),
+    "convert": (("convert", "a.vdi", "-o", "out.exr"), "pyvista_vdi.io.deep_exr.files.write_image"),
+    "convert back": (
+        ("convert", "a.exr", "-o", "out.vdi"),
+        "pyvista_vdi.io.deep_exr.files.read_image",
+    ),
 }
 
 

@@ -15,9 +15,9 @@ from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume, state_of
 from strategies import random_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 #: Seconds after which a process counts as one that hangs.
 PATIENCE = 100
@@ -146,9 +146,9 @@ import gc, multiprocessing, os
 import numpy as np
 import pyvista_vdi as pvdi
 from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
-from pyvista_vdi.opencl_runtime import aligned_empty, get_runtime, list_devices
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.device import aligned_empty, get_runtime, list_devices
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.raycasting.raycast import render_vdi
 
 runtime = get_runtime(sys.argv[1])
 volume = fresh_volume()
@@ -199,8 +199,8 @@ FORK_BEFORE = """
 import multiprocessing
 import pyvista_vdi as pvdi
 from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
-from pyvista_vdi.opencl_runtime import get_runtime
-from pyvista_vdi.generation import generate_vdi
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.generation.generate import generate_vdi
 
 def child(queue):
     runtime = get_runtime(sys.argv[1])

@@ -29,9 +29,10 @@ from fuzz.choices import JUNK, NUMBERS, Choices
 from strategies import random_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import VDI, Camera, TransferFunction, Volume, cli, host_memory, io
+from pyvista_vdi import VDI, Camera, TransferFunction, Volume, cli, io
+from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import VDIError, VDIWarning
-from pyvista_vdi.opencl_runtime import get_runtime
+from pyvista_vdi.model import host_memory
 
 #: Bytes that a byte of a file may become (docs/robustness.md): a block of 128 KiB from 4 bytes is
 #: Zstandard's best, and an array is held twice while it is decoded, a third time as the VDI's.
@@ -271,7 +272,7 @@ def vtk_form(data: bytes) -> None:
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonCore import vtkStringArray
 
-    from pyvista_vdi.vtk_pipeline.convert import vdi_from_image, vdi_to_image
+    from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image
 
     choices = Choices(data)
     image = vdi_to_image(base_vdi(choices.integer(0, 15)))
@@ -637,7 +638,7 @@ class _Session:
         self.vdi = back
 
     def through_vtk(self) -> None:
-        from pyvista_vdi.vtk_pipeline.convert import vdi_from_image, vdi_to_image
+        from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image
 
         back = vdi_from_image(vdi_to_image(self.vdi))
         assert back.equals(self.vdi)

@@ -9,10 +9,10 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
-from pyvista_vdi.compare import Settings, contact_sheet, measure, table
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, MissingDependencyError
-from pyvista_vdi.metrics import compare_images
-from pyvista_vdi.standard_cases import filling_camera
+from pyvista_vdi.measure.compare import Settings, contact_sheet, measure, table
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.standard_cases import filling_camera
 
 SIZE = (96, 64)
 LOOKS = {"cmap": "viridis", "opacity": "linear", "interpolation": "linear"}
@@ -97,7 +97,7 @@ def test_the_report_becomes_json_and_text(measured):
 @pytest.mark.parametrize("mapper", ["gpu", "fixed_point"])
 @pytest.mark.parametrize("parallel", [False, True])
 def test_peers_see_the_view_as_we_do(mapper, parallel, volume, peer_property, default_runtime):
-    from pyvista_vdi.vtk_pipeline.peers import PeerRenderer
+    from pyvista_vdi.measure.vtk_baselines import PeerRenderer
 
     matrix = np.diag([1.0, -1.3, 0.8, 1.0])  # mirrored, scaled
     matrix[:3, 3] = (0.5, 2.0, -1.0)
@@ -195,7 +195,7 @@ def test_settings_are_checked(options, message):
 )
 def test_a_vtk_that_cannot_be_loaded_names_the_package(text, message):
     pytest.importorskip("vtkmodules")
-    from pyvista_vdi.vtk_pipeline.peers import explain_import_error
+    from pyvista_vdi.measure.vtk_baselines import explain_import_error
 
     error = explain_import_error(ImportError(text))
     assert isinstance(error, MissingDependencyError)
@@ -206,7 +206,7 @@ def test_a_vtk_that_cannot_be_loaded_names_the_package(text, message):
 def test_a_machine_without_opengl_names_the_packages(volume, peer_property, monkeypatch):
     from vtkmodules import vtkRenderingOpenGL2
 
-    from pyvista_vdi.vtk_pipeline.peers import PeerRenderer
+    from pyvista_vdi.measure.vtk_baselines import PeerRenderer
 
     class NoWindow:
         def __getattr__(self, name):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pyvista_vdi import api, compare_images, examples
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.model.volume import Volume
 
 WINDOW = (480, 270)
 
@@ -90,7 +90,7 @@ def coloured(volume):
 @pytest.mark.parametrize("name", list(CASES))
 def test_pictures_are_those_of_vtk(name, default_runtime):
     pytest.importorskip("pyvista")
-    from pyvista_vdi.vtk_pipeline.peers import PeerRenderer
+    from pyvista_vdi.measure.vtk_baselines import PeerRenderer
 
     case = CASES[name]
     volume = examples.load_brain(as_volume=True)

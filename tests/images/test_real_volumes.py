@@ -15,14 +15,14 @@ import pytest
 from real_data import require_data
 
 from pyvista_vdi import examples
-from pyvista_vdi.compare import Settings, judge_vdi, judge_vtk, measure
-from pyvista_vdi.compare.bounds import (
+from pyvista_vdi.measure.compare import Settings, judge_vdi, judge_vtk, measure
+from pyvista_vdi.measure.compare.bounds import (
     BRIGHTNESS_TOLERANCE,
     CONVERGED_STEPS,
     PSNR_TO_VTK,
     SSIM_TO_VTK,
 )
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 
 SMALL = (320, 180)
 

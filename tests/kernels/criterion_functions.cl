@@ -1,5 +1,5 @@
-// Entry point to opencl/vdi/criteria.cl, one work-item per record. -D CRITERION.
-#include "vdi/criteria.cl"
+// Entry point to opencl/generation/criteria.cl, one work-item per record. -D CRITERION.
+#include "generation/criteria.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Cut record i; `runs` are in (record, k) order, before and after.

@@ -1,7 +1,7 @@
-// Entry point to opencl/common/lists.cl, one work-item per query.
+// Entry point to opencl/raycasting/lists.cl, one work-item per query.
 //
-// -D OFFSET_T   see common/supersegments.cl
-#include "common/lists.cl"
+// -D OFFSET_T   see raycasting/supersegments.cl
+#include "raycasting/lists.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Query i asks list lists[i].x .. lists[i].x + lists[i].y; (direction, guess) = how[i]. Supersegment k is faces[k * stride],

@@ -1,7 +1,7 @@
-// Entry point to opencl/common/march.cl: whole marches, one ray per work-item.
+// Entry point to opencl/volume/march.cl: whole marches, one ray per work-item.
 //
-// -D: as opencl/common/march.cl
-#include "common/march.cl"
+// -D: as opencl/volume/march.cl
+#include "volume/march.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Of each ray its interval and step, its number of steps (-1 where it misses), every face, every step's medium, and how

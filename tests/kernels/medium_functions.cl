@@ -1,5 +1,5 @@
-// Entry points to opencl/common/classification.cl and opacity.cl, one work-item per case.
-#include "common/classification.cl"
+// Entry points to opencl/lib/classification.cl and opacity.cl, one work-item per case.
+#include "lib/classification.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 __kernel void classified(int count, __global const float *scalars, __global const float4 *table, int entries, float low,

@@ -1,6 +1,6 @@
-// Entry points to opencl/common/occupancy.cl and to list_space.cl's depth coordinate, one work-item per query.
-#include "common/list_space.cl"
-#include "common/occupancy.cl"
+// Entry points to opencl/raycasting/tiles.cl and to list_space.cl's depth coordinate, one work-item per query.
+#include "lib/list_space.cl"
+#include "raycasting/tiles.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 __kernel void constants(int count, __global int *results)

@@ -1,7 +1,7 @@
-// Entry points to opencl/common/pairs.cl and to what common/rays.cl does with it, one work-item per case.
+// Entry points to opencl/lib/double_float.cl and to what lib/rays.cl does with it, one work-item per case.
 //
 // -D FAR_ENTRIES
-#include "common/rays.cl"
+#include "lib/rays.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 __kernel void arithmetic(int count, __global const float2 *a, __global const float2 *b, __global float2 *sums,

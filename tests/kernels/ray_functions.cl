@@ -1,5 +1,5 @@
-// Entry points to opencl/common/rays.cl, one work-item per case.
-#include "common/rays.cl"
+// Entry points to opencl/lib/rays.cl, one work-item per case.
+#include "lib/rays.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Value and slope of form i for pixel offsets i.

@@ -1,5 +1,5 @@
-// Entry points to opencl/vdi/runs.cl, one work-item per case or record.
-#include "vdi/runs.cl"
+// Entry points to opencl/generation/runs.cl, one work-item per case or record.
+#include "generation/runs.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 __kernel void merged(int count, __global const float8 *a, __global const float8 *b, __global float8 *results)

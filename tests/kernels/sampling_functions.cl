@@ -1,7 +1,7 @@
-// Entry point to opencl/common/volume_sampling.cl, one work-item per sample.
+// Entry point to opencl/volume/sampling.cl, one work-item per sample.
 //
-// -D VOXEL_T, INDEX_T, NEAREST: see common/volume_sampling.cl
-#include "common/volume_sampling.cl"
+// -D VOXEL_T, INDEX_T, NEAREST: see volume/sampling.cl
+#include "volume/sampling.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 __kernel void samples(int count, __global const VOXEL_T *voxels, int4 size, __global const float *positions,

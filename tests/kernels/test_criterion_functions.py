@@ -1,4 +1,4 @@
-"""opencl/vdi/criteria.cl against the float64 cuts of pyvista_vdi.reference.criteria."""
+"""opencl/generation/criteria.cl against the float64 cuts of pyvista_vdi.reference.criteria."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from recorded_runs import (
     random_records,
 )
 
-from pyvista_vdi import compositing
-from pyvista_vdi.compositing import Segment
+from pyvista_vdi.model import compositing
+from pyvista_vdi.model.compositing import Segment
 from pyvista_vdi.reference import criteria
 
 FILE = "criterion_functions.cl"

@@ -1,4 +1,5 @@
-"""opencl/common/lists.cl: the first supersegment that a ray meets in a list, against a linear scan.
+"""opencl/raycasting/lists.cl: the first supersegment that a ray meets in a list, against a linear
+scan.
 
 The paper's Algorithm 1 as printed is not what is tested here, but what it is for; docs give the
 errata. Supersegments (front, back) with depth growing away from V_O:

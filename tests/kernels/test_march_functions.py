@@ -1,4 +1,4 @@
-"""opencl/common/march.cl against float64: where the steps of a ray lie, and what is in them."""
+"""opencl/volume/march.cl against float64: where the steps of a ray lie, and what is in them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.interpolate import RegularGridInterpolator
 from strategies import camera_around, random_transform
 
 from pyvista_vdi import Camera, TransferFunction, Volume
-from pyvista_vdi.device_volume import DeviceVolume
+from pyvista_vdi.volume.classified_volume import DeviceVolume
 
 EPS = 2.0**-24  # unit roundoff of float32
 FILE = "march_functions.cl"

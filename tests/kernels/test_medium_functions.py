@@ -1,12 +1,12 @@
-"""opencl/common/classification.cl against float64 (DESIGN section 3, "From volume to medium")."""
+"""opencl/lib/classification.cl against float64 (DESIGN section 3, "From volume to medium")."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from pyvista_vdi.device_volume import _per_scalar
-from pyvista_vdi.transfer_function import OPAQUE_OPTICAL_DEPTH
+from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH
+from pyvista_vdi.volume.classified_volume import _per_scalar
 
 EPS = 2.0**-24  # unit roundoff of float32
 FILE = "medium_functions.cl"

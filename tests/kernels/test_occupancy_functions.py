@@ -1,14 +1,14 @@
-"""opencl/common/occupancy.cl, and the depths at which the raycaster looks the grid up."""
+"""opencl/raycasting/tiles.cl, and the depths at which the raycaster looks the grid up."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.occupancy import SLABS, TILE
-from pyvista_vdi.raycast import PreparedVDI
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.occupancy import SLABS, TILE
+from pyvista_vdi.raycasting.raycast import PreparedVDI
 
 FILE = "occupancy_functions.cl"
 

@@ -1,13 +1,13 @@
-"""opencl/vdi/offsets.cl: where lists begin, against NumPy's running sum, slice behind slice."""
+"""opencl/generation/offsets.cl: where lists begin, against NumPy's running sum by slices."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from pyvista_vdi.opencl_runtime import LocalMemory
+from pyvista_vdi.device import LocalMemory
 
-LISTS_PER_ITEM = 16  # see vdi/offsets.cl
+LISTS_PER_ITEM = 16  # see generation/offsets.cl
 UNTOUCHED = np.uint64(0xA5A5A5A5A5A5A5A5)
 
 
@@ -22,7 +22,9 @@ def lengths_of(kind, n, seed):
 
 def summed(runtime, slices, group):
     """Offsets that the device makes of slices of lengths, one behind the other."""
-    kernels = [runtime.kernel("vdi/offsets.cl", name) for name in ("sum_lengths", "list_offsets")]
+    kernels = [
+        runtime.kernel("generation/offsets.cl", name) for name in ("sum_lengths", "list_offsets")
+    ]
     total = sum(map(len, slices))
     most = max(map(len, slices))
     room = np.full(total + 3, UNTOUCHED)

@@ -1,4 +1,4 @@
-"""opencl/common/pairs.cl: numbers of two floats, and rays that enter far away, against float64."""
+"""opencl/lib/double_float.cl: numbers of two floats, and rays from far away, against float64."""
 
 from __future__ import annotations
 

@@ -1,11 +1,18 @@
-"""opencl/common/rays.cl: forms, clipping, and how pixels are dealt to work-items."""
+"""opencl/lib/rays.cl: forms, clipping, and how pixels are dealt to work-items."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from pyvista_vdi.blocks import CELL, CELL_ITEMS, GROUP, Rectangle, block_items, part_columns
+from pyvista_vdi.device.work_order import (
+    CELL,
+    CELL_ITEMS,
+    GROUP,
+    Rectangle,
+    block_items,
+    part_columns,
+)
 
 EPS = 2.0**-24  # unit roundoff of float32
 FILE = "ray_functions.cl"

@@ -1,4 +1,5 @@
-"""opencl/vdi/runs.cl: runs, what merging two costs, and the three ways of shortening a record.
+"""opencl/generation/runs.cl: runs, what merging two costs, and the three ways of shortening a
+record.
 
 The reference is float64 and written from DESIGN section 3 ("Merging samples into a
 supersegment") and the head of the kernel file: a run is a homogeneous medium of straight colour c
@@ -25,12 +26,12 @@ from recorded_runs import (
     random_segments,
 )
 
-from pyvista_vdi import compositing
-from pyvista_vdi.compositing import Segment
+from pyvista_vdi.model import compositing
+from pyvista_vdi.model.compositing import Segment
 
 FILE = "run_functions.cl"
 WITHIN, ROOM, LIMIT = range(3)
-ERRORS_AT_A_TIME = 8  # see vdi/runs.cl
+ERRORS_AT_A_TIME = 8  # see generation/runs.cl
 
 
 # -- float64 reference -----------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""opencl/common/volume_sampling.cl against float64."""
+"""opencl/volume/sampling.cl against float64."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""opencl/vdi/shorten_blocks.cl does to records what shorten_lists of vdi/generate.cl does."""
+"""opencl/generation/shorten_blocks.cl does what shorten_lists of generation/generate.cl does."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from recorded_runs import EXTREMES, as_runs, random_records
 
-from pyvista_vdi.blocks import GROUP, block_items
+from pyvista_vdi.device.work_order import GROUP, block_items
 
 MEDIUM = {"VOXEL_T": "uchar", "INDEX_T": "int", "NEAREST": None, "BLOCK_SHIFT": 3}
 LANES = 16
@@ -65,8 +65,8 @@ def shortened(runtime, kernel, records, limit, exactly, *, hidden_weight=0.25, r
         return after, runtime.download(of_items)[inside], np.concatenate(kept)
 
 
-RAY_BY_RAY = ("vdi/generate.cl", "shorten_lists", 1)
-IN_BLOCKS = ("vdi/shorten_blocks.cl", "shorten_blocks", LANES)
+RAY_BY_RAY = ("generation/generate.cl", "shorten_lists", 1)
+IN_BLOCKS = ("generation/shorten_blocks.cl", "shorten_blocks", LANES)
 
 
 def check_the_same(runtime, records, limit, exactly, **options):

@@ -8,8 +8,8 @@ from scipy.ndimage import distance_transform_cdt
 from strategies import camera_around
 
 from pyvista_vdi import TransferFunction, Volume
-from pyvista_vdi.device_volume import DeviceVolume
-from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.render import raycast_volume
 
 MOST = 16
 
@@ -21,7 +21,7 @@ def test_reaches_are_chessboard_distances(runtime, share):
     shape = (23, 9, 40)
     visible = rng.random(shape) < share
     kernel = runtime.kernel(
-        "grid/volume_blocks.cl",
+        "volume/volume_blocks.cl",
         "block_reaches",
         {"VOXEL_T": "uchar", "INDEX_T": "uint", "BLOCK_SHIFT": 3},
     )

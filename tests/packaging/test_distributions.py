@@ -99,7 +99,7 @@ def test_wheel_holds_the_package_and_nothing_else(source, wheel_names):
 
 def test_wheel_holds_kernels_types_volumes_and_licences(wheel_names):
     kernels = [name for name in wheel_names if name.endswith(".cl")]
-    for folder in ("common", "vdi"):
+    for folder in ("lib", "generation", "raycasting"):
         assert any(name.startswith(f"pyvista_vdi/opencl/{folder}/") for name in kernels), folder
     assert "pyvista_vdi/py.typed" in wheel_names
     assert "pyvista_vdi/data/brain_colin27_181x217x181_u8.nrrd" in wheel_names
@@ -187,7 +187,7 @@ def test_installed_kernels_are_resources():
 
     kernels = [
         kernel.name
-        for folder in ("common", "vdi")
+        for folder in ("lib", "generation", "raycasting")
         for kernel in files("pyvista_vdi.opencl").joinpath(folder).iterdir()
     ]
     assert any(name.endswith(".cl") for name in kernels), kernels

@@ -22,8 +22,8 @@ from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumePrope
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import examples
-from pyvista_vdi.metrics import compare_images, over_background
-from pyvista_vdi.standard_cases import filling_camera
+from pyvista_vdi.model.metrics import compare_images, over_background
+from pyvista_vdi.model.standard_cases import filling_camera
 
 pytestmark = pytest.mark.paraview
 

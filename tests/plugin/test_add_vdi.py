@@ -15,9 +15,9 @@ from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import VDIWarning
-from pyvista_vdi.vtk_pipeline import painter as painter_module
-from pyvista_vdi.vtk_pipeline import source as source_module
-from pyvista_vdi.vtk_pipeline.convert import vdi_to_image
+from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
+from pyvista_vdi.vtk_pipeline.filters import source as source_module
+from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
 
 pytestmark = pytest.mark.gl
 

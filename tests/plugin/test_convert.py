@@ -18,17 +18,17 @@ from vtkmodules.vtkRenderingCore import (
     vtkVolumeProperty,
 )
 
-from pyvista_vdi.camera import Camera
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVDIError,
     InvalidVolumeError,
     UnsupportedError,
 )
-from pyvista_vdi.lighting import Light, Lights, Shading
-from pyvista_vdi.vdi import VDI
-from pyvista_vdi.vtk_pipeline.convert import vdi_from_image, vdi_to_image, volume_from_vtk
-from pyvista_vdi.vtk_pipeline.properties import transfer_function_from_property
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.lighting import Light, Lights, Shading
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image, volume_from_vtk
+from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 
 
 def some_grid(dimensions=(4, 3, 5)):

@@ -7,13 +7,13 @@ import pyvista as pv
 from plugin_scenes import LOOKS, WINDOW, soft_ball
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import dial_measurement
-from pyvista_vdi.background import BackgroundGeneration
-from pyvista_vdi.dial import LADDER, Dial
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
-from pyvista_vdi.vtk_pipeline.convert import vdi_from_image
-from pyvista_vdi.vtk_pipeline.dense import VDIToDenseImage
-from pyvista_vdi.vtk_pipeline.regeneration import REGENERATE_BELOW
+from pyvista_vdi.quality import probe as dial_measurement
+from pyvista_vdi.quality.background import BackgroundGeneration
+from pyvista_vdi.quality.dial import LADDER, Dial
+from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
+from pyvista_vdi.vtk_pipeline.filters.dense import VDIToDenseImage
+from pyvista_vdi.vtk_pipeline.interaction.regeneration import REGENERATE_BELOW
 
 pytestmark = pytest.mark.gl
 

@@ -9,11 +9,11 @@ from plugin_scenes import LOOKS, opaque_sphere, soft_ball
 from vtkmodules.vtkCommonDataModel import vtkPlane
 from vtkmodules.vtkRenderingOpenGL2 import vtkTextureObject
 
-from pyvista_vdi.opencl_runtime import get_runtime
-from pyvista_vdi.vtk_pipeline import depth as depth_module
-from pyvista_vdi.vtk_pipeline import frame as frame_module
-from pyvista_vdi.vtk_pipeline import painter as painter_module
-from pyvista_vdi.vtk_pipeline import texture as texture_module
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.vtk_pipeline.drawing import depth as depth_module
+from pyvista_vdi.vtk_pipeline.drawing import frame as frame_module
+from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
+from pyvista_vdi.vtk_pipeline.drawing import texture as texture_module
 
 pytestmark = pytest.mark.gl
 

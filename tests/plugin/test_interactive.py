@@ -23,17 +23,17 @@ from vtkmodules.vtkRenderingCore import (
 from vtkmodules.vtkRenderingUI import vtkGenericRenderWindowInteractor
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import background
-from pyvista_vdi.camera import Camera
 from pyvista_vdi.cli import main
+from pyvista_vdi.device.ray_forms import pixel_rays
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, VDIWarning
-from pyvista_vdi.frame_rate import FrameRateController
-from pyvista_vdi.rays import pixel_rays
-from pyvista_vdi.vtk_pipeline import estimation, regeneration
-from pyvista_vdi.vtk_pipeline import painter as painter_module
-from pyvista_vdi.vtk_pipeline.frame import Frame, sampled
-from pyvista_vdi.vtk_pipeline.interaction import reduced
-from pyvista_vdi.vtk_pipeline.view import View
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.quality import background
+from pyvista_vdi.quality.frame_rate import FrameRateController
+from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, sampled
+from pyvista_vdi.vtk_pipeline.filters.view import View
+from pyvista_vdi.vtk_pipeline.interaction import estimation, regeneration
+from pyvista_vdi.vtk_pipeline.interaction.motion import reduced
 
 pytestmark = pytest.mark.gl
 
@@ -433,7 +433,7 @@ def test_several_vdis_and_two_eyes_share_a_frame(plotter, coarsest):
 
 def test_samples_follow_the_time_that_frames_take(plotter, monkeypatch):
     """With a clock that counts a microsecond per ray, 100 frames a second leave 10 000 rays."""
-    from pyvista_vdi.vtk_pipeline import interaction
+    from pyvista_vdi.vtk_pipeline.interaction import motion as interaction
 
     class Clock:
         now = 0.0
@@ -1009,7 +1009,7 @@ def regenerate_repeatedly(times):
     """Regenerate in the background again and again; bytes of memory per round, after the first."""
     plotter = pv.Plotter(window_size=(120, 100))
     actor = watched(plotter, soft_ball(16), regenerate=lambda status: status.angle > 10)
-    start, runtime = None, pvdi.opencl_runtime.get_runtime()
+    start, runtime = None, pvdi.device.get_runtime()
     before = runtime.allocated
     for number in range(times):
         if number == times // 4:  # caches of drivers and allocators are warm

@@ -17,8 +17,8 @@ from vtkmodules.vtkRenderingVolume import vtkMultiVolume
 from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 
 from pyvista_vdi.errors import VDIWarning
-from pyvista_vdi.vtk_pipeline import overlap
-from pyvista_vdi.vtk_pipeline.frame import Frame
+from pyvista_vdi.vtk_pipeline.drawing import overlap
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 
 pytestmark = pytest.mark.gl
 

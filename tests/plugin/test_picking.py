@@ -492,7 +492,7 @@ def test_an_impossible_threshold_is_refused():
 
 
 def test_what_fails_is_said_once_and_picks_nothing(monkeypatch):
-    from pyvista_vdi.vtk_pipeline import selection
+    from pyvista_vdi.vtk_pipeline.drawing import selection
 
     def fail(*args, **options):
         raise DeviceError("the device is gone")

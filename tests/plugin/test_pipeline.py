@@ -42,9 +42,9 @@ from pyvista_vdi.errors import (
     UnsupportedError,
     VDIWarning,
 )
-from pyvista_vdi.vtk_pipeline.convert import vdi_from_image, vdi_to_image
-from pyvista_vdi.vtk_pipeline.estimation import Estimation
-from pyvista_vdi.vtk_pipeline.frame import as_array, view_of
+from pyvista_vdi.vtk_pipeline.drawing.frame import as_array, view_of
+from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image
+from pyvista_vdi.vtk_pipeline.interaction.estimation import Estimation
 
 pytestmark = pytest.mark.gl
 
@@ -480,7 +480,7 @@ def test_importing_the_pipeline_does_not_import_pyvista():
 
 def test_converters_load_no_opengl():
     code = (
-        "import sys, pyvista_vdi.vtk_pipeline.convert; "
+        "import sys, pyvista_vdi.vtk_pipeline.filters.convert; "
         "sys.exit(any('OpenGL' in name for name in sys.modules))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

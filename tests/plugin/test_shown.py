@@ -19,8 +19,8 @@ from vtkmodules.vtkCommonDataModel import vtkPlane
 from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.cropping import PRESETS
 from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
+from pyvista_vdi.model.cropping import PRESETS
 
 pytestmark = pytest.mark.gl
 

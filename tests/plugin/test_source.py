@@ -31,7 +31,7 @@ from pyvista_vdi.errors import (
     InvalidVolumeError,
     UnsupportedError,
 )
-from pyvista_vdi.vtk_pipeline.convert import vdi_to_image
+from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
 
 pytestmark = pytest.mark.gl
 

@@ -18,9 +18,7 @@ from vtkmodules.vtkImagingCore import vtkExtractVOI
 from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLImageDataWriter
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import host_memory
 from pyvista_vdi.cli import main
-from pyvista_vdi.compositing import opacity
 from pyvista_vdi.errors import (
     DeviceMemoryError,
     InvalidArgumentError,
@@ -29,7 +27,9 @@ from pyvista_vdi.errors import (
     VDIFileError,
 )
 from pyvista_vdi.io import read_info
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.model import host_memory
+from pyvista_vdi.model.compositing import opacity
+from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline import (
     VDIToDenseImage,
     vdi_from_dense_image,
@@ -37,7 +37,7 @@ from pyvista_vdi.vtk_pipeline import (
     vdi_to_dense_image,
     vdi_to_image,
 )
-from pyvista_vdi.vtk_pipeline.dense import is_dense_image
+from pyvista_vdi.vtk_pipeline.filters.dense import is_dense_image
 
 #: Metadata that text could spoil.
 METADATA = {

@@ -14,18 +14,18 @@ from pyvista_vdi import (
     Shading,
     TransferFunction,
     Volume,
-    device_volume,
     reference,
 )
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.device_volume import DeviceVolume
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.opencl_runtime import Runtime
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.device import Runtime
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.quality.view_error import estimate_view_error
+from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.reference.generate import node_occlusion
 from pyvista_vdi.reference.occlusion import _trilinear as trilinear
-from pyvista_vdi.view_error import estimate_view_error
+from pyvista_vdi.volume import classified_volume as device_volume
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (7, 6)
 

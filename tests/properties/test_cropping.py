@@ -12,16 +12,16 @@ import pytest
 import strategies
 from oracle import explain, total
 
-from pyvista_vdi import rays
-from pyvista_vdi.cropping import PRESETS, Cropping
-from pyvista_vdi.picking import pick_vdi
-from pyvista_vdi.raycast import render_first_hits, render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.model.cropping import PRESETS, Cropping
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.quality.view_error import ViewErrorEstimator
+from pyvista_vdi.raycasting.picking import pick_vdi
+from pyvista_vdi.raycasting.raycast import render_first_hits, render_vdi
 from pyvista_vdi.reference.raycast import kept_parts
 from pyvista_vdi.reference.rays import clip, inside_box, pixel_ray
-from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.view_error import ViewErrorEstimator
-from pyvista_vdi.volume import Volume
+from pyvista_vdi.volume.render import raycast_volume
 
 
 def planes_in(rng, bounds):
@@ -217,8 +217,8 @@ def test_multiplier_of_a_volume_is_its_unit_distance(runtime):
 
 def test_an_estimate_compares_the_pictures_that_are_shown(default_runtime):
     """Where a volume has changed, and what has changed is cropped away, nothing is lost."""
-    from pyvista_vdi.camera import Camera
-    from pyvista_vdi.generation import generate_vdi
+    from pyvista_vdi.generation.generate import generate_vdi
+    from pyvista_vdi.model.camera import Camera
 
     rng = np.random.default_rng(7)
     before = rng.random((16, 16, 16), dtype=np.float32)

@@ -9,7 +9,7 @@ from oracle import TOLERANCE
 
 import pyvista_vdi
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.raycast import TRANSMITTANCE_CUTOFF, render_vdi
+from pyvista_vdi.raycasting.raycast import TRANSMITTANCE_CUTOFF, render_vdi
 
 
 def seen_from_beside(seed):

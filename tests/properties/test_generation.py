@@ -17,16 +17,16 @@ import strategies
 from sampling_uncertainty import uncertainties
 
 from pyvista_vdi import reference
-from pyvista_vdi.camera import Camera
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
-from pyvista_vdi.generation import CRITERIA, generate_vdi
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.generation.generate import CRITERIA, generate_vdi
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
+from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
+from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.reference.generate import near_depth
 from pyvista_vdi.reference.ranges import ROUNDOFF
 from pyvista_vdi.reference.raycast import NEAR_LIMIT
-from pyvista_vdi.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
-from pyvista_vdi.volume import VOXEL_TYPES, Volume
+from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (14, 10)
 

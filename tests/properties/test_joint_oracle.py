@@ -16,14 +16,15 @@ import pytest
 import strategies
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import joint, reference
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.cropping import Cropping
+from pyvista_vdi import reference
+from pyvista_vdi.device.ray_forms import cells_of_points
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.joint import PlacedVDI, joint_image, render_vdis
-from pyvista_vdi.raycast import prepared_vdi, render_vdi
-from pyvista_vdi.rays import cells_of_points
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.cropping import Cropping
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting import multi_vdi as joint
+from pyvista_vdi.raycasting.multi_vdi import PlacedVDI, joint_image, render_vdis
+from pyvista_vdi.raycasting.raycast import prepared_vdi, render_vdi
 
 #: Largest difference per channel from the oracle; see above.
 TOLERANCE = 4e-5
@@ -216,7 +217,7 @@ def test_the_order_of_the_vdis_changes_no_bit(runtime, count):
 
 @pytest.mark.usefixtures("_dealt")
 def test_passing_by_what_is_empty_changes_no_bit(runtime, monkeypatch):
-    monkeypatch.setattr("pyvista_vdi.occupancy._WORTHWHILE", np.inf)
+    monkeypatch.setattr("pyvista_vdi.raycasting.occupancy._WORTHWHILE", np.inf)
     vdis, cameras, size = scene(np.random.default_rng(11), "beside", 2)
     image = draw(runtime, vdis, cameras, size)
     assert np.array_equal(image, draw(runtime, vdis, cameras, size, skip_empty=False))

@@ -19,13 +19,13 @@ from pyvista_vdi import (
     Volume,
     reference,
 )
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.device_volume import DeviceVolume
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.opencl_runtime import sources
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.device import sources
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.reference.generate import medium_at
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (7, 6)
 
@@ -239,7 +239,7 @@ def compiled(runtime, path, function, lights=None, **options):
     return preprocessed(sources.expand(path), medium.defines)
 
 
-@pytest.mark.parametrize("path", ["vdi/generate.cl", "vdi/render_volume.cl"])
+@pytest.mark.parametrize("path", ["generation/generate.cl", "volume/render_volume.cl"])
 def test_kernels_compile_only_what_is_used(default_runtime, path):
     code = {
         "plain": compiled(default_runtime, path, lambda v: looks(v, shaded=False)),

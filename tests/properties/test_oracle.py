@@ -7,11 +7,11 @@ import pytest
 import strategies
 
 from pyvista_vdi import reference
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.compositing import Segment, composite, split
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.compositing import Segment, composite, split
+from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.reference.raycast import centre_ray_scale
-from pyvista_vdi.vdi import VDI
 
 #: Float64 rounding, grown by a few hundred operations and by media as thin as 1e-3 of the depth.
 EXACT = 1e-9

@@ -1,4 +1,4 @@
-"""Rays that stay in a list of their own: each pixel from that list (vdi/raycast_own_lists.cl).
+"""Rays that stay in a list of their own: each pixel from that list (raycasting/aligned_view.cl).
 
 These are views from V_O whose pixels are those of the VDI's window, more, or some of them. Against
 the float64 oracle, as in ``test_raycast_oracle.py``, and against rays that are followed one by one:
@@ -13,12 +13,12 @@ import pytest
 import strategies
 from oracle import explain
 
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.opencl_runtime import Runtime
-from pyvista_vdi.picking import FirstHit
-from pyvista_vdi.precision import PRECISIONS
-from pyvista_vdi.raycast import PreparedVDI, render_vdi
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.device import Runtime
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.packing import PRECISIONS
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.picking import FirstHit
+from pyvista_vdi.raycasting.raycast import PreparedVDI, render_vdi
 
 #: Most that a channel of these random VDIs may differ from rays that are followed one by one, whose
 #: lengths have more roundings. Measured: 2e-6.

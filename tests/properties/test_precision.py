@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from oracle import explain, total
 
 from pyvista_vdi import reference, render
-from pyvista_vdi.camera import Camera
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.precision import DEPTH_CODES, Packed8, Packed16, gaps_and_thicknesses, packed_8
-from pyvista_vdi.raycast import PreparedVDI, render_first_hits, render_vdi
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.packing import DEPTH_CODES, Packed8, Packed16, gaps_and_thicknesses, packed_8
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.raycast import PreparedVDI, render_first_hits, render_vdi
 
 PACKED = ("16-byte", "8-byte")
 BOUNDS = (-1, 1, -1, 1, -1, 1)

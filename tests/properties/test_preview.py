@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import strategies
 
-from pyvista_vdi.camera import Camera
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.raycast import MAX_PREVIEW_SAMPLES, render_vdi
-from pyvista_vdi.standard_cases import filling_camera
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.raycast import MAX_PREVIEW_SAMPLES, render_vdi
 
 BOUNDS = (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
 COLOR = np.array([0.8, 0.5, 0.2])

@@ -14,9 +14,9 @@ import pytest
 import strategies
 from oracle import explain, total
 
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.raycast import render_vdi
 
 #: Share of pixels that may differ by more from the unmoved ray, over all views together.
 MAX_SHARE = 0.02

@@ -7,9 +7,9 @@ import pytest
 import strategies
 
 from pyvista_vdi import InvalidVolumeError, Shading, TransferFunction, Volume, reference
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (7, 6)
 

@@ -19,12 +19,14 @@ import pytest
 import strategies
 from real_data import require_data
 
-from pyvista_vdi import examples, generate, occupancy, rays
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.occupancy import SLABS, TILE
-from pyvista_vdi.raycast import prepared_vdi, render_vdi
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi import examples, generate
+from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting import occupancy
+from pyvista_vdi.raycasting.occupancy import SLABS, TILE
+from pyvista_vdi.raycasting.raycast import prepared_vdi, render_vdi
 
 #: Lists of the sparse VDIs: many tiles, those of the last column cut off. The middle is a corner of
 #: lists, and lies on a border between two rows of tiles.

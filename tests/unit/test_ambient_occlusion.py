@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pyvista_vdi import AmbientOcclusion, InvalidArgumentError, Volume, api
-from pyvista_vdi.ambient_occlusion import OcclusionGrid, spread_directions
+from pyvista_vdi.model.ambient_occlusion import OcclusionGrid, spread_directions
 
 
 def grid_of(shape, radius, spacing=(1, 1, 1), direction=None):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import api, classification
+from pyvista_vdi import api
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidCameraError,
@@ -20,7 +20,8 @@ from pyvista_vdi.errors import (
     NoDeviceError,
     UnsupportedError,
 )
-from pyvista_vdi.standard_cases import filling_camera
+from pyvista_vdi.model import classification
+from pyvista_vdi.model.standard_cases import filling_camera
 
 SIZE = (24, 16)
 

@@ -14,20 +14,16 @@ import numpy as np
 import pytest
 from fresh_python import run_python
 
-from pyvista_vdi import (
-    Camera,
-    TransferFunction,
-    Volume,
-    background,
-    generation,
-    voxels,
-)
-from pyvista_vdi.background import BackgroundGeneration
+from pyvista_vdi import Camera, TransferFunction, Volume
+from pyvista_vdi.device import scheduling as turns
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.opencl_runtime import turns
-from pyvista_vdi.raycast import prepared_vdi, render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.generation import generate as generation
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.quality import background
+from pyvista_vdi.quality.background import BackgroundGeneration
+from pyvista_vdi.raycasting.raycast import prepared_vdi, render_vdi
+from pyvista_vdi.volume import upload as voxels
+from pyvista_vdi.volume.render import raycast_volume
 
 #: Seconds after which a test that waits for the thread gives up: it would wait for ever.
 PATIENCE = 120
@@ -351,7 +347,7 @@ def test_the_interpreter_ends_in_the_middle(runtime):
     code = f"""
 import numpy as np
 from pyvista_vdi import Camera, TransferFunction, Volume
-from pyvista_vdi.background import BackgroundGeneration
+from pyvista_vdi.quality.background import BackgroundGeneration
 generator = BackgroundGeneration({runtime.info.selector!r}, on_finished=lambda: print("made"))
 volume = Volume(np.random.default_rng(0).random((100, 100, 100)).astype("f4"))
 transfer = TransferFunction(np.eye(3), [0.0, 0.3, 0.6], (0, 1))

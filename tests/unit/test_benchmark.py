@@ -14,7 +14,9 @@ from fresh_python import run_python
 from json_schema import read_checked
 
 from pyvista_vdi import cli, examples
-from pyvista_vdi.benchmark import (
+from pyvista_vdi.cli import parser
+from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError, InvalidVolumeError
+from pyvista_vdi.measure.benchmark import (
     PROFILES,
     Plan,
     Results,
@@ -26,13 +28,11 @@ from pyvista_vdi.benchmark import (
     read_results,
     session,
 )
-from pyvista_vdi.benchmark import datasets as datasets_module
-from pyvista_vdi.benchmark.changes import rank_sum_chance
-from pyvista_vdi.benchmark.paper import paper_tables, paper_targets
-from pyvista_vdi.benchmark.procedural import PROCEDURAL, make
-from pyvista_vdi.cli import parser
-from pyvista_vdi.compare.bounds import SSIM_TO_VTK
-from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError, InvalidVolumeError
+from pyvista_vdi.measure.benchmark import datasets as datasets_module
+from pyvista_vdi.measure.benchmark.changes import rank_sum_chance
+from pyvista_vdi.measure.benchmark.paper import paper_tables, paper_targets
+from pyvista_vdi.measure.benchmark.procedural import PROCEDURAL, make
+from pyvista_vdi.measure.compare.bounds import SSIM_TO_VTK
 
 SCHEMA = Path(__file__).parents[2] / "docs" / "benchmark_schema.json"
 
@@ -114,8 +114,8 @@ def test_vtk_takes_part_and_draws_the_same(default_runtime, tmp_path):
 
 def test_vtk_gets_the_same_transfer_function():
     pytest.importorskip("vtkmodules")
-    from pyvista_vdi.vtk_pipeline.convert import transfer_function_from_property
-    from pyvista_vdi.vtk_pipeline.peers import property_from_transfer_function
+    from pyvista_vdi.measure.vtk_baselines import property_from_transfer_function
+    from pyvista_vdi.vtk_pipeline.filters.convert import transfer_function_from_property
 
     dataset = find_dataset(TINY)
     volume = dataset.load(None)
@@ -217,15 +217,15 @@ def test_a_volume_beyond_the_device_is_a_refused_row(default_runtime, tmp_path, 
 
 
 def test_a_volume_beyond_the_host_is_refused_by_name(monkeypatch):
-    monkeypatch.setattr("pyvista_vdi.host_memory.physical_memory", lambda: 2**30)
+    monkeypatch.setattr("pyvista_vdi.model.host_memory.physical_memory", lambda: 2**30)
     with pytest.raises(
         DeviceMemoryError,
         match=r"the volume 'beechnut_like', 1024 x 1024 x 1546 of uint16, needs 4.02 GiB on the "
         r"host, which has 1.00 GiB: take 'beechnut_like@2'",
     ):
         find_dataset("beechnut_like").load(None)
-    monkeypatch.setattr("pyvista_vdi.host_memory.physical_memory", lambda: 2**40)
-    monkeypatch.setattr("pyvista_vdi.host_memory.free_memory", lambda: 2**30)
+    monkeypatch.setattr("pyvista_vdi.model.host_memory.physical_memory", lambda: 2**40)
+    monkeypatch.setattr("pyvista_vdi.model.host_memory.free_memory", lambda: 2**30)
     with pytest.raises(DeviceMemoryError, match="of which 1.00 GiB are free: close other programs"):
         find_dataset("beechnut_like").load(None)
 
@@ -234,7 +234,7 @@ def test_a_volume_beyond_the_host_is_refused_by_name(monkeypatch):
 def test_vtk_is_left_out_by_name_where_memory_is_short(default_runtime, tmp_path, monkeypatch):
     # Enough for the volume of 25 KiB and the working memory, and not for two copies of another
     free = iter([2**40] + [2**10] * 100)
-    monkeypatch.setattr("pyvista_vdi.host_memory.free_memory", lambda: next(free))
+    monkeypatch.setattr("pyvista_vdi.model.host_memory.free_memory", lambda: next(free))
     out = tmp_path / "a.json"
     assert benchmark(*TINY_RUN, "--angles", "5", "--tables", "1", "--out", out) == 0
     (cell,) = checked(out)["cells"]

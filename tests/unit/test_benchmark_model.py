@@ -10,15 +10,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.compositing import optical_depth_over_length
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.occupancy import TILE
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.compositing import optical_depth_over_length
+from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.occupancy import TILE
 from pyvista_vdi.reference import build_vdi, render_pixels, samples, volume_image
 from pyvista_vdi.reference.raycast import Lists, crossings, lines_of_pixel
-from pyvista_vdi.standard_cases import filling_camera
-from pyvista_vdi.transfer_function import TransferFunction
-from pyvista_vdi.volume import Volume
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 if not BENCHMARKS.is_dir():

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from pyvista_vdi.compare import (
+from pyvista_vdi.measure.compare import (
     AngleResult,
     Check,
     Report,
@@ -15,8 +15,8 @@ from pyvista_vdi.compare import (
     judge_vdi,
     judge_vtk,
 )
-from pyvista_vdi.metrics import Comparison
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS
+from pyvista_vdi.model.metrics import Comparison
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 
 PERFECT = Comparison(1.0, math.inf, 0.0, (0, 0), 1.0)
 

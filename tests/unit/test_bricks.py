@@ -9,19 +9,15 @@ import numpy as np
 import pytest
 import strategies
 
-from pyvista_vdi import Camera, Light, TransferFunction, Volume, bricks
-from pyvista_vdi.bricks import (
-    BrickLayout,
-    DeviceBricks,
-    fitting_layout,
-    in_parts,
-)
-from pyvista_vdi.checks import memory_limit_bytes
+from pyvista_vdi import Camera, Light, TransferFunction, Volume
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
-from pyvista_vdi.generation import estimate, generate_vdi
-from pyvista_vdi.lighting import Shading
-from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.view_error import estimate_view_error
+from pyvista_vdi.generation.generate import estimate, generate_vdi
+from pyvista_vdi.model.checks import memory_limit_bytes
+from pyvista_vdi.model.lighting import Shading
+from pyvista_vdi.quality.view_error import estimate_view_error
+from pyvista_vdi.volume import bricks
+from pyvista_vdi.volume.bricks import BrickLayout, DeviceBricks, fitting_layout, in_parts
+from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (20, 13)
 #: Little enough that the volumes below do not fit, enough for the rays of that window.
@@ -117,7 +113,9 @@ def test_same_bytes_whatever_the_bricks(runtime, used, monkeypatch, shift, slots
     function, camera = transfer_for(volume), VIEWS["perspective"]
     whole = make(runtime, volume, camera, function, sample_distance=0.5)
     layout = BrickLayout.of(volume.dimensions, shift, False, 1)
-    monkeypatch.setattr("pyvista_vdi.device_volume.fitting_layout", lambda *args: (layout, slots))
+    monkeypatch.setattr(
+        "pyvista_vdi.volume.classified_volume.fitting_layout", lambda *args: (layout, slots)
+    )
     few = make(runtime, volume, camera, function, sample_distance=0.5, memory_limit=LIMIT)
     assert used[0].copied >= min(slots, layout.n_bricks)
     assert few.equals(whole)

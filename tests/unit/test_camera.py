@@ -12,8 +12,8 @@ import strategies
 from hypothesis import given
 from strategies import GENERATORS
 
-from pyvista_vdi.camera import MAX_WINDOW_EDGE, Camera, check_window_size
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError, UnsupportedError
+from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
 
 WINDOW = (160, 90)
 

@@ -17,7 +17,7 @@ import pytest
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
 from pyvista_vdi.cli import parser
-from pyvista_vdi.standard_cases import filling_camera
+from pyvista_vdi.model.standard_cases import filling_camera
 
 VERBS = (
     "devices",
@@ -321,8 +321,8 @@ def test_devices(capsys, default_runtime):
 
 
 def test_devices_fails_where_none_is_usable(capsys, monkeypatch):
-    monkeypatch.setattr(pvdi.opencl_runtime, "list_devices", list)
-    monkeypatch.setattr(pvdi.opencl_runtime, "describe_devices", lambda: "No device.")
+    monkeypatch.setattr(pvdi.device, "list_devices", list)
+    monkeypatch.setattr(pvdi.device, "describe_devices", lambda: "No device.")
     assert run(capsys, "devices")[:2] == (1, "No device.\n")
 
 
@@ -535,7 +535,7 @@ def test_ctrl_c_while_generating(folder, default_runtime, tmp_path):
     code = (
         "import sys, time\n"
         "from pyvista_vdi.cli import main\n"
-        "from pyvista_vdi.io import writer\n"
+        "from pyvista_vdi.io.vdi_file import writer\n"
         "def slow(stream, *_):\n"
         "    stream.write(b'half'); print('writing', flush=True); time.sleep(60)\n"
         "writer.write_chunks = slow\n"

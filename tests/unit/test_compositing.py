@@ -10,9 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import colors, optical_depths
 
-from pyvista_vdi import compositing
-from pyvista_vdi.compositing import Segment, composite, merge, opacity, over, split, transmittance
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model import compositing
+from pyvista_vdi.model.compositing import (
+    Segment,
+    composite,
+    merge,
+    opacity,
+    over,
+    split,
+    transmittance,
+)
 
 EPS = np.finfo(np.float64).eps
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pyvista_vdi.cropping import PRESETS, Cropping, checked_opacity_multiplier
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.cropping import PRESETS, Cropping, checked_opacity_multiplier
 
 BOX = (0.0, 3.0, 0.0, 3.0, 0.0, 3.0)
 THIRDS = (1.0, 2.0, 1.0, 2.0, 1.0, 2.0)

@@ -12,9 +12,14 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import Camera, TransferFunction, Volume, dial_measurement
-from pyvista_vdi.classification import Classification
-from pyvista_vdi.dial import (
+from pyvista_vdi import Camera, TransferFunction, Volume
+from pyvista_vdi.errors import Cancelled, InvalidArgumentError, VDIWarning
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.quality import probe as dial_measurement
+from pyvista_vdi.quality.dial import (
     DENSE,
     LADDER,
     QUALITIES,
@@ -26,13 +31,9 @@ from pyvista_vdi.dial import (
     describe,
     predictions,
 )
-from pyvista_vdi.dial_measurement import Scene, lists_met, turned, viewport_planes
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError, VDIWarning
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.metrics import compare_images
-from pyvista_vdi.raycast import prepared_vdi, render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.quality.probe import Scene, lists_met, turned, viewport_planes
+from pyvista_vdi.raycasting.raycast import prepared_vdi, render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (160, 120)
 
@@ -293,7 +294,7 @@ def shipped():
                     (
                         rung,
                         compare_images(seen, picture).ssim,
-                        prepared_vdi(pvdi.opencl_runtime.get_runtime(), vdi).list_bytes,
+                        prepared_vdi(pvdi.device.get_runtime(), vdi).list_bytes,
                     )
                 )
     return rows

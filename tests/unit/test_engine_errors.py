@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pyvista_vdi import VDI, Camera, TransferFunction, Volume, generation
+from pyvista_vdi import VDI, Camera, TransferFunction, Volume
 from pyvista_vdi.errors import (
     Cancelled,
     DeviceMemoryError,
@@ -16,9 +16,10 @@ from pyvista_vdi.errors import (
     InvalidCameraError,
     InvalidVolumeError,
 )
-from pyvista_vdi.generation import estimate, generate_vdi
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
+from pyvista_vdi.generation import generate as generation
+from pyvista_vdi.generation.generate import estimate, generate_vdi
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (12, 9)
 CAMERA = Camera((3.5, 3.5, 30), (3.5, 3.5, 3.5), (0, 1, 0))
@@ -299,7 +300,7 @@ def test_a_window_beyond_memory_is_refused_before_anything_is_drawn(
     with pytest.raises(DeviceMemoryError, match=message):
         draw(window_size=(65536, 65536))
     # Four rows of lists at the very least are made at a time
-    monkeypatch.setattr("pyvista_vdi.host_memory.physical_memory", lambda: 2**60)
+    monkeypatch.setattr("pyvista_vdi.model.host_memory.physical_memory", lambda: 2**60)
     with pytest.raises(DeviceMemoryError, match="'recorded runs' needs .* GiB"):
         make(window_size=(65536, 65536), max_supersegments=4096)
     gc.collect()
@@ -396,7 +397,7 @@ def test_an_interrupt_leaves_nothing_allocated(runtime, make, sliced, at, error)
 
 
 def test_a_window_whose_lists_the_host_cannot_hold_is_refused_before_any_work(make, monkeypatch):
-    monkeypatch.setattr("pyvista_vdi.host_memory.physical_memory", lambda: 2**30)
+    monkeypatch.setattr("pyvista_vdi.model.host_memory.physical_memory", lambda: 2**30)
     with pytest.raises(
         DeviceMemoryError, match=r"65536 x 65536 lists needs 32\.00 GiB.* has 1\.00"
     ):
@@ -406,6 +407,6 @@ def test_a_window_whose_lists_the_host_cannot_hold_is_refused_before_any_work(ma
 def test_a_vdi_that_outgrows_the_host_is_given_up_with_the_remedy(make, monkeypatch):
     # Room for the offsets of its lists and nothing more
     room = 8 * WINDOW[0] * WINDOW[1]
-    monkeypatch.setattr("pyvista_vdi.host_memory.physical_memory", lambda: room)
+    monkeypatch.setattr("pyvista_vdi.model.host_memory.physical_memory", lambda: room)
     with pytest.raises(DeviceMemoryError, match=r"12 x 9 lists .* lower the window size"):
         make()

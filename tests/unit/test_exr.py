@@ -25,8 +25,10 @@ from pyvista_vdi.errors import (
     VDIFileError,
     VDIWarning,
 )
-from pyvista_vdi.io import exr, exr_layout, exr_view
-from pyvista_vdi.transfer_function import OPAQUE_OPTICAL_DEPTH
+from pyvista_vdi.io.deep_exr import files as exr
+from pyvista_vdi.io.deep_exr import layout as exr_layout
+from pyvista_vdi.io.deep_exr import view as exr_view
+from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH
 
 ARRAYS = ("offsets", "front", "back", "color", "optical_depth")
 VIEW = Camera((0, 0, 0), (0, 0, -1), (0, 1, 0), view_angle=40)
@@ -713,7 +715,7 @@ def test_exrinfo_accepts_our_files(file):
 def test_oiiotool_flattens_to_the_picture_from_the_generating_view(tmp_path, default_runtime):
     """Within 2/255 of ``render`` at V_O."""
     from pyvista_vdi import examples
-    from pyvista_vdi.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+    from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 
     program, openexr = tool("oiiotool"), pytest.importorskip("OpenEXR")
     volume, size = examples.load_data("brain", as_volume=True), (160, 90)

@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.frame_rate import FLOOR, RECENT_FRAMES, FrameRateController
+from pyvista_vdi.quality.frame_rate import FLOOR, RECENT_FRAMES, FrameRateController
 
 FULL = 1280 * 720
 TARGET = 30.0  # frames per second

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from pyvista_vdi import Camera, generation, growing_lists
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.opencl_runtime import GrowingArray, Runtime
+from pyvista_vdi import Camera
+from pyvista_vdi.device import GrowingArray, Runtime
+from pyvista_vdi.generation import generate as generation
+from pyvista_vdi.generation import list_arrays as growing_lists
+from pyvista_vdi.generation.generate import generate_vdi
 from tests.faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
 
 #: Looks past the volume, so that first all and then no lists have something in them.

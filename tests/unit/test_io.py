@@ -21,8 +21,8 @@ from strategies import random_vdi
 
 from pyvista_vdi import VDI, Camera, io
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-from pyvista_vdi.io import chunks, writer
-from pyvista_vdi.io.layout import CHUNK_ROWS, INDEX_DTYPE
+from pyvista_vdi.io.vdi_file import chunks, writer
+from pyvista_vdi.io.vdi_file.layout import CHUNK_ROWS, INDEX_DTYPE
 
 CODECS = ("lz4", "zstd", "none")
 ARRAYS = ("counts", "front", "back", "color", "optical_depth")

@@ -1,6 +1,7 @@
 """A CPU device marches nearest samples of integers in blocks of rays: the VDI is the same.
 
-``vdi/march_blocks.cl`` against ``march_lists`` of ``vdi/generate.cl``, to the last bit.
+``generation/march_blocks.cl`` against ``march_lists`` of ``generation/generate.cl``, to the last
+bit.
 """
 
 from __future__ import annotations
@@ -8,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pyvista_vdi import Camera, TransferFunction, Volume, generation
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.opencl_runtime import Runtime
-from pyvista_vdi.standard_cases import filling_camera
+from pyvista_vdi import Camera, TransferFunction, Volume
+from pyvista_vdi.device import Runtime
+from pyvista_vdi.generation import generate as generation
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.standard_cases import filling_camera
 
 WINDOW = (53, 39)  # no multiple of a block's edge
 CENTER = (24.5, 20.0, 23.0)

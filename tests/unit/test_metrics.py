@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.metrics import compare_images, over_background
-from pyvista_vdi.standard_cases import ANGLES, TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.model.metrics import compare_images, over_background
+from pyvista_vdi.model.standard_cases import ANGLES, TRANSFER_FUNCTIONS, filling_camera
 
 
 def picture(seed=0, size=(24, 32), channels=3):

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 import strategies
 
-from pyvista_vdi import occupancy, rays, read
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.occupancy import SLABS, TILE
-from pyvista_vdi.raycast import PreparedVDI
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi import read
+from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting import occupancy
+from pyvista_vdi.raycasting.occupancy import SLABS, TILE
+from pyvista_vdi.raycasting.raycast import PreparedVDI
 
 #: Seeds of random VDIs per kind.
 N_CASES = 6

@@ -11,15 +11,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pyvista_vdi import host_memory
-from pyvista_vdi import opencl_runtime as ocl
-from pyvista_vdi.errors import (
-    DeviceError,
-    DeviceMemoryError,
-    InvalidArgumentError,
-)
-from pyvista_vdi.opencl_runtime import devices
-from pyvista_vdi.opencl_runtime.buffers import Ledger, bytes_text
+from pyvista_vdi import device as ocl
+from pyvista_vdi.device import devices
+from pyvista_vdi.device.buffers import Ledger, bytes_text
+from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.model import host_memory
 
 # -- buffers -----------------------------------------------------------------------------------
 
@@ -157,7 +153,7 @@ def test_a_result_that_is_never_read_is_finished_before_its_memory_goes(runtime,
     finished = []
     monkeypatch.setattr(runtime, "_finish", lambda numbers: finished.append(set(numbers)))
     kernel = runtime.kernel(
-        "grid/volume_blocks.cl",
+        "volume/volume_blocks.cl",
         "block_reaches",
         {"VOXEL_T": "uchar", "INDEX_T": "uint", "BLOCK_SHIFT": 3},
     )

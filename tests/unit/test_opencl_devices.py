@@ -12,12 +12,9 @@ import numpy as np
 import pytest
 from fresh_python import run_python
 
-from pyvista_vdi import opencl_runtime as ocl
-from pyvista_vdi.errors import (
-    InvalidArgumentError,
-    NoDeviceError,
-)
-from pyvista_vdi.opencl_runtime import choice, devices, icd
+from pyvista_vdi import device as ocl
+from pyvista_vdi.device import choice, devices, icd
+from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError
 
 
 def fake(platform: str, name: str, kind: str, index: tuple[int, int], **more) -> ocl.DeviceInfo:
@@ -171,7 +168,7 @@ def test_probe_notices_wrong_numbers(where):
 def test_import_touches_no_environment_and_loads_no_driver():
     code = (
         "import os, sys; before = dict(os.environ)\n"
-        "import pyvista_vdi.opencl_runtime\n"
+        "import pyvista_vdi.device\n"
         "assert 'pyopencl' not in sys.modules\n"
         "assert dict(os.environ) == before"
     )
@@ -182,7 +179,7 @@ def test_import_touches_no_environment_and_loads_no_driver():
 def test_listing_devices_puts_the_environment_back():
     code = (
         "import os; before = dict(os.environ)\n"
-        "from pyvista_vdi.opencl_runtime import list_devices; list_devices()\n"
+        "from pyvista_vdi.device import list_devices; list_devices()\n"
         "changed = set(os.environ.items()) ^ set(before.items())\n"
         "print(sorted(name for name, _ in changed if 'OCL' in name))"
     )
@@ -194,7 +191,7 @@ def test_listing_devices_puts_the_environment_back():
 def test_no_device_says_what_was_found_and_the_remedy(tmp_path):
     code = (
         "from pyvista_vdi.errors import NoDeviceError\n"
-        "from pyvista_vdi.opencl_runtime import get_runtime, list_devices, describe_devices\n"
+        "from pyvista_vdi.device import get_runtime, list_devices, describe_devices\n"
         "assert list_devices() == []\n"
         "print(describe_devices())\n"
         "try:\n    get_runtime()\nexcept NoDeviceError as exc:\n    print('caught', exc)\n"

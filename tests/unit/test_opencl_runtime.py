@@ -8,14 +8,10 @@ import numpy as np
 import pytest
 from fresh_python import run_python
 
-from pyvista_vdi import opencl_runtime as ocl
-from pyvista_vdi.errors import (
-    DeviceError,
-    InvalidArgumentError,
-    KernelBuildError,
-)
-from pyvista_vdi.opencl_runtime import devices, profiling, programs, sources
-from pyvista_vdi.opencl_runtime.runtime import Runtime
+from pyvista_vdi import device as ocl
+from pyvista_vdi.device import devices, profiling, programs, sources
+from pyvista_vdi.device.runtime import Runtime
+from pyvista_vdi.errors import DeviceError, InvalidArgumentError, KernelBuildError
 
 # -- sources -----------------------------------------------------------------------------------
 
@@ -79,7 +75,7 @@ def test_resources_outside_the_package_are_not_read(path):
 # -- programs ----------------------------------------------------------------------------------
 
 SCALE = """\
-#include "common/probe.cl"
+#include "lib/probe.cl"
 __kernel void scale(__global float *x, const float factor, const uint n)
 {
     const uint i = get_global_id(0);
@@ -136,7 +132,7 @@ def test_failed_builds_leave_no_files(runtime, texts, monkeypatch, tmp_path):
 
 def test_unknown_kernel_lists_those_there_are(runtime):
     with pytest.raises(KernelBuildError, match="has no kernel 'nix'.*it has: probe"):
-        runtime.kernel("common/probe.cl", "nix")
+        runtime.kernel("lib/probe.cl", "nix")
 
 
 def test_long_logs_are_trimmed():
@@ -326,10 +322,7 @@ def test_a_scope_can_be_profiled_by_itself(runtime, scale_file):
 
 
 def test_profile_table_is_printed_at_exit(runtime):
-    code = (
-        "from pyvista_vdi.opencl_runtime import get_runtime\n"
-        f"get_runtime({runtime.info.selector!r})"
-    )
+    code = f"from pyvista_vdi.device import get_runtime\nget_runtime({runtime.info.selector!r})"
     done = run_python(code, PYVISTA_VDI_PROFILE="1")
     assert done.returncode == 0, done.stderr
     assert done.stdout == ""

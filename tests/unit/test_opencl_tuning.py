@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.classification import Classification
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.opencl_runtime import choice, tuning
-from pyvista_vdi.opencl_runtime.devices import Candidate, DeviceInfo
-from pyvista_vdi.opencl_runtime.runtime import Runtime
-from pyvista_vdi.raycast import render_first_hits, render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.standard_cases import filling_camera
+from pyvista_vdi.device import choice, tuning
+from pyvista_vdi.device.devices import Candidate, DeviceInfo
+from pyvista_vdi.device.runtime import Runtime
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.raycasting.raycast import render_first_hits, render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 INFO = DeviceInfo(
     "Device", "Platform", "Vendor", "OpenCL 3.0", "1.2", "GPU", 8, 2**33, 2**31, has_fp64=True
@@ -45,7 +45,7 @@ class Events:
         self.cost, self.drift, self.launches = cost, drift, []
         limits = {"PREFERRED_WORK_GROUP_SIZE_MULTIPLE": 32, "WORK_GROUP_SIZE": most}
         self.kernel = Named(
-            path="vdi/raycast.cl",
+            path="raycasting/raycast.cl",
             name="raycast",
             source=source,
             object=SimpleNamespace(get_work_group_info=lambda what, _: limits[what]),
@@ -193,7 +193,7 @@ def test_kept_sizes_are_of_this_driver_and_source(file):
 
 def _contents(entry):
     key = "Platform / Device, driver 1.2"
-    return json.dumps({"version": 1, "devices": {key: {"vdi/raycast.cl:raycast": entry}}})
+    return json.dumps({"version": 1, "devices": {key: {"raycasting/raycast.cl:raycast": entry}}})
 
 
 @pytest.mark.parametrize(
@@ -229,7 +229,7 @@ def test_what_others_have_kept_stays(file):
     other.kernel.name = "march_lists"
     other.run(_tuner(file), ALL + 1)
     (kernels,) = json.loads(file.read_text())["devices"].values()
-    assert sorted(kernels) == ["vdi/raycast.cl:march_lists", "vdi/raycast.cl:raycast"]
+    assert sorted(kernels) == ["raycasting/raycast.cl:march_lists", "raycasting/raycast.cl:raycast"]
 
 
 def test_where_nothing_can_be_written_sizes_hold_for_the_process(tmp_path):

@@ -8,11 +8,11 @@ import threading
 import numpy as np
 import pytest
 
-from pyvista_vdi import opencl_runtime as ocl
+from pyvista_vdi import device as ocl
+from pyvista_vdi.device import runtime as runtime_module
+from pyvista_vdi.device import scheduling as turns
+from pyvista_vdi.device.scheduling import Turns
 from pyvista_vdi.errors import Cancelled
-from pyvista_vdi.opencl_runtime import runtime as runtime_module
-from pyvista_vdi.opencl_runtime import turns
-from pyvista_vdi.opencl_runtime.turns import Turns
 
 #: Seconds after which a test that waits for another thread gives up: it would wait for ever.
 PATIENCE = 60

@@ -16,7 +16,7 @@ from strategies import random_vdi
 from pyvista_vdi import VDI, Camera, io
 from pyvista_vdi.cli import main
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-from pyvista_vdi.io.layout import CHUNK_ROWS, INDEX_DTYPE
+from pyvista_vdi.io.vdi_file.layout import CHUNK_ROWS, INDEX_DTYPE
 
 CODECS = ("lz4", "zstd", "none")
 JUNK = (None, -1, True, 2**70, 1e300, "x", [], {}, [1], [[]], {"a": 1})

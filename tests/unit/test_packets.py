@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 import strategies
 
-from pyvista_vdi import packets, rays
-from pyvista_vdi.blocks import Rectangle
-from pyvista_vdi.camera import Camera
-from pyvista_vdi.cropping import Cropping
-from pyvista_vdi.raycast import PreparedVDI
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.device.work_order import Rectangle
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.cropping import Cropping
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting import packets
+from pyvista_vdi.raycasting.raycast import PreparedVDI
 
 BOUNDS = (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
 CAMERA = Camera((0, 0, 6), (0, 0, 0), (0, 1, 0), view_angle=30)

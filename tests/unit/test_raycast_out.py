@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pyvista_vdi import VDI, Camera
+from pyvista_vdi.device import aligned_empty
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.opencl_runtime import aligned_empty
-from pyvista_vdi.raycast import render_vdi
+from pyvista_vdi.raycasting.raycast import render_vdi
 
 CAMERA = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))
 

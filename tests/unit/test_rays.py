@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from strategies import camera_around, random_bounds, random_transform, world_corners
 
-from pyvista_vdi import Camera, rays
+from pyvista_vdi import Camera
+from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
 
 EPS64 = np.finfo(np.float64).eps

@@ -20,8 +20,8 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import cli
 from pyvista_vdi.cli import parser
 from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
-from pyvista_vdi.tradeoff import AXES, Setting, Tradeoff, measure_tradeoff, session, sweep
-from pyvista_vdi.tradeoff.settings import DEFAULT_AXES, ON_REQUEST, PAIRS, QUICK_AXES
+from pyvista_vdi.measure.tradeoff import AXES, Setting, Tradeoff, measure_tradeoff, session, sweep
+from pyvista_vdi.measure.tradeoff.settings import DEFAULT_AXES, ON_REQUEST, PAIRS, QUICK_AXES
 
 SCHEMA = Path(__file__).parents[2] / "docs" / "tradeoff_schema.json"
 
@@ -178,7 +178,7 @@ def test_python_and_the_command_measure_the_same(default_runtime, folder, tmp_pa
     run = (folder / "ball_20x18x14_uint8.raw", *TINY_RUN, "--sweep", "lists=0.5", "--no-vtk")
     assert tradeoff(*run, "--out", tmp_path, "--device", default_runtime.info.selector) == 0
     commanded = Tradeoff.read(tmp_path / "tradeoff-ball_20x18x14_uint8.json")
-    table = pvdi.benchmark.datasets.look("ramp", (0.0, 255.0), "nearest")
+    table = pvdi.measure.benchmark.datasets.look("ramp", (0.0, 255.0), "nearest")
     ours = measure_tradeoff(
         pvdi.Volume(shell()),
         sweep({"lists": (0.5,)}),
@@ -283,7 +283,7 @@ def test_ctrl_c_leaves_no_half_file(folder, default_runtime, tmp_path):
     code = (
         "import sys, time\n"
         "from pyvista_vdi.cli import main\n"
-        "from pyvista_vdi.tradeoff import results, session\n"
+        "from pyvista_vdi.measure.tradeoff import results, session\n"
         "save = results.TradeoffFile.save\n"
         "def slow(self):\n"
         "    if self.data['points']:\n"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.transfer_function import TransferFunction
+from pyvista_vdi.model.transfer_function import TransferFunction
 
 COLORS = [[0, 0, 0], [0.5, 0.25, 1]]
 OPACITIES = [0.0, 0.75]

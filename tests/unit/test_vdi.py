@@ -8,9 +8,9 @@ import strategies
 from hypothesis import given
 from strategies import GENERATORS
 
-from pyvista_vdi.camera import Camera
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
-from pyvista_vdi.vdi import VDI
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.vdi import VDI
 
 CAMERA = Camera((0, 0, 9), (0, 0, 0), (0, 1, 0))
 

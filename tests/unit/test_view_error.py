@@ -10,25 +10,25 @@ import pytest
 
 from pyvista_vdi import VDI, Camera, TransferFunction, Volume
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
-from pyvista_vdi.generation import generate_vdi
-from pyvista_vdi.metrics import compare_images
-from pyvista_vdi.picture_tiles import (
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.quality.tiles import (
     _along_curve,
     _cell_starts,
     _chances,
     _ratio_estimate,
     _systematic,
 )
-from pyvista_vdi.raycast import render_vdi
-from pyvista_vdi.raycast_volume import raycast_volume
-from pyvista_vdi.standard_cases import filling_camera
-from pyvista_vdi.view_error import (
+from pyvista_vdi.quality.view_error import (
     TILES,
     ViewErrorEstimator,
     angle_from_generating_view,
     estimate_view_error,
     magnification,
 )
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume.render import raycast_volume
 
 #: Frames; a hundred cells of the default tiles' 14 pixels, of which the bounds take about 60.
 WINDOW = (160, 120)
@@ -291,7 +291,7 @@ def test_coarse_pictures_are_made_in_bands(scene, monkeypatch):
     vdi, camera = scene.vdi("coarse"), VIEW.azimuth(33)
     whole = scene.estimator().estimate(vdi, camera, WINDOW)
     calls = []
-    monkeypatch.setattr("pyvista_vdi.view_error._COARSE_LAUNCH", 1)  # a row each
+    monkeypatch.setattr("pyvista_vdi.quality.view_error._COARSE_LAUNCH", 1)  # a row each
     found = scene.estimator().estimate(vdi, camera, WINDOW, pause=lambda: calls.append(1))
     assert len(calls) > 2 * TILES + 20
     assert found.ssim == pytest.approx(whole.ssim, abs=1e-5)

@@ -9,7 +9,7 @@ from hypothesis import given
 from strategies import GENERATORS
 
 from pyvista_vdi.errors import InvalidVolumeError
-from pyvista_vdi.volume import VOXEL_TYPES, Volume
+from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
 
 
 @pytest.mark.parametrize("dtype", VOXEL_TYPES)

@@ -1,0 +1,131 @@
+// Rays through a window, and their clipping to a convex region.
+//
+// A "form" is an affine function along the ray of pixel (x, y), six floats (c0, c1, c2, d0, d1, d2):
+//
+//     value(t) = (c0 + a c1 + b c2) + t (d0 + a d1 + b d2),   a = x + 1/2 - W/2,  b = y + 1/2 - H/2
+//
+// with t the view depth of the ray's own camera less a reference depth (world units). The host forms all six in float64
+// about a reference depth near the data, so that float32 is enough here however far away the eye or the origin is
+// (docs/conventions.md, "Rays"). y = 0 is the bottom row.
+//
+// -D FAR_ENTRIES   rays may enter the data so far from there that it is not enough for the positions of samples: six more
+//                  floats of each form are what float32 has rounded off the first six (docs/numerics.md)
+#include "lib/double_float.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+#ifdef FAR_ENTRIES
+#define FORM_SIZE 12
+#else
+#define FORM_SIZE 6
+#endif
+
+// Value of a form at t = 0 for pixel offsets (a, b), and its slope along the ray, per unit of t. TYPE: of a and b, float or a
+// vector.
+#define FORM_VALUE(TYPE, form, a, b) fma(b, (TYPE)((form)[2]), fma(a, (TYPE)((form)[1]), (TYPE)((form)[0])))
+#define FORM_SLOPE(TYPE, form, a, b) FORM_VALUE(TYPE, (form) + 3, a, b)
+
+inline float form_value(__global const float *form, float a, float b)
+{
+    return FORM_VALUE(float, form, a, b);
+}
+
+inline float form_slope(__global const float *form, float a, float b)
+{
+    return FORM_SLOPE(float, form, a, b);
+}
+
+// Model-frame direction of a ray that is marched, per unit of t. `forms`: 3 index positions, then 3 model directions.
+inline float3 model_direction(__global const float *forms, float a, float b)
+{
+    return (float3)(form_slope(forms + 3 * FORM_SIZE, a, b), form_slope(forms + 4 * FORM_SIZE, a, b),
+                    form_slope(forms + 5 * FORM_SIZE, a, b));
+}
+
+// Clip [*t0, *t1] to where each of `count` forms is >= 0. Returns whether anything is left.
+inline bool clip_to_planes(__global const float *planes, int count, float a, float b, float *t0, float *t1)
+{
+    for (int k = 0; k < count; ++k) {
+        const float value = form_value(planes + k * FORM_SIZE, a, b);
+        const float slope = form_slope(planes + k * FORM_SIZE, a, b);
+        if (slope > 0.0f)
+            *t0 = fmax(*t0, -value / slope);
+        else if (slope < 0.0f)
+            *t1 = fmin(*t1, -value / slope);
+        else if (value < 0.0f)  // parallel to the plane and outside it
+            *t1 = -INFINITY;
+    }
+    return *t0 < *t1;
+}
+
+#ifdef FAR_ENTRIES
+// Three coefficients of a form, and their rests, at pixel offsets (a, b), which are exact.
+inline float2 pair_of_form(__global const float *c, float a, float b)
+{
+    const float2 of_a = pair_product((float2)(c[1], c[7]), (float2)(a, 0.0f));
+    const float2 of_b = pair_product((float2)(c[2], c[8]), (float2)(b, 0.0f));
+    return pair_sum(pair_sum((float2)(c[0], c[6]), of_a), of_b);
+}
+
+// Value of a form at t.
+inline float2 form_at(__global const float *form, float a, float b, float2 t)
+{
+    return pair_sum(pair_of_form(form, a, b), pair_product(t, pair_of_form(form + 3, a, b)));
+}
+
+// clip_to_planes, and what is left as its entry and its length.
+inline bool clip_from_entry(__global const float *planes, int count, float a, float b, float t_end, float2 *entry,
+                            float *length)
+{
+    float2 t0 = (float2)(-INFINITY, 0.0f);
+    float2 t1 = (float2)(t_end, 0.0f);
+    for (int k = 0; k < count; ++k) {
+        const float2 value = pair_of_form(planes + k * FORM_SIZE, a, b);
+        const float2 slope = pair_of_form(planes + k * FORM_SIZE + 3, a, b);
+        if (slope.x == 0.0f) {
+            if (value.x < 0.0f) // parallel to the plane and outside it
+                return false;
+            continue;
+        }
+        const float2 t = pair_quotient(-value, slope);
+        if (slope.x > 0.0f)
+            t0 = pair_less(t0, t) ? t : t0;
+        else
+            t1 = pair_less(t, t1) ? t : t1;
+    }
+    if (!pair_less(t0, t1))
+        return false;
+    *entry = t0;
+    *length = pair_sum(t1, -t0).x;
+    return *length < INFINITY; // not so where every slope has become 0
+}
+#endif
+
+// Pixel of a work-item: blocks of 4 x 4 pixels, so that neighbouring items walk through the same lists and voxels.
+inline int2 block_pixel(uint item, int width)
+{
+    const uint block = item >> 4;
+    const uint columns = (uint)(width + 3) >> 2;
+    return (int2)((int)((block % columns) << 2 | (item & 3)), (int)((block / columns) << 2 | (item >> 2 & 3)));
+}
+
+// The same for part of a window, in strips STRIP blocks high, each from left to right, so that one work-item's lists are still
+// cached when those above and below come to them: whole columns of strips, a work-group each. `part` is its first column and
+// strip, in columns and strips of the window, how many columns it has in each strip, and how many strips.
+#define STRIP 4
+#define COLUMN_ITEMS (16 * STRIP) // that of pyvista_vdi/blocks.py, and of every group that draws, unless it may be of any size
+inline int2 part_pixel(int group, int item, int4 part)
+{
+    const int strip = group / part.z;
+    const int column = group - strip * part.z;
+    return (int2)((part.x + column) << 2 | (item & 3), (part.y + strip) * (4 * STRIP) + (item >> 2));
+}
+
+// The same for some of a window's cells, squares of STRIP x STRIP blocks; `cells` are their columns and rows.
+#define CELL_ITEMS (STRIP * COLUMN_ITEMS) // that of pyvista_vdi/blocks.py
+inline int2 cell_pixel(__global const int2 *cells, int item)
+{
+    const int2 cell = cells[item / CELL_ITEMS];
+    const int place = item % CELL_ITEMS;
+    return (int2)((cell.x * STRIP + place / COLUMN_ITEMS) << 2 | (place & 3),
+                  cell.y * (4 * STRIP) + (place % COLUMN_ITEMS >> 2));
+}

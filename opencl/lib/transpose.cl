@@ -1,0 +1,27 @@
+// Four numbers for each lane (lib/lanes.cl): as they lie in memory, and as one vector of each number.
+#include "lib/lanes.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+// Each vector has four lanes' numbers side by side, or each has one of all lanes.
+typedef struct {
+    Reals of[4];
+} Quads;
+
+// The first halves, or the second ones, of each 128 bits of two vectors; and their numbers in turns, or half behind half.
+// Swizzles of whole vectors: of vectors put together by single numbers a compiler makes as many instructions.
+#define FIRST_HALVES(p, q) ((Reals)((p).s014589cd, (q).s014589cd))
+#define SECOND_HALVES(p, q) ((Reals)((p).s2367abef, (q).s2367abef))
+#define IN_TURNS s08192a3b4c5d6e7f
+#define JOINED s018923ab45cd67ef
+
+// From one to the other: in the g-th 128 bits of the n-th vector stand the numbers of lane 4 g + n, and the other way round.
+inline Quads transposed(Quads x)
+{
+    const Reals first_01 = FIRST_HALVES(x.of[0], x.of[1]).IN_TURNS;
+    const Reals first_23 = FIRST_HALVES(x.of[2], x.of[3]).IN_TURNS;
+    const Reals second_01 = SECOND_HALVES(x.of[0], x.of[1]).IN_TURNS;
+    const Reals second_23 = SECOND_HALVES(x.of[2], x.of[3]).IN_TURNS;
+    const Quads result = {{FIRST_HALVES(first_01, first_23).JOINED, SECOND_HALVES(first_01, first_23).JOINED,
+                           FIRST_HALVES(second_01, second_23).JOINED, SECOND_HALVES(second_01, second_23).JOINED}};
+    return result;
+}

@@ -1,0 +1,50 @@
+// The occupancy grid: how many supersegments reach into each cell (paper, section 4), and for each tile of lists the set of
+// its occupied slabs as one 64-bit mask, which answers a ray's whole crossing of the tile with one load.
+//
+// -D OFFSET_T   type of an offset into the supersegments: uint or ulong
+#include "raycasting/tiles.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+// One work-item per list. Each supersegment adds 1 where it begins and takes 1 away behind its end, whatever it spans;
+// `occupied_slabs` sums up. Counts are sums of whole numbers, so that their order changes nothing.
+__kernel void count_supersegments(
+    __global const OFFSET_T *offsets, // width * height + 1
+    __global const float *fronts,     // view depth less depth_origin
+    __global const float *backs,
+    int width, int height,            // lists
+    int tiles_wide,
+    float first_depth,                // where slab 0 begins, view depth less depth_origin
+    float slabs_per_depth,            // per world unit
+    float margin,                     // by which supersegments count beyond their faces, world units
+    __global uint *changes)           // of the counts along each tile: tiles_high, tiles_wide, SLABS; all 0
+{
+    const size_t list = get_global_id(0);
+    if (list >= (size_t)width * (size_t)height)
+        return;
+    const size_t i = (list % (size_t)width) >> TILE_SHIFT;
+    const size_t j = (list / (size_t)width) >> TILE_SHIFT;
+    __global uint *cells = changes + (j * (size_t)tiles_wide + i) * SLABS;
+    for (OFFSET_T k = offsets[list]; k < offsets[list + 1]; ++k) {
+        const int first = slab_of(fronts[k] - margin, first_depth, slabs_per_depth);
+        const int last = slab_of(backs[k] + margin, first_depth, slabs_per_depth);
+        atomic_inc(cells + first);
+        if (last + 1 < SLABS)
+            atomic_dec(cells + last + 1);
+    }
+}
+
+// One work-item per tile: its changes become counts.
+__kernel void occupied_slabs(__global uint *counts, uint tiles, __global ulong *masks)
+{
+    const size_t tile = get_global_id(0);
+    if (tile >= tiles)
+        return;
+    ulong mask = 0;
+    uint count = 0;
+    for (int slab = 0; slab < SLABS; ++slab) {
+        count += counts[tile * SLABS + slab];
+        counts[tile * SLABS + slab] = count;
+        mask |= (ulong)(count > 0) << slab;
+    }
+    masks[tile] = mask;
+}

@@ -1,0 +1,135 @@
+// Direct volume rendering: the baseline that a VDI is measured against, by the same march as generation.
+//
+// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, SKIP_EMPTY, BLOCK_SHIFT: see volume/sampling.cl and volume/march.cl
+// -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see volume/shading.cl; OCCLUSION: see volume/occlusion.cl
+// -D COMPENSATED: see lib/compositing.cl; FAR_ENTRIES: see lib/rays.cl
+// -D CROPPED: see lib/cropping.cl
+// -D OPACITY_MULTIPLIER: optical depths are multiplied
+// -D SAMPLED: see volume/samples.cl; some steps of some rows at a time then, as they are sampled
+#include "volume/march.cl"
+#include "lib/cropping.cl"
+#include "lib/compositing.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+#ifdef OPACITY_MULTIPLIER
+#define MULTIPLIER_PARAMETER float opacity_multiplier,
+#else
+#define MULTIPLIER_PARAMETER
+#endif
+
+#ifdef SAMPLED
+#define PART_PARAMETERS                                                                        \
+    int first_row, int rows, int first_step, int steps,                                        \
+    __global float4 *states, /* of each ray: colour and transmittance, what they rounded off */
+#else
+#define PART_PARAMETERS
+#endif
+
+#ifdef CROPPED
+// The kept parts of a ray, in t.
+inline Kept kept_march(const March *march, __global const float *form, float a, float b, uint regions)
+{
+    float at_t0[CROPPING_PLANES], at_t1[CROPPING_PLANES];
+    for (int k = 0; k < CROPPING_PLANES; ++k, form += FORM_SIZE) {
+        const float value = march_value(march, form, a, b);
+        at_t0[k] = fma(march->t0, form_slope(form, a, b), value);
+        at_t1[k] = fma(march->t1, form_slope(form, a, b), value);
+    }
+    return kept_parts(at_t0, at_t1, march->t0, march->t1, regions);
+}
+
+// The share of a step that is kept.
+inline float kept_share(const Kept *kept, float front, float back)
+{
+    float sum = 0.0f;
+    for (int n = 0; n < kept->count; ++n) {
+        float from = front, to = back;
+        cut_to_part(kept, n, &from, &to);
+        sum += fmax(to - from, 0.0f);
+    }
+    return sum / (back - front);
+}
+#endif
+
+__kernel void render_volume(
+    __global const VOXEL_T *voxels,
+    int4 size,
+    __global const float4 *table,
+    int entries,
+    float low, float per_scalar,
+    __global const uchar *reaches, // of the blocks, see volume/volume_blocks.cl
+    int4 blocks,                   // along x, y, z
+    SHADING_PARAMETERS             // see volume/shading.cl
+    __global const float *forms,          // see begin_march
+    int planes,
+    float sample_distance,                // model units
+    float unit_distance,                  // model units
+    int width, int height,
+    __global const float *opaque_depth,   // t at which each pixel's ray ends, top row first, if has_opaque_depth
+    int has_opaque_depth,
+    float transmittance_cutoff,           // the ray ends where no more than this is left; negative: never
+    CROPPING_PARAMETER                    // regions that are kept; their planes are forms behind the others
+    MULTIPLIER_PARAMETER
+    PART_PARAMETERS
+    __global float4 *image)               // premultiplied RGBA, top row first
+{
+    int2 pixel = block_pixel((uint)get_global_id(0), width);
+#ifdef SAMPLED
+    pixel.y = pixel.y < rows ? first_row + pixel.y : height;
+    __global float4 *state = states + 2 * (size_t)get_global_id(0);
+#else
+    const int first_step = 0, steps = INT_MAX;
+#endif
+    if (pixel.x >= width || pixel.y >= height)
+        return;
+    const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
+    const float b = (float)pixel.y + 0.5f - 0.5f * (float)height;
+    const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
+    const float t_end = has_opaque_depth ? opaque_depth[place] : INFINITY;
+
+    float3 color = (float3)(0.0f);
+    float transmittance = 1.0f;
+    float4 rest = (float4)(0.0f);
+#ifdef SAMPLED
+    if (first_step > 0) {
+        color = state[0].xyz;
+        transmittance = state[0].w;
+        rest = state[1];
+    }
+#endif
+    March march;
+    if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, t_end)) {
+        const Medium medium = {voxels, size, table, entries, low, per_scalar, reaches, blocks SHADING_ARGUMENTS};
+#ifdef CROPPED
+        const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, a, b, regions);
+#endif
+        int k = first_step;
+        const int end = march.steps - first_step > steps ? first_step + steps : march.steps;
+        float front = step_face(&march, k);
+        while (k < end && transmittance > transmittance_cutoff) {
+            const int empty = empty_steps(&march, &medium, k, end, 1);
+            k += empty;
+            if (empty > 0) {
+                front = step_face(&march, k);
+                continue;
+            }
+            const float back = step_face(&march, k + 1);
+            float4 step = step_medium(&march, &medium, k, front, back);
+#ifdef CROPPED
+            step.w *= kept_share(&kept, front, back);
+#endif
+#ifdef OPACITY_MULTIPLIER
+            step.w *= opacity_multiplier;
+#endif
+            const float weight = transmittance * opacity_of(step.w); // over, front to back
+            composite_over(&color, &transmittance, &rest, weight, step.xyz);
+            front = back;
+            ++k;
+        }
+    }
+#ifdef SAMPLED
+    state[0] = (float4)(color, transmittance);
+    state[1] = rest;
+#endif
+    image[place] = composited(color, transmittance, rest);
+}

@@ -1,0 +1,82 @@
+// Samples of a uniform grid, between its points.
+//
+// -D VOXEL_T  type of a voxel: uchar, char, ushort, short or float
+// -D INDEX_T  type of a voxel's address: uint, or ulong where the grid has 2^32 points or more
+// -D RGBA     a voxel is four of them: colours, and the scalar last; otherwise it is the scalar alone
+// -D NEAREST  the nearest point's value (VTK's nearest interpolation); otherwise trilinear
+// -D BRICK_POINTS  `voxels` is a brick of the grid with so many points along each edge, see volume/bricks.cl
+//
+// Positions are in index space: point (i, j, k) lies at (i, j, k); x is fastest in memory.
+#pragma OPENCL FP_CONTRACT OFF
+
+#ifdef BRICK_POINTS
+// Positions and points are the whole grid's; addresses alone are the brick's, whose first point has the address size.w in a
+// grid of its rows and planes. Unsigned, so that what wraps in the parts is right in the difference.
+#define POINTS_X(size) BRICK_POINTS
+#define POINTS_Y(size) BRICK_POINTS
+#define FIRST_POINT(size) (INDEX_T)(size).w
+#else
+#define POINTS_X(size) (size).x
+#define POINTS_Y(size) (size).y
+#define FIRST_POINT(size) 0
+#endif
+
+#ifdef RGBA
+#define COMPONENTS 4
+#else
+#define COMPONENTS 1
+#endif
+#define SCALAR (COMPONENTS - 1) // which of them classification sees
+
+#ifdef NEAREST
+// A component of the point nearest to a position.
+inline VOXEL_T nearest_component(__global const VOXEL_T *voxels, int4 size, float x, float y, float z, int component)
+{
+    // What is below 0 is clamped, so that (int) rounds down
+    const int i = clamp((int)(x + 0.5f), 0, size.x - 1);
+    const int j = clamp((int)(y + 0.5f), 0, size.y - 1);
+    const int k = clamp((int)(z + 0.5f), 0, size.z - 1);
+    const INDEX_T voxel = ((INDEX_T)k * (INDEX_T)POINTS_Y(size) + (INDEX_T)j) * (INDEX_T)POINTS_X(size) + (INDEX_T)i -
+                          FIRST_POINT(size);
+    return voxels[voxel * COMPONENTS + component];
+}
+#endif
+
+inline float sample_component(__global const VOXEL_T *voxels, int4 size, float x, float y, float z, int component)
+{
+#ifdef NEAREST
+    return (float)nearest_component(voxels, size, x, y, z, component);
+#else
+    // Rounding can put a position on the far face a hair outside: clamp the cell, keep the weight in [0, 1]
+    const int i = clamp((int)x, 0, size.x - 2);
+    const int j = clamp((int)y, 0, size.y - 2);
+    const int k = clamp((int)z, 0, size.z - 2);
+    const float fx = clamp(x - (float)i, 0.0f, 1.0f);
+    const float fy = clamp(y - (float)j, 0.0f, 1.0f);
+    const float fz = clamp(z - (float)k, 0.0f, 1.0f);
+    const INDEX_T row = (INDEX_T)POINTS_X(size) * COMPONENTS;
+    const INDEX_T plane = row * (INDEX_T)POINTS_Y(size);
+    __global const VOXEL_T *v = voxels + ((INDEX_T)k * plane + (INDEX_T)j * row + (INDEX_T)i * COMPONENTS + component -
+                                          FIRST_POINT(size) * COMPONENTS);
+    const float c00 = mix((float)v[0], (float)v[COMPONENTS], fx);
+    const float c10 = mix((float)v[row], (float)v[row + COMPONENTS], fx);
+    const float c01 = mix((float)v[plane], (float)v[plane + COMPONENTS], fx);
+    const float c11 = mix((float)v[plane + row], (float)v[plane + row + COMPONENTS], fx);
+    return mix(mix(c00, c10, fy), mix(c01, c11, fy), fz);
+#endif
+}
+
+inline float sample_volume(__global const VOXEL_T *voxels, int4 size, float x, float y, float z)
+{
+    return sample_component(voxels, size, x, y, z, SCALAR);
+}
+
+#ifdef RGBA
+// Straight colour of a volume of bytes, 0 to 1.
+inline float3 sample_color(__global const VOXEL_T *voxels, int4 size, float x, float y, float z)
+{
+    return (float3)(sample_component(voxels, size, x, y, z, 0), sample_component(voxels, size, x, y, z, 1),
+                    sample_component(voxels, size, x, y, z, 2)) /
+           255.0f;
+}
+#endif

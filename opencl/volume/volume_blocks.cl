@@ -1,0 +1,73 @@
+// Blocks of a volume that a transfer function makes transparent, so that marches can skip them.
+//
+// -D VOXEL_T, INDEX_T, RGBA: see volume/sampling.cl
+//
+// Block (i, j, k) covers the index positions from BLOCK i to BLOCK (i + 1) along x, both included, and likewise along y and
+// z: every point that a sample between them reads, whatever the interpolation.
+#include "volume/empty_blocks.cl"
+#include "volume/sampling.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+// Least and largest scalar of each block, NaN left out (it is transparent); (INFINITY, -INFINITY) where all is NaN.
+__kernel void block_ranges(__global const VOXEL_T *voxels, int4 size, int4 blocks, __global float2 *ranges)
+{
+    const uint item = (uint)get_global_id(0);
+    if (item >= (uint)blocks.x * (uint)blocks.y * (uint)blocks.z)
+        return;
+    const int i = (int)(item % (uint)blocks.x) * BLOCK;
+    const int j = (int)(item / (uint)blocks.x % (uint)blocks.y) * BLOCK;
+    const int k = (int)(item / ((uint)blocks.x * (uint)blocks.y)) * BLOCK;
+    float least = INFINITY;
+    float largest = -INFINITY;
+    for (int z = k; z <= min(k + BLOCK, size.z - 1); ++z)
+        for (int y = j; y <= min(j + BLOCK, size.y - 1); ++y) {
+            __global const VOXEL_T *row =
+                voxels + ((INDEX_T)z * (INDEX_T)size.y + (INDEX_T)y) * (INDEX_T)size.x * COMPONENTS;
+            for (int x = i; x <= min(i + BLOCK, size.x - 1); ++x) {
+                const float value = (float)row[x * COMPONENTS + SCALAR];
+                least = fmin(least, value);
+                largest = fmax(largest, value);
+            }
+        }
+    ranges[item] = (float2)(least, largest);
+}
+
+// The reach of a block: how far it is to one that may be visible, in blocks along the axis on which that is most; 0 where it is
+// one itself, `most` where there is none nearer. One axis at a time: `along` blocks are on it, their numbers `apart`.
+__kernel void block_reaches(
+    __global const uchar *before, uint blocks, uint apart, int along, int most, __global uchar *reaches)
+{
+    const uint item = (uint)get_global_id(0);
+    if (item >= blocks)
+        return;
+    const int place = (int)(item / apart % (uint)along);
+    int reach = before[item];
+    for (int d = 1; d < reach; ++d) {
+        const int low = place >= d ? before[item - (uint)d * apart] : most;
+        const int high = place + d < along ? before[item + (uint)d * apart] : most;
+        reach = min(reach, max(d, min(low, high)));
+    }
+    reaches[item] = (uchar)reach;
+}
+
+// Whether anything in a block may be visible. visible_before[e]: how many of the table's entries 0 to e - 1 are not
+// transparent.
+__kernel void block_visibility(
+    __global const float2 *ranges, uint blocks, __global const uint *visible_before, int entries, float low,
+    float per_scalar, __global uchar *visible)
+{
+    const uint item = (uint)get_global_id(0);
+    if (item >= blocks)
+        return;
+    const float2 range = ranges[item];
+    if (range.x > range.y) {
+        visible[item] = 0;
+        return;
+    }
+    // A thousandth of an entry on either side covers the rounding of scalars between two different ones
+    const float margin = range.x < range.y ? 1e-3f : 0.0f;
+    const float last = (float)(entries - 1);
+    const int first_entry = (int)floor(clamp((range.x - low) * per_scalar - margin, 0.0f, last));
+    const int last_entry = (int)ceil(clamp((range.y - low) * per_scalar + margin, 0.0f, last));
+    visible[item] = visible_before[last_entry + 1] > visible_before[first_entry] ? 1 : 0;
+}

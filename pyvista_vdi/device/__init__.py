@@ -1,0 +1,40 @@
+"""Devices, kernel sources, programs and buffers: the only importer of pyopencl.
+
+Importing this compiles nothing, prints nothing and touches no environment; drivers are looked for
+when a device is first asked for.
+"""
+
+from __future__ import annotations
+
+from pyvista_vdi.device.arguments import padded
+from pyvista_vdi.device.buffers import (
+    DeviceBuffer,
+    GrowingArray,
+    LocalMemory,
+    bytes_text,
+    kept_together,
+)
+from pyvista_vdi.device.choice import describe_devices, get_runtime, list_devices
+from pyvista_vdi.device.devices import DeviceInfo
+from pyvista_vdi.device.profiling import KernelTime, Profile
+from pyvista_vdi.device.programs import Kernel
+from pyvista_vdi.device.runtime import Runtime
+from pyvista_vdi.model.host_memory import aligned_empty
+
+__all__ = [
+    "DeviceBuffer",
+    "DeviceInfo",
+    "GrowingArray",
+    "Kernel",
+    "KernelTime",
+    "LocalMemory",
+    "Profile",
+    "Runtime",
+    "aligned_empty",
+    "bytes_text",
+    "describe_devices",
+    "get_runtime",
+    "kept_together",
+    "list_devices",
+    "padded",
+]

@@ -1,0 +1,318 @@
+"""Probing devices and choosing one: the way from a ``device=`` argument to a runtime."""
+
+from __future__ import annotations
+
+import os
+import threading
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pyvista_vdi.device import devices
+from pyvista_vdi.device.buffers import LocalMemory, bytes_text
+from pyvista_vdi.device.devices import Candidate, DeviceInfo
+from pyvista_vdi.device.runtime import Runtime
+from pyvista_vdi.device.tuning import tuned_sizes
+from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError, VDIError
+
+PROBE_COUNT = 256
+PROBE_GROUP = 32
+# OpenCL 1.2 allows expm1 and exp 3 ulp, log1p 2 ulp (section 7.4); one ulp is at most 2^-23 of the
+# value; the fourth is for the reference, which is rounded to single precision nowhere.
+PROBE_RTOL = 4 * 2.0**-23
+
+_lock = threading.RLock()
+_probed: dict[tuple[int, int], tuple[DeviceInfo, Runtime | None]] = {}
+_shared_contexts: dict[int, Runtime] = {}
+
+
+def list_devices() -> list[DeviceInfo]:
+    """Every device of every OpenCL platform, after a probe kernel has been tried on each.
+
+    Returns
+    -------
+    list of DeviceInfo
+        In the drivers' order; ``usable`` and ``reason`` say how the probe went.
+
+    Raises
+    ------
+    MissingDependencyError
+        If pyopencl cannot be imported.
+    """
+    candidates, _ = devices.find_candidates()
+    return [_probe(candidate)[0] for candidate in candidates]
+
+
+def get_runtime(device: Any = None) -> Runtime:
+    """The runtime of a device, made once per process.
+
+    Parameters
+    ----------
+    device : str, DeviceInfo, Runtime, pyopencl.Device or pyopencl.Context, optional
+        A string is a part of ``"platform / device"``, letter case ignored, or
+        ``"platform_index:device_index"``. By default the environment variable
+        ``PYVISTA_VDI_DEVICE``, read in the same way, and without it the best device that passes
+        the probe: GPU, then CPU (Intel's runtime before PoCL). A context is shared and must have
+        one device.
+
+    Returns
+    -------
+    Runtime
+        The same object for the same device; safe to use from any thread.
+
+    Raises
+    ------
+    NoDeviceError
+        If there is no usable device, or the one asked for is absent, ambiguous or not usable.
+    InvalidArgumentError
+        If ``device`` is of another type.
+    MissingDependencyError
+        If pyopencl cannot be imported.
+    DeviceError
+        In a fork of a process that had used or listed devices.
+    """
+    devices.require_drivers()
+    if isinstance(device, Runtime):
+        return device
+    origin = "device="
+    if device is None:
+        device = os.environ.get(devices.DEVICE_VARIABLE, "").strip() or None
+        origin = f"{devices.DEVICE_VARIABLE}="
+    with _lock:
+        if device is None:
+            return _default()
+        return _named(device, origin)
+
+
+def default_device(infos: list[DeviceInfo]) -> DeviceInfo | None:
+    """The device that is used when none is named, among probed ones; None if none is usable."""
+    usable = [info for info in infos if info.usable]
+    return min(usable, key=devices.preference) if usable else None
+
+
+def describe_devices() -> str:
+    """Every device found, which one is the default, and why the others are not used.
+
+    Returns
+    -------
+    str
+        Lines for ``pyvista-vdi devices``; with the remedy if nothing is usable.
+
+    Raises
+    ------
+    MissingDependencyError
+        If pyopencl cannot be imported.
+    """
+    _, notes = devices.find_candidates()
+    infos = list_devices()
+    best = default_device(infos)
+    chosen, trouble = _chosen_by_user(infos)
+    used = chosen if chosen is not None else best
+
+    lines = []
+    for info in infos:
+        lines += _device_lines(info, info.index == (used.index if used and not trouble else None))
+    if trouble:
+        lines.append(trouble)
+    elif chosen is not None:
+        variable = f"{devices.DEVICE_VARIABLE}={os.environ[devices.DEVICE_VARIABLE]!r}"
+        lines.append(f"Default: {chosen.full_name}, because {variable}.")
+    elif best is not None:
+        lines.append(f"Default: {best.full_name}; GPUs come first, then CPUs, Intel's before PoCL.")
+        lines.append(f"Choose another with device=, --device or {devices.DEVICE_VARIABLE}.")
+    else:
+        lines.append(devices.no_device_message(infos, []) + ".")
+    lines += [f"Note: {note}." for note in notes if note]
+    return "\n".join(lines)
+
+
+def _chosen_by_user(infos: list[DeviceInfo]) -> tuple[DeviceInfo | None, str]:
+    selector = os.environ.get(devices.DEVICE_VARIABLE, "").strip()
+    if not selector:
+        return None, ""
+    try:
+        info = devices.select(infos, selector, f"{devices.DEVICE_VARIABLE}=")
+    except NoDeviceError as exc:
+        return None, f"No default: {exc}."
+    if not info.usable:
+        return None, f"No default: {_unusable(info, f'{devices.DEVICE_VARIABLE}={selector!r}')}."
+    return info, ""
+
+
+def _device_lines(info: DeviceInfo, is_default: bool) -> list[str]:
+    mark = "*" if is_default else " "
+    precision = "fp64" if info.has_fp64 else "no fp64"
+    memory = (
+        f"{bytes_text(info.global_memory)} memory, {bytes_text(info.max_allocation)} per buffer"
+    )
+    tuned = ", ".join(f"{kernel} {size}" for kernel, size in tuned_sizes(info).items())
+    return [
+        f"{mark} [{info.platform_index}:{info.device_index}] {info.full_name}",
+        f"    {info.kind}, {info.compute_units} compute units, {memory}, {precision}",
+        f"    {info.version}, driver {info.driver}, selector {info.selector!r}",
+        "    usable" if info.usable else f"    not used: {info.reason}",
+        *([f"    work-group sizes found: {tuned}"] if tuned else []),
+    ]
+
+
+# -- choosing ----------------------------------------------------------------------------------
+
+
+def _default() -> Runtime:
+    candidates, notes = devices.find_candidates()
+    for candidate in sorted(candidates, key=lambda c: devices.preference(c.info)):
+        _, runtime = _probe(candidate)
+        if runtime is not None:
+            return runtime
+    infos = [_probe(candidate)[0] for candidate in candidates]
+    raise NoDeviceError(devices.no_device_message(infos, notes))
+
+
+def _named(device: Any, origin: str) -> Runtime:
+    candidates, _ = devices.find_candidates()
+    infos = [candidate.info for candidate in candidates]
+    context = None
+    if isinstance(device, str):
+        info = devices.select(infos, device, origin)
+    elif isinstance(device, DeviceInfo):
+        info = _same(infos, device)
+    elif hasattr(device, "int_ptr"):
+        info, context = _from_driver_object(candidates, device)
+    else:
+        raise InvalidArgumentError(
+            f"device={device!r} of type {type(device).__name__}: give a name, a DeviceInfo, a "
+            "Runtime, a pyopencl.Device or a pyopencl.Context"
+        )
+
+    candidate = next(c for c in candidates if c.info.index == info.index)
+    probed, runtime = _probe(candidate)
+    if runtime is None:
+        raise NoDeviceError(_unusable(probed, f"{origin}{device!r}"))
+    if context is None:
+        return runtime
+    return _sharing(context, Candidate(probed, candidate.device))
+
+
+def _unusable(info: DeviceInfo, asked: str) -> str:
+    return (
+        f"{asked} means {info.full_name}, which is not usable: {info.reason}; "
+        f"choose another device, or {devices.REMEDY}"
+    )
+
+
+def _same(infos: list[DeviceInfo], wanted: DeviceInfo) -> DeviceInfo:
+    for info in infos:
+        if info.index == wanted.index and info.full_name == wanted.full_name:
+            return info
+    raise NoDeviceError(
+        f"the device {wanted.full_name} does not exist in this process; there is "
+        f"{devices.listing(infos)}"
+    )
+
+
+def _from_driver_object(candidates: list[Candidate], given: Any) -> tuple[DeviceInfo, Any]:
+    context = given if hasattr(given, "devices") else None
+    if context is not None and len(context.devices) != 1:
+        raise InvalidArgumentError(
+            f"a context of {len(context.devices)} devices was given; it must have exactly one"
+        )
+    handle = given if context is None else context.devices[0]
+    for candidate in candidates:
+        if candidate.device.int_ptr == handle.int_ptr:
+            return candidate.info, context
+    raise NoDeviceError(
+        f"{given!r} is none of the devices that the drivers list (a sub-device?); there is "
+        f"{devices.listing([candidate.info for candidate in candidates])}"
+    )
+
+
+def _sharing(context: Any, candidate: Candidate) -> Runtime:
+    key = int(context.int_ptr)
+    if key not in _shared_contexts:
+        # The runtime keeps the context alive, so that its address cannot be given to another.
+        _shared_contexts[key] = Runtime(candidate, context)
+    return _shared_contexts[key]
+
+
+# -- probing -----------------------------------------------------------------------------------
+
+
+def _probe(candidate: Candidate) -> tuple[DeviceInfo, Runtime | None]:
+    """Run the probe kernel, once per device and process."""
+    with _lock:
+        index = candidate.info.index
+        if index not in _probed:
+            runtime, reason = _try(candidate)
+            info = replace(candidate.info, usable=not reason, reason=reason)
+            if runtime is not None:
+                runtime.info = info
+            _probed[index] = (info, runtime if not reason else None)
+        return _probed[index]
+
+
+def _try(candidate: Candidate) -> tuple[Runtime | None, str]:
+    try:
+        runtime = Runtime(candidate)
+        return runtime, run_probe(runtime)
+    except VDIError as exc:
+        return None, f"the probe kernel failed: {exc}"
+
+
+def run_probe(runtime: Runtime) -> str:
+    """Run the probe kernel and check its numbers.
+
+    Parameters
+    ----------
+    runtime : Runtime
+        The device to try.
+
+    Returns
+    -------
+    str
+        What is wrong; empty if all is right.
+
+    Raises
+    ------
+    VDIError
+        If the driver fails.
+    """
+    x = np.linspace(0.01, 0.99, PROBE_COUNT, dtype=np.float32)
+    groups = PROBE_COUNT // PROBE_GROUP
+    kernel = runtime.kernel("lib/probe.cl", "probe")
+    with (
+        runtime.upload(x, name="probe input") as inputs,
+        runtime.buffer((PROBE_COUNT, 4), np.float32, name="probe values") as values,
+        runtime.buffer((groups,), np.uint32, name="probe sums") as sums,
+        runtime.buffer((1,), np.uint32, name="probe total") as total,
+    ):
+        runtime.fill(total, 0)
+        shared = LocalMemory(PROBE_GROUP * 4)
+        runtime.launch(kernel, PROBE_COUNT, PROBE_GROUP, inputs, values, sums, total, shared)
+        return _check_probe(x, *(runtime.download(b) for b in (values, sums, total)))
+
+
+def _check_probe(x: Any, values: Any, sums: Any, total: Any) -> str:
+    exact = x.astype(np.float64)
+    square = (x * x).astype(np.float64)
+    expected = {
+        "expm1": np.expm1(-exact),
+        "log1p": np.log1p(-exact),
+        "exp": np.exp(-exact),
+        "fma": exact * exact - square,  # exact in float64: 48 bits
+    }
+    for column, (name, wanted) in enumerate(expected.items()):
+        rtol = 0.0 if name == "fma" else PROBE_RTOL
+        error = np.abs(values[:, column] - wanted)
+        if not np.all(error <= rtol * np.abs(wanted)):
+            worst = int(np.nanargmax(np.where(np.isnan(error), np.inf, error)))
+            return (
+                f"the probe kernel's {name} of {x[worst]!r} is {values[worst, column]!r}, "
+                f"not {wanted[worst]!r}"
+            )
+    group_sums = np.arange(len(x), dtype=np.uint32).reshape(len(sums), -1).sum(axis=1)
+    if not np.array_equal(sums, group_sums):
+        return f"the probe kernel's sums through local memory are {sums}, not {group_sums}"
+    if total[0] != len(x) * (len(x) + 1) // 2:
+        return f"the probe kernel's atomic sum is {total[0]}, not {len(x) * (len(x) + 1) // 2}"
+    return ""

@@ -1,0 +1,443 @@
+"""Rays as the kernels take them: affine forms of the pixel, made in float64 (docs/conventions.md).
+
+Along the ray of a pixel every quantity that the kernels need (a coordinate, the distance from a
+clipping plane, a homogeneous denominator) is affine in the pixel's position and in t, the view
+depth of the ray's camera less a reference depth. The six numbers of each such form are computed
+here in float64, so that an eye or an origin far away costs the kernels' float32 nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.device import aligned_empty
+from pyvista_vdi.device.work_order import CELL, Rectangle
+from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.cropping import Cropping
+
+Floats: TypeAlias = NDArray[np.float64]
+
+#: Depth before which nothing is looked up in perspective, in diagonals of the bounds (DESIGN 3).
+NEAREST_DEPTH = 1e-6
+
+#: Tangents of a hull between which :func:`cells_of_points` looks for cells.
+_TANGENTS = 32
+
+#: Lengths times reciprocal depths beyond which, or below whose reciprocal, float32 loses digits.
+LARGEST_PRODUCT = 1e36
+
+
+@dataclass(frozen=True)
+class PixelRays:
+    """The rays of all pixels of a window, in the model frame.
+
+    ``P(t) = pixel @ origin + t * (pixel @ direction)`` with ``pixel = (1, a, b)``, a and b the
+    offsets of the pixel's centre from the window's, in pixels, and t view depth less
+    ``reference_depth``.
+
+    Attributes
+    ----------
+    origin, direction : numpy.ndarray
+        float64 (3, 3), rows for 1, a and b; model units.
+    reference_depth : float
+        View depth of t = 0, world units.
+    """
+
+    origin: Floats
+    direction: Floats
+    reference_depth: float
+
+    def form(self, normal: ArrayLike, offset: float = 0.0) -> Floats:
+        """Six numbers of the function ``normal . P + offset`` of model points P."""
+        normal = np.asarray(normal, dtype=np.float64)
+        form = np.concatenate([self.origin @ normal, self.direction @ normal])
+        form[0] += offset
+        return form
+
+
+def corners(bounds: Sequence[float]) -> Floats:
+    """Return the eight corners of axis-aligned bounds, float64 (8, 3)."""
+    x, y, z = np.reshape(np.asarray(bounds, dtype=np.float64), (3, 2))
+    return np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(8, 3)
+
+
+def depth_range(camera: Camera, bounds: Sequence[float]) -> tuple[float, float]:
+    """Return the least and the largest view depth of bounds in the model frame; world units."""
+    row = camera.model_to_view[2]
+    # About the bounds' centre, so that an origin far away does not cost the extent its digits
+    box = np.reshape(np.asarray(bounds, dtype=np.float64), (3, 2))
+    centre, half = box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2
+    middle = row[:3] @ centre + row[3]
+    reach = np.abs(row[:3]) @ half
+    return float(middle - reach), float(middle + reach)
+
+
+def nearest_depth(camera: Camera, bounds: Sequence[float]) -> float:
+    """Return the view depth before which nothing is looked up in perspective, world units.
+
+    :data:`NEAREST_DEPTH` times the diagonal of the bounds, carried into the world by the model
+    transform's largest stretch.
+    """
+    diagonal = float(np.linalg.norm(np.subtract(bounds[1::2], bounds[::2])))
+    return NEAREST_DEPTH * diagonal * float(np.linalg.norm(camera.model_transform[:3, :3], 2))
+
+
+def reference_depth(camera: Camera, bounds: Sequence[float]) -> float:
+    """Return the view depth about which rays and lists are formed, world units.
+
+    The near depth of the bounds where the eye is outside, 0 where they reach behind it.
+    """
+    near, _ = depth_range(camera, bounds)
+    return near if camera.parallel_projection else max(near, 0.0)
+
+
+def check_list_space(camera: Camera, bounds: Sequence[float]) -> None:
+    """Refuse a generating view whose lists float32 cannot express.
+
+    Raises
+    ------
+    InvalidCameraError
+        If lengths times reciprocal depths leave the range of float32 (docs/numerics.md).
+    """
+    near, far = (1.0, 1.0) if camera.parallel_projection else depth_range(camera, bounds)
+    near = max(near, 0.0 if camera.parallel_projection else nearest_depth(camera, bounds))
+    diagonal = float(np.linalg.norm(np.subtract(bounds[1::2], bounds[::2])))
+    if not (0 < near <= far and diagonal > 0):
+        return  # nothing is seen
+    products = (1 / near / near, 1 / far / far, diagonal / near / far, diagonal)
+    if min(products) < 1 / LARGEST_PRODUCT or max(products) > LARGEST_PRODUCT:
+        raise InvalidCameraError(
+            f"view depths from {near:.3g} to {far:.3g} world units, of bounds that are "
+            f"{diagonal:.3g} model units across, are beyond float32: scale the spacing (or the "
+            "actor's matrix), and the camera with it, towards 1"
+        )
+
+
+def pixel_rays(camera: Camera, window_size: Sequence[int], bounds: Sequence[float]) -> PixelRays:
+    """Return the rays of a camera's window, formed about the near depth of ``bounds``.
+
+    Parameters
+    ----------
+    camera : Camera
+        Its ``model_transform`` says where the model is.
+    window_size : (int, int)
+        Width and height in pixels.
+    bounds : sequence of float, shape (6,)
+        Of the data, model frame.
+
+    Returns
+    -------
+    PixelRays
+        In the model frame.
+    """
+    width, height = check_window_size(window_size)
+    depth = reference_depth(camera, bounds)
+    origin, direction = camera.ray_coefficients((width, height))
+    per_pixel = np.array([[1.0], [2 / width], [2 / height]])  # (u, v) to pixel offsets
+    origin = (origin + depth * direction) * per_pixel
+    direction = direction * per_pixel
+    to_model = inverse_affine(camera.model_to_view)
+    linear = to_model[:3, :3].T
+    origin = origin @ linear
+    origin[0] += to_model[:3, 3]
+    return PixelRays(origin, direction @ linear, depth)
+
+
+def inverse_affine(matrix: Floats) -> Floats:
+    """Return the inverse of an affine float64 (4, 4) matrix."""
+    inverse = np.eye(4)
+    # Columns scaled to one, so that a world of 1e-9 or 1e9 is inverted as well as one of 1
+    scale = np.linalg.norm(matrix[:3, :3], axis=0)
+    inverse[:3, :3] = np.linalg.inv(matrix[:3, :3] / scale) / scale[:, None]
+    inverse[:3, 3] = -inverse[:3, :3] @ matrix[:3, 3]
+    return inverse
+
+
+def eye_plane(camera: Camera, rays: PixelRays) -> list[Floats]:
+    """Return the form that keeps what is in front of the eye: none in parallel projection."""
+    if camera.parallel_projection:
+        return []
+    return [np.array([rays.reference_depth, 0, 0, 1.0, 0, 0])]
+
+
+def box_planes(rays: PixelRays, bounds: Sequence[float]) -> list[Floats]:
+    """Return the six forms that keep what is inside axis-aligned bounds of the model frame."""
+    forms = []
+    for axis in range(3):
+        normal = np.eye(3)[axis]
+        forms.append(rays.form(normal, -bounds[2 * axis]))
+        forms.append(rays.form(-normal, bounds[2 * axis + 1]))
+    return forms
+
+
+def user_planes(camera: Camera, rays: PixelRays, planes: ArrayLike | None) -> list[Floats]:
+    """Return the forms of clipping planes given in world coordinates.
+
+    Parameters
+    ----------
+    camera : Camera
+        Its ``model_transform`` carries them into the model frame.
+    rays : PixelRays
+        Rays in the model frame.
+    planes : array_like of float, shape (k, 6), optional
+        Origin and normal of each; the side that the normal points to is kept.
+
+    Returns
+    -------
+    list of numpy.ndarray
+        One form each.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If the shape is another, a value is not finite or a normal is zero.
+    """
+    if planes is None:
+        return []
+    wanted = "clipping_planes must be (k, 6) finite numbers, origin and normal of each plane"
+    table = _numbers(planes, wanted)
+    if table.size == 0:
+        return []
+    if table.ndim != 2 or table.shape[1] != 6 or not np.isfinite(table).all():
+        raise InvalidArgumentError(f"{wanted}; got shape {table.shape}")
+    if not table[:, 3:].any(axis=1).all():
+        raise InvalidArgumentError("a clipping plane's normal is zero: give its direction")
+    # Unit normals, scaled first: a form of one that float32 cannot hold would clip nothing
+    normals = table[:, 3:] / np.abs(table[:, 3:]).max(axis=1, keepdims=True)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    matrix = camera.model_transform
+    return [
+        rays.form(normal @ matrix[:3, :3], normal @ (matrix[:3, 3] - origin))
+        for origin, normal in zip(table[:, :3], normals, strict=True)
+    ]
+
+
+@dataclass(frozen=True)
+class CroppedRays:
+    """How a kernel crops: by what it clips to, and what is left.
+
+    Attributes
+    ----------
+    planes : list of numpy.ndarray
+        Forms to clip to: a box, or nothing at all.
+    forms : list of numpy.ndarray
+        Six that are positive beyond the low and the high plane of each axis, for
+        ``opencl/lib/cropping.cl``; empty where clipping is enough.
+    regions : int
+        The flags that belong to them.
+    """
+
+    planes: list[Floats]
+    forms: list[Floats]
+    regions: int
+
+    @property
+    def defines(self) -> dict[str, str | int | None]:
+        """``-D`` names: none where clipping is enough."""
+        return {"CROPPED": 1} if self.forms else {}
+
+    @property
+    def arguments(self) -> tuple[np.uint32, ...]:
+        """The kernel's arguments that come with the define."""
+        return (np.uint32(self.regions),) if self.forms else ()
+
+
+def cropped(rays: PixelRays, cropping: Cropping | None, bounds: Sequence[float]) -> CroppedRays:
+    """Return how the rays through a box are cropped."""
+    if cropping is None:
+        return CroppedRays([], [], 0)
+    within = cropping.within(bounds)
+    if within.box is None:
+        normals = np.repeat(np.eye(3), 2, axis=0)
+        offsets = within.cuts.ravel()
+        forms = [rays.form(normal, -at) for normal, at in zip(normals, offsets, strict=True)]
+        return CroppedRays([], forms, cropping.regions)
+    if np.isnan(within.box).any():
+        return CroppedRays([np.array([-1.0, 0, 0, 0, 0, 0])], [], 0)  # a plane that keeps nothing
+    if np.array_equal(within.box.ravel(), bounds):
+        return CroppedRays([], [], 0)
+    return CroppedRays(box_planes(rays, within.box.ravel().tolist()), [], 0)
+
+
+def direction_forms(
+    rays: PixelRays, window_size: Sequence[int], multiplier: float = 1.0
+) -> list[Floats]:
+    """Return forms whose slopes are the rays' direction, times a factor, over a power of two.
+
+    With that power as their value, see ``model_speed`` of ``lib/list_space.cl``. Slopes are
+    about 1 then, and squares of theirs neither overflow nor vanish in float32, whatever the units.
+    """
+    forms = np.zeros((3, 6))
+    forms[:, 3:] = multiplier * rays.direction.T
+    reach = np.abs(forms[:, 3:]) @ [1.0, *np.asarray(window_size) / 2]
+    _, exponent = np.frexp(reach.max())
+    unit = np.ldexp(1.0, int(np.clip(exponent, -126, 126)))
+    forms[:, 3:] /= unit
+    forms[:, 0] = unit
+    return [*forms]
+
+
+def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
+    """Return forms as the kernels read them, float32 (n, 6).
+
+    Raises
+    ------
+    InvalidCameraError
+        If one is not finite in float32: the camera or the data are beyond what it can hold.
+    """
+    with np.errstate(over="ignore"):
+        table = np.asarray(forms, dtype=np.float32)
+    if not np.isfinite(table).all():
+        raise InvalidCameraError(
+            "the view cannot be expressed in float32: positions or distances exceed 1e38 model "
+            "units; scale the data and the camera"
+        )
+    return table
+
+
+def packed_pairs(forms: Sequence[Floats]) -> NDArray[np.float32]:
+    """Return forms with what float32 rounds off them, float32 (n, 12): see ``lib/rays.cl``."""
+    table = packed(forms)
+    return np.hstack([table, np.subtract(forms, table, dtype=np.float64).astype(np.float32)])
+
+
+def largest_value(
+    camera: Camera,
+    window_size: Sequence[int],
+    bounds: Sequence[float],
+    forms: Sequence[Floats],
+) -> float:
+    """Return the largest magnitude of forms, or of a part of one, on rays that meet the bounds.
+
+    Parameters
+    ----------
+    camera, window_size, bounds
+        As for :func:`pixel_rays`, whose forms they are.
+    forms : sequence of numpy.ndarray
+        float64 (6,) each.
+
+    Returns
+    -------
+    float
+        Over the depths of the bounds; infinite where nothing of them is in the window.
+    """
+    width, height = window_size
+    near, far = depth_range(camera, bounds)
+    depth = reference_depth(camera, bounds)
+    low, high = np.array([-width / 2, -height / 2]), np.array([width / 2, height / 2])
+    if camera.parallel_projection or near > 0:  # the bounds have a place in the window
+        matrix = camera.viewport_matrix((width, height)) @ camera.model_to_view
+        x, y, _, d = matrix @ np.vstack([corners(bounds).T, np.ones(8)])
+        at = np.array([x / d * width / 2, y / d * height / 2])
+        low, high = np.clip(at.min(axis=1), low, high), np.clip(at.max(axis=1), low, high)
+    pixels = np.array([[1, a, b] for a in (low[0], high[0]) for b in (low[1], high[1])])
+    table = np.asarray(forms)
+    values, slopes = pixels @ table[:, :3].T, pixels @ table[:, 3:].T
+    parts = (table[:, 0], values, values + (far - depth) * slopes)
+    return float(max(np.abs(part).max() for part in parts))
+
+
+def pixels_of_points(camera: Camera, window_size: tuple[int, int], points: Floats) -> Rectangle:
+    """Return a part of a window that the convex hull of model points lies in, float64 (n, 3).
+
+    All of the window, if one of them is not in front of the eye; two pixels more than the points
+    reach to otherwise.
+    """
+    width, height = window_size
+    whole = Rectangle(0, width, 0, height)
+    if not len(points):
+        return Rectangle(0, 0, 0, 0)
+    at = _pixels_at(camera, window_size, points)
+    if at is None:
+        return whole
+    low = np.clip(np.floor(at.min(axis=1) - 2), 0, window_size)
+    high = np.clip(np.ceil(at.max(axis=1) + 2), 0, window_size)
+    return Rectangle(int(low[0]), int(high[0]), int(low[1]), int(high[1]))
+
+
+def _pixels_at(camera: Camera, window_size: tuple[int, int], points: Floats) -> Floats | None:
+    """Return where model points are seen, in pixels, float64 (2, n).
+
+    None if one of them is not in front of the eye.
+    """
+    matrix = camera.viewport_matrix(window_size) @ camera.model_to_view
+    x, y, _, d = matrix[:, :3] @ points.T + matrix[:, 3:]
+    if not d.min() > NEAREST_DEPTH * np.abs(d).max():
+        return None
+    half = np.array([[window_size[0] / 2], [window_size[1] / 2]])
+    at = np.stack([x, y]) / d * half + half
+    return at if np.isfinite(at).all() else None
+
+
+def cells_of_points(
+    camera: Camera, window_size: tuple[int, int], points: Floats
+) -> NDArray[np.bool_]:
+    """Return which cells of a window the convex hull of model points may lie in.
+
+    Parameters
+    ----------
+    camera, window_size, points
+        As for :func:`pixels_of_points`.
+
+    Returns
+    -------
+    numpy.ndarray
+        bool (high, wide), bottom row first, of squares of
+        :data:`~pyvista_vdi.device.work_order.CELL` pixels.
+        All of them, if a point is not in front of the eye; those that two pixels more reach into
+        otherwise.
+    """
+    wide, high = (-(-edge // CELL) for edge in window_size)
+    if not len(points):
+        return np.zeros((high, wide), np.bool_)
+    at = _pixels_at(camera, window_size, points)
+    if at is None:
+        return np.ones((high, wide), np.bool_)
+    # Between tangents of the hull in some directions
+    angles = np.arange(_TANGENTS) * (2 * np.pi / _TANGENTS)
+    normals = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    reach = (normals @ at).max(axis=1) + 2
+    x, y = (np.arange(n) * CELL + CELL / 2 for n in (wide, high))
+    nearest = np.abs(normals).sum(axis=1) * CELL / 2  # a cell's corner, from its centre
+    beyond = normals[:, 0, None, None] * x + normals[:, 1, None, None] * y[:, None]
+    return np.asarray((beyond - nearest[:, None, None] <= reach[:, None, None]).all(axis=0))
+
+
+def checked_opaque_depth(
+    opaque_depth: ArrayLike | None, window_size: tuple[int, int], rays: PixelRays
+) -> NDArray[np.float32] | None:
+    """Return where each pixel's ray ends, as t: float32 (H, W), top row first; page-aligned.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If the shape is not (H, W) or a depth is NaN.
+    """
+    if opaque_depth is None:
+        return None
+    wanted = f"opaque_depth must have shape (height, width) = {window_size[::-1]}"
+    depth = opaque_depth
+    if not (isinstance(depth, np.ndarray) and depth.dtype in (np.float32, np.float64)):
+        depth = _numbers(opaque_depth, wanted)
+    if depth.shape != window_size[::-1]:
+        raise InvalidArgumentError(f"{wanted}; got {depth.shape}")
+    ends = aligned_empty(depth.shape, np.float32)
+    with np.errstate(over="ignore"):  # beyond float32 is as good as never
+        np.subtract(depth, rays.reference_depth, out=ends, dtype=np.float64, casting="same_kind")
+    if np.isnan(ends.min()):
+        raise InvalidArgumentError("opaque_depth holds NaN: use inf where nothing is opaque")
+    return ends
+
+
+def _numbers(values: ArrayLike, wanted: str) -> Floats:
+    """Return values as float64; what is ragged or no number is refused with what is wanted."""
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidArgumentError(f"{wanted}; got {values!r}") from error

@@ -1,0 +1,240 @@
+"""Who works on a device now: frames first, background work in short turns between them.
+
+A frame that a person waits for is drawn inside ``Turns.foreground``; a thread whose work may take
+its time works inside ``Turns.background``. Background work runs in *turns*, only while no frame is
+in progress; within its turn it passes a ``checkpoint`` between two *pieces* of work. A frame that
+arrives waits for the piece in progress. Where frames follow each other without pause, background
+work still gets a turn after each, as long as a fixed share of a recent frame.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import statistics
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+
+from pyvista_vdi.errors import Cancelled
+
+#: What a turn may take, as a share of a recent frame's time. Frames without pause then take 1.3
+#: times as long, which leaves room below 1.5 for waking threads and for a piece that runs over.
+SHARE = 0.3
+#: A turn is no shorter, seconds: below, handing over costs more than the work.
+SHORTEST_TURN = 0.001
+#: A piece is no longer, seconds, however long frames take: a cancelled thread ends as soon.
+LONGEST_PIECE = 0.025
+#: A turn before any frame was seen, seconds.
+FIRST_TURN = 0.005
+#: Frames that "a recent frame" is the median of.
+RECENT_FRAMES = 5
+#: A turn ends when less than this share of it is left: no useful piece fits.
+LEAST_REMAINDER = 0.15
+#: Pieces of one kind of work whose slowest says how fast the next will be: more than a slice of
+#: rays has, so that a march through nothing does not make the next one through much too long.
+RECENT_PIECES = 32
+#: A piece is planned for this share of the time that it may take: work per item varies.
+CAUTION = 0.8
+#: Seconds between two looks at whether a waiting thread's work is still wanted.
+POLL = 0.02
+
+
+class Worker:
+    """A thread inside :meth:`Turns.background`.
+
+    Attributes
+    ----------
+    cancelled : callable
+        Says whether the work is no longer wanted.
+    turn_began : float
+        When its turn began, seconds of ``time.perf_counter``.
+    """
+
+    def __init__(self, cancelled: Callable[[], bool]) -> None:
+        self.cancelled = cancelled
+        self.turn_began = 0.0
+        self._rates: dict[str, deque[float]] = {}  # items per second of the last pieces
+
+    def piece(self, kind: str, seconds: float) -> int | None:
+        """Return how many items of a kind of work fill so many seconds; None if never tried."""
+        rates = self._rates.get(kind)
+        return max(1, int(min(rates) * seconds * CAUTION)) if rates else None
+
+    def took(self, kind: str, items: int, seconds: float) -> None:
+        """Note what a piece took."""
+        rates = self._rates.setdefault(kind, deque(maxlen=RECENT_PIECES))
+        rates.append(items / max(seconds, 1e-9))
+
+
+class Turns:
+    """The order in which frames and background work use one device."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._local = threading.local()
+        self._frames = 0  # in progress
+        self._arriving = 0  # frames that wait to begin
+        self._waiting: deque[Worker] = deque()
+        self._holder: Worker | None = None  # whose turn it is
+        self._owed = False  # a frame has ended while background work waited
+        self._recent: deque[float] = deque(maxlen=RECENT_FRAMES)
+
+    # -- frames --------------------------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def foreground(self) -> Iterator[None]:
+        """See :meth:`pyvista_vdi.device.Runtime.foreground`."""
+        if self.worker is not None or self._in_frame:
+            yield
+            return
+        self._begin_frame()
+        began = time.perf_counter()
+        try:
+            yield
+        finally:
+            self._end_frame()
+            self._recent.append(time.perf_counter() - began)
+
+    @property
+    def _in_frame(self) -> bool:
+        return getattr(self._local, "in_frame", False)
+
+    def _begin_frame(self) -> None:
+        with self._changed:
+            self._arriving += 1
+            try:
+                while self._holder is not None or (self._owed and self._waiting):
+                    self._changed.wait()
+            finally:
+                self._arriving -= 1
+            self._frames += 1
+        self._local.in_frame = True
+
+    def _end_frame(self) -> None:
+        self._local.in_frame = False
+        with self._changed:
+            self._frames -= 1
+            self._owed = bool(self._waiting)
+            self._changed.notify_all()
+
+    # -- background work -----------------------------------------------------------------------
+
+    @property
+    def worker(self) -> Worker | None:
+        """The calling thread as one that works in turns, None for any other thread."""
+        return getattr(self._local, "worker", None)
+
+    @contextlib.contextmanager
+    def background(self, cancelled: Callable[[], bool]) -> Iterator[None]:
+        """See :meth:`pyvista_vdi.device.Runtime.background`."""
+        if self.worker is not None or self._in_frame:
+            raise RuntimeError("background work cannot begin inside a frame or background work")
+        worker = Worker(cancelled)
+        self._take_turn(worker)
+        self._local.worker = worker
+        try:
+            yield
+        finally:
+            self._local.worker = None
+            self._end_turn(worker)
+
+    def checkpoint(self) -> float:
+        """Let others go first if this thread's turn is over.
+
+        Returns
+        -------
+        float
+            Seconds that the next piece may take.
+
+        Raises
+        ------
+        Cancelled
+            If the work is no longer wanted.
+        """
+        worker = self.worker
+        if worker is None:
+            return float("inf")
+        if worker.cancelled():
+            raise Cancelled("background work was cancelled")
+        turn = self._turn()
+        left = worker.turn_began + turn - time.perf_counter()
+        over = left <= LEAST_REMAINDER * turn
+        with self._changed:  # throughout, so that who is let in finds this thread waiting already
+            if over and self._wanted():
+                self._end_turn(worker)
+            if self._holder is not worker:
+                self._take_turn(worker)
+        return min(turn if over else left, LONGEST_PIECE)
+
+    def _turn(self) -> float:
+        recent = list(self._recent)
+        if not recent:
+            return FIRST_TURN
+        return max(SHORTEST_TURN, SHARE * statistics.median(recent))
+
+    def _wanted(self) -> bool:
+        """Whether anybody waits for the turn to end."""
+        return self._arriving > 0 or bool(self._waiting)
+
+    def _take_turn(self, worker: Worker) -> None:
+        with self._changed:
+            self._waiting.append(worker)
+            try:
+                while not self._free_for(worker):
+                    # A frame may be ending this very work and wait for its end: look now and then
+                    self._changed.wait(POLL)
+                    if worker.cancelled():
+                        raise Cancelled("background work was cancelled")
+                self._holder = worker
+                self._owed = False
+            finally:
+                self._waiting.remove(worker)
+                self._changed.notify_all()
+        worker.turn_began = time.perf_counter()
+
+    def _free_for(self, worker: Worker) -> bool:
+        frames_first = self._frames > 0 or (self._arriving > 0 and not self._owed)
+        return not frames_first and self._holder is None and self._waiting[0] is worker
+
+    def _end_turn(self, worker: Worker) -> None:
+        with self._changed:
+            if self._holder is worker:
+                self._holder = None
+                self._changed.notify_all()
+
+    # -- waiting for something else --------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def aside(self) -> Iterator[None]:
+        """Let others go on while the calling thread needs no device or waits for another thread."""
+        worker = self.worker
+        if worker is not None:
+            self._end_turn(worker)
+            yield
+            self._take_turn(worker)
+        elif self._in_frame:
+            self._end_frame()
+            try:
+                yield
+            finally:
+                self._begin_frame()
+        else:
+            yield
+
+    @contextlib.contextmanager
+    def holding(self, lock: threading.Lock) -> Iterator[None]:
+        """Hold a lock under which device work is done.
+
+        Its holder may be waiting for the calling thread's frame or turn to end, so who finds it
+        taken stands aside.
+        """
+        taken = lock.acquire(blocking=False)
+        try:
+            if not taken:
+                with self.aside():
+                    taken = lock.acquire()
+            yield
+        finally:
+            if taken:
+                lock.release()

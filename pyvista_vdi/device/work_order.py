@@ -1,0 +1,51 @@
+"""How pixels are dealt to work-items: blocks of 4 x 4, as ``block_pixel`` of the kernels undoes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Work-items per group: four blocks.
+GROUP = 64
+#: Pixels along the edges of a block, and up a strip of them: those of ``lib/rays.cl``.
+_BLOCK = 4
+_STRIP = 16
+#: Rays of a block, which kernels written out in vectors follow in one work-item.
+BLOCK_RAYS = _BLOCK * _BLOCK
+#: Work-items of a column of a strip, which a group draws: that of ``lib/rays.cl``.
+COLUMN_ITEMS = _BLOCK * _STRIP
+#: Pixels along the edges of a cell, and all of them: those of ``lib/rays.cl``.
+CELL = _STRIP
+CELL_ITEMS = CELL * CELL
+
+
+class Rectangle(NamedTuple):
+    """Pixels of a window, the last ones excluded; y = 0 is the bottom row."""
+
+    x0: int
+    x1: int
+    y0: int
+    y1: int
+
+    @property
+    def pixels(self) -> int:
+        """How many there are."""
+        return max(self.x1 - self.x0, 0) * max(self.y1 - self.y0, 0)
+
+
+def part_columns(part: Rectangle) -> NDArray[np.int32]:
+    """Return the columns of strips that cover part of a window, as ``part_pixel`` takes them.
+
+    First column, first strip, columns of each strip, strips: int32 (4,). Each column is a group.
+    """
+    column, strip = part.x0 // _BLOCK, part.y0 // _STRIP
+    columns, strips = -(-part.x1 // _BLOCK) - column, -(-part.y1 // _STRIP) - strip
+    return np.array([column, strip, columns, strips], np.int32)
+
+
+def block_items(width: int, height: int) -> int:
+    """Return the work-items that cover a window in blocks of 4 x 4 pixels, in whole groups."""
+    items = -(-width // 4) * -(-height // 4) * 16
+    return -(-items // GROUP) * GROUP

@@ -1,0 +1,287 @@
+"""The arrays of a VDI while slices of lists are written into them, one behind the other."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.device import (
+    DeviceBuffer,
+    GrowingArray,
+    LocalMemory,
+    Runtime,
+    aligned_empty,
+    kept_together,
+)
+from pyvista_vdi.device.work_order import GROUP
+from pyvista_vdi.model.host_memory import require_host_memory
+
+#: Lists whose lengths a work-item sums up: that of ``generation/offsets.cl``.
+_LISTS_PER_ITEM = 16
+#: A VDI's arrays of supersegments, as messages call them, and the shape of an element.
+_LIST_ARRAYS: dict[str, tuple[int, ...]] = {
+    "front depths": (),
+    "back depths": (),
+    "supersegment colours": (3,),
+    "optical depths": (),
+}
+#: Bytes of a supersegment in them, and in the largest of them.
+SUPERSEGMENT_BYTES, _LARGEST_ELEMENT = 24, 12
+
+
+class GrowingLists(ABC):
+    """A VDI's arrays while slices of lists are written into them, one behind the other.
+
+    Room for every list at its longest is asked for at once: systems take memory as it is written,
+    so that what stays unused costs nothing, and nothing is ever copied. :meth:`finished` gives it
+    back. The device sums up the lists' lengths itself; the host learns the sum of a slice when it
+    has launched the march of the next, and waits for nothing else.
+    """
+
+    def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int):
+        self._runtime = runtime
+        self._size = size
+        self._limit = limit
+        self._most = size[0] * size[1] * limit  # supersegments
+        self._offsets = aligned_empty(size[0] * size[1] + 1, np.uint64)
+        self._offsets[0] = 0
+        self._made = 0  # lists, those of the last slice included
+        self._known = 0  # supersegments of all lists whose sum is known here
+        self._summing: Callable[[], None] | None = None  # waits for the sum of the last slice
+        self._arrays = {name: GrowingArray(item) for name, item in _LIST_ARRAYS.items()}
+        self._kernels = [
+            runtime.kernel("generation/offsets.cl", name)
+            for name in ("sum_lengths", "list_offsets")
+        ]
+        self._sums = runtime.buffer((blocks_to_sum(slice_lists),), np.uint64, "sums of lengths")
+
+    def __enter__(self) -> GrowingLists:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        try:
+            self._runtime.finish()  # the arrays may go when nothing is copied into them any more
+        finally:
+            for buffer in self._buffers():
+                buffer.release()
+
+    def follow(self, lengths: DeviceBuffer, n: int) -> tuple[Any, ...]:
+        """Have the device find where the next n lists go, of which there are so many lengths.
+
+        Returns
+        -------
+        tuple
+            Arguments ``offsets`` to ``optical_depths`` of the kernel ``pack_lists``.
+        """
+        self.wait()
+        blocks = blocks_to_sum(n)
+        shared = (np.uint32(n), lengths, LocalMemory(8 * GROUP), self._sums)
+        made, offsets = self._offsets_of_slice()
+        places = (np.uint32(made), offsets)
+        for kernel, arguments in zip(self._kernels, (shared, shared + places), strict=True):
+            self._runtime.launch(kernel, blocks * GROUP, GROUP, *arguments)
+        self._summing = self._sum_later(n)
+        self._made += n
+        held, targets = self._room_for(n)
+        return offsets, np.uint32(made), np.uint64(held), *targets
+
+    def wait(self) -> None:
+        """Wait until the lengths of the last slice are summed up."""
+        if self._summing is None:
+            return
+        self._summing()
+        self._summing = None
+        begin, self._known = self._known, self._sum()
+        require_room(self._known, self._size)
+        self._learned(begin)
+
+    @abstractmethod
+    def finished(self) -> list[NDArray[Any]]:
+        """Return offsets, fronts, backs, colours and optical depths."""
+
+    @abstractmethod
+    def _buffers(self) -> Iterator[DeviceBuffer]:
+        """All buffers, to be released."""
+
+    @abstractmethod
+    def _offsets_of_slice(self) -> tuple[int, DeviceBuffer]:
+        """Return where in a buffer of offsets that of the next slice is, and the buffer."""
+
+    @abstractmethod
+    def _sum_later(self, n: int) -> Callable[[], None]:
+        """Let the host have the sum of the n lists that follow those made."""
+
+    @abstractmethod
+    def _sum(self) -> int:
+        """Return the supersegments of all lists, whose sum has come to the host."""
+
+    @abstractmethod
+    def _learned(self, begin: int) -> None:
+        """Do what can be done now that it is known which supersegments the last slice has."""
+
+    @abstractmethod
+    def _room_for(self, n: int) -> tuple[int, list[DeviceBuffer]]:
+        """Return the supersegments before those that the buffers for n lists hold, and these."""
+
+
+class _ListsInPlace(GrowingLists):
+    """Of a device that uses the arrays in place: all slices are written through the same buffers.
+
+    These reach as far as they may; where the lists might pass their end, the host waits for the
+    lengths of the slice, and makes others.
+    """
+
+    def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int):
+        super().__init__(runtime, size, limit, slice_lists)
+        self._begin = self._end = 0  # supersegments that the buffers hold
+        self._targets: list[tuple[DeviceBuffer, NDArray[Any]]] = []  # and what they are to fill
+        self._last = np.zeros(1, np.uint64)
+        with kept_together() as keep:
+            keep(self._sums)
+            self._places = keep(runtime.target(self._offsets, "list offsets"))
+            runtime.write(self._places, np.zeros(1, np.uint64), first=0)
+            try:
+                self._make_room(0, 1)
+            except BaseException:
+                self._release_targets()
+                raise
+
+    def _buffers(self) -> Iterator[DeviceBuffer]:
+        yield from (target for target, _part in self._targets)
+        yield from (self._sums, self._places)
+
+    def _offsets_of_slice(self) -> tuple[int, DeviceBuffer]:
+        return self._made, self._places
+
+    def _sum_later(self, n: int) -> Callable[[], None]:
+        return self._runtime.download_later(self._places, self._last, first=self._made + n)
+
+    def _sum(self) -> int:
+        return int(self._last[0])
+
+    def _learned(self, begin: int) -> None:
+        if self._known > self._end:
+            self._make_room(begin, self._known)
+
+    def _room_for(self, n: int) -> tuple[int, list[DeviceBuffer]]:
+        if self._known + n * self._limit > self._end:
+            self.wait()
+        return self._begin, [target for target, _part in self._targets]
+
+    def _make_room(self, begin: int, end: int) -> None:
+        """Have buffers of the supersegments from ``begin``, those made so far, to ``end``."""
+        self._collect(begin)
+        for array in self._arrays.values():
+            array.reserve(end, self._most)
+        alignment = self._runtime.in_place_alignment or 1
+        begin -= begin % alignment  # so many elements are aligned as well
+        room = min(array.room for array in self._arrays.values())
+        largest = self._runtime.info.max_allocation // _LARGEST_ELEMENT
+        end = max(end, min(room, begin + largest))
+        self._begin, self._end = begin, end
+        for name, array in self._arrays.items():
+            part: NDArray[Any] = array.part(begin, end)
+            self._targets.append((self._runtime.target(part, name), part))
+
+    def _collect(self, made: int) -> None:
+        """Wait until so many supersegments are in the arrays, and let go of the buffers."""
+        for target, part in self._targets:
+            filled = part[: made - self._begin]
+            self._runtime.download(target, filled, count=filled.size)
+        self._release_targets()
+
+    def _release_targets(self) -> None:
+        while self._targets:
+            self._targets[-1][0].release()
+            self._targets.pop()
+
+    def finished(self) -> list[NDArray[Any]]:
+        self.wait()
+        self._collect(self._known)
+        self._runtime.download(self._places, self._offsets)
+        arrays = [array.finished(self._known) for array in self._arrays.values()]
+        return [self._offsets, *arrays]
+
+
+class _CopiedLists(GrowingLists):
+    """Of any other device, which has buffers of a slice at its longest.
+
+    What a slice has is copied from there while the next one is marched, before it is packed.
+    """
+
+    def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int):
+        super().__init__(runtime, size, limit, slice_lists)
+        with kept_together() as keep:
+            keep(self._sums)
+            self._places = keep(runtime.buffer((slice_lists + 1,), np.uint64, "list offsets"))
+            runtime.write(self._places, np.zeros(1, np.uint64), first=0)
+            self._targets = [
+                keep(runtime.buffer((slice_lists * limit, *item), name=name))
+                for name, item in _LIST_ARRAYS.items()
+            ]
+        self._first = 0  # list of the last slice
+        self._copies: list[Callable[[], None]] = []
+
+    def _buffers(self) -> Iterator[DeviceBuffer]:
+        yield from (*self._targets, self._sums, self._places)
+
+    def _offsets_of_slice(self) -> tuple[int, DeviceBuffer]:
+        return 0, self._places
+
+    def _sum_later(self, n: int) -> Callable[[], None]:
+        self._first = self._made
+        ends = self._offsets[self._made + 1 : self._made + n + 1]
+        return self._runtime.download_later(self._places, ends, first=1)
+
+    def _sum(self) -> int:
+        ends = self._offsets[self._first + 1 : self._made + 1]
+        np.add(ends, self._offsets[self._first], out=ends)
+        return int(ends[-1])
+
+    def _learned(self, begin: int) -> None:
+        if any(self._known > array.room for array in self._arrays.values()):
+            self._runtime.finish()  # what is being copied would not move with the array
+        copies = []
+        for target, array in zip(self._targets, self._arrays.values(), strict=True):
+            array.reserve(self._known, self._most)
+            part: NDArray[Any] = array.part(begin, self._known)
+            copies.append(self._runtime.download_later(target, part))
+        self._copies = copies  # a copy that nobody remembers is waited for; those before are done
+
+    def _room_for(self, n: int) -> tuple[int, list[DeviceBuffer]]:
+        return 0, self._targets
+
+    def finished(self) -> list[NDArray[Any]]:
+        self.wait()
+        self._runtime.finish()
+        arrays = [array.finished(self._known) for array in self._arrays.values()]
+        return [self._offsets, *arrays]
+
+
+def growing_lists(
+    runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int
+) -> GrowingLists:
+    """Return the arrays of a VDI of so many lists, for slices of up to ``slice_lists``."""
+    offsets_bytes = 8 * (size[0] * size[1] + 1)
+    in_place = runtime.in_place_alignment is not None
+    if in_place and offsets_bytes <= runtime.info.max_allocation:
+        return _ListsInPlace(runtime, size, limit, slice_lists)
+    return _CopiedLists(runtime, size, limit, slice_lists)
+
+
+def blocks_to_sum(lists: int) -> int:
+    """Return the work-groups that sum up the lengths of so many lists."""
+    return -(-lists // (GROUP * _LISTS_PER_ITEM))
+
+
+def require_room(supersegments: int, size: tuple[int, int]) -> None:
+    """Refuse to go on where the host cannot hold a VDI of at least so many supersegments."""
+    require_host_memory(
+        supersegments * SUPERSEGMENT_BYTES + 8 * size[0] * size[1],
+        f"a VDI of {size[0]} x {size[1]} lists",
+        "lower the window size or max_supersegments, or raise tolerance",
+    )

@@ -1,0 +1,1 @@
+"""VDIs as OpenEXR deep images."""

@@ -1,0 +1,1 @@
+"""The file format ``.vdi``: layout, chunks, checksums."""

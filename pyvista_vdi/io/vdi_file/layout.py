@@ -1,0 +1,139 @@
+"""The .vdi format: what its writer and its reader agree on.
+
+A .vdi file is a ZIP archive of one JSON description and one member per array;
+``docs/files.md`` describes it for those who read it with other tools. Members are stored as they
+are (the arrays are compressed already), times are constant, and the description comes first: the
+same VDI gives the same bytes, and the description is read without the arrays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+#: Highest version of the format; files of this and of lower versions are read.
+FORMAT_VERSION = 3
+
+#: What is written for each precision: version 3 only where version 2 has no place for it.
+VERSION_OF = {"exact": 2, "16-byte": 3, "8-byte": 3}
+
+#: Rows of an array in one chunk, for each version. What one chunk holds of all arrays, 1.5 MiB,
+#: stays in a core's cache until it has been decoded; larger chunks do not compress better.
+CHUNK_ROWS = {1: 1 << 18, 2: 1 << 16, 3: 1 << 16}
+
+#: What a description calls the format.
+FORMAT_NAME = "pyvista-vdi"
+
+#: The name that a file's name ends in.
+SUFFIX = ".vdi"
+
+#: The archive's first member.
+DESCRIPTION = "vdi.json"
+
+#: The archive's last member, since version 2: bytes and CRC-32 of every chunk, in the order of
+#: the arrays. A chunk is found, read and checked by itself.
+INDEX = "chunks"
+INDEX_DTYPE = np.dtype([("bytes", "<u4"), ("crc32", "<u4")])
+
+#: No description is longer: the longest metadata are a transfer function's table.
+MAX_DESCRIPTION_BYTES = 1 << 26
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How one array lies in its member.
+
+    Parameters
+    ----------
+    dtype : numpy.dtype
+        Type of its elements, little-endian.
+    row_shape : tuple of int
+        Shape of a row.
+    n_rows : int
+        Number of rows.
+    filter : {"none", "difference"}
+        What was done to the rows before they were compressed.
+    chunk_rows : int
+        Rows that are compressed together.
+    """
+
+    dtype: np.dtype[Any]
+    row_shape: tuple[int, ...]
+    n_rows: int
+    filter: str
+    chunk_rows: int
+
+    @property
+    def row_bytes(self) -> int:
+        """Bytes of one row."""
+        return self.dtype.itemsize * int(np.prod(self.row_shape, dtype=np.int64))
+
+    @property
+    def n_chunks(self) -> int:
+        """Number of chunks."""
+        return -(-self.n_rows // self.chunk_rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what the description says about the array."""
+        return {
+            "dtype": self.dtype.str,
+            "shape": [self.n_rows, *self.row_shape],
+            "filter": self.filter,
+        }
+
+
+def layouts(
+    window_size: tuple[int, int],
+    n: int,
+    counts: np.dtype[Any],
+    *,
+    filtered: bool,
+    version: int = FORMAT_VERSION,
+    precision: str = "exact",
+) -> dict[str, Layout]:
+    """Return the arrays of a file, in their order.
+
+    Parameters
+    ----------
+    window_size : (int, int)
+        W and H.
+    n : int
+        Supersegments in all lists.
+    counts : numpy.dtype
+        Type of the lists' lengths, as small as they allow.
+    filtered : bool
+        Whether depths are stored as differences.
+    version : int
+        Of the format. In version 1 front and back were one array.
+    precision : str
+        One of :data:`pyvista_vdi.model.packing.PRECISIONS`; packed since version 3.
+    """
+    n_lists = window_size[0] * window_size[1]
+    rows = CHUNK_ROWS[version]
+    counts_layout = Layout(counts, (), n_lists, "none", rows)
+    if precision == "8-byte":
+        u2 = np.dtype("<u2")
+        return {
+            "counts": counts_layout,
+            "origin": Layout(np.dtype("<i4"), (), n_lists, "none", rows),
+            "stride": Layout(u2, (), n_lists, "none", rows),
+            **{name: Layout(u2, (), n, "difference", rows) for name in ("front", "back")},
+            "color": Layout(np.dtype("|u1"), (3,), n, "none", rows),
+            "optical_depth": Layout(u2, (), n, "none", rows),
+        }
+    f4, kind = np.dtype("<f4"), "difference" if filtered else "none"
+    depth = np.dtype("<u4") if filtered else f4
+    depths = (
+        {"depth": Layout(depth, (2,), n, kind, rows)}
+        if version == 1
+        else {name: Layout(depth, (), n, kind, rows) for name in ("front", "back")}
+    )
+    color = np.dtype("<u4") if precision == "16-byte" else f4
+    return {
+        "counts": counts_layout,
+        **depths,
+        "color": Layout(color, () if precision == "16-byte" else (3,), n, "none", rows),
+        "optical_depth": Layout(f4, (), n, "none", rows),
+    }

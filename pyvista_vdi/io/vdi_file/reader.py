@@ -1,0 +1,517 @@
+"""Reads .vdi files, trusting nothing that they say before it is checked."""
+
+from __future__ import annotations
+
+import os
+import struct
+import zipfile
+import zlib
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from threading import Lock
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi._version import __version__
+from pyvista_vdi.errors import InvalidVDIError, VDIError, VDIFileError
+from pyvista_vdi.io.vdi_file.chunks import (
+    CODECS,
+    DamagedChunkError,
+    PackedArray,
+    chunk_sizes,
+    workers,
+)
+from pyvista_vdi.io.vdi_file.description import from_json, number
+from pyvista_vdi.io.vdi_file.layout import (
+    CHUNK_ROWS,
+    DESCRIPTION,
+    FORMAT_NAME,
+    FORMAT_VERSION,
+    INDEX,
+    INDEX_DTYPE,
+    MAX_DESCRIPTION_BYTES,
+    Layout,
+    layouts,
+)
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.host_memory import aligned_empty
+from pyvista_vdi.model.packing import Packed16, Packing, check_precision, packed_8
+from pyvista_vdi.model.vdi import VDI
+
+#: The first bytes: a ZIP member's local header, whose name stands at byte 30.
+_SIGNATURE = b"PK\x03\x04"
+_NAME_AT = 30
+
+#: A local header: signature, and at its end the bytes of the name and of extra fields behind it.
+_LOCAL_HEADER = struct.Struct("<4s22xHH")
+
+#: What zipfile raises, beside its own error, for archives that are not well formed.
+_ARCHIVE_ERRORS = (
+    zipfile.BadZipFile,
+    EOFError,
+    NotImplementedError,
+    OSError,
+    OverflowError,
+    RuntimeError,
+    ValueError,
+    struct.error,
+)
+
+_REMEDY = "copy it from its source again, or generate the VDI anew"
+
+
+@dataclass(frozen=True)
+class FileInfo:
+    """What a .vdi file says about itself, without its arrays.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        The file.
+    format_version : int
+        Version of the format.
+    written_by : str
+        Program and version.
+    camera : Camera
+        The generating view V_O.
+    window_size : (int, int)
+        Lists along each edge of the viewport.
+    n_supersegments : int
+        Supersegments in all lists.
+    bounds : tuple of float
+        Axis-aligned bounds in the model frame.
+    depth_origin : float
+        World units, added to every front and back.
+    metadata : dict
+        What made the VDI.
+    codec : str
+        How the arrays are compressed: ``"zstd"``, ``"lz4"`` or ``"none"``.
+    file_bytes : int
+        Size of the file.
+    memory_bytes : int
+        Size of the VDI's arrays in memory.
+    precision : str
+        One of :data:`pyvista_vdi.model.packing.PRECISIONS`.
+    depth_step : float
+        Of the 8-byte form: step of its depths, world units.
+    """
+
+    path: Path
+    format_version: int
+    written_by: str
+    camera: Camera
+    window_size: tuple[int, int]
+    n_supersegments: int
+    bounds: tuple[float, ...]
+    depth_origin: float
+    metadata: dict[str, Any]
+    codec: str
+    file_bytes: int
+    memory_bytes: int
+    precision: str = "exact"
+    depth_step: float = 1.0
+
+
+def read(path: str | os.PathLike[str]) -> VDI:
+    """Read a VDI from a file.
+
+    Parameters
+    ----------
+    path : path-like
+        A .vdi file.
+
+    Returns
+    -------
+    VDI
+        The same to the last bit as was written.
+
+    Raises
+    ------
+    VDIFileError
+        If the file is absent, foreign, of a newer version, truncated or damaged; the message
+        says which and what can be done.
+    """
+    with _OpenFile(path) as file:
+        return file.vdi()
+
+
+def read_info(path: str | os.PathLike[str]) -> FileInfo:
+    """Read what a file says about itself; the arrays are not touched.
+
+    Parameters
+    ----------
+    path : path-like
+        A .vdi file.
+
+    Returns
+    -------
+    FileInfo
+        View, size, metadata.
+
+    Raises
+    ------
+    VDIFileError
+        As for :func:`read`, except that damaged arrays are not noticed.
+    """
+    with _OpenFile(path) as file:
+        return file.info
+
+
+class _OpenFile:
+    """A .vdi file whose description has been read and checked."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        try:
+            self._path = Path(path)
+            self._stream = self._path.open("rb")
+        except (OSError, ValueError, TypeError) as error:
+            raise VDIFileError(
+                f"{path!s} cannot be read: {getattr(error, 'strerror', None) or error}"
+            ) from error
+        try:
+            self._archive = self._opened_archive()
+            self._description = self._read_description()
+            self.info = self._checked_info()
+            self._layouts = self._checked_layouts()
+        except OSError as error:
+            self._stream.close()
+            raise VDIFileError(f"{path!s} cannot be read: {error.strerror}") from error
+        except BaseException:
+            self._stream.close()
+            raise
+
+    def __enter__(self) -> _OpenFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._archive.close()
+        self._stream.close()
+
+    def vdi(self) -> VDI:
+        """Return the VDI with its arrays, all checked."""
+        info = self.info
+        try:
+            packed = self._packed()
+            with workers() as pool:
+                counts = pool.submit(self._decoded_counts, packed.pop("counts"))
+                packing: Packing | None = None
+                if info.precision == "8-byte":
+                    stored = self._decoded_codes(packed, pool)
+                    offsets = counts.result()
+                    rows = CHUNK_ROWS[info.format_version]
+                    packing = packed_8(info.depth_step, offsets, stored, rows)
+                    media = packing.media(np.diff(offsets).astype(np.int64))
+                else:
+                    media = self._decoded_media(packed, pool)
+                    offsets = counts.result()
+                    if info.precision == "16-byte":
+                        packing = Packed16(media["color"].view(np.uint32).reshape(-1))
+                        media.update(packing.media(np.diff(offsets).astype(np.int64)))
+            vdi = VDI(
+                info.camera,
+                info.window_size,
+                offsets,
+                **media,
+                bounds=info.bounds,
+                depth_origin=info.depth_origin,
+                metadata=info.metadata,
+            )
+            vdi.packing = packing
+            return vdi
+        except DamagedChunkError as error:
+            self._refuse(str(error))
+        except OSError as error:
+            raise VDIFileError(f"{self._path} cannot be read: {error.strerror}") from error
+        except InvalidVDIError as error:
+            self._refuse(f"it holds no valid VDI: {error}")
+
+    # -- archive and description -----------------------------------------------------------------
+
+    def _opened_archive(self) -> zipfile.ZipFile:
+        head = self._stream.read(_NAME_AT + len(DESCRIPTION))
+        if not head:
+            self._refuse("it is empty")
+        # A file cut off within these bytes may still be one of ours
+        ours = _SIGNATURE.startswith(head[: len(_SIGNATURE)])
+        if not (ours and DESCRIPTION.encode().startswith(head[_NAME_AT:])):
+            raise VDIFileError(
+                f"{self._path} is not a VDI file: it begins with {head[:8]!r}; "
+                "a VDI file is written by VDI.save() or 'pyvista-vdi generate'"
+            )
+        try:
+            archive = zipfile.ZipFile(self._stream)
+        except _ARCHIVE_ERRORS as error:
+            raise VDIFileError(
+                f"{self._path} is truncated: the directory at its end is missing or damaged "
+                f"({error}); {_REMEDY}"
+            ) from error
+        names = archive.namelist()
+        if len(set(names)) < len(names):
+            self._refuse("two of its members have the same name")
+        return archive
+
+    def _read_description(self) -> dict[str, Any]:
+        text = self._read_member(DESCRIPTION, MAX_DESCRIPTION_BYTES)
+        try:
+            description = from_json(text)
+        except (ValueError, RecursionError) as error:
+            self._refuse(f"its description {DESCRIPTION} is no JSON ({error})")
+        if not isinstance(description, dict) or description.get("format") != FORMAT_NAME:
+            raise VDIFileError(
+                f"{self._path} is not a VDI file: {DESCRIPTION} does not name the format "
+                f"{FORMAT_NAME!r}"
+            )
+        version = description.get("version")
+        if isinstance(version, bool) or not isinstance(version, int) or version < 1:
+            self._refuse(f"its format version is {version!r}")
+        if version > FORMAT_VERSION:
+            raise VDIFileError(
+                f"{self._path} is of format version {version}, written by "
+                f"{description.get('written_by', 'a newer program')!r}; this is pyvista-vdi "
+                f"{__version__}, which reads up to version {FORMAT_VERSION}: "
+                "upgrade by pip install -U pyvista-vdi"
+            )
+        return description
+
+    def _checked_info(self) -> FileInfo:
+        d = self._description
+        try:
+            window_size = check_window_size(d["window_size"])
+            n = d["n_supersegments"]
+            if isinstance(n, bool) or not isinstance(n, int) or not 0 <= n < 1 << 48:
+                self._refuse(f"n_supersegments is {n!r}")
+            if not isinstance(d["metadata"], dict) or not isinstance(d["codec"], str):
+                self._refuse("its metadata or codec are of the wrong kind")
+            if d["codec"] not in (*CODECS, "none"):
+                self._refuse(f"its codec {d['codec']!r} is unknown")
+            rows = CHUNK_ROWS[d["version"]]
+            if d["chunk_rows"] != rows:
+                self._refuse(f"chunk_rows is {d['chunk_rows']!r}, not {rows}")
+            n_lists = window_size[0] * window_size[1]
+            precision = check_precision(d["precision"]) if d["version"] >= 3 else "exact"
+            packed_bytes = {"exact": 0, "16-byte": 4 * n, "8-byte": 8 * n + 6 * n_lists}
+            return FileInfo(
+                path=self._path,
+                format_version=d["version"],
+                written_by=str(d.get("written_by", "")),
+                camera=Camera.from_dict(d["camera"]),
+                window_size=window_size,
+                n_supersegments=n,
+                bounds=tuple(number(b) for b in d["bounds"]),
+                depth_origin=number(d["depth_origin"]),
+                metadata=d["metadata"],
+                codec=d["codec"],
+                file_bytes=os.fstat(self._stream.fileno()).st_size,
+                memory_bytes=(n_lists + 1) * 8 + n * 24 + packed_bytes[precision],
+                precision=precision,
+                depth_step=number(d["depth_step"]) if precision == "8-byte" else 1.0,
+            )
+        except VDIFileError:
+            raise
+        except (VDIError, KeyError, TypeError, ValueError, OverflowError) as error:
+            self._refuse(f"its description is incomplete or wrong: {error!r}")
+
+    def _checked_layouts(self) -> dict[str, Layout]:
+        """Return the arrays' layouts, which must be what window and length imply."""
+        info, arrays = self.info, self._description.get("arrays")
+        if not isinstance(arrays, dict):
+            self._refuse("it does not describe its arrays")
+        try:
+            counts = np.dtype(arrays["counts"]["dtype"])
+        except (TypeError, KeyError, ValueError):
+            self._refuse("it does not describe its arrays")
+        if counts.str not in ("|u1", "<u2", "<u4", "<u8"):
+            self._refuse(f"counts of type {counts} are unknown")
+        wanted = layouts(
+            info.window_size,
+            info.n_supersegments,
+            counts,
+            filtered=info.codec != "none",
+            version=info.format_version,
+            precision=info.precision,
+        )
+        for name, layout in wanted.items():
+            if arrays.get(name) != layout.to_dict():
+                self._refuse(
+                    f"array {name!r} is described as {arrays.get(name)}, but "
+                    f"{info.window_size[0]} x {info.window_size[1]} lists of "
+                    f"{info.n_supersegments} supersegments need {layout.to_dict()}"
+                )
+        return wanted
+
+    # -- arrays ----------------------------------------------------------------------------------
+
+    def _decoded_counts(self, packed: PackedArray) -> NDArray[np.uint64]:
+        """Return the offsets that the lists' lengths add up to."""
+        n, counts = self.info.n_supersegments, np.empty(packed.layout.n_rows, packed.layout.dtype)
+        for first, last in packed.ranges():
+            packed.read(first, counts[first:last])
+        offsets = np.zeros(len(counts) + 1, np.uint64)
+        np.cumsum(counts, out=offsets[1:])
+        # Where no count is above n, a sum that wraps falls, which no VDI's offsets may
+        if int(counts.max(initial=0)) > n or offsets[-1] != n:
+            self._refuse(f"its lists do not hold {n} supersegments")
+        return offsets
+
+    def _decoded_media(
+        self, packed: dict[str, PackedArray], pool: ThreadPoolExecutor
+    ) -> dict[str, NDArray[Any]]:
+        """Return front, back, color and optical depth, each decompressed where it will stay."""
+        n, names = self.info.n_supersegments, ("front", "back", "color", "optical_depth")
+        color = self._layouts["color"]
+        # Where a CPU device uses them in place
+        media = {name: aligned_empty(n, "<f4") for name in names}
+        media["color"] = aligned_empty((n, *color.row_shape), color.dtype)
+        decode_depths = _DEPTHS[self.info.format_version]
+
+        def decode(first: int, last: int) -> None:
+            rows = {name: array[first:last] for name, array in media.items()}
+            decode_depths(packed, first, rows["front"], rows["back"])
+            for name in ("color", "optical_depth"):
+                packed[name].read(first, rows[name])
+
+        for _ in pool.map(lambda rows: decode(*rows), packed["optical_depth"].ranges()):
+            pass  # raises what went wrong
+        return media
+
+    def _decoded_codes(
+        self, packed: dict[str, PackedArray], pool: ThreadPoolExecutor
+    ) -> dict[str, NDArray[Any]]:
+        """Return the arrays of the 8-byte form as they are stored."""
+        stored = {
+            name: np.empty((array.layout.n_rows, *array.layout.row_shape), array.layout.dtype)
+            for name, array in packed.items()
+        }
+
+        def decode(name: str, first: int, last: int) -> None:
+            packed[name].read(first, stored[name][first:last])
+
+        tasks = [(name, *rows) for name, array in packed.items() for rows in array.ranges()]
+        for _ in pool.map(lambda task: decode(*task), tasks):
+            pass  # raises what went wrong
+        return stored
+
+    def _packed(self) -> dict[str, PackedArray]:
+        """Return the arrays as the file holds them, their chunks known and possible."""
+        if self.info.format_version == 1:
+            return {name: self._packed_whole(name) for name in self._layouts}
+        return self._packed_in_place()
+
+    def _packed_whole(self, name: str) -> PackedArray:
+        """Return an array of version 1, whose member is read and checked as a whole."""
+        layout, codec = self._layouts[name], self.info.codec
+        data = self._read_member(name, self.info.file_bytes)
+        view = memoryview(data)
+        try:
+            sizes = chunk_sizes(data, layout, codec)
+        except DamagedChunkError as error:
+            self._refuse(f"array {name!r}: {error}")
+        return PackedArray(
+            name, layout, codec, sizes, len(data), lambda _, begin, end: view[begin:end]
+        )
+
+    def _packed_in_place(self) -> dict[str, PackedArray]:
+        """Return the arrays of which every chunk is read from the file when it is decoded."""
+        n_chunks = sum(layout.n_chunks for layout in self._layouts.values())
+        content = self._read_member(INDEX, self.info.file_bytes)
+        if len(content) != n_chunks * INDEX_DTYPE.itemsize:
+            self._refuse(f"its member {INDEX!r} has {len(content)} bytes for {n_chunks} chunks")
+        index, packed, lock = np.frombuffer(content, INDEX_DTYPE), {}, Lock()
+        for name, layout in self._layouts.items():
+            rows, index = index[: layout.n_chunks], index[layout.n_chunks :]
+            member = self._member(name, self.info.file_bytes)
+            fetch = partial(self._fetch, lock, self._data_start(member), rows["crc32"].tolist())
+            packed[name] = PackedArray(
+                name, layout, self.info.codec, rows["bytes"], member.file_size, fetch
+            )
+        return packed
+
+    def _fetch(
+        self, lock: Lock, start: int, checksums: list[int], k: int, begin: int, end: int
+    ) -> bytes:
+        """Return the bytes of a chunk; from any thread."""
+        with lock:
+            self._stream.seek(start + begin)
+            chunk = self._stream.read(end - begin)
+        if zlib.crc32(chunk) != checksums[k]:
+            raise DamagedChunkError(f"chunk {k} is not what was written: its checksum differs")
+        return chunk
+
+    def _data_start(self, member: zipfile.ZipInfo) -> int:
+        """Return where a member's data begin: behind its local header, which must name it."""
+        self._stream.seek(member.header_offset)
+        header = self._stream.read(_LOCAL_HEADER.size)
+        if len(header) < _LOCAL_HEADER.size:
+            self._refuse(f"its member {member.filename!r} is not where its directory says")
+        signature, name_bytes, extra_bytes = _LOCAL_HEADER.unpack(header)
+        name = self._stream.read(name_bytes)
+        if signature != _SIGNATURE or name != member.filename.encode():
+            self._refuse(f"its member {member.filename!r} is not where its directory says")
+        return self._stream.tell() + int(extra_bytes)
+
+    def _member(self, name: str, limit: int) -> zipfile.ZipInfo:
+        """Return where a member is, which must be stored plainly and no longer than ``limit``."""
+        try:
+            member = self._archive.getinfo(name)
+        except KeyError:
+            self._refuse(f"its member {name!r} is missing")
+        if member.compress_type != zipfile.ZIP_STORED or member.flag_bits & 0x1:
+            self._refuse(f"its member {name!r} is not stored plainly")
+        if member.file_size != member.compress_size or member.file_size > limit:
+            self._refuse(f"its member {name!r} declares {member.file_size} bytes")
+        return member
+
+    def _read_member(self, name: str, limit: int) -> bytes:
+        """Return a member whole; ZIP's checksum is compared on the way."""
+        member = self._member(name, limit)
+        try:
+            data = self._archive.read(member)
+        except _ARCHIVE_ERRORS as error:
+            self._refuse(f"its member {name!r}: {error}")
+        if len(data) != member.file_size:
+            self._refuse(f"its member {name!r} ends after {len(data)} bytes")
+        return data
+
+    def _refuse(self, why: str) -> NoReturn:
+        raise VDIFileError(f"{self._path} is damaged: {why}; {_REMEDY}")
+
+
+def _decode_depths_1(
+    packed: Mapping[str, PackedArray],
+    first: int,
+    front: NDArray[np.float32],
+    back: NDArray[np.float32],
+) -> None:
+    """Decode a chunk of version 1: (front, back), each bit pattern less the one before."""
+    depth = packed["depth"]
+    stored = np.empty((len(front), 2), depth.layout.dtype)
+    depth.read(first, stored)
+    if depth.layout.filter == "difference":
+        np.cumsum(stored, dtype=np.uint32, out=stored.reshape(-1))
+    pairs = stored.view(np.float32)
+    front[:], back[:] = pairs[:, 0], pairs[:, 1]
+
+
+def _decode_depths_2(
+    packed: Mapping[str, PackedArray],
+    first: int,
+    front: NDArray[np.float32],
+    back: NDArray[np.float32],
+) -> None:
+    """Decode a chunk of version 2: front less the back before it, back less its own front."""
+    packed["front"].read(first, front)
+    packed["back"].read(first, back)
+    if packed["back"].layout.filter == "difference":
+        gap, thickness = front.view(np.uint32), back.view(np.uint32).copy()
+        gap += thickness
+        np.cumsum(gap, dtype=np.uint32, out=back.view(np.uint32))
+        np.subtract(back.view(np.uint32), thickness, out=gap)
+
+
+#: How each version of the format stores the depths of a chunk.
+_DEPTHS = {1: _decode_depths_1, 2: _decode_depths_2, 3: _decode_depths_2}

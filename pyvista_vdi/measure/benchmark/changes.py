@@ -1,0 +1,222 @@
+"""What changed between two runs, beyond noise.
+
+A time has changed if chance alone would separate its repetitions as much in at most one case of a
+hundred (Wilcoxon's rank sum, exact and two-sided), and its median by more than a twentieth. Times
+are compared as they are, which says something where the machine was the same and did nothing
+else, and in pairs: each repetition over that of ``render_volume`` beside it, which machines that
+are now faster and now slower leave alone. What repeats exactly is held to fixed limits.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from pyvista_vdi.measure.benchmark.candidates import CANDIDATES
+
+#: Chance of a separation by noise up to which a time counts as changed.
+CHANCE = 0.01
+#: Relative change of a median below which nothing counts as changed.
+LEAST_CHANGE = 0.05
+
+#: What a figure may differ by between devices that round differently. PSNR and the worst pixel
+#: follow SSIM's pictures, and single pixels more than the picture.
+_SSIM_LIMIT = 0.0005
+_SIZE_LIMIT = 0.001  # relative
+
+
+@dataclass(frozen=True)
+class Change:
+    """A figure in two runs.
+
+    Parameters
+    ----------
+    cell : str
+        Which row.
+    figure : str
+        Which figure of it.
+    before, after : float
+        Medians, or the figures themselves.
+    chance : float or None
+        Chance that noise alone would separate the repetitions as much; ``None`` for what repeats
+        exactly.
+    changed : bool
+        Whether it is beyond noise.
+    """
+
+    cell: str
+    figure: str
+    before: float
+    after: float
+    chance: float | None
+    changed: bool
+
+    @property
+    def ratio(self) -> float:
+        """After over before; infinite where before is 0."""
+        return self.after / self.before if self.before else math.inf
+
+
+def compare_results(before: dict[str, Any], after: dict[str, Any]) -> list[Change]:
+    """Return every figure that is in both runs.
+
+    Parameters
+    ----------
+    before, after : dict
+        What two files hold, see :func:`pyvista_vdi.measure.benchmark.read_results`.
+
+    Returns
+    -------
+    list of Change
+        In the order of `before`.
+    """
+    return list(_changes(before, after))
+
+
+def describe_changes(before: dict[str, Any], after: dict[str, Any]) -> str:
+    """Return what changed as lines of text, with the rule and what could not be compared."""
+    found = compare_results(before, after)
+    changed = [change for change in found if change.changed]
+    rule = (
+        f"A time changed where its median did by more than {LEAST_CHANGE:.0%}, and noise alone "
+        f"separates the repetitions as much in at most {CHANCE:.0%} of cases (rank sum)."
+    )
+    lines = [
+        f"Figures in both: {len(found)}; changed beyond noise: {len(changed)}.",
+        rule,
+    ]
+    tested = sum(change.chance is not None for change in found)
+    lines.append(f"Of {tested} times, about {CHANCE * tested:.1f} pass the second test by chance.")
+    too_few = _too_few(before, after)
+    if too_few:
+        lines.append(
+            "The runs have too few repetitions for any time to count as changed: 5 and 5 are enough"
+        )
+    for name in ("device", "driver", "opengl"):
+        ours, theirs = (run["system"].get(name) for run in (before, after))
+        if ours != theirs:
+            lines.append(f"The {name} differs: {ours}; {theirs}. Look at times in pairs only.")
+    for name in ("interpolation", "seed"):
+        ours, theirs = (run["plan"].get(name) for run in (before, after))
+        if ours != theirs:
+            lines.append(f"The {name} differs: {ours}; {theirs}. Other pictures were drawn.")
+    lines.append("")
+    for change in changed:
+        chance = "" if change.chance is None else f"  (chance {change.chance:.2g})"
+        lines.append(
+            f"{change.cell}: {change.figure} {change.before:.5g} -> {change.after:.5g}, "
+            f"{change.ratio:.3f} times{chance}"
+        )
+    lines += _only_in_one(before, after)
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def rank_sum_chance(a: Sequence[float], b: Sequence[float]) -> float:
+    """Return the chance that samples of one distribution are separated as much as these.
+
+    Wilcoxon's rank sum test, exact and two-sided; ties count as half.
+
+    Parameters
+    ----------
+    a, b : sequence of float
+        Repetitions.
+
+    Returns
+    -------
+    float
+        0 to 1.
+    """
+    n, m = len(a), len(b)
+    wins = sum(1.0 if x > y else 0.5 if x == y else 0.0 for x in a for y in b)
+    least = math.floor(min(wins, n * m - wins))
+    tail = sum(_arrangements(n, m, u) for u in range(least + 1))
+    return min(1.0, 2 * tail / math.comb(n + m, n))
+
+
+@cache
+def _arrangements(n: int, m: int, wins: int) -> int:
+    """Return how many orders of n and m samples give the first so many wins over the second."""
+    if wins < 0:
+        return 0
+    if n == 0 or m == 0:
+        return int(wins == 0)
+    # The largest of all is one of the first, which then wins m times, or one of the second
+    return _arrangements(n - 1, m, wins - m) + _arrangements(n, m - 1, wins)
+
+
+def _changes(before: dict[str, Any], after: dict[str, Any]) -> Iterator[Change]:
+    others = {cell["name"]: cell for cell in after["cells"]}
+    for cell in before["cells"]:
+        other = others.get(cell["name"])
+        if other is None:
+            continue
+        name = cell["name"]
+        if cell["vdi"] is not None and other["vdi"] is not None:
+            yield from _vdi_changes(name, cell["vdi"], other["vdi"])
+        rows = {row["angle"]: row for row in other["angles"]}
+        for row in cell["angles"]:
+            if row["angle"] in rows:
+                at = f"{name} at {row['angle']:g} degrees"
+                yield from _row_changes(at, row, rows[row["angle"]])
+
+
+def _vdi_changes(name: str, before: dict[str, Any], after: dict[str, Any]) -> Iterator[Change]:
+    for figure in ("supersegments", "bytes_raw", "bytes_saved"):
+        old, new = before[figure], after[figure]
+        if old is not None and new is not None:
+            yield _exact(name, figure, old, new, _SIZE_LIMIT * old)
+    old, new = (vdi["generation_seconds"]["clock"] for vdi in (before, after))
+    yield _timed(name, "generation, s", old, new)
+
+
+def _row_changes(at: str, before: dict[str, Any], after: dict[str, Any]) -> Iterator[Change]:
+    ssim = [row["vdi_to_volume"]["ssim"] for row in (before, after)]
+    if None not in ssim:  # windows below 11 pixels have none
+        yield _exact(at, "SSIM", ssim[0], ssim[1], _SSIM_LIMIT)
+    for name, label in CANDIDATES.items():
+        if name not in before["seconds"] or name not in after["seconds"]:
+            continue
+        old, new = (row["seconds"][name]["clock"] for row in (before, after))
+        yield _timed(at, f"{label}, s", old, new)
+        if name != "volume":
+            old, new = (_paired(row["seconds"], name) for row in (before, after))
+            yield _timed(at, f"{label} / render_volume", old, new)
+
+
+def _paired(seconds: dict[str, Any], name: str) -> list[float]:
+    """Return each repetition over that of ``render_volume`` beside it."""
+    pairs = zip(seconds[name]["clock"], seconds["volume"]["clock"], strict=True)
+    return [ours / volume for ours, volume in pairs]
+
+
+def _timed(cell: str, figure: str, before: list[float], after: list[float]) -> Change:
+    chance = rank_sum_chance(before, after)
+    old, new = statistics.median(before), statistics.median(after)
+    moved = abs(new - old) > LEAST_CHANGE * old
+    return Change(cell, figure, old, new, chance, chance <= CHANCE and moved)
+
+
+def _exact(cell: str, figure: str, before: float, after: float, limit: float) -> Change:
+    return Change(cell, figure, before, after, None, abs(after - before) > limit)
+
+
+def _too_few(before: dict[str, Any], after: dict[str, Any]) -> bool:
+    n, m = before["plan"]["repeats"], after["plan"]["repeats"]
+    return bool(2 / math.comb(n + m, n) > CHANCE)
+
+
+def _only_in_one(before: dict[str, Any], after: dict[str, Any]) -> Iterator[str]:
+    """Name cells that one run lacks, or has refused."""
+    runs = [{cell["name"]: cell for cell in run["cells"]} for run in (before, after)]
+    for name in dict.fromkeys([*runs[0], *runs[1]]):
+        states = ["missing" if name not in run else _state(run[name]) for run in runs]
+        if states[0] != states[1]:
+            yield f"{name}: {states[0]} -> {states[1]}"
+
+
+def _state(cell: dict[str, Any]) -> str:
+    return "measured" if cell["refused"] is None else f"refused ({cell['refused']})"

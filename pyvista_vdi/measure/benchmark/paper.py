@@ -1,0 +1,89 @@
+"""The paper's own figures, read from ``paper_tables.json``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+
+@dataclass(frozen=True)
+class PaperCell:
+    """One cell of the paper's Table 1.
+
+    Parameters
+    ----------
+    volume_fps : float
+        Frames per second of the paper's volume rendering at this angle.
+    fps, fps_skipping : float
+        Frames per second of the VDI without and with skipping of empty space.
+    ssim : float
+        SSIM of the VDI's picture against volume rendering.
+    """
+
+    volume_fps: float
+    fps: float
+    fps_skipping: float
+    ssim: float
+
+    @property
+    def speed_up(self) -> float:
+        """Speed of the VDI without skipping over the paper's volume rendering."""
+        return self.fps / self.volume_fps
+
+    @property
+    def speed_up_skipping(self) -> float:
+        """Speed of the VDI with skipping over the paper's volume rendering."""
+        return self.fps_skipping / self.volume_fps
+
+
+@cache
+def paper_tables() -> dict[str, Any]:
+    """Return the data file: ``source``, ``device``, ``table1`` and ``table2``."""
+    file = resources.files("pyvista_vdi.measure.benchmark") / "paper_tables.json"
+    tables: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    return tables
+
+
+def paper_cell(
+    dataset: str | None, window_size: Sequence[int], max_supersegments: int, angle: float
+) -> PaperCell | None:
+    """Return what the paper measured.
+
+    Parameters
+    ----------
+    dataset : str or None
+        ``"kingsnake"``, ``"beechnut"`` or ``"richtmyer_meshkov"``.
+    window_size : (int, int)
+        Width and height in pixels.
+    max_supersegments : int
+        N_S.
+    angle : float
+        Degrees from V_O.
+
+    Returns
+    -------
+    PaperCell or None
+        ``None`` where the paper has no such cell.
+    """
+    for row in paper_tables()["table1"]:
+        if row["dataset"] != dataset or row["window_size"] != list(window_size):
+            continue
+        for cell in row["vdi"]:
+            if cell["max_supersegments"] == max_supersegments and cell["angle"] == angle:
+                return PaperCell(
+                    row["volume_fps"][str(cell["angle"])],
+                    cell["fps"],
+                    cell["fps_skipping"],
+                    cell["ssim"],
+                )
+    return None
+
+
+def paper_targets() -> list[tuple[float, float]]:
+    """Return Table 2: each target rate as a multiple of the full frame's rate, and the SSIM."""
+    table = paper_tables()["table2"]
+    return [(target["fps"] / table["full_fps"], target["ssim"]) for target in table["targets"]]

@@ -1,0 +1,148 @@
+"""What is measured: profiles, and the cells that they come to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from itertools import product
+from types import MappingProxyType
+from typing import Any
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.measure.benchmark.datasets import DEFAULT_SEED, label_of
+
+#: The paper's windows, supersegments and angles; and angles beyond the paper's.
+SIZES = ((1280, 720), (1920, 1080))
+LIMITS = (15, 30)
+ANGLES = (0.0, 5.0, 15.0, 30.0, 60.0, 90.0, 180.0)
+
+#: Frames of each kind at a view. Two runs of five are the fewest that ``--compare`` can tell apart.
+REPEATS = 5
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run measures.
+
+    Parameters
+    ----------
+    profile : str
+        Name of what the rest began as.
+    datasets : tuple of str
+        Names that :func:`pyvista_vdi.measure.benchmark.find_dataset` knows.
+    sizes : tuple of (int, int)
+        Windows, pixels.
+    limits : tuple of int
+        Longest lists, the paper's N_S.
+    angles : tuple of float
+        Degrees of ``Azimuth`` from V_O.
+    repeats : int
+        Timed frames of each candidate at each view.
+    generations : int
+        Timed generations of each VDI.
+    interpolation : {"nearest", "linear"}
+        Of all volume renderers, and of generation.
+    preview : tuple of (str, (int, int), int, float), optional
+        Data set, window, N_S and angle of Table 2; ``None`` leaves it out.
+    vtk : bool
+        Whether VTK's mappers take part.
+    seed : int
+        Of the procedural volumes.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If a number is out of its range.
+    """
+
+    profile: str
+    datasets: tuple[str, ...]
+    sizes: tuple[tuple[int, int], ...] = SIZES
+    limits: tuple[int, ...] = LIMITS
+    angles: tuple[float, ...] = ANGLES
+    repeats: int = REPEATS
+    generations: int = 3
+    interpolation: str = "nearest"
+    preview: tuple[str, tuple[int, int], int, float] | None = None
+    vtk: bool = True
+    seed: int = DEFAULT_SEED
+
+    def __post_init__(self) -> None:
+        for name in ("repeats", "generations"):
+            if not 1 <= getattr(self, name) <= 1000:
+                raise InvalidArgumentError(
+                    f"{name} must be from 1 to 1000; got {getattr(self, name)!r}"
+                )
+        labels = [label_of(name) for name in self.datasets]
+        twice = sorted({name for name in labels if labels.count(name) > 1})
+        if twice:
+            raise InvalidArgumentError(
+                f"{twice[0]!r} is given twice: name files differently, as in kingsnake=FILE"
+            )
+        if not self.angles or not all(math.isfinite(a) for a in self.angles):
+            raise InvalidArgumentError(
+                f"angles must be one or more numbers of degrees; got {self.angles!r}"
+            )
+        if self.seed < 0:
+            raise InvalidArgumentError(f"seed must be 0 or above; got {self.seed!r}")
+
+    def cells(self) -> Iterator[tuple[tuple[int, int], int]]:
+        """Yield window and N_S of each VDI of a data set."""
+        yield from product(self.sizes, self.limits)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything in values that JSON can hold; files without their folders."""
+        described = asdict(self)
+        described["datasets"] = [label_of(name) for name in self.datasets]
+        if self.preview is not None:
+            dataset, size, limit, angle = self.preview
+            described["preview"] = {
+                "dataset": label_of(dataset),
+                "window_size": size,
+                "max_supersegments": limit,
+                "angle": angle,
+            }
+        plain: dict[str, Any] = _lists(described)
+        return plain
+
+
+def cell_name(dataset: str, size: tuple[int, int], limit: int) -> str:
+    """Return a cell's name in the results: ``brain/1280x720/15``."""
+    return f"{dataset}/{size[0]}x{size[1]}/{limit}"
+
+
+def _lists(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _lists(item) for key, item in value.items()}
+    return [_lists(item) for item in value] if isinstance(value, tuple | list) else value
+
+
+#: Arguments of :class:`Plan` by the name of a profile. ``full`` also takes every volume in the
+#: folder that ``PYVISTA_VDI_DATA`` names.
+PROFILES: MappingProxyType[str, MappingProxyType[str, Any]] = MappingProxyType(
+    {
+        # Sized for ten minutes on two cores
+        "quick": MappingProxyType(
+            {
+                "datasets": (
+                    "brain",
+                    "rayleigh_taylor",
+                    "kingsnake_like@4",
+                    "beechnut_like@4",
+                    "richtmyer_meshkov_like@8",
+                ),
+                "sizes": SIZES[:1],
+                "angles": (0.0, 5.0, 30.0),
+                "generations": 1,
+                "preview": ("beechnut_like@4", SIZES[0], 15, 30.0),
+            }
+        ),
+        "full": MappingProxyType(
+            {
+                "datasets": ("kingsnake_like", "beechnut_like", "richtmyer_meshkov_like"),
+                "preview": ("beechnut_like", SIZES[1], 15, 30.0),
+            }
+        ),
+    }
+)

@@ -1,0 +1,97 @@
+"""The results' file: JSON that is whole after every row, and can be gone on with."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from pyvista_vdi.measure.benchmark.plan import Plan, cell_name
+from pyvista_vdi.measure.benchmark.results_file import ResultsFile
+
+#: What the file says it is; ``docs/benchmark_schema.json`` describes it.
+FORMAT = "pyvista-vdi benchmark"
+FORMAT_VERSION = 1
+
+
+class Results(ResultsFile):
+    """What was measured, as the JSON has it.
+
+    Parameters
+    ----------
+    path : path-like
+        Its file.
+    data : dict
+        The JSON's content.
+
+    Attributes
+    ----------
+    data : dict
+        See ``docs/benchmark_schema.json``.
+    """
+
+    form, version = FORMAT, FORMAT_VERSION
+    parts = frozenset({"datasets", "cells", "previews"})
+
+    @classmethod
+    def begun(cls, path: str | os.PathLike[str], plan: Plan, system: dict[str, str]) -> Results:
+        """Return what holds nothing yet."""
+        return cls(
+            path, cls.new(plan.to_dict(), system, {"datasets": {}, "cells": [], "previews": []})
+        )
+
+    @classmethod
+    def resumed(cls, path: str | os.PathLike[str], plan: Plan, system: dict[str, str]) -> Results:
+        """Return what an earlier run of the same plan, on the same device, has left.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If the file is no such results, or holds those of another plan or device.
+        """
+        results = read_results(path)
+        results.require_same(plan.to_dict(), system)
+        return results
+
+    # -- cells -------------------------------------------------------------------------------------
+
+    def cell(self, dataset: str, size: tuple[int, int], limit: int) -> dict[str, Any] | None:
+        """Return a cell that is there, or None."""
+        name = cell_name(dataset, size, limit)
+        return next((cell for cell in self.data["cells"] if cell["name"] == name), None)
+
+    def new_cell(self, dataset: str, size: tuple[int, int], limit: int) -> dict[str, Any]:
+        """Return a cell, made anew where it is not there."""
+        found = self.cell(dataset, size, limit)
+        if found is None:
+            found = {
+                "name": cell_name(dataset, size, limit),
+                "dataset": dataset,
+                "window_size": list(size),
+                "max_supersegments": limit,
+                "refused": None,
+                "vdi": None,
+                "angles": [],
+            }
+            self.data["cells"].append(found)
+        return found
+
+    def missing_angles(self, plan: Plan, dataset: str, size: tuple[int, int], limit: int) -> int:
+        """Return how many angles of a cell are not there yet; none of one that was refused."""
+        cell = self.cell(dataset, size, limit)
+        if cell is None:
+            return len(plan.angles)
+        if cell["refused"] is not None:
+            return 0
+        there = {row["angle"] for row in cell["angles"]}
+        return sum(angle not in there for angle in plan.angles)
+
+
+def read_results(path: str | os.PathLike[str]) -> Results:
+    """Read a file of results.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If it cannot be read, or is something else.
+    """
+    return Results(path, Results.checked(path))

@@ -1,0 +1,294 @@
+"""The run: data set by data set, window by window, VDI by VDI, and view by view."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pyvista_vdi.device import Runtime, get_runtime
+from pyvista_vdi.errors import VDIError
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.benchmark.candidates import (
+    VDIRenderer,
+    VolumeRenderers,
+    accuracy,
+    take_turns,
+)
+from pyvista_vdi.measure.benchmark.datasets import (
+    Dataset,
+    find_dataset,
+    label_of,
+    require_allocation,
+)
+from pyvista_vdi.measure.benchmark.plan import Plan
+from pyvista_vdi.measure.benchmark.preview import measure_preview
+from pyvista_vdi.measure.benchmark.results import Results
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.raycast import PreparedVDI
+
+#: Window in which a VDI is generated once before generation is timed, pixels.
+_WARM_UP_SIZE = (64, 36)
+
+#: Called with the finished fraction, 0 to 1, and what is being done.
+Progress = Callable[[float, str], object]
+
+
+def run(plan: Plan, results: Results, device: Any = None, progress: Progress | None = None) -> None:
+    """Measure what is missing, and write the file after every row.
+
+    A volume or VDI that the host or the device cannot hold gives rows that are marked as refused,
+    with the reason.
+
+    Parameters
+    ----------
+    plan : Plan
+        What is measured.
+    results : Results
+        Where it goes; rows that are there are not measured again.
+    device : optional
+        See :func:`pyvista_vdi.list_devices`.
+    progress : callable, optional
+        Called with the finished fraction and what is being done.
+    """
+    _Run(plan, results, get_runtime(device), progress).everything()
+
+
+class _Run:
+    def __init__(
+        self, plan: Plan, results: Results, runtime: Runtime, progress: Progress | None
+    ) -> None:
+        self._plan, self._results, self._runtime = plan, results, runtime
+        self._progress = progress
+        self._measured = [label_of(name) for name in plan.datasets]
+        self._previewed = None if plan.preview is None else label_of(plan.preview[0])
+        # In the order of the plan; that of Table 2 last where it is no other's
+        names = [*plan.datasets, *([plan.preview[0]] if plan.preview else [])]
+        self._datasets = [find_dataset(name, plan.seed) for name in dict.fromkeys(names)]
+        self._done = 0
+        self._total = max(1, sum(self._missing(dataset.name) for dataset in self._datasets))
+
+    def everything(self) -> None:
+        """Measure what is missing."""
+        for dataset in self._datasets:
+            if self._missing(dataset.name):
+                self._dataset(dataset)
+        self._results.save()
+
+    # -- what is left to do ------------------------------------------------------------------------
+
+    def _cells(self, name: str) -> list[tuple[tuple[int, int], int]]:
+        return list(self._plan.cells()) if name in self._measured else []
+
+    def _missing(self, name: str) -> int:
+        """Return how many rows of a data set are not there yet."""
+        rows = sum(
+            self._results.missing_angles(self._plan, name, *cell) for cell in self._cells(name)
+        )
+        return rows + int(self._preview_missing(name))
+
+    def _preview_missing(self, name: str) -> bool:
+        return name == self._previewed and not self._results.data["previews"]
+
+    def _step(self, doing: str, rows: int = 0) -> None:
+        self._done += rows
+        if self._progress is not None:
+            self._progress(min(1.0, self._done / self._total), doing)
+
+    # -- a data set --------------------------------------------------------------------------------
+
+    def _dataset(self, dataset: Dataset) -> None:
+        """Measure a data set, or mark its rows as refused."""
+        name = dataset.name
+        try:
+            require_allocation(self._runtime, dataset)
+            begin = time.perf_counter()
+            volume = dataset.load(lambda fraction: self._step(f"{name}: making it"))
+            seconds = time.perf_counter() - begin
+        except (VDIError, MemoryError) as error:
+            self._refuse(name, self._cells(name), error)
+            return
+        self._results.data["datasets"][name] = {
+            **dataset.describe(volume),
+            "load_seconds": seconds,
+        }
+        table = dataset.transfer_function(volume, self._plan.interpolation)
+        for size in dict.fromkeys(size for size, _ in self._cells(name)):
+            self._window(name, volume, table, size)
+        if self._preview_missing(name):
+            self._table2(name, volume, table)
+
+    def _refuse(
+        self, name: str, cells: list[tuple[tuple[int, int], int]], error: BaseException
+    ) -> None:
+        reason = f"{type(error).__name__}: {error}"
+        for size, limit in cells:
+            rows = self._results.missing_angles(self._plan, name, size, limit)
+            if rows:
+                self._results.new_cell(name, size, limit)["refused"] = reason
+            self._step(f"{name}: refused", rows)
+        if self._preview_missing(name):
+            self._results.data["previews"].append(self._preview_entry(reason))
+            self._step(f"{name}: refused", 1)
+        self._results.save()
+
+    def _window(
+        self, name: str, volume: Volume, table: TransferFunction, size: tuple[int, int]
+    ) -> None:
+        limits = [
+            limit
+            for limit in self._plan.limits
+            if self._results.missing_angles(self._plan, name, size, limit)
+        ]
+        if not limits:
+            return
+        try:
+            renderers = VolumeRenderers(self._runtime, volume, table, size, self._plan.vtk)
+        except (VDIError, MemoryError) as error:
+            self._refuse(name, [(size, limit) for limit in limits], error)
+            return
+        try:
+            if renderers.opengl is not None:
+                self._results.data["system"]["opengl"] = renderers.opengl
+            for limit in limits:
+                try:
+                    self._cell(name, volume, table, size, limit, renderers)
+                except (VDIError, MemoryError) as error:
+                    self._refuse(name, [(size, limit)], error)
+        finally:
+            renderers.close()
+
+    # -- a VDI -------------------------------------------------------------------------------------
+
+    def _cell(
+        self,
+        name: str,
+        volume: Volume,
+        table: TransferFunction,
+        size: tuple[int, int],
+        limit: int,
+        renderers: VolumeRenderers,
+    ) -> None:
+        view = filling_camera(volume.bounds, size)
+        self._step(f"{name}, {size[0]}x{size[1]}, N_S {limit}: generating")
+        vdi, seconds = self._generated(volume, table, view, size, limit)
+        cell = self._results.new_cell(name, size, limit)
+        if cell["vdi"] is None:
+            cell["vdi"] = {"generation_seconds": seconds, **_sizes(vdi)}
+        draw = VDIRenderer(self._runtime, PreparedVDI(self._runtime, vdi), size)
+        there = {row["angle"] for row in cell["angles"]}
+        for angle in self._plan.angles:
+            if angle in there:
+                continue
+            self._step(f"{name}, {size[0]}x{size[1]}, N_S {limit}: {angle:g} degrees")
+            cell["angles"].append(self._row(view.azimuth(angle), angle, draw, renderers))
+            cell["angles"].sort(key=lambda row: row["angle"])
+            cell["left_out"] = dict(renderers.left_out)
+            self._results.save()
+            self._step(f"{name}, {size[0]}x{size[1]}, N_S {limit}", 1)
+
+    def _generated(
+        self,
+        volume: Volume,
+        table: TransferFunction,
+        view: Camera,
+        size: tuple[int, int],
+        limit: int,
+    ) -> tuple[VDI, dict[str, list[float]]]:
+        """Generate the VDI as often as is timed; kernels are compiled before."""
+
+        def generate(size: tuple[int, int]) -> VDI:
+            return generate_vdi(
+                volume,
+                view,
+                size,
+                table,
+                max_supersegments=limit,
+                sample_distance=min(volume.spacing) / 2,
+                device=self._runtime,
+            )
+
+        generate(_WARM_UP_SIZE)
+        made: list[VDI] = []
+
+        def timed() -> None:
+            made[:] = [generate(size)]
+
+        work = {"generate": timed}
+        seconds = take_turns(self._runtime, work, self._plan.generations, warm_up=False)
+        return made[0], seconds["generate"]
+
+    def _row(
+        self, camera: Camera, angle: float, draw: VDIRenderer, renderers: VolumeRenderers
+    ) -> dict[str, Any]:
+        """Compare the pictures of one view, and time everybody's frames."""
+        reference, vtk_accuracy = renderers.reference(camera, angle)
+        frames = {**draw.frames(camera), **renderers.frames(camera)}
+        return {
+            "angle": angle,
+            "vdi_to_volume": accuracy(draw.image(camera), reference),
+            "volume_to_vtk_gpu": vtk_accuracy,
+            "seconds": take_turns(self._runtime, frames, self._plan.repeats),
+        }
+
+    # -- Table 2 -----------------------------------------------------------------------------------
+
+    def _table2(self, name: str, volume: Volume, table: TransferFunction) -> None:
+        assert self._plan.preview is not None
+        _, size, limit, angle = self._plan.preview
+        self._step(f"{name}: previews at target rates")
+        entry = self._preview_entry(None)
+        try:
+            renderers = VolumeRenderers(self._runtime, volume, table, size, vtk=False)
+            view = filling_camera(volume.bounds, size)
+            vdi, _ = self._generated(volume, table, view, size, limit)
+            draw = VDIRenderer(self._runtime, PreparedVDI(self._runtime, vdi), size)
+            camera = view.azimuth(angle)
+            reference = renderers.image(camera)
+            frames = take_turns(self._runtime, draw.frames(camera), self._plan.repeats)
+            entry["full"] = {
+                "seconds": frames["vdi_skipping"],
+                "to_volume": accuracy(draw.image(camera), reference),
+            }
+            full = frames["vdi_skipping"]
+            entry["rows"] = measure_preview(draw, camera, size, full, reference)
+        except (VDIError, MemoryError) as error:
+            entry["refused"] = f"{type(error).__name__}: {error}"
+        self._results.data["previews"].append(entry)
+        self._results.save()
+        self._step(f"{name}: previews", 1)
+
+    def _preview_entry(self, reason: str | None) -> dict[str, Any]:
+        entry = self._plan.to_dict()["preview"]
+        return {**entry, "refused": reason, "full": None, "rows": []}
+
+
+def _sizes(vdi: VDI) -> dict[str, Any]:
+    """Return how large a VDI is; ``bytes_saved`` is of a file in the default compression."""
+    counts = vdi.counts
+    occupied = int(np.count_nonzero(counts))
+    with tempfile.TemporaryDirectory() as folder:
+        begin = time.perf_counter()
+        try:
+            saved = vdi.save(Path(folder) / "vdi.vdi").stat().st_size
+        except VDIError:  # no room for it: nothing else is lost
+            saved = None
+        seconds = time.perf_counter() - begin
+    return {
+        "lists": int(counts.size),
+        "occupied_lists": occupied,
+        "supersegments": vdi.n_supersegments,
+        "mean_length": vdi.n_supersegments / occupied if occupied else 0.0,
+        "longest_list": int(counts.max()),
+        "bytes_raw": vdi.nbytes,
+        "bytes_saved": saved,
+        "save_seconds": seconds if saved is not None else None,
+    }

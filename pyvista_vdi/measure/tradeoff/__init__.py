@@ -1,0 +1,24 @@
+"""What each setting of a VDI costs and gives, measured on one volume: ``pyvista-vdi tradeoff``.
+
+Everything runs without VTK and PyVista; where VTK is installed its mappers are timed beside.
+"""
+
+from __future__ import annotations
+
+from pyvista_vdi.measure.tradeoff.dominance import Figure, dominates, find_dominated, front
+from pyvista_vdi.measure.tradeoff.findings import Point, Tradeoff
+from pyvista_vdi.measure.tradeoff.session import measure_tradeoff
+from pyvista_vdi.measure.tradeoff.settings import AXES, Setting, sweep
+
+__all__ = [
+    "AXES",
+    "Figure",
+    "Point",
+    "Setting",
+    "Tradeoff",
+    "dominates",
+    "find_dominated",
+    "front",
+    "measure_tradeoff",
+    "sweep",
+]

@@ -1,0 +1,138 @@
+"""Which settings are dominated, when what was measured is noisy.
+
+Every figure is smaller for the better. A setting *dominates* another if
+
+- no figure of it is worse by more than what does not count for its kind,
+- at least one is better by more than that, and beyond the noise of its repetitions, and
+- in sum its gains outweigh its losses, each in units of what does not count.
+
+So noise keeps a setting from being called dominated and never makes it so. Where nothing is
+noisy and everything counts this is Pareto's dominance. With differences that do not count, the
+first two conditions alone could lead in circles (a is nearly as fast as b, and b as c, but a not as
+c), at whose end everything is dominated; the third one orders the settings by a sum. They could
+also lead astray: each setting gives way to a neighbour, and the last of them is far from the first.
+So a setting gives way only to one that stays. *The front* is what stays, found in the order of the
+sums: whatever is not on it is dominated by something that is.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.measure.benchmark.changes import CHANCE, rank_sum_chance
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One figure of a setting; the smaller, the better.
+
+    Parameters
+    ----------
+    value : float
+        What counts.
+    tolerance : float
+        Differences that do not, above 0 and the same in all figures of a kind.
+    repetitions : tuple of float
+        What `value` is the median of; none where it repeats exactly.
+    """
+
+    value: float
+    tolerance: float
+    repetitions: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.value) and 0 < self.tolerance < math.inf):
+            raise InvalidArgumentError(
+                "a figure has a finite value and a tolerance above 0; got "
+                f"{self.value!r} and {self.tolerance!r}"
+            )
+
+    @classmethod
+    def of_times(cls, repetitions: Sequence[float], tolerance: float) -> Figure:
+        """Return what repetitions of a positive figure say, as logarithms: ratios count."""
+        logs = tuple(math.log(value) for value in repetitions)
+        return cls(statistics.median(logs), tolerance, logs)
+
+    def is_worse(self, other: Figure) -> bool:
+        """Whether it is larger by more than what does not count."""
+        return self.value > other.value + other.tolerance
+
+    def is_better(self, other: Figure) -> bool:
+        """Whether it is smaller by more than that, and beyond the noise."""
+        if not other.is_worse(self):
+            return False
+        if not (self.repetitions and other.repetitions):
+            return True
+        return rank_sum_chance(self.repetitions, other.repetitions) <= CHANCE
+
+
+Figures = Sequence[Figure]
+
+
+def dominates(one: Figures, other: Figures) -> bool:
+    """Whether one setting makes another pointless.
+
+    Parameters
+    ----------
+    one, other : sequence of Figure
+        The same kinds of figures in the same order.
+    """
+    pairs = list(zip(one, other, strict=True))
+    if any(ours.is_worse(theirs) for ours, theirs in pairs):
+        return False
+    if _sum(one) >= _sum(other):
+        return False
+    return any(ours.is_better(theirs) for ours, theirs in pairs)
+
+
+def find_dominated(settings: Mapping[str, Figures]) -> dict[str, list[str]]:
+    """Return the settings that are dominated, and by which of the others.
+
+    Parameters
+    ----------
+    settings : mapping of str to sequence of Figure
+        By name.
+
+    Returns
+    -------
+    dict of str to list of str
+        Dominated settings, in the order of `settings`; of each, those on the front that dominate
+        it, in the same order.
+    """
+    kept = front(settings)
+    found = {
+        name: [one for one in kept if dominates(settings[one], settings[name])] for name in settings
+    }
+    return {name: by for name, by in found.items() if by}
+
+
+def front(settings: Mapping[str, Figures]) -> list[str]:
+    """Return the settings that none of them dominates, in the order of `settings`."""
+    kept: list[str] = []
+    # What dominates a setting has the smaller sum, so that it has been decided on before
+    for name in sorted(settings, key=lambda name: _sum(settings[name])):
+        if not any(dominates(settings[one], settings[name]) for one in kept):
+            kept.append(name)
+    return [name for name in settings if name in kept]
+
+
+def told_apart(names: Sequence[str], settings: Mapping[str, Figures]) -> list[str]:
+    """Return `names` without those that are no different from an earlier one that stays.
+
+    Two settings differ where one of them is better, by what counts and beyond the noise, in at
+    least one figure.
+    """
+    kept: list[str] = []
+    for name in names:
+        pairs = (zip(settings[one], settings[name], strict=True) for one in kept)
+        if all(any(a.is_better(b) or b.is_better(a) for a, b in pair) for pair in pairs):
+            kept.append(name)
+    return kept
+
+
+def _sum(figures: Figures) -> float:
+    return math.fsum(figure.value / figure.tolerance for figure in figures)

@@ -1,0 +1,250 @@
+"""What a VDI's user can choose, as points of a sweep: one setting each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from itertools import product as combinations
+from types import MappingProxyType
+from typing import Any
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.generation.generate import CRITERIA, check_max_supersegments
+from pyvista_vdi.model.packing import PRECISIONS
+
+#: Most settings of one sweep: each is drawn many times from every angle.
+MOST_SETTINGS = 500
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One choice of everything that trades accuracy for time and memory.
+
+    Parameters
+    ----------
+    max_supersegments : int
+        Longest list, the paper's N_S.
+    tolerance : float
+        Error per list that may be traded for shorter lists.
+    lists : float
+        Lists along each edge of the VDI over pixels along that edge of the frame.
+    precision : {"exact", "16-byte", "8-byte"}
+        What a supersegment takes on the device and in a file.
+    skip_empty : bool
+        Whether frames pass by empty space.
+    preview : float
+        Share of the frame's edges that is drawn, 0 to 1, before it is brought to size: what a
+        plotter does while the view moves.
+    criterion : str
+        What decides where lists are cut.
+    view_cone : float
+        Half angle of the cone of new views to serve, degrees.
+    sample_distance : float
+        Step of generation over the volume's smallest spacing.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If a value is out of its range.
+    """
+
+    max_supersegments: int = 20
+    tolerance: float = 0.0
+    lists: float = 1.0
+    precision: str = "exact"
+    skip_empty: bool = True
+    preview: float = 1.0
+    criterion: str = "least-error"
+    view_cone: float = 60.0
+    sample_distance: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_max_supersegments(self.max_supersegments)
+        for name, choices in (("precision", PRECISIONS), ("criterion", CRITERIA)):
+            if getattr(self, name) not in choices:
+                raise InvalidArgumentError(
+                    f"{name} must be one of {', '.join(choices)}; got {getattr(self, name)!r}"
+                )
+        for name, (least, most) in _RANGES.items():
+            value = getattr(self, name)
+            if not (math.isfinite(value) and least <= value <= most):
+                raise InvalidArgumentError(
+                    f"{name} must be from {least:g} to {most:g}; got {value!r}"
+                )
+
+    @property
+    def name(self) -> str:
+        """What differs from the defaults: ``"N_S 10, lists x2"``, or ``"default"``."""
+        changed = [_spelled(n, getattr(self, n)) for n in AXES if n in self.changes]
+        return ", ".join(changed) or "default"
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """Values that differ from the defaults, by name."""
+        return {
+            field.name: getattr(self, field.name)
+            for field in fields(self)
+            if getattr(self, field.name) != field.default
+        }
+
+    @property
+    def generated(self) -> Setting:
+        """The same without what can be chosen after generation: settings of one VDI share it."""
+        return replace(self, precision="exact", skip_empty=True, preview=1.0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the values by name."""
+        return asdict(self)
+
+
+#: Least and most of the numbers; finer steps than the engine takes are refused by it.
+_RANGES: MappingProxyType[str, tuple[float, float]] = MappingProxyType(
+    {
+        "tolerance": (0.0, 1e6),
+        "lists": (0.05, 8.0),
+        "preview": (0.02, 1.0),
+        "view_cone": (0.0, 90.0),
+        "sample_distance": (1e-3, 100.0),
+    }
+)
+
+#: Values of each axis in the default sweep, beside the default; none of an axis that is swept only
+#: when it is asked for, see :data:`ON_REQUEST`.
+AXES: MappingProxyType[str, tuple[Any, ...]] = MappingProxyType(
+    {
+        "max_supersegments": (5, 10, 15, 30, 40),
+        "tolerance": (0.01, 0.1),
+        "lists": (0.5, 1.5, 2.0),
+        "precision": ("16-byte", "8-byte"),
+        "skip_empty": (False,),
+        "preview": (0.7, 0.5, 0.35),
+        "criterion": ("homogeneity", "length", "transmittance", "optical-depth"),
+        "view_cone": (0.0, 30.0, 90.0),
+        "sample_distance": (0.25, 1.0),
+    }
+)
+
+#: Axes that are swept by default; the others have a right value for each scene, or compare methods.
+DEFAULT_AXES = tuple(AXES)[:6]
+ON_REQUEST = tuple(AXES)[6:]
+
+#: The same where there is little time.
+QUICK_AXES: MappingProxyType[str, tuple[Any, ...]] = MappingProxyType(
+    {
+        "max_supersegments": (5, 10, 40),
+        "lists": (0.5, 2.0),
+        "precision": ("8-byte",),
+        "skip_empty": (False,),
+        "preview": (0.5,),
+    }
+)
+
+#: Knobs that are worth turning together: bytes spent on more lists or on longer ones, saved by
+#: packing and spent again, and time saved twice.
+PAIRS: tuple[MappingProxyType[str, Any], ...] = tuple(
+    MappingProxyType(pair)
+    for pair in (
+        {"max_supersegments": 40, "lists": 0.5},
+        {"max_supersegments": 10, "lists": 1.5},
+        {"max_supersegments": 10, "lists": 2.0},
+        {"max_supersegments": 5, "lists": 2.0},
+        {"tolerance": 0.01, "lists": 2.0},
+        {"max_supersegments": 5, "precision": "8-byte"},
+        {"max_supersegments": 10, "precision": "8-byte"},
+        {"max_supersegments": 40, "precision": "8-byte"},
+        {"lists": 0.5, "precision": "8-byte"},
+        {"lists": 1.5, "precision": "8-byte"},
+        {"lists": 2.0, "precision": "8-byte"},
+        {"max_supersegments": 10, "lists": 2.0, "precision": "8-byte"},
+        {"precision": "8-byte", "preview": 0.7},
+        {"lists": 0.5, "preview": 0.5},
+        {"max_supersegments": 10, "preview": 0.5},
+    )
+)
+
+
+def sweep(
+    axes: Mapping[str, Sequence[Any]] | Sequence[str] | None = None,
+    *,
+    base: Setting | None = None,
+    pairs: bool = True,
+    product: bool = False,
+) -> tuple[Setting, ...]:
+    """Return the settings of a sweep: the base, and every value of every axis by itself.
+
+    Parameters
+    ----------
+    axes : mapping of str to sequence, or sequence of str, optional
+        Values by name of a :class:`Setting`'s parameter, or names whose usual values are taken;
+        by default N_S, tolerance, lists, precision, skipping and preview.
+    base : Setting, optional
+        Where all begins; the defaults of :func:`pyvista_vdi.generate` unless given.
+    pairs : bool
+        Add the pairs of values that are worth having together, of those axes that are swept.
+    product : bool
+        In place of both: every combination.
+
+    Returns
+    -------
+    tuple of Setting
+        The base first; none twice.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If there is no such axis, a value is out of its range, or there are too many settings.
+
+    Examples
+    --------
+    >>> from pyvista_vdi.measure.tradeoff import sweep
+    >>> [setting.name for setting in sweep({"lists": (0.5, 2)})]
+    ['default', 'lists x0.5', 'lists x2']
+    """
+    base = Setting() if base is None else base
+    chosen = _chosen(DEFAULT_AXES if axes is None else axes)
+    if product:
+        values = [(getattr(base, name), *chosen[name]) for name in chosen]
+        found = [replace(base, **dict(zip(chosen, v, strict=True))) for v in combinations(*values)]
+    else:
+        found = [base]
+        found += [replace(base, **{n: value}) for n, values in chosen.items() for value in values]
+        if pairs:
+            found += [
+                replace(base, **pair)
+                for pair in PAIRS
+                if all(n in chosen and value in chosen[n] for n, value in pair.items())
+            ]
+    settings = tuple(dict.fromkeys(found))
+    if len(settings) > MOST_SETTINGS:
+        raise InvalidArgumentError(
+            f"the sweep has {len(settings)} settings, more than {MOST_SETTINGS}: name fewer axes "
+            "or values, or leave out the product"
+        )
+    return settings
+
+
+def _chosen(axes: Mapping[str, Sequence[Any]] | Sequence[str]) -> dict[str, tuple[Any, ...]]:
+    unknown = [name for name in axes if name not in AXES]
+    if unknown:
+        raise InvalidArgumentError(f"there is no axis {unknown[0]!r}: known are {', '.join(AXES)}")
+    if isinstance(axes, Mapping):
+        return {name: tuple(values) for name, values in axes.items()}
+    return {name: AXES[name] for name in axes}
+
+
+def _spelled(name: str, value: Any) -> str:
+    """Return a value as tables and plots have it."""
+    if name in ("precision", "criterion"):
+        return str(value)
+    if name == "skip_empty":
+        return "skipping" if value else "no skipping"
+    form = {
+        "max_supersegments": "N_S {:g}",
+        "tolerance": "tolerance {:g}",
+        "lists": "lists x{:g}",
+        "preview": "preview x{:g}",
+        "view_cone": "view cone {:g}",
+        "sample_distance": "steps {:g}",
+    }
+    return form[name].format(value)

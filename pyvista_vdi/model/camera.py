@@ -1,0 +1,530 @@
+"""The camera: the only place that knows world, view and list coordinates (DESIGN section 3)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError, UnsupportedError
+from pyvista_vdi.model.checks import as_float, as_floats
+
+Matrix: TypeAlias = NDArray[np.float64]
+
+#: Largest width or height of a window, in pixels: four times 16k, far beyond any display.
+MAX_WINDOW_EDGE = 65536
+
+
+def check_window_size(window_size: Sequence[int], *, name: str = "window_size") -> tuple[int, int]:
+    """Return ``window_size`` as two positive Python ints.
+
+    Parameters
+    ----------
+    window_size : sequence of int
+        Width and height in pixels.
+    name : str
+        What to call it in an error.
+
+    Returns
+    -------
+    tuple of int
+        ``(width, height)``.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If it is not two whole numbers between 1 and :data:`MAX_WINDOW_EDGE`.
+    """
+    try:
+        width, height = window_size
+        size = (int(width), int(height))
+        whole = size == (width, height)
+    except (TypeError, ValueError, OverflowError):
+        whole = False
+    if not whole:
+        raise InvalidArgumentError(
+            f"{name} must be (width, height), two whole numbers of pixels; got {window_size!r}"
+        )
+    if not all(1 <= edge <= MAX_WINDOW_EDGE for edge in size):
+        raise InvalidArgumentError(
+            f"{name} must be between 1 and {MAX_WINDOW_EDGE} pixels along each edge; "
+            f"got {size[0]} x {size[1]}"
+        )
+    return size
+
+
+class Camera:
+    """A view, with VTK's names and meanings.
+
+    Immutable and hashable. What the viewport's aspect decides is taken from the window size that
+    it is used with; clipping ranges are not part of it, because nothing here needs them.
+
+    Parameters
+    ----------
+    position, focal_point, view_up : array_like of float, shape (3,)
+        Eye, the point looked at, and the up direction, in world coordinates. ``view_up`` need not
+        be perpendicular to the direction of projection, only not parallel to it.
+    view_angle : float
+        Full opening angle in degrees, vertical unless ``use_horizontal_view_angle``; between 0
+        and 180, both excluded. Ignored in parallel projection.
+    parallel_projection : bool
+        Parallel instead of perspective projection.
+    parallel_scale : float
+        Half the viewport's height in world units, for parallel projection.
+    window_center : array_like of float, shape (2,)
+        Centre of the viewport in units of its half width and half height (``c_x, c_y``), as
+        ``vtkCamera::SetWindowCenter``.
+    use_horizontal_view_angle : bool
+        Read ``view_angle`` as the horizontal angle.
+    model_transform : array_like of float, shape (4, 4), optional
+        M, from the model frame (the data set's own coordinates) to world coordinates; affine and
+        invertible. Identity by default.
+
+    Raises
+    ------
+    InvalidCameraError
+        If a value is not finite or out of range, the eye is the focal point, ``view_up`` is
+        parallel to the direction of projection, or ``model_transform`` cannot be inverted.
+    """
+
+    __slots__ = (
+        "_axes",
+        "_key",
+        "focal_point",
+        "model_transform",
+        "parallel_projection",
+        "parallel_scale",
+        "position",
+        "use_horizontal_view_angle",
+        "view_angle",
+        "view_up",
+        "window_center",
+    )
+
+    position: tuple[float, float, float]
+    focal_point: tuple[float, float, float]
+    view_up: tuple[float, float, float]
+    view_angle: float
+    parallel_projection: bool
+    parallel_scale: float
+    window_center: tuple[float, float]
+    use_horizontal_view_angle: bool
+    model_transform: Matrix
+
+    def __init__(
+        self,
+        position: ArrayLike,
+        focal_point: ArrayLike,
+        view_up: ArrayLike,
+        *,
+        view_angle: float = 30.0,
+        parallel_projection: bool = False,
+        parallel_scale: float = 1.0,
+        window_center: ArrayLike = (0.0, 0.0),
+        use_horizontal_view_angle: bool = False,
+        model_transform: ArrayLike | None = None,
+    ) -> None:
+        put = object.__setattr__
+        put(self, "position", _vector("position", position, 3))
+        put(self, "focal_point", _vector("focal_point", focal_point, 3))
+        put(self, "view_up", _vector("view_up", view_up, 3))
+        put(self, "view_angle", as_float(view_angle))
+        put(self, "parallel_projection", bool(parallel_projection))
+        put(self, "parallel_scale", as_float(parallel_scale))
+        put(self, "window_center", _vector("window_center", window_center, 2))
+        put(self, "use_horizontal_view_angle", bool(use_horizontal_view_angle))
+        put(self, "model_transform", _affine(model_transform))
+        put(self, "_key", self._make_key())
+        self._check()
+        put(self, "_axes", self._make_axes())
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"a Camera cannot be changed (tried to set {name!r}): use replace()")
+
+    # -- making one ------------------------------------------------------------------------------
+
+    @classmethod
+    def from_any(cls, camera: Any, *, model_transform: ArrayLike | None = None) -> Camera:
+        """Return ``camera`` as a :class:`Camera`.
+
+        Parameters
+        ----------
+        camera : Camera or vtkCamera or pyvista.Camera
+            VTK's cameras are read through their ``Get…`` methods; VTK itself is not imported.
+        model_transform : array_like, shape (4, 4), optional
+            Replaces the model transform; by default a ``Camera`` keeps its own and others get the
+            identity (``vtkCamera``'s own model transform is used where it has been set).
+
+        Returns
+        -------
+        Camera
+            The same view.
+
+        Raises
+        ------
+        InvalidCameraError
+            If it is not a camera.
+        UnsupportedError
+            If it has a view shear, an explicit projection, an off-axis projection or a user
+            transform: the optical model has no place for them.
+        """
+        if isinstance(camera, Camera):
+            return (
+                camera
+                if model_transform is None
+                else camera.replace(model_transform=model_transform)
+            )
+        if not hasattr(camera, "GetDirectionOfProjection"):
+            raise InvalidCameraError(
+                f"expected a pyvista_vdi.Camera, a vtkCamera or a pyvista.Camera; "
+                f"got {type(camera).__name__}"
+            )
+        _refuse_unsupported(camera)
+        if model_transform is None:
+            matrix = camera.GetModelTransformMatrix()
+            model_transform = [[matrix.GetElement(i, j) for j in range(4)] for i in range(4)]
+        return cls(
+            camera.GetPosition(),
+            camera.GetFocalPoint(),
+            camera.GetViewUp(),
+            view_angle=camera.GetViewAngle(),
+            parallel_projection=bool(camera.GetParallelProjection()),
+            parallel_scale=camera.GetParallelScale(),
+            window_center=camera.GetWindowCenter(),
+            use_horizontal_view_angle=bool(camera.GetUseHorizontalViewAngle()),
+            model_transform=model_transform,
+        )
+
+    @classmethod
+    def from_dict(cls, state: Mapping[str, Any]) -> Camera:
+        """Return the camera that :meth:`to_dict` described."""
+        names = cls.__slots__[2:]
+        if not isinstance(state, Mapping):
+            raise InvalidCameraError(
+                f"a camera's description is a dictionary; got {type(state).__name__}"
+            )
+        unknown = sorted(set(state) - set(names))
+        missing = sorted({"position", "focal_point", "view_up"} - set(state))
+        if unknown or missing:
+            raise InvalidCameraError(
+                f"a camera's description has unknown entries {unknown}, lacks {missing}"
+            )
+        return cls(**{name: state[name] for name in names if name in state})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all arguments of the constructor, as plain numbers and lists (for JSON)."""
+        state: dict[str, Any] = {name: getattr(self, name) for name in self.__slots__[2:]}
+        for name in ("position", "focal_point", "view_up", "window_center"):
+            state[name] = list(state[name])
+        state["model_transform"] = self.model_transform.tolist()
+        return state
+
+    def replace(self, **changes: Any) -> Camera:
+        """Return a copy with some arguments of the constructor changed."""
+        state = {name: getattr(self, name) for name in self.__slots__[2:]}
+        unknown = sorted(set(changes) - set(state))
+        if unknown:
+            raise InvalidCameraError(f"a Camera has no {', '.join(unknown)}")
+        return Camera(**{**state, **changes})
+
+    def azimuth(self, degrees: float) -> Camera:
+        """Return the view turned about ``view_up`` through the focal point (as VTK's Azimuth)."""
+        return self._turned(np.asarray(self.view_up), degrees)
+
+    def elevation(self, degrees: float) -> Camera:
+        """Return the view turned about the horizontal axis through the focal point.
+
+        As VTK's ``Elevation``: positive angles lift the eye; ``view_up`` stays.
+        """
+        return self._turned(-self.axes[0], degrees)
+
+    def tile(
+        self, window_size: Sequence[int], corner: Sequence[int], tile_size: Sequence[int]
+    ) -> Camera:
+        """Return the view that a rectangle of pixels of a window has.
+
+        A picture of ``tile_size`` by the new view is the part ``picture[row : row + height,
+        column : column + width]`` of this view's picture of ``window_size``: its rays are the
+        same to rounding.
+
+        Parameters
+        ----------
+        window_size : (int, int)
+            Width and height of the whole window in pixels.
+        corner : (int, int)
+            Column and row of the tile's first pixel, from the top left; the tile may reach
+            beyond the window.
+        tile_size : (int, int)
+            Width and height of the tile in pixels.
+
+        Returns
+        -------
+        Camera
+            The same eye and frame with another lens and window centre.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If the sizes or the corner are not two whole numbers of pixels each.
+        """
+        window = np.array(check_window_size(window_size))
+        tile = np.array(check_window_size(tile_size, name="tile_size"))
+        first = np.asarray(corner)
+        if first.shape != (2,) or first.dtype.kind not in "iu":
+            raise InvalidArgumentError(
+                f"corner must be (column, row), two whole numbers of pixels; got {corner!r}"
+            )
+        centre = (2 * first + tile) / window - 1  # (u, v) in the window, v downwards
+        around = np.asarray(self.window_center) + centre * (1, -1)
+        width_share, height_share = tile / window
+        # The angle is that of the edge it is measured along; the other follows from the aspect
+        share = width_share if self.use_horizontal_view_angle else height_share
+        tangent = math.tan(math.radians(self.view_angle) / 2)
+        return self.replace(
+            view_angle=2 * math.degrees(math.atan(tangent * share)),
+            parallel_scale=self.parallel_scale * height_share,
+            window_center=around * window / tile,
+        )
+
+    # -- frames ----------------------------------------------------------------------------------
+
+    @property
+    def axes(self) -> Matrix:
+        """Unit vectors right, up and forward in world coordinates, float64 (3, 3), as rows."""
+        return self._axes  # type: ignore[attr-defined, no-any-return]
+
+    @property
+    def view_matrix(self) -> Matrix:
+        """World to view space (X right, Y up, Z forward, world units), float64 (4, 4)."""
+        axes = self.axes
+        matrix = np.eye(4)
+        matrix[:3, :3] = axes
+        matrix[:3, 3] = -axes @ np.asarray(self.position)
+        return matrix
+
+    @property
+    def model_to_view(self) -> Matrix:
+        """Model frame to view space, float64 (4, 4).
+
+        The eye is subtracted before the rotation, so that an origin far from zero costs no digits
+        beyond those of the coordinates themselves.
+        """
+        axes = self.axes
+        matrix = np.eye(4)
+        matrix[:3, :3] = axes @ self.model_transform[:3, :3]
+        matrix[:3, 3] = axes @ (self.model_transform[:3, 3] - np.asarray(self.position))
+        return matrix
+
+    def half_extent(self, window_size: Sequence[int]) -> tuple[float, float]:
+        """Return half the viewport's width and height.
+
+        Parameters
+        ----------
+        window_size : (int, int)
+            Width and height in pixels.
+
+        Returns
+        -------
+        tuple of float
+            ``(t_x, t_y)``, tangents of the half angles, in perspective; ``(s_x, s_y)``, world
+            units, in parallel projection.
+        """
+        width, height = check_window_size(window_size)
+        aspect = width / height
+        if self.parallel_projection:
+            return self.parallel_scale * aspect, self.parallel_scale
+        tangent = math.tan(math.radians(self.view_angle) / 2)
+        if self.use_horizontal_view_angle:
+            return tangent, tangent / aspect
+        return tangent * aspect, tangent
+
+    def viewport_matrix(self, window_size: Sequence[int]) -> Matrix:
+        """View space to homogeneous viewport coordinates.
+
+        Parameters
+        ----------
+        window_size : (int, int)
+            Width and height in pixels.
+
+        Returns
+        -------
+        numpy.ndarray
+            float64 (4, 4), K with ``K [X, Y, Z, 1] = [u d, v d, Z, d]``: ``(u, v)`` in [-1, 1]²
+            is the viewport; ``d`` is Z in perspective and 1 in parallel projection
+            (DESIGN section 3, "List coordinates").
+        """
+        half_width, half_height = self.half_extent(window_size)
+        denominator = 3 if self.parallel_projection else 2
+        matrix = np.zeros((4, 4))
+        matrix[0, 0] = 1 / half_width
+        matrix[1, 1] = 1 / half_height
+        matrix[0, denominator] -= self.window_center[0]
+        matrix[1, denominator] -= self.window_center[1]
+        matrix[2, 2] = 1
+        matrix[3, denominator] = 1
+        return matrix
+
+    def ray_coefficients(self, window_size: Sequence[int]) -> tuple[Matrix, Matrix]:
+        """Rays through the viewport, in view space.
+
+        Parameters
+        ----------
+        window_size : (int, int)
+            Width and height in pixels.
+
+        Returns
+        -------
+        origin, direction : numpy.ndarray
+            float64 (3, 3) each. The ray through ``(u, v)`` is ``P(t) = [1, u, v] @ origin +
+            t [1, u, v] @ direction``; its direction has Z = 1, so t is view depth.
+        """
+        half_width, half_height = self.half_extent(window_size)
+        slope = np.array(
+            [
+                [self.window_center[0] * half_width, self.window_center[1] * half_height, 0.0],
+                [half_width, 0.0, 0.0],
+                [0.0, half_height, 0.0],
+            ]
+        )
+        forward = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+        if self.parallel_projection:
+            return slope, forward
+        return np.zeros((3, 3)), slope + forward
+
+    # -- the rest --------------------------------------------------------------------------------
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Camera) and self._key == other._key  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash(self._key)  # type: ignore[attr-defined]
+
+    def __reduce__(self) -> Any:
+        return (Camera.from_dict, (self.to_dict(),))
+
+    def __repr__(self) -> str:
+        if self.parallel_projection:
+            lens = f"parallel_projection=True, parallel_scale={self.parallel_scale:g}"
+        else:
+            lens = f"view_angle={self.view_angle:g}"
+        return (
+            f"Camera(position={self.position}, focal_point={self.focal_point}, "
+            f"view_up={self.view_up}, {lens})"
+        )
+
+    def _make_key(self) -> tuple[Any, ...]:
+        state = self.to_dict()
+        state["model_transform"] = self.model_transform.tobytes()
+        return tuple(tuple(v) if isinstance(v, list) else v for v in state.values())
+
+    def _make_axes(self) -> Matrix:
+        forward = np.subtract(self.focal_point, self.position)
+        # By a power of two, which rounds nothing: squares may overflow
+        forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])
+        forward = forward / np.linalg.norm(forward)
+        right = np.cross(forward, _unit(np.asarray(self.view_up)))
+        right /= np.linalg.norm(right)
+        axes = np.array([right, np.cross(right, forward), forward])
+        axes.setflags(write=False)
+        return axes
+
+    def _check(self) -> None:
+        # In parallel projection the angle has no meaning, but it is a number
+        any_angle = self.parallel_projection and math.isfinite(self.view_angle)
+        if not (any_angle or 0 < self.view_angle < 180):
+            raise InvalidCameraError(
+                f"view_angle must lie between 0 and 180 degrees, both excluded; "
+                f"got {self.view_angle!r}"
+            )
+        if not (math.isfinite(self.parallel_scale) and self.parallel_scale > 0):
+            raise InvalidCameraError(
+                f"parallel_scale must be a positive number of world units; "
+                f"got {self.parallel_scale!r}"
+            )
+        with np.errstate(over="ignore"):
+            forward = np.subtract(self.focal_point, self.position)
+        if not np.isfinite(forward).all():
+            raise InvalidCameraError(
+                f"the camera's position {self.position} and focal point {self.focal_point} are "
+                "too far apart for float64: move them closer"
+            )
+        if not np.any(forward):
+            raise InvalidCameraError(
+                f"the camera's position and focal point are the same point {self.position}: "
+                "move one of them"
+            )
+        if not np.any(self.view_up):
+            raise InvalidCameraError("view_up is the zero vector: give the direction that is up")
+        # sin of the angle between them; below 1e-12 float64 cannot tell which way is right
+        if np.linalg.norm(np.cross(_unit(forward), _unit(np.asarray(self.view_up)))) < 1e-12:
+            raise InvalidCameraError(
+                f"view_up {self.view_up} is parallel to the direction of projection "
+                f"{tuple(_unit(forward))}: choose another up direction"
+            )
+
+    def _turned(self, axis: Matrix, degrees: float) -> Camera:
+        """Rotate the eye about ``axis`` through the focal point (Rodrigues' formula)."""
+        axis = _unit(axis)
+        angle = math.radians(as_float(degrees))
+        if not math.isfinite(angle):
+            raise InvalidCameraError(f"a view is turned by a finite angle; got {degrees!r}")
+        arm = np.subtract(self.position, self.focal_point)
+        turned = (
+            arm * math.cos(angle)
+            + np.cross(axis, arm) * math.sin(angle)
+            + axis * (axis @ arm) * (1 - math.cos(angle))
+        )
+        return self.replace(position=np.asarray(self.focal_point) + turned)
+
+
+def _vector(name: str, value: ArrayLike, length: int) -> tuple[float, ...]:
+    array = as_floats(value)
+    if array.shape != (length,) or not np.isfinite(array).all():
+        raise InvalidCameraError(f"{name} must be {length} finite numbers; got {value!r}")
+    return tuple(array.tolist())
+
+
+def _affine(value: ArrayLike | None) -> Matrix:
+    matrix = np.eye(4) if value is None else as_floats(value)
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+        raise InvalidCameraError(f"model_transform must be 4 x 4 finite numbers; got {value!r}")
+    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
+        raise InvalidCameraError(
+            f"model_transform must be affine: its last row is {matrix[3].tolist()}, not 0 0 0 1"
+        )
+    # Scale-free: the determinant against the product of the column lengths (Hadamard's bound)
+    columns = np.abs(matrix[:3, :3]).max(axis=0)  # first, because squares may overflow
+    if columns.all():
+        columns *= np.linalg.norm(matrix[:3, :3] / columns, axis=0)
+    if not columns.all() or abs(np.linalg.det(matrix[:3, :3] / columns)) < 1e-12:
+        raise InvalidCameraError(
+            "model_transform cannot be inverted: it flattens space "
+            f"(matrix {matrix[:3, :3].tolist()})"
+        )
+    matrix.setflags(write=False)
+    return matrix
+
+
+def _unit(vector: Matrix) -> Matrix:
+    # Scaled first: the square of a component may overflow or vanish though the vector does not
+    vector = vector / np.max(np.abs(vector))
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def _refuse_unsupported(camera: Any) -> None:
+    reasons = []
+    if tuple(camera.GetViewShear()) != (0.0, 0.0, 1.0):
+        reasons.append("a view shear (SetViewShear)")
+    if camera.GetUseExplicitProjectionTransformMatrix():
+        reasons.append("an explicit projection matrix (SetExplicitProjectionTransformMatrix)")
+    if camera.GetUseOffAxisProjection():
+        reasons.append("an off-axis projection (SetUseOffAxisProjection)")
+    if camera.GetUserViewTransform() is not None or camera.GetUserTransform() is not None:
+        reasons.append("a user transform (SetUserTransform, SetUserViewTransform)")
+    if reasons:
+        raise UnsupportedError(
+            f"the camera has {' and '.join(reasons)}, which a VDI cannot honour: remove it"
+        )

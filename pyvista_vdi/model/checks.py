@@ -1,0 +1,84 @@
+"""What callers give for numbers, as numbers: NaN or nothing where it is none.
+
+Range checks that are written so that NaN fails them then refuse it, in the words of the one who
+asked for it.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.errors import InvalidArgumentError
+
+#: Bytes in units of memory, by their names in lower case.
+_UNITS = {
+    "": 1,
+    "b": 1,
+    **{f"{prefix}b": 1000 ** (k + 1) for k, prefix in enumerate("kmgt")},
+    **{f"{prefix}ib": 1024 ** (k + 1) for k, prefix in enumerate("kmgt")},
+}
+
+
+def as_float(value: Any) -> float:
+    """Return ``value`` as a float, NaN where it is no number: range checks then refuse it."""
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
+def as_range(values: Any) -> tuple[float, float]:
+    """Return two numbers as floats, NaN where they are no numbers or not two."""
+    try:
+        low, high = values
+    except (TypeError, ValueError):
+        return math.nan, math.nan
+    return as_float(low), as_float(high)
+
+
+def as_floats(values: Any) -> NDArray[np.float64]:
+    """Return numbers as a new float64 array, of shape (0,) where they are none."""
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return np.empty(0)
+
+
+def memory_limit_bytes(memory_limit: Any) -> int | None:
+    """Return a memory limit in bytes.
+
+    Parameters
+    ----------
+    memory_limit : None, int, float or str
+        Bytes, or a text with a unit: ``"2 GiB"`` (2^30 bytes), ``"2 GB"`` (10^9), KiB to TiB.
+
+    Returns
+    -------
+    int or None
+        ``None`` where there is none.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If it is no size above 0.
+    """
+    if memory_limit is None:
+        return None
+    unit, number = 1, math.nan
+    if isinstance(memory_limit, str):
+        match = re.fullmatch(r"\s*([\d.]+)\s*([a-z]*)\s*", memory_limit.lower())
+        if match and match[2] in _UNITS:
+            unit, number = _UNITS[match[2]], as_float(match[1])
+    elif not isinstance(memory_limit, bool | np.bool_):
+        number = as_float(memory_limit)
+    if not 1 <= number * unit < 2**63:
+        raise InvalidArgumentError(
+            "memory_limit must be a number of bytes above 0, or a text such as '2 GiB' or "
+            f"'800 MB'; got {memory_limit!r}"
+        )
+    return int(number * unit)

@@ -1,0 +1,133 @@
+"""Which part of the screen's pixel grid a generating view covers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
+
+#: Most lists that a covering view may have, as a multiple of the window's pixels.
+MAX_LISTS_PER_PIXEL = 4.0
+
+#: Least depth in front of the eye at which a corner can be projected, as a share of the diagonal
+#: of all corners; below it the rectangle on the screen has no useful size.
+_NEAREST = 1e-3
+
+#: A corner this little beyond a pixel's border, in pixels, does not need another row of lists.
+_SLACK = 1e-6
+
+
+def covering_view(
+    camera: Camera,
+    window_size: Sequence[int],
+    corners: ArrayLike,
+    *,
+    max_lists_per_pixel: float = MAX_LISTS_PER_PIXEL,
+) -> tuple[Camera, tuple[int, int]] | None:
+    """Move a view's window so that it covers a volume, and nothing else.
+
+    Eye, direction and the pixels' size and borders stay as they are on the screen; the window
+    becomes the smallest rectangle of whole pixels of that (unlimited) grid which contains the
+    projected corners. So V_N = V_O hits every list on its centre ray, and neither panning nor
+    zooming out shows a cut edge.
+
+    Parameters
+    ----------
+    camera : Camera
+        The view on the screen, with the model transform in it.
+    window_size : (int, int)
+        The screen's width and height in pixels.
+    corners : array_like of float, shape (n, 3)
+        Points whose convex hull contains the volume, model frame.
+    max_lists_per_pixel : float
+        Most lists, as a multiple of the window's pixels. Where the rectangle would need more,
+        lists become larger than pixels, square as before, and their borders no longer coincide.
+
+    Returns
+    -------
+    (Camera, (int, int)) or None
+        The view with its own window centre and view angle (or parallel scale), and its window
+        size. ``None`` if a corner is behind the eye or closer than a thousandth of the corners'
+        diagonal: no window can cover them.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If the window size or the limit is out of range.
+
+    Notes
+    -----
+    With t the tangents of the half angles and c the window centre (DESIGN section 3), the pixel
+    rectangle [x0, x1) of width w in a window of width W has t' = t w / W and
+    c' t' = t (c + (x0 + x1) / W - 1); the same in y, and with s for t in parallel projection.
+    """
+    camera = Camera.from_any(camera)
+    size = np.asarray(check_window_size(window_size), dtype=np.float64)
+    if not max_lists_per_pixel > 0:
+        raise InvalidArgumentError(
+            f"max_lists_per_pixel must be positive; got {max_lists_per_pixel!r}"
+        )
+    pixels = _project(camera, window_size, np.asarray(corners, dtype=np.float64))
+    if pixels is None:
+        return None
+    low = np.floor(pixels.min(axis=0) + _SLACK)
+    high = np.maximum(np.ceil(pixels.max(axis=0) - _SLACK), low + 1)
+    low, high, lists = _limited(low, high, max_lists_per_pixel * size.prod())
+
+    half = np.asarray(camera.half_extent(window_size))
+    new_half = half * (high - low) / size
+    middle = half * (np.asarray(camera.window_center) + (low + high) / size - 1)
+    width, height = (int(n) for n in lists)
+    lens = (
+        {"parallel_scale": new_half[1]}
+        if camera.parallel_projection
+        else {
+            "view_angle": math.degrees(2 * math.atan(new_half[1])),
+            "use_horizontal_view_angle": False,
+        }
+    )
+    return camera.replace(window_center=middle / new_half, **lens), (width, height)
+
+
+#: Which of the six numbers of bounds are x, y and z of each corner, int (3, 8).
+_CORNERS = np.array(np.meshgrid([0, 1], [2, 3], [4, 5])).reshape(3, 8)
+
+
+def bounds_corners(bounds: ArrayLike) -> NDArray[np.float64]:
+    """Return the eight corners of axis-aligned bounds (x0, x1, y0, y1, z0, z1), float64 (8, 3)."""
+    return np.asarray(bounds, dtype=np.float64)[_CORNERS].T
+
+
+def _project(
+    camera: Camera, window_size: Sequence[int], corners: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Return points in pixels from the window's lower left corner, or None (see above)."""
+    points = np.column_stack([corners, np.ones(len(corners))]) @ camera.model_to_view.T
+    if not camera.parallel_projection:
+        world = corners @ camera.model_transform[:3, :3].T
+        diagonal = float(np.linalg.norm(np.ptp(world, axis=0)))
+        if points[:, 2].min() <= _NEAREST * diagonal:
+            return None
+    viewport = points @ camera.viewport_matrix(window_size).T
+    uv = viewport[:, :2] / viewport[:, 3:]
+    return (uv + 1) / 2 * np.asarray(window_size)
+
+
+def _limited(
+    low: NDArray[np.float64], high: NDArray[np.float64], most: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return a rectangle in pixels and its lists, as many as allowed, each a square."""
+    extent = high - low
+    pitch = max(1.0, math.sqrt(extent.prod() / most), extent.max() / MAX_WINDOW_EDGE)
+    while True:
+        lists = np.ceil(extent / pitch - _SLACK)
+        if lists.prod() <= most or (lists == 1).any():
+            break
+        pitch *= 1.01  # rounding up both edges may pass the limit by less than two rows
+    grown = (lists * pitch - extent) / 2
+    return low - grown, high + grown, lists

@@ -1,0 +1,216 @@
+"""Cropping as ``vtkVolumeMapper`` has it: 27 regions, each kept or not."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.errors import InvalidArgumentError
+
+#: Names of VTK's sets of regions, and their flags (VTK_CROP_SUBVOLUME ...).
+PRESETS = {
+    "subvolume": 0x0002000,
+    "fence": 0x2EBFEBA,
+    "inverted_fence": 0x5140145,
+    "cross": 0x0417410,
+    "inverted_cross": 0x7BE8BEF,
+}
+
+_N_REGIONS = 27
+
+
+@dataclass(frozen=True)
+class Cropping:
+    """Regions of the data that are drawn.
+
+    Two planes across each axis cut the data's own coordinates (the model frame) into 3 x 3 x 3
+    regions. Region (i, j, k) is kept if bit ``i + 3 j + 9 k`` of ``regions`` is set: i = 0 before
+    the first x plane, 1 between the two, 2 behind the second.
+
+    Parameters
+    ----------
+    planes : (float, float, float, float, float, float)
+        x_low, x_high, y_low, y_high, z_low, z_high, model units; infinity is allowed. Where a high
+        plane lies below its low one, nothing is between them. (VTK's GPU mapper, and a
+        ``VDIMapper`` with it, draws nothing at all then.)
+    regions : int or str
+        27 flags, or the name of one of VTK's sets: ``"subvolume"`` (the box between the planes,
+        the default), ``"fence"``, ``"inverted_fence"``, ``"cross"``, ``"inverted_cross"``.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If the planes are not six numbers, or the regions no such set.
+    """
+
+    planes: tuple[float, float, float, float, float, float]
+    regions: int = PRESETS["subvolume"]
+
+    #: Every region.
+    ALL: ClassVar[int] = 2**_N_REGIONS - 1
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "planes", _checked_planes(self.planes))
+        put(self, "regions", _checked_regions(self.regions))
+
+    @classmethod
+    def from_any(cls, cropping: Any) -> Cropping | None:
+        """Return what a user calls cropping.
+
+        Parameters
+        ----------
+        cropping : None, Cropping, vtkVolumeMapper, sequence of six numbers, or a pair
+            A mapper's own cropping, which may be off; the planes of a sub-volume; or the planes
+            and the regions.
+
+        Returns
+        -------
+        Cropping or None
+            ``None`` where nothing is cropped.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is none of these.
+        """
+        if cropping is None or isinstance(cropping, Cropping):
+            return cropping
+        if hasattr(cropping, "GetCroppingRegionFlags"):
+            if not cropping.GetCropping():
+                return None
+            return cls(cropping.GetCroppingRegionPlanes(), cropping.GetCroppingRegionFlags())
+        try:
+            parts = list(cropping)
+        except TypeError:
+            parts = [cropping]
+        return cls(*parts) if len(parts) == 2 else cls(cropping)
+
+    def keeps(self, i: int, j: int, k: int) -> bool:
+        """Whether the i-th region along x, j-th along y and k-th along z is kept."""
+        return bool(self.regions >> (i + 3 * j + 9 * k) & 1)
+
+    def parts_of_ray(
+        self, origin: NDArray[np.float64], direction: NDArray[np.float64], first: float, last: float
+    ) -> NDArray[np.float64]:
+        """Return the parts of a ray in kept regions.
+
+        Parameters
+        ----------
+        origin, direction : numpy.ndarray
+            P(t) = origin + t direction, model frame, float64 (3,).
+        first, last : float
+            Between which t to look.
+
+        Returns
+        -------
+        numpy.ndarray
+            First and last t of each part, float64 (k, 2), ascending.
+        """
+        planes = np.maximum.accumulate(np.reshape(np.asarray(self.planes), (3, 2)), axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):  # a plane that is never reached
+            t = ((planes - origin[:, None]) / direction[:, None]).ravel()
+        cuts = np.unique(np.concatenate([[first, last], t[(t > first) & (t < last)]]))
+        middles = origin + (cuts[:-1] + cuts[1:])[:, None] / 2 * direction
+        region = (middles[:, :, None] >= planes).sum(axis=2) @ (1, 3, 9)
+        keeps = (self.regions >> region & 1) == 1
+        return np.stack([cuts[:-1], cuts[1:]], axis=1)[keeps]
+
+    def within(self, bounds: Sequence[float]) -> Within:
+        """Return what is kept of a box, and how simply that can be said.
+
+        Parameters
+        ----------
+        bounds : sequence of float, shape (6,)
+            Of the data, model frame. Regions that lie outside do not count.
+        """
+        box = np.reshape(np.asarray(bounds, dtype=np.float64), (3, 2))
+        planes = np.reshape(np.asarray(self.planes), (3, 2))
+        planes = np.maximum.accumulate(planes, axis=1)  # nothing is between a low one and less
+        # Within the bounds, so that a plane far away costs float32 nothing
+        low, high = np.clip(planes, box[:, :1], box[:, 1:]).T
+        there = [
+            [i for i, some in enumerate((lo > x0, hi > lo, hi < x1)) if some]
+            for (x0, x1), lo, hi in zip(box, low, high, strict=True)
+        ]
+        regions = [region for region in itertools.product(*there) if self.keeps(*region)]
+        cuts = np.stack([low, high], axis=1)
+        if not regions:
+            return Within(cuts, np.full((3, 2), np.nan))
+        ends = np.array([(min(axis), max(axis)) for axis in zip(*regions, strict=True)])
+        covered = [[i for i in t if a <= i <= b] for t, (a, b) in zip(there, ends, strict=True)]
+        if len(regions) < len(list(itertools.product(*covered))):
+            return Within(cuts, None)
+        borders = np.stack([box[:, 0], low, high, box[:, 1]], axis=1)
+        kept = np.stack([borders[range(3), ends[:, 0]], borders[range(3), ends[:, 1] + 1]], axis=1)
+        return Within(cuts, kept)
+
+
+@dataclass(frozen=True)
+class Within:
+    """What cropping keeps of a box.
+
+    Attributes
+    ----------
+    cuts : numpy.ndarray
+        The low and the high plane of each axis, moved into the box, float64 (3, 2).
+    box : numpy.ndarray or None
+        Low and high of what is kept, where that is a box, float64 (3, 2): NaN if it is nothing.
+        ``None`` where it takes the regions to say it.
+    """
+
+    cuts: NDArray[np.float64]
+    box: NDArray[np.float64] | None
+
+
+def checked_opacity_multiplier(multiplier: Any) -> float:
+    """Return a factor of the extinction as a float, 0 or above.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If it is no finite number, or below 0.
+    """
+    try:
+        factor = float(multiplier)
+    except (TypeError, ValueError, OverflowError):
+        factor = np.nan
+    if not 0 <= factor < np.inf:
+        raise InvalidArgumentError(
+            "opacity_multiplier is a finite factor of the extinction, 0 (transparent) or above, "
+            f"1 for what was generated; got {multiplier!r}"
+        )
+    return factor
+
+
+def _checked_planes(planes: Any) -> tuple[float, ...]:
+    try:
+        values = np.asarray(planes, dtype=np.float64)
+    except (TypeError, ValueError):
+        values = np.array(np.nan)
+    if values.shape != (6,) or np.isnan(values).any():
+        raise InvalidArgumentError(
+            "cropping takes six planes, x_low, x_high, y_low, y_high, z_low, z_high in the data's "
+            f"own coordinates, or a pair of those and the regions; got {planes!r}"
+        )
+    return tuple(values.tolist())
+
+
+def _checked_regions(regions: Any) -> int:
+    if isinstance(regions, str) and regions in PRESETS:
+        return PRESETS[regions]
+    try:
+        flags = int(regions)
+    except (TypeError, ValueError):
+        flags = -1
+    if isinstance(regions, str | bool) or flags != regions or not 0 <= flags <= Cropping.ALL:
+        raise InvalidArgumentError(
+            f"the regions of cropping are 27 flags, 0 to {Cropping.ALL:#x}, or one of "
+            f"{', '.join(map(repr, PRESETS))}; got {regions!r}"
+        )
+    return flags

@@ -1,0 +1,148 @@
+"""The host's memory: how much there is, so that what cannot fit is refused; aligned arrays."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import mmap
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from pyvista_vdi.errors import DeviceMemoryError
+
+HOST_ALIGNMENT = 4096
+"""Bytes; arrays that begin at a multiple are used in place by CPU drivers instead of copied."""
+
+#: Bytes of a huge page; on other processors than x86 it is at least a whole number of pages.
+_HUGE_PAGE = 2**21
+#: Bytes from which lasting arrays have mappings of their own.
+_LARGE = 2**22
+
+
+def aligned_empty(
+    shape: int | tuple[int, ...], dtype: DTypeLike, *, lasting: bool = False
+) -> NDArray[Any]:
+    """Uninitialised C-contiguous array that a CPU device can use without a copy.
+
+    Parameters
+    ----------
+    shape : int or tuple of int
+        Shape.
+    dtype : dtype_like
+        Element type.
+    lasting : bool, default: False
+        Whether it is made seldom and kept for long, so that memory of its own pays.
+
+    Returns
+    -------
+    numpy.ndarray
+        Its data begin at a multiple of 4096 bytes.
+    """
+    dtype = np.dtype(dtype)
+    shape = (shape,) if isinstance(shape, int) else tuple(shape)
+    nbytes = math.prod(shape) * dtype.itemsize
+    if lasting and nbytes >= _LARGE and hasattr(mmap, "MADV_HUGEPAGE"):
+        raw, start = _in_huge_pages(nbytes)
+    else:
+        raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
+        start = -raw.ctypes.data % HOST_ALIGNMENT
+    return raw[start : start + nbytes].view(dtype).reshape(shape)
+
+
+def _in_huge_pages(nbytes: int) -> tuple[NDArray[np.uint8], int]:
+    """Return memory that Linux may give in huge pages, and where in it to begin; bytes.
+
+    NumPy asks for them as well, but also where it uses a part of one, which then takes all of it.
+    """
+    try:
+        memory = mmap.mmap(-1, nbytes + _HUGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    except OSError as exc:
+        raise MemoryError(f"no memory for an array of {nbytes} bytes: {exc}") from exc
+    raw = np.frombuffer(memory, np.uint8)  # holds the mapping
+    start = -raw.ctypes.data % _HUGE_PAGE
+    with contextlib.suppress(OSError):  # a kernel without them
+        memory.madvise(mmap.MADV_HUGEPAGE, start, nbytes // _HUGE_PAGE * _HUGE_PAGE)
+    return raw, start
+
+
+def physical_memory() -> int | None:
+    """Return the host's memory in bytes, or None where the system does not say."""
+    if sys.platform == "win32":
+        return _windows_memory()
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return None
+
+
+def free_memory() -> int | None:
+    """Return the bytes that can be had without swapping, or None where the system does not say."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return None
+    found = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
+    return int(found[0]) * 1024 if found else None
+
+
+def require_free_memory(nbytes: int, what: str, remedy: str) -> None:
+    """Refuse what the host cannot hold beside what is running; parameters as below.
+
+    Raises
+    ------
+    DeviceMemoryError
+        If the host has less memory in all, or less of it free.
+    """
+    require_host_memory(nbytes, what, remedy)
+    free = free_memory()
+    if free is not None and nbytes > free:
+        raise DeviceMemoryError(
+            f"{what} needs {nbytes / 2**30:.2f} GiB on the host, of which {free / 2**30:.2f} GiB "
+            f"are free: close other programs, or {remedy}"
+        )
+
+
+def require_host_memory(nbytes: int, what: str, remedy: str) -> None:
+    """Refuse what the host cannot hold.
+
+    Parameters
+    ----------
+    nbytes : int
+        Bytes that would be taken.
+    what : str
+        What needs them, and how large it is.
+    remedy : str
+        What the caller can do.
+
+    Raises
+    ------
+    DeviceMemoryError
+        If the host has less memory in all.
+    """
+    available = physical_memory()
+    if available is not None and nbytes > available:
+        raise DeviceMemoryError(
+            f"{what} needs {nbytes / 2**30:.2f} GiB on the host, which has "
+            f"{available / 2**30:.2f} GiB: {remedy}"
+        )
+
+
+def _windows_memory() -> int | None:
+    import ctypes
+
+    class _Status(ctypes.Structure):
+        _fields_ = (
+            ("dwLength", ctypes.c_ulong),
+            ("dwMemoryLoad", ctypes.c_ulong),
+            ("ullTotalPhys", ctypes.c_ulonglong),
+            ("rest", ctypes.c_ulonglong * 6),
+        )
+
+    status = _Status(dwLength=ctypes.sizeof(_Status))
+    kernel = getattr(ctypes, "windll").kernel32  # noqa: B009 (unknown to type checkers elsewhere)
+    return int(status.ullTotalPhys) if kernel.GlobalMemoryStatusEx(ctypes.byref(status)) else None

@@ -1,0 +1,240 @@
+"""Lights, and how a shaded volume reflects them: what VTK's GPU volume mapper computes.
+
+A sample's normal is the direction in which the scalar grows. What a VDI is lit by is baked into
+its colours when it is generated (docs/conventions.md, "Lighting").
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.camera import Camera
+
+Vector: TypeAlias = tuple[float, float, float]
+
+#: What a light's place is relative to.
+KINDS = ("headlight", "camera", "scene")
+
+
+@dataclass(frozen=True)
+class Shading:
+    """How a volume reflects light: a ``vtkVolumeProperty``'s coefficients and defaults.
+
+    Attributes
+    ----------
+    ambient, diffuse, specular : float
+        Coefficients, 0 or above.
+    specular_power : float
+        Exponent of the highlight, 0 or above.
+    """
+
+    ambient: float = 0.1
+    diffuse: float = 0.7
+    specular: float = 0.2
+    specular_power: float = 10.0
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = _number(item.name, getattr(self, item.name))
+            if value < 0:
+                raise InvalidArgumentError(f"{item.name} must be 0 or above; got {value}")
+            object.__setattr__(self, item.name, value)
+
+
+@dataclass(frozen=True)
+class Light:
+    """A light, as a ``vtkLight`` describes it.
+
+    Attributes
+    ----------
+    kind : {"headlight", "camera", "scene"}
+        A headlight stands at the eye; a camera light's position and focal point are relative to
+        the camera, whose eye is (0, 0, 1) and whose focal point is (0, 0, 0) there; a scene
+        light's are world coordinates.
+    position, focal_point : (float, float, float)
+        Where it is and where it shines to; without meaning for a headlight.
+    ambient, diffuse, specular : (float, float, float)
+        Colours, each multiplied by ``intensity``.
+    positional : bool
+        Whether it shines from its position, or from infinitely far in one direction.
+    attenuation : (float, float, float)
+        Of a positional light: 1 / (a + b d + c d^2) at distance d, world units.
+    cone_angle : float
+        Half angle of a positional light's cone, degrees; above 90 it shines everywhere.
+    exponent : float
+        How a cone's light falls off towards its edge.
+    intensity : float
+        Of all three colours; VTK shades by a lone headlight its own way only where this is 1.
+    """
+
+    kind: str = "headlight"
+    position: Vector = (0.0, 0.0, 1.0)
+    focal_point: Vector = (0.0, 0.0, 0.0)
+    ambient: Vector = (0.0, 0.0, 0.0)
+    diffuse: Vector = (1.0, 1.0, 1.0)
+    specular: Vector = (1.0, 1.0, 1.0)
+    positional: bool = False
+    attenuation: Vector = (1.0, 0.0, 0.0)
+    cone_angle: float = 30.0
+    exponent: float = 1.0
+    intensity: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise InvalidArgumentError(f"a light's kind must be one of {KINDS}; got {self.kind!r}")
+        put = object.__setattr__
+        vectors = ("position", "focal_point", "ambient", "diffuse", "specular", "attenuation")
+        for name in vectors:
+            put(self, name, _vector(f"a light's {name}", getattr(self, name)))
+        for name in ("cone_angle", "exponent", "intensity"):
+            put(self, name, _number(f"a light's {name}", getattr(self, name)))
+        put(self, "positional", bool(self.positional))
+        if self.kind != "headlight" and self.position == self.focal_point:
+            raise InvalidArgumentError(
+                f"a light at {self.position} has its focal point there: it shines nowhere"
+            )
+
+    @classmethod
+    def from_any(cls, light: Any) -> Light:
+        """Return a ``Light``, ``vtkLight`` or ``pyvista.Light`` as a :class:`Light`.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is none of them.
+        """
+        if isinstance(light, Light):
+            return light
+        if not hasattr(light, "GetTransformedPosition"):
+            raise InvalidArgumentError(
+                "a light must be a Light, a vtkLight or a pyvista.Light; "
+                f"got {type(light).__name__}"
+            )
+        kind = "scene"
+        if light.LightTypeIsHeadlight():
+            kind = "headlight"
+        elif light.LightTypeIsCameraLight():
+            kind = "camera"
+        follows = kind != "scene"  # its matrix is what VTK last made of the camera
+        return cls(
+            kind,
+            light.GetPosition() if follows else light.GetTransformedPosition(),
+            light.GetFocalPoint() if follows else light.GetTransformedFocalPoint(),
+            light.GetAmbientColor(),
+            light.GetDiffuseColor(),
+            light.GetSpecularColor(),
+            bool(light.GetPositional()),
+            light.GetAttenuationValues(),
+            light.GetConeAngle(),
+            light.GetExponent(),
+            light.GetIntensity(),
+        )
+
+    def in_world(self, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return position and unit direction of travel in world coordinates, float64 (3,) each."""
+        position, target = np.array(self.position), np.array(self.focal_point)
+        if self.kind == "headlight":
+            position, target = np.array(camera.position), np.array(camera.focal_point)
+        elif self.kind == "camera":
+            right, up, forward = camera.axes
+            centre = np.array(camera.focal_point)
+            distance = np.linalg.norm(centre - camera.position)
+            axes = distance * np.array([right, up, -forward])
+            position, target = centre + position @ axes, centre + target @ axes
+        direction = target - position
+        return position, direction / np.linalg.norm(direction)
+
+
+@dataclass(frozen=True)
+class Lights:
+    """What a volume is lit by.
+
+    Attributes
+    ----------
+    lights : tuple of Light
+        One headlight by default.
+    two_sided : bool
+        Whether a side that faces away from a light is lit as if it faced it (VTK's default).
+    """
+
+    lights: tuple[Light, ...] = field(default_factory=lambda: (Light(),))
+    two_sided: bool = True
+
+    @classmethod
+    def from_any(cls, lights: Any) -> Lights:
+        """Return what a user calls lights.
+
+        Parameters
+        ----------
+        lights : None, Lights, vtkRenderer, or iterable of Light or vtkLight
+            ``None`` is one headlight. Of a renderer, the lights that are switched on are taken as
+            they are now, and a headlight where none is on, which is what VTK would make.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is something else.
+        """
+        if lights is None:
+            return cls()
+        if isinstance(lights, Lights):
+            return lights
+        if hasattr(lights, "GetTwoSidedLighting"):
+            on = tuple(Light.from_any(each) for each in lights.GetLights() if each.GetSwitch())
+            if not on and lights.GetAutomaticLightCreation():
+                return cls(two_sided=bool(lights.GetTwoSidedLighting()))
+            return cls(on, bool(lights.GetTwoSidedLighting()))
+        if not isinstance(lights, Iterable) or isinstance(lights, str | Mapping):
+            raise InvalidArgumentError(
+                "lights must be Light or vtkLight objects, or the renderer whose lights are "
+                f"meant; got {type(lights).__name__}"
+            )
+        return cls(tuple(Light.from_any(light) for light in lights))
+
+    @property
+    def headlight_only(self) -> bool:
+        """Whether there is one headlight and nothing else: VTK shades this case its own way.
+
+        Of intensity 1; a dimmed one is a light like others to VTK, a positional one is not.
+        """
+        return [(light.kind, light.intensity) for light in self.lights] == [("headlight", 1.0)]
+
+    @property
+    def positional(self) -> bool:
+        """Whether any light has a position."""
+        return any(light.positional for light in self.lights)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what can be written to JSON."""
+        lights = [
+            {item.name: getattr(light, item.name) for item in fields(light)}
+            for light in self.lights
+        ]
+        return {"lights": lights, "two_sided": self.two_sided}
+
+
+def _number(name: str, value: Any) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise InvalidArgumentError(f"{name} must be a finite number; got {value!r}")
+    return number
+
+
+def _vector(name: str, value: Any) -> Vector:
+    try:
+        x, y, z = (float(v) for v in value)
+    except (TypeError, ValueError, OverflowError):
+        x = y = z = math.nan
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+        raise InvalidArgumentError(f"{name} must be three finite numbers; got {value!r}")
+    return x, y, z

@@ -1,0 +1,171 @@
+"""How far one image is from another: SSIM, PSNR, worst pixel, brightness.
+
+The definitions are those of the design's section 7, so that a figure means the same everywhere:
+RGB over a background, clipped to 0..1, not quantised.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.errors import InvalidArgumentError
+
+#: Arguments of ``skimage.metrics.structural_similarity``: Wang et al. 2004.
+SSIM_ARGUMENTS: MappingProxyType[str, Any] = MappingProxyType(
+    {
+        "data_range": 1.0,
+        "channel_axis": -1,
+        "gaussian_weights": True,
+        "sigma": 1.5,
+        "use_sample_covariance": False,
+    }
+)
+
+#: Shortest edge of an image that has an SSIM, pixels: the window, 2 round(3.5 sigma) + 1.
+SSIM_WINDOW = 11
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What :func:`compare_images` found.
+
+    Parameters
+    ----------
+    ssim : float
+        Structural similarity, 1 for equal images; NaN where an edge is below 11 pixels.
+    psnr : float
+        Peak signal to noise ratio in dB; infinite for equal images.
+    worst_pixel : float
+        Largest absolute difference of a channel, in units of 1/255.
+    worst_position : (int, int)
+        Column and row of that pixel, from the top left.
+    mean_brightness_ratio : float
+        Mean of the image's RGB over that of the reference; 1 where both are black.
+    """
+
+    ssim: float
+    psnr: float
+    worst_pixel: float
+    worst_position: tuple[int, int]
+    mean_brightness_ratio: float
+
+
+def over_background(
+    image: ArrayLike, background: Sequence[float] = (0.0, 0.0, 0.0)
+) -> NDArray[np.float64]:
+    """Blend a premultiplied image over a background.
+
+    Parameters
+    ----------
+    image : array_like of float, shape (H, W, 4) or (H, W, 3)
+        Premultiplied RGBA, or RGB, which has nothing to blend.
+    background : (float, float, float)
+        RGB, 0 to 1.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 (H, W, 3), clipped to 0..1.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If it is not such an image, or not finite.
+    """
+    pixels = np.asarray(image)
+    if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or pixels.dtype.kind != "f":
+        raise InvalidArgumentError(
+            "an image is an array of floats of shape (height, width, 4), premultiplied RGBA, or "
+            f"(height, width, 3), RGB; got {pixels.dtype} of shape {pixels.shape}"
+        )
+    if not np.isfinite(pixels).all():
+        row, column = np.argwhere(~np.isfinite(pixels).all(axis=2))[0]
+        raise InvalidArgumentError(
+            f"the image is not finite: pixel (column {column}, row {row}) is {pixels[row, column]}"
+        )
+    behind = np.asarray(background, dtype=np.float64)
+    if behind.shape != (3,) or not ((behind >= 0) & (behind <= 1)).all():
+        raise InvalidArgumentError(
+            f"background must be three numbers from 0 to 1; got {background!r}"
+        )
+    rgb = pixels[..., :3].astype(np.float64)
+    if pixels.shape[2] == 4:
+        rgb += (1.0 - pixels[..., 3:].astype(np.float64)) * behind
+    return np.clip(rgb, 0.0, 1.0)
+
+
+def compare_images(
+    image: ArrayLike, reference: ArrayLike, background: Sequence[float] = (0.0, 0.0, 0.0)
+) -> Comparison:
+    """Compare an image with a reference.
+
+    Parameters
+    ----------
+    image, reference : array_like of float, shape (H, W, 4) or (H, W, 3)
+        Premultiplied RGBA (what :func:`pyvista_vdi.render` returns) or RGB.
+    background : (float, float, float)
+        RGB that both are blended over before they are compared.
+
+    Returns
+    -------
+    Comparison
+        SSIM, PSNR, worst pixel, brightness.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If one is not an image, not finite, or their sizes differ.
+
+    References
+    ----------
+    Z. Wang, A. C. Bovik, H. R. Sheikh, E. P. Simoncelli, "Image quality assessment: from error
+    visibility to structural similarity", IEEE TIP 13(4), 2004.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pyvista_vdi import compare_images
+    >>> grey = np.full((16, 16, 3), 0.5)
+    >>> compare_images(grey + 1 / 255, grey).worst_pixel
+    1.0
+    """
+    a, b = over_background(image, background), over_background(reference, background)
+    if a.shape != b.shape:
+        raise InvalidArgumentError(
+            f"the images are of different sizes, {a.shape[1]} x {a.shape[0]} and "
+            f"{b.shape[1]} x {b.shape[0]}: render both at one size"
+        )
+    if a.size == 0:
+        raise InvalidArgumentError(f"the images are empty: their shape is {a.shape}")
+    difference = np.abs(a - b)
+    row, column, _ = np.unravel_index(int(difference.argmax()), difference.shape)
+    mean_square = float(np.mean(np.square(difference)))
+    return Comparison(
+        ssim=_ssim(a, b),
+        psnr=math.inf if mean_square == 0 else -10 * math.log10(mean_square),
+        # Rounded to a millionth of a step: what float64 leaves of a whole number of steps
+        worst_pixel=round(float(difference.max()) * 255, 6),
+        worst_position=(int(column), int(row)),
+        mean_brightness_ratio=_ratio(float(a.mean()), float(b.mean())),
+    )
+
+
+def _ssim(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    if min(a.shape[:2]) < SSIM_WINDOW:
+        return math.nan
+    from skimage.metrics import structural_similarity  # loads SciPy
+
+    return float(structural_similarity(a, b, **SSIM_ARGUMENTS))
+
+
+def _ratio(mean: float, reference: float) -> float:
+    if reference == 0:
+        return 1.0 if mean == 0 else math.inf
+    return mean / reference

@@ -1,0 +1,389 @@
+"""Packed supersegments: 16 and 8 bytes each in place of 24, in integers alone.
+
+``docs/conventions.md`` ("Packed supersegments") has the bits and what each form loses.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
+from pyvista_vdi.model.host_memory import aligned_empty
+
+if TYPE_CHECKING:
+    from pyvista_vdi.model.vdi import VDI
+
+#: What a supersegment takes: 24 bytes as it was made, or less.
+PRECISIONS = ("exact", "16-byte", "8-byte")
+
+#: Largest code of a depth in a list, 14 bits: those of ``opencl/raycasting/supersegments.cl``, as
+#: are the colours' steps and the optical depths' base.
+DEPTH_CODES = (1 << 14) - 1
+
+#: Whole steps of a VDI's depth grid that a depth is away from its origin at most. float32 holds
+#: every whole number to 2^24, and codes may be pushed by as many steps as there are codes.
+_GRID = (1 << 24) - (1 << 15)
+
+#: No step is shorter: devices may take what is nearer to 0 than float32's normal numbers for 0.
+_LEAST_STEP_EXPONENT = -126
+
+#: Supersegments that are packed or unpacked at a time: what this takes is small beside a VDI.
+_PIECE = 2**16
+
+#: Codes of optical depth: 0 is 0; from 1 on the upper half of a float32's bits, from 2^-18.
+TAU_CODES = (1 << 12) - 1
+TAU_BASE = (127 - 18) << 7
+_LEAST_TAU = np.float32(2.0**-19)
+
+#: Steps of red, green and blue, and where their bits begin.
+_COLOR_16 = ((2047, 0), (2047, 11), (1023, 22))
+_COLOR_8 = ((255, 8), (255, 16), (255, 24))
+
+
+@dataclass(frozen=True)
+class Packed16:
+    """The 16-byte form: depths and optical depths as they are, colours in 32 bits.
+
+    Parameters
+    ----------
+    color : numpy.ndarray
+        uint32 (n,): red in bits 0 to 10, green in 11 to 21, blue in 22 to 31.
+    """
+
+    color: NDArray[np.uint32]
+    precision = "16-byte"
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes beside the VDI's own arrays."""
+        return self.color.nbytes
+
+    def media(self, counts: NDArray[np.int64]) -> dict[str, NDArray[np.float32]]:
+        """Return what takes the place of the VDI's arrays: the colours."""
+        return {"color": unpacked_color(self.color, _COLOR_16)}
+
+
+@dataclass(frozen=True)
+class Packed8:
+    """The 8-byte form: codes of depth on a grid of the list's own, all else in 36 bits.
+
+    A depth is ``step * (origins[i] + code * strides[i])`` in list i, in whole numbers below 2^24
+    that float32 holds, times a power of two: exact on every device.
+
+    Parameters
+    ----------
+    step : float
+        Step of the VDI's depth grid, world units; a power of two.
+    origins : numpy.ndarray
+        int32 (W * H,): where each list's codes begin, steps; 0 for an empty list.
+    strides : numpy.ndarray
+        uint16 (W * H,): steps per code; 0 for an empty list.
+    words : numpy.ndarray
+        uint32 (n, 2): front in bits 0 to 13, back in 14 to 27, optical depth in 28 to 39, red,
+        green and blue from 40, 48 and 56 on.
+    """
+
+    step: float
+    origins: NDArray[np.int32]
+    strides: NDArray[np.uint16]
+    words: NDArray[np.uint32]
+    precision = "8-byte"
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes beside the VDI's own arrays."""
+        return self.origins.nbytes + self.strides.nbytes + self.words.nbytes
+
+    def depth_codes(
+        self, first: int = 0, last: int | None = None
+    ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+        """Return the codes of fronts and backs, uint32."""
+        low, mask = self.words[first:last, 0], np.uint32(DEPTH_CODES)
+        return np.bitwise_and(low, mask), np.bitwise_and(low >> np.uint32(14), mask)
+
+    def tau_codes(self, first: int = 0, last: int | None = None) -> NDArray[np.uint32]:
+        """Return the codes of optical depths, uint32."""
+        low, high = self.words[first:last].T
+        return np.bitwise_or(low >> np.uint32(28), (high & np.uint32(0xFF)) << np.uint32(4))
+
+    def colors(self, first: int = 0, last: int | None = None) -> NDArray[np.uint8]:
+        """Return red, green and blue, uint8 (n, 3)."""
+        words = np.ascontiguousarray(self.words[first:last, 1], "<u4")
+        return np.ascontiguousarray(words.view(np.uint8).reshape(-1, 4)[:, 1:])
+
+    def media(self, counts: NDArray[np.int64]) -> dict[str, NDArray[np.float32]]:
+        """Return front, back, color and optical_depth; ``counts`` are the lists' lengths."""
+        n = len(self.words)
+        media = {name: aligned_empty(n, np.float32) for name in ("front", "back", "optical_depth")}
+        media["color"] = aligned_empty((n, 3), np.float32)
+        for lists, part in _pieces(counts):
+            origins = np.repeat(self.origins[lists], counts[lists])
+            strides = np.repeat(self.strides[lists].astype(np.int32), counts[lists])
+            faces = self.depth_codes(part.start, part.stop)
+            for name, codes in zip(("front", "back"), faces, strict=True):
+                whole = (origins + codes.view(np.int32) * strides).astype(np.float32)
+                media[name][part] = whole * np.float32(self.step)
+            tau = self.tau_codes(part.start, part.stop)
+            bits = np.where(tau > 0, tau + np.uint32(TAU_BASE - 1) << np.uint32(16), 0)
+            media["optical_depth"][part] = bits.astype(np.uint32).view(np.float32)
+            media["color"][part] = unpacked_color(self.words[part, 1], _COLOR_8)
+        return media
+
+    @classmethod
+    def of_codes(
+        cls,
+        step: float,
+        origins: NDArray[np.int32],
+        strides: NDArray[np.uint16],
+        front: NDArray[np.uint32],
+        back: NDArray[np.uint32],
+        tau: NDArray[np.uint32],
+        color: NDArray[np.uint32],
+    ) -> Packed8:
+        """Put codes together; ``color`` has red, green and blue in bits 8 to 31."""
+        return cls(step, origins, strides, _words(front, back, tau, color))
+
+
+Packing = Packed16 | Packed8
+
+
+def check_precision(precision: object) -> str:
+    """Return one of :data:`PRECISIONS`, or raise InvalidArgumentError."""
+    if precision not in PRECISIONS:
+        raise InvalidArgumentError(
+            f"precision must be one of {', '.join(PRECISIONS[:-1])} and {PRECISIONS[-1]}; "
+            f"got {precision!r}"
+        )
+    return str(precision)
+
+
+def packing_of(vdi: VDI, precision: str) -> Packing:
+    """Return a VDI's supersegments in a packed form.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If a list is too long for the 8-byte form.
+    """
+    if precision == "16-byte":
+        return Packed16(packed_color(vdi.color, _COLOR_16))
+    counts = vdi.counts.reshape(-1)
+    if counts.max() > DEPTH_CODES:
+        raise InvalidArgumentError(
+            f"a list of {counts.max()} supersegments cannot be packed into 8 bytes each: at most "
+            f"{DEPTH_CODES} have depths of their own; use the precision '16-byte'"
+        )
+    origins, strides = np.zeros(len(counts), np.int32), np.zeros(len(counts), np.uint16)
+    words = np.empty((vdi.n_supersegments, 2), np.uint32)
+    step = _grid_step(vdi)
+    for lists, part in _pieces(counts):
+        origins[lists], strides[lists], front, back = _depths(vdi, step, counts[lists], part)
+        tau, color = _tau_codes(vdi.optical_depth[part]), packed_color(vdi.color[part], _COLOR_8)
+        words[part] = _words(front, back, tau, color)
+    return Packed8(step, origins, strides, words)
+
+
+def _pieces(counts: NDArray[np.int64]) -> Iterator[tuple[slice, slice]]:
+    """Lists one after the other and their supersegments, in pieces of about :data:`_PIECE`."""
+    ends = np.cumsum(counts)
+    first_list = first = 0
+    while first_list < len(counts):
+        last_list = max(int(np.searchsorted(ends, first + _PIECE, side="right")), first_list + 1)
+        last = int(ends[last_list - 1])
+        yield slice(first_list, last_list), slice(first, last)
+        first_list, first = last_list, last
+
+
+def _words(
+    front: NDArray[np.uint32],
+    back: NDArray[np.uint32],
+    tau: NDArray[np.uint32],
+    color: NDArray[np.uint32],
+) -> NDArray[np.uint32]:
+    """Return the two words of each supersegment, see :class:`Packed8`."""
+    words = np.empty((len(front), 2), np.uint32)
+    words[:, 0] = front | back << np.uint32(14) | tau << np.uint32(28)
+    words[:, 1] = tau >> np.uint32(4) | color
+    return words
+
+
+def packed_color(
+    color: NDArray[np.float32], channels: tuple[tuple[int, int], ...]
+) -> NDArray[np.uint32]:
+    """Return straight RGB, float32 (n, 3), in whole steps; uint32 (n,)."""
+    packed = aligned_empty(len(color), np.uint32)
+    packed[...] = 0
+    for channel, (steps, first_bit) in enumerate(channels):
+        code = np.rint(color[:, channel] * np.float32(steps)).astype(np.uint32)
+        packed |= code << np.uint32(first_bit)
+    return packed
+
+
+def unpacked_color(
+    packed: NDArray[np.uint32], channels: tuple[tuple[int, int], ...]
+) -> NDArray[np.float32]:
+    """Return straight RGB, float32 (n, 3); one multiplication, which every device rounds alike."""
+    color = aligned_empty((len(packed), 3), np.float32)
+    for channel, (steps, first_bit) in enumerate(channels):
+        code = packed >> np.uint32(first_bit) & np.uint32(steps)
+        color[:, channel] = code.astype(np.float32) * (np.float32(1) / np.float32(steps))
+    return color
+
+
+def _tau_codes(tau: NDArray[np.float32]) -> NDArray[np.uint32]:
+    """Round optical depths to eight significant bits, ties to even, between 2^-18 and 16256."""
+    bits = tau.view(np.uint32).astype(np.int64)
+    upper = (bits + 0x7FFF + (bits >> 16 & 1)) >> 16
+    codes = np.clip(upper - TAU_BASE + 1, 1, TAU_CODES)
+    return np.where(tau < _LEAST_TAU, 0, codes).astype(np.uint32)
+
+
+def _depths(
+    vdi: VDI, step: float, counts: NDArray[np.int64], part: slice
+) -> tuple[NDArray[np.int32], NDArray[np.uint16], NDArray[np.uint32], NDArray[np.uint32]]:
+    """Return some lists' origins, strides and codes of fronts and backs.
+
+    ``counts`` are their lengths, and ``part`` their supersegments.
+    """
+    origins, strides = np.zeros(len(counts), np.int32), np.zeros(len(counts), np.uint16)
+    occupied = np.flatnonzero(counts)
+    lengths = counts[occupied]
+    first = np.cumsum(lengths) - lengths
+    # Whole steps, exactly: a division by a power of two
+    faces = np.stack([vdi.front[part], vdi.back[part]], axis=1).astype(np.float64) / step
+    if not vdi.camera.parallel_projection:
+        # What is in front of the eye stays there
+        np.maximum(faces, np.ceil(max(-vdi.depth_origin / step, -(2.0**30))), out=faces)
+    origin = np.rint(faces[first, 0])
+    span = np.rint(faces[first + lengths - 1, 1]) - origin
+    stride = np.maximum(1, np.ceil(span / DEPTH_CODES))
+    origins[occupied], strides[occupied] = origin, stride
+    own = np.repeat(np.arange(len(occupied)), lengths)
+    codes = np.rint((faces - origin[own, np.newaxis]) / stride[own, np.newaxis]).astype(np.int64)
+    codes = _kept_apart(np.maximum(codes, 0), own, first, lengths)
+    front, back = codes.astype(np.uint32).T
+    return origins, strides, front, back
+
+
+def _grid_step(vdi: VDI) -> float:
+    """Return the shortest power of two of which at most :data:`_GRID` reach every depth."""
+    if vdi.n_supersegments == 0:
+        return 1.0
+    farthest = max(-float(vdi.front.min()), float(vdi.back.max()))
+    exponent = math.frexp(farthest / _GRID)[1]  # farthest / _GRID < 2^exponent
+    if farthest / 2.0 ** (exponent - 1) <= _GRID:
+        exponent -= 1
+    return 2.0 ** max(exponent, _LEAST_STEP_EXPONENT)
+
+
+def _kept_apart(
+    codes: NDArray[np.int64],
+    own: NDArray[np.int64],
+    first: NDArray[np.int64],
+    lengths: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """Return codes, (n, 2), such that every back exceeds its front by at least 1.
+
+    Rounding keeps faces in order; what it made equal is moved behind, and where no codes are left
+    behind, before. ``own`` is each supersegment's list among those that are not empty.
+    """
+    # Less the thicknesses that must lie before it, a face may equal the one before it
+    within = np.arange(len(codes)) - first[own]
+    needed = np.stack([within, within + 1], axis=1)
+    slack = codes - needed
+    apart = own[:, np.newaxis] << 20  # no list's maximum reaches the next list
+    running = np.maximum.accumulate((slack + apart).reshape(-1)).reshape(-1, 2) - apart
+    most = DEPTH_CODES - lengths[own]
+    return np.minimum(running, most[:, np.newaxis]) + needed
+
+
+def gaps_and_thicknesses(
+    packed: Packed8, offsets: NDArray[np.uint64], first: int, last: int
+) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
+    """Return how far each front is behind the back before it, and each back behind its front.
+
+    In codes, of the supersegments ``first:last``. The first gap of a list is 0, as its code is;
+    that of ``first`` is its front's code.
+    """
+    front, back = packed.depth_codes(first, last)
+    gaps = front.copy()
+    gaps[1:] -= back[:-1]
+    begin, end = np.searchsorted(offsets, [first, last])
+    gaps[offsets[begin:end].astype(np.int64) - first] = 0
+    return gaps.astype(np.uint16), (back - front).astype(np.uint16)
+
+
+def packed_8(
+    step: float,
+    offsets: NDArray[np.uint64],
+    stored: Mapping[str, NDArray[Any]],
+    chunk_rows: int,
+) -> Packed8:
+    """Return the 8-byte form of what a file holds, checked.
+
+    Parameters
+    ----------
+    step : float
+        Of the depth grid.
+    offsets : numpy.ndarray
+        The lists'.
+    stored : mapping
+        ``origin``, ``stride``, ``front`` and ``back`` as :func:`gaps_and_thicknesses` gives them
+        for every ``chunk_rows`` supersegments, ``color`` and ``optical_depth``.
+    chunk_rows : int
+        See above.
+
+    Raises
+    ------
+    InvalidVDIError
+        If packing gives no such codes.
+    """
+    if (offsets[1:] < offsets[:-1]).any():
+        raise InvalidVDIError("offsets must not decrease")
+    counts = np.diff(offsets).astype(np.int64)
+    _check_grid(step, stored["origin"], stored["stride"], counts)
+    gaps, thicknesses = stored["front"].astype(np.int64), stored["back"].astype(np.int64)
+    tau = stored["optical_depth"].astype(np.uint32)
+    # Codes begin anew with every list and every chunk
+    n = len(gaps)
+    begins = np.zeros(n, bool)
+    begins[offsets[:-1][counts > 0].astype(np.int64)] = True
+    begins[::chunk_rows] = True
+    runs = np.cumsum(gaps + thicknesses)
+    starts = np.flatnonzero(begins)
+    before = runs[starts] - gaps[starts] - thicknesses[starts]
+    back = runs - np.repeat(before, np.diff(np.append(starts, n)))
+    if n and not (thicknesses.min() > 0 and back.max() <= DEPTH_CODES and tau.max() <= TAU_CODES):
+        raise InvalidVDIError("a supersegment has no thickness, or a code beyond its largest")
+    color = np.zeros((n, 4), np.uint8)
+    color[:, 1:] = stored["color"]
+    return Packed8.of_codes(
+        step,
+        stored["origin"].astype(np.int32, copy=False),
+        stored["stride"].astype(np.uint16, copy=False),
+        (back - thicknesses).astype(np.uint32),
+        back.astype(np.uint32),
+        tau,
+        color.view("<u4").reshape(-1).astype(np.uint32, copy=False),
+    )
+
+
+def _check_grid(
+    step: float, origins: NDArray[Any], strides: NDArray[Any], counts: NDArray[np.int64]
+) -> None:
+    mantissa, exponent = math.frexp(step)
+    if not (mantissa == 0.5 and _LEAST_STEP_EXPONENT < exponent <= 105):
+        raise InvalidVDIError(f"the step of depths must be a power of two; got {step}")
+    first = origins.astype(np.int64)
+    last = first + strides.astype(np.int64) * DEPTH_CODES
+    if (np.abs(first) > _GRID).any() or (last > _GRID + DEPTH_CODES + 1).any():
+        raise InvalidVDIError("a list's depths lie beyond the VDI's grid")
+    occupied = counts > 0
+    if ((strides > 0) != occupied).any() or origins[~occupied].any():
+        raise InvalidVDIError("the lists with a stride are not those with supersegments")

@@ -1,0 +1,114 @@
+"""The standard cases: transfer functions and views that give a measured figure the same meaning.
+
+They are those of the design's section 7. Everything that measures (``pyvista-vdi compare``,
+tests, benchmarks) takes them from here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.camera import Camera, check_window_size
+
+#: Transfer functions by name, as arguments of ``Plotter.add_volume``; the rest is default.
+TRANSFER_FUNCTIONS: MappingProxyType[str, MappingProxyType[str, Any]] = MappingProxyType(
+    {
+        "soft": MappingProxyType({"cmap": "bone", "opacity": "linear"}),
+        "steep": MappingProxyType({"cmap": "viridis", "opacity": "sigmoid_10"}),
+        "nearly-opaque": MappingProxyType(
+            {"cmap": "inferno", "opacity": (0.0, 0.0, 0.02, 0.9, 1.0)}
+        ),
+    }
+)
+
+#: Angles from V_O at which a VDI is judged, degrees of ``Azimuth`` about the centre.
+ANGLES: tuple[float, ...] = (0.0, 5.0, 30.0)
+
+#: Elevation of V_O above the horizontal plane through the centre, degrees.
+ELEVATION = 20.0
+
+#: Vertical opening angle of V_O, degrees.
+VIEW_ANGLE = 30.0
+
+#: The window of the paper's smaller cases, pixels.
+WINDOW_SIZE: tuple[int, int] = (1280, 720)
+
+#: Distance kept between the outermost corner and the viewport's edge, in half viewports: below a
+#: tenth of a pixel at any usual size, far above rounding.
+_MARGIN = 1e-4
+
+
+def filling_camera(
+    bounds: ArrayLike,
+    window_size: Sequence[int],
+    azimuth: float = 0.0,
+    elevation: float = ELEVATION,
+    view_angle: float = VIEW_ANGLE,
+) -> Camera:
+    """Return the view that a box just fills.
+
+    The eye looks at the centre of the bounds; z is up, and at azimuth 0 the eye is on the -y
+    side. The distance is the smallest at which all eight corners lie inside the viewport.
+
+    Parameters
+    ----------
+    bounds : array_like of float, shape (6,)
+        x0, x1, y0, y1, z0, z1; world units.
+    window_size : (int, int)
+        Width and height in pixels.
+    azimuth : float
+        Angle about the z axis, degrees, counter-clockwise seen from above (VTK's ``Azimuth``).
+    elevation : float
+        Angle above the horizontal plane, degrees, between -90 and 90, both excluded.
+    view_angle : float
+        Full vertical opening angle, degrees.
+
+    Returns
+    -------
+    Camera
+        Perspective view with ``view_up`` (0, 0, 1), so that ``camera.azimuth(5)`` is the view
+        that the design calls "5 degrees from V_O".
+
+    Raises
+    ------
+    InvalidArgumentError
+        If the bounds are not finite, enclose nothing, or the elevation looks along the z axis.
+    """
+    width, height = check_window_size(window_size)
+    box = np.asarray(bounds, dtype=np.float64)
+    if box.shape != (6,) or not np.isfinite(box).all() or (box[1::2] < box[::2]).any():
+        raise InvalidArgumentError(
+            f"bounds must be six finite numbers x0 <= x1, y0 <= y1, z0 <= z1; got {bounds!r}"
+        )
+    if not np.any(box[1::2] > box[::2]):
+        raise InvalidArgumentError(f"the bounds {box.tolist()} are a point: nothing fills a view")
+    if not abs(elevation) < 90:
+        raise InvalidArgumentError(
+            f"elevation must lie between -90 and 90 degrees, both excluded; got {elevation!r}"
+        )
+    if not 0 < view_angle < 180:
+        raise InvalidArgumentError(
+            f"view_angle must lie between 0 and 180 degrees, both excluded; got {view_angle!r}"
+        )
+    centre = (box[::2] + box[1::2]) / 2
+    turn, lift = math.radians(azimuth), math.radians(elevation)
+    to_eye = np.array(
+        [math.sin(turn) * math.cos(lift), -math.cos(turn) * math.cos(lift), math.sin(lift)]
+    )
+    towards = Camera(centre + to_eye, centre, (0, 0, 1), view_angle=view_angle)
+
+    # A corner at (x, y, z) from the centre in view axes is inside at distance d of the eye if
+    # |x| <= t_x (d + z) and |y| <= t_y (d + z)
+    half = (box[1::2] - box[::2]) / 2
+    signs = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)]) * 2 - 1
+    x, y, z = towards.axes @ (signs * half).T
+    t_x, t_y = (t * (1 - _MARGIN) for t in towards.half_extent((width, height)))
+    distance = float(np.max(np.maximum(np.abs(x) / t_x, np.abs(y) / t_y) - z))
+    return towards.replace(position=centre + to_eye * distance)

@@ -1,0 +1,327 @@
+"""The Volumetric Depth Image: its arrays and their rules (DESIGN section 2)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.errors import InvalidVDIError
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.packing import Packing, check_precision, packing_of
+
+if TYPE_CHECKING:
+    import os
+
+
+class VDI:
+    """A view-dependent, piecewise constant stand-in for a classified volume.
+
+    Pixel (x, y) of the generating view V_O, y = 0 at the bottom, owns list ``i = y * W + x``: the
+    supersegments ``offsets[i]:offsets[i + 1]``, sorted by depth and disjoint. Each is a
+    homogeneous medium between two depths. A VDI is valid or cannot be built, and its arrays are
+    read-only.
+
+    Parameters
+    ----------
+    camera : Camera
+        The generating view V_O, with the model transform in it.
+    window_size : (int, int)
+        W and H: lists along each edge of the viewport.
+    offsets : array_like of uint64, shape (W * H + 1,)
+        Where each list begins; the last entry is the number n of supersegments.
+    front, back : array_like of float32, shape (n,)
+        View depth of the two faces less ``depth_origin``, world units; ``front < back``.
+    color : array_like of float32, shape (n, 3)
+        Straight RGB, 0 to 1.
+    optical_depth : array_like of float32, shape (n,)
+        tau >= 0 from front to back along the list's centre ray.
+    bounds : array_like of float, shape (6,)
+        Axis-aligned bounds (x0, x1, y0, y1, z0, z1) of what it was made from, in the model frame;
+        medium outside contributes nothing.
+    depth_origin : float
+        World units, float64; added to every front and back.
+    metadata : mapping, optional
+        What made it; values that JSON can hold.
+
+    Raises
+    ------
+    InvalidVDIError
+        If an element breaks a rule; the message names the element and the rule.
+    """
+
+    camera: Camera
+    window_size: tuple[int, int]
+    offsets: NDArray[np.uint64]
+    front: NDArray[np.float32]
+    back: NDArray[np.float32]
+    color: NDArray[np.float32]
+    optical_depth: NDArray[np.float32]
+    bounds: tuple[float, float, float, float, float, float]
+    depth_origin: float
+    metadata: dict[str, Any]
+    #: The packed form of the arrays, not public; ``None`` where they are exact.
+    packing: Packing | None
+
+    def __init__(
+        self,
+        camera: Camera,
+        window_size: Sequence[int],
+        offsets: ArrayLike,
+        front: ArrayLike,
+        back: ArrayLike,
+        color: ArrayLike,
+        optical_depth: ArrayLike,
+        bounds: ArrayLike,
+        *,
+        depth_origin: float = 0.0,
+        metadata: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.camera = Camera.from_any(camera)
+        self.window_size = check_window_size(window_size)
+        self.depth_origin = _checked_depth_origin(depth_origin)
+        self.metadata = _checked_metadata(metadata)
+        self.offsets = _array("offsets", offsets, np.uint64, ())
+        self.front = _array("front", front, np.float32, ())
+        self.back = _array("back", back, np.float32, ())
+        self.color = _array("color", color, np.float32, (3,))
+        self.optical_depth = _array("optical_depth", optical_depth, np.float32, ())
+        self.bounds = _checked_bounds(bounds)
+        self.packing = None
+        self._check_lists()
+        self._check_media()
+
+    # -- what is in it ---------------------------------------------------------------------------
+
+    @property
+    def n_supersegments(self) -> int:
+        """Number of supersegments in all lists."""
+        return len(self.front)
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Supersegments per list, int64 (H, W), bottom row first."""
+        width, height = self.window_size
+        starts = self.offsets.view(np.int64)
+        counts = starts[1:] - starts[:-1]
+        return counts.reshape(height, width)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays in memory, with those of the packed form where there is one."""
+        arrays = (self.offsets, self.front, self.back, self.color, self.optical_depth)
+        packed = 0 if self.packing is None else self.packing.nbytes
+        return sum(array.nbytes for array in arrays) + packed
+
+    @property
+    def precision(self) -> str:
+        """What a supersegment takes on a device and in a file: see :meth:`with_precision`."""
+        return "exact" if self.packing is None else self.packing.precision
+
+    def list_at(self, x: int, y: int) -> slice:
+        """Return the supersegments of pixel (x, y), y = 0 at the bottom, as a slice."""
+        width, height = self.window_size
+        if not (0 <= x < width and 0 <= y < height):
+            raise IndexError(f"pixel ({x}, {y}) is outside the window of {width} x {height}")
+        i = y * width + x
+        return slice(int(self.offsets[i]), int(self.offsets[i + 1]))
+
+    def equals(self, other: VDI) -> bool:
+        """Whether all arrays, the view and the bounds are the same to the last bit."""
+        names = ("offsets", "front", "back", "color", "optical_depth")
+        return (
+            self.camera == other.camera
+            and self.window_size == other.window_size
+            and self.bounds == other.bounds
+            and self.depth_origin == other.depth_origin
+            and all(np.array_equal(getattr(self, n), getattr(other, n)) for n in names)
+        )
+
+    # -- precision -------------------------------------------------------------------------------
+
+    def with_precision(self, precision: str) -> VDI:
+        """Return the VDI with supersegments of fewer bytes, on devices and in ``.vdi`` files.
+
+        Its arrays, float32 as ever, hold what the packed form gives back, so that whatever reads
+        them sees what is drawn. docs/conventions.md ("Packed supersegments") has the bounds.
+
+        Parameters
+        ----------
+        precision : {"exact", "16-byte", "8-byte"}
+            ``"exact"``: 24 bytes, whatever float32 holds; from a packed VDI, its values.
+            ``"16-byte"``: colours in steps of 1/2047, blue of 1/1023; all else exact.
+            ``"8-byte"``: depths in 14 bits of the list's extent, optical depth with 8 significant
+            bits, colours in steps of 1/255.
+
+        Returns
+        -------
+        VDI
+            Itself where it has that precision.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If there is no such precision, or a list is too long for 8 bytes (above 16383).
+        """
+        if check_precision(precision) == self.precision:
+            return self
+        if precision == "exact":
+            return self._with_media(None, {})
+        packing = packing_of(self, precision)
+        return self._with_media(packing, packing.media(self.counts.reshape(-1)))
+
+    def _with_media(self, packing: Packing | None, media: Mapping[str, Any]) -> VDI:
+        vdi = VDI(
+            self.camera,
+            self.window_size,
+            self.offsets,
+            media.get("front", self.front),
+            media.get("back", self.back),
+            media.get("color", self.color),
+            media.get("optical_depth", self.optical_depth),
+            self.bounds,
+            depth_origin=self.depth_origin,
+            metadata=self.metadata,
+        )
+        vdi.packing = packing
+        return vdi
+
+    # -- files -----------------------------------------------------------------------------------
+
+    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a ``.vdi``, ``.exr`` or ``.vti`` file that :func:`pyvista_vdi.read` opens.
+
+        The options are those of :func:`pyvista_vdi.io.write`.
+        """
+        from pyvista_vdi.io import (
+            write,  # the file format's libraries are loaded only where a file is made
+        )
+
+        return write(self, path, **options)
+
+    def __repr__(self) -> str:
+        width, height = self.window_size
+        occupied = int(np.count_nonzero(np.diff(self.offsets)))
+        return (
+            f"VDI({width} x {height} lists, {occupied} not empty, "
+            f"{self.n_supersegments} supersegments, {self.nbytes / 2**20:.1f} MiB)"
+        )
+
+    # -- rules -----------------------------------------------------------------------------------
+
+    def _check_lists(self) -> None:
+        width, height = self.window_size
+        n_lists, n = width * height, len(self.front)
+        if len(self.offsets) != n_lists + 1:
+            raise InvalidVDIError(
+                f"offsets must have W * H + 1 = {n_lists + 1} entries for {width} x {height} "
+                f"lists; got {len(self.offsets)}"
+            )
+        if self.offsets[0] != 0:
+            raise InvalidVDIError(f"offsets[0] must be 0; got {self.offsets[0]}")
+        falls = self.offsets[1:] < self.offsets[:-1]
+        if falls.any():
+            i = int(np.argmax(falls))
+            raise InvalidVDIError(
+                f"offsets must not decrease; offsets[{i}] = {self.offsets[i]} is followed by "
+                f"{self.offsets[i + 1]}"
+            )
+        for name in ("front", "back", "color", "optical_depth"):
+            if len(getattr(self, name)) != n or self.offsets[-1] != n:
+                raise InvalidVDIError(
+                    f"offsets[-1] = {self.offsets[-1]} supersegments, but front has {n} and "
+                    f"{name} has {len(getattr(self, name))} entries"
+                )
+
+    def _check_media(self) -> None:
+        if len(self.front) == 0:
+            return
+        front, back, color, tau = self.front, self.back, self.color, self.optical_depth
+        # Extremes need no array in between. Comparisons are written so that NaN fails each
+        if not (-np.inf < front.min() and back.max() < np.inf):
+            self._require(np.isfinite(front) & np.isfinite(back), "front and back finite")
+        self._require(front < back, "front < back")
+        if not (color.min() >= 0 and color.max() <= 1):
+            inside = (color >= 0) & (color <= 1)
+            self._require(inside[:, 0] & inside[:, 1] & inside[:, 2], "0 <= color <= 1")
+        if not (tau.min() >= 0 and tau.max() < np.inf):
+            self._require((tau >= 0) & np.isfinite(tau), "optical_depth >= 0 and finite")
+        # Exact comparison: depth in front of the eye is front + depth_origin > 0
+        nearest = np.float64(-self.depth_origin)
+        if not self.camera.parallel_projection and not front.min() >= nearest:
+            self._require(front >= nearest, "in front of the eye (depth >= 0)")
+        ordered = np.ones(len(front), dtype=bool)
+        np.less_equal(back[:-1], front[1:], out=ordered[1:])
+        # None is before a list's first. As int64, which NumPy takes as indices without a copy
+        starts = self.offsets[:-1].view(np.int64)
+        ordered[starts[: np.searchsorted(starts, len(front))]] = True
+        self._require(ordered, "sorted within its list and not overlapping")
+
+    def _require(self, good: NDArray[np.bool_], rule: str) -> None:
+        if good.all():
+            return
+        k = int(np.argmin(good))
+        i = int(np.searchsorted(self.offsets, k, side="right")) - 1
+        width = self.window_size[0]
+        raise InvalidVDIError(
+            f"supersegment {k} (list {i}: pixel x={i % width}, y={i // width}) breaks the rule "
+            f"'{rule}': front {self.front[k]}, back {self.back[k]}, color {self.color[k]}, "
+            f"optical_depth {self.optical_depth[k]}, depth_origin {self.depth_origin}"
+        )
+
+
+def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> NDArray[Any]:
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError) as error:  # lists of different lengths
+        raise InvalidVDIError(f"{name} must be an array of numbers: {error}") from error
+    if array.dtype.kind not in "uif":
+        if array.size:
+            raise InvalidVDIError(f"{name} must be numbers; got {array.dtype}")
+        array = np.zeros(array.shape, dtype)
+    counts = dtype is np.uint64 and array.size > 0
+    if counts and (array.dtype.kind == "f" or array.min() < 0):
+        raise InvalidVDIError(f"{name} must be whole numbers >= 0; got {array.dtype}")
+    with np.errstate(over="ignore"):  # infinite then: a rule refuses it, and says where
+        array = np.ascontiguousarray(array, dtype=dtype)
+    if array.size == 0 and item:
+        array = array.reshape((0, *item))
+    if array.ndim != 1 + len(item) or array.shape[1:] != item:
+        wanted = f"(n, {item[0]})" if item else "(n,)"
+        raise InvalidVDIError(f"{name} must have shape {wanted}; got {array.shape}")
+    view = array.view()  # the caller's own array stays writable
+    view.setflags(write=False)
+    return view
+
+
+def _checked_depth_origin(depth_origin: Any) -> float:
+    try:
+        origin = float(depth_origin)
+    except (TypeError, ValueError, OverflowError):
+        origin = math.nan
+    if not math.isfinite(origin):
+        raise InvalidVDIError(f"depth_origin must be finite; got {depth_origin!r}")
+    return origin
+
+
+def _checked_metadata(metadata: Any) -> dict[str, Any]:
+    if not isinstance(metadata, Mapping | None):
+        raise InvalidVDIError(f"metadata must be a dictionary; got {type(metadata).__name__}")
+    return dict(metadata or {})
+
+
+def _checked_bounds(bounds: ArrayLike) -> tuple[float, float, float, float, float, float]:
+    try:
+        box = np.asarray(bounds, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        box = np.empty(0)
+    if box.shape != (6,) or not np.isfinite(box).all() or (box[::2] > box[1::2]).any():
+        raise InvalidVDIError(
+            f"bounds must be six finite numbers x0 <= x1, y0 <= y1, z0 <= z1; got {bounds!r}"
+        )
+    x0, x1, y0, y1, z0, z1 = box.tolist()
+    return x0, x1, y0, y1, z0, z1

@@ -1,0 +1,212 @@
+"""A scalar volume on a uniform grid: samples, spacing, origin, direction."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.errors import InvalidVolumeError
+from pyvista_vdi.model.checks import as_floats
+
+#: Voxel types that the kernels read as they are.
+VOXEL_TYPES: tuple[str, ...] = (
+    "uint8",
+    "int8",
+    "uint16",
+    "int16",
+    "uint32",
+    "int32",
+    "float32",
+    "float64",
+)
+
+#: Types that one of those represents without loss for every value they can hold.
+_WIDENED = {"bool": "uint8", "float16": "float32"}
+
+
+class Volume:
+    """Scalars, or colours with opacity, at the points of a uniform grid.
+
+    The grid's model coordinates are ``origin + direction @ (spacing * (x, y, z))`` for the point
+    with index ``array[z, y, x]``, as in ``vtkImageData``. The array is not copied where it is
+    already contiguous, native and of a supported type; do not change it while it is in use.
+
+    Parameters
+    ----------
+    array : array_like, shape (nz, ny, nx) or (nz, ny, nx, 4)
+        The scalars: uint8, int8, uint16, int16, uint32, int32, float32 or float64 (bool and
+        float16 are widened; 64-bit integers become float64 when that is exact). Or straight RGBA,
+        uint8, whose fourth component is the scalar. At least two points along each axis.
+    spacing : array_like of float, shape (3,)
+        Distance between neighbouring points along x, y, z; model units, positive.
+    origin : array_like of float, shape (3,)
+        Model coordinates of ``array[0, 0, 0]``.
+    direction : array_like of float, shape (3, 3), optional
+        Columns are the directions of the x, y and z index axes; identity by default.
+    name : str
+        What the scalars are called.
+
+    Raises
+    ------
+    InvalidVolumeError
+        If the array has another shape, is empty, only one point thick or of another type, or
+        the grid is not finite, positive and invertible.
+    """
+
+    array: NDArray[np.generic]
+    spacing: tuple[float, float, float]
+    origin: tuple[float, float, float]
+    direction: NDArray[np.float64]
+    name: str
+
+    def __init__(
+        self,
+        array: ArrayLike,
+        spacing: ArrayLike = (1.0, 1.0, 1.0),
+        origin: ArrayLike = (0.0, 0.0, 0.0),
+        direction: ArrayLike | None = None,
+        *,
+        name: str = "values",
+    ) -> None:
+        self.array = _checked_array(array)
+        self.spacing = _checked_vector("spacing", spacing)
+        self.origin = _checked_vector("origin", origin)
+        self.direction = _checked_direction(direction)
+        self.name = str(name)
+        if min(self.spacing) <= 0:
+            raise InvalidVolumeError(
+                f"spacing must be positive along each axis; got {self.spacing}: "
+                "flip the array (or the direction matrix) instead of a negative spacing"
+            )
+
+    @property
+    def dimensions(self) -> tuple[int, int, int]:
+        """Number of points along x, y and z."""
+        nz, ny, nx = self.array.shape[:3]
+        return nx, ny, nz
+
+    @property
+    def rgba(self) -> bool:
+        """Whether every point has a colour of its own; the scalar is the fourth component then."""
+        return self.array.ndim == 4
+
+    @property
+    def scalars(self) -> NDArray[np.generic]:
+        """What opacity depends on, (nz, ny, nx)."""
+        return self.array[..., 3] if self.rgba else self.array
+
+    @property
+    def index_to_model(self) -> NDArray[np.float64]:
+        """Point index (x, y, z) to model coordinates, float64 (4, 4)."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.direction * np.asarray(self.spacing)
+        matrix[:3, 3] = self.origin
+        return matrix
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float, float, float]:
+        """Axis-aligned bounds in the model frame: x0, x1, y0, y1, z0, z1; model units."""
+        axes = self.index_to_model[:3, :3] * (np.asarray(self.dimensions) - 1)
+        low = np.asarray(self.origin) + np.minimum(axes, 0).sum(axis=1)
+        high = np.asarray(self.origin) + np.maximum(axes, 0).sum(axis=1)
+        x, y, z = zip(low.tolist(), high.tolist(), strict=True)
+        return (*x, *y, *z)
+
+    @property
+    def length(self) -> float:
+        """Diagonal of :attr:`bounds`, model units (``pyvista.DataSet.length``)."""
+        x0, x1, y0, y1, z0, z1 = self.bounds
+        return float(np.linalg.norm([x1 - x0, y1 - y0, z1 - z0]))
+
+    @property
+    def default_unit_distance(self) -> float:
+        """The opacity unit distance that ``Plotter.add_volume`` takes by default, model units."""
+        return self.length / (float(np.mean(self.dimensions)) - 1)
+
+    def finite_range(self) -> tuple[float, float]:
+        """Return the smallest and the largest scalar, NaN left out.
+
+        Raises
+        ------
+        InvalidVolumeError
+            If every value is NaN.
+        """
+        if self.array.dtype.kind != "f":
+            return float(self.scalars.min()), float(self.scalars.max())
+        low = float(np.fmin.reduce(self.array, axis=None))
+        high = float(np.fmax.reduce(self.array, axis=None))
+        if np.isnan(low):
+            raise InvalidVolumeError(
+                f"every value of {self.name!r} is NaN: there is nothing to render"
+            )
+        return low, high
+
+    def __repr__(self) -> str:
+        nx, ny, nz = self.dimensions
+        kind = "RGBA" if self.rgba else self.array.dtype
+        return f"Volume({nx} x {ny} x {nz} {kind}, spacing={self.spacing})"
+
+
+def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError) as error:  # lists of different lengths
+        raise InvalidVolumeError(f"a volume is an array of numbers: {error}") from error
+    rgba = array.ndim == 4 and array.shape[-1] == 4 and array.dtype == np.uint8
+    if array.ndim != 3 and not rgba:
+        hint = (
+            ": give one scalar per point, indexed [z, y, x], or RGBA as four uint8"
+            if array.ndim == 4
+            else ""
+        )
+        raise InvalidVolumeError(
+            f"a volume is a three-dimensional array; got shape {array.shape}{hint}"
+        )
+    if array.size == 0:
+        raise InvalidVolumeError(f"the volume is empty: its shape is {array.shape}")
+    if min(array.shape[:3]) < 2:
+        raise InvalidVolumeError(
+            f"the volume has only one plane of points: its shape is {array.shape[:3]} (z, y, x), "
+            "and a volume needs at least two points along each axis"
+        )
+    kind = array.dtype.newbyteorder("=").name
+    if kind in ("int64", "uint64"):
+        return _from_long_integers(array)
+    kind = _WIDENED.get(kind, kind)
+    if kind not in VOXEL_TYPES:
+        raise InvalidVolumeError(
+            f"voxels of type {array.dtype} are not supported: convert to one of "
+            f"{', '.join(VOXEL_TYPES)}"
+        )
+    return np.ascontiguousarray(array, dtype=kind)
+
+
+def _from_long_integers(array: NDArray[np.generic]) -> NDArray[np.generic]:
+    widest = max(abs(int(array.min())), abs(int(array.max())))
+    if widest > 2**53:
+        raise InvalidVolumeError(
+            f"voxels of type {array.dtype} hold values up to {widest}, which float64 cannot "
+            "represent exactly: scale them, or convert them yourself"
+        )
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def _checked_vector(name: str, value: ArrayLike) -> tuple[float, float, float]:
+    vector = as_floats(value)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise InvalidVolumeError(f"{name} must be three finite numbers; got {value!r}")
+    x, y, z = vector.tolist()
+    return x, y, z
+
+
+def _checked_direction(value: ArrayLike | None) -> NDArray[np.float64]:
+    matrix = np.eye(3) if value is None else as_floats(value)
+    if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
+        raise InvalidVolumeError(f"direction must be 3 x 3 finite numbers; got {value!r}")
+    if abs(np.linalg.det(matrix)) < 1e-9:
+        raise InvalidVolumeError(
+            f"the direction matrix {matrix.tolist()} cannot be inverted: its columns must be "
+            "three independent directions"
+        )
+    matrix.setflags(write=False)
+    return matrix

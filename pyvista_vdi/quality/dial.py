@@ -1,0 +1,435 @@
+"""One dial for speed against accuracy: how a VDI is to be made, from a short measurement.
+
+What is asked for is a quality, an SSIM, frames per second or bytes. What may be chosen is a ladder
+of settings (:data:`LADDER`). Three small measurements tell what each rung gives: a few tiles of one
+new view are rendered by the volume and by VDIs with few or short lists, and the rest is inferred.
+docs/dial.md says how, and how well that predicts.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
+from pyvista_vdi.model.checks import as_float
+
+if TYPE_CHECKING:
+    from pyvista_vdi.model.vdi import VDI
+
+#: The SSIM that a name asks for. "reference" asks for nothing: it is what is made without a dial.
+QUALITIES: dict[str, float | None] = {
+    "reference": None,
+    "high": 0.98,
+    "balanced": 0.96,
+    "fast": 0.93,
+}
+
+#: Degrees from V_O at which a target is to be reached unless another angle is asked for.
+TARGET_ANGLE = 30.0
+
+#: How fast the loss across lists falls beyond half a list per pixel: its exponent is the first
+#: number plus the second times the exponent between a fifth and a half. Fitted by
+#: benchmarks/dial.py.
+EXPONENT = (1.15, 0.05)
+#: Range of that exponent over the fitted cases, with some room.
+_EXPONENTS = (0.6, 1.8)
+#: A frame's time over that of the rough VDI's, as powers of the density and the longest list over
+#: its own. Fitted by benchmarks/dial.py on a CPU.
+FRAME_COST = (0.44, 0.27)
+
+_UNAVOIDABLE = (
+    "; {:.3f} of the loss is what the generating view's window does not cover, or light that moves "
+    "with the camera: another generating view helps, other settings do not"
+)
+
+#: Share of a limit in bytes that is left free: lists are counted on a sample of the rays.
+_BYTES_MARGIN = 0.05
+#: Bytes of a list and of a supersegment on a device, in the 8-byte form: a list that is not empty
+#: has two supersegments' room for its header.
+_LIST_BYTES, _SUPERSEGMENT_BYTES, _HEADER_BYTES = 4, 8, 16
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One rung of the ladder.
+
+    Attributes
+    ----------
+    lists : float
+        Lists along an edge of the VDI's window, over the pixels of the window asked for.
+    max_supersegments : int
+        Longest list.
+    precision : str
+        Of the supersegments, see :meth:`VDI.with_precision`.
+    """
+
+    lists: float
+    max_supersegments: int
+    precision: str = "8-byte"
+
+    def window_size(self, window_size: tuple[int, int]) -> tuple[int, int]:
+        """Return the VDI's window for pictures of ``window_size``."""
+        width, height = (max(1, round(self.lists * edge)) for edge in window_size)
+        return width, height
+
+
+#: What is measured. The VDI of ``ROUGH`` also says where tiles are to lie, how long lists are and
+#: what a frame takes.
+ROUGH = Setting(1 / 5, 40)
+SPARSE = Setting(1 / 5, 10)
+DENSE = Setting(1 / 2, 10)
+
+#: What a dial chooses from. No rung has fewer or shorter lists than the one before it.
+LADDER = (
+    Setting(1 / 4, 10),
+    Setting(1 / 3, 10),
+    Setting(1 / 2, 10),
+    Setting(1 / 2, 15),
+    Setting(3 / 4, 15),
+    Setting(1, 15),
+    Setting(1, 20),
+    Setting(1, 30),
+    Setting(3 / 2, 30),
+    Setting(2, 30),
+)
+
+
+@dataclass(frozen=True)
+class Dial:
+    """What is asked of a VDI; :meth:`of` checks what a user gives.
+
+    Attributes
+    ----------
+    quality : str, optional
+        The name that ``ssim`` stands for.
+    ssim : float, optional
+        Goal: SSIM of a picture at ``angle`` against volume rendering.
+    fps : float, optional
+        Limit: frames per second of full frames, at least.
+    max_bytes : int, optional
+        Limit: bytes of the VDI on the device.
+    angle : float
+        Degrees from V_O.
+    """
+
+    quality: str | None = None
+    ssim: float | None = None
+    fps: float | None = None
+    max_bytes: int | None = None
+    angle: float = TARGET_ANGLE
+
+    @classmethod
+    def of(
+        cls,
+        quality: str | None = None,
+        target_ssim: float | None = None,
+        target_fps: float | None = None,
+        max_bytes: int | None = None,
+        target_angle: float = TARGET_ANGLE,
+    ) -> Dial | None:
+        """Return the dial of arguments of ``generate``; ``None`` where nothing is to be chosen.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If one is out of range, or they contradict each other.
+        """
+        if quality is not None and quality not in QUALITIES:
+            raise InvalidArgumentError(
+                f"quality must be one of {', '.join(QUALITIES)}; got {quality!r}"
+            )
+        if quality is not None and target_ssim is not None:
+            raise InvalidArgumentError(
+                f"quality={quality!r} and target_ssim={target_ssim!r} both say how good pictures "
+                "are to be: give one of them"
+            )
+        goal = _within("target_ssim", target_ssim, 0, 1, "an SSIM between 0 and 1")
+        fps = _within("target_fps", target_fps, 0, math.inf, "frames per second above 0")
+        limit = _within("max_bytes", max_bytes, 0, math.inf, "a number of bytes above 0")
+        angle = _within("target_angle", target_angle, 0, 180, "an angle between 0 and 180 degrees")
+        if quality == "reference" and (fps, limit) != (None, None):
+            raise InvalidArgumentError(
+                "quality='reference' is what is made without a dial, so that target_fps and "
+                "max_bytes have nothing to choose: leave them out, or ask for 'high'"
+            )
+        if quality is not None:
+            goal = QUALITIES[quality]
+        if goal is None and fps is None and limit is None:
+            return None
+        assert angle is not None
+        return cls(quality, goal, fps, None if limit is None else int(limit), angle)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what was asked for, by the names of the arguments."""
+        asked = {
+            "quality": self.quality,
+            "target_ssim": None if self.quality else self.ssim,
+            "target_fps": self.fps,
+            "max_bytes": self.max_bytes,
+        }
+        return {name: value for name, value in asked.items() if value is not None}
+
+
+def _within(name: str, value: Any, above: float, below: float, what: str) -> float | None:
+    if value is None:
+        return None
+    number = as_float(value)
+    if isinstance(value, bool) or not above < number < below:
+        raise InvalidArgumentError(f"{name} must be {what}; got {value!r}")
+    return number
+
+
+def refuse_settings(dial: Dial | None, **given: tuple[Any, Any]) -> None:
+    """Refuse settings that a dial chooses: pairs of what was given and its default, by name.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If there is a dial, and one differs from its default.
+    """
+    if dial is None:
+        return
+    fixed = [f"{name}={value!r}" for name, (value, default) in given.items() if value != default]
+    if fixed:
+        asked = ", ".join(f"{name}={value!r}" for name, value in dial.to_dict().items())
+        raise InvalidArgumentError(
+            f"{asked} chooses the settings of the VDI, among them {', '.join(fixed)}: leave out "
+            "one or the other"
+        )
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a rung of the ladder is predicted to give.
+
+    Attributes
+    ----------
+    setting : Setting
+        The rung.
+    window_size : (int, int)
+        Lists along each edge of the VDI's window.
+    ssim : float
+        SSIM, at the dial's angle, of a picture of the window asked for against volume rendering.
+    nbytes : int
+        Bytes of the VDI on the device.
+    fps : float
+        Full frames of that window per second.
+    """
+
+    setting: Setting
+    window_size: tuple[int, int]
+    ssim: float
+    nbytes: int
+    fps: float
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a dial chose.
+
+    Attributes
+    ----------
+    dial : Dial
+        What was asked.
+    prediction : Prediction
+        The rung that was chosen, and what it is predicted to give.
+    missed : tuple of str
+        What cannot be reached, each a sentence with the values and a remedy.
+    window_size : (int, int)
+        The window asked for.
+    """
+
+    dial: Dial
+    prediction: Prediction
+    missed: tuple[str, ...]
+    window_size: tuple[int, int]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it for a VDI's metadata: see docs/dial.md."""
+        chosen = self.prediction
+        return {
+            "asked": self.dial.to_dict(),
+            "angle": self.dial.angle,
+            "window_size": list(self.window_size),
+            "chosen": {
+                "window_size": list(chosen.window_size),
+                "max_supersegments": chosen.setting.max_supersegments,
+                "precision": chosen.setting.precision,
+            },
+            "predicted": {
+                "ssim": round(chosen.ssim, 4),
+                "bytes": chosen.nbytes,
+                "fps": float(f"{chosen.fps:.3g}"),
+            },
+            "missed": list(self.missed),
+        }
+
+
+def describe(metadata: dict[str, Any]) -> str | None:
+    """Say in one line what the dial chose for a VDI with such metadata; ``None`` without one."""
+    dial: Any = metadata.get("dial")
+    try:
+        chosen, predicted = dial["chosen"], dial["predicted"]
+        width, height = chosen["window_size"]
+        return (
+            f"chosen {width} x {height} lists of up to {chosen['max_supersegments']}, "
+            f"predicted SSIM {predicted['ssim']:.3f} at {dial['angle']:g}°, "
+            f"predicted {predicted['bytes'] / 2**20:.1f} MiB, "
+            f"predicted {predicted['fps']:.3g} full frames/s"
+            + (", target missed" if dial["missed"] else "")
+        )
+    except (TypeError, KeyError, ValueError):  # no dial's, or of a file that somebody has written
+        return None
+
+
+def warn_missed(vdi: VDI, *, stacklevel: int) -> None:
+    """Give a VDIWarning for what the dial of a VDI could not reach."""
+    for missed in vdi.metadata.get("dial", {}).get("missed", ()):
+        warnings.warn(missed, VDIWarning, stacklevel=stacklevel + 1)
+
+
+# -- choosing --------------------------------------------------------------------------------------
+
+
+def chosen(
+    dial: Dial, ladder: Sequence[Prediction], window_size: tuple[int, int], least: float = 0.0
+) -> Choice:
+    """Choose from what the rungs are predicted to give.
+
+    Limits come before the goal, and of the limits bytes before frames per second: what breaks a
+    limit is never taken for a better picture. ``least`` is the loss that no rung avoids.
+    """
+    missed = []
+    within = len(ladder)
+    if dial.max_bytes is not None:
+        free = (1 - _BYTES_MARGIN) * dial.max_bytes
+        within = sum(rung.nbytes <= free for rung in ladder)
+        if within == 0:
+            within = 1
+            missed.append(
+                f"max_bytes={dial.max_bytes} cannot be kept: the smallest VDI that a dial makes "
+                f"is predicted to have {ladder[0].nbytes} bytes; allow more, or ask for a smaller "
+                "window"
+            )
+    if dial.fps is not None:
+        fast = sum(rung.fps >= dial.fps for rung in ladder[:within])
+        if fast == 0:
+            missed.append(
+                f"{dial.fps:g} full frames per second cannot be reached on this device: for "
+                f"{window_size[0]} x {window_size[1]} pixels {ladder[0].fps:.3g} are predicted at "
+                "most; ask for fewer, or for a smaller window (a plotter keeps target_fps while "
+                "the view moves by drawing fewer pixels)"
+            )
+        within = max(1, fast)
+    if dial.ssim is None:
+        return Choice(dial, ladder[within - 1], tuple(missed), window_size)
+    reaching = [i for i, rung in enumerate(ladder) if rung.ssim >= dial.ssim]
+    wanted = reaching[0] if reaching else len(ladder) - 1
+    rung = ladder[min(wanted, within - 1)]
+    if rung.ssim < dial.ssim:
+        name = f"quality={dial.quality!r}" if dial.quality else "target_ssim"
+        limits = [f"{n}={v}" for n, v in dial.to_dict().items() if n in ("max_bytes", "target_fps")]
+        held = within <= wanted
+        missed.append(
+            f"{name} asks for an SSIM of {dial.ssim:g} at {dial.angle:g} degrees; "
+            f"{rung.ssim:.3f} is predicted for "
+            + (f"what is within {' and '.join(limits)}" if held else "the best settings")
+            + ("; allow more, or ask for less" if held else "; ask for less, or a smaller angle")
+            + (_UNAVOIDABLE.format(least) if least > (1 - rung.ssim) / 2 else "")
+        )
+    return Choice(dial, rung, tuple(missed), window_size)
+
+
+# -- predicting ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What was measured of one scene on one device.
+
+    Attributes
+    ----------
+    rough, sparse, dense : float
+        1 - SSIM of the picture by a VDI of the settings :data:`ROUGH`, :data:`SPARSE` and
+        :data:`DENSE`.
+    least : float
+        The same of what no VDI of this V_O does better: what its window does not cover is
+        missing, and light that has moved with the camera is baked in.
+    counts : numpy.ndarray
+        int64: lists of the rough VDI by their length.
+    frame_seconds : float
+        Of a full frame of the rough VDI.
+    """
+
+    rough: float
+    sparse: float
+    dense: float
+    counts: NDArray[np.int64]
+    frame_seconds: float
+    least: float = 0.0
+
+
+def predictions(
+    measured: Measurement,
+    window_size: tuple[int, int],
+    *,
+    exponent: tuple[float, float] = EXPONENT,
+    frame_cost: tuple[float, float] = FRAME_COST,
+) -> tuple[Prediction, ...]:
+    """Return what each rung of the ladder is predicted to give for pictures of ``window_size``.
+
+    Notes
+    -----
+    The loss 1 - SSIM is taken as a sum: what any VDI of this V_O loses; what is lost across lists,
+    which depends on their density s alone and falls as a power of it; and along lists, b / N_S.
+    Two longest lists at one density give b; two densities at one longest list give the power up to
+    half a list per pixel, and, by a relation fitted to many scenes, beyond.
+    """
+    along = max(0.0, (measured.sparse - measured.rough) / (_per(SPARSE) - _per(ROUGH)))
+    across = max(0.0, measured.dense - measured.least - along * _per(DENSE))
+    sparse = max(across, measured.sparse - measured.least - along * _per(SPARSE))
+    power = _exponent(sparse, across)
+    beyond = float(np.clip(exponent[0] + exponent[1] * power, *_EXPONENTS))
+    out = []
+    for setting in LADDER:
+        ratio = setting.lists / DENSE.lists
+        loss = across * ratio ** -(power if ratio < 1 else beyond)
+        loss += along * _per(setting) + measured.least
+        cost = (setting.lists / ROUGH.lists) ** frame_cost[0]
+        cost *= (setting.max_supersegments / ROUGH.max_supersegments) ** frame_cost[1]
+        out.append(
+            Prediction(
+                setting,
+                setting.window_size(window_size),
+                1.0 - min(1.0, loss),
+                _bytes(measured.counts, setting, window_size),
+                1.0 / (measured.frame_seconds * cost),
+            )
+        )
+    return tuple(out)
+
+
+def _per(setting: Setting) -> float:
+    return 1 / setting.max_supersegments
+
+
+def _exponent(sparse: float, dense: float) -> float:
+    """Return the power of the density that a loss falls by, from a fifth to half a list."""
+    return math.log(sparse / dense) / math.log(DENSE.lists / SPARSE.lists) if dense > 0 else 1.0
+
+
+def _bytes(counts: NDArray[np.int64], setting: Setting, window_size: tuple[int, int]) -> int:
+    """Predict the bytes on the device of the 8-byte form."""
+    width, height = setting.window_size(window_size)
+    share = width * height / counts.sum()
+    lengths = np.minimum(np.arange(len(counts)), setting.max_supersegments)
+    supersegments, occupied = float(counts @ lengths), float(counts[1:].sum())
+    per_list = _SUPERSEGMENT_BYTES * supersegments + _HEADER_BYTES * occupied
+    return round(share * per_list) + _LIST_BYTES * (width * height + 1)

@@ -1,0 +1,395 @@
+"""The short measurement of a scene that a dial chooses by."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.device import Runtime, get_runtime
+from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.errors import Cancelled, InvalidArgumentError
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.lighting import Lights
+from pyvista_vdi.model.metrics import SSIM_WINDOW
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.quality.dial import (
+    DENSE,
+    ROUGH,
+    SPARSE,
+    Choice,
+    Dial,
+    Measurement,
+    Setting,
+    chosen,
+    predictions,
+)
+from pyvista_vdi.quality.tiles import TileSample, tiles_ssim
+from pyvista_vdi.quality.view_error import ViewErrorEstimator
+from pyvista_vdi.raycasting.raycast import render_vdi
+
+#: Tiles that are measured, and their edge in pixels: benchmarks/dial.py.
+TILES = 9
+TILE_SIZE = 32
+
+#: What generating and rendering the part of a VDI for one tile costs beyond its lists, in lists.
+_PART_OVERHEAD = 8000
+#: Frames of the rough VDI that are timed; the shortest counts.
+_FRAMES = 2
+#: Scenes that are remembered.
+_REMEMBERED = 32
+
+Progress = Callable[[float], object]
+
+_measurements: OrderedDict[Any, Measurement] = OrderedDict()
+_lock = threading.Lock()
+
+
+def choose(
+    volume: Volume,
+    camera: Camera,
+    window_size: Sequence[int],
+    transfer_function: TransferFunction,
+    dial: Dial,
+    *,
+    device: Any = None,
+    progress: Progress | None = None,
+    **settings: Any,
+) -> Choice:
+    """Choose how a VDI is to be made.
+
+    Parameters
+    ----------
+    volume, camera, window_size, transfer_function
+        As for :func:`~pyvista_vdi.generation.generate.generate_vdi`; the window is that of the
+        pictures.
+    dial : Dial
+        What is asked for.
+    device : optional
+        See :func:`pyvista_vdi.list_devices`.
+    progress : callable, optional
+        Called with 0 between the parts of the measurement; when it returns False it is given up.
+    **settings
+        Keyword arguments of ``generate_vdi`` that the VDI will be made with: criterion,
+        sample_distance, view_cone, lights, ambient_occlusion, memory_limit.
+
+    Returns
+    -------
+    Choice
+        The first rung of the ladder that reaches the goal, and no rung above the limits. Without
+        a goal, the best within the limits.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If the window is too small for an SSIM, or another argument cannot be used.
+    Cancelled
+        If ``progress`` returned False.
+    """
+    size = check_window_size(window_size)
+    if min(size) < SSIM_WINDOW:
+        raise InvalidArgumentError(
+            f"a window of {size[0]} x {size[1]} pixels has no SSIM to choose settings by: it "
+            f"takes {SSIM_WINDOW} along each edge; choose max_supersegments and window yourself"
+        )
+    scene = Scene(volume, camera, size, transfer_function, dial.angle, device, settings, progress)
+    measured = _measurement(scene)
+    return chosen(dial, predictions(measured, size), size, measured.least)
+
+
+def forget() -> None:
+    """Forget all measurements, so that the next choice measures anew."""
+    with _lock:
+        _measurements.clear()
+
+
+def _measurement(scene: Scene) -> Measurement:
+    """Return what was measured of a scene before, or measure it."""
+    key = scene.key
+    with _lock:
+        known = _measurements.get(key)
+        if known is not None:
+            _measurements.move_to_end(key)
+            return known
+    measured = scene.measure()
+    with _lock:
+        _measurements[key] = measured
+        while len(_measurements) > _REMEMBERED:
+            _measurements.popitem(last=False)
+    return measured
+
+
+class Scene:
+    """One volume, look, generating view, window and device, and the view that is judged."""
+
+    def __init__(
+        self,
+        volume: Volume,
+        camera: Camera,
+        window_size: tuple[int, int],
+        transfer_function: TransferFunction,
+        angle: float,
+        device: Any,
+        settings: dict[str, Any],
+        progress: Progress | None = None,
+    ) -> None:
+        self._volume = volume
+        self._camera = camera
+        self._size = window_size
+        self._transfer_function = transfer_function
+        self._angle = angle
+        self._view = turned(camera, volume.bounds, angle)
+        self._runtime: Runtime = get_runtime(device)
+        self._settings = {
+            **settings,
+            "lights": Lights.from_any(settings.get("lights")),
+            "ambient_occlusion": AmbientOcclusion.from_any(settings.get("ambient_occlusion")),
+        }
+        self._progress = progress
+
+    @property
+    def key(self) -> Any:
+        """Equal where a measurement would be equal, but for times."""
+        volume = self._volume
+        return (
+            hashlib.blake2b(np.ascontiguousarray(volume.array).data, digest_size=16).digest(),
+            (volume.array.shape, volume.array.dtype.str),
+            (volume.spacing, volume.origin, np.asarray(volume.direction).tobytes()),
+            (self._camera, self._size, self._transfer_function, self._angle),
+            tuple(sorted(self._settings.items(), key=lambda item: item[0])),
+            self._runtime.info.index,
+        )
+
+    def measure(self) -> Measurement:
+        """Measure losses, lengths of lists and the time of a frame."""
+        self._go_on()
+        estimator = ViewErrorEstimator(
+            self._volume,
+            self._transfer_function,
+            sample_distance=self._settings.get("sample_distance"),
+            tiles=TILES,
+            tile_size=TILE_SIZE,
+            lights=self._settings["lights"],
+            ambient_occlusion=self._settings["ambient_occlusion"],
+            memory_limit=self._settings.get("memory_limit"),
+            device=self._runtime,
+        )
+        rough = self._whole(ROUGH)
+        counts = np.bincount(rough.counts.reshape(-1), minlength=2)
+        tiles = estimator.sample(rough, self._view, self._size)
+        seconds = self._frame_seconds(rough)
+        if tiles is None:
+            return Measurement(0.0, 0.0, 0.0, counts, seconds)
+        truth = [estimator.volume_tile(lens, tiles.size) for lens in self._lenses(tiles)]
+        losses = []
+        for setting in (ROUGH, SPARSE, DENSE):
+            self._go_on()
+            pictures = self._pictures(tiles, setting, rough if setting == ROUGH else None)
+            losses.append(_loss(tiles, pictures, truth))
+        losses.append(self._least(estimator, tiles, truth))
+        at_rough, sparse, dense, least = (min(1.0, max(0.0, loss)) for loss in losses)
+        return Measurement(at_rough, sparse, dense, counts, seconds, least)
+
+    def _least(
+        self, estimator: ViewErrorEstimator, tiles: TileSample, truth: list[NDArray[np.float32]]
+    ) -> float:
+        """Return the loss of the volume itself where V_O covers it, lit as V_O has it."""
+        sides = viewport_planes(self._camera, self._size)
+        world = self._camera.model_transform
+        corners = rays.corners(self._volume.bounds) @ world[:3, :3].T + world[:3, 3]
+        covered = all(((corners - side[:3]) @ side[3:]).min() >= 0 for side in sides)
+        if covered and self._transfer_function.shading is None:
+            return 0.0
+        pictures = [
+            estimator.volume_tile(
+                lens,
+                tiles.size,
+                clipping_planes=None if covered else sides,
+                lit_from=self._camera,
+            )
+            for lens in self._lenses(tiles)
+        ]
+        return _loss(tiles, pictures, truth)
+
+    def _go_on(self) -> None:
+        if self._progress is not None and self._progress(0.0) is False:
+            raise Cancelled("choosing the settings of a VDI was cancelled")
+
+    def _lenses(self, tiles: TileSample) -> list[Camera]:
+        """Return the view that each tile has."""
+        corners = tiles.corners.tolist()
+        return [self._view.tile(self._size, corner, tiles.size) for corner in corners]
+
+    def _whole(self, setting: Setting) -> VDI:
+        return self._generated(self._camera, setting.window_size(self._size), setting)
+
+    def _generated(self, camera: Camera, size: tuple[int, int], setting: Setting) -> VDI:
+        return generate_vdi(
+            self._volume,
+            camera,
+            size,
+            self._transfer_function,
+            max_supersegments=setting.max_supersegments,
+            precision=setting.precision,
+            device=self._runtime,
+            **self._settings,
+        )
+
+    def _pictures(
+        self, tiles: TileSample, setting: Setting, whole: VDI | None
+    ) -> list[NDArray[np.float32]]:
+        """Return the tiles' pictures, by the whole VDI if there is one, or else as is cheaper."""
+        window = setting.window_size(self._size)
+        lenses = self._lenses(tiles)
+        if whole is not None:
+            return [render_vdi(whole, at, tiles.size, device=self._runtime) for at in lenses]
+        met = [
+            lists_met(lens, tiles.size, self._volume.bounds, self._camera, window)
+            for lens in lenses
+        ]
+        parts = [math.prod(part[1]) + _PART_OVERHEAD for part in met if part is not None]
+        # Where the parts together cost more than the whole, the whole is made
+        if sum(parts) >= math.prod(window):
+            return self._pictures(tiles, setting, self._whole(setting))
+        pictures = []
+        for lens, part in zip(lenses, met, strict=True):
+            if part is None:
+                pictures.append(np.zeros((*tiles.size[::-1], 4), np.float32))
+                continue
+            corner, size = part
+            vdi = self._generated(self._camera.tile(window, corner, size), size, setting)
+            pictures.append(render_vdi(vdi, lens, tiles.size, device=self._runtime))
+        return pictures
+
+    def _frame_seconds(self, vdi: VDI) -> float:
+        """Return the shortest time of a few full frames, seconds."""
+        seconds = []
+        for _ in range(_FRAMES):
+            start = time.perf_counter()
+            render_vdi(vdi, self._view, self._size, device=self._runtime)
+            seconds.append(time.perf_counter() - start)
+        return max(min(seconds), 1e-9)
+
+
+def _loss(
+    tiles: TileSample, pictures: list[NDArray[np.float32]], truth: list[NDArray[np.float32]]
+) -> float:
+    """Return 1 - SSIM of the whole picture, inferred from tiles."""
+    return 1.0 - tiles.infer(tiles_ssim(pictures, truth))[0]
+
+
+def viewport_planes(camera: Camera, window_size: tuple[int, int]) -> NDArray[np.float64]:
+    """Return the four sides of what a view covers, as clipping planes that keep it.
+
+    Parameters
+    ----------
+    camera : Camera
+        The view.
+    window_size : (int, int)
+        Width and height of its window.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 (4, 6): origin and inward normal of each, world coordinates.
+    """
+    # 1 - u, 1 + u, 1 - v and 1 + v, times the homogeneous denominator, of world points
+    matrix = camera.viewport_matrix(window_size) @ camera.view_matrix
+    planes = np.stack([matrix[3] + sign * matrix[row] for row in (0, 1) for sign in (-1, 1)])
+    planes /= np.linalg.norm(planes[:, :3], axis=1)[:, np.newaxis]
+    origins = -planes[:, 3:] * planes[:, :3]
+    return np.concatenate([origins, planes[:, :3]], axis=1)
+
+
+def turned(camera: Camera, bounds: Sequence[float], degrees: float) -> Camera:
+    """Return a view turned about ``view_up`` through the centre of bounds in the model frame.
+
+    The view of :meth:`Camera.azimuth` where the camera looks at that centre.
+    """
+    matrix = camera.model_transform
+    low, high = np.asarray(bounds)[::2], np.asarray(bounds)[1::2]
+    centre = matrix[:3, :3] @ ((low + high) / 2) + matrix[:3, 3]
+    axis = np.asarray(camera.view_up) / np.linalg.norm(camera.view_up)
+    cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+
+    def around(point: Sequence[float]) -> NDArray[np.float64]:  # Rodrigues' formula
+        v = np.asarray(point) - centre
+        along = axis * (axis @ v)
+        return np.asarray(centre + along + (v - along) * cosine + np.cross(axis, v) * sine)
+
+    return camera.replace(position=around(camera.position), focal_point=around(camera.focal_point))
+
+
+def lists_met(
+    lens: Camera,
+    size: tuple[int, int],
+    bounds: Sequence[float],
+    camera: Camera,
+    window: tuple[int, int],
+) -> tuple[tuple[int, int], tuple[int, int]] | None:
+    """Return the rectangle of V_O's lists that the rays of a picture meet within bounds.
+
+    Parameters
+    ----------
+    lens : Camera
+        The view of the picture.
+    size : (int, int)
+        Width and height of the picture in pixels.
+    bounds : sequence of float, shape (6,)
+        Of the volume, model frame.
+    camera : Camera
+        The generating view V_O.
+    window : (int, int)
+        Width and height of V_O's window in lists.
+
+    Returns
+    -------
+    corner, size : (int, int)
+        First column and row from the top left, and how many; ``None`` if there are none.
+    """
+    pixel_rays = rays.pixel_rays(lens, size, bounds)
+    width, height = size
+    b, a = np.meshgrid(
+        (height - 1) / 2 - np.arange(height), np.arange(width) - (width - 1) / 2, indexing="ij"
+    )
+    pixels = np.stack([np.ones(a.size), a.ravel(), b.ravel()], axis=1)
+    origin, direction = pixels @ pixel_rays.origin, pixels @ pixel_rays.direction
+    # Where each ray enters and leaves the box
+    low, high = np.asarray(bounds)[::2], np.asarray(bounds)[1::2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        faces = np.stack([(low - origin) / direction, (high - origin) / direction])
+    enter = np.nanmax(faces.min(axis=0), axis=1)
+    leave = np.nanmin(faces.max(axis=0), axis=1)
+    if not lens.parallel_projection:
+        enter = np.maximum(enter, -pixel_rays.reference_depth)
+    inside = enter < leave
+    if not inside.any():
+        return None
+    ends = np.concatenate(
+        [origin[inside] + t[inside, None] * direction[inside] for t in (enter, leave)]
+    )
+    points = np.column_stack([ends, np.ones(len(ends))]) @ camera.model_to_view.T
+    if not camera.parallel_projection and points[:, 2].min() <= 0:
+        return (0, 0), window  # they pass V_O's eye
+    viewport = points @ camera.viewport_matrix(window).T
+    u, v = viewport[:, :2].T / viewport[:, 3]
+    place = (np.stack([u, -v], axis=1) + 1) / 2 * window
+    # One more on each side, for the ends' rounding
+    first = np.clip(np.floor(place.min(axis=0)) - 1, 0, window).astype(int)
+    last = np.clip(np.ceil(place.max(axis=0)) + 1, 0, window).astype(int)
+    if (last <= first).any():
+        return None
+    column, row = first.tolist()
+    across, down = (last - first).tolist()
+    return (column, row), (across, down)

@@ -1,0 +1,1 @@
+"""From VDIs to pictures, depths and picks, from any view."""

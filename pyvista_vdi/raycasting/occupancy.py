@@ -1,0 +1,202 @@
+"""The occupancy grid of a VDI: where there is nothing to see (paper section 4)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together
+from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.device.work_order import GROUP
+from pyvista_vdi.model.vdi import VDI
+
+#: Lists along each edge of a tile, and slabs of depth: those of ``opencl/raycasting/tiles.cl``.
+TILE = 16
+SLABS = 64
+
+#: Squares of tiles along the grid's longer edge: `OccupancyGrid.corners` has a box for each.
+_SQUARES = 12
+
+#: By how much supersegments count beyond their faces: roundings of 2**-23 of the depths that the
+#: raycaster looks up. At most 17 add up (docs/conventions.md, "Occupancy grid").
+_ROUNDINGS = 32
+
+#: Share of the cells within the volume's bounds above which skipping costs more than it saves.
+#: Measured: it gains below .6 and loses above 1 (docs/performance.md).
+_WORTHWHILE = 0.8
+
+
+class OccupancyGrid:
+    """How many supersegments reach into each cell: tiles of 16 x 16 lists by 64 slabs of depth.
+
+    A supersegment that spans several slabs counts in each. The slabs are equal in view depth and
+    span the depth range of the VDI's bounds. Built on the device, from the VDI's arrays alone, so
+    that a file need not carry it.
+
+    Parameters
+    ----------
+    runtime : Runtime
+        The device.
+    vdi : VDI
+        Not kept.
+    offsets, front, back : DeviceBuffer
+        The VDI's arrays on the device; offsets uint32, or uint64 if ``long_offsets``.
+    nearest : float
+        Least view depth that is in front of V_O's eye, world units.
+    shifted : bool
+        Whether the raycaster's depth coordinate is that of a long lens.
+    long_offsets : bool
+        Type of the offsets.
+
+    Attributes
+    ----------
+    tiles : (int, int)
+        Tiles along the width and the height.
+    first_depth : float
+        Where slab 0 begins: view depth less the VDI's depth origin, world units.
+    slabs_per_depth : float
+        Slabs per world unit.
+    margin : float
+        By which supersegments count beyond their faces, world units: more than the raycaster's
+        depths are rounded by.
+    counts : DeviceBuffer
+        uint32 (tiles high, tiles wide, slabs).
+    masks : DeviceBuffer
+        uint64 per tile: bit s is set where slab s is occupied.
+    occupied : float
+        Occupied cells over cells within the volume's bounds; above 1 if borders are crossed.
+    corners : numpy.ndarray
+        Points of the model frame, float64 (n, 3), whose convex hull holds all occupied cells that
+        rays meet, and a list and a slab around them.
+    """
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        vdi: VDI,
+        offsets: DeviceBuffer,
+        front: DeviceBuffer,
+        back: DeviceBuffer,
+        *,
+        nearest: float,
+        shifted: bool,
+        long_offsets: bool,
+    ) -> None:
+        width, height = vdi.window_size
+        wide, high = self.tiles = (-(-width // TILE), -(-height // TILE))
+        near, far = rays.depth_range(vdi.camera, vdi.bounds)
+        if not vdi.camera.parallel_projection:
+            near = max(near, nearest)
+        self.first_depth = near - vdi.depth_origin
+        # Bounds without depth, or behind the eye: everything is in slab 0
+        self.slabs_per_depth = SLABS / (far - near) if far > near else 1.0
+        self.margin = _ROUNDINGS * 2.0**-23 * _looked_up(vdi, near, far, shifted)
+        with kept_together() as keep:
+            self.counts = keep(runtime.buffer((high, wide, SLABS), np.uint32, "occupancy counts"))
+            self.masks = keep(runtime.buffer((high, wide), np.uint64, "occupancy masks"))
+            defines = {"OFFSET_T": "ulong" if long_offsets else "uint"}
+            runtime.fill(self.counts, np.uint32(0))
+            runtime.launch(
+                runtime.kernel("raycasting/occupancy.cl", "count_supersegments", defines),
+                -(-width * height // GROUP) * GROUP,
+                GROUP,
+                offsets,
+                front,
+                back,
+                np.int32(width),
+                np.int32(height),
+                np.int32(wide),
+                np.float32(self.first_depth),
+                np.float32(self.slabs_per_depth),
+                np.float32(self.margin),
+                self.counts,
+            )
+            runtime.launch(
+                runtime.kernel("raycasting/occupancy.cl", "occupied_slabs", defines),
+                -(-wide * high // GROUP) * GROUP,
+                GROUP,
+                self.counts,
+                np.uint32(wide * high),
+                self.masks,
+            )
+            masks = runtime.download(self.masks)
+        self.corners = _corners(vdi, masks, near, far)
+        cells = _share_in_bounds(vdi, near, far) * masks.size * SLABS
+        self.occupied = float(np.unpackbits(masks.view(np.uint8)).sum() / max(cells, 1.0))
+
+    @property
+    def worthwhile(self) -> bool:
+        """Whether enough is empty for skipping to gain time."""
+        return self.occupied < _WORTHWHILE
+
+
+def _corners(vdi: VDI, masks: NDArray[np.uint64], near: float, far: float) -> NDArray[np.float64]:
+    """Return corners of boxes in list space that hold the occupied cells, in the model frame.
+
+    A box for each square of tiles. ``near`` and ``far`` are the view depths that slabs divide; what
+    counts in the first or the last of them lies within the bounds, too, where a ray meets it.
+    """
+    half = np.asarray(vdi.window_size) / 2
+    pixel_rays = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds)
+    slab = (far - near) / SLABS
+    least = -np.inf if vdi.camera.parallel_projection else 0.0
+    high, wide = masks.shape
+    edge = -(-max(high, wide) // _SQUARES)
+    points = [np.empty((0, 3))]
+    for row in range(0, high, edge):
+        for column in range(0, wide, edge):
+            part = masks[row : row + edge, column : column + edge]
+            j, i = np.nonzero(part)
+            if not i.size:
+                continue
+            bits = np.unpackbits(part.reshape(-1, 1).view(np.uint8), axis=1, bitorder="little")
+            slabs = np.flatnonzero(bits.any(axis=0))
+            a = (column + np.array([i.min(), i.max() + 1])) * TILE + [-1, 1] - half[0]
+            b = (row + np.array([j.min(), j.max() + 1])) * TILE + [-1, 1] - half[1]
+            depth = np.maximum(near + slab * (slabs[[0, -1]] + [-1, 2]), least)
+            at = np.stack(np.meshgrid(1.0, a, b, depth, indexing="ij"), axis=-1).reshape(-1, 4)
+            t = at[:, 3:] - pixel_rays.reference_depth
+            points.append(at[:, :3] @ pixel_rays.origin + t * (at[:, :3] @ pixel_rays.direction))
+    return np.concatenate(points)
+
+
+def _looked_up(vdi: VDI, near: float, far: float, shifted: bool) -> float:
+    """Return the size of what the raycaster rounds where it looks up a depth, world units.
+
+    That is the offset from the VDI's depth origin and, in perspective, the depth coordinate times
+    the change of view depth Z with it: Z**2 for -1 / Z, Z**2 / depth_origin for the long lens's
+    (``opencl/lib/list_space.cl``; docs/conventions.md, "Occupancy grid").
+    """
+    origin = vdi.depth_origin
+    offset = max(abs(near - origin), abs(far - origin))
+    if vdi.camera.parallel_projection:
+        return offset
+    if shifted:
+        coordinate = max(abs(near - origin) / near, abs(far - origin) / far)
+        return offset + coordinate * far**2 / origin
+    return offset + max(far, 0.0)
+
+
+def _share_in_bounds(vdi: VDI, near: float, far: float) -> float:
+    """Return the share of all cells that lies within the bounds, by the rays of tile centres."""
+    width, height = vdi.window_size
+    pixel_rays = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds)
+    a, b = np.meshgrid(_tile_centres(width), _tile_centres(height))
+    pixels = np.stack([np.ones_like(a), a, b], axis=-1)
+    first = np.full(a.shape, near - pixel_rays.reference_depth)
+    last = np.full(a.shape, far - pixel_rays.reference_depth)
+    for form in rays.box_planes(pixel_rays, vdi.bounds):
+        value, slope = pixels @ form[:3], pixels @ form[3:]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            crossing = -value / slope
+        first = np.where(slope > 0, np.maximum(first, crossing), first)
+        last = np.where(slope < 0, np.minimum(last, crossing), last)
+        last = np.where((slope == 0) & (value < 0), first, last)  # beside the bounds
+    depth = far - near
+    return float(np.maximum(last - first, 0).mean() / depth) if depth > 0 else 0.0
+
+
+def _tile_centres(lists: int) -> NDArray[np.float64]:
+    """Return the tiles' centres along an edge of that many lists, pixels from its middle."""
+    starts = np.arange(0, lists, TILE)
+    return (starts + np.minimum(starts + TILE, lists)) / 2 - lists / 2

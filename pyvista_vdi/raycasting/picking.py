@@ -1,0 +1,371 @@
+"""What a ray meets first in a VDI: a single ray, walked on the host in float64.
+
+The same laws as the kernels' (DESIGN section 3): a ray is cut where it crosses from one list to
+the next, each piece is clipped by interval to the supersegments of its list, and what it crosses
+of one absorbs in proportion to its length.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.compositing import opacity
+from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
+from pyvista_vdi.model.vdi import VDI
+
+Floats: TypeAlias = NDArray[np.float64]
+Integers: TypeAlias = NDArray[np.int64]
+
+#: Opacity from which on something is picked; what VTK's pickers take for volumes
+#: (``vtkCellPicker::VolumeOpacityIsovalue``).
+DEFAULT_OPACITY = 0.05
+
+
+@dataclass(frozen=True)
+class Pick:
+    """A supersegment that a ray has hit.
+
+    Attributes
+    ----------
+    position : tuple of float
+        Where the ray enters it, world coordinates.
+    depth : float
+        View depth of that point: its distance from the eye along the view direction, world units.
+    list : (int, int)
+        Column and row of the list in V_O's window; row 0 is the bottom one.
+    index : int
+        Which supersegment of the list it is; 0 is nearest to V_O.
+    supersegment : int
+        Its place in the VDI's arrays.
+    color : tuple of float
+        Its straight RGB, 0 to 1.
+    optical_depth : float
+        tau of the length of it that the ray crosses.
+    accumulated_optical_depth : float
+        tau of the ray from its beginning up to where it leaves the supersegment.
+    """
+
+    position: tuple[float, float, float]
+    depth: float
+    list: tuple[int, int]
+    index: int
+    supersegment: int
+    color: tuple[float, float, float]
+    optical_depth: float
+    accumulated_optical_depth: float
+
+    @property
+    def opacity(self) -> float:
+        """Opacity of the length of it that the ray crosses."""
+        return float(opacity(self.optical_depth))
+
+    @property
+    def accumulated_opacity(self) -> float:
+        """Opacity of the ray from its beginning up to where it leaves the supersegment."""
+        return float(opacity(self.accumulated_optical_depth))
+
+
+class FirstHit(NamedTuple):
+    """What counts as a hit: some optical depth, and at least this much.
+
+    Attributes
+    ----------
+    optical_depth : float
+        tau >= 0.
+    accumulated : bool
+        Whether what the ray has met before counts, too.
+    """
+
+    optical_depth: float
+    accumulated: bool
+
+    @classmethod
+    def of(cls, opacity_threshold: float, accumulated: bool) -> FirstHit:
+        """Return it for an opacity.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If the opacity is not a number of at least 0 and less than 1.
+        """
+        return cls(-math.log1p(-checked_opacity(opacity_threshold)), bool(accumulated))
+
+    def first(self, optical_depths: Floats) -> int | None:
+        """Return which of the media that a ray meets is hit; ``None`` if none is."""
+        met = np.cumsum(optical_depths) if self.accumulated else optical_depths
+        reached = (met > 0) & (met >= self.optical_depth)
+        return int(np.argmax(reached)) if reached.any() else None
+
+
+def checked_opacity(opacity_threshold: float) -> float:
+    """Return an opacity threshold as a float, at least 0 and less than 1."""
+    try:
+        threshold = float(opacity_threshold)
+    except (TypeError, ValueError):
+        threshold = math.nan
+    if not 0 <= threshold < 1:
+        raise InvalidArgumentError(
+            "opacity_threshold must be at least 0 and less than 1, which no medium reaches; "
+            f"got {opacity_threshold!r}"
+        )
+    return threshold
+
+
+def pick_vdi(
+    vdi: VDI,
+    camera: Camera,
+    pixel: Sequence[float],
+    window_size: Sequence[int] | None = None,
+    *,
+    opacity_threshold: float = DEFAULT_OPACITY,
+    accumulated: bool = True,
+    opaque_depth: float | None = None,
+    clipping_planes: ArrayLike | None = None,
+    cropping: Any = None,
+    opacity_multiplier: float = 1.0,
+) -> Pick | None:
+    """Return the first supersegment on a pixel's ray that reaches an opacity.
+
+    Parameters
+    ----------
+    vdi : VDI
+        What to look at.
+    camera : Camera
+        The view; its ``model_transform`` says where the VDI's model frame is.
+    pixel : (float, float)
+        x and y in pixels; whole numbers are pixels' centres, y = 0 is the bottom row.
+    window_size : (int, int), optional
+        Width and height in pixels; by default the VDI's own.
+    opacity_threshold, accumulated
+        What counts as a hit: see :func:`pyvista_vdi.pick`.
+    opaque_depth : float, optional
+        View depth at which the ray ends, world units.
+    clipping_planes, cropping, opacity_multiplier
+        As for :func:`pyvista_vdi.render`.
+
+    Returns
+    -------
+    Pick or None
+        ``None`` where nothing is hit.
+    """
+    if not isinstance(vdi, VDI):
+        raise InvalidArgumentError(f"expected a VDI, got {type(vdi).__name__}")
+    camera = Camera.from_any(camera)
+    size = check_window_size(vdi.window_size if window_size is None else window_size)
+    wanted = FirstHit.of(opacity_threshold, accumulated)
+    ray = _Ray.of_pixel(vdi, camera, _checked_pixel(pixel, size), size)
+    span = ray.span(vdi, camera, opaque_depth, clipping_planes)
+    if span is None:
+        return None
+    cropping = Cropping.from_any(cropping)
+    kept = np.array([span]) if cropping is None else ray.parts(cropping, *span)
+    met = _media_along(vdi, ray, *span, kept, checked_opacity_multiplier(opacity_multiplier))
+    k = wanted.first(met.optical_depth)
+    if k is None:
+        return None
+    row, column = divmod(int(met.list[k]), vdi.window_size[0])
+    supersegment = int(met.supersegment[k])
+    at_model = np.append(ray.origin + met.enters[k] * ray.direction, 1.0)
+    return Pick(
+        position=_triple((camera.model_transform @ at_model)[:3]),
+        depth=float(met.enters[k] + ray.reference_depth),
+        list=(column, row),
+        index=supersegment - vdi.list_at(column, row).start,
+        supersegment=supersegment,
+        color=_triple(vdi.color[supersegment]),
+        optical_depth=float(met.optical_depth[k]),
+        accumulated_optical_depth=float(met.optical_depth[: k + 1].sum()),
+    )
+
+
+@dataclass(frozen=True)
+class _Ray:
+    """A pixel's ray, P(t) = origin + t direction in the model frame; t as in ``rays.PixelRays``.
+
+    ``at + t slope`` are its homogeneous coordinates (u d, v d, Z, d) in V_O's viewport.
+    """
+
+    pixel: Floats  # (1, a, b)
+    window: rays.PixelRays
+    origin: Floats
+    direction: Floats
+    at: Floats
+    slope: Floats
+
+    @classmethod
+    def of_pixel(
+        cls, vdi: VDI, camera: Camera, pixel: tuple[float, float], size: tuple[int, int]
+    ) -> _Ray:
+        x, y = pixel
+        weights = np.array([1.0, x + 0.5 - size[0] / 2, y + 0.5 - size[1] / 2])
+        window = rays.pixel_rays(camera, size, vdi.bounds)
+        origin, direction = weights @ window.origin, weights @ window.direction
+        to_viewport = vdi.camera.viewport_matrix(vdi.window_size) @ vdi.camera.model_to_view
+        return cls(
+            weights,
+            window,
+            origin,
+            direction,
+            to_viewport @ np.append(origin, 1.0),
+            to_viewport @ np.append(direction, 0.0),
+        )
+
+    @property
+    def reference_depth(self) -> float:
+        """View depth of t = 0, world units."""
+        return self.window.reference_depth
+
+    def span(
+        self,
+        vdi: VDI,
+        camera: Camera,
+        opaque_depth: float | None,
+        clipping_planes: ArrayLike | None,
+    ) -> tuple[float, float] | None:
+        """Return first and last t where there may be a medium; ``None`` where there is none."""
+        forms = rays.box_planes(self.window, vdi.bounds)
+        forms += rays.eye_plane(camera, self.window)
+        forms += rays.user_planes(camera, self.window, clipping_planes)
+        table = np.asarray(forms)
+        (u, v, depth, d), (du, dv, ddepth, dd) = self.at, self.slope
+        value = [*(table[:, :3] @ self.pixel), d + u, d - u, d + v, d - v]
+        slope = [*(table[:, 3:] @ self.pixel), dd + du, dd - du, dd + dv, dd - dv]
+        if not vdi.camera.parallel_projection:
+            value.append(depth - rays.nearest_depth(vdi.camera, vdi.bounds))
+            slope.append(ddepth)
+        if opaque_depth is not None:
+            value.append(_checked_depth(opaque_depth) - self.reference_depth)
+            slope.append(-1.0)
+        return _where_positive(np.array(value), np.array(slope))
+
+    def parts(self, cropping: Cropping, first: float, last: float) -> Floats:
+        """Return first and last t of each part that cropping keeps, (k, 2)."""
+        return cropping.parts_of_ray(self.origin, self.direction, first, last)
+
+
+class _Media(NamedTuple):
+    """What a ray crosses, in the order in which it meets it; arrays of equal length."""
+
+    list: Integers
+    supersegment: Integers
+    enters: Floats  # t
+    optical_depth: Floats  # of the length crossed
+
+
+def _media_along(
+    vdi: VDI, ray: _Ray, first: float, last: float, kept: Floats, multiplier: float
+) -> _Media:
+    """Return every supersegment that a ray crosses between two t, in the parts that are kept."""
+    # Pieces of the ray, each within one list
+    cuts = _list_crossings(ray, first, last, vdi.window_size)
+    lists = _lists_at(ray, (cuts[:-1] + cuts[1:]) / 2, vdi.window_size)
+
+    # All supersegments of these lists, each list from the end that the ray comes from
+    begin, end = vdi.offsets[lists].astype(np.int64), vdi.offsets[lists + 1].astype(np.int64)
+    count = end - begin
+    piece = np.repeat(np.arange(len(lists)), count)
+    rank = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
+    depth, rises = ray.at[2], ray.slope[2]
+    member = begin[piece] + rank if rises >= 0 else end[piece] - 1 - rank
+
+    # Clip each by interval to its piece
+    front = vdi.front[member].astype(np.float64) + vdi.depth_origin
+    back = vdi.back[member].astype(np.float64) + vdi.depth_origin
+    enters, leaves = cuts[piece], cuts[piece + 1]
+    if rises == 0:
+        leaves = np.where((front <= depth) & (depth < back), leaves, enters)
+    else:
+        with np.errstate(over="ignore"):  # a face that is hardly ever reached
+            at_front, at_back = (front - depth) / rises, (back - depth) / rises
+        enters = np.maximum(enters, np.minimum(at_front, at_back))
+        leaves = np.minimum(leaves, np.maximum(at_front, at_back))
+    begins = np.maximum(enters[:, None], kept[:, 0])
+    drawn = np.maximum(np.minimum(leaves[:, None], kept[:, 1]) - begins, 0.0)
+    crossed = drawn.sum(axis=1) > 0
+    piece, member, begins, drawn = piece[crossed], member[crossed], begins[crossed], drawn[crossed]
+    enters = begins[np.arange(len(begins)), np.argmax(drawn > 0, axis=1)] if len(begins) else begins
+
+    # tau l / L (DESIGN section 3, "A supersegment is a homogeneous medium")
+    length = multiplier * drawn.sum(axis=1) * np.linalg.norm(ray.direction)
+    thickness = vdi.back[member].astype(np.float64) - vdi.front[member].astype(np.float64)
+    whole = thickness * _centre_ray_scale(vdi, lists[piece])
+    return _Media(lists[piece], member, enters, vdi.optical_depth[member] * (length / whole))
+
+
+def _list_crossings(ray: _Ray, first: float, last: float, window_size: tuple[int, int]) -> Floats:
+    """Return ``first``, each t between where the ray enters another list, and ``last``; sorted."""
+    cuts = [np.array([first, last])]
+    for axis, edge in enumerate(window_size):
+        border = 2 * np.arange(edge + 1) / edge - 1
+        with np.errstate(divide="ignore", invalid="ignore"):  # a border that is never reached
+            t = -(ray.at[axis] - border * ray.at[3]) / (ray.slope[axis] - border * ray.slope[3])
+        cuts.append(t[(t > first) & (t < last)])
+    return np.unique(np.concatenate(cuts))
+
+
+def _lists_at(ray: _Ray, t: Floats, window_size: tuple[int, int]) -> Integers:
+    """Return the list in which the ray is at each t, which lies inside V_O's viewport."""
+    u, v, _, d = ray.at[:, None] + ray.slope[:, None] * t
+    places = [
+        np.clip(np.floor((c / d + 1) / 2 * edge), 0, edge - 1).astype(np.int64)
+        for c, edge in zip((u, v), window_size, strict=True)
+    ]
+    return places[1] * window_size[0] + places[0]
+
+
+def _centre_ray_scale(vdi: VDI, lists: Integers) -> Floats:
+    """Return the model length of one world unit of view depth along the lists' centre rays."""
+    wide, high = vdi.window_size
+    row, column = np.divmod(lists, wide)
+    pixels = np.stack([np.ones(len(lists)), column + 0.5 - wide / 2, row + 0.5 - high / 2], axis=1)
+    centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
+    return np.asarray(np.linalg.norm(pixels @ centre, axis=1))
+
+
+def _where_positive(value: Floats, slope: Floats) -> tuple[float, float] | None:
+    """Return the t between which every ``value + t slope`` is positive; ``None`` if none is."""
+    if (value[slope == 0] < 0).any():
+        return None
+    rising, falling = slope > 0, slope < 0
+    first = float(np.max(-value[rising] / slope[rising], initial=-np.inf))
+    last = float(np.min(-value[falling] / slope[falling], initial=np.inf))
+    return (first, last) if first < last else None
+
+
+def _checked_pixel(pixel: Sequence[float], size: tuple[int, int]) -> tuple[float, float]:
+    try:
+        x, y = (float(c) for c in pixel)
+    except (TypeError, ValueError):
+        x = y = math.nan
+    if not (-0.5 <= x < size[0] - 0.5 and -0.5 <= y < size[1] - 0.5):
+        raise InvalidArgumentError(
+            f"pixel must be (x, y) inside the window of {size[0]} x {size[1]}, y = 0 at the "
+            f"bottom; got {pixel!r}"
+        )
+    return x, y
+
+
+def _checked_depth(depth: float) -> float:
+    try:
+        number = float(depth)
+    except (TypeError, ValueError):
+        number = math.nan
+    if math.isnan(number):
+        raise InvalidArgumentError(
+            f"opaque_depth must be a view depth in world units, or inf; got {depth!r}"
+        )
+    return number
+
+
+def _triple(values: ArrayLike) -> tuple[float, float, float]:
+    x, y, z = np.asarray(values, dtype=np.float64).tolist()
+    return x, y, z

@@ -1,0 +1,478 @@
+"""A volume that a device cannot hold, or is not allowed to: brick by brick (volume/bricks.cl).
+
+Which bricks the steps of some rays lie in is asked of the device; each of them is copied there,
+the steps in it are sampled, and what was used longest ago makes room for the next. The samples are
+those of the whole volume to the last bit, and so is what is made of them.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, kept_together
+from pyvista_vdi.device.work_order import GROUP, block_items
+from pyvista_vdi.errors import DeviceMemoryError
+
+#: Logarithms to base 2 of the cells along a brick's edge: large ones copy fewer points twice.
+_SHIFTS = (6, 5, 4)
+#: Bricks that should be on a device at once: a slice of rays then finds most where it left them.
+_ENOUGH_SLOTS = 64
+#: Points before and behind a brick's cells that samples in them read, and that gradients read.
+_NEIGHBOURS, _GRADIENT_NEIGHBOURS = (0, 1), (1, 3)
+#: Bytes of a step's sample: colour and optical depth, float32.
+SAMPLE_BYTES = 16
+#: Share of a device's free memory that bricks take where no limit is given: drivers need some.
+_SHARE_OF_FREE = 0.8
+#: Turns part of a volume's array, or all of it, into what the kernels read, C-contiguous.
+Read = Callable[[NDArray[Any]], NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Room:
+    """Device memory for a volume, and what else there is on the device meanwhile.
+
+    Attributes
+    ----------
+    limit : int or None
+        Most bytes in all; ``None``: what the device has.
+    working : int
+        Bytes of the buffers that the rays need.
+    steps : int
+        Steps whose samples bricks hold at a time, of all rays.
+    rays : str
+        What the rays are of, for messages.
+    """
+
+    limit: int | None
+    working: int
+    steps: int
+    rays: str
+
+    def holds(self, runtime: Runtime, nbytes: int, others: int, *, uploaded: bool) -> bool:
+        """Whether a volume of so many bytes, and others beside, may be on the device as a whole."""
+        info = runtime.info
+        if self.limit is None and uploaded:
+            return True
+        if nbytes > info.max_allocation:
+            return False
+        if self.limit is not None:
+            return nbytes + others + self.working <= self.limit
+        return runtime.allocated + nbytes + others + self.working <= info.global_memory
+
+    def in_all(self, runtime: Runtime) -> int:
+        """Return the bytes that may be taken, drivers' needs left out."""
+        if self.limit is not None:
+            return self.limit
+        return int(_SHARE_OF_FREE * (runtime.info.global_memory - runtime.allocated))
+
+    def for_bricks(self, runtime: Runtime, others: int) -> int:
+        """Return the bytes left for bricks beside ``others``, and what holds their samples."""
+        return self.in_all(runtime) - self.working - self.sample_bytes - others
+
+    @property
+    def sample_bytes(self) -> int:
+        """Bytes of the samples that bricks need beside them."""
+        return self.steps * SAMPLE_BYTES
+
+
+@dataclass(frozen=True)
+class BrickLayout:
+    """How a grid is cut into bricks.
+
+    Attributes
+    ----------
+    shift : int
+        Logarithm to base 2 of the cells along an edge.
+    gradients : bool
+        Whether samples need the points that gradients read.
+    counts : (int, int, int)
+        Bricks along x, y and z.
+    point_bytes : int
+        Bytes of a point on the device.
+    """
+
+    shift: int
+    gradients: bool
+    counts: tuple[int, int, int]
+    point_bytes: int
+
+    @classmethod
+    def of(
+        cls, dimensions: Sequence[int], shift: int, gradients: bool, point_bytes: int
+    ) -> BrickLayout:
+        """Return the layout for a grid of so many points along x, y and z."""
+        x, y, z = (-(-(points - 1) // 2**shift) for points in dimensions)
+        return cls(shift, gradients, (x, y, z), point_bytes)
+
+    @property
+    def before(self) -> int:
+        """Points that a brick holds before its first cell."""
+        return _GRADIENT_NEIGHBOURS[0] if self.gradients else _NEIGHBOURS[0]
+
+    @property
+    def points(self) -> int:
+        """Points along each edge that a brick holds."""
+        return 2**self.shift + sum(_GRADIENT_NEIGHBOURS if self.gradients else _NEIGHBOURS)
+
+    @property
+    def n_bricks(self) -> int:
+        """Bricks in all."""
+        return math.prod(self.counts)
+
+    @property
+    def brick_bytes(self) -> int:
+        """Bytes of a brick on the device."""
+        return self.points**3 * self.point_bytes
+
+    @property
+    def table_bytes(self) -> int:
+        """Bytes of the tables that say which bricks are wanted, and where they are."""
+        return 8 * self.n_bricks
+
+    @property
+    def defines(self) -> dict[str, str | int | None]:
+        """``-D`` names of the kernels that read bricks."""
+        return {
+            "BRICK_SHIFT": self.shift,
+            "BRICK_POINTS": self.points,
+            "BRICK_MARGIN": self.before,
+            "INDEX_T": "uint",  # of a brick's points
+        }
+
+    def region(self, brick: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+        """Return where a brick lies in the grid and in its own points, both (z, y, x)."""
+        x, y, _ = self.counts
+        numbers = brick // (x * y), brick // x % y, brick % x
+        firsts = [(n << self.shift) - self.before for n in numbers]
+        grid = tuple(slice(max(first, 0), first + self.points) for first in firsts)
+        own = tuple(slice(max(-first, 0), self.points) for first in firsts)
+        return grid, own
+
+
+def fitting_layout(
+    dimensions: Sequence[int], point_bytes: int, gradients: bool, nbytes: int, largest: int
+) -> tuple[BrickLayout, int] | None:
+    """Return how to cut a grid, and how many bricks the device holds at once.
+
+    Parameters
+    ----------
+    dimensions : (int, int, int)
+        Points along x, y and z.
+    point_bytes : int
+        Bytes of a point on the device.
+    gradients : bool
+        Whether samples need gradients.
+    nbytes : int
+        What bricks and their tables may take.
+    largest : int
+        What one buffer may take.
+
+    Returns
+    -------
+    (BrickLayout, int) or None
+        ``None`` where not even one brick fits.
+    """
+    best = None
+    for shift in _SHIFTS:
+        layout = BrickLayout.of(dimensions, shift, gradients, point_bytes)
+        room = min(nbytes - layout.table_bytes, largest)
+        slots = min(room // layout.brick_bytes, layout.n_bricks)
+        if slots > 0:
+            best = layout, slots
+        if slots >= min(_ENOUGH_SLOTS, layout.n_bricks):
+            break
+    return best
+
+
+def least_brick_bytes(dimensions: Sequence[int], point_bytes: int, gradients: bool) -> int:
+    """Return what one brick of the smallest kind and its tables take, bytes."""
+    layout = BrickLayout.of(dimensions, _SHIFTS[-1], gradients, point_bytes)
+    return layout.brick_bytes + layout.table_bytes
+
+
+class DeviceBricks:
+    """The bricks of a volume that are on a device.
+
+    Parameters
+    ----------
+    runtime : Runtime
+        The device.
+    array : numpy.ndarray, shape (nz, ny, nx) or (nz, ny, nx, 4)
+        The voxels; read as they are needed.
+    read : callable
+        Turns part of them into what the kernels read.
+    dtype : dtype_like
+        Of that.
+    layout : BrickLayout
+        How they are cut.
+    slots : int
+        Bricks on the device at once.
+    memory_limit : int or None
+        Most bytes on the device in all, as it was asked for.
+    visible : DeviceBuffer
+        Which blocks hold anything that is not transparent; other bricks are never copied.
+    name : str
+        Of the volume, for messages.
+
+    Attributes
+    ----------
+    pool : DeviceBuffer
+        The bricks.
+    slots : DeviceBuffer
+        Where each brick is whose steps are to be sampled now, int32; -1 for the others.
+    copied : int
+        Bricks that were copied to the device so far.
+    """
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        array: NDArray[Any],
+        read: Read,
+        dtype: DTypeLike,
+        layout: BrickLayout,
+        slots: int,
+        memory_limit: int | None,
+        visible: DeviceBuffer,
+        name: str,
+    ) -> None:
+        self.layout = layout
+        self.visible = visible
+        self.memory_limit = memory_limit
+        self.copied = 0
+        self._runtime = runtime
+        self._array = array
+        self._read = read
+        self._staged = np.zeros((layout.points,) * 3 + array.shape[3:], dtype)
+        self._slot_of: OrderedDict[int, int] = OrderedDict()  # used longest ago first
+        self._free = list(range(slots))
+        self._n_slots = slots
+        with kept_together() as keep:
+            pool = runtime.buffer((slots, self._staged.size), dtype, f"bricks of volume {name!r}")
+            self.pool = keep(pool)
+            self.slots = keep(runtime.buffer((layout.n_bricks,), np.int32, "slots of bricks"))
+            self._wanted = keep(runtime.buffer((layout.n_bricks,), np.uint32, "wanted bricks"))
+
+    def __enter__(self) -> DeviceBricks:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._runtime.finish()
+        for buffer in (self.pool, self.slots, self._wanted):
+            buffer.release()
+
+    def wanted(self, ask: Callable[[DeviceBuffer], None]) -> NDArray[np.intp]:
+        """Return the bricks that ``ask`` sets in the buffer it is given, ascending."""
+        self._runtime.fill(self._wanted, np.uint32(0))
+        ask(self._wanted)
+        return np.flatnonzero(self._runtime.download(self._wanted))
+
+    def rounds(self, bricks: NDArray[np.intp]) -> Iterator[None]:
+        """Bring bricks to the device, as many at a time as there is room for.
+
+        In each round ``slots`` says where those are that have not had their turn.
+        """
+        ordered = sorted(bricks.tolist(), key=lambda brick: brick not in self._slot_of)
+        for first in range(0, len(ordered), self._n_slots):
+            now = ordered[first : first + self._n_slots]
+            self._hold(now)
+            slots = np.full(self.layout.n_bricks, -1, np.int32)
+            slots[now] = [self._slot_of[brick] for brick in now]
+            self._runtime.write(self.slots, slots)
+            yield
+
+    def _hold(self, bricks: Sequence[int]) -> None:
+        missing = [brick for brick in bricks if brick not in self._slot_of]
+        for brick in bricks:
+            if brick in self._slot_of:
+                self._slot_of.move_to_end(brick)
+        for brick in missing:
+            self._runtime.give_way()
+            slot = self._free.pop() if self._free else self._slot_of.popitem(last=False)[1]
+            self._copy(brick, slot)
+            self._slot_of[brick] = slot
+
+    def _copy(self, brick: int, slot: int) -> None:
+        grid, own = self.layout.region(brick)
+        part = self._read(self._array[grid])
+        # What a brick at the volume's end holds beyond it is never read
+        starts = (place.start for place in own)
+        place = tuple(slice(k, k + n) for k, n in zip(starts, part.shape[:3], strict=True))
+        self._staged[place] = part
+        self._runtime.write(self.pool, self._staged.ravel(), first=slot * self._staged.size)
+        self.copied += 1
+
+
+class StepSampler:
+    """Samples the steps of rays in a volume that is on the device brick by brick.
+
+    Parameters
+    ----------
+    runtime : Runtime
+        The device.
+    bricks : DeviceBricks
+        The volume.
+    medium : sequence
+        Arguments ``voxels`` to ``forms``, without it, of the kernels that march.
+    defines : mapping
+        What these are compiled with.
+    march : sequence
+        Arguments ``forms`` to ``unit_distance``.
+    size : (int, int)
+        Width and height of the window.
+    room : int
+        Most steps of all rays that are sampled at a time.
+    ends : DeviceBuffer, optional
+        Where each ray ends in t, top row first.
+    """
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        bricks: DeviceBricks,
+        medium: Sequence[Any],
+        defines: Mapping[str, str | int | None],
+        march: Sequence[Any],
+        size: tuple[int, int],
+        room: int,
+        ends: DeviceBuffer | None = None,
+    ) -> None:
+        self._runtime = runtime
+        self._bricks = bricks
+        self._medium = tuple(medium)
+        self._march = tuple(march)
+        self._size = size
+        own = {k: v for k, v in defines.items() if k not in ("SAMPLED", "SKIP_EMPTY")}
+        self._kernels = {
+            name: runtime.kernel("volume/bricks.cl", name, {**own, **bricks.layout.defines})
+            for name in ("want_bricks", "sample_steps")
+        }
+        with ExitStack() as stack:
+            no_ends = stack.enter_context(runtime.buffer((1,), name="no ends"))
+            self._ends = (no_ends, np.int32(0)) if ends is None else (ends, np.int32(1))
+            self._samples = stack.enter_context(runtime.buffer((room, 4), name="samples of steps"))
+            self._buffers = stack.pop_all()
+
+    def __enter__(self) -> StepSampler:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._runtime.finish()
+        self._buffers.close()
+
+    def sample(
+        self, first_row: int, rows: int, first_step: int, steps: int
+    ) -> tuple[DeviceBuffer, np.int32, np.int32]:
+        """Sample some steps of the rays in some rows.
+
+        Returns
+        -------
+        tuple
+            Arguments ``samples`` to ``first_sample`` of kernels with ``-D SAMPLED``, which follow
+            those of the medium.
+        """
+        width, height = self._size
+        items = block_items(width, rows)
+        place = tuple(np.int32(n) for n in (width, height, first_row, rows, first_step, steps))
+        counts = np.array([*self._bricks.layout.counts, 0], dtype=np.int32)
+
+        def launch(name: str, table: DeviceBuffer) -> None:
+            self._runtime.launch(
+                self._kernels[name],
+                items,
+                GROUP,
+                *self._medium,
+                *self._march,
+                *place,
+                *self._ends,
+                self._bricks.visible,
+                counts,
+                table,
+                self._samples,
+            )
+
+        wanted = self._bricks.wanted(lambda table: launch("want_bricks", table))
+        for _ in self._bricks.rounds(wanted):
+            launch("sample_steps", self._bricks.slots)
+        return self._samples, np.int32(steps), np.int32(first_step)
+
+
+def in_parts(
+    blocks: tuple[int, int, int], block_points: int, point_bytes: int, nbytes: int
+) -> Iterator[tuple[tuple[slice, ...], tuple[slice, ...]]]:
+    """Cut a grid into parts of whole blocks, along z first.
+
+    Parameters
+    ----------
+    blocks : (int, int, int)
+        Blocks along x, y and z.
+    block_points : int
+        Points along a block's edge; blocks share the points on their faces.
+    point_bytes : int
+        Bytes of a point.
+    nbytes : int
+        Most bytes of a part, if that is enough for a block.
+
+    Yields
+    ------
+    (tuple of slice, tuple of slice)
+        Which blocks, and which points, both (z, y, x).
+    """
+    lengths = list(reversed(blocks))
+    for axis in range(3):
+        of_others = math.prod(n * block_points + 1 for k, n in enumerate(lengths) if k != axis)
+        fitting = (nbytes // (of_others * point_bytes) - 1) // block_points
+        lengths[axis] = max(1, min(lengths[axis], fitting))
+        if fitting >= 1:
+            break
+    starts = (range(0, n, length) for n, length in zip(reversed(blocks), lengths, strict=True))
+    for first in itertools.product(*starts):
+        ends = [
+            min(start + length, n)
+            for start, length, n in zip(first, lengths, reversed(blocks), strict=True)
+        ]
+        yield (
+            tuple(slice(start, end) for start, end in zip(first, ends, strict=True)),
+            tuple(
+                slice(start * block_points, end * block_points + 1)
+                for start, end in zip(first, ends, strict=True)
+            ),
+        )
+
+
+def too_small(what: str, room: Room, runtime: Runtime, whole: int, brick: int) -> DeviceMemoryError:
+    """Return the error for a volume of which not even one brick has room.
+
+    Parameters
+    ----------
+    what : str
+        The volume.
+    room : Room
+        What there is.
+    runtime : Runtime
+        The device.
+    whole, brick : int
+        Bytes of the volume, and of one brick, each with what it needs beside.
+    """
+    info = runtime.info
+    given = (
+        f"{info.full_name!r} has {bytes_text(info.global_memory)}, of which this process holds "
+        f"{bytes_text(runtime.allocated)}, and allows {bytes_text(info.max_allocation)} per buffer"
+        if room.limit is None
+        else f"memory_limit is {bytes_text(room.limit)}"
+    )
+    return DeviceMemoryError(
+        f"{what} takes {bytes_text(whole + room.working)} in one piece and at least "
+        f"{bytes_text(brick + room.working + room.sample_bytes)} brick by brick, "
+        f"{room.rays} included; {given}: raise memory_limit, or use a smaller window size or "
+        "max_supersegments, or another device"
+    )

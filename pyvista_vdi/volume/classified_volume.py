@@ -1,0 +1,433 @@
+"""A volume and its classification on a device, shared by generation and direct volume rendering."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, padded
+from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.device.ray_forms import Floats, PixelRays, packed, packed_pairs
+from pyvista_vdi.device.work_order import GROUP
+from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.checks import as_float
+from pyvista_vdi.model.float32_limits import MOST_STEPS, compensation, entries, held_unit_distance
+from pyvista_vdi.model.lighting import Lights
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.volume.bricks import (
+    DeviceBricks,
+    Room,
+    fitting_layout,
+    least_brick_bytes,
+    too_small,
+)
+from pyvista_vdi.volume.light_tables import gradient_table, lighting_table, shading_defines
+from pyvista_vdi.volume.occlusion_grid import ambient_transmittances
+from pyvista_vdi.volume.upload import (
+    BLOCK_BYTES,
+    TABLE_BYTES,
+    Scale,
+    blocks_over,
+    described,
+    device_bytes,
+    fits_whole,
+    integer_ends,
+    reads_natively,
+    scale_of,
+    upload_ranges,
+    upload_voxels,
+    uploads_of,
+    voxel_defines,
+    voxel_reader,
+)
+
+#: Blocks: farther than this no march looks for what is not transparent.
+_FARTHEST = 16
+#: Share of transparent blocks from which on looking for them pays. Measured (docs/performance.md):
+#: where none is, a picture takes 1.2 to 1.35 times as long with the look as without; from .32 on it
+#: takes .4 to .85.
+_WORTH_SKIPPING = 0.15
+
+
+@dataclass(frozen=True)
+class MarchForms:
+    """The rays of a view through a volume, as ``begin_march`` of ``volume/march.cl`` takes them.
+
+    Attributes
+    ----------
+    forms : list of numpy.ndarray
+        Three index positions, three model directions, then the planes to clip to.
+    rays : PixelRays
+        The rays that they belong to.
+    planes : int
+        How many of the forms are planes.
+    defines : dict
+        ``-D`` names of the kernels that read them.
+    """
+
+    forms: list[Floats]
+    rays: PixelRays
+    planes: int
+    defines: dict[str, str | int | None]
+
+    def packed(self, *more: Floats) -> NDArray[np.float32]:
+        """Return the forms, and more of the same rays, as the kernels read them."""
+        pack = packed_pairs if self.defines else packed
+        return pack([*self.forms, *more])
+
+
+class DeviceVolume:
+    """A classified volume as kernel arguments.
+
+    Parameters
+    ----------
+    runtime : Runtime
+        The device.
+    volume : Volume
+        Uploaded once per device and kept as long as the object lives.
+    transfer_function : TransferFunction
+        Its table is uploaded each time: a few kilobytes.
+    sample_distance : float, optional
+        Length of a step, model units; half the smallest spacing by default.
+    skip_empty : bool
+        Pass by blocks that the transfer function makes transparent; the samples stay the same.
+    lights : Lights, optional
+        What a shaded volume is lit by; one headlight by default.
+    ambient_occlusion : AmbientOcclusion, optional
+        Darkens samples by what stands around them; computed once for a classification.
+    room : Room, optional
+        Memory that there is; a volume for which it is too little is held brick by brick. Without
+        it a volume is held in one piece or refused.
+
+    Attributes
+    ----------
+    bricks : DeviceBricks or None
+        What is on the device, where that is not the whole volume: steps must be sampled by a
+        :class:`~pyvista_vdi.volume.bricks.StepSampler` before kernels march along them.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If ``sample_distance`` is not a positive length.
+    DeviceMemoryError
+        If the volume or the grid of its occlusion does not fit.
+    """
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        volume: Volume,
+        transfer_function: TransferFunction,
+        sample_distance: float | None = None,
+        *,
+        skip_empty: bool = True,
+        lights: Lights | None = None,
+        ambient_occlusion: AmbientOcclusion | None = None,
+        room: Room | None = None,
+    ) -> None:
+        if not isinstance(volume, Volume):
+            raise InvalidArgumentError(f"expected a Volume, got {type(volume).__name__}")
+        if not isinstance(transfer_function, TransferFunction):
+            raise InvalidArgumentError(
+                f"expected a TransferFunction, got {type(transfer_function).__name__}"
+            )
+        self.volume = volume
+        self.sample_distance = checked_sample_distance(volume, sample_distance)
+        self.unit_distance = held_unit_distance(
+            transfer_function.unit_distance or volume.default_unit_distance, self.sample_distance
+        )
+        low, high = transfer_function.scalar_range
+        native = reads_natively(runtime, volume, transfer_function, room)
+        scale = None if native else scale_of(volume, low, high)
+        self.defines = voxel_defines(volume, native)
+        whole = room is None or fits_whole(runtime, volume, scale, room)
+        if room is None or whole:
+            self._voxels, ranges = upload_voxels(runtime, volume, scale, self.defines)
+        else:
+            ranges = upload_ranges(runtime, volume, scale, self.defines, room)
+        self._low, span = (low, high - low) if native else (0.0, 1.0 if high > low else 0.0)
+        table = np.column_stack([transfer_function.colors, transfer_function.opacities])
+        self._entries = len(table)
+        self._per_scalar = _per_scalar(self._entries, span)
+        self._table = runtime.upload(np.ascontiguousarray(table), "transfer function")
+        self._visible = self._reaches = self._visibility(runtime, ranges, transfer_function)
+        if skip_empty:
+            seen = runtime.download(self._visible)
+            if 1.0 - float(np.mean(seen)) >= _WORTH_SKIPPING:
+                self.defines["SKIP_EMPTY"] = 1
+                self._reaches = self._reaches_of(runtime, seen)
+        if transfer_function.interpolation == "nearest":
+            self.defines["NEAREST"] = 1
+            if native and (ends := integer_ends(runtime, volume, ranges)):
+                self._look_up_by_scalar(runtime, *ends)
+        self._runtime = runtime
+        self._shading = transfer_function.shading
+        self._lights = Lights() if lights is None else lights
+        self._lit: tuple[Camera, DeviceBuffer] | None = None
+        self._gradient: tuple[DeviceBuffer, ...] = ()
+        shading = shading_defines(transfer_function, self._lights)
+        if transfer_function.gradient_opacities is not None:
+            gradient = gradient_table(volume, transfer_function, scale.unit if scale else 1.0)
+            self._gradient = (runtime.upload(gradient, "gradient opacity"),)
+        self.ambient_occlusion = ambient_occlusion
+        self._occlusion: tuple[Any, ...] = ()
+        if ambient_occlusion is not None:
+            if not whole:
+                raise DeviceMemoryError(
+                    f"ambient occlusion needs the volume {volume.name!r} in one piece, "
+                    f"{bytes_text(device_bytes(volume, scale))}: raise memory_limit, leave "
+                    "ambient_occlusion out, or use another device"
+                )
+            unlit = {k: v for k, v in shading.items() if k == "GRADIENT_OPACITY"}
+            self._occlusion = self._occluded(
+                ambient_occlusion, transfer_function, {**self.defines, **unlit}
+            )
+            shading["OCCLUSION"] = 1
+        self.defines.update(shading)
+        self.defines.update(compensation(volume.length / self.sample_distance))
+        # Last: nothing that fails then keeps them for as long as somebody looks at the error
+        self.bricks: DeviceBricks | None = None
+        if room is not None and not whole:
+            self.bricks = self._bricks_within(room, scale, transfer_function)
+            self._voxels = self.bricks.pool
+            self.defines["SAMPLED"] = 1
+
+    def _look_up_by_scalar(self, runtime: Runtime, first: int, last: int) -> None:
+        """Replace the table by one of what each scalar from ``first`` to ``last`` looks like."""
+        n = last - first + 1
+        media = runtime.buffer((n, 4), name="media of scalars")
+        with self._table:
+            runtime.launch(
+                runtime.kernel("volume/scalar_media.cl", "scalar_media"),
+                padded(n, GROUP),
+                GROUP,
+                self._table,
+                np.int32(self._entries),
+                np.float32(self._low),
+                np.float32(self._per_scalar),
+                np.int32(first),
+                np.int32(n),
+                media,
+            )
+            runtime.finish()  # the table may be host memory in use
+        self._table, self._entries, self._low, self._per_scalar = media, n, float(first), 1.0
+        self.defines["BY_SCALAR"] = 1
+
+    def giving_bricks_back(self) -> contextlib.AbstractContextManager[object]:
+        """Give back what bricks take at the end of a ``with`` block, also if it fails."""
+        return contextlib.nullcontext() if self.bricks is None else self.bricks
+
+    @property
+    def most_steps(self) -> int:
+        """Steps of the longest ray."""
+        return math.ceil(self.volume.length / self.sample_distance) + 1
+
+    def medium_arguments(self, camera: Camera) -> tuple[Any, ...]:
+        """Arguments ``voxels`` to ``forms``, without it, of the kernels that march.
+
+        ``camera`` is the view: lights may move with it.
+        """
+        return (
+            *self._classified(self._reaches),
+            *self._lighting(camera),
+            *self._gradient,
+            *self._occlusion,
+        )
+
+    def _bricks_within(
+        self, room: Room, scale: Scale | None, transfer_function: TransferFunction
+    ) -> DeviceBricks:
+        """Return room for bricks of the volume, none of which is there yet."""
+        runtime = self._runtime
+        volume = self.volume
+        gradients = (
+            transfer_function.shading is not None
+            or transfer_function.gradient_opacities is not None
+        )
+        dtype = volume.array.dtype if scale is None else np.dtype(np.float32)
+        point_bytes = dtype.itemsize * math.prod(volume.array.shape[3:])
+        others = math.prod(blocks_over(volume)) * BLOCK_BYTES + TABLE_BYTES
+        left = room.for_bricks(runtime, others)
+        largest = runtime.info.max_allocation
+        found = fitting_layout(volume.dimensions, point_bytes, gradients, left, largest)
+        if found is None:
+            least = least_brick_bytes(volume.dimensions, point_bytes, gradients) + others
+            whole = device_bytes(volume, scale) + others
+            raise too_small(described(volume), room, runtime, whole, least)
+        return DeviceBricks(
+            runtime,
+            volume.array,
+            voxel_reader(scale),
+            dtype,
+            *found,
+            room.limit,
+            self._visible,
+            volume.name,
+        )
+
+    def _classified(self, blocks: DeviceBuffer) -> tuple[Any, ...]:
+        """Arguments ``voxels`` to ``blocks``, of which ``blocks`` says what may be skipped."""
+        return (
+            self._voxels,
+            np.array([*self.volume.dimensions, 0], dtype=np.int32),
+            self._table,
+            np.int32(self._entries),
+            np.float32(self._low),
+            np.float32(self._per_scalar),
+            blocks,
+            np.array([*blocks_over(self.volume), 0], dtype=np.int32),
+        )
+
+    def _occluded(
+        self,
+        occlusion: AmbientOcclusion,
+        transfer_function: TransferFunction,
+        defines: dict[str, str | int | None],
+    ) -> tuple[Any, ...]:
+        """Return the grid of the occlusion as kernel arguments, made once and kept."""
+        grid = OcclusionGrid.of(self.volume, occlusion)
+        # Colours and shading have no part in it
+        opacity = transfer_function.replace(
+            colors=np.zeros_like(transfer_function.colors), shading=None
+        )
+        radius, directions = occlusion.radius_in(self.volume), occlusion.directions
+        key = (opacity, radius, directions, self.sample_distance)
+        uploads = uploads_of(self.volume)
+        with self._runtime.holding(uploads.lock):
+            kept = uploads.occlusions.get(self._runtime)
+            if kept is None or kept[0] != key:
+                uploads.occlusions.pop(self._runtime, None)  # its memory goes first
+                kept = None
+                ambient = ambient_transmittances(
+                    self._runtime,
+                    grid,
+                    (*self._classified(self._visible), *self._gradient),
+                    self._classified(self._visible)[-2:],
+                    defines,
+                    self.sample_distance,
+                    self.unit_distance,
+                )
+                uploads.occlusions[self._runtime] = kept = (key, ambient)
+        to_nodes = [*(1 / edge for edge in grid.cell), occlusion.strength]
+        return (
+            kept[1],
+            np.array([*grid.nodes, 0], dtype=np.int32),
+            np.array(to_nodes, dtype=np.float32),
+        )
+
+    def _lighting(self, camera: Camera) -> tuple[DeviceBuffer, ...]:
+        """Return the lights of a view on the device, if the volume is shaded."""
+        if self._shading is None:
+            return ()
+        if self._lit is None or self._lit[0] != camera:
+            table = lighting_table(self.volume, camera, self._shading, self._lights)
+            self._lit = (camera, self._runtime.upload(table, "lights"))
+        return (self._lit[1],)
+
+    def _visibility(
+        self, runtime: Runtime, ranges: DeviceBuffer, transfer_function: TransferFunction
+    ) -> DeviceBuffer:
+        """Return which blocks hold anything that is not transparent, uint8 on the device."""
+        n = int(np.prod(blocks_over(self.volume)))
+        visible = runtime.buffer((n,), np.uint8, "visible blocks")
+        before = np.zeros(self._entries + 1, np.uint32)
+        np.cumsum(transfer_function.opacities > 0, out=before[1:])
+        kernel = runtime.kernel("volume/volume_blocks.cl", "block_visibility", self.defines)
+        with runtime.upload(before, "visible entries") as visible_before:
+            runtime.launch(
+                kernel,
+                padded(n, GROUP),
+                GROUP,
+                ranges,
+                np.uint32(n),
+                visible_before,
+                np.int32(self._entries),
+                np.float32(self._low),
+                np.float32(self._per_scalar),
+                visible,
+            )
+            runtime.finish()  # the table above may be host memory in use
+        return visible
+
+    def _reaches_of(self, runtime: Runtime, seen: NDArray[np.uint8]) -> DeviceBuffer:
+        """Return how far each block is from one that may be visible, uint8 on the device."""
+        n = np.uint32(seen.size)
+        kernel = runtime.kernel("volume/volume_blocks.cl", "block_reaches", self.defines)
+        far = np.where(seen > 0, 0, _FARTHEST).astype(np.uint8)
+        reaches = runtime.upload(far, "empty blocks")
+        apart = 1
+        for along in blocks_over(self.volume):
+            with reaches as before:
+                reaches = runtime.buffer((seen.size,), np.uint8, "reaches of empty blocks")
+                runtime.launch(
+                    kernel,
+                    padded(seen.size, GROUP),
+                    GROUP,
+                    before,
+                    n,
+                    np.uint32(apart),
+                    np.int32(along),
+                    np.int32(_FARTHEST),
+                    reaches,
+                )
+                runtime.finish()  # what was read is released
+            apart *= along
+        return reaches
+
+    def forms(
+        self, camera: Camera, window_size: Sequence[int], clipping_planes: ArrayLike | None
+    ) -> MarchForms:
+        """Return what the kernels march along in a view."""
+        pixel_rays = rays.pixel_rays(camera, window_size, self.volume.bounds)
+        to_index = rays.inverse_affine(self.volume.index_to_model)
+        index = [pixel_rays.form(row[:3], row[3]) for row in to_index[:3]]
+        direction = [pixel_rays.form(axis) for axis in np.eye(3)]
+        planes = []
+        for form, points in zip(index, self.volume.dimensions, strict=True):
+            far = -form
+            far[0] += points - 1
+            planes += [form, far]
+        planes += rays.eye_plane(camera, pixel_rays)
+        planes += rays.user_planes(camera, pixel_rays, clipping_planes)
+        reach = rays.largest_value(camera, window_size, self.volume.bounds, index)
+        defines = entries(reach, max(self.volume.dimensions))
+        return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), defines)
+
+
+def checked_sample_distance(volume: Volume, sample_distance: float | None) -> float:
+    """Return the length of a step in model units; half the smallest spacing by default."""
+    least = volume.length / MOST_STEPS
+    if sample_distance is None:
+        step = min(volume.spacing) / 2
+        if step < least:
+            raise InvalidArgumentError(
+                f"half the smallest spacing, {step:.3g}, is less than 2^-19 of the volume's "
+                f"diagonal, {least:.3g}: float32 cannot sum up so many steps; give a longer "
+                "sample_distance, or resample the volume"
+            )
+        return step
+    step = as_float(sample_distance)
+    if not (np.isfinite(step) and step >= least):
+        raise InvalidArgumentError(
+            f"sample_distance must be a length of at least {least:.3g} model units "
+            f"(2^-19 of the volume's diagonal); got {sample_distance!r}"
+        )
+    # No ray is longer than the diagonal; float32 may not hold how much longer the step is
+    return min(step, 2 * volume.length)
+
+
+def _per_scalar(entries: int, span: float) -> float:
+    """Table positions per unit of scalar; a huge number where the range is a single scalar."""
+    if entries == 1:
+        return 0.0
+    largest = float(np.finfo(np.float32).max)
+    return min((entries - 1) / span, largest) if span > 0 else largest

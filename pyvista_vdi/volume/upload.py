@@ -1,0 +1,342 @@
+"""A volume's voxels on a device, as they are or scaled, and the scalar ranges of its blocks."""
+
+from __future__ import annotations
+
+import math
+import threading
+import weakref
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.device import DeviceBuffer, Runtime, aligned_empty, kept_together, padded
+from pyvista_vdi.device.work_order import GROUP
+from pyvista_vdi.model.float32_limits import LARGEST_VOXEL, scalars_suit_float32
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.volume.bricks import Room, in_parts
+
+#: Voxel types that the kernels read as they are; the others are scaled to float32 on the host.
+_DEVICE_TYPES = {
+    "uint8": "uchar",
+    "int8": "char",
+    "uint16": "ushort",
+    "int16": "short",
+    "float32": "float",
+}
+#: Logarithm to base 2 of the points along each edge of a block that can be skipped.
+_BLOCK_SHIFT = 3
+#: Most bytes of a volume that are looked through at a time for the ranges of its blocks, and how
+#: many such parts there must be room for.
+_PART_BYTES, _PARTS = 64 * 2**20, 4
+#: Bytes on the device of what is known of a block: its scalar range, whether it is visible, and its
+#: reach, which is made from another one.
+BLOCK_BYTES = 11
+#: Bytes that are kept for tables: transfer functions, lights, rays. They may be a tenth of it.
+TABLE_BYTES = 2**20
+#: Scalars of 16 bits that are looked up and not classified at each sample: 64 KiB of media.
+_MOST_LOOKED_UP = 4096
+#: Where scaled voxels end, in ranges of the transfer function.
+_BEYOND = 2.0**60
+#: Scaled voxels that are above the only scalar of a range are so by this at least.
+_ABOVE = 2.0**-60
+_uploads: weakref.WeakKeyDictionary[Volume, _Uploads] = weakref.WeakKeyDictionary()
+_uploads_lock = threading.Lock()
+
+
+def voxel_defines(volume: Volume, native: bool) -> dict[str, str | int | None]:
+    """Return the ``-D`` names by which kernels find and read a voxel."""
+    defines: dict[str, str | int | None] = {
+        "VOXEL_T": _DEVICE_TYPES[volume.array.dtype.name] if native else "float",
+        "INDEX_T": "ulong" if volume.array.size >= 2**32 else "uint",
+        "BLOCK_SHIFT": _BLOCK_SHIFT,
+    }
+    if volume.rgba:
+        defines["RGBA"] = 1
+    return defines
+
+
+def voxel_bytes(volume: Volume, transfer_function: TransferFunction | None = None) -> int:
+    """Return the bytes of a scalar, or of a colour's component, on the device.
+
+    Scalars are taken to be read as they are where it is not known what for.
+    """
+    native = volume.array.dtype.name in _DEVICE_TYPES
+    if transfer_function is not None:
+        native = _suits_natively(volume, transfer_function)
+    return volume.array.dtype.itemsize if native else np.dtype(np.float32).itemsize
+
+
+def reads_natively(
+    runtime: Runtime, volume: Volume, transfer_function: TransferFunction, room: Room | None
+) -> bool:
+    """Whether kernels read the voxels as they are, or scaled to the transfer function's range."""
+    if not _suits_natively(volume, transfer_function):
+        return False
+    return volume.array.dtype.kind != "f" or not _too_large(runtime, volume, room)
+
+
+def _suits_natively(volume: Volume, transfer_function: TransferFunction) -> bool:
+    """Whether type and range let kernels read the voxels as they are."""
+    dtype = volume.array.dtype
+    if dtype.name not in _DEVICE_TYPES:
+        return False
+    if volume.rgba:  # a byte is exact, and colours have no such range
+        return True
+    low, high = transfer_function.scalar_range
+    return scalars_suit_float32(low, high, dtype, transfer_function.interpolation)
+
+
+def _too_large(runtime: Runtime, volume: Volume, room: Room | None = None) -> bool:
+    """Whether differences of a float32 volume's finite voxels may overflow; found once."""
+    uploads = uploads_of(volume)
+    if uploads.too_large is None:
+        defines = voxel_defines(volume, True)
+        if room is None or fits_whole(runtime, volume, None, room):
+            ends = runtime.download(upload_voxels(runtime, volume, None, defines)[1])
+        else:
+            ends = _ranges_in_parts(runtime, volume, None, defines, room)
+        largest = np.abs(ends).max(initial=0.0, where=np.isfinite(ends))
+        uploads.too_large = bool(largest > LARGEST_VOXEL)
+    return uploads.too_large
+
+
+def uploads_of(volume: Volume) -> _Uploads:
+    """Return what devices have of a volume, the same as long as the object lives."""
+    with _uploads_lock:
+        return _uploads.setdefault(volume, _Uploads())
+
+
+class _Uploads:
+    """What is on devices of one volume; its lock lets the thread that uploads it be the only one.
+
+    Voxels and the scalar range of each block, by device and scaling; the last classification's
+    ambient occlusion, by device, with what it was computed from.
+    """
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.made: dict[Any, tuple[DeviceBuffer, DeviceBuffer]] = {}
+        #: Scalar range of each block of a volume that no device holds in one piece, by scaling.
+        self.ranges: dict[Any, NDArray[np.float32]] = {}
+        #: Whether float32 cannot hold the voxels' differences; None before anyone has asked.
+        self.too_large: bool | None = None
+        #: The least and the largest voxel of 16 bits; None before anyone has asked.
+        self.ends: tuple[int, int] | None = None
+        self.occlusions: dict[Runtime, tuple[Any, DeviceBuffer]] = {}
+
+
+def blocks_over(volume: Volume) -> tuple[int, int, int]:
+    """Blocks along x, y and z that cover the cells of a volume."""
+    return _blocks_of(volume.dimensions)
+
+
+def _blocks_of(dimensions: Sequence[int]) -> tuple[int, int, int]:
+    """Blocks along x, y and z that cover the cells of a grid of so many points."""
+    x, y, z = (-(-(points - 1) // 2**_BLOCK_SHIFT) for points in dimensions)
+    return x, y, z
+
+
+def device_bytes(volume: Volume, scale: Scale | None) -> int:
+    """Bytes of the volume on a device."""
+    return volume.array.nbytes if scale is None else 4 * volume.array.size
+
+
+def described(volume: Volume) -> str:
+    """Return a volume in words, for errors."""
+    nx, ny, nz = volume.dimensions
+    return f"the volume {volume.name!r}, {nx} x {ny} x {nz} of {volume.array.dtype}"
+
+
+def fits_whole(runtime: Runtime, volume: Volume, scale: Scale | None, room: Room) -> bool:
+    """Whether there is room for a volume in one piece."""
+    uploaded = (runtime, scale) in uploads_of(volume).made
+    nbytes, blocks = device_bytes(volume, scale), math.prod(blocks_over(volume))
+    return room.holds(runtime, nbytes, blocks * BLOCK_BYTES + TABLE_BYTES, uploaded=uploaded)
+
+
+def volume_bytes(volume: Volume, nbytes: int, room: Room) -> tuple[int, int]:
+    """Return what a volume of ``nbytes`` on the device takes there, and its rays' samples, bytes.
+
+    What its blocks and tables take is in it where there is a limit.
+    """
+    if room.limit is None:
+        return nbytes, 0
+    others = math.prod(blocks_over(volume)) * BLOCK_BYTES + TABLE_BYTES
+    if nbytes + others + room.working <= room.limit:
+        return nbytes + others, 0
+    return room.limit - room.working - room.sample_bytes, room.sample_bytes
+
+
+def voxel_reader(scale: Scale | None) -> Callable[[NDArray[Any]], NDArray[Any]]:
+    """Return what makes of voxels what the kernels read."""
+    return (lambda part: part) if scale is None else (lambda part: _scaled(part, scale))
+
+
+def upload_voxels(
+    runtime: Runtime,
+    volume: Volume,
+    scale: Scale | None,
+    defines: dict[str, str | int | None],
+) -> tuple[DeviceBuffer, DeviceBuffer]:
+    """Return voxels and the scalar range of each block, made once per device and scaling."""
+    uploads = uploads_of(volume)
+    with runtime.holding(uploads.lock):
+        made = uploads.made
+        for other in [key for key in made if key[0] is runtime and key[1] != scale]:
+            del made[other]  # one copy per device: the last classification's
+        key = (runtime, scale)
+        if key not in made:
+            _require_a_number(runtime, volume)
+            array = volume.array if scale is None else _all_scaled(runtime, volume.array, scale)
+            with kept_together() as keep:
+                voxels = keep(runtime.upload(array, f"volume {volume.name!r}"))
+                ranges = keep(_block_ranges(runtime, volume.dimensions, voxels, defines))
+                runtime.finish()  # a thread with another queue may use them next
+            made[key] = (voxels, ranges)
+        return made[key]
+
+
+def upload_ranges(
+    runtime: Runtime,
+    volume: Volume,
+    scale: Scale | None,
+    defines: dict[str, str | int | None],
+    room: Room,
+) -> DeviceBuffer:
+    """Return the scalar range of each block of a volume that the device holds brick by brick."""
+    uploads = uploads_of(volume)
+    with runtime.holding(uploads.lock):
+        for other in [key for key in uploads.made if key[0] is runtime]:
+            del uploads.made[other]  # its memory goes to the bricks
+        if scale not in uploads.ranges:
+            _require_a_number(runtime, volume)
+            uploads.ranges = {scale: _ranges_in_parts(runtime, volume, scale, defines, room)}
+        return runtime.upload(uploads.ranges[scale], "ranges of blocks")
+
+
+def _ranges_in_parts(
+    runtime: Runtime,
+    volume: Volume,
+    scale: Scale | None,
+    defines: dict[str, str | int | None],
+    room: Room,
+) -> NDArray[np.float32]:
+    """Return the scalar range of each block, float32 (n, 2), from parts of the volume."""
+    blocks, read = blocks_over(volume), voxel_reader(scale)
+    ranges = aligned_empty((*reversed(blocks), 2), np.float32)
+    point_bytes = device_bytes(volume, scale) // math.prod(volume.dimensions)
+    nbytes = min(_PART_BYTES, room.in_all(runtime) // _PARTS, runtime.info.max_allocation)
+    for place, points in in_parts(blocks, 2**_BLOCK_SHIFT, point_bytes, nbytes):
+        runtime.give_way()
+        part = np.ascontiguousarray(read(volume.array[points]))
+        nz, ny, nx = part.shape[:3]
+        with (
+            runtime.upload(part, f"part of volume {volume.name!r}") as voxels,
+            _block_ranges(runtime, (nx, ny, nz), voxels, defines) as found,
+        ):
+            ranges[place] = runtime.download(found).reshape(ranges[place].shape)
+    return ranges.reshape(-1, 2)
+
+
+def _block_ranges(
+    runtime: Runtime,
+    dimensions: Sequence[int],
+    voxels: DeviceBuffer,
+    defines: dict[str, str | int | None],
+) -> DeviceBuffer:
+    """Return the scalar range of each block of a grid of so many points along x, y and z."""
+    blocks = _blocks_of(dimensions)
+    n = int(np.prod(blocks))
+    ranges = runtime.buffer((n, 2), name="ranges of blocks")
+    runtime.launch(
+        runtime.kernel("volume/volume_blocks.cl", "block_ranges", defines),
+        padded(n, GROUP),
+        GROUP,
+        voxels,
+        np.array([*dimensions, 0], dtype=np.int32),
+        np.array([*blocks, 0], dtype=np.int32),
+        ranges,
+    )
+    return ranges
+
+
+def integer_ends(runtime: Runtime, volume: Volume, ranges: DeviceBuffer) -> tuple[int, int] | None:
+    """Return the least and the largest scalar that voxels may have, if they are few enough."""
+    dtype = volume.array.dtype
+    if dtype.kind not in "iu":
+        return None
+    if dtype.itemsize == 1:
+        return (0, 255) if dtype.kind == "u" else (-128, 127)
+    uploads = uploads_of(volume)
+    if uploads.ends is None:
+        blocks = runtime.download(ranges)
+        uploads.ends = int(blocks[:, 0].min()), int(blocks[:, 1].max())
+    least, largest = uploads.ends
+    return uploads.ends if largest - least < _MOST_LOOKED_UP else None
+
+
+def _require_a_number(runtime: Runtime, volume: Volume) -> None:
+    """Refuse a volume that is NaN throughout; nearly every other is known by its first plane."""
+    if volume.array.dtype.kind != "f":
+        return
+    for plane in volume.array:
+        runtime.give_way()
+        if not np.isnan(plane).all():
+            return
+    volume.finite_range()  # says what is wrong
+
+
+class Scale(NamedTuple):
+    """How voxels are taken relative to a transfer function's range.
+
+    Attributes
+    ----------
+    low : float
+        The scalar that becomes 0.
+    unit : float
+        Scalars per unit of the device's voxels.
+    step : bool
+        Whether ``low`` is the whole range, so that being above it is what counts.
+    """
+
+    low: float
+    unit: float
+    step: bool
+
+
+def scale_of(volume: Volume, low: float, high: float) -> Scale:
+    """Return how to take voxels relative to a transfer function's range of scalars."""
+    if high > low:
+        return Scale(low, high - low, False)
+    farthest = 0.0
+    for plane in volume.scalars:
+        finite = plane[np.isfinite(plane)].astype(np.float64)
+        farthest = max(farthest, float(np.abs(finite / 2 - low / 2).max(initial=0.0)))
+    return Scale(low, 2 * farthest or 1.0, True)
+
+
+def _all_scaled(runtime: Runtime, array: NDArray[Any], scale: Scale) -> NDArray[np.float32]:
+    """Scale a volume plane by plane, see :func:`_scaled`."""
+    scaled = aligned_empty(array.shape, np.float32)
+    for plane, target in zip(array, scaled, strict=True):
+        runtime.give_way()
+        target[...] = _scaled(plane, scale)
+    return scaled
+
+
+def _scaled(array: NDArray[Any], scale: Scale) -> NDArray[np.float32]:
+    """32-bit integers and float64 to float32, taken relative to the transfer function's range.
+
+    float32 holds 24 bits: of a value far from zero compared with the range little would be left,
+    of its place in the range everything that the table can tell apart is.
+    """
+    scaled = (array.astype(np.float64) - scale.low) / scale.unit
+    if scale.step:  # what is above stays above, however little
+        scaled = np.where(scaled > 0, np.maximum(scaled, _ABOVE), scaled)
+    # Beyond any table anyway: their differences and the squares of these stay finite. An infinite
+    # voxel stays one
+    finite = np.clip(scaled, -_BEYOND, _BEYOND)
+    return np.where(np.isinf(array), scaled, finite).astype(np.float32)

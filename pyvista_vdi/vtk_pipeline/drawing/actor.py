@@ -1,0 +1,205 @@
+"""``VDIActor``: a real ``vtkVolume`` whose shader looks up the image of its VDI."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from vtkmodules.vtkRenderingCore import vtkVolume
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.picking import Pick
+from pyvista_vdi.raycasting.raycast import TRANSMITTANCE_CUTOFF
+from pyvista_vdi.vtk_pipeline.drawing.frame import as_array
+from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
+from pyvista_vdi.vtk_pipeline.drawing.shader import show_image
+from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
+
+
+class VDIActorMethods:
+    """What makes a volume show a VDI; mixed into VTK's and into PyVista's."""
+
+    def _become_vdi_actor(self: Any) -> None:
+        """Install the shader; to be called once, from ``__init__``."""
+        show_image(self)
+
+    def SetMapper(self: Any, mapper: Any) -> None:
+        """Set the mapper, which must be a :class:`VDIMapper` of its own.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is another mapper, or already behind another actor.
+        """
+        if mapper is not None and not isinstance(mapper, VDIMapperMethods):
+            raise InvalidArgumentError(
+                f"a VDIActor needs a VDIMapper; got {type(mapper).__name__}: an ordinary volume "
+                "mapper goes behind a vtkVolume"
+            )
+        if mapper is not None:
+            mapper.painter.set_actor(self)
+        old = self.GetMapper()
+        if isinstance(old, VDIMapperMethods) and old is not mapper:
+            old.painter.leave_actor(self)
+        super().SetMapper(mapper)  # type: ignore[misc]
+
+    @property
+    def vdi(self: Any) -> VDI | None:
+        """The VDI that is shown; ``None`` until the first frame has made it."""
+        mapper = self.GetMapper()
+        return None if mapper is None else mapper.GetVDI()
+
+    @property
+    def status(self: Any) -> VDIStatus:
+        """How the VDI was drawn in the last frame, and what goes on behind it."""
+        mapper = self.GetMapper()
+        if mapper is None:
+            raise InvalidArgumentError("this actor has no mapper, so there is no status of it")
+        return mapper.painter.status()  # type: ignore[no-any-return]
+
+    @property
+    def opacity_multiplier(self: Any) -> float:
+        """Factor of the extinction, 1 by default: see :meth:`VDIMapper.SetOpacityMultiplier`."""
+        mapper = self.GetMapper()
+        return 1.0 if mapper is None else mapper.GetOpacityMultiplier()
+
+    @opacity_multiplier.setter
+    def opacity_multiplier(self: Any, multiplier: float) -> None:
+        mapper = self.GetMapper()
+        if mapper is None:
+            raise InvalidArgumentError("this actor has no mapper whose opacity could be set")
+        mapper.SetOpacityMultiplier(multiplier)
+
+    @property
+    def transmittance_cutoff(self: Any) -> float:
+        """Light below which rays end: see :meth:`VDIMapper.SetTransmittanceCutoff`."""
+        mapper = self.GetMapper()
+        return TRANSMITTANCE_CUTOFF if mapper is None else mapper.GetTransmittanceCutoff()
+
+    @transmittance_cutoff.setter
+    def transmittance_cutoff(self: Any, cutoff: float) -> None:
+        mapper = self.GetMapper()
+        if mapper is None:
+            raise InvalidArgumentError("this actor has no mapper whose rays could be ended")
+        mapper.SetTransmittanceCutoff(cutoff)
+
+    def show_status(self: Any, renderer: Any = None, corner: str = "upper left") -> Any:
+        """Show :attr:`status` as a text in a corner, written anew in each frame.
+
+        Parameters
+        ----------
+        renderer : vtkRenderer or pyvista.Plotter, optional
+            Where; by default the renderer that shows the actor.
+        corner : {"lower left", "lower right", "upper left", "upper right"}
+            Which corner.
+
+        Returns
+        -------
+        vtkCornerAnnotation
+            The text: it can be styled (``GetTextProperty()``), hidden and removed.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If there is no such corner, or no renderer shows the actor.
+        """
+        mapper = self.GetMapper()
+        if renderer is None and mapper is not None:
+            renderer = mapper.painter.renderer()
+        renderer = getattr(renderer, "renderer", renderer)  # a plotter's active one
+        if mapper is None or renderer is None:
+            raise InvalidArgumentError(
+                "nothing shows this actor yet: add it to a renderer first, or pass the renderer"
+            )
+        return mapper.painter.texts.add(renderer, corner)
+
+    def pick(self: Any, x: float, y: float, *, renderer: Any = None) -> Pick | None:
+        """Return the supersegment that is seen at a place of the window.
+
+        Parameters
+        ----------
+        x, y : float
+            Display coordinates: pixels of the window from its lower left corner, as in VTK's
+            events and pickers.
+        renderer : vtkRenderer or pyvista.Plotter, optional
+            Which one, where renderers overlap; by default the one that shows the actor there.
+
+        Returns
+        -------
+        Pick or None
+            The first supersegment that reaches the opacity set by
+            ``GetMapper().SetPickingOpacity(...)``, and where the ray enters it, in world
+            coordinates. ``None`` where nothing of the VDI is hit, where something else that can
+            be picked is in front of the hit, and where the actor is invisible or not pickable.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If no renderer of a window shows the actor.
+        """
+        mapper = self.GetMapper()
+        shown = [] if mapper is None else mapper.painter.renderers()
+        shown = [r for r in shown if r.GetRenderWindow() is not None]
+        if not shown:
+            raise InvalidArgumentError(
+                "nothing shows this actor yet: add it to a renderer of a window first"
+            )
+        if renderer is not None:
+            shown = [r for r in shown if r is getattr(renderer, "renderer", renderer)]
+        there = [r for r in shown if r.IsInViewport(int(x), int(y))]
+        return mapper.painter.selection.pick(self, there[0], x, y) if there else None
+
+    def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
+        """Generate the VDI anew, now.
+
+        Parameters
+        ----------
+        camera : vtkCamera or pyvista.Camera or Camera, optional
+            The new generating view; by default the view of the renderer that shows the actor, or
+            the view before if none does.
+        window_size : (int, int), optional
+            Width and height of that view in pixels; by default the renderer's.
+
+        Returns
+        -------
+        VDI
+            What is shown from now on.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If there is no volume to make it from, or no view.
+        VDIError, KeyboardInterrupt
+            Whatever stops the generation; the VDI before stays.
+        """
+        mapper = self.GetMapper()
+        source = None if mapper is None else mapper.GetSource()
+        if source is None:
+            raise InvalidArgumentError(
+                "this actor shows a VDI without its volume, which cannot be generated anew: add "
+                "the volume, or set another VDI (actor.GetMapper().SetVDI(vdi))"
+            )
+        mapper.painter.upkeep.retry()
+        matrix = as_array(self.GetMatrix())
+        renderer = mapper.painter.renderer()
+        if camera is not None:
+            source.SetCamera(camera, matrix)
+        elif renderer is not None:
+            source.SetCamera(renderer.GetActiveCamera(), matrix)
+        if window_size is not None:
+            source.SetWindowSize(window_size)
+        elif renderer is not None and min(renderer.GetSize()) > 0:
+            source.SetWindowSize(renderer.GetSize())
+        return source.GetVDI()  # type: ignore[no-any-return]
+
+
+class VDIActor(VDIActorMethods, vtkVolume):
+    """Shows a VDI in a VTK scene: ``renderer.AddVolume(actor)``.
+
+    Position, scale, user matrix, visibility and picking are those of a ``vtkVolume``. Its volume
+    property has no effect here: the classification is in the VDI (see
+    ``VDISource.SetVolumeProperty``).
+    """
+
+    def __init__(self) -> None:
+        self._become_vdi_actor()

@@ -1,0 +1,376 @@
+"""``VDIMapper``: a real VTK volume mapper that draws a raycast VDI.
+
+VTK does not call Python overrides of C++ methods, so nothing here overrides ``Render``. The mapper
+is VTK's GPU ray caster on a proxy image of 2 x 2 x 2 voxels that has the VDI's bounds; observers
+on its start and end events have the image of exactly this frame raycast and bound as a texture,
+and the fragment shader that ``VDIActor`` installs looks it up.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NoReturn
+
+from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
+
+from pyvista_vdi.errors import UnsupportedError
+from pyvista_vdi.model.cropping import checked_opacity_multiplier
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.picking import checked_opacity
+from pyvista_vdi.raycasting.raycast import check_transmittance_cutoff
+from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
+from pyvista_vdi.vtk_pipeline.filters.source import VDISource
+from pyvista_vdi.vtk_pipeline.interaction.motion import checked_rate
+from pyvista_vdi.vtk_pipeline.interaction.regeneration import Policy, checked_bound, checked_policy
+
+#: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.
+COARSEST = 4.0
+
+
+def _on_start(mapper: Any, event: str) -> None:
+    mapper.painter.begin(mapper)
+
+
+def _on_end(mapper: Any, event: str) -> None:
+    mapper.painter.end()
+
+
+class VDIMapperMethods:
+    """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
+
+    _painter: Painter | None = None
+
+    def _become_vdi_mapper(self: Any) -> None:
+        """Install proxy and observers; to be called once, from ``__init__``."""
+        self._painter = Painter()
+        super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
+        self.SetImageSampleDistance(1.0)
+        self.SetMaximumImageSampleDistance(COARSEST)
+        super().SetInputDataObject(self._painter.proxy)  # type: ignore[misc]
+        # Plain functions: they get the mapper from VTK and hold nothing
+        self.AddObserver("VolumeMapperRenderStartEvent", _on_start)
+        self.AddObserver("VolumeMapperRenderEndEvent", _on_end)
+
+    @property
+    def painter(self) -> Painter:
+        """What draws; made with the mapper."""
+        assert self._painter is not None
+        return self._painter
+
+    # -- input -----------------------------------------------------------------------------------
+
+    def SetInputConnection(self, *args: Any) -> None:
+        """Draw what a :class:`VDISource` (or a reader of canonical images) makes."""
+        port = args[-1]
+        self._set_input(None if port is None else input_of_port(port))
+
+    def SetInputDataObject(self, *args: Any) -> None:
+        """Draw a VDI in its canonical form."""
+        self.SetInputData(args[-1])
+
+    def SetInputData(self, data: Any) -> None:
+        """Draw a VDI, or its canonical image."""
+        self._set_input(None if data is None else input_of(data))
+
+    def GetInputDataObject(self, *args: Any) -> Any:
+        """Return the box of the VDI's bounds that VTK is given in its place, and warn.
+
+        Nothing that draws asks for it by this method; what writes the scene for another renderer
+        does, and gets an empty box.
+        """
+        self.painter.say_not_exported()
+        return super().GetInputDataObject(*args)  # type: ignore[misc]
+
+    def SetVDI(self, vdi: VDI) -> None:
+        """Draw this VDI."""
+        self._set_input(input_of(vdi))
+
+    def GetVDI(self) -> VDI | None:
+        """Return the VDI that was drawn last, or would be drawn; ``None`` before the first."""
+        source = self.painter.input
+        if source is None:
+            return None
+        return source.last() if isinstance(source, SourceInput) else source.vdi()
+
+    def GetSource(self) -> VDISource | None:
+        """Return the :class:`VDISource` at the input, if it is one."""
+        source = self.painter.input
+        return source.source if isinstance(source, SourceInput) else None
+
+    def SetDevice(self, device: Any) -> None:
+        """Choose the OpenCL device that raycasts; ``None`` is the default one."""
+        self.painter.device = device
+
+    def GetDevice(self) -> Any:
+        """Return the device as it was set."""
+        return self.painter.device
+
+    def SetAutomaticView(self, automatic: bool) -> None:
+        """Give a source without camera the view of the first frame (on by default)."""
+        self.painter.upkeep.automatic_view = bool(automatic)
+
+    def GetAutomaticView(self) -> bool:
+        """Whether a source without camera gets the view of the first frame."""
+        return self.painter.upkeep.automatic_view
+
+    # -- how it is drawn -------------------------------------------------------------------------
+
+    def SetOpacityMultiplier(self: Any, multiplier: float) -> None:
+        """Multiply the extinction of everything that is drawn; 1 by default.
+
+        It acts on the next frame, without another VDI: 2 is twice as dense, 0 transparent. For
+        what is not opaque it is the same as dividing the volume property's scalar opacity unit
+        distance by it; changing that itself makes the VDI anew.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is no finite number, or below 0.
+        """
+        factor = checked_opacity_multiplier(multiplier)
+        if factor != self.painter.opacity_multiplier:
+            self.painter.opacity_multiplier = factor
+            self.Modified()
+
+    def GetOpacityMultiplier(self) -> float:
+        """Return the factor of the extinction."""
+        return self.painter.opacity_multiplier
+
+    def SetTransmittanceCutoff(self: Any, cutoff: float) -> None:
+        """End rays where less light than this is left; 10^-6 by default.
+
+        No channel of the picture loses more than that. VTK's own volume mappers stop at about
+        1/255. VDIs that overlap are merged to the default, whatever is set here.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is not from 0 to below 1.
+        """
+        least = check_transmittance_cutoff(cutoff)
+        if least != self.painter.transmittance_cutoff:
+            self.painter.transmittance_cutoff = least
+            self.Modified()
+
+    def GetTransmittanceCutoff(self) -> float:
+        """Return the light below which rays end."""
+        return self.painter.transmittance_cutoff
+
+    # -- while a hand moves ----------------------------------------------------------------------
+
+    # In VTK's GPU mapper the following would draw VTK's own volume into a smaller framebuffer, so
+    # its own switch stays off and these methods, called from Python, keep ours.
+
+    def SetAutoAdjustSampleDistances(self, on: bool) -> None:
+        """Draw previews of fewer pixels while the view moves (on by default).
+
+        Frames in a window whose desired update rate is at least ``GetInteractiveUpdateRate()``
+        are interactive: the window's interactor sets that rate while its style turns, pans or
+        zooms. Frames at rest, screenshots, exports and off-screen windows are always full.
+        """
+        if self._painter is not None:  # PyVista's constructor turns VTK's own switch off
+            self._painter.interaction.adjust = bool(on)
+
+    def GetAutoAdjustSampleDistances(self) -> bool:
+        """Whether previews are drawn."""
+        return self.painter.interaction.adjust
+
+    def AutoAdjustSampleDistancesOn(self) -> None:
+        """Draw previews."""
+        self.SetAutoAdjustSampleDistances(True)
+
+    def AutoAdjustSampleDistancesOff(self) -> None:
+        """Draw every frame in full."""
+        self.SetAutoAdjustSampleDistances(False)
+
+    def SetInteractiveUpdateRate(self, rate: float) -> None:
+        """Set the window's desired update rate from which on a frame is interactive, 1/s.
+
+        1 by default, as in ``vtkSmartVolumeMapper``.
+        """
+        self.painter.interaction.update_rate = checked_rate("the interactive update rate", rate)
+
+    def GetInteractiveUpdateRate(self) -> float:
+        """Return the desired update rate from which on a frame is interactive, 1/s."""
+        return self.painter.interaction.update_rate
+
+    def SetTargetFrameRate(self, rate: float | None) -> None:
+        """Set the frames per second that previews keep.
+
+        ``None``, the default, means the window's desired update rate, which the interactor gives
+        (``SetDesiredUpdateRate``: 15 in VTK, 30 in PyVista); 0 means that no rate is to be kept,
+        so that every frame is full. Several VDIs in a window keep the highest of their targets.
+        """
+        target = None if rate is None else checked_rate("the target frame rate", rate)
+        self.painter.interaction.target = target
+
+    def GetTargetFrameRate(self) -> float | None:
+        """Return the frames per second that previews keep, as it was set."""
+        return self.painter.interaction.target
+
+    def SetRegenerate(self, policy: Policy) -> None:
+        """Choose what decides that a view needs a VDI of its own.
+
+        Parameters
+        ----------
+        policy : {"auto", "never"} or callable
+            ``"auto"`` (the default): an estimate of the view's error, where somebody watches the
+            window. ``"never"``: only ``actor.regenerate()``. A callable gets a
+            :class:`~pyvista_vdi.vtk_pipeline.VDIStatus` once per frame and says whether to
+            regenerate; its ``ssim`` is ``None``, because it is asked in place of the estimate.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is something else.
+        """
+        self.painter.upkeep.regeneration.policy = checked_policy(policy)
+
+    def GetRegenerate(self) -> Policy:
+        """Return what decides that a view needs a VDI of its own."""
+        return self.painter.upkeep.regeneration.policy
+
+    def SetRegenerateBelow(self, ssim: float) -> None:
+        """Set the estimated SSIM below which ``"auto"`` regenerates a view at rest.
+
+        While the view moves, twice the error (1 - SSIM) is borne.
+        """
+        self.painter.upkeep.regeneration.bound = checked_bound(ssim)
+
+    def GetRegenerateBelow(self) -> float:
+        """Return the estimated SSIM below which ``"auto"`` regenerates."""
+        return self.painter.upkeep.regeneration.bound
+
+    def SetInteractiveOffScreen(self, on: bool) -> None:
+        """Treat off-screen windows as if somebody watched them (off by default).
+
+        For server-side rendering, where the window is off-screen and the person in a browser:
+        previews are drawn, and VDIs are made in the background.
+        """
+        self.painter.interaction.off_screen = bool(on)
+
+    def GetInteractiveOffScreen(self) -> bool:
+        """Whether off-screen windows are treated as if somebody watched them."""
+        return self.painter.interaction.off_screen
+
+    # -- picking ---------------------------------------------------------------------------------
+
+    def SetPickingOpacity(self, opacity: float) -> None:
+        """Set the opacity that a ray must reach in the VDI to pick it.
+
+        At least 0 and less than 1; 0.05 by default, as in VTK's pickers for volumes. What is
+        compared says ``SetPickingAccumulated``; see :func:`pyvista_vdi.pick`.
+        """
+        self.painter.selection.opacity = checked_opacity(opacity)
+
+    def GetPickingOpacity(self) -> float:
+        """Return the opacity that a ray must reach in the VDI to pick it."""
+        return self.painter.selection.opacity
+
+    def SetPickingAccumulated(self, accumulated: bool) -> None:
+        """Compare the opacity from the ray's beginning (the default), or each supersegment's."""
+        self.painter.selection.accumulated = bool(accumulated)
+
+    def GetPickingAccumulated(self) -> bool:
+        """Whether the opacity from the ray's beginning is compared."""
+        return self.painter.selection.accumulated
+
+    def _set_input(self: Any, source: Input | None) -> None:
+        self.painter.set_input(source)
+        self.Modified()
+
+    # -- what a VDI cannot honour ----------------------------------------------------------------
+
+    def SetBlendMode(self: Any, mode: int) -> None:
+        """Accept composite blending only."""
+        if mode != self.COMPOSITE_BLEND:
+            _refuse_blending()
+
+    def SetBlendModeToMaximumIntensity(self) -> NoReturn:
+        """Refuse."""
+        _refuse_blending()
+
+    def SetBlendModeToMinimumIntensity(self) -> NoReturn:
+        """Refuse."""
+        _refuse_blending()
+
+    def SetBlendModeToAverageIntensity(self) -> NoReturn:
+        """Refuse."""
+        _refuse_blending()
+
+    def SetBlendModeToAdditive(self) -> NoReturn:
+        """Refuse."""
+        _refuse_blending()
+
+    def SetBlendModeToIsoSurface(self) -> NoReturn:
+        """Refuse."""
+        _refuse_blending()
+
+    def SetBlendModeToSlice(self) -> NoReturn:
+        """Refuse."""
+        _refuse_blending()
+
+    def SetGlobalIlluminationReach(self, reach: float) -> None:
+        """Refuse VTK's shadows along light rays; 0 is accepted."""
+        if reach:
+            _refuse_illumination("SetGlobalIlluminationReach")
+
+    def SetVolumetricScatteringBlending(self, share: float) -> None:
+        """Refuse VTK's volumetric scattering; 0 is accepted."""
+        if share:
+            _refuse_illumination("SetVolumetricScatteringBlending")
+
+    def SetComputeNormalFromOpacity(self, on: bool) -> None:
+        """Refuse normals from opacity; ``SetComputeNormalFromOpacity(0)`` is accepted."""
+        if on:
+            self.ComputeNormalFromOpacityOn()
+
+    def ComputeNormalFromOpacityOn(self) -> NoReturn:
+        """Refuse."""
+        raise UnsupportedError(
+            "a VDI is shaded by the gradient of its scalars, and when it is generated: leave "
+            "ComputeNormalFromOpacity off"
+        )
+
+    def SetMaskInput(self, mask: Any) -> None:
+        """Refuse a mask; ``SetMaskInput(None)`` is accepted."""
+        if mask is not None:
+            raise UnsupportedError(
+                "a VDI cannot be masked when it is drawn: set masked voxels to a transparent "
+                "value before it is generated"
+            )
+
+
+def _refuse_blending() -> NoReturn:
+    raise UnsupportedError(
+        "a VDI stores what is composited along a ray, so only composite blending is supported: "
+        "draw the volume itself by one of VTK's mappers for another"
+    )
+
+
+def _refuse_illumination(setter: str) -> NoReturn:
+    raise UnsupportedError(
+        f"{setter} lights a volume while it is drawn, and a VDI is lit when it is generated: use "
+        "ambient_occlusion (VDISource.SetAmbientOcclusion), which darkens what is hidden"
+    )
+
+
+class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
+    """Draws a VDI in a VTK renderer, behind a :class:`VDIActor`.
+
+    The input is a :class:`VDISource` (``SetInputConnection``), a VDI in its canonical form
+    (``SetInputData``) or a :class:`~pyvista_vdi.VDI` (``SetVDI``). Before each frame it brings
+    the input up to date and raycasts it from the frame's view, ending rays at opaque geometry;
+    an image is kept as long as view, depth and VDI stay the same. Clipping planes
+    (``AddClippingPlane``), cropping (``SetCropping`` and its regions) and the opacity multiplier
+    act on the next frame without another VDI; other blending modes, masks and VTK's global
+    illumination are refused.
+
+    Notes
+    -----
+    A problem while drawing is reported once as a ``VDIWarning`` and the last good image stays:
+    exceptions cannot pass through VTK's renderer.
+    """
+
+    def __init__(self) -> None:
+        self._become_vdi_mapper()

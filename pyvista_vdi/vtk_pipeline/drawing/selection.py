@@ -1,0 +1,227 @@
+"""Picking: how a VDI draws itself in the passes of VTK's hardware selector.
+
+Such a pass draws numbers in place of colours. VTK's own volumes fill their box with theirs, write
+no depth, and wipe out what lies behind the box. A VDI draws its number where a ray hits it, at the
+depth of the hit, and nothing elsewhere; the z-buffer does the rest: a mesh in front of the hit
+wins, and so does one behind a part that is transparent.
+"""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from vtkmodules.vtkCommonCore import vtkInformation
+from vtkmodules.vtkCommonDataModel import vtkDataObject
+from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLActor
+
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, Pick, pick_vdi
+from pyvista_vdi.raycasting.raycast import render_first_hits
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
+from pyvista_vdi.vtk_pipeline.drawing.shader import show_first_hits, show_image
+from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture
+
+Hits = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a pass shows of a VDI.
+
+    Attributes
+    ----------
+    vdi : VDI
+        What is drawn.
+    frame : Frame
+        The viewport's view.
+    planes : numpy.ndarray or None
+        Clipping planes in the frame's world, (k, 6).
+    looks : dict
+        Its cropping and opacity multiplier: arguments of :func:`pyvista_vdi.pick`.
+    """
+
+    vdi: VDI
+    frame: Frame
+    planes: NDArray[np.float64] | None
+    looks: dict[str, Any]
+
+    def area(self, selected: tuple[int, ...]) -> tuple[int, int, int, int]:
+        """Return what of (x0, y0, x1, y1), both ends included, lies in the viewport.
+
+        Returns
+        -------
+        tuple of int
+            Lower left corner, width and height in pixels of the framebuffer; the latter may be 0.
+        """
+        (x, y), (width, height) = self.frame.origin, self.frame.size
+        left, bottom = max(x, selected[0]), max(y, selected[1])
+        right, top = min(x + width, selected[2] + 1), min(y + height, selected[3] + 1)
+        return left, bottom, max(0, right - left), max(0, top - bottom)
+
+
+class Selection:
+    """What happens behind a mapper in a selection's passes.
+
+    Attributes
+    ----------
+    opacity : float
+        What a hit has to reach.
+    accumulated : bool
+        Whether what is in front of a supersegment counts.
+    """
+
+    def __init__(self) -> None:
+        self.opacity = DEFAULT_OPACITY
+        self.accumulated = True
+        self._texture = ImageTexture()
+        self._drawn: tuple[Any, Hits] | None = None
+        self._uploads = 0
+        self._picking = False
+        self._seen: Seen | None = None
+
+    def take_settings(self, other: Selection) -> None:
+        """Take over what another counts as a hit."""
+        self.opacity, self.accumulated = other.opacity, other.accumulated
+
+    def enter(self, actor: Any, selector: Any) -> None:
+        """Have an actor draw hits, with their depth, in the pass that begins."""
+        show_first_hits(actor, selector.GetCurrentPass())
+        keys = actor.GetPropertyKeys()
+        if keys is None:
+            keys = vtkInformation()
+            actor.SetPropertyKeys(keys)
+        keys.Set(vtkOpenGLActor.GLDepthMaskOverride(), 1)
+
+    def leave(self, actor: Any) -> None:
+        """Have it draw its image, in the frame that begins, whatever was drawn last."""
+        show_image(actor)
+        keys = actor.GetPropertyKeys()
+        if keys is not None:
+            keys.Remove(vtkOpenGLActor.GLDepthMaskOverride())
+
+    def show(self, window: Any, selector: Any, seen: Seen | None, device: Any) -> None:
+        """Raycast and bind the hits in a selector's area; none if nothing is seen.
+
+        Raises
+        ------
+        DeviceError
+            If OpenCL or OpenGL fails; nothing can be picked then.
+        """
+        if self._picking:
+            self._seen = seen
+        # VTK draws volumes' numbers only where cells are selected: the points of what is around
+        cells = selector.GetFieldAssociation() == vtkDataObject.FIELD_ASSOCIATION_CELLS
+        if seen is None or not cells:
+            self._bind(window, _packed((0, 0, 0, 0), np.empty((0, 0), np.float32)))
+            return
+        area = seen.area(selector.GetArea())
+        planes = None if seen.planes is None else seen.planes.tobytes()
+        key = (
+            weakref.ref(seen.vdi),
+            seen.frame.camera,
+            area,
+            planes,
+            tuple(seen.looks.values()),
+            self.opacity,
+            self.accumulated,
+        )
+        if self._drawn is None or self._drawn[0] != key:
+            self._drawn = (key, _packed(area, self._depths(seen, area, device)))
+            self._uploads += 1
+        self._bind(window, self._drawn[1], self._uploads)
+
+    def let_go(self) -> None:
+        """Let go of the texture unit."""
+        self._texture.let_go()
+
+    def release(self) -> None:
+        """Free the texture."""
+        self._texture.release()
+        self._drawn = None
+
+    def pick(self, actor: Any, renderer: Any, x: float, y: float) -> Pick | None:
+        """Return what of an actor's VDI a renderer shows at a place of the window.
+
+        Parameters
+        ----------
+        actor : vtkVolume
+            The VDI's actor.
+        renderer : vtkRenderer
+            It shows the actor.
+        x, y : float
+            Display coordinates, pixels.
+
+        Returns
+        -------
+        Pick or None
+            ``None`` where nothing of it is hit, or something else is in front.
+        """
+        # VTK's hardware selection sees nothing through render passes (SSAA, eye-dome lighting ...)
+        render_pass = renderer.GetPass()
+        renderer.SetPass(None)
+        self._picking = True
+        try:
+            # Not PickProp, which picks from what a picker before has left (seen: VTK 9.7)
+            path = renderer.PickPropFrom(x, y, None)
+            seen = self._seen
+        finally:
+            renderer.SetPass(render_pass)
+            self._picking, self._seen = False, None
+        if path is None or path.GetLastNode().GetViewProp() is not actor or seen is None:
+            return None
+        left, bottom = seen.frame.origin
+        hit = pick_vdi(
+            seen.vdi,
+            seen.frame.camera,
+            (int(x) - left, int(y) - bottom),
+            seen.frame.size,
+            opacity_threshold=self.opacity,
+            accumulated=self.accumulated,
+            clipping_planes=seen.planes,
+            **seen.looks,
+        )
+        if hit is None:  # at the threshold, by rounding
+            return None
+        # From the frame's world, whose origin is the eye, to the scene's
+        px, py, pz, _ = np.linalg.solve(seen.frame.to_view, [*hit.position, 1.0]).tolist()
+        return replace(hit, position=(px, py, pz))
+
+    def _depths(self, seen: Seen, area: tuple[int, int, int, int], device: Any) -> Hits:
+        """Return window depth of the hits in an area, (h, w), bottom row first; inf for none."""
+        left, bottom, width, height = area
+        if width == 0 or height == 0:
+            return np.empty((0, 0), np.float32)
+        frame = seen.frame
+        corner = (
+            left - frame.origin[0],
+            frame.origin[1] + frame.size[1] - (bottom + height),  # from the top
+        )
+        depth = render_first_hits(
+            seen.vdi,
+            frame.camera.tile(frame.size, corner, (width, height)),
+            (width, height),
+            opacity_threshold=self.opacity,
+            accumulated=self.accumulated,
+            clipping_planes=seen.planes,
+            device=device,
+            **seen.looks,
+        )
+        return frame.window_depth(depth[::-1])
+
+    def _bind(self, window: Any, image: Hits, number: int | None = None) -> None:
+        self._texture.show(window, image, number, smooth=False)
+
+
+def _packed(area: tuple[int, int, int, int], depth: Hits) -> Hits:
+    """Return the texture that the shader reads: see ``shader.py``."""
+    height, width = depth.shape
+    image = np.zeros((height + 1, max(1, width), 4), dtype=np.float32)
+    image[0, 0] = area
+    hit = np.isfinite(depth)
+    image[1:, :width, 0][hit] = depth[hit]
+    image[1:, :width, 3] = hit
+    return image

@@ -1,0 +1,1 @@
+"""Sources, readers, writers and filters of VTK pipelines."""

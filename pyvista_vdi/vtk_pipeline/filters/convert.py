@@ -1,0 +1,418 @@
+"""VTK's images to and from the engine's volumes and VDIs; no voxel is copied where VTK lets us."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from vtkmodules import vtkCommonDataModel
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import VTK_UNSIGNED_CHAR, vtkDataArray, vtkStringArray
+from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
+from vtkmodules.vtkFiltersCore import vtkCellDataToPointData
+
+from pyvista_vdi.errors import (
+    InvalidCameraError,
+    InvalidVDIError,
+    InvalidVolumeError,
+    UnsupportedError,
+)
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
+
+__all__ = [
+    "is_vdi_image",
+    "require_image",
+    "require_image_port",
+    "scalars_of",
+    "transfer_function_from_property",
+    "vdi_from_image",
+    "vdi_to_image",
+    "volume_from_vtk",
+]
+
+#: Point scalars of the canonical form: how many supersegments each pixel's list has.
+COUNT = "count"
+#: Field array of the canonical form: everything that is not an array, as JSON.
+DESCRIPTION = "vdi"
+#: Version of the canonical form; readers refuse newer ones.
+FORM_VERSION = 1
+
+#: Ragged arrays in field data, with their number of components.
+_RAGGED = {"front": 1, "back": 1, "color": 3, "optical_depth": 1}
+
+_RESAMPLE = "resample it: pyvista.ImageData(...).sample(grid), or vtkResampleToImage"
+
+#: What to do with data sets that are not uniform grids.
+_REMEDIES = {
+    "vtkRectilinearGrid": _RESAMPLE,
+    "vtkStructuredGrid": _RESAMPLE,
+    "vtkUnstructuredGrid": _RESAMPLE,
+    "vtkCompositeDataSet": "add its blocks one by one (vtkExtractBlock, or block by index)",
+    "vtkPolyData": "a surface has no volume: voxelise it (pyvista's voxelize_binary_mask)",
+}
+
+
+# -- volumes ---------------------------------------------------------------------------------------
+
+
+def require_image(data: Any) -> vtkImageData:
+    """Return ``data`` if it is a uniform grid.
+
+    Raises
+    ------
+    UnsupportedError
+        If it is another VTK data set; the message says how to make a uniform grid of it.
+    InvalidVolumeError
+        If it is no data set at all.
+    """
+    if isinstance(data, vtkImageData):
+        return data
+    if not hasattr(data, "GetClassName"):
+        raise InvalidVolumeError(
+            f"expected a vtkImageData or pyvista.ImageData; got {type(data).__name__}"
+        )
+    raise _refusal(type(data))
+
+
+def require_image_port(port: Any) -> None:
+    """Refuse an output port that is known to give something other than a uniform grid.
+
+    Raises
+    ------
+    UnsupportedError
+        As :func:`require_image`. A port that promises no more than a ``vtkDataSet``, say, passes.
+    """
+    information = port.GetProducer().GetOutputPortInformation(port.GetIndex())
+    name = str(information.Get(vtkDataObject.DATA_TYPE_NAME()))
+    promised = getattr(vtkCommonDataModel, name, None)
+    if promised is None or issubclass(promised, vtkImageData) or issubclass(vtkImageData, promised):
+        return
+    raise _refusal(promised)
+
+
+def _refusal(kind: type) -> UnsupportedError:
+    """Return what is to be said of data that are no uniform grid."""
+    named = f"a {kind.__name__} is not a uniform grid"
+    for name, remedy in _REMEDIES.items():
+        if issubclass(kind, getattr(vtkCommonDataModel, name)):
+            return UnsupportedError(f"{named}, which is all that a VDI is made from: {remedy}")
+    return UnsupportedError(
+        f"{named} (vtkImageData), which is all that a VDI is made from: resample it to one"
+    )
+
+
+def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "point") -> Volume:
+    """Return a VTK image's scalars and geometry as a :class:`~pyvista_vdi.Volume`.
+
+    Parameters
+    ----------
+    image : vtkImageData or pyvista.ImageData
+        Origin, spacing, direction matrix and an extent that does not begin at 0 are honoured.
+    scalars : str, optional
+        Name of the array; the active scalars by default, else the only array there is.
+    preference : {"point", "cell"}
+        Which array, where points and cells both have one of that name.
+
+    Returns
+    -------
+    Volume
+        It shares memory with the point array where that is contiguous and of a type that the
+        kernels take; cell data become point data by ``vtkCellDataToPointData``, as
+        ``Plotter.add_volume`` does.
+
+    Raises
+    ------
+    InvalidVolumeError
+        If there are no such scalars, or not a grid of at least 2 x 2 x 2 points.
+    UnsupportedError
+        If it is another kind of grid, or the scalars have several components.
+    """
+    image = require_image(image)
+    array = scalars_of(image, scalars, preference)
+    rgba = array.GetNumberOfComponents() == 4 and array.GetDataType() == VTK_UNSIGNED_CHAR
+    if array.GetNumberOfComponents() != 1 and not rgba:
+        raise UnsupportedError(_several_components(array))
+    dimensions = image.GetDimensions()
+    name = array.GetName() or "values"
+    if not _is_point_array(image, array):
+        if min(dimensions) < 2:
+            raise InvalidVolumeError(
+                f"the volume has only one plane of points: its dimensions are {dimensions}, and "
+                "a volume needs at least two points along each axis"
+            )
+        array = _at_points(image, array)
+    extent = image.GetExtent()
+    first: list[float] = [0.0, 0.0, 0.0]
+    image.TransformIndexToPhysicalPoint(extent[0], extent[2], extent[4], first)
+    direction = image.GetDirectionMatrix()
+    return Volume(
+        _as_numpy(array).reshape((*dimensions[::-1], 4) if rgba else dimensions[::-1]),
+        image.GetSpacing(),
+        first,
+        [[direction.GetElement(i, j) for j in range(3)] for i in range(3)],
+        name=name,
+    )
+
+
+def scalars_of(image: vtkImageData, name: str | None, preference: str = "point") -> vtkDataArray:
+    """Return the array that ``name`` means: see :func:`volume_from_vtk`."""
+    if image.GetNumberOfPoints() == 0:
+        raise InvalidVolumeError("the volume is empty: it has no points")
+    if is_vdi_image(image):
+        raise InvalidVolumeError(
+            "this image is a VDI in its VTK form, not a volume: render, add_vdi and VDIMapper "
+            "show it as it is"
+        )
+    attributes = {"point": image.GetPointData(), "cell": image.GetCellData()}
+    order = sorted(attributes, key=lambda kind: kind != preference)
+    if name is None:
+        # Active scalars: points first, whatever the preference, as pyvista's active_scalars
+        for kind in ("point", "cell"):
+            active = attributes[kind].GetScalars()
+            if active is not None:
+                return active
+        names = _array_names(attributes)
+        if len(names) != 1:
+            raise InvalidVolumeError(
+                f"the volume has no active scalars; its arrays are {names}: name one"
+                if names
+                else "the volume has no scalars: there is nothing to render"
+            )
+        name = names[0]
+    for kind in order:
+        array = attributes[kind].GetArray(name)
+        if array is not None:
+            return array
+    names = _array_names(attributes)
+    lower = {each.lower(): each for each in reversed(names)}
+    near = [lower[m] for m in difflib.get_close_matches(str(name).lower(), list(lower), n=1)]
+    hint = f"did you mean {near[0]!r}? Its" if near else "its"
+    raise InvalidVolumeError(f"the volume has no array {name!r}: {hint} arrays are {names}")
+
+
+def _array_names(attributes: dict[str, Any]) -> list[str]:
+    names = []
+    for data in attributes.values():
+        for i in range(data.GetNumberOfArrays()):
+            array = data.GetArray(i)  # None for strings, which cannot be rendered
+            if array is not None and array.GetName() not in names:
+                names.append(array.GetName())
+    return names
+
+
+def _is_point_array(image: vtkImageData, array: vtkDataArray) -> bool:
+    data = image.GetPointData()
+    return any(data.GetArray(i) is array for i in range(data.GetNumberOfArrays()))
+
+
+def _several_components(array: vtkDataArray) -> str:
+    n = array.GetNumberOfComponents()
+    if n == 4:
+        return (
+            f"the scalars {array.GetName()!r} have 4 components, but are not RGBA of type unsigned "
+            "char: convert them, or pass one scalar per point"
+        )
+    return (
+        f"the scalars {array.GetName()!r} have {n} components: a VDI is made from one scalar per "
+        "point; pass one component, or the vectors' length"
+    )
+
+
+def _at_points(image: vtkImageData, array: vtkDataArray) -> vtkDataArray:
+    """Average cell values at the points, by the filter that ``add_volume`` uses."""
+    cells = vtkImageData()
+    cells.CopyStructure(image)
+    cells.GetCellData().SetScalars(array)
+    to_points = vtkCellDataToPointData()
+    to_points.SetInputData(cells)
+    to_points.Update()
+    return to_points.GetOutput().GetPointData().GetScalars()
+
+
+def _as_numpy(array: vtkDataArray) -> NDArray[Any]:
+    try:
+        return vtk_to_numpy(array)  # type: ignore[no-any-return]
+    except (AttributeError, TypeError, ValueError):
+        # Implicit arrays (constant, affine, ...) have no memory of their own
+        plain = vtkDataArray.CreateDataArray(array.GetDataType())
+        plain.DeepCopy(array)
+        return vtk_to_numpy(plain)  # type: ignore[no-any-return]
+
+
+# -- VDIs ------------------------------------------------------------------------------------------
+
+
+def vdi_to_image(vdi: VDI) -> vtkImageData:
+    """Return a VDI in its canonical VTK form.
+
+    Parameters
+    ----------
+    vdi : VDI
+        Any VDI.
+
+    Returns
+    -------
+    vtkImageData
+        Dimensions (W, H, 1), bottom row first; point scalars ``count``: supersegments per pixel;
+        field data ``front``, ``back``, ``color``, ``optical_depth``: all lists one after the
+        other; field string ``vdi``: camera, bounds, depth origin and metadata as JSON. The
+        arrays share the VDI's memory, so they must not be written to. A ``.vti`` file keeps every
+        bit.
+    """
+    width, height = vdi.window_size
+    image = vtkImageData()
+    image.SetDimensions(width, height, 1)
+    counts = np.diff(vdi.offsets).astype(np.uint32)
+    image.GetPointData().SetScalars(_to_vtk(COUNT, counts))
+    field = image.GetFieldData()
+    for name in _RAGGED:
+        field.AddArray(_to_vtk(name, getattr(vdi, name)))
+    field.AddArray(description_of(DESCRIPTION, vdi))
+    return image
+
+
+def description_of(name: str, vdi: VDI) -> vtkStringArray:
+    """Return everything of a VDI that is not an array, as a field string of JSON.
+
+    Raises
+    ------
+    InvalidVDIError
+        If the metadata hold what JSON cannot.
+    """
+    about = {
+        "form_version": FORM_VERSION,
+        "camera": vdi.camera.to_dict(),
+        "bounds": list(vdi.bounds),
+        "depth_origin": vdi.depth_origin,
+        "metadata": vdi.metadata,
+    }
+    try:
+        text = json.dumps(about, default=_plain)  # NaN and infinity included, as Python reads them
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InvalidVDIError(
+            f"the VDI's metadata cannot be written: {error}; they may hold numbers, text, lists "
+            "and dictionaries with text as keys"
+        ) from error
+    description = vtkStringArray()
+    description.SetName(name)
+    description.InsertNextValue(text)
+    return description
+
+
+def _plain(value: Any) -> Any:
+    """Return NumPy's numbers and arrays as Python's."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise TypeError(f"a value of type {type(value).__name__} is not JSON")
+
+
+def is_vdi_image(data: Any) -> bool:
+    """Whether a VTK object is a VDI in its canonical form."""
+    return isinstance(data, vtkImageData) and isinstance(
+        data.GetFieldData().GetAbstractArray(DESCRIPTION), vtkStringArray
+    )
+
+
+def vdi_from_image(image: Any) -> VDI:
+    """Return the VDI that a canonical VTK form holds.
+
+    Parameters
+    ----------
+    image : vtkImageData or pyvista.ImageData
+        As :func:`vdi_to_image` makes it, or ``pyvista.read("x.vdi")``.
+
+    Returns
+    -------
+    VDI
+        The same to the last bit; it shares the image's memory.
+
+    Raises
+    ------
+    InvalidVDIError
+        If the image is not such a form, of a newer version, or its arrays break a rule.
+    """
+    if not is_vdi_image(image):
+        kind = type(image).__name__
+        raise InvalidVDIError(
+            f"this {kind} is not a VDI: it has no field string {DESCRIPTION!r}; a volume becomes "
+            "a VDI by pyvista_vdi.generate or VDISource, and a dense form by vdi_from_dense_image"
+        )
+    field = image.GetFieldData()
+    about = view_from_description(image, DESCRIPTION)
+    counts = _counts(image)
+    offsets = np.zeros(len(counts) + 1, dtype=np.uint64)
+    np.cumsum(counts, dtype=np.uint64, out=offsets[1:])
+    arrays: dict[str, Any] = {name: _ragged(field, name, int(offsets[-1])) for name in _RAGGED}
+    return VDI(window_size=image.GetDimensions()[:2], offsets=offsets, **arrays, **about)
+
+
+def view_from_description(image: vtkImageData, name: str) -> dict[str, Any]:
+    """Return what :func:`description_of` wrote: arguments of :class:`VDI`.
+
+    Raises
+    ------
+    InvalidVDIError
+        If it is damaged, or of a newer version.
+    """
+    try:
+        about = json.loads(image.GetFieldData().GetAbstractArray(name).GetValue(0))
+        version = int(about["form_version"])
+        if version <= FORM_VERSION:
+            camera = Camera.from_dict(about["camera"])
+            entries = {key: about[key] for key in ("bounds", "depth_origin", "metadata")}
+            return {"camera": camera, **entries}
+    except (
+        *(KeyError, TypeError, IndexError, ValueError, OverflowError, RecursionError),
+        InvalidCameraError,
+    ) as error:
+        raise InvalidVDIError(f"the VDI's description is damaged: {error!r}") from error
+    raise InvalidVDIError(
+        f"the VDI's VTK form has version {version}, and this pyvista-vdi reads up to "
+        f"{FORM_VERSION}: update pyvista-vdi"
+    )
+
+
+def _counts(image: vtkImageData) -> NDArray[Any]:
+    """Return the supersegments of each list, checked; nothing is allocated for a window alone."""
+    array = image.GetPointData().GetArray(COUNT)
+    if array is None:
+        raise InvalidVDIError(f"the VDI's image lacks its point array {COUNT!r}")
+    width, height, depth = image.GetDimensions()
+    counts = _as_numpy(array)
+    if depth != 1 or counts.shape != (width * height,):
+        raise InvalidVDIError(
+            f"the VDI's image has {width} x {height} x {depth} points, and {COUNT!r} is of shape "
+            f"{counts.shape}: one whole number for each point of one plane is needed"
+        )
+    if counts.dtype.kind not in "ui" or (counts.size and counts.min() < 0):
+        raise InvalidVDIError(
+            f"{COUNT!r} must be whole numbers >= 0; got {counts.dtype} from "
+            f"{counts.min() if counts.size else 'no value'}"
+        )
+    return counts
+
+
+def _ragged(field: Any, name: str, n: int) -> NDArray[Any]:
+    array = field.GetArray(name)
+    if array is None:
+        if n == 0:  # VTK's XML files drop arrays without values
+            return np.zeros((0, 3) if _RAGGED[name] == 3 else 0, dtype=np.float32)
+        raise InvalidVDIError(f"the VDI's image lacks its field array {name!r}")
+    return _as_numpy(array)
+
+
+def _to_vtk(name: str, array: NDArray[Any]) -> vtkDataArray:
+    # VTK's arrays hold memory through the buffer protocol; this view drops NumPy's read-only flag
+    if not array.flags.writeable and array.size:
+        array = np.frombuffer(memoryview(array.data).cast("B"), dtype=array.dtype).reshape(
+            array.shape
+        )
+    result = numpy_to_vtk(array)
+    result.SetName(name)
+    return result

@@ -1,0 +1,101 @@
+"""``VDIReader`` and ``VDIWriter``: files at the ends of a VTK pipeline."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from vtkmodules.vtkCommonDataModel import vtkImageData
+
+from pyvista_vdi.errors import InvalidArgumentError, VDIError
+from pyvista_vdi.io import checked_target, read, read_info
+from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce, ask_for_all
+from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image
+
+
+class VDIReader(Algorithm):
+    """Read a VDI from a ``.vdi`` file or an OpenEXR deep image.
+
+    Out comes the VDI in its canonical VTK form, see
+    :func:`~pyvista_vdi.vtk_pipeline.filters.convert.vdi_to_image`.
+
+    Notes
+    -----
+    Python's ``Update`` raises what went wrong; an update that VTK asks for writes it to VTK's
+    output window and gives an empty image.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkImageData")
+        self._path: str | None = None
+
+    def SetFileName(self, path: str | os.PathLike[str] | None) -> None:
+        """Set the file."""
+        self._change("_path", os.fspath(path) if path else None)
+
+    def GetFileName(self) -> str | None:
+        """Return the file."""
+        return self._path
+
+    def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Announce the output's extent: one point per list; reads the file's description only."""
+        try:
+            size = read_info(self._path).window_size if self._path else (1, 1)
+        except (VDIError, OSError):  # RequestData says it
+            size = (1, 1)
+        announce(outputs, size)
+        return 1
+
+    def _execute(self, inputs: Any, outputs: Any) -> None:
+        if self._path is None:
+            raise InvalidArgumentError("VDIReader has no file name: call SetFileName(path)")
+        vtkImageData.GetData(outputs, 0).ShallowCopy(vdi_to_image(read(self._path)))
+
+
+class VDIWriter(Algorithm):
+    """Write the VDI at its input, in its canonical VTK form, to a ``.vdi`` or ``.exr`` file.
+
+    The file appears whole or not at all. Nothing is written before :meth:`Write`.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(nInputPorts=1, inputType="vtkImageData", nOutputPorts=0)
+        self._path: str | None = None
+
+    def SetInputData(self, image: vtkImageData) -> None:
+        """Set the VDI's canonical VTK form."""
+        self.SetInputDataObject(image)
+
+    def SetFileName(self, path: str | os.PathLike[str] | None) -> None:
+        """Set the file; its name ends in ``.vdi`` or ``.exr``."""
+        self._change("_path", os.fspath(path) if path else None)
+
+    def GetFileName(self) -> str | None:
+        """Return the file."""
+        return self._path
+
+    def Write(self) -> None:
+        """Write the file.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If there is no file name, or it names no format.
+        InvalidVDIError
+            If the input is no VDI.
+        OSError
+            If it cannot be written.
+        """
+        self.Modified()
+        self.Update()
+
+    def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Ask for the whole VDI."""
+        ask_for_all(inputs)
+        return 1
+
+    def _execute(self, inputs: Any, outputs: Any) -> None:
+        if self._path is None:
+            raise InvalidArgumentError("VDIWriter has no file name: call SetFileName(path)")
+        target = checked_target(self._path)
+        vdi_from_image(vtkImageData.GetData(inputs[0], 0)).save(target)

@@ -1,0 +1,183 @@
+"""``VDIToImage``: from a VDI in a VTK pipeline to a picture of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+
+from pyvista_vdi.io import to_bytes
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce, ask_for_all
+from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
+
+#: Point scalars of the picture: straight RGBA, uint8.
+STRAIGHT = "RGBA"
+#: Its other point array: what was rendered, premultiplied RGBA, float32.
+PREMULTIPLIED = "premultiplied"
+
+
+class VDIToImage(Algorithm):
+    """Raycast the VDI at its input, and put out the picture.
+
+    In goes a VDI in its canonical VTK form (see
+    :func:`~pyvista_vdi.vtk_pipeline.filters.convert.vdi_to_image`); out comes a ``vtkImageData`` of
+    W x H x 1 points, bottom row first, one per pixel, with the point scalars ``RGBA`` (uint8,
+    straight, for display) and the point array ``premultiplied`` (float32, what
+    :func:`pyvista_vdi.render` returns). It executes again only if the VDI or a setting has changed.
+
+    Notes
+    -----
+    Settings are checked when they are set. Python's ``Update`` and :meth:`GetImage` raise what
+    went wrong; an update that VTK asks for writes it to VTK's output window and gives an empty
+    image.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(
+            nInputPorts=1, inputType="vtkImageData", nOutputPorts=1, outputType="vtkImageData"
+        )
+        self._camera: Camera | None = None
+        self._azimuth = 0.0
+        self._elevation = 0.0
+        self._window_size: tuple[int, int] | None = None
+        self._device: Any = None
+        self._vdi: VDI | None = None
+        self._vdi_of: tuple[Any, int] | None = None
+
+    # -- settings --------------------------------------------------------------------------------
+
+    def SetCamera(self, camera: Any, model_transform: ArrayLike | None = None) -> None:
+        """Set the new view V_N.
+
+        Parameters
+        ----------
+        camera : vtkCamera or pyvista.Camera or Camera or None
+            A copy is kept. ``None``, the default, means the generating view.
+        model_transform : array_like, shape (4, 4), optional
+            Where the VDI's model frame is in that view's world.
+
+        Raises
+        ------
+        InvalidCameraError, UnsupportedError
+            If it is no camera, or has what the optical model has no place for.
+        """
+        view = None if camera is None else Camera.from_any(camera, model_transform=model_transform)
+        self._change("_camera", view)
+
+    def GetCamera(self) -> Camera | None:
+        """Return the view before it is turned, or ``None`` for the generating view."""
+        return self._camera
+
+    def SetAzimuth(self, degrees: float) -> None:
+        """Turn the view about its up direction through the focal point, as VTK's ``Azimuth``."""
+        self._change("_azimuth", float(degrees))
+
+    def GetAzimuth(self) -> float:
+        """Return by how much the view is turned, degrees."""
+        return self._azimuth
+
+    def SetElevation(self, degrees: float) -> None:
+        """Lift the view through the focal point, after turning it, as VTK's ``Elevation``."""
+        self._change("_elevation", float(degrees))
+
+    def GetElevation(self) -> float:
+        """Return by how much the view is lifted, degrees."""
+        return self._elevation
+
+    def SetWindowSize(self, *size: Any) -> None:
+        """Set the picture's width and height in pixels; ``None``, the default, is the VDI's own."""
+        pair = size[0] if len(size) == 1 else size
+        self._change("_window_size", None if pair is None else check_window_size(pair))
+
+    def GetWindowSize(self) -> tuple[int, int] | None:
+        """Return the picture's width and height in pixels, or ``None`` for the VDI's own."""
+        return self._window_size
+
+    def SetDevice(self, device: Any) -> None:
+        """Choose the OpenCL device; ``None`` is the default one."""
+        self._change("_device", device)
+
+    def GetDevice(self) -> Any:
+        """Return the device as it was set."""
+        return self._device
+
+    # -- results ---------------------------------------------------------------------------------
+
+    def GetImage(self) -> vtkImageData:
+        """Return the picture, brought up to date.
+
+        Raises
+        ------
+        VDIError
+            What :func:`pyvista_vdi.render` raises.
+        """
+        self.Update()
+        return self.GetOutputDataObject(0)
+
+    # -- the pipeline's requests -----------------------------------------------------------------
+
+    def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Announce the output's extent: one point per pixel."""
+        size = self._window_size
+        information = inputs[0].GetInformationObject(0)
+        executive = vtkStreamingDemandDrivenPipeline
+        if size is None and information.Has(executive.WHOLE_EXTENT()):
+            whole = information.Get(executive.WHOLE_EXTENT())
+            size = whole[1] - whole[0] + 1, whole[3] - whole[2] + 1
+        announce(outputs, size or (1, 1))
+        return 1
+
+    def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Ask for the whole VDI, whatever part of the picture is wanted."""
+        ask_for_all(inputs)
+        return 1
+
+    # -- how -------------------------------------------------------------------------------------
+
+    def _execute(self, inputs: Any, outputs: Any) -> None:
+        vdi = self._read(vtkImageData.GetData(inputs[0], 0))
+        view = vdi.camera if self._camera is None else self._camera
+        view = view.azimuth(self._azimuth) if self._azimuth else view
+        view = view.elevation(self._elevation) if self._elevation else view
+        pixels = render_vdi(vdi, view, self._window_size, device=self._device)
+        vtkImageData.GetData(outputs, 0).ShallowCopy(rgba_to_image(pixels))
+
+    def _read(self, image: vtkImageData) -> VDI:
+        """Return the VDI; the same object as long as it is the same (it is on the device)."""
+        key = (image, image.GetMTime()) if is_vdi_image(image) else None
+        if self._vdi is None or key is None or key != self._vdi_of:
+            self._vdi = vdi_from_image(image)
+            self._vdi_of = key
+        return self._vdi
+
+
+def rgba_to_image(pixels: NDArray[np.float32]) -> vtkImageData:
+    """Return a rendered picture as VTK data.
+
+    Parameters
+    ----------
+    pixels : numpy.ndarray
+        Premultiplied RGBA, float32 (H, W, 4), top row first.
+
+    Returns
+    -------
+    vtkImageData
+        As :class:`VDIToImage` puts it out.
+    """
+    height, width = pixels.shape[:2]
+    image = vtkImageData()
+    image.SetDimensions(width, height, 1)
+    bottom_first = np.ascontiguousarray(pixels[::-1])
+    for name, values in ((STRAIGHT, to_bytes(bottom_first)), (PREMULTIPLIED, bottom_first)):
+        array = numpy_to_vtk(values.reshape(-1, 4))
+        array.SetName(name)
+        image.GetPointData().AddArray(array)
+    image.GetPointData().SetActiveScalars(STRAIGHT)
+    return image

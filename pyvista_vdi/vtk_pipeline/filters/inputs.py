@@ -1,0 +1,175 @@
+"""What a :class:`VDIMapper` draws: a VDI as it is, or what a pipeline makes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.errors import InvalidVDIError
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
+from pyvista_vdi.vtk_pipeline.filters.source import VDISource
+
+
+class Input:
+    """A VDI that does not change."""
+
+    def __init__(self, vdi: VDI | None = None) -> None:
+        self._vdi = vdi
+
+    def vdi(self) -> VDI | None:
+        """Return the VDI, brought up to date; raises what went wrong."""
+        return self._vdi
+
+    def last(self) -> VDI | None:
+        """Return the VDI made last."""
+        return self._vdi
+
+    def bounds(self) -> tuple[float, ...] | None:
+        """Return the bounds in the model frame, without making a VDI."""
+        return None if self._vdi is None else self._vdi.bounds
+
+    def stamp(self) -> Any:
+        """Return something that changes whenever it is worth trying again."""
+        return None if self._vdi is None else id(self._vdi)
+
+    def set_view_if_missing(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
+        """Take the frame's view as the generating view, if there is none yet."""
+
+    def shared(self) -> Input:
+        """Return an input of the same VDI for another mapper."""
+        return self
+
+    def watch(self, changed: Callable[..., Any] | None) -> None:
+        """Have this called when the bounds may have changed; ``None`` ends it."""
+
+
+class SourceInput(Input):
+    """What a :class:`VDISource` makes."""
+
+    def __init__(self, source: VDISource) -> None:
+        super().__init__()
+        self.source = source
+        self._tag: int | None = None
+
+    def shared(self) -> Input:
+        """Return an input from the same source."""
+        return SourceInput(self.source)
+
+    def watch(self, changed: Callable[..., Any] | None) -> None:
+        """Call back when the source has been modified."""
+        if self._tag is not None:
+            self.source.RemoveObserver(self._tag)
+            self._tag = None
+            self.source.inputs.discard(self)
+        if changed is not None:
+            self._tag = self.source.AddObserver("ModifiedEvent", changed)
+            self.source.inputs.add(self)
+
+    @property
+    def alone(self) -> bool:
+        """Whether no other mapper draws what the source makes."""
+        return len(self.source.inputs) == 1
+
+    def vdi(self) -> VDI | None:
+        """Return the VDI, brought up to date."""
+        return self.source.GetVDI()
+
+    def last(self) -> VDI | None:
+        """Return the VDI made last."""
+        return self.source.GetCurrentVDI()
+
+    def bounds(self) -> tuple[float, ...] | None:
+        """Return the volume's bounds."""
+        return self.source.GetInputBounds()
+
+    def stamp(self) -> Any:
+        """Return the newest time stamp of the source, its input and its property."""
+        if self.source.GetNumberOfInputConnections(0) > 0:
+            self.source.GetInputAlgorithm(0, 0).Update()
+        self.source.CheckLights()
+        stamps = [self.source.GetMTime()]
+        data = self.source.GetInputDataObject(0, 0)
+        prop = self.source.GetVolumeProperty()
+        stamps += [thing.GetMTime() for thing in (data, prop) if thing is not None]
+        return max(stamps)
+
+    def set_view_if_missing(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
+        """Take the renderer's view."""
+        source = self.source
+        if source.GetCamera() is None:
+            source.SetCamera(renderer.GetActiveCamera(), model_transform)
+        if source.GetWindowSize() is None:
+            width, height = renderer.GetSize()
+            source.SetWindowSize(max(1, width), max(1, height))
+
+
+class ImageInput(Input):
+    """A canonical image, from a data object or from any algorithm that makes one."""
+
+    def __init__(self, image: Any = None, port: Any = None) -> None:
+        super().__init__()
+        self._image = image
+        self._port = port
+        # A port does not keep its algorithm; what is connected in VTK does
+        self._producer: Any = None if port is None else port.GetProducer()
+        self._read_at: int | None = None
+
+    def vdi(self) -> VDI | None:
+        """Return the VDI in the image, read again only if the image has changed."""
+        image = self._updated()
+        if self._vdi is None or self._read_at != image.GetMTime():
+            self._vdi = vdi_from_image(image)
+            self._read_at = image.GetMTime()
+        return self._vdi
+
+    def bounds(self) -> tuple[float, ...] | None:
+        """Return the VDI's bounds; this updates the pipeline."""
+        vdi = self.vdi()
+        return None if vdi is None else vdi.bounds
+
+    def stamp(self) -> Any:
+        """Return the image's time stamp."""
+        if self._port is not None:
+            self._producer.UpdateInformation()
+            return self._producer.GetMTime()
+        return self._image.GetMTime()
+
+    def _updated(self) -> Any:
+        if self._port is not None:
+            self._producer.Update(self._port.GetIndex())
+            self._image = self._producer.GetOutputDataObject(self._port.GetIndex())
+        return self._image
+
+
+def input_of(data: Any) -> Input:
+    """Return what to draw for a VDI, its canonical image, or a :class:`VDISource`.
+
+    Raises
+    ------
+    InvalidVDIError
+        If it is none of these; for a volume the message says what to do.
+    """
+    if isinstance(data, VDI):
+        return Input(data)
+    if isinstance(data, VDISource):
+        return SourceInput(data)
+    if is_vdi_image(data):
+        image = ImageInput(data)
+        image.vdi()  # refuse a damaged one now
+        return image
+    raise InvalidVDIError(
+        f"a VDIMapper draws a VDI, its canonical image or a VDISource's output; got "
+        f"{type(data).__name__}: put a VDISource between a volume and the mapper"
+    )
+
+
+def input_of_port(port: Any) -> Input:
+    """Return what to draw for an output port."""
+    producer = port.GetProducer()
+    if isinstance(producer, VDISource):
+        return SourceInput(producer)
+    return ImageInput(port=port)

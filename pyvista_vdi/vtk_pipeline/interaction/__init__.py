@@ -1,0 +1,1 @@
+"""What goes on between frames: motion, estimates, regeneration, status."""

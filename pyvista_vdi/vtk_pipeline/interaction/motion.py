@@ -1,0 +1,346 @@
+"""How good a frame is to be: full at rest and in every picture, a preview while a hand moves."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+import weakref
+from dataclasses import dataclass
+from typing import Any
+
+from vtkmodules.vtkCommonCore import vtkWeakReference
+from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLGL2PSHelper
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.quality.frame_rate import FrameRateController
+
+#: Cameras remembered per window; more than any scene has viewports that are turned in turn.
+_KNOWN_CAMERAS = 16
+
+_clocks: weakref.WeakValueDictionary[str, WindowClock] = weakref.WeakValueDictionary()
+
+
+def checked_rate(name: str, value: Any, *, least: str = "0 or above") -> float:
+    """Return a rate in frames per second; 0 or above, finite."""
+    try:
+        rate = float(value)
+    except (TypeError, ValueError):
+        rate = math.nan
+    if isinstance(value, bool) or not (math.isfinite(rate) and rate >= 0):
+        raise InvalidArgumentError(
+            f"{name} must be a number of frames per second, {least}; got {value!r}"
+        )
+    return rate
+
+
+@dataclass
+class Interaction:
+    """What a mapper allows while a hand moves; VTK's names are in the mapper.
+
+    Attributes
+    ----------
+    adjust : bool
+        Draw previews at all (``SetAutoAdjustSampleDistances``).
+    update_rate : float
+        A frame is interactive if its window's desired update rate is at least this, 1/s
+        (``SetInteractiveUpdateRate``, default 1 as in ``vtkSmartVolumeMapper``).
+    target : float or None
+        Frames per second to be kept; ``None``: the window's desired update rate.
+    off_screen : bool
+        Treat off-screen windows as if somebody watched them.
+    """
+
+    adjust: bool = True
+    update_rate: float = 1.0
+    target: float | None = None
+    off_screen: bool = False
+
+    def watched(self, window: Any) -> bool:
+        """Whether somebody looks at the window while it is drawn."""
+        return self.off_screen or bool(window.GetShowWindow())
+
+    def asynchronous(self, window: Any) -> bool:
+        """Whether work may go on behind the frames: somebody watches, and can move."""
+        return self.off_screen or (
+            bool(window.GetShowWindow()) and window.GetInteractor() is not None
+        )
+
+    def moving(self, window: Any) -> bool:
+        """Whether a hand moves, by VTK's convention."""
+        return bool(window.GetDesiredUpdateRate() >= self.update_rate)
+
+    def wants_preview(self, window: Any) -> bool:
+        """Whether frames of this window may be previews now."""
+        return self.adjust and self.target != 0 and self.moving(window) and self.watched(window)
+
+
+@dataclass
+class _Frame:
+    """What the VDIs of one frame have taken together.
+
+    Attributes
+    ----------
+    share : float or None
+        Of its pixels that each is drawn with; ``None`` before one has asked.
+    interactive : bool
+        Whether one may be a preview.
+    preview : bool
+        Whether one is.
+    target : float
+        The highest rate that one wants to keep, 1/s.
+    pixels, full_pixels : int
+        That were raycast, and those of full images.
+    work : float
+        Seconds that this took.
+    """
+
+    share: float | None = None
+    interactive: bool = False
+    preview: bool = False
+    target: float = 0.0
+    pixels: int = 0
+    full_pixels: int = 0
+    work: float = 0.0
+
+
+class WindowClock:
+    """The frames of one render window, and the rate that all VDIs in it keep together.
+
+    All previews of a frame are reduced by the same share, so several VDIs, the two eyes of a
+    stereo pair and several viewports divide the time among them by their pixels. The window owns
+    this object, through its observers.
+
+    Attributes
+    ----------
+    number : int
+        Frames of the window so far.
+    seconds : float or None
+        What the last one that was raycast took, from the window's StartEvent to its EndEvent;
+        ``None`` before. The time between two frames would count how long a hand rests.
+    of_frame : dict
+        What those who draw share within a frame; empty between two.
+    """
+
+    def __init__(self, window: Any) -> None:
+        self.number = 0
+        self.seconds: float | None = None
+        self.of_frame: dict[Any, Any] = {}
+        self._window = vtkWeakReference()
+        self._window.Set(window)
+        self._painters: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._watched: set[str] = set()
+        self._known: list[vtkWeakReference] = []
+        self._controller: FrameRateController | None = None
+        self._floor = 0.0
+        self._target = 0.0
+        self._started: float | None = None
+        self._interacting = False
+        self._previewed = False
+        self._picture_wanted = False
+        self._full_pixels_before = 0
+        self._resting: tuple[int, float, float] | None = None
+        self._foreground = contextlib.ExitStack()  # from the frame's start to its end
+        self._frame = _Frame()
+        window.AddObserver("StartEvent", lambda *_: self._start())
+        window.AddObserver("EndEvent", lambda *_: self._end())
+
+    @classmethod
+    def of(cls, window: Any) -> WindowClock:
+        """Return the window's clock, made on first use."""
+        address = window.GetAddressAsString("")
+        clock = _clocks.get(address)
+        if clock is None or clock._window.Get() is not window:
+            clock = _clocks[address] = cls(window)
+        return clock
+
+    def join(self, painter: Any, renderer: Any) -> None:
+        """Note that a painter draws in this window; called in each of its frames."""
+        self._painters.add(painter)
+        address = renderer.GetAddressAsString("")
+        if address not in self._watched:
+            self._watched.add(address)
+            weak = weakref.ref(self)
+
+            def camera_changed(*_: Any) -> None:
+                clock = weak()
+                if clock is not None:
+                    clock._camera_changed()
+
+            renderer.AddObserver("ActiveCameraEvent", camera_changed)
+
+    @property
+    def fps(self) -> float | None:
+        """Mean rate of the interaction's last frames; at rest what the last frame would allow."""
+        if self._interacting and self._controller is not None and self._controller.fps > 0:
+            return self._controller.fps
+        return 1 / self.seconds if self.seconds else None
+
+    @property
+    def drawing(self) -> bool:
+        """Whether a frame has begun and not ended."""
+        return self._started is not None
+
+    def render(self) -> None:
+        """Have the window drawn, as from its event loop."""
+        window = self._window.Get()
+        interactor = None if window is None else window.GetInteractor()
+        if interactor is not None:
+            interactor.Render()
+
+    @property
+    def whole_picture(self) -> bool:
+        """Whether this frame is a whole picture by itself, and not a tile of one."""
+        window = self._window.Get()
+        return window is None or tuple(window.GetTileScale()) == (1, 1)
+
+    def share(self, renderer: Any, interaction: Interaction, pixels: int, floor: float) -> float:
+        """Return the share of its pixels, 0 to 1, that a VDI is drawn with in this frame.
+
+        Parameters
+        ----------
+        renderer : vtkRenderer
+            Where it is drawn.
+        interaction : Interaction
+            What its mapper allows.
+        pixels : int
+            Of the full image.
+        floor : float
+            Least share.
+        """
+        window = self._window.Get()
+        if not interaction.wants_preview(window):
+            self._know(renderer.GetActiveCamera())
+            return 1.0
+        if self._takes_picture(renderer, window):
+            return 1.0
+        frame = self._frame
+        frame.interactive = True
+        target = interaction.target or window.GetDesiredUpdateRate()
+        frame.target = max(frame.target, target)
+        if frame.share is None:
+            # The other VDIs of this frame are not known yet: count on those of the last
+            controller = self._tuned(max(target, self._target), floor)
+            full = max(self._full_pixels_before, pixels)
+            frame.share = controller.choose(full) / full
+        return max(frame.share, floor)
+
+    def drawn(self, size: tuple[int, int], full: tuple[int, int], seconds: float) -> None:
+        """Note a raycast of this frame: the image's size, the viewport's, and its time."""
+        self._frame.pixels += size[0] * size[1]
+        self._frame.full_pixels += full[0] * full[1]
+        self._frame.work += seconds
+
+    def showed(self, preview: bool) -> None:
+        """Note that a VDI of this frame is a preview, or not."""
+        self._frame.preview = self._frame.preview or preview
+
+    # -- the window's events ---------------------------------------------------------------------
+
+    def _start(self) -> None:
+        self._started = time.perf_counter()
+        self._frame = _Frame()
+        self.of_frame.clear()
+        self.number += 1
+        # Between two frames only: no frame shows two generations, nor does a picture in tiles
+        painters = list(self._painters)
+        if self.whole_picture:
+            for painter in painters:
+                painter.before_frame()
+        self._foreground.close()
+        for runtime in {painter.runtime() for painter in painters}:
+            self._foreground.enter_context(runtime.foreground())
+
+    def _end(self) -> None:
+        self._foreground.close()
+        self.of_frame.clear()
+        started, self._started = self._started, None
+        frame, self._frame = self._frame, _Frame()
+        self._previewed = frame.preview
+        if frame.pixels:
+            # The first frame began before anybody looked at the clock: its work is known
+            seconds = frame.work if started is None else time.perf_counter() - started
+            self._record(frame, seconds)
+        window = self._window.Get()
+        moving = any(painter.interaction.moving(window) for painter in self._painters)
+        if self._interacting and not frame.interactive and not moving:
+            self._interacting = False
+            if self._controller is not None:
+                self._controller.rest()
+
+    def _record(self, frame: _Frame, seconds: float) -> None:
+        self.seconds = seconds
+        if not frame.interactive:
+            self._resting = (frame.pixels, frame.work, seconds)
+            return
+        assert self._controller is not None
+        self._interacting = True
+        self._target = frame.target
+        self._full_pixels_before = frame.full_pixels
+        self._controller.record(frame.pixels, frame.work, seconds)
+
+    def _tuned(self, target: float, floor: float) -> FrameRateController:
+        """Return the window's controller, with this target and at most this floor."""
+        if self._controller is None or floor < self._floor:
+            self._controller = FrameRateController(target, floor=floor)
+            self._floor = floor
+            if self._resting is not None:
+                # What the last full frame took, so that an interaction does not begin with another
+                self._controller.record(*self._resting)
+        self._controller.target_fps = target
+        return self._controller
+
+    # -- pictures --------------------------------------------------------------------------------
+
+    def _takes_picture(self, renderer: Any, window: Any) -> bool:
+        """Whether this frame is drawn to be kept: such a frame is always full.
+
+        A screenshot draws in tiles, or with a camera of its own; an export of vector graphics has
+        a helper installed.
+        """
+        if self._picture_wanted or tuple(window.GetTileScale()) != (1, 1):
+            return True
+        if vtkOpenGLGL2PSHelper.GetInstance() is not None:
+            return True
+        return self._is_new(renderer.GetActiveCamera())
+
+    def _is_new(self, camera: Any) -> bool:
+        """Whether nothing was drawn with this camera before; from now on it is known."""
+        if any(known.Get() is camera for known in self._known):
+            return False
+        self._know(camera)
+        return True
+
+    def _know(self, camera: Any) -> None:
+        """Remember a camera as one that frames are drawn with."""
+        known = [k for k in self._known if k.Get() is not None and k.Get() is not camera]
+        weak = vtkWeakReference()
+        weak.Set(camera)
+        self._known = [*known[1 - _KNOWN_CAMERAS :], weak]
+
+    def _camera_changed(self) -> None:
+        """Replace a preview on the screen by the full frame before a screenshot reads it.
+
+        ``vtkWindowToImageFilter`` puts a copy of its own in place of each renderer's camera, and
+        may then take the picture that is on the screen, as ``Plotter.screenshot`` has it.
+        """
+        window = self._window.Get()
+        if not self._previewed or self._started is not None or window is None:
+            return
+        interactor = window.GetInteractor()
+        if interactor is not None and not interactor.GetEnableRender():
+            return  # it is being closed
+        self._picture_wanted = True
+        try:
+            window.Render()
+        finally:
+            self._picture_wanted = False
+
+
+def reduced(size: tuple[int, int], share: float) -> tuple[int, int]:
+    """Return the size in whole pixels, of about the same aspect, that has this share of pixels."""
+    if share >= 1:
+        return size
+    scale = math.sqrt(share)
+    width, height = (max(1, round(edge * scale)) for edge in size)
+    return width, height

@@ -1,0 +1,153 @@
+"""What a person wants to know of a VDI on the screen, and a corner text that says it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from vtkmodules.vtkCommonCore import vtkWeakReference
+from vtkmodules.vtkRenderingAnnotation import vtkCornerAnnotation
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.dial import describe
+
+#: VTK's names of the corners.
+CORNERS = {
+    "lower left": vtkCornerAnnotation.LowerLeft,
+    "lower right": vtkCornerAnnotation.LowerRight,
+    "upper left": vtkCornerAnnotation.UpperLeft,
+    "upper right": vtkCornerAnnotation.UpperRight,
+}
+
+#: Largest font of the corner text, points.
+_FONT_SIZE = 14
+#: Progress after which a text is drawn again though nothing else has changed.
+_PROGRESS_STEP = 0.05
+
+
+@dataclass(frozen=True)
+class VDIStatus:
+    """How a VDI was drawn in the last frame, and what goes on behind it.
+
+    Attributes
+    ----------
+    mode : {"none", "full", "preview"}
+        Nothing drawn yet, one ray per pixel, or fewer.
+    samples : int
+        Rays that were cast: pixels of the image.
+    full_samples : int
+        Pixels of the viewport.
+    fps : float or None
+        Frames per second of the window: mean of an interaction's last frames; at rest, what the
+        last frame would allow. ``None`` before the first whole frame.
+    angle : float or None
+        Between the view and V_O, degrees; ``None`` without a VDI.
+    ssim : float or None
+        Estimated SSIM of the picture against volume rendering; ``None`` where it was not
+        estimated (``regenerate="auto"`` does, in windows that somebody watches).
+    progress : float or None
+        Share done, 0 to 1, of the VDI that is being made in the background; ``None`` if none is.
+    generation : int
+        How many VDIs were shown so far, this one included.
+    vdi : VDI or None
+        The one that is shown.
+    """
+
+    mode: Literal["none", "full", "preview"]
+    samples: int
+    full_samples: int
+    fps: float | None
+    angle: float | None
+    ssim: float | None
+    progress: float | None
+    generation: int
+    vdi: VDI | None
+
+    @property
+    def share(self) -> float:
+        """Share of the viewport's pixels that a ray was cast for, 0 to 1."""
+        return self.samples / self.full_samples if self.full_samples else 0.0
+
+    @property
+    def dial(self) -> dict[str, Any] | None:
+        """What a dial chose for the VDI, and what it predicts; ``None`` where there is none.
+
+        See ``vdi.metadata["dial"]`` in docs/dial.md.
+        """
+        return None if self.vdi is None else self.vdi.metadata.get("dial")
+
+    def __str__(self) -> str:
+        if self.mode == "none":
+            parts = ["no VDI drawn yet"]
+        else:
+            parts = [f"{self.mode}: {self.share:.0%} of {self.full_samples} pixels"]
+        if self.fps is not None:
+            parts.append(f"{self.fps:.3g} frames/s")
+        if self.angle is not None:
+            parts.append(f"{self.angle:.0f}° from the generating view")
+        if self.ssim is not None:
+            parts.append(f"SSIM about {self.ssim:.3f}")
+        if self.generation:
+            parts.append(f"VDI no. {self.generation}")
+        chosen = None if self.vdi is None else describe(self.vdi.metadata)
+        if chosen is not None:
+            parts.append(chosen)
+        if self.progress is not None:
+            parts.append(f"making the next: {self.progress:.0%}")
+        return ", ".join(parts)
+
+
+class CornerTexts:
+    """Annotations that show a status; the renderers own them."""
+
+    def __init__(self) -> None:
+        self._texts: list[tuple[vtkWeakReference, vtkWeakReference, int]] = []
+        self._progress: float | None = None
+
+    def add(self, renderer: Any, corner: str) -> vtkCornerAnnotation:
+        """Add one to a corner of a renderer.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If there is no such corner.
+        """
+        if corner not in CORNERS:
+            raise InvalidArgumentError(f"corner must be one of {tuple(CORNERS)}; got {corner!r}")
+        annotation = vtkCornerAnnotation()
+        annotation.SetMaximumFontSize(_FONT_SIZE)
+        annotation.PickableOff()
+        look = annotation.GetTextProperty()  # white on a shade: legible on any background
+        look.SetColor(1.0, 1.0, 1.0)
+        look.SetBackgroundColor(0.0, 0.0, 0.0)
+        look.SetBackgroundOpacity(0.5)
+        renderer.AddViewProp(annotation)
+        text, where = vtkWeakReference(), vtkWeakReference()
+        text.Set(annotation)
+        where.Set(renderer)
+        self._texts.append((text, where, CORNERS[corner]))
+        return annotation
+
+    def write(self, renderer: Any, status: Callable[[], VDIStatus]) -> None:
+        """Show the status in the frame that this renderer is drawing."""
+        self._texts = [text for text in self._texts if text[0].Get() is not None]
+        for text, where, corner in self._texts:
+            if where.Get() is not renderer:
+                continue
+            annotation, now = text.Get(), status()
+            self._progress = now.progress
+            lines = str(now).replace(", ", "\n")
+            if annotation.GetText(corner) != lines:
+                annotation.SetText(corner, lines)
+                # It was laid out in the opaque pass, which is over when volumes are drawn
+                annotation.RenderOpaqueGeometry(renderer)
+
+    def are_behind(self, progress: float | None) -> bool:
+        """Whether there are texts, and what they say of the progress is too old."""
+        if not self._texts or progress == self._progress:
+            return False
+        if progress is None or self._progress is None:
+            return True
+        return abs(progress - self._progress) >= _PROGRESS_STEP

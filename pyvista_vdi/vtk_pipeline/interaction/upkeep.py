@@ -1,0 +1,232 @@
+"""Which VDI a frame draws: one that is up to date, or the old one while a new one is made."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.view_error import angle_from_generating_view
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
+from pyvista_vdi.vtk_pipeline.filters.view import View
+from pyvista_vdi.vtk_pipeline.interaction.motion import Interaction, WindowClock
+from pyvista_vdi.vtk_pipeline.interaction.regeneration import Regeneration
+from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus
+from pyvista_vdi.vtk_pipeline.interaction.ticker import Ticker
+from pyvista_vdi.vtk_pipeline.interaction.warnings import Voice
+
+#: Views that a VDI is made to serve, degrees from V_O, where its metadata do not say.
+_VIEW_CONE = 60.0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Where a frame shows the VDI.
+
+    Attributes
+    ----------
+    renderer : vtkRenderer
+        It draws the frame.
+    model_transform : numpy.ndarray
+        The actor's matrix.
+    view : View
+        The renderer's, between the two eyes of a stereo pair.
+    clock : WindowClock
+        Its window's.
+    only : bool
+        Whether no other renderer shows the actor.
+    shown : dict
+        Clipping planes (world coordinates), cropping and opacity multiplier of its picture:
+        arguments of :meth:`ViewErrorEstimator.estimate`.
+    """
+
+    renderer: Any
+    model_transform: NDArray[np.float64]
+    view: View
+    clock: WindowClock
+    only: bool
+    shown: dict[str, Any]
+
+
+class Upkeep:
+    """Keeps the input of a mapper up to date.
+
+    Where somebody watches the window, a change or a new view is made a VDI of in the background
+    and swapped between two frames; elsewhere a frame waits for the VDI that belongs to it.
+
+    Parameters
+    ----------
+    interaction : Interaction
+        Says where somebody watches.
+    voice : Voice
+        For what goes wrong.
+    texts : CornerTexts
+        They may have to be drawn again though nothing else has changed.
+    """
+
+    def __init__(self, interaction: Interaction, voice: Voice, texts: CornerTexts) -> None:
+        self.input: Input | None = None
+        self.automatic_view = True
+        self.regeneration = Regeneration()
+        self._interaction = interaction
+        self._voice = voice
+        self._texts = texts
+        self._ticker = Ticker(self._tick)
+        self._clock: weakref.ref[WindowClock] | None = None
+        self._looked_at = (0, 0)
+        self._failed_at: Any = None
+        self._said_far = False
+
+    def set_input(self, source: Input | None, changed: Callable[..., Any]) -> None:
+        """Keep another input; ``changed`` is called when its bounds may be others."""
+        if self.input is not None:
+            self.input.watch(None)
+        self.input = source
+        self._failed_at = None
+        self._said_far = False
+        self.regeneration.cancel()
+        if source is not None:
+            source.watch(changed)
+
+    @property
+    def vdi(self) -> VDI | None:
+        """The VDI made last."""
+        return None if self.input is None else self.input.last()
+
+    def retry(self) -> None:
+        """Try again what failed before, and give up what is being made in the background."""
+        self.regeneration.cancel()
+        self._failed_at = None
+        self._voice.forget()
+
+    def close(self) -> None:
+        """End what goes on; the next frame may begin anew."""
+        self._ticker.stop()
+        self.regeneration.close()
+
+    # -- in a frame ------------------------------------------------------------------------------
+
+    def current(self, scene: Scene, ask: Callable[[], VDIStatus]) -> VDI | None:
+        """Return the VDI that a frame is to draw.
+
+        Parameters
+        ----------
+        scene : Scene
+            Where it is drawn.
+        ask : callable
+            Gives the status, for a policy that is a callable.
+        """
+        source = self.input
+        if source is None:
+            return None
+        self._clock = weakref.ref(scene.clock)
+        if self.automatic_view:
+            source.set_view_if_missing(scene.renderer, scene.model_transform)
+        if not isinstance(source, SourceInput):
+            vdi = self._updated(source)
+            self._mind_the_angle(vdi, scene.view)
+            return vdi
+        # Once for both eyes of a stereo pair, and not between the tiles of a picture
+        now = (scene.clock.number, id(scene.clock))
+        decide, self._looked_at = scene.clock.whole_picture and now != self._looked_at, now
+        if source.last() is None:
+            return self._updated(source)
+        # A VDI that is drawn in several views is out of date in none of them by itself
+        one_view = scene.only and source.alone
+        if one_view and self._interaction.asynchronous(scene.renderer.GetRenderWindow()):
+            if decide:
+                self._look(source, scene, ask)
+            return source.last()
+        if one_view and decide and self._asked_for(ask):
+            source.source.SetCamera(scene.view.camera)
+            source.source.SetWindowSize(scene.view.size)
+        return self._updated(source)
+
+    def tick(self, window: Any) -> None:
+        """Have the event loop look at what goes on, if something does and no hand moves."""
+        if self.regeneration.busy and not self._interaction.moving(window):
+            self._ticker.start(window.GetInteractor())
+
+    def _updated(self, source: Input) -> VDI | None:
+        """Bring the input up to date, but do not repeat what failed until something changes."""
+        stamp = source.stamp()
+        if self._failed_at == stamp:
+            return source.last()
+        try:
+            vdi = source.vdi()
+        except BaseException:
+            self._failed_at = source.stamp()
+            raise
+        self._failed_at = None
+        return vdi
+
+    def _asked_for(self, ask: Callable[[], VDIStatus]) -> bool:
+        """Whether a policy that is a callable wants a VDI of this view."""
+        policy = self.regeneration.policy
+        try:
+            return callable(policy) and bool(policy(ask()))
+        except Exception as error:
+            self._complain(error)
+            return False
+
+    def _look(self, source: SourceInput, scene: Scene, ask: Callable[[], VDIStatus]) -> None:
+        moving = self._interaction.moving(scene.renderer.GetRenderWindow())
+        try:
+            self.regeneration.look(
+                source.source,
+                source.stamp(),
+                scene.view,
+                moving=moving,
+                ask=ask,
+                shown=scene.shown,
+            )
+        except Exception as error:  # what is shown can still be drawn
+            self._complain(error)
+
+    def _mind_the_angle(self, vdi: VDI | None, view: View) -> None:
+        """Say once that a VDI without its volume is seen from where it was not made for."""
+        if vdi is None or self._said_far or self.regeneration.policy != "auto":
+            return
+        angle = angle_from_generating_view(vdi, view.camera)
+        stored = vdi.metadata.get("view_cone")
+        served = stored if isinstance(stored, int | float) else _VIEW_CONE
+        if angle > served:
+            self._said_far = True
+            self._voice.warn(
+                f"the view is {angle:.0f} degrees from the VDI's generating view, which was to "
+                f"serve {served:.0f}: without its volume it cannot be made anew, and shows less "
+                "and less of what was hidden; regenerate='never' takes this as it is"
+            )
+
+    # -- between frames --------------------------------------------------------------------------
+
+    def collect(self) -> bool:
+        """Take what was made in the background; whether there is another VDI to be drawn."""
+        try:
+            return self.regeneration.collect()
+        except Exception as error:
+            self._complain(error)
+            return False
+
+    def _tick(self) -> None:
+        """Look, from the event loop, at what goes on, and have shown what is new."""
+        clock = None if self._clock is None else self._clock()
+        if clock is None or clock.drawing:
+            return
+        swapped = self.collect()
+        if not self.regeneration.busy:
+            self._ticker.stop()
+        if swapped or self._texts.are_behind(self.regeneration.progress):
+            clock.render()
+
+    def _complain(self, error: Exception) -> None:
+        self._voice.warn(
+            f"the VDI cannot be made anew: {type(error).__name__}: {error}; what was shown stays, "
+            "and actor.regenerate() tries again",
+            error,
+        )
