@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pyvista_vdi import _moved
 from pyvista_vdi._version import __version__
+from pyvista_vdi.model import providers
 
 if TYPE_CHECKING:
     from pyvista_vdi import errors, examples
@@ -95,6 +96,16 @@ __all__ = ["__version__", "errors", "examples", *sorted(_HOMES)]
 
 
 _moved.install()
+# The composition root: what lower rooms need of upper ones, by name and loaded when asked for
+providers.provide(
+    image_with_scalars="pyvista_vdi.plotting.volumes:as_image",
+    transfer_function_from_arguments="pyvista_vdi.plotting.classify:transfer_function_from_arguments",
+    transfer_function_from_property="pyvista_vdi.vtk_pipeline:transfer_function_from_property",
+    vdi_from_image="pyvista_vdi.vtk_pipeline:vdi_from_image",
+    volume_from_vtk="pyvista_vdi.vtk_pipeline:volume_from_vtk",
+    vti_files="pyvista_vdi.vtk_pipeline.filters.vti",
+    write_vdi="pyvista_vdi.io:write",
+)
 
 
 def __getattr__(name: str) -> Any:

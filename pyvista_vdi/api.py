@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, InvalidVolumeError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import DEFAULTS, IN_PLACE, Classification
+from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, warn_missed
@@ -646,13 +647,12 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
     if isinstance(volume, Volume):
         return _with_scalars(volume, scalars)
     if hasattr(volume, "GetClassName"):
-        from pyvista_vdi.vtk_pipeline.filters.convert import volume_from_vtk
-
+        from_vtk = provider("volume_from_vtk")
         if scalars is not None and not isinstance(scalars, str):
-            from pyvista_vdi.plotting.volumes import as_image
-
-            volume, scalars = as_image(volume, scalars, None)
-        return volume_from_vtk(volume, scalars=scalars, preference=preference)
+            volume, scalars = provider("image_with_scalars")(volume, scalars, None)
+        return from_vtk(  # type: ignore[no-any-return]
+            volume, scalars=scalars, preference=preference
+        )
     if isinstance(volume, np.ndarray):
         raise InvalidVolumeError(
             f"got a NumPy array of shape {volume.shape}, which has no spacing: "
@@ -693,9 +693,7 @@ def as_vdi(vdi: Any) -> VDI:
     if isinstance(vdi, VDI):
         return vdi
     if hasattr(vdi, "GetClassName"):
-        from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
-
-        return vdi_from_image(vdi)
+        return provider("vdi_from_image")(vdi)  # type: ignore[no-any-return]
     hint = ": read it by pyvista_vdi.read(path)" if isinstance(vdi, str | os.PathLike) else ""
     raise InvalidVDIError(
         f"expected a VDI or its VTK form (a vtkImageData); got {_described(vdi)}{hint}"

@@ -14,6 +14,7 @@ from pyvista_vdi.io.vdi_file.chunks import CODECS
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.whole_file import check_writable, with_suffix
 from pyvista_vdi.model.packing import check_precision
+from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 
 #: What the name of a file may end in; the first is our own format.
@@ -182,13 +183,12 @@ def _is_vti(path: Any) -> bool:
 def _vti() -> Any:
     """Return the module that has VTK write and read."""
     try:
-        from pyvista_vdi.vtk_pipeline.filters import vti
+        return provider("vti_files")
     except ImportError as error:
         raise MissingDependencyError(
             f".vti files need VTK, which cannot be loaded ({error}): install it by "
             'pip install "pyvista-vdi[plot]", or use .vdi files'
         ) from error
-    return vti
 
 
 def _check_names(what: str, path: Any, options: Mapping[str, Any], known: tuple[str, ...]) -> None:

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, UnsupportedError
+from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 
@@ -112,9 +113,8 @@ class Classification:
         if "transfer_function" in self._in_place:
             return self._checked_transfer_function()
         if "volume_property" in self._in_place:
-            from pyvista_vdi.vtk_pipeline.filters.convert import transfer_function_from_property
-
-            return transfer_function_from_property(
+            from_property = provider("transfer_function_from_property")
+            return from_property(  # type: ignore[no-any-return]
                 self._in_place["volume_property"], rgba=volume.rgba
             )
         if find_spec("pyvista") is None:
@@ -123,11 +123,12 @@ class Classification:
                 'install it by pip install "pyvista-vdi[plot]", or pass '
                 "transfer_function=pyvista_vdi.TransferFunction(colors, opacities, scalar_range)"
             )
-        from pyvista_vdi.plotting.classify import transfer_function_from_arguments
-
         left_out = (*_CHOOSE_THE_ARRAY, "blending")
         arguments = {n: v for n, v in {**DEFAULTS, **self._given}.items() if n not in left_out}
-        return transfer_function_from_arguments(volume.array, rgba=volume.rgba, **arguments)
+        from_arguments = provider("transfer_function_from_arguments")
+        return from_arguments(  # type: ignore[no-any-return]
+            volume.array, rgba=volume.rgba, **arguments
+        )
 
     def describe(self) -> dict[str, Any]:
         """Return the arguments as given, in values that JSON can hold."""

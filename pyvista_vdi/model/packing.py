@@ -8,16 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.host_memory import aligned_empty
-
-if TYPE_CHECKING:
-    from pyvista_vdi.model.vdi import VDI
 
 #: What a supersegment takes: 24 bytes as it was made, or less.
 PRECISIONS = ("exact", "16-byte", "8-byte")
@@ -44,6 +42,25 @@ _LEAST_TAU = np.float32(2.0**-19)
 #: Steps of red, green and blue, and where their bits begin.
 _COLOR_16 = ((2047, 0), (2047, 11), (1023, 22))
 _COLOR_8 = ((255, 8), (255, 16), (255, 24))
+
+
+class Lists(Protocol):
+    """The parts of a :class:`~pyvista_vdi.model.vdi.VDI` that packing reads."""
+
+    camera: Camera
+    depth_origin: float
+    front: NDArray[np.float32]
+    back: NDArray[np.float32]
+    color: NDArray[np.float32]
+    optical_depth: NDArray[np.float32]
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Supersegments per list, int64 (H, W)."""
+
+    @property
+    def n_supersegments(self) -> int:
+        """Number of supersegments in all lists."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +180,7 @@ def check_precision(precision: object) -> str:
     return str(precision)
 
 
-def packing_of(vdi: VDI, precision: str) -> Packing:
+def packing_of(vdi: Lists, precision: str) -> Packing:
     """Return a VDI's supersegments in a packed form.
 
     Raises
@@ -245,7 +262,7 @@ def _tau_codes(tau: NDArray[np.float32]) -> NDArray[np.uint32]:
 
 
 def _depths(
-    vdi: VDI, step: float, counts: NDArray[np.int64], part: slice
+    vdi: Lists, step: float, counts: NDArray[np.int64], part: slice
 ) -> tuple[NDArray[np.int32], NDArray[np.uint16], NDArray[np.uint32], NDArray[np.uint32]]:
     """Return some lists' origins, strides and codes of fronts and backs.
 
@@ -271,7 +288,7 @@ def _depths(
     return origins, strides, front, back
 
 
-def _grid_step(vdi: VDI) -> float:
+def _grid_step(vdi: Lists) -> float:
     """Return the shortest power of two of which at most :data:`_GRID` reach every depth."""
     if vdi.n_supersegments == 0:
         return 1.0

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.packing import Packing, check_precision, packing_of
+from pyvista_vdi.model.providers import provider
 
 if TYPE_CHECKING:
     import os
@@ -197,11 +198,7 @@ class VDI:
 
         The options are those of :func:`pyvista_vdi.io.write`.
         """
-        from pyvista_vdi.io import (
-            write,  # the file format's libraries are loaded only where a file is made
-        )
-
-        return write(self, path, **options)
+        return provider("write_vdi")(self, path, **options)  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         width, height = self.window_size

@@ -18,7 +18,8 @@ from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
 from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
 
 try:
-    from pyvista_vdi import __version__, vtk_pipeline
+    from pyvista_vdi import vtk_pipeline
+from pyvista_vdi._version import __version__
 except ImportError as error:
     raise ImportError(
         f"ParaView's Python cannot import pyvista_vdi ({error}): start ParaView with PYTHONPATH="
