@@ -19,7 +19,7 @@ from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumePrope
 
 try:
     from pyvista_vdi import vtk_pipeline
-from pyvista_vdi._version import __version__
+    from pyvista_vdi._version import __version__
 except ImportError as error:
     raise ImportError(
         f"ParaView's Python cannot import pyvista_vdi ({error}): start ParaView with PYTHONPATH="
