@@ -1,75 +1,58 @@
 """What a folder of DICOM slices says of itself, as far as a volume needs it.
 
-VTK's reader takes all slices of a folder for one volume and drops where they lie in the patient.
-So the headers are read here as well: only the elements of :data:`_WANTED`, from files that are not
-compressed (DICOM PS3.5, section 7 and annex A).
+VTK's reader takes all slices of a folder for one volume and drops where they lie in the patient:
+pydicom reads that.
 """
 
 from __future__ import annotations
 
-import struct
+import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
+from pyvista_vdi.errors import InvalidVolumeError, MissingDependencyError, UnsupportedError
 
-#: Bytes before the first element: 128 of any content and a mark.
-_PREAMBLE, _MARK = 128, b"DICM"
+#: What is read of a header, by DICOM's keywords.
+_WANTED = [
+    "SeriesDescription",
+    "SliceThickness",
+    "SeriesInstanceUID",
+    "ImagePositionPatient",
+    "ImageOrientationPatient",
+    "Rows",
+    "PixelSpacing",
+]
 
-#: No header that is read here is longer; what follows is left alone.
-_MAX_HEADER = 1 << 20
-
-#: Element (group, number) and what it is called here.
-_WANTED = {
-    (0x0002, 0x0010): "transfer_syntax",
-    (0x0008, 0x103E): "description",
-    (0x0018, 0x0050): "thickness",
-    (0x0020, 0x000E): "series",
-    (0x0020, 0x0032): "position",
-    (0x0020, 0x0037): "orientation",
-    (0x0028, 0x0010): "rows",
-    (0x0028, 0x0030): "spacing",
-}
-
-#: Transfer syntaxes whose pixels VTK reads; the first has no value representations.
-_IMPLICIT = "1.2.840.10008.1.2"
-_UNCOMPRESSED = (_IMPLICIT, "1.2.840.10008.1.2.1")
-
-#: Value representations whose length has four bytes, behind two that are reserved.
-_LONG = (b"OB", b"OD", b"OF", b"OL", b"OV", b"OW", b"SQ", b"SV", b"UC", b"UN", b"UR", b"UT", b"UV")
-
-_UNDEFINED = 0xFFFFFFFF
-_ITEM_END, _SEQUENCE_END = (0xFFFE, 0xE00D), (0xFFFE, 0xE0DD)
+#: Transfer syntaxes whose pixels VTK reads.
+_UNCOMPRESSED = ("1.2.840.10008.1.2", "1.2.840.10008.1.2.1")
 
 
 @dataclass(frozen=True)
 class Slice:
-    """One slice of a scan.
+    """One slice of a scan; lengths are millimetres, ``None`` where the file does not say.
 
-    Parameters
+    Attributes
     ----------
     path : pathlib.Path
         Its file.
-    series : str
-        Identifier of the series that it belongs to.
-    description : str
-        What the series is called.
+    series, description : str
+        Identifier and name of the series that it belongs to.
     transfer_syntax : str
         Identifier of how the file is encoded.
     position : numpy.ndarray or None
-        Centre of its first pixel, float64 (3,), millimetres in the patient's frame: to the left,
-        to the back, to the head.
+        Centre of its first pixel, float64 (3,), in the patient's frame: to the left, to the back,
+        to the head.
     orientation : numpy.ndarray or None
         Directions in which columns and rows are counted, float64 (2, 3).
     thickness : float or None
-        Of what the slice shows, millimetres.
+        Of what the slice shows.
     spacing : numpy.ndarray or None
-        Between the centres of rows and of columns, in this order, float64 (2,), millimetres.
+        Between the centres of rows and of columns, in this order, float64 (2,).
     """
 
     path: Path
@@ -123,80 +106,41 @@ def require_uncompressed(one: Slice) -> None:
 
 def read_slice(path: Path) -> Slice | None:
     """Return what a file says of its slice, or None where it is no DICOM image."""
-    with path.open("rb") as stream:
-        data = stream.read(_MAX_HEADER)
-    if data[_PREAMBLE : _PREAMBLE + len(_MARK)] != _MARK:
-        return None
+    dcmread = _pydicom().dcmread
     try:
-        found = _found(data)
-        if "rows" not in found:  # a directory, a report, a plan ...
-            return None
-        thickness = _numbers(found, "thickness", ())
-        return Slice(
-            path,
-            _text(found.get("series", b"")),
-            _text(found.get("description", b"")),
-            _text(found["transfer_syntax"]),
-            _numbers(found, "position", (3,)),
-            _numbers(found, "orientation", (2, 3)),
-            None if thickness is None else float(thickness),
-            _numbers(found, "spacing", (2,)),
-        )
-    except (KeyError, ValueError, IndexError, struct.error, RecursionError):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of values that break a rule
+            header = dcmread(path, stop_before_pixels=True, specific_tags=_WANTED)
+            if "Rows" not in header:  # a directory, a report, a plan ...
+                return None
+            thickness = _numbers(header, "SliceThickness", ())
+            return Slice(
+                path,
+                str(header.get("SeriesInstanceUID", "")),
+                str(header.get("SeriesDescription", "")),
+                str(header.file_meta.TransferSyntaxUID),
+                _numbers(header, "ImagePositionPatient", (3,)),
+                _numbers(header, "ImageOrientationPatient", (2, 3)),
+                None if thickness is None else float(thickness),
+                _numbers(header, "PixelSpacing", (2,)),
+            )
+    except Exception:  # damage shows at whatever pydicom comes to first
         return None
 
 
-def _found(data: bytes) -> dict[str, bytes]:
-    """Return the values of the elements that are wanted."""
-    found: dict[str, bytes] = {}
-
-    def explicit() -> bool:
-        return _text(found.get("transfer_syntax", b"")) != _IMPLICIT
-
-    for tag, begin, end in _elements(data, _PREAMBLE + len(_MARK), explicit):
-        if tag > max(_WANTED):
-            break
-        if tag in _WANTED:
-            found[_WANTED[tag]] = data[begin:end]
-    return found
-
-
-def _elements(
-    data: bytes, place: int, is_explicit: Callable[[], bool]
-) -> Iterator[tuple[tuple[int, int], int, int]]:
-    """Yield each element's tag and where its value begins and ends."""
-    while place + 8 <= len(data):
-        tag = struct.unpack_from("<HH", data, place)
-        explicit = tag[0] == 0x0002 or is_explicit()  # group 2 always is
-        if not explicit or tag[0] == 0xFFFE:
-            length, begin = struct.unpack_from("<I", data, place + 4)[0], place + 8
-        elif data[place + 4 : place + 6] in _LONG:
-            length, begin = struct.unpack_from("<I", data, place + 8)[0], place + 12
-        else:
-            length, begin = struct.unpack_from("<H", data, place + 6)[0], place + 8
-        if length == _UNDEFINED:
-            end = place = _end_of(data, begin, is_explicit)
-        else:
-            end = place = begin + length
-        yield tag, begin, end
-
-
-def _end_of(data: bytes, place: int, is_explicit: Callable[[], bool]) -> int:
-    """Return where a sequence or an item of undefined length ends, behind its delimiter."""
-    for tag, _, end in _elements(data, place, is_explicit):
-        if tag in (_ITEM_END, _SEQUENCE_END):
-            return end
-    raise ValueError("a sequence does not end")
-
-
-def _text(value: bytes) -> str:
-    return value.decode("latin-1").strip("\0 ")
-
-
-def _numbers(
-    found: dict[str, bytes], name: str, shape: tuple[int, ...]
-) -> NDArray[np.float64] | None:
-    if not _text(found.get(name, b"")):
+def _numbers(header: Any, name: str, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
+    value = header.get(name)
+    if value is None or value == "":
         return None
-    values = np.array([float(v) for v in _text(found[name]).split("\\")])
-    return values.reshape(shape)
+    return np.array(value, dtype=np.float64).reshape(shape)
+
+
+def _pydicom() -> Any:
+    try:
+        import pydicom
+    except ImportError as error:
+        raise MissingDependencyError(
+            "DICOM slices are read by pydicom, which is not installed: install it by "
+            'pip install "pyvista-vdi[plot]"'
+        ) from error
+    return pydicom

@@ -16,7 +16,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 from vtkmodules.vtkIOImage import vtkDICOMImageReader, vtkMetaImageReader, vtkNIFTIImageReader
 
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIWarning
+from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIError, VDIWarning
 from pyvista_vdi.plotting.dicom import Slice, read_slice, require_uncompressed, slices_of
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
 
@@ -86,7 +86,7 @@ def read_volume(path: str | os.PathLike[str]) -> pv.ImageData:
         else:
             with _silence():
                 data = pv.read(file)
-    except (InvalidVolumeError, UnsupportedError):
+    except VDIError:
         raise
     except Exception as error:  # each format has readers, and exceptions, of its own
         raise InvalidVolumeError(f"{file} cannot be read as a volume: {error}") from error

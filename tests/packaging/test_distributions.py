@@ -128,7 +128,7 @@ def test_wheel_metadata_and_entry_points(wheel, wheel_names):
     }
     assert {"numpy", "pyopencl", "scikit-image"} <= required
     # the engine runs on machines without these
-    assert required.isdisjoint({"vtk", "pyvista", "matplotlib", "intel-opencl-rt"})
+    assert required.isdisjoint({"vtk", "pyvista", "matplotlib", "pydicom", "intel-opencl-rt"})
     assert "pyvista-vdi = pyvista_vdi.cli:main" in entry_points
     assert "[pyvista.plotter_components]\nadd_vdi = pyvista_vdi.plotting.component" in entry_points
     assert "[pyvista.accessors]\nvdi = pyvista_vdi.plotting.accessor" in entry_points

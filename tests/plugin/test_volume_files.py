@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import shutil
 import struct
+import sys
 from argparse import Namespace
 
 import numpy as np
@@ -29,7 +30,12 @@ from strategies import random_vdi
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
 from pyvista_vdi.cli.inputs import read_volume
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIWarning
+from pyvista_vdi.errors import (
+    InvalidVolumeError,
+    MissingDependencyError,
+    UnsupportedError,
+    VDIWarning,
+)
 
 SPACING, ORIGIN = np.array([1.0, 1.5, 2.5]), np.array([-10.0, 20.0, 30.0])
 MARK = (4, 2, 1)  # x, y, z
@@ -345,6 +351,13 @@ def test_a_folder_without_slices(files, tmp_path, capsys):
         assert cli.main([verb[0], str(tmp_path / "scan"), *verb[1:]]) == 1
         assert "holds no DICOM slices" in capsys.readouterr().err
     assert not (tmp_path / "a.vdi").exists()
+
+
+def test_without_pydicom_the_extra_is_named(tmp_path, monkeypatch):
+    folder = dicom_folder(tmp_path)
+    monkeypatch.setitem(sys.modules, "pydicom", None)
+    with pytest.raises(MissingDependencyError, match=r"pydicom.*pyvista-vdi\[plot\]"):
+        read(folder)
 
 
 def test_several_series_are_named(tmp_path):
