@@ -5,6 +5,7 @@
 // it lies, by one store, and what is sampled is loaded lane by lane.
 //
 // -D VOXEL_T, SKIP_EMPTY, BLOCK_SHIFT: see volume/sampling.cl and volume/march.cl
+#define LANES 16
 #include "lib/rays.cl"
 #include "volume/empty_blocks.cl"
 #include "generation/run_blocks.cl"

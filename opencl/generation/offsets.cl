@@ -2,7 +2,6 @@
 //
 // A block is what one work-group takes, whatever its size: LISTS_PER_ITEM lists for each of its work-items. sum_lengths sums
 // up each block; list_offsets adds what lies before a block to the running sum within it.
-#define LISTS_PER_ITEM 16 // that of pyvista_vdi/growing_lists.py
 
 // Sum of the values of the work-group's items before this one. `sums`: an element for each item; afterwards the last one's
 // is the sum of all.

@@ -96,8 +96,6 @@ inline float merge_error(float8 a, float4 feature_a, float8 b, float4 feature_b,
 // A ray's runs lie one behind the other, and its errors likewise: what shortens them goes from run to run, and rays whose
 // records grow at different places write to one line of the cache each. A run moves as four words of 8 bytes, because the
 // number of loads and stores is what counts where a vector's lanes go to different places.
-#define RUN_WORDS 8
-
 inline size_t record_start(uint item, int capacity, int words)
 {
     return (size_t)item * (size_t)(capacity * words);
@@ -118,12 +116,11 @@ inline void store_run(__global float *record, int k, float8 run)
     pairs[3] = as_ulong(run.s67);
 }
 
-// A ray's errors are looked through this many at a time, and end with INFINITY.
-#define ERRORS 8
+// A ray's errors are looked through ERRORS_AT_A_TIME at a time, and end with INFINITY.
 
 inline size_t errors_start(uint item, int capacity)
 {
-    return (size_t)item * (size_t)((capacity + ERRORS - 1) / ERRORS * ERRORS);
+    return (size_t)item * (size_t)((capacity + ERRORS_AT_A_TIME - 1) / ERRORS_AT_A_TIME * ERRORS_AT_A_TIME);
 }
 
 // errors[k]: what merging runs k and k + 1 costs, merge_error of eight pairs at a time.
@@ -131,7 +128,7 @@ inline void measure_errors(__global const float *record, __global float *errors,
 {
     const int last = count - 1;
     float8 h = load_run(record, 0);
-    for (int k = 0; k < count; k += ERRORS) {
+    for (int k = 0; k < count; k += ERRORS_AT_A_TIME) {
         const float8 a = h;
         const float8 b = load_run(record, min(k + 1, last));
         const float8 c = load_run(record, min(k + 2, last));
@@ -176,7 +173,7 @@ inline void measure_errors(__global const float *record, __global float *errors,
 inline int count_within(__global const float *errors, int count, float threshold)
 {
     int8 n = (int8)(0);
-    for (int k = 0; k < count; k += ERRORS)
+    for (int k = 0; k < count; k += ERRORS_AT_A_TIME)
         n += vload8(0, errors + k) <= threshold; // -1 where it is so
     const int4 sums = n.lo + n.hi;
     return -(sums.x + sums.y + sums.z + sums.w);
@@ -187,7 +184,7 @@ inline int least_of(__global const float *errors, int count)
 {
     float8 least = (float8)(INFINITY);
     int8 at = (int8)(INT_MAX);
-    for (int k = 0; k < count; k += ERRORS) {
+    for (int k = 0; k < count; k += ERRORS_AT_A_TIME) {
         const float8 error = vload8(0, errors + k);
         const int8 less = error < least;
         least = select(least, error, less);

@@ -6,6 +6,7 @@
 // side by side.
 //
 // -D FAR_ENTRIES: see lib/rays.cl
+#define LANES 16
 #include "lib/rays.cl"
 #include "generation/run_blocks.cl"
 #pragma OPENCL FP_CONTRACT OFF

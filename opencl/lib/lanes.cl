@@ -1,16 +1,103 @@
-// Vectors that are written out: the lanes of each are LANES rays, which a work-item follows together.
+// One text for one ray and for several side by side: what the lanes of a vector hold, and what is done to each.
+//
+// -D LANES  1 (default): a work-item follows one ray, and what vectors there are is the compiler's business
+//           16: it follows that many together, in vectors that are written out
+//
+// A formula is written once, of Real, Int and Uint; only loads, stores and transposes differ (#if LANES == 1). Truth values are
+// Int: 1 in one lane, all bits in a vector. They are joined by &, | and !, never by ~, and are not counted with: COUNT is.
+// Functions that take a vector and a number (min, fmax, clamp) and operators take both forms; fma and SELECT want (Real)(x).
 #pragma OPENCL FP_CONTRACT OFF
 
-#define LANES 16 // those of pyvista_vdi/packets.py, and BLOCK_RAYS of pyvista_vdi/blocks.py
-typedef float16 Reals;
-typedef int16 Ints; // also truth values: all bits or none
-#define NUMBERS (Ints)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
-// Whether a truth value is true in any lane. By the sign, which compilers know how to ask a mask for.
-#define ANY(chosen) any((chosen) < 0)
+#ifndef LANES
+#define LANES 1
+#endif
 
-// Sixteen places that are read one by one, as volatile: from memory, as to take each out of a register costs two operations
+#if LANES == 1
+typedef float Real;
+typedef int Int;
+typedef uint Uint;
+typedef float3 Real3;
+typedef float4 Real4;
+#define REAL3(x, y, z) (float3)(x, y, z)
+#define REAL4(x, y, z, w) (float4)(x, y, z, w)
+#define SELECT(otherwise, then, condition) ((condition) ? (then) : (otherwise))
+#define ANY(condition) (condition) // whether it holds in any lane
+#define ALL(condition) (condition)
+#define MAY_MATTER(condition) 1    // whether to do what is selected by `condition` alone: without a branch, unless lanes are many
+#define COUNT(condition) (condition) // 1 where it holds, or 0
+#define TO_REAL(x) ((float)(x))    // the value
+#define TO_INT(x) ((int)(x))
+#define AS_REAL(x) as_float(x)     // the bits
+#define AS_INT(x) as_int(x)
+#define AS_UINT(x) as_uint(x)
+#define LANE_NUMBERS 0
+#define OF_LANES(TYPE, OF_LANE) (TYPE)(OF_LANE(0)) // TYPE: Real, Int or Uint; OF_LANE(n): lane n's, a macro
+#define LOAD_LANES(k, from) ((from)[k]) // the k-th row of LANES numbers
+#define STORE_LANES(x, k, to) ((to)[k] = (x))
+
+inline int least_lane(int x)
+{
+    return x;
+}
+
+inline int largest_lane(int x)
+{
+    return x;
+}
+#else
+typedef float16 Real;
+typedef int16 Int;
+typedef uint16 Uint;
+typedef struct {
+    Real x, y, z;
+} Real3;
+typedef struct {
+    Real x, y, z, w;
+} Real4;
+#define REAL3(x, y, z) ((Real3){x, y, z})
+#define REAL4(x, y, z, w) ((Real4){x, y, z, w})
+#define SELECT(otherwise, then, condition) select(otherwise, then, condition)
+#define ANY(condition) any((condition) < 0) // by the sign, which compilers know how to ask a mask for
+#define ALL(condition) all((condition) < 0)
+#define MAY_MATTER(condition) ANY(condition)
+#define COUNT(condition) (-(condition))
+#define TO_REAL(x) convert_float16(x)
+#define TO_INT(x) convert_int16(x)
+#define AS_REAL(x) as_float16(x)
+#define AS_INT(x) as_int16(x)
+#define AS_UINT(x) as_uint16(x)
+#define LANE_NUMBERS (Int)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+#define OF_LANES(TYPE, OF_LANE)                                                                                       \
+    (TYPE)(OF_LANE(0), OF_LANE(1), OF_LANE(2), OF_LANE(3), OF_LANE(4), OF_LANE(5), OF_LANE(6), OF_LANE(7), OF_LANE(8), \
+           OF_LANE(9), OF_LANE(10), OF_LANE(11), OF_LANE(12), OF_LANE(13), OF_LANE(14), OF_LANE(15))
+#define LOAD_LANES(k, from) vload16(k, from)
+#define STORE_LANES(x, k, to) vstore16(x, k, to)
+
+inline int least_lane(Int x)
+{
+    const int8 of_two = min(x.lo, x.hi);
+    const int4 of_four = min(of_two.lo, of_two.hi);
+    const int2 of_eight = min(of_four.lo, of_four.hi);
+    return min(of_eight.x, of_eight.y);
+}
+
+inline int largest_lane(Int x)
+{
+    const int8 of_two = max(x.lo, x.hi);
+    const int4 of_four = max(of_two.lo, of_two.hi);
+    const int2 of_eight = max(of_four.lo, of_four.hi);
+    return max(of_eight.x, of_eight.y);
+}
+
+// Names that are going: of files that know only vectors
+typedef Real Reals;
+typedef Int Ints;
+#define NUMBERS LANE_NUMBERS
+#endif
+
+// A number of each lane that is read one by one, as volatile: from memory, as to take each out of a register costs two operations
 // more.
 typedef union {
-    Ints all;
+    Int all;
     int each[LANES];
 } Places;

@@ -111,8 +111,6 @@ inline int2 block_pixel(uint item, int width)
 // The same for part of a window, in strips STRIP blocks high, each from left to right, so that one work-item's lists are still
 // cached when those above and below come to them: whole columns of strips, a work-group each. `part` is its first column and
 // strip, in columns and strips of the window, how many columns it has in each strip, and how many strips.
-#define STRIP 4
-#define COLUMN_ITEMS (16 * STRIP) // that of pyvista_vdi/blocks.py, and of every group that draws, unless it may be of any size
 inline int2 part_pixel(int group, int item, int4 part)
 {
     const int strip = group / part.z;
@@ -121,7 +119,6 @@ inline int2 part_pixel(int group, int item, int4 part)
 }
 
 // The same for some of a window's cells, squares of STRIP x STRIP blocks; `cells` are their columns and rows.
-#define CELL_ITEMS (STRIP * COLUMN_ITEMS) // that of pyvista_vdi/blocks.py
 inline int2 cell_pixel(__global const int2 *cells, int item)
 {
     const int2 cell = cells[item / CELL_ITEMS];

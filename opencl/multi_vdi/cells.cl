@@ -2,7 +2,6 @@
 // from its picture. A work-item has a row of pixels of a cell.
 #pragma OPENCL FP_CONTRACT OFF
 
-#define CELL 16     // pixels along each edge: those of pyvista_vdi/blocks.py
 #define NOBODY (-2) // of `alone`: no VDI is met there; -1: several are drawn together
 
 // t at which the rays end by which a VDI is drawn by itself: at once in other cells.

@@ -6,6 +6,7 @@
 // -D STREAMS          how many VDIs
 // -D SEGMENTS (2)     see raycasting/segments.cl
 // -D COMPENSATED (1)  see lib/compositing.cl
+#define LANES 16
 #include "raycasting/packet_light.cl"
 #include "raycasting/segment_rows.cl"
 #pragma OPENCL FP_CONTRACT OFF

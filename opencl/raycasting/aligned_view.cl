@@ -8,6 +8,7 @@
 // in the depth coordinate, and a length is a difference of it over the reciprocal depths at both ends.
 //
 // -D OFFSET_T, PARALLEL, SHIFTED, PACKED, COMPENSATED (1)    as in raycasting/raycast.cl
+#define LANES 16
 #include "raycasting/packet_light.cl"
 #include "lib/transpose.cl"
 #include "raycasting/supersegments.cl"

@@ -7,6 +7,7 @@
 // -D SKIP_EMPTY         as in raycasting/raycast.cl: the picture is the same to the last bit
 // -D SEGMENTS (2)       write what the rays cross, as there; multi_vdi/merge_blocks.cl or multi_vdi/merge.cl merges it
 // -D PARALLEL, SHIFTED, CROPPED, COMPENSATED (1)    as there; OFFSET_T is int, and supersegments are not packed
+#define LANES 16
 #include "raycasting/lists.cl"
 #include "raycasting/packet_cropping.cl"
 #include "raycasting/packet_light.cl"

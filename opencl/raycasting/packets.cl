@@ -9,6 +9,7 @@
 // -D UPRIGHT            packets stand on end in the window of V_N
 // -D SKIP_EMPTY         as in raycasting/raycast.cl: the picture is the same to the last bit
 // -D OFFSET_T, PARALLEL, SHIFTED, PACKED, COMPENSATED (1)    as there
+#define LANES 16
 #include "raycasting/lists.cl"
 #include "raycasting/packet_light.cl"
 #include "raycasting/slabs_ahead.cl"

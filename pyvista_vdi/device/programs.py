@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.device import sources
+from pyvista_vdi.device.constants import KERNEL_CONSTANTS
 from pyvista_vdi.device.devices import opencl
 from pyvista_vdi.errors import InvalidArgumentError, KernelBuildError
 
@@ -137,7 +138,11 @@ class ProgramCache:
         self._device = device
         self._kernels: dict[tuple[Any, ...], Kernel] = {}
         self._programs: dict[tuple[str, tuple[str, ...]], Any] = {}
-        self._base_options = ("-cl-std=CL1.2", *_rounding_options(device))
+        self._base_options = (
+            "-cl-std=CL1.2",
+            *_rounding_options(device),
+            *define_options(KERNEL_CONSTANTS),
+        )
 
     def known(self, path: str | Path, name: str, defines: Mapping[str, Define]) -> Kernel | None:
         """A kernel of the package's files that was compiled before; parameters as for kernel."""

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.device import aligned_empty
-from pyvista_vdi.device.work_order import CELL, Rectangle
+from pyvista_vdi.device.constants import CELL
+from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.cropping import Cropping

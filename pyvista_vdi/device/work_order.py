@@ -7,18 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi.device.constants import STRIP
+
 #: Work-items per group: four blocks.
 GROUP = 64
-#: Pixels along the edges of a block, and up a strip of them: those of ``lib/rays.cl``.
+#: Pixels along the edges of a block.
 _BLOCK = 4
-_STRIP = 16
 #: Rays of a block, which kernels written out in vectors follow in one work-item.
 BLOCK_RAYS = _BLOCK * _BLOCK
-#: Work-items of a column of a strip, which a group draws: that of ``lib/rays.cl``.
-COLUMN_ITEMS = _BLOCK * _STRIP
-#: Pixels along the edges of a cell, and all of them: those of ``lib/rays.cl``.
-CELL = _STRIP
-CELL_ITEMS = CELL * CELL
 
 
 class Rectangle(NamedTuple):
@@ -40,8 +36,8 @@ def part_columns(part: Rectangle) -> NDArray[np.int32]:
 
     First column, first strip, columns of each strip, strips: int32 (4,). Each column is a group.
     """
-    column, strip = part.x0 // _BLOCK, part.y0 // _STRIP
-    columns, strips = -(-part.x1 // _BLOCK) - column, -(-part.y1 // _STRIP) - strip
+    column, strip = part.x0 // _BLOCK, part.y0 // (_BLOCK * STRIP)
+    columns, strips = -(-part.x1 // _BLOCK) - column, -(-part.y1 // (_BLOCK * STRIP)) - strip
     return np.array([column, strip, columns, strips], np.int32)
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi._version import __version__
 from pyvista_vdi.device import Kernel, Runtime, get_runtime
+from pyvista_vdi.device.constants import ERRORS_AT_A_TIME, RUN_WORDS
 from pyvista_vdi.device.ray_forms import check_list_space
 from pyvista_vdi.device.work_order import BLOCK_RAYS, GROUP, block_items
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
@@ -49,10 +50,8 @@ _CRITERIA: dict[str, str | None] = {
 }
 CRITERIA = tuple(_CRITERIA)
 
-#: Bytes of one recorded run on the device: eight float32 and its merge error.
-_RUN_BYTES = 9 * 4
-#: Records have room for a multiple of so many runs: ``ERRORS`` of ``generation/runs.cl``.
-_ERRORS_AT_A_TIME = 8
+#: Bytes of one recorded run on the device, and of its merge error.
+_RUN_BYTES = (RUN_WORDS + 1) * 4
 #: ``-D`` names that ``generation/march_blocks.cl`` knows; ``COMPENSATED=1`` changes no march.
 _IN_BLOCKS = {"VOXEL_T", "INDEX_T", "NEAREST", "BY_SCALAR", "SKIP_EMPTY", "BLOCK_SHIFT"}
 #: Bytes of runs that one slice of rays records at a time; also how often progress is reported.
@@ -392,7 +391,7 @@ class _Slices:
         if _CRITERIA[criterion]:
             self.kept = max(self.kept, _UNMERGED_RUNS)
             self.capacity = self.kept + _CHUNK_STEPS + limit  # the kernel cuts into what is free
-        self.capacity = -(-self.capacity // _ERRORS_AT_A_TIME) * _ERRORS_AT_A_TIME
+        self.capacity = -(-self.capacity // ERRORS_AT_A_TIME) * ERRORS_AT_A_TIME
         per_block_row = block_items(width, 4) * self.capacity * _RUN_BYTES
         most = _SLICE_BYTES
         if memory_limit is not None:
@@ -470,7 +469,7 @@ class _Recorder:
         with ExitStack() as stack:
             keep = stack.enter_context
             self._forms = keep(runtime.upload(rays.packed(), "rays"))
-            self._records = keep(runtime.buffer((items, capacity, 8), name="recorded runs"))
+            self._records = keep(runtime.buffer((items, capacity, RUN_WORDS), name="recorded runs"))
             self._errors = keep(runtime.buffer((items, capacity), name="merge errors"))
             self._thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
             self._counts = keep(runtime.buffer((items,), np.uint32, "list lengths"))

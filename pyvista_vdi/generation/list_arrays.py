@@ -17,11 +17,10 @@ from pyvista_vdi.device import (
     aligned_empty,
     kept_together,
 )
+from pyvista_vdi.device.constants import LISTS_PER_ITEM
 from pyvista_vdi.device.work_order import GROUP
 from pyvista_vdi.model.host_memory import require_host_memory
 
-#: Lists whose lengths a work-item sums up: that of ``generation/offsets.cl``.
-_LISTS_PER_ITEM = 16
 #: A VDI's arrays of supersegments, as messages call them, and the shape of an element.
 _LIST_ARRAYS: dict[str, tuple[int, ...]] = {
     "front depths": (),
@@ -275,7 +274,7 @@ def growing_lists(
 
 def blocks_to_sum(lists: int) -> int:
     """Return the work-groups that sum up the lengths of so many lists."""
-    return -(-lists // (GROUP * _LISTS_PER_ITEM))
+    return -(-lists // (GROUP * LISTS_PER_ITEM))
 
 
 def require_room(supersegments: int, size: tuple[int, int]) -> None:

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, get_runtime
+from pyvista_vdi.device.constants import CELL, CELL_ITEMS
 from pyvista_vdi.device.ray_forms import cells_of_points
-from pyvista_vdi.device.work_order import CELL, CELL_ITEMS, GROUP, Rectangle
+from pyvista_vdi.device.work_order import GROUP, Rectangle
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier

@@ -21,7 +21,8 @@ from pyvista_vdi.device import (
     kept_together,
 )
 from pyvista_vdi.device import ray_forms as rays
-from pyvista_vdi.device.work_order import COLUMN_ITEMS, GROUP, Rectangle, block_items, part_columns
+from pyvista_vdi.device.constants import COLUMN_ITEMS
+from pyvista_vdi.device.work_order import GROUP, Rectangle, block_items, part_columns
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
