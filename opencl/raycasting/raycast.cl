@@ -15,7 +15,6 @@
 // -D ONE_LIST           the view is V_O: each ray stays in a list, whose supersegments a loop of its own composites
 // -D SEGMENTS           write what each ray crosses into a pool (raycasting/segments.cl), to be merged with other VDIs by
 //                       multi_vdi/merge.cl or multi_vdi/merge_blocks.cl, in place of compositing it; for a band of rays
-// -D ANY_GROUP          work-groups need not be a column of a strip each; any power of two will do
 // -D FIRST_HIT          in place of a picture, where each ray enters the first supersegment that reaches an opacity
 #include "raycasting/list_ray.cl"
 #include "raycasting/lists.cl"
@@ -85,9 +84,6 @@ __kernel void raycast(
 #ifdef SEGMENTS
     const int band_ray = (int)get_global_id(0);
     const int2 pixel = cell_pixel(cells + first_cell, band_ray);
-#elif defined(ANY_GROUP)
-    const int item = (int)get_global_id(0) % COLUMN_ITEMS;
-    const int2 pixel = part_pixel((int)get_global_id(0) / COLUMN_ITEMS, item, part);
 #else
     // By what a work-group has in common, so that it divides once
     const int item = (int)get_local_id(0);

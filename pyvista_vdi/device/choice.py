@@ -13,7 +13,6 @@ from pyvista_vdi.device import devices
 from pyvista_vdi.device.buffers import LocalMemory, bytes_text
 from pyvista_vdi.device.devices import Candidate, DeviceInfo
 from pyvista_vdi.device.runtime import Runtime
-from pyvista_vdi.device.tuning import tuned_sizes
 from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError, VDIError
 
 PROBE_COUNT = 256
@@ -146,13 +145,11 @@ def _device_lines(info: DeviceInfo, is_default: bool) -> list[str]:
     memory = (
         f"{bytes_text(info.global_memory)} memory, {bytes_text(info.max_allocation)} per buffer"
     )
-    tuned = ", ".join(f"{kernel} {size}" for kernel, size in tuned_sizes(info).items())
     return [
         f"{mark} [{info.platform_index}:{info.device_index}] {info.full_name}",
         f"    {info.kind}, {info.compute_units} compute units, {memory}, {precision}",
         f"    {info.version}, driver {info.driver}, selector {info.selector!r}",
         "    usable" if info.usable else f"    not used: {info.reason}",
-        *([f"    work-group sizes found: {tuned}"] if tuned else []),
     ]
 
 

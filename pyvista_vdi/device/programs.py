@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import os
 import re
+import sys
 import threading
+import time
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import platformdirs
 
 from pyvista_vdi.device import sources
 from pyvista_vdi.device.constants import KERNEL_CONSTANTS
@@ -19,6 +24,9 @@ from pyvista_vdi.errors import InvalidArgumentError, KernelBuildError
 
 Define = str | int | float | bool | None
 LOG_LINES_SHOWN = 30
+#: Age in seconds from which pyopencl's lock on its cache belongs to no living process: it is held
+#: while a program's file is read or written, which takes milliseconds.
+STALE_LOCK = 20.0
 
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*")
 _NOT_IN_OPTIONS = re.compile(r"[\s\"'\\;]")
@@ -89,14 +97,11 @@ class Kernel:
     divisible : bool
         Whether several launches with offsets do what one launch does: nothing in the program asks
         where in the whole its work-group is.
-    source : str
-        The program's text, with all that it includes.
     """
 
     def __init__(self, program: Any, path: str, name: str, source: str) -> None:
         self.name = name
         self.path = path
-        self.source = source
         self.divisible = _PLACE_OF_GROUP.search(source) is None
         self._program = program
         self._local = threading.local()
@@ -242,10 +247,14 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
         With the compiler's log, the options and the source.
     """
     cl = opencl()
+    # pyopencl asks for this without a default where its cache fails; empty, it compiles instead
+    os.environ.setdefault("PYOPENCL_CACHE_FAILURE_FATAL", "")
     with _build_lock, warnings.catch_warnings(record=True) as remarks:
         warnings.simplefilter("always")
+        cache = cache_folder()
+        _remove_stale_lock(cache / "lock")
         try:
-            program = cl.Program(context, source).build(options=list(options))
+            program = cl.Program(context, source).build(list(options), cache_dir=str(cache))
         except cl.Error as exc:
             log = _compiler_log(str(exc))
             raise KernelBuildError(
@@ -258,6 +267,19 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
     for remark in remarks:
         _logger.debug("%s: %s", path, remark.message)
     return program
+
+
+def cache_folder() -> Path:
+    """Return where compiled programs are kept, by the system's convention for such folders."""
+    versions = f"pyopencl{opencl().VERSION_TEXT}-py{'.'.join(map(str, sys.version_info[:3]))}"
+    return Path(platformdirs.user_cache_dir("pyvista-vdi", appauthor=False)) / versions
+
+
+def _remove_stale_lock(lock: Path) -> None:
+    """Remove the lock of a process that was killed: everybody else would wait a minute for it."""
+    with contextlib.suppress(OSError):
+        if time.time() - lock.stat().st_mtime > STALE_LOCK:
+            lock.unlink()
 
 
 def _compiler_log(message: str) -> str:

@@ -20,7 +20,6 @@ from pyvista_vdi.device.arguments import (
     Size,
     as_size,
     check_host_array,
-    padded,
     preferred_group,
     set_arguments,
 )
@@ -29,7 +28,6 @@ from pyvista_vdi.device.devices import Candidate, DeviceInfo, drivers_lost, open
 from pyvista_vdi.device.profiling import KernelTime, Profile, profiling_wanted, table
 from pyvista_vdi.device.programs import Define, Kernel, ProgramCache
 from pyvista_vdi.device.scheduling import Turns, Worker
-from pyvista_vdi.device.tuning import tuner_of
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.model.host_memory import HOST_ALIGNMENT, aligned_empty
 
@@ -82,7 +80,6 @@ class Runtime:
         self._queues: dict[int, Any] = {}  # those that exist, numbered as they were made
         self._queues_made = 0
         self._queues_lock = threading.RLock()
-        self._tuner = tuner_of(self._device, self.info)
         self._profile: Profile | None = None
         if profiling_wanted():
             self._profile = Profile()
@@ -130,18 +127,12 @@ class Runtime:
         with self._turns.aside():  # compilers take seconds, and not the device
             return self._programs.kernel(path, name, defines)
 
-    @property
-    def tunes_groups(self) -> bool:
-        """Whether launches with ``any_group`` may get work-groups of other sizes than they ask."""
-        return self._tuner is not None
-
     def launch(
         self,
         kernel: Kernel,
         global_size: Size,
         local_size: Size | None,
         *args: Argument,
-        any_group: bool = False,
     ) -> None:
         """Enqueue a kernel and return at once; inside :meth:`background`, run it in pieces.
 
@@ -157,10 +148,6 @@ class Runtime:
         *args : DeviceBuffer, LocalMemory, numpy scalar, numpy.ndarray or None
             In the kernel's order. Numbers carry their type (``np.float32(x)``); a small array is
             passed by value, as a vector (``float4``) or a structure; None is a null pointer.
-        any_group : bool, default: False
-            That the kernel, of one dimension, does the same in work-groups of any power of two, and
-            leaves out surplus work items itself: the size that is fastest on this device is found
-            and used (:mod:`pyvista_vdi.device.tuning`), the global size rounded up to it.
 
         Raises
         ------
@@ -191,21 +178,13 @@ class Runtime:
             )
         if 0 in whole:
             return
-        turn = None
-        if any_group and group is not None and self._tuner is not None:
-            undivided = self._turns.worker is None
-            size, turn = self._tuner.size(kernel, whole[0], group[0], timed=undivided)
-            group, whole = (size,), padded(whole, size)
-
         with self._driver(f"launching {kernel.name!r} of {kernel.path} on {whole} by {group}"):
             set_arguments(kernel, args)
             for argument in args:
                 if isinstance(argument, DeviceBuffer) and argument.readers is not None:
                     self._note_reader(argument)
             if self._turns.worker is None:
-                event = self._enqueue(kernel, whole, group)
-                if turn is not None and self._tuner is not None:
-                    self._tuner.timed(turn, event)
+                self._enqueue(kernel, whole, group)
             else:
                 self._run_in_pieces(self._turns.worker, kernel, whole, group)
 
@@ -215,12 +194,11 @@ class Runtime:
         size: tuple[int, ...],
         group: tuple[int, ...] | None,
         offset: tuple[int, ...] | None = None,
-    ) -> Any:
+    ) -> None:
         event = opencl().enqueue_nd_range_kernel(
             self._queue, kernel.object, size, group, global_work_offset=offset
         )
         self._record(kernel.name, event)
-        return event
 
     def _run_in_pieces(
         self, worker: Worker, kernel: Kernel, whole: tuple[int, ...], group: tuple[int, ...] | None
@@ -760,7 +738,7 @@ class Runtime:
 
     def _new_queue(self, *, profiled: bool = False) -> int:
         cl = opencl()
-        wanted = profiled or self._profile is not None or self._tuner is not None
+        wanted = profiled or self._profile is not None
         properties = cl.command_queue_properties.PROFILING_ENABLE if wanted else 0
         with self._driver("making a command queue"):
             queue = cl.CommandQueue(self._context, self._device, properties)

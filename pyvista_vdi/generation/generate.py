@@ -620,7 +620,7 @@ class _Recorder:
 
     def _launch(self, name: str, items: int, *arguments: Any) -> None:
         kernel, rays = self._kernels[name]
-        self._runtime.launch(kernel, items // rays, GROUP // rays, *arguments, any_group=rays == 1)
+        self._runtime.launch(kernel, items // rays, GROUP // rays, *arguments)
 
 
 def _check_weights(tolerance: float, view_cone: float) -> tuple[float, float]:

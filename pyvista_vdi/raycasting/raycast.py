@@ -301,16 +301,12 @@ class SegmentsKernel(NamedTuple):
 
 
 class _Launch(NamedTuple):
-    """A kernel, its work-items and those of a group, and its arguments after the walk's.
-
-    ``any_group`` as for :meth:`Runtime.launch`.
-    """
+    """A kernel, its work-items and those of a group, and its arguments after the walk's."""
 
     kernel: Kernel
     items: int
     group: int
     mode: tuple[Any, ...]
-    any_group: bool = False
 
 
 class PreparedVDI:
@@ -428,7 +424,6 @@ class PreparedVDI:
                 *self.walk_arguments(view, form_buffer, depth, transmittance_cutoff),
                 *launch.mode,
                 image,
-                any_group=launch.any_group,
             )
             runtime.finish()  # the buffers above may be host memory in use
 
@@ -472,7 +467,7 @@ class PreparedVDI:
         defines = {**self.defines, **view.defines, **compensation(samples)}
         kernel = self._runtime.kernel("raycasting/preview.cl", "preview", defines)
         mode = (self.occupancy.counts, np.int32(samples))
-        return _Launch(kernel, block_items(*view.size), GROUP, mode, any_group=True)
+        return _Launch(kernel, block_items(*view.size), GROUP, mode)
 
     def _raycast(
         self,
@@ -520,10 +515,8 @@ class PreparedVDI:
         if self._in_blocks(defines):
             kernel = self._runtime.kernel("raycasting/blocks.cl", "raycast_blocks", defines)
             return _Launch(kernel, items // LANES, COLUMN_ITEMS // LANES, (columns,))
-        if self._runtime.tunes_groups:
-            defines["ANY_GROUP"] = 1
         kernel = self._runtime.kernel("raycasting/raycast.cl", "raycast", defines)
-        return _Launch(kernel, items, COLUMN_ITEMS, (columns, *hit), any_group=True)
+        return _Launch(kernel, items, COLUMN_ITEMS, (columns, *hit))
 
     def _in_vectors(self, defines: dict[str, str | int | None]) -> bool:
         """Return whether there are kernels for a frame that follow rays in vectors."""

@@ -215,7 +215,6 @@ def raycast_medium(
                 *multiplier,
                 *part,
                 image,
-                any_group=True,
             )
 
         if medium.bricks is None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -338,3 +340,28 @@ def test_no_rounding_option_is_left_out_or_invented(runtime):
     options = runtime._programs._base_options
     assert ("-cl-fp32-correctly-rounded-divide-sqrt" in options) == bool(offered)
     assert not any("relaxed" in option or "unsafe" in option for option in options)
+
+
+def test_a_lock_that_a_killed_process_left_does_not_hold_up_builds(
+    runtime, tmp_path, monkeypatch, caplog
+):
+    monkeypatch.setattr(programs, "cache_folder", lambda: tmp_path)
+    lock = tmp_path / "lock"
+    lock.touch()
+    killed = time.time() - 2 * programs.STALE_LOCK
+    os.utime(lock, (killed, killed))
+    source = tmp_path / "twice.cl"
+    source.write_text("__kernel void twice(__global float *x) { x[get_global_id(0)] *= 2; }")
+    with caplog.at_level("DEBUG", "pyvista_vdi"):
+        runtime.kernel(source, "twice")
+    assert not lock.exists()
+    assert "cache lock" not in caplog.text  # of pyopencl, when it has waited ten seconds
+
+
+def test_kernels_are_built_where_nothing_can_be_cached(runtime, tmp_path, monkeypatch):
+    occupied = tmp_path / "a file"
+    occupied.touch()
+    monkeypatch.setattr(programs, "cache_folder", lambda: occupied / "folder")
+    source = tmp_path / "thrice.cl"
+    source.write_text("__kernel void thrice(__global float *x) { x[get_global_id(0)] *= 3; }")
+    assert runtime.kernel(source, "thrice").argument_count == 1
