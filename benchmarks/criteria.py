@@ -26,9 +26,10 @@ from common import (  # beside this file
 )
 from tqdm import tqdm
 
-from pyvista_vdi.generation.generate import CRITERIA, generate_vdi
+from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.compare import describe_system
 from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.raycast import render_vdi

@@ -31,6 +31,7 @@ from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
@@ -121,7 +122,9 @@ def measured(
 ) -> Case:
     """Return what the dial measures, and what that costs in time of the process."""
     start = time.process_time()
-    scene = Scene(volume, camera, options.size, table, TARGET_ANGLE, options.device, {})
+    scene = Scene(
+        volume, camera, options.size, table, TARGET_ANGLE, options.device, GenerationOptions()
+    )
     found = scene.measure()
     measuring = time.process_time() - start
     start = time.process_time()

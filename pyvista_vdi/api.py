@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, InvalidVolumeError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import DEFAULTS, IN_PLACE, Classification
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -89,7 +90,7 @@ def generate(
         What decides where a list that must be shortened is cut: merging at least error, or, to
         compare with, a threshold on differences, equal depths, or equal shares of the light that
         V_O loses, by differences or, with ``"optical-depth"``, by ratios. See
-        :func:`pyvista_vdi.generation.generate.generate_vdi`.
+        :class:`pyvista_vdi.model.options.GenerationOptions`.
     sample_distance : float, optional
         Length of a step along the ray, model units; half the smallest spacing by default.
     tolerance : float
@@ -175,24 +176,27 @@ def generate(
     looks = Classification(classification, "generate", _keywords(generate))
     view = Camera.from_any(camera)
     dial = Dial.of(quality, target_ssim, target_fps, max_bytes, target_angle)
-    volume = as_volume(volume, looks.scalars, looks.preference)
-    from pyvista_vdi.generation.generate import generate_vdi
-
-    vdi = generate_vdi(
-        volume,
-        view,
-        window_size,
-        looks.transfer_function(volume),
+    options = GenerationOptions(
         max_supersegments=max_supersegments,
         criterion=criterion,
         sample_distance=sample_distance,
         tolerance=tolerance,
         view_cone=view_cone,
         precision=precision,
-        dial=dial,
         lights=lights,
         ambient_occlusion=ambient_occlusion,
-        memory_limit=memory_limit,
+        memory_limit=memory_limit,  # type: ignore[arg-type]  # a text becomes bytes
+    )
+    volume = as_volume(volume, looks.scalars, looks.preference)
+    from pyvista_vdi.quality.probe import generate_by_dial
+
+    vdi = generate_by_dial(
+        volume,
+        view,
+        window_size,
+        looks.transfer_function(volume),
+        dial,
+        options,
         device=device,
         progress=progress,
         metadata={"classification": looks.describe(), "scalars": volume.name},

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from pyvista_vdi.generation.generate import CRITERIA
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume

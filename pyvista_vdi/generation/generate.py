@@ -15,7 +15,7 @@ from pyvista_vdi.device import Kernel, Runtime, get_runtime
 from pyvista_vdi.device.constants import ERRORS_AT_A_TIME, RUN_WORDS
 from pyvista_vdi.device.ray_forms import check_list_space
 from pyvista_vdi.device.work_order import BLOCK_RAYS, GROUP, block_items
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError
+from pyvista_vdi.errors import Cancelled
 from pyvista_vdi.generation.list_arrays import (
     SUPERSEGMENT_BYTES,
     GrowingLists,
@@ -23,32 +23,22 @@ from pyvista_vdi.generation.list_arrays import (
     growing_lists,
     require_room,
 )
-from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float, memory_limit_bytes
-from pyvista_vdi.model.lighting import Lights
-from pyvista_vdi.model.packing import check_precision
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.quality.dial import Dial, refuse_settings
 from pyvista_vdi.volume.bricks import Room, StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.upload import volume_bytes, voxel_bytes
 
-#: Most supersegments that a list may be allowed.
-MAX_SUPERSEGMENTS = 4096
-
-#: What decides where lists are cut that must be shortened: what users ask for, and the kernels'
-#: name. ``docs/concepts.md`` says what each means; the first is the default and compiles nothing.
-_CRITERIA: dict[str, str | None] = {
-    "least-error": None,
+#: The kernels' name of each criterion other than least error, which compiles nothing.
+_CUTS = {
     "homogeneity": "HOMOGENEITY",
     "length": "EQUAL_LENGTH",
     "transmittance": "EQUAL_TRANSMITTANCE",
     "optical-depth": "EQUAL_OPTICAL_DEPTH",
 }
-CRITERIA = tuple(_CRITERIA)
 
 #: Bytes of one recorded run on the device, and of its merge error.
 _RUN_BYTES = (RUN_WORDS + 1) * 4
@@ -101,78 +91,33 @@ class Estimate:
         return self.volume + self.vdi_worst_case + self.working + self.occlusion
 
 
-def check_max_supersegments(max_supersegments: int) -> int:
-    """Return ``max_supersegments`` as an int between 1 and :data:`MAX_SUPERSEGMENTS`."""
-    try:
-        limit = int(max_supersegments)
-    except (TypeError, ValueError, OverflowError):
-        limit = 0
-    if limit != max_supersegments or not 1 <= limit <= MAX_SUPERSEGMENTS:
-        raise InvalidArgumentError(
-            f"max_supersegments must be a whole number from 1 to {MAX_SUPERSEGMENTS}; "
-            f"got {max_supersegments!r}"
-        )
-    return limit
-
-
-def check_criterion(criterion: str) -> str:
-    """Return ``criterion`` if it is one of :data:`CRITERIA`."""
-    if criterion not in CRITERIA:
-        raise InvalidArgumentError(
-            f"criterion must be one of {', '.join(CRITERIA)}; got {criterion!r}"
-        )
-    return criterion
-
-
 def estimate(
     volume: Volume,
     window_size: Sequence[int],
+    options: GenerationOptions | None = None,
     *,
-    max_supersegments: int = 20,
-    criterion: str = "least-error",
-    ambient_occlusion: Any = None,
-    memory_limit: Any = None,
     transfer_function: TransferFunction | None = None,
+    **changes: Any,
 ) -> Estimate:
     """State the memory that :func:`generate_vdi` takes, before it is taken.
 
-    Parameters
-    ----------
-    volume : Volume
-        What would be generated from.
-    window_size : (int, int)
-        Width and height of V_O's window in pixels.
-    max_supersegments : int
-        Most supersegments in a list.
-    criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
-        As for :func:`generate_vdi`; all but the first record more of each ray at a time.
-    ambient_occlusion, memory_limit : optional
-        As for :func:`generate_vdi`.
-    transfer_function : TransferFunction, optional
-        Scalars whose range is narrow for how far it is from 0 are taken relative to it, which
-        takes 4 bytes a voxel on the device, and as much on the host while they are scaled. Without
-        it they are taken to be read as they are.
-
-    Returns
-    -------
-    Estimate
-        Bytes.
+    Scalars whose range is narrow for how far it is from 0 are taken relative to it, which takes 4
+    bytes a voxel on the device, and as much on the host while they are scaled. Without a transfer
+    function they are taken to be read as they are.
     """
+    options = GenerationOptions.of(options, changes)
     width, height = check_window_size(window_size)
-    limit = check_max_supersegments(max_supersegments)
-    memory = memory_limit_bytes(memory_limit)
     item = voxel_bytes(volume, transfer_function)
-    lists = width * height
-    plan = _Slices(width, height, limit, check_criterion(criterion), memory)
-    occlusion = AmbientOcclusion.from_any(ambient_occlusion)
-    grid = 0 if occlusion is None else OcclusionGrid.of(volume, occlusion).nbytes
-    room = plan.room(memory, grid)
-    on_device, samples = volume_bytes(volume, volume.array.size * item, room)
+    plan = _Slices(width, height, options)
+    occlusion = options.occlusion_bytes(volume)
+    on_device, samples = volume_bytes(
+        volume, volume.array.size * item, plan.room(options.memory_limit, occlusion)
+    )
     return Estimate(
         volume=on_device,
-        vdi_worst_case=lists * (limit * SUPERSEGMENT_BYTES + 8) + 8,
+        vdi_worst_case=width * height * (options.max_supersegments * SUPERSEGMENT_BYTES + 8) + 8,
         working=plan.bytes + samples,
-        occlusion=grid,
+        occlusion=occlusion,
     )
 
 
@@ -181,27 +126,19 @@ def generate_vdi(
     camera: Camera,
     window_size: Sequence[int],
     transfer_function: TransferFunction,
+    options: GenerationOptions | None = None,
     *,
-    max_supersegments: int = 20,
-    criterion: str = "least-error",
-    sample_distance: float | None = None,
-    tolerance: float = 0.0,
-    view_cone: float = 60.0,
-    precision: str = "exact",
-    dial: Dial | None = None,
-    lights: Any = None,
-    ambient_occlusion: Any = None,
-    memory_limit: Any = None,
     device: Any = None,
     progress: Progress | None = None,
     metadata: Mapping[str, Any] | None = None,
+    **changes: Any,
 ) -> VDI:
     """Make a VDI of a classified volume.
 
     Each list's ray is marched once. Neighbouring samples are merged while the medium stays
-    homogeneous; what is recorded is then merged at least error, or cut by another ``criterion``,
-    until ``max_supersegments`` are left. Lists go on behind what V_O sees, because other views may
-    see it.
+    homogeneous; what is recorded is then merged at least error, or cut by another criterion,
+    until the budget of supersegments is kept. Lists go on behind what V_O sees, because other
+    views may see it.
 
     Parameters
     ----------
@@ -213,46 +150,8 @@ def generate_vdi(
         Width and height of V_O's window in pixels: one list each.
     transfer_function : TransferFunction
         Scalar to colour and opacity.
-    max_supersegments : int
-        Most supersegments in a list, 1 to 4096; never exceeded, and nothing that is not
-        transparent is dropped.
-    criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
-        What decides where a list is cut. ``"least-error"``: neighbours are merged at least error.
-        The others are those of the paper's section 2, for comparison. ``"homogeneity"`` (Frey et
-        al. 2013): a supersegment goes on while the medium is like its mean so far, by the least
-        threshold that keeps the budget on this ray. ``"length"`` (Brady et al. 1997): cuts at
-        equal depths from the first to the last of what is not transparent. ``"transmittance"``
-        (Lochmann et al. 2016): cuts where V_O has lost equal shares of the light it loses.
-        ``"optical-depth"``: the same by ratios, so that each lets the same share through. With
-        each of them neighbours within ``tolerance`` are merged; they record up to 512 runs of a
-        ray before unlike ones are merged, which takes more time and, in wide windows, memory.
-    sample_distance : float, optional
-        Length of a step, model units; half the smallest spacing by default.
-    tolerance : float
-        Neighbours are merged even under budget where this changes (opacity-weighted colour,
-        opacity) per voxel, in the root of the sum of squares along the ray, by no more than this.
-        0 merges only what is homogeneous.
-    view_cone : float
-        Half angle in degrees, 0 to 90, of the cone of views that must be served: what V_O cannot
-        see at all counts ``1 - cos(view_cone)`` as much as what it sees when neighbours are merged
-        at least error or within ``tolerance``. Other criteria cut without regard to it.
-    precision : {"exact", "16-byte", "8-byte"}
-        What a supersegment takes; see :meth:`VDI.with_precision`.
-    dial : Dial, optional
-        Chooses the lists of the window, max_supersegments and precision in place of those given
-        here, which must have their defaults, as tolerance must; see
-        :mod:`pyvista_vdi.quality.dial`.
-    lights : optional
-        What a shaded volume is lit by; see :meth:`pyvista_vdi.Lights.from_any`. The light is
-        baked into the colours: it stays as it is where V_O has it.
-    ambient_occlusion : optional
-        Darken what is hidden from the light around it, see
-        :meth:`pyvista_vdi.AmbientOcclusion.from_any`; baked into the colours as well, and the same
-        from every view.
-    memory_limit : int, float or str, optional
-        Most bytes to take on the device, or a text such as ``"2 GiB"``; by default what the device
-        has. A volume that does not fit goes there brick by brick, which takes more time and makes
-        the same VDI to the last bit.
+    options : GenerationOptions, optional
+        How it is made.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
     progress : callable, optional
@@ -260,6 +159,8 @@ def generate_vdi(
         work is given up.
     metadata : mapping, optional
         Entries to add to ``vdi.metadata``.
+    **changes
+        Options by name, in place of those in ``options``.
 
     Returns
     -------
@@ -273,65 +174,28 @@ def generate_vdi(
     Cancelled
         If ``progress`` returned False.
     DeviceMemoryError
-        If the device lacks the memory, see :func:`estimate`, or ``memory_limit`` is too little
+        If the device lacks the memory, see :func:`estimate`, or the memory limit is too little
         even for one brick.
     """
+    options = GenerationOptions.of(options, changes)
     camera = Camera.from_any(camera)
-    if dial is not None:
-        from pyvista_vdi.quality.probe import choose  # it measures VDIs that are made here
-
-        refuse_settings(
-            dial,
-            max_supersegments=(max_supersegments, 20),
-            tolerance=(tolerance, 0.0),
-            precision=(precision, "exact"),
-        )
-        choice = choose(
-            volume,
-            camera,
-            window_size,
-            transfer_function,
-            dial,
-            device=device,
-            progress=progress,
-            criterion=check_criterion(criterion),
-            sample_distance=sample_distance,
-            view_cone=view_cone,
-            lights=lights,
-            ambient_occlusion=ambient_occlusion,
-            memory_limit=memory_limit,
-        )
-        window_size = choice.prediction.window_size
-        max_supersegments = choice.prediction.setting.max_supersegments
-        precision = choice.prediction.setting.precision
-        metadata = {**(metadata or {}), "dial": choice.to_dict()}
-    width, height = check_window_size(window_size)
-    limit = check_max_supersegments(max_supersegments)
-    criterion, precision = check_criterion(criterion), check_precision(precision)
-    tolerance, hidden_weight = _check_weights(tolerance, view_cone)
-    require_room(0, (width, height))
+    width, height = size = check_window_size(window_size)
+    require_room(0, size)
     runtime = get_runtime(device)
-    lights = Lights.from_any(lights)
-    occlusion = AmbientOcclusion.from_any(ambient_occlusion)
-    memory = memory_limit_bytes(memory_limit)
-    slices = _Slices(width, height, limit, criterion, memory)
-    grid = 0 if occlusion is None else OcclusionGrid.of(volume, occlusion).nbytes
+    slices = _Slices(width, height, options)
     medium = DeviceVolume(
         runtime,
         volume,
         transfer_function,
-        sample_distance,
-        lights=lights,
-        ambient_occlusion=occlusion,
-        room=slices.room(memory, grid),
+        options.sample_distance,
+        lights=options.lights,
+        ambient_occlusion=options.ambient_occlusion,
+        room=slices.room(options.memory_limit, options.occlusion_bytes(volume)),
     )
-    size = (width, height)
     with (
         medium.giving_bricks_back(),
-        _Recorder(
-            runtime, medium, camera, size, slices, limit, criterion, tolerance, hidden_weight
-        ) as recorder,
-        growing_lists(runtime, size, limit, slices.rows * width) as lists,
+        _Recorder(runtime, medium, camera, size, slices, options) as recorder,
+        growing_lists(runtime, size, options.max_supersegments, slices.rows * width) as lists,
     ):
         _report(progress, 0.0)
         for first_row in range(0, height, slices.rows):
@@ -346,10 +210,10 @@ def generate_vdi(
 
     made_by = {
         "generator": f"pyvista-vdi {__version__}",
-        "criterion": criterion,
-        "max_supersegments": limit,
-        "tolerance": tolerance,
-        "view_cone": float(view_cone),
+        "criterion": options.criterion,
+        "max_supersegments": options.max_supersegments,
+        "tolerance": options.tolerance,
+        "view_cone": options.view_cone,
         "sample_distance": medium.sample_distance,
         "opacity_unit_distance": medium.unit_distance,
         "transfer_function": transfer_function.to_dict(),
@@ -362,12 +226,12 @@ def generate_vdi(
         "device": runtime.info.name,
     }
     if transfer_function.shading is not None:
-        made_by["lights"] = lights.to_dict()
-    if occlusion is not None:
-        made_by["ambient_occlusion"] = occlusion.to_dict(volume)
+        made_by["lights"] = options.lights.to_dict()
+    if options.ambient_occlusion is not None:
+        made_by["ambient_occlusion"] = options.ambient_occlusion.to_dict(volume)
     return VDI(
         camera,
-        (width, height),
+        size,
         offsets,
         front,
         back,
@@ -376,19 +240,18 @@ def generate_vdi(
         volume.bounds,
         depth_origin=recorder.depth_origin,
         metadata={**made_by, **(metadata or {})},
-    ).with_precision(precision)
+    ).with_precision(options.precision)
 
 
 class _Slices:
     """How many rows of lists are made at a time, and the buffers that this takes."""
 
-    def __init__(
-        self, width: int, height: int, limit: int, criterion: str, memory_limit: int | None
-    ) -> None:
+    def __init__(self, width: int, height: int, options: GenerationOptions) -> None:
+        limit, memory_limit = options.max_supersegments, options.memory_limit
         # Twice the budget: the records' thresholds then stay well below the final merges' errors
         self.kept = max(2 * limit, limit + 12)
         self.capacity = self.kept + _CHUNK_STEPS
-        if _CRITERIA[criterion]:
+        if options.criterion in _CUTS:
             self.kept = max(self.kept, _UNMERGED_RUNS)
             self.capacity = self.kept + _CHUNK_STEPS + limit  # the kernel cuts into what is free
         self.capacity = -(-self.capacity // ERRORS_AT_A_TIME) * ERRORS_AT_A_TIME
@@ -438,21 +301,18 @@ class _Recorder:
         camera: Camera,
         size: tuple[int, int],
         slices: _Slices,
-        limit: int,
-        criterion: str,
-        tolerance: float,
-        hidden_weight: float,
+        options: GenerationOptions,
     ) -> None:
         self._runtime = runtime
         self._medium = medium
         self._camera = camera
         self._size = size
-        self._limit = limit
+        self._limit = options.max_supersegments
         # Differences stay below 1e18, whose square float32 still holds
-        self._threshold = np.float32(max(min(tolerance, 1e18) ** 2, _INDISTINGUISHABLE))
+        self._threshold = np.float32(max(min(options.tolerance, 1e18) ** 2, _INDISTINGUISHABLE))
         self._weights = (
             np.float32(min(medium.volume.spacing)),  # reference length: a voxel
-            np.float32(hidden_weight),
+            np.float32(options.hidden_weight),
         )
         check_list_space(camera, medium.volume.bounds)
         rays = medium.forms(camera, size, None)
@@ -463,7 +323,7 @@ class _Recorder:
         self.slices = slices
         self._grain = _steps_per_voxel(medium.volume, medium.sample_distance)
         items, capacity = self.slices.items, self.slices.capacity
-        self._cuts = _CRITERIA[criterion]
+        self._cuts = _CUTS.get(options.criterion)
         defines = {**medium.defines, **rays.defines}
         self._kernels = self._kernels_of(defines, rays.defines)
         with ExitStack() as stack:
@@ -623,20 +483,9 @@ class _Recorder:
         self._runtime.launch(kernel, items // rays, GROUP // rays, *arguments)
 
 
-def _check_weights(tolerance: float, view_cone: float) -> tuple[float, float]:
-    difference, angle = as_float(tolerance), as_float(view_cone)
-    if not (np.isfinite(difference) and difference >= 0):
-        raise InvalidArgumentError(f"tolerance must be a number >= 0; got {tolerance!r}")
-    if not 0 <= angle <= 90:
-        raise InvalidArgumentError(
-            f"view_cone must be an angle between 0 and 90 degrees; got {view_cone!r}"
-        )
-    return difference, float(1 - np.cos(np.radians(angle)))
-
-
 def _report(progress: Progress | None, fraction: float) -> None:
     if progress is not None and progress(fraction) is False:
         raise Cancelled(f"generation was cancelled at {fraction:.0%}")
 
 
-__all__ = ["CRITERIA", "MAX_SUPERSEGMENTS", "Estimate", "estimate", "generate_vdi"]
+__all__ = ["Estimate", "estimate", "generate_vdi"]

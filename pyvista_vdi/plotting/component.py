@@ -15,6 +15,7 @@ from vtkmodules.vtkRenderingCore import vtkVolume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.classification import DEFAULTS, Classification, refuse_unknown
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.classify import (
@@ -454,7 +455,7 @@ def _refuse(given: dict[str, Any]) -> None:
     chosen_by = {k: given[k] for k in ("quality", "target_ssim", "max_bytes", "target_angle")}
     refuse_settings(
         Dial.of(**chosen_by, target_fps=given["full_fps"]),
-        **{k: (given[k], _OF_VOLUMES[k]) for k in ("max_supersegments", "tolerance", "precision")},
+        GenerationOptions(**{k: given[k] for k in ("max_supersegments", "tolerance", "precision")}),
     )
 
 

@@ -7,23 +7,25 @@ import inspect
 import threading
 import traceback
 import weakref
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import Cancelled
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.quality.dial import Dial
+from pyvista_vdi.quality.probe import generate_by_dial
 from pyvista_vdi.raycasting.raycast import render_vdi
 
 #: Pixels along each edge of the frame that a new VDI is tried with: what the first real frame
 #: would have to compile and upload is there then.
 _TRIAL_SIZE = 8
 
-_SIGNATURE = inspect.signature(generate_vdi)
+_SIGNATURE = inspect.signature(GenerationOptions)
 
 
 class BackgroundGeneration:
@@ -60,9 +62,12 @@ class BackgroundGeneration:
         camera: Camera,
         window_size: Sequence[int],
         transfer_function: TransferFunction,
+        options: GenerationOptions | None = None,
         *,
         key: Hashable = None,
-        **options: Any,
+        dial: Dial | None = None,
+        metadata: Mapping[str, Any] | None = None,
+        **changes: Any,
     ) -> None:
         """Make a VDI, in place of whatever is being made or was not taken yet.
 
@@ -71,23 +76,30 @@ class BackgroundGeneration:
         volume, camera, window_size, transfer_function
             As for :func:`~pyvista_vdi.generation.generate.generate_vdi`. The volume's values
             must stay until the VDI is finished or cancelled with ``wait=True``.
+        options : GenerationOptions, optional
+            How it is made.
         key : hashable
             What the VDI is for; see :attr:`key`.
-        **options
-            Keyword arguments of ``generate_vdi`` other than ``device`` and ``progress``.
+        dial : Dial, optional
+            Chooses the window, max_supersegments and precision.
+        metadata : mapping, optional
+            Entries to add to ``vdi.metadata``.
+        **changes
+            Options by name, in place of those in ``options``. :meth:`take` raises what is wrong
+            with their values.
 
         Raises
         ------
         TypeError
-            If ``generate_vdi`` has no such argument.
+            If there is no such option.
         RuntimeError
             After :meth:`close`.
         """
-        if "device" in options or "progress" in options:
+        if "device" in changes or "progress" in changes:
             raise TypeError("device is given to BackgroundGeneration, and progress is an attribute")
-        arguments = (volume, Camera.from_any(camera), window_size, transfer_function)
-        _SIGNATURE.bind(*arguments, **options)
-        self._desk.put(_Job(key, arguments, options))
+        _SIGNATURE.bind(**changes)
+        arguments = (volume, Camera.from_any(camera), window_size, transfer_function, dial, options)
+        self._desk.put(_Job(key, arguments, {"metadata": metadata, **changes}))
 
     def cancel(self, *, wait: bool = False) -> None:
         """Give up what is being made, and what was made and not taken.
@@ -165,7 +177,7 @@ class _Job:
         """Make the VDI and put it on the device, in turns between frames."""
         runtime = get_runtime(device)
         with runtime.background(self.cancelled.is_set):
-            vdi = generate_vdi(
+            vdi = generate_by_dial(
                 *self.arguments, **self.options, device=runtime, progress=self._report
             )
             render_vdi(vdi, vdi.camera, (_TRIAL_SIZE, _TRIAL_SIZE), device=runtime)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
 from pyvista_vdi.model.checks import as_float
+from pyvista_vdi.model.options import GenerationOptions
 
 if TYPE_CHECKING:
     from pyvista_vdi.model.vdi import VDI
@@ -49,6 +50,9 @@ _UNAVOIDABLE = (
     "with the camera: another generating view helps, other settings do not"
 )
 
+#: Options that a dial chooses, or leaves no room for.
+_CHOSEN = ("max_supersegments", "tolerance", "precision")
+
 #: Share of a limit in bytes that is left free: lists are counted on a sample of the rays.
 _BYTES_MARGIN = 0.05
 #: Bytes of a list and of a supersegment on a device, in the 8-byte form: a list that is not empty
@@ -78,6 +82,10 @@ class Setting:
         """Return the VDI's window for pictures of ``window_size``."""
         width, height = (max(1, round(self.lists * edge)) for edge in window_size)
         return width, height
+
+    def applied_to(self, options: GenerationOptions) -> GenerationOptions:
+        """Return options with what this rung says."""
+        return replace(options, max_supersegments=self.max_supersegments, precision=self.precision)
 
 
 #: What is measured. The VDI of ``ROUGH`` also says where tiles are to lie, how long lists are and
@@ -186,8 +194,8 @@ def _within(name: str, value: Any, above: float, below: float, what: str) -> flo
     return number
 
 
-def refuse_settings(dial: Dial | None, **given: tuple[Any, Any]) -> None:
-    """Refuse settings that a dial chooses: pairs of what was given and its default, by name.
+def refuse_settings(dial: Dial | None, options: GenerationOptions) -> None:
+    """Refuse options that a dial chooses where they do not have their defaults.
 
     Raises
     ------
@@ -196,7 +204,8 @@ def refuse_settings(dial: Dial | None, **given: tuple[Any, Any]) -> None:
     """
     if dial is None:
         return
-    fixed = [f"{name}={value!r}" for name, (value, default) in given.items() if value != default]
+    given = {name: getattr(options, name) for name in _CHOSEN}
+    fixed = [f"{n}={v!r}" for n, v in given.items() if v != getattr(GenerationOptions, n)]
     if fixed:
         asked = ", ".join(f"{name}={value!r}" for name, value in dial.to_dict().items())
         raise InvalidArgumentError(

@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,9 @@ from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.metrics import SSIM_WINDOW
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -34,6 +33,7 @@ from pyvista_vdi.quality.dial import (
     Setting,
     chosen,
     predictions,
+    refuse_settings,
 )
 from pyvista_vdi.quality.tiles import TileSample, tiles_ssim
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
@@ -56,16 +56,64 @@ _measurements: OrderedDict[Any, Measurement] = OrderedDict()
 _lock = threading.Lock()
 
 
+def generate_by_dial(
+    volume: Volume,
+    camera: Camera,
+    window_size: Sequence[int],
+    transfer_function: TransferFunction,
+    dial: Dial | None,
+    options: GenerationOptions | None = None,
+    *,
+    device: Any = None,
+    progress: Progress | None = None,
+    metadata: Mapping[str, Any] | None = None,
+    **changes: Any,
+) -> VDI:
+    """Make a VDI by the settings that a dial chooses, or, without a dial, by the options alone.
+
+    With a dial, the window is that of the pictures, and the VDI's metadata say what was chosen.
+    Arguments and errors are those of :func:`~pyvista_vdi.generation.generate.generate_vdi` and of
+    :func:`choose`.
+    """
+    options = GenerationOptions.of(options, changes)
+    if dial is not None:
+        choice = choose(
+            volume,
+            camera,
+            window_size,
+            transfer_function,
+            dial,
+            options,
+            device=device,
+            progress=progress,
+        )
+        window_size = choice.prediction.window_size
+        setting = choice.prediction.setting
+        options = setting.applied_to(options)
+        metadata = {**(metadata or {}), "dial": choice.to_dict()}
+    return generate_vdi(
+        volume,
+        camera,
+        window_size,
+        transfer_function,
+        options,
+        device=device,
+        progress=progress,
+        metadata=metadata,
+    )
+
+
 def choose(
     volume: Volume,
     camera: Camera,
     window_size: Sequence[int],
     transfer_function: TransferFunction,
     dial: Dial,
+    options: GenerationOptions | None = None,
     *,
     device: Any = None,
     progress: Progress | None = None,
-    **settings: Any,
+    **changes: Any,
 ) -> Choice:
     """Choose how a VDI is to be made.
 
@@ -76,13 +124,16 @@ def choose(
         pictures.
     dial : Dial
         What is asked for.
+    options : GenerationOptions, optional
+        How the VDI will be made; max_supersegments, tolerance and precision, which the dial
+        chooses, must have their defaults.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
     progress : callable, optional
         Called with 0 between the parts of the measurement; when it returns False it is given up.
-    **settings
-        Keyword arguments of ``generate_vdi`` that the VDI will be made with: criterion,
-        sample_distance, view_cone, lights, ambient_occlusion, memory_limit.
+    **changes
+        Options by name, in place of those in ``options``: criterion, sample_distance, view_cone,
+        lights, ambient_occlusion, memory_limit.
 
     Returns
     -------
@@ -97,13 +148,15 @@ def choose(
     Cancelled
         If ``progress`` returned False.
     """
-    size = check_window_size(window_size)
+    options = GenerationOptions.of(options, changes)
+    refuse_settings(dial, options)
+    camera, size = Camera.from_any(camera), check_window_size(window_size)
     if min(size) < SSIM_WINDOW:
         raise InvalidArgumentError(
             f"a window of {size[0]} x {size[1]} pixels has no SSIM to choose settings by: it "
             f"takes {SSIM_WINDOW} along each edge; choose max_supersegments and window yourself"
         )
-    scene = Scene(volume, camera, size, transfer_function, dial.angle, device, settings, progress)
+    scene = Scene(volume, camera, size, transfer_function, dial.angle, device, options, progress)
     measured = _measurement(scene)
     return chosen(dial, predictions(measured, size), size, measured.least)
 
@@ -141,7 +194,7 @@ class Scene:
         transfer_function: TransferFunction,
         angle: float,
         device: Any,
-        settings: dict[str, Any],
+        options: GenerationOptions,
         progress: Progress | None = None,
     ) -> None:
         self._volume = volume
@@ -151,11 +204,7 @@ class Scene:
         self._angle = angle
         self._view = turned(camera, volume.bounds, angle)
         self._runtime: Runtime = get_runtime(device)
-        self._settings = {
-            **settings,
-            "lights": Lights.from_any(settings.get("lights")),
-            "ambient_occlusion": AmbientOcclusion.from_any(settings.get("ambient_occlusion")),
-        }
+        self._options = options
         self._progress = progress
 
     @property
@@ -167,7 +216,7 @@ class Scene:
             (volume.array.shape, volume.array.dtype.str),
             (volume.spacing, volume.origin, np.asarray(volume.direction).tobytes()),
             (self._camera, self._size, self._transfer_function, self._angle),
-            tuple(sorted(self._settings.items(), key=lambda item: item[0])),
+            self._options,
             self._runtime.info.index,
         )
 
@@ -177,12 +226,9 @@ class Scene:
         estimator = ViewErrorEstimator(
             self._volume,
             self._transfer_function,
-            sample_distance=self._settings.get("sample_distance"),
+            self._options,
             tiles=TILES,
             tile_size=TILE_SIZE,
-            lights=self._settings["lights"],
-            ambient_occlusion=self._settings["ambient_occlusion"],
-            memory_limit=self._settings.get("memory_limit"),
             device=self._runtime,
         )
         rough = self._whole(ROUGH)
@@ -240,10 +286,8 @@ class Scene:
             camera,
             size,
             self._transfer_function,
-            max_supersegments=setting.max_supersegments,
-            precision=setting.precision,
+            setting.applied_to(self._options),
             device=self._runtime,
-            **self._settings,
         )
 
     def _pictures(

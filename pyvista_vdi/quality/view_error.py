@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -19,12 +19,11 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
-from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float, memory_limit_bytes
+from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
-from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.metrics import SSIM_WINDOW, over_background
+from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -155,44 +154,26 @@ def estimate_view_error(
     transfer_function: TransferFunction,
     camera: Any,
     window_size: Sequence[int] | None = None,
+    medium: MediumOptions | None = None,
     *,
-    sample_distance: float | None = None,
     tiles: int = TILES,
     tile_size: int = TILE_SIZE,
-    lights: Any = None,
-    ambient_occlusion: Any = None,
-    memory_limit: Any = None,
     device: Any = None,
     **options: Any,
 ) -> ViewError:
     """Estimate a VDI's error in one view; see :class:`ViewErrorEstimator` for several.
 
-    Parameters
-    ----------
-    vdi : VDI
-        What is judged.
-    volume, transfer_function, sample_distance, tiles, tile_size
-        As for :class:`ViewErrorEstimator`.
-    lights, ambient_occlusion, memory_limit, device
-        As for :class:`ViewErrorEstimator`.
-    camera, window_size, **options
-        As for :meth:`ViewErrorEstimator.estimate`.
-
-    Returns
-    -------
-    ViewError
-        The predicted SSIM, and where the view stands.
+    The options are those of :class:`MediumOptions` and of :meth:`ViewErrorEstimator.estimate`.
     """
+    of_medium = {f.name: options.pop(f.name) for f in fields(MediumOptions) if f.name in options}
     estimator = ViewErrorEstimator(
         volume,
         transfer_function,
-        sample_distance=sample_distance,
+        medium,
         tiles=tiles,
         tile_size=tile_size,
-        lights=lights,
-        ambient_occlusion=ambient_occlusion,
-        memory_limit=memory_limit,
         device=device,
+        **of_medium,
     )
     return estimator.estimate(vdi, camera, window_size, **options)
 
@@ -206,22 +187,19 @@ class ViewErrorEstimator:
         What the VDIs stand for.
     transfer_function : TransferFunction
         How it is to look.
-    sample_distance : float, optional
-        Length of a step through the volume, model units; half the smallest spacing by default.
+    medium : MediumOptions, optional
+        How the volume is sampled: as it was when the VDIs were generated, but for the lights,
+        which are those of the view that is judged.
     tiles : int
         Tiles of an estimate, at least 2. All there are, if that is fewer.
     tile_size : int
         Edge of a tile in pixels, at least 11. What SSIM compares around a pixel reaches five
         pixels to each side, so a tile of 24 tells the SSIM of 14 x 14 pixels.
-    lights : optional
-        What a shaded volume is lit by in the view that is judged; see :meth:`Lights.from_any`.
-    ambient_occlusion : optional
-        What the VDIs were generated with; see :meth:`AmbientOcclusion.from_any`.
-    memory_limit : int, float or str, optional
-        Most bytes to take on the device, see
-        :func:`~pyvista_vdi.generation.generate.generate_vdi`.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
+    **changes
+        Options by name, in place of those in ``medium``: sample_distance, lights,
+        ambient_occlusion, memory_limit; see :class:`~pyvista_vdi.model.options.MediumOptions`.
 
     Raises
     ------
@@ -252,15 +230,14 @@ class ViewErrorEstimator:
         self,
         volume: Volume,
         transfer_function: TransferFunction,
+        medium: MediumOptions | None = None,
         *,
-        sample_distance: float | None = None,
         tiles: int = TILES,
         tile_size: int = TILE_SIZE,
-        lights: Any = None,
-        ambient_occlusion: Any = None,
-        memory_limit: Any = None,
         device: Any = None,
+        **changes: Any,
     ) -> None:
+        options = MediumOptions.of(medium, changes)
         self._tiles = _whole("tiles", tiles, 2)
         self._edge = _whole("tile_size", tile_size, SSIM_WINDOW) - 2 * REACH
         self._runtime = get_runtime(device)
@@ -269,10 +246,10 @@ class ViewErrorEstimator:
             self._runtime,
             volume,
             transfer_function,
-            sample_distance,
-            lights=Lights.from_any(lights),
-            ambient_occlusion=AmbientOcclusion.from_any(ambient_occlusion),
-            room=picture_room((edge, edge), memory_limit_bytes(memory_limit)),
+            options.sample_distance,
+            lights=options.lights,
+            ambient_occlusion=options.ambient_occlusion,
+            room=picture_room((edge, edge), options.memory_limit),
         )
 
     def estimate(

@@ -42,7 +42,9 @@ def calls(monkeypatch):
         return call
 
     monkeypatch.setattr(
-        source_module, "generate_vdi", counting("generate", source_module.generate_vdi)
+        source_module,
+        "generate_by_dial",
+        counting("generate", source_module.generate_by_dial),
     )
     monkeypatch.setattr(painter_module, "render_vdi", counting("render", painter_module.render_vdi))
     return counted

@@ -55,15 +55,15 @@ def plotter():
 def gate(monkeypatch):
     """Holds up what is generated in the background, until it is set."""
     gate = threading.Event()
-    generate_vdi = background.generate_vdi
+    generate_by_dial = background.generate_by_dial
 
     def gated(*arguments, device, **keywords):
         while not gate.is_set():
             device.give_way()
             time.sleep(0.001)
-        return generate_vdi(*arguments, device=device, **keywords)
+        return generate_by_dial(*arguments, device=device, **keywords)
 
-    monkeypatch.setattr(background, "generate_vdi", gated)
+    monkeypatch.setattr(background, "generate_by_dial", gated)
     yield gate
     gate.set()
 
@@ -790,7 +790,7 @@ def test_what_fails_is_said_once_and_not_repeated(plotter, monkeypatch):
         tries.append(1)
         raise DeviceError("no more")
 
-    monkeypatch.setattr(background, "generate_vdi", failing)
+    monkeypatch.setattr(background, "generate_by_dial", failing)
     plotter.camera.Azimuth(40)
     before = actor.vdi
     with pytest.warns(VDIWarning, match="cannot be made anew: DeviceError: no more"):

@@ -18,8 +18,9 @@ from sampling_uncertainty import uncertainties
 
 from pyvista_vdi import reference
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
-from pyvista_vdi.generation.generate import CRITERIA, generate_vdi
+from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
 from pyvista_vdi.raycasting.raycast import render_vdi

@@ -21,6 +21,7 @@ from pyvista_vdi.generation import generate as generation
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.quality import background
 from pyvista_vdi.quality.background import BackgroundGeneration
+from pyvista_vdi.quality.probe import generate_by_dial
 from pyvista_vdi.raycasting.raycast import prepared_vdi, render_vdi
 from pyvista_vdi.volume import upload as voxels
 from pyvista_vdi.volume.render import raycast_volume
@@ -90,7 +91,7 @@ class Gate:
     def __init__(self, monkeypatch):
         self.reached, self._open = threading.Event(), threading.Event()
         self.cancelled = []
-        monkeypatch.setattr(background, "generate_vdi", self._gated)
+        monkeypatch.setattr(background, "generate_by_dial", self._gated)
 
     def _gated(self, *arguments, progress, **options):
         def report(fraction):
@@ -100,7 +101,7 @@ class Gate:
                 self._open.wait(PATIENCE)
 
         try:
-            return generate_vdi(*arguments, progress=report, **options)
+            return generate_by_dial(*arguments, progress=report, **options)
         except Cancelled as reason:
             self.cancelled.append(str(reason))
             raise

@@ -17,6 +17,7 @@ from pyvista_vdi.errors import Cancelled, InvalidArgumentError, VDIWarning
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 from pyvista_vdi.quality import probe as dial_measurement
 from pyvista_vdi.quality.dial import (
@@ -279,7 +280,9 @@ def shipped():
         for look in TRANSFER_FUNCTIONS.values():
             table = Classification(dict(look), "test").transfer_function(volume)
             picture = raycast_volume(volume, view, window, table)
-            measured = Scene(volume, camera, window, table, TARGET_ANGLE, None, {}).measure()
+            measured = Scene(
+                volume, camera, window, table, TARGET_ANGLE, None, GenerationOptions()
+            ).measure()
             for rung in predictions(measured, window)[::3]:
                 vdi = generate_vdi(
                     volume,
@@ -361,7 +364,9 @@ def test_no_lists_are_met_beside_the_volume_and_all_where_the_eye_is_inside():
 
 def test_parts_predict_what_the_whole_predicts(default_runtime, monkeypatch):
     def measured():
-        scene = Scene(VOLUME, VIEW, (640, 480), TRANSFER, TARGET_ANGLE, default_runtime, {})
+        scene = Scene(
+            VOLUME, VIEW, (640, 480), TRANSFER, TARGET_ANGLE, default_runtime, GenerationOptions()
+        )
         return scene.measure()
 
     windows = []

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.generation.generate import CRITERIA, check_max_supersegments
+from pyvista_vdi.model.options import CRITERIA, check_max_supersegments
 from pyvista_vdi.model.packing import PRECISIONS
 
 #: Most settings of one sweep: each is drawn many times from every angle.

@@ -23,21 +23,18 @@ from pyvista_vdi.errors import (
     VDIError,
     VDIWarning,
 )
-from pyvista_vdi.generation.generate import (
-    check_criterion,
-    check_max_supersegments,
-    generate_vdi,
-)
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import memory_limit_bytes
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.lighting import Lights
+from pyvista_vdi.model.options import check_criterion, check_max_supersegments
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, warn_missed
+from pyvista_vdi.quality.probe import generate_by_dial
 from pyvista_vdi.vtk_pipeline.filters.algorithm import announce, ask_for_all
 from pyvista_vdi.vtk_pipeline.filters.convert import (
     require_image,
@@ -74,7 +71,7 @@ class Request:
     generating : (Camera, (int, int))
         The generating view V_O and its window, after coverage.
     settings, metadata : dict
-        Keyword arguments of ``generate_vdi``.
+        Keyword arguments of ``generate_by_dial``.
     content : tuple
         Equal where what is generated from is equal, the view apart.
     """
@@ -94,12 +91,12 @@ class Request:
 
     @property
     def arguments(self) -> tuple[Volume, Camera, tuple[int, int], TransferFunction]:
-        """The positional arguments of ``generate_vdi``."""
+        """The positional arguments of ``generate_by_dial``."""
         return (self.volume, *self.generating, self.transfer_function)
 
     @property
     def keywords(self) -> dict[str, Any]:
-        """The keyword arguments of ``generate_vdi``."""
+        """The keyword arguments of ``generate_by_dial``."""
         return {"metadata": {"scalars": self.volume.name, **self.metadata}, **self.settings}
 
 
@@ -634,7 +631,9 @@ class VDISource(VTKPythonAlgorithmBase):
     def _generated(self, image: Any) -> VDI:
         request = self._make_request(image, self.GetCamera(), self._window_size, warn=True)
         if self._vdi is None or self._request is None or request.key != self._request.key:
-            self._vdi = generate_vdi(*request.arguments, progress=self._advance, **request.keywords)
+            self._vdi = generate_by_dial(
+                *request.arguments, progress=self._advance, **request.keywords
+            )
             self._request = request
             warn_missed(self._vdi, stacklevel=2)
         return self._vdi
