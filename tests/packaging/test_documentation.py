@@ -1,14 +1,17 @@
-"""The pages of ``docs/``: their diagrams, and the tables that they include.
+"""The pages of ``docs/``: their diagrams, the tables that they include, and the names on them.
 
 Needs a checkout: the folder that ``PYVISTA_VDI_CHECKOUT`` names, or the one these tests lie in.
 """
 
 from __future__ import annotations
 
+import contextlib
+import importlib
 import importlib.util
 import os
 import re
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -56,3 +59,90 @@ def test_included_tables_bring_no_headings():
             assert not re.search(r"^#", text, re.MULTILINE), f"{page.name}: headings of {name}"
             included += 1
     assert included > 5
+
+
+# -- where is what ---------------------------------------------------------------------------------
+
+
+def _rows():
+    """Yield the cells of each row of the tables on the page *Where is what*."""
+    for line in (DOCS / "where_is_what.md").read_text(encoding="utf-8").splitlines():
+        if line.startswith("|") and not line.startswith("|---"):
+            cells = [cell.strip() for cell in line.strip("|").split("|")]
+            assert len(cells) == 5, line
+            if cells[1] != "Python":
+                yield cells
+
+
+def _named(cell):
+    return re.findall(r"`([^`]+)`", cell)
+
+
+def _is_importable(name):
+    """Return whether a dotted name, relative to the package, is a module or in one."""
+    found = importlib.import_module("pyvista_vdi")
+    for part in name.split("."):
+        if isinstance(found, ModuleType) and hasattr(found, "__path__"):
+            with contextlib.suppress(ModuleNotFoundError):
+                importlib.import_module(f"{found.__name__}.{part}")
+        found = getattr(found, part, None)
+        if found is None:
+            return False
+    return True
+
+
+def _defines(text, pattern):
+    return re.search(pattern, text, re.MULTILINE) is not None
+
+
+def _anchors(page):
+    """Return the anchors of a page: those of its headings, and those that it names."""
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    slugs = {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+    return slugs | set(re.findall(r"^\(([a-z0-9-]+)\)=$", text, re.MULTILINE))
+
+
+def test_where_is_what_names_python_that_exists():
+    pytest.importorskip("vtkmodules")
+    pytest.importorskip("pyvista")
+    missing = [name for row in _rows() for name in _named(row[1]) if not _is_importable(name)]
+    assert not missing, f"docs/where_is_what.md: {missing}"
+
+
+def test_where_is_what_names_kernels_tests_and_pages_that_exist():
+    missing = []
+    for _step, _python, kernels, tests, page in _rows():
+        for name in _named(kernels):
+            file, _, function = name.partition("::")
+            path = CHECKOUT / "opencl" / file
+            # A definition, or a macro that makes one, begins its line or names itself in one
+            defined = rf"^(?!\s|//)[^;\n]*\b{function}\s*[(,]"
+            if not path.is_file() or not _defines(path.read_text(encoding="utf-8"), defined):
+                missing.append(name)
+        for name in _named(tests):
+            file, _, function = name.partition("::")
+            path = CHECKOUT / "tests" / file
+            defined = rf"^def {function}\(" if function else ""
+            if not path.is_file() or not _defines(path.read_text(encoding="utf-8"), defined):
+                missing.append(name)
+        target = re.search(r"\]\(([^)#]+)#?([^)]*)\)", page)
+        assert target, page
+        file, anchor = target.groups()
+        if not (DOCS / file).is_file() or (anchor and anchor not in _anchors(DOCS / file)):
+            missing.append(f"{file}#{anchor}")
+    assert not missing, f"docs/where_is_what.md: {missing}"
+
+
+def test_pages_name_files_that_exist():
+    """Paths of this repository in the pages lead somewhere."""
+    missing = set()
+    for page in _pages():
+        if page.name == "changelog.md":
+            continue
+        text = page.read_text(encoding="utf-8")
+        roots = r"(?:pyvista_vdi|opencl|tests|benchmarks|examples|docs|tools)"
+        for name in re.findall(rf"`({roots}/[\w/.-]+\.(?:py|cl|md|json|sh))`", text):
+            if not (CHECKOUT / name).is_file():
+                missing.add(f"{page.name}: {name}")
+    assert not missing, sorted(missing)
