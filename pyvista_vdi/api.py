@@ -256,7 +256,7 @@ def render(
     preview_samples : int, optional
         An approximation (paper section 5): look the VDI up at so many points of each ray instead
         of intersecting its supersegments. A smaller ``window_size`` is the better one: see
-        docs/performance.md, "Previews". For a single VDI only.
+        docs/decisions/previews.md. For a single VDI only.
     transmittance_cutoff : float, optional
         A ray ends where less light than this is left, 0 to below 1; 10⁻⁶ by default. No channel
         loses more than that: 0.004 changes a picture of 8 bits by one step at most, and saves a

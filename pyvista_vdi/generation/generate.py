@@ -277,7 +277,8 @@ def _steps_per_voxel(volume: Volume, sample_distance: float) -> int:
     """Steps that a ray whose record has been full composites before it asks about homogeneity.
 
     Measured: such a VDI's SSIM changes by less than .003 either way, and generation is up to a
-    fifth faster (docs/performance.md). Rays that keep every detail are asked at every step.
+    fifth faster (docs/decisions/generation.md). Rays that keep every detail are asked at every
+    step.
     """
     # A hair more, so that half a voxel divides a voxel twice whatever the rounding
     return int(max(1, min(min(volume.spacing) / sample_distance * (1 + 1e-9), _CHUNK_STEPS)))

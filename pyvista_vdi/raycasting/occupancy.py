@@ -22,7 +22,7 @@ _SQUARES = 12
 _ROUNDINGS = 32
 
 #: Share of the cells within the volume's bounds above which skipping costs more than it saves.
-#: Measured: it gains below .6 and loses above 1 (docs/performance.md).
+#: Measured: it gains below .6 and loses above 1 (docs/decisions/empty_space.md).
 _WORTHWHILE = 0.8
 
 

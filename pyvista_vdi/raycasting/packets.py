@@ -1,4 +1,4 @@
-"""When rays are followed in packets, and how those lie in the window (docs/performance.md).
+"""When rays are followed in packets, and how those lie in the window (docs/decisions/packets.md).
 
 Rays of one plane through the eyes of V_O and V_N cross the same lists, if not at the same depth. On
 a CPU a packet of such rays loads each list once. That pays where rays cross many lists. Where they
@@ -35,7 +35,7 @@ MARGIN = 24
 #: those of ``lib/list_space.cl``.
 COORDINATE_FORMS, PLANE_FORMS = 4, 7
 #: Lists that a ray crosses before its light ends, over those that lie between a packet's first and
-#: last ray, from which packets are faster: what they have in common (docs/performance.md).
+#: last ray, from which packets are faster: what they have in common (docs/decisions/packets.md).
 LEAST_IN_COMMON = 4.5
 #: The same where rays that are not in packets cannot be in blocks, either.
 LEAST_IN_COMMON_WITHOUT_BLOCKS = 1.8

@@ -112,7 +112,8 @@ def render_vdi(
         that. The picture is the same to the last bit.
     preview_samples : int, optional
         Look the VDI up at so many points of each ray instead of intersecting its supersegments
-        (paper section 5): an approximation. Fewer pixels are the better one (docs/performance.md).
+        (paper section 5): an approximation. Fewer pixels are the better one
+        (docs/decisions/previews.md).
     transmittance_cutoff : float
         A ray ends where less than this is left, 0 to below 1. It bounds what any channel of the
         image can lose.

@@ -52,9 +52,9 @@ from pyvista_vdi.volume.upload import (
 
 #: Blocks: farther than this no march looks for what is not transparent.
 _FARTHEST = 16
-#: Share of transparent blocks from which on looking for them pays. Measured (docs/performance.md):
-#: where none is, a picture takes 1.2 to 1.35 times as long with the look as without; from .32 on it
-#: takes .4 to .85.
+#: Share of transparent blocks from which on looking for them pays. Measured
+#: (docs/decisions/generation.md): where none is, a picture takes 1.2 to 1.35 times as long with the
+#: look as without; from .32 on it takes .4 to .85.
 _WORTH_SKIPPING = 0.15
 
 
