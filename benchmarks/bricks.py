@@ -21,7 +21,8 @@ from common import (  # beside this file
 )
 
 from pyvista_vdi import VDI
-from pyvista_vdi.generation.generate import estimate, generate_vdi
+from pyvista_vdi.generation.estimate import estimate
+from pyvista_vdi.generation.generate import generate_vdi
 
 
 def main() -> int:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
         VDIFileError,
         VDIWarning,
     )
-    from pyvista_vdi.generation.generate import Estimate
+    from pyvista_vdi.generation.estimate import Estimate
     from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
     from pyvista_vdi.model.camera import Camera
     from pyvista_vdi.model.cropping import Cropping
@@ -68,7 +68,7 @@ _HOMES = {
     "AmbientOcclusion": "model.ambient_occlusion",
     "Camera": "model.camera",
     "Cropping": "model.cropping",
-    "Estimate": "generation.generate",
+    "Estimate": "generation.estimate",
     "Light": "model.lighting",
     "Lights": "model.lighting",
     "Pick": "raycasting.picking",

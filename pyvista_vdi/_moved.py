@@ -51,8 +51,8 @@ MODULES = {
 #: Names of modules whose former name is a package's today.
 NAMES = {
     "generation": {
-        "Estimate": "generation.generate",
-        "estimate": "generation.generate",
+        "Estimate": "generation.estimate",
+        "estimate": "generation.estimate",
         "generate_vdi": "generation.generate",
     },
     "volume": {"Volume": "model.volume"},

@@ -25,7 +25,7 @@ from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, warn_missed
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY
 
 if TYPE_CHECKING:
-    from pyvista_vdi.generation.generate import Estimate
+    from pyvista_vdi.generation.estimate import Estimate
     from pyvista_vdi.raycasting.picking import Pick
 
 __all__ = ["estimate", "generate", "pick", "read", "render", "render_depth", "render_volume"]
@@ -618,7 +618,7 @@ def estimate(
     """
     looks = Classification(classification, "estimate", _keywords(estimate))
     volume = as_volume(volume, looks.scalars, looks.preference)
-    from pyvista_vdi.generation.generate import estimate as estimate_bytes
+    from pyvista_vdi.generation.estimate import estimate as estimate_bytes
 
     return estimate_bytes(
         volume,

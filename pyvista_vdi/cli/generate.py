@@ -16,7 +16,7 @@ from pyvista_vdi.cli.inputs import (
     read_volume,
 )
 from pyvista_vdi.cli.text import printable
-from pyvista_vdi.generation.generate import estimate
+from pyvista_vdi.generation.estimate import estimate
 from pyvista_vdi.io import checked_target
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification

@@ -15,7 +15,7 @@ from extreme_scenes import BOUND, TURNS, field_volume, transfer, turned, view
 from oracle import explain, total
 
 from pyvista_vdi.device import get_runtime, list_devices
-from pyvista_vdi.generation import generate as generation
+from pyvista_vdi.generation import march, records, slices
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting import occupancy, raycast
@@ -62,9 +62,9 @@ def test_across_runs(runtime):
 @pytest.mark.parametrize("group", [16, 128])
 def test_across_work_group_sizes(runtime, monkeypatch, group):
     expected = digest(runtime)
-    for module in (generation, raycast, raycast_volume, occupancy):
+    for module in (march, records, raycast, raycast_volume, occupancy):
         monkeypatch.setattr(module, "GROUP", group)
-    for module in ("blocks", "device_volume", "voxels"):
+    for module in ("device.work_order", "volume.classified_volume", "volume.upload"):
         monkeypatch.setattr(f"pyvista_vdi.{module}.GROUP", group)
     assert digest(runtime) == expected
 
@@ -72,7 +72,7 @@ def test_across_work_group_sizes(runtime, monkeypatch, group):
 def test_across_slices(runtime, monkeypatch):
     """However many rows of lists are made at a time, and in the background or not."""
     expected = digest(runtime)
-    monkeypatch.setattr(generation, "_SLICE_BYTES", 1)
+    monkeypatch.setattr(slices, "_SLICE_BYTES", 1)
     assert digest(runtime) == expected
     monkeypatch.undo()
     with runtime.background():

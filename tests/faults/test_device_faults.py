@@ -293,7 +293,7 @@ def test_cancelling_at_each_report(runtime, monkeypatch):
     """``progress`` that returns False, at every call."""
     from faulty_driver import TRANSFER, fresh_volume
 
-    monkeypatch.setattr("pyvista_vdi.generation.generate._SLICE_BYTES", 1)
+    monkeypatch.setattr("pyvista_vdi.generation.slices._SLICE_BYTES", 1)
     fractions = []
     arguments = (fresh_volume(), CAMERA, WINDOW, TRANSFER)
     pvdi.generation.generate.generate_vdi(*arguments, device=runtime, progress=fractions.append)

@@ -17,7 +17,7 @@ from fresh_python import run_python
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import scheduling as turns
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
-from pyvista_vdi.generation import generate as generation
+from pyvista_vdi.generation import slices
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.quality import background
 from pyvista_vdi.quality.background import BackgroundGeneration
@@ -82,7 +82,7 @@ def generator(runtime):
 @pytest.fixture
 def many_slices(monkeypatch):
     """Four rows of lists at a time, so that these small VDIs are made of several slices."""
-    monkeypatch.setattr(generation, "_SLICE_BYTES", 1)
+    monkeypatch.setattr(slices, "_SLICE_BYTES", 1)
 
 
 class Gate:

@@ -11,7 +11,8 @@ import strategies
 
 from pyvista_vdi import Camera, Light, TransferFunction, Volume
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
-from pyvista_vdi.generation.generate import estimate, generate_vdi
+from pyvista_vdi.generation.estimate import estimate
+from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.checks import memory_limit_bytes
 from pyvista_vdi.model.lighting import Shading
 from pyvista_vdi.quality.view_error import estimate_view_error

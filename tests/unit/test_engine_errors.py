@@ -16,8 +16,9 @@ from pyvista_vdi.errors import (
     InvalidCameraError,
     InvalidVolumeError,
 )
-from pyvista_vdi.generation import generate as generation
-from pyvista_vdi.generation.generate import estimate, generate_vdi
+from pyvista_vdi.generation import slices
+from pyvista_vdi.generation.estimate import estimate
+from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.volume.render import raycast_volume
 
@@ -346,7 +347,7 @@ def test_the_estimate_counts_scalars_taken_relative(runtime, make, monkeypatch, 
 @pytest.fixture
 def sliced(monkeypatch):
     """Slices of four rows, so that a small window takes several."""
-    monkeypatch.setattr(generation, "_SLICE_BYTES", 1)
+    monkeypatch.setattr(slices, "_SLICE_BYTES", 1)
 
 
 def test_progress_goes_from_nothing_to_all(make, sliced):

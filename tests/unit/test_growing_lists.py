@@ -8,9 +8,10 @@ import pytest
 
 from pyvista_vdi import Camera
 from pyvista_vdi.device import GrowingArray, Runtime
-from pyvista_vdi.generation import generate as generation
 from pyvista_vdi.generation import list_arrays as growing_lists
+from pyvista_vdi.generation import slices
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.generation.march import March
 from tests.faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
 
 #: Looks past the volume, so that first all and then no lists have something in them.
@@ -30,7 +31,7 @@ def make(runtime):
 def test_slices_make_the_same_vdi_however_memory_is_had(monkeypatch, make, camera, memory):
     whole = make(camera)
     assert whole.n_supersegments > 100
-    monkeypatch.setattr(generation, "_SLICE_BYTES", 1)  # four rows each
+    monkeypatch.setattr(slices, "_SLICE_BYTES", 1)  # four rows each
     moved = []
     if memory == "copied":  # as by a device with memory of its own
         monkeypatch.setattr(Runtime, "in_place_alignment", None)
@@ -55,17 +56,17 @@ def test_slices_make_the_same_vdi_however_memory_is_had(monkeypatch, make, camer
 def test_a_slice_is_marched_before_the_sum_of_the_one_before_is_waited_for(
     monkeypatch, runtime, make, copied
 ):
-    monkeypatch.setattr(generation, "_SLICE_BYTES", 1)
+    monkeypatch.setattr(slices, "_SLICE_BYTES", 1)
     if copied:
         monkeypatch.setattr(Runtime, "in_place_alignment", None)
     elif runtime.in_place_alignment is None:
         pytest.skip("the device copies")
     done = []
-    march, later = generation._Recorder.march, Runtime.download_later
+    chunks, later = March.chunks, Runtime.download_later
 
-    def noted_march(self, first_row, rows):
+    def noted_chunks(self, part):
         done.append("march")
-        march(self, first_row, rows)
+        return chunks(self, part)
 
     def noted_later(self, buffer, out, *, first=0):
         wait = later(self, buffer, out, first=first)
@@ -76,11 +77,11 @@ def test_a_slice_is_marched_before_the_sum_of_the_one_before_is_waited_for(
 
         return noted_wait
 
-    monkeypatch.setattr(generation._Recorder, "march", noted_march)
+    monkeypatch.setattr(March, "chunks", noted_chunks)
     monkeypatch.setattr(Runtime, "download_later", noted_later)
     make(CAMERA)
-    slices = -(-WINDOW[1] // 4)
-    assert done == ["march", *["march", "wait"] * (slices - 1), "wait"]
+    n = -(-WINDOW[1] // 4)
+    assert done == ["march", *["march", "wait"] * (n - 1), "wait"]
 
 
 def test_offsets_that_no_buffer_holds_are_copied(monkeypatch, runtime):

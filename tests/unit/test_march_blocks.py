@@ -11,7 +11,7 @@ import pytest
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.generation import generate as generation
+from pyvista_vdi.generation import march, slices
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.standard_cases import filling_camera
 
@@ -70,7 +70,7 @@ def ways(monkeypatch, runtime):
         arguments = (volume, camera, WINDOW, transfer_for(volume))
         found = generate_vdi(*arguments, device=runtime, **options)
         with monkeypatch.context() as patch:
-            patch.setattr(generation, "_IN_BLOCKS", set())
+            patch.setattr(march, "_IN_BLOCKS", set())
             expected = generate_vdi(*arguments, device=runtime, **options)
         return found, expected
 
@@ -119,6 +119,6 @@ def test_volumes_without_empty_blocks(ways):
 
 
 def test_a_slice_of_four_rows(ways, monkeypatch):
-    monkeypatch.setattr(generation, "_SLICE_BYTES", 1)
+    monkeypatch.setattr(slices, "_SLICE_BYTES", 1)
     volume = volume_of(np.uint8)
     check(ways, volume, VIEWS["all of it"](volume))

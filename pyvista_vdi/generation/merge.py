@@ -1,0 +1,81 @@
+"""The second step: neighbouring runs are merged until each ray's record keeps the budget."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyvista_vdi.generation.march import Chunk
+from pyvista_vdi.generation.records import Records, Step
+from pyvista_vdi.generation.slices import Slice
+from pyvista_vdi.model.options import GenerationOptions
+
+#: The kernel's name of each criterion other than least error, which needs no kernel of its own.
+_CUTS = {
+    "homogeneity": "HOMOGENEITY",
+    "length": "EQUAL_LENGTH",
+    "transmittance": "EQUAL_TRANSMITTANCE",
+    "optical-depth": "EQUAL_OPTICAL_DEPTH",
+}
+
+
+class Merge:
+    """Shortens the records of a slice, between chunks of the march and to the budget."""
+
+    def __init__(self, records: Records, options: GenerationOptions) -> None:
+        self._records = records
+        self._limit = options.max_supersegments
+        kernel, defines = records.runtime.kernel, records.of_medium
+        if records.runtime.is_cpu:
+            path, name = "generation/shorten_blocks.cl", "shorten_blocks"
+            self._shorten_step = Step.in_blocks(kernel(path, name, records.of_rays))
+        else:
+            self._shorten_step = Step(kernel("generation/generate.cl", "shorten_lists", defines))
+        self._cut = None
+        if options.criterion in _CUTS:
+            defines = {**defines, "CRITERION": _CUTS[options.criterion]}
+            self._cut = Step(kernel("generation/generate.cl", "cut_lists", defines))
+
+    def make_room(self, part: Slice, chunk: Chunk) -> None:
+        """Merge what is least unlike in records without room for another chunk.
+
+        Such a ray's threshold is raised. What follows the last chunk does it at least error.
+        """
+        if self._cut is not None or not chunk.last:
+            self._shorten(part, self._records.slices.kept, exactly=False)
+
+    def to_budget(self, part: Slice) -> None:
+        """Merge at least error, or cut by another criterion, until the budget is kept."""
+        if self._cut is None:
+            self._shorten(part, self._limit, exactly=True)
+            return
+        records = self._records
+        records.launch(
+            self._cut,
+            part,
+            np.int32(self._limit),
+            *records.place(part),
+            records.forms,
+            np.int32(records.slices.capacity),
+            *records.weights,
+            records.finest,
+            records.runs,
+            records.counts,
+        )
+
+    def _shorten(self, part: Slice, limit: int, *, exactly: bool) -> None:
+        """Bring records to at most so many runs: least error first, or by raised thresholds."""
+        records = self._records
+        records.launch(
+            self._shorten_step,
+            part,
+            np.int32(limit),
+            np.int32(exactly),
+            *records.place(part),
+            records.forms,
+            np.int32(records.slices.capacity),
+            *records.weights,
+            records.thresholds,
+            records.runs,
+            records.errors,
+            records.counts,
+        )

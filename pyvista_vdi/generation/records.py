@@ -1,0 +1,113 @@
+"""What is recorded of a slice's rays on a device: the steps from march to pack work on it."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pyvista_vdi.device import Kernel, Runtime
+from pyvista_vdi.device.constants import RUN_WORDS
+from pyvista_vdi.device.ray_forms import check_list_space
+from pyvista_vdi.device.work_order import BLOCK_RAYS, GROUP, block_items
+from pyvista_vdi.generation.slices import Slice, Slices
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+
+#: Merge error that no picture shows: a difference of a thousandth of full opacity over one voxel.
+_INDISTINGUISHABLE = 1e-6
+
+
+@dataclass(frozen=True)
+class Step:
+    """A kernel of generation, and how many rays a work-item of it follows: 1, or a block of 16."""
+
+    kernel: Kernel
+    rays: int = 1
+
+    @classmethod
+    def in_blocks(cls, kernel: Kernel) -> Step:
+        """Return the step of a kernel whose work-items follow blocks of rays."""
+        return cls(kernel, BLOCK_RAYS)
+
+
+class Records:
+    """A ray per list, and the runs of like samples that are recorded along each of a slice's rays.
+
+    Attributes
+    ----------
+    runtime, size, slices
+        The device, width and height of the window in lists, and how they are cut into slices.
+    forms, planes
+        The rays as the kernels take them, and how many of the forms are planes.
+    march : tuple
+        Arguments ``forms`` to ``unit_distance`` of the kernels that march.
+    of_medium, of_rays : dict
+        What kernels are compiled with that march, and those that take rays alone.
+    weights : tuple
+        Arguments ``reference_length`` and ``hidden_weight`` of the kernels that merge.
+    finest : float32
+        Merge error that is accepted on every ray.
+    runs, errors, thresholds, counts : DeviceBuffer
+        The recorded runs, their merge errors, and each ray's accepted merge error and number of
+        runs.
+    """
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        medium: DeviceVolume,
+        camera: Camera,
+        size: tuple[int, int],
+        slices: Slices,
+        options: GenerationOptions,
+    ) -> None:
+        check_list_space(camera, medium.volume.bounds)
+        self.runtime, self.size, self.slices = runtime, size, slices
+        rays = medium.forms(camera, size, None)
+        self.planes, self.depth_origin = rays.planes, rays.rays.reference_depth
+        self.of_medium, self.of_rays = {**medium.defines, **rays.defines}, rays.defines
+        # Differences stay below 1e18, whose square float32 still holds
+        self.finest = np.float32(max(min(options.tolerance, 1e18) ** 2, _INDISTINGUISHABLE))
+        voxel = min(medium.volume.spacing)
+        self.weights = (np.float32(voxel), np.float32(options.hidden_weight))
+        items, capacity = slices.items, slices.capacity
+        with ExitStack() as stack:
+            keep = stack.enter_context
+            self.forms = keep(runtime.upload(rays.packed(), "rays"))
+            self.runs = keep(runtime.buffer((items, capacity, RUN_WORDS), name="recorded runs"))
+            self.errors = keep(runtime.buffer((items, capacity), name="merge errors"))
+            self.thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
+            self.counts = keep(runtime.buffer((items,), np.uint32, "list lengths"))
+            self._buffers = stack.pop_all()
+        self.march = (
+            self.forms,
+            np.int32(self.planes),
+            np.float32(medium.sample_distance),
+            np.float32(medium.unit_distance),
+        )
+
+    def __enter__(self) -> Records:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.runtime.finish()  # the forms may be host memory that the device still reads
+        self._buffers.close()
+
+    def clear(self) -> None:
+        """Forget the slice before."""
+        self.runtime.fill(self.counts, np.uint32(0))
+        self.runtime.fill(self.thresholds, self.finest)
+
+    def launch(self, step: Step, part: Slice, *arguments: Any) -> None:
+        """Launch a step for the rays of a slice."""
+        items, rays = block_items(self.size[0], part.rows), step.rays
+        self.runtime.launch(step.kernel, items // rays, GROUP // rays, *arguments)
+
+    def place(self, part: Slice) -> tuple[np.int32, ...]:
+        """Return the arguments ``width`` to ``rows`` of the kernels that take a slice's rays."""
+        width, height = self.size
+        return tuple(np.int32(n) for n in (width, height, part.first_row, part.rows))

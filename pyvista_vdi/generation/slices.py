@@ -1,0 +1,86 @@
+"""How many rows of lists are made at a time: a ray's record takes far more than its list."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from pyvista_vdi.device.constants import ERRORS_AT_A_TIME, RUN_WORDS
+from pyvista_vdi.device.work_order import block_items
+from pyvista_vdi.generation.list_arrays import SUPERSEGMENT_BYTES, blocks_to_sum
+from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.volume.bricks import Room
+
+#: Steps of a ray between two looks at the length of its record.
+CHUNK_STEPS = 128
+#: Bytes of one recorded run on the device, and of its merge error.
+_RUN_BYTES = (RUN_WORDS + 1) * 4
+#: Bytes of runs that one slice of rays records at a time; also how often progress is reported.
+_SLICE_BYTES = 96 * 2**20
+#: Slices that a memory limit has room for: the volume gets more than they do.
+_SLICES_IN_LIMIT = 4
+#: Runs that a ray's record keeps for the criteria other than least error: more than a ray through
+#: most data has, so that these cut what was sampled and not what least error has left of it.
+_UNMERGED_RUNS = 512
+
+
+class Slice(NamedTuple):
+    """Rows of lists that are made together."""
+
+    number: int
+    first_row: int
+    rows: int
+
+
+class Slices:
+    """The slices of a window, and the buffers that one of them takes.
+
+    Attributes
+    ----------
+    kept : int
+        Runs that a record is shortened to between chunks of its ray's march.
+    capacity : int
+        Runs that a record has room for.
+    rows : int
+        Rows of lists in a slice; the last one may have fewer.
+    items : int
+        Records of a slice: work-items that cover it in blocks.
+    bytes : int
+        On the device, of records, lists and all else but the volume.
+    """
+
+    def __init__(self, size: tuple[int, int], options: GenerationOptions) -> None:
+        limit = options.max_supersegments
+        # Twice the budget: the records' thresholds then stay well below the final merges' errors
+        self.kept = max(2 * limit, limit + 12)
+        self.capacity = self.kept + CHUNK_STEPS
+        if options.criterion != "least-error":
+            self.kept = max(self.kept, _UNMERGED_RUNS)
+            self.capacity = self.kept + CHUNK_STEPS + limit  # the kernel cuts into what is free
+        self.capacity = -(-self.capacity // ERRORS_AT_A_TIME) * ERRORS_AT_A_TIME
+        width, self._height = size
+        most = _SLICE_BYTES
+        if options.memory_limit is not None:
+            most = min(most, options.memory_limit // _SLICES_IN_LIMIT)
+        per_block_row = block_items(width, 4) * self.capacity * _RUN_BYTES
+        self.rows = min(self._height, 4 * max(1, most // per_block_row))
+        self.items = block_items(width, self.rows)
+        lists = self.rows * width
+        packed_bytes = lists * (limit * SUPERSEGMENT_BYTES + 8) + 8 + 8 * blocks_to_sum(lists)
+        self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + packed_bytes
+        self._options = options
+        self._text = f"{self.rows} rows of {width} lists of up to {limit} supersegments"
+
+    def __len__(self) -> int:
+        return -(-self._height // self.rows)
+
+    def __iter__(self) -> Iterator[Slice]:
+        for number in range(len(self)):
+            first_row = number * self.rows
+            yield Slice(number, first_row, min(self.rows, self._height - first_row))
+
+    def room(self, volume: Volume) -> Room:
+        """Return the room for a volume beside a slice and the grid of an ambient occlusion."""
+        beside = self.bytes + self._options.occlusion_bytes(volume)
+        return Room(self._options.memory_limit, beside, self.items * CHUNK_STEPS, self._text)
