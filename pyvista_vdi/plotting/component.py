@@ -28,17 +28,16 @@ from pyvista_vdi.plotting.classify import (
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.volumes import as_image
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, refuse_settings
-from pyvista_vdi.vtk_pipeline.drawing.frame import as_array
-from pyvista_vdi.vtk_pipeline.drawing.painter import make_proxy_rgba
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
-from pyvista_vdi.vtk_pipeline.interaction.motion import checked_rate
+from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.interaction.regeneration import (
     REGENERATE_BELOW,
     Policy,
     checked_bound,
     checked_policy,
 )
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import checked_rate
 
 #: ``add_volume``'s aliases.
 _ALIASES = {"rng": "clim", "colormap": "cmap", "backface_culling": "culling"}
@@ -402,7 +401,7 @@ class AddVDI:
         if prop is not None:
             actor.prop = prop
             if not prop.independent_components:
-                make_proxy_rgba(mapper.painter.proxy)
+                mapper.painter.give_proxy(4)
         if isinstance(shown, VDI):
             mapper.SetVDI(shown)
         else:

@@ -10,10 +10,11 @@ from vtkmodules.vtkCommonDataModel import vtkPlane
 from vtkmodules.vtkRenderingOpenGL2 import vtkTextureObject
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.vtk_pipeline.drawing import depth as depth_module
 from pyvista_vdi.vtk_pipeline.drawing import frame as frame_module
 from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.drawing import texture as texture_module
+from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import WindowClock
 
 pytestmark = pytest.mark.gl
 
@@ -49,6 +50,10 @@ def counts(monkeypatch):
 
     monkeypatch.setattr(texture_module, "vtkTextureObject", Texture)
     return found
+
+
+def forget(plotter):
+    WindowClock.of(plotter.render_window).shared(OpaqueDepths)._known.clear()
 
 
 @pytest.fixture
@@ -103,7 +108,7 @@ def test_a_view_that_has_not_changed_costs_nothing(plotter, counts, opaque):
 
 def test_a_view_that_moves_allocates_nothing(plotter, counts):
     plotter.show(auto_close=False)
-    for _ in range(painter_module._KEPT_IMAGES + 1):
+    for _ in range(frame_module.KEPT + 1):
         plotter.camera.Azimuth(3)
         plotter.render()
     allocated = counts["aligned_empty"]
@@ -112,7 +117,7 @@ def test_a_view_that_moves_allocates_nothing(plotter, counts):
         plotter.camera.Azimuth(3)
         plotter.render()
     assert counts["render_vdi"] == raycasts + 6
-    assert counts["aligned_empty"] == allocated == painter_module._KEPT_IMAGES + 1
+    assert counts["aligned_empty"] == allocated == frame_module.KEPT + 1
     np.testing.assert_array_equal(picture(plotter), fresh_picture(plotter))
 
 
@@ -129,7 +134,7 @@ def test_a_mesh_that_moves_allocates_nothing(plotter, counts):
 def test_images_that_are_kept_are_not_drawn_over(plotter):
     """Views come again in another order, while the memory of others is used again."""
     plotter.show(auto_close=False)
-    views = [30.0 * i for i in range(painter_module._KEPT_IMAGES + 2)]
+    views = [30.0 * i for i in range(frame_module.KEPT + 2)]
     pictures = {}
     for view in [*views, *views[::-1], *views[::2], *views]:
         plotter.camera_position = ((4, 3, 2), (0, 0, 0), (0, 0, 1))
@@ -170,7 +175,7 @@ def test_depth_is_read_again_when_what_is_opaque_changes(plotter, counts):
         after = picture(plotter)
         assert counts["opaque_z"] > reads, name
         assert (after != before).any(), f"{name} changes nothing"
-        depth_module._of_windows.clear()  # nothing is known, and all of it is read
+        forget(plotter)  # nothing is known, and all of it is read
         plotter.volume.mapper.painter._images.clear()
         np.testing.assert_array_equal(picture(plotter), after, err_msg=name)
         before = after
@@ -180,9 +185,9 @@ def test_only_what_can_hide_the_vdi_is_read(from_x, monkeypatch):
     areas = []
     read = frame_module.Frame.opaque_z
 
-    def watched(self, renderer, area):
+    def watched(self, area):
         areas.append(area)
-        return read(self, renderer, area)
+        return read(self, area)
 
     monkeypatch.setattr(frame_module.Frame, "opaque_z", watched)
     from_x.add_mesh(pv.Cube(center=(1, 0.5, 0)).scale((1, 0.2, 0.2)), reset_camera=False)

@@ -33,7 +33,7 @@ from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, sampled
 from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.interaction import estimation, regeneration
-from pyvista_vdi.vtk_pipeline.interaction.motion import reduced
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import reduced
 
 pytestmark = pytest.mark.gl
 
@@ -433,7 +433,7 @@ def test_several_vdis_and_two_eyes_share_a_frame(plotter, coarsest):
 
 def test_samples_follow_the_time_that_frames_take(plotter, monkeypatch):
     """With a clock that counts a microsecond per ray, 100 frames a second leave 10 000 rays."""
-    from pyvista_vdi.vtk_pipeline.interaction import motion as interaction
+    from pyvista_vdi.vtk_pipeline.interaction import window_clock as interaction
 
     class Clock:
         now = 0.0
@@ -620,7 +620,7 @@ def test_the_estimate_is_of_the_picture_that_is_shown(plotter, no_estimates):
     assert no_estimates.camera == pvdi.Camera.from_any(plotter.camera)
     assert shown["cropping"] == pvdi.Cropping(planes, "fence")
     assert shown["opacity_multiplier"] == 0.5
-    (row,) = shown["clipping_planes"]
+    row = np.array(shown["clipping_planes"])[0]
     np.testing.assert_allclose(row[3:] / np.linalg.norm(row[3:]), (0.6, 0, 0.8), atol=1e-12)
     # any point of the plane says where it is
     assert (row[:3] - (0.1, 0.2, 0.3)) @ (0.6, 0, 0.8) == pytest.approx(0, abs=1e-9)

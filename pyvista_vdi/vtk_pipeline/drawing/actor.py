@@ -10,9 +10,9 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
 from pyvista_vdi.raycasting.raycast import TRANSMITTANCE_CUTOFF
-from pyvista_vdi.vtk_pipeline.drawing.frame import as_array
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.shader import show_image
+from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 
 

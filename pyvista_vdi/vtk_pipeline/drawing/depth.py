@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from vtkmodules.vtkRenderingCore import vtkActor2D, vtkMapper, vtkVolume
 
-from pyvista_vdi.vtk_pipeline.drawing.frame import Area, Frame, Matrix, depths_of, rectangle
-from pyvista_vdi.vtk_pipeline.interaction.motion import WindowClock
-
-Depth = NDArray[np.float32]
-
-#: Readings kept: two eyes, and two more for other renderers.
-_KEPT_READINGS = 4
+from pyvista_vdi.vtk_pipeline.drawing.frame import Area, Frame, Image, Matrix, Recent, depths_of
 
 #: Pixels around a rectangle that are read as well: a pixel is drawn where its centre is inside.
 _MARGIN = 2
@@ -27,8 +19,6 @@ _MARGIN = 2
 #: lines.
 _PLAIN_ACTORS = ("vtkActor", "vtkOpenGLActor")
 _PLAIN_MAPPERS = ("vtkDataSetMapper", "vtkPolyDataMapper", "vtkOpenGLPolyDataMapper")
-
-_of_windows: weakref.WeakKeyDictionary[WindowClock, OpaqueDepths] = weakref.WeakKeyDictionary()
 
 
 @dataclass
@@ -49,37 +39,22 @@ class _Reading:
 
     view: Any
     state: Any
-    z: Depth
-    depth: Depth | None
+    z: Image
+    depth: Image | None
 
 
 class OpaqueDepths:
-    """Depths of a window's renderers."""
+    """Depths of a window's renderers: ``clock.shared(OpaqueDepths)``."""
 
     def __init__(self) -> None:
-        self._known: dict[Any, _Reading] = {}
+        self._known: Recent[_Reading] = Recent()
 
-    @classmethod
-    def of(cls, clock: WindowClock) -> OpaqueDepths:
-        """Return those of a window, made on first use."""
-        depths = _of_windows.get(clock)
-        if depths is None:
-            depths = _of_windows[clock] = cls()
-        return depths
-
-    def read(self, renderer: Any, shown: Sequence[tuple[Frame, tuple[float, ...]]]) -> Depth | None:
-        """Return where rays end in the frame that is being drawn.
+    def read(self, frames: Sequence[Frame]) -> Image | None:
+        """Return where rays end in the frame that is being drawn, of these VDIs.
 
         Nothing is read where nothing opaque is before the VDIs, outside the VDIs' rectangles on
         the screen, outside what can hide them where that is known, and if all that it depends on
         is as it was.
-
-        Parameters
-        ----------
-        renderer : vtkRenderer
-            It has drawn what is opaque.
-        shown : sequence of (Frame, bounds)
-            The VDIs: the view of each, and its bounds in the model frame.
 
         Returns
         -------
@@ -87,28 +62,27 @@ class OpaqueDepths:
             View depth, float32 (H, W), top row first, world units; inf where nothing is. The same
             object as long as it has not changed. ``None`` if no ray ends early.
         """
-        frame = shown[0][0]
-        farthest = max(own.depths_of(bounds)[1] for own, bounds in shown)
+        frame = frames[0]
+        renderer = frame.renderer  # it has drawn what is opaque
+        farthest = max(own.depths_of(own.bounds)[1] for own in frames)
         opaque = _opaque_before(renderer, frame.to_view, farthest)
         if opaque is None:
             return None
         if renderer.GetPass() is not None or not all(_is_plain(prop) for prop in opaque):
             opaque = []
-        area = _area(frame, shown, opaque)
+        area = _area(frames, opaque)
         if area is None:
             return None
         view = (frame.size, frame.origin, frame.to_view.tobytes(), frame.projection.tobytes(), area)
         state = _state(renderer, view, opaque)
         place = (renderer.GetAddressAsString(""), *view[:3])  # two eyes have two views
-        known = self._known.pop(place, None)
+        known = self._known.get(place)
         if known is None or state is None or known.state != state:
-            z = frame.opaque_z(renderer, area)
+            z = frame.opaque_z(area)
             if known is None or known.view != view or not np.array_equal(known.z, z):
                 known = _Reading(view, state, z, frame.depth_image(z, area))
             known.state = state
-        self._known[place] = known
-        while len(self._known) > _KEPT_READINGS:
-            del self._known[next(iter(self._known))]
+        self._known.keep(place, known)
         return known.depth
 
 
@@ -134,14 +108,13 @@ def _opaque_before(renderer: Any, to_view: Matrix, farthest: float) -> list[Any]
     return found or None
 
 
-def _area(
-    frame: Frame, shown: Sequence[tuple[Frame, tuple[float, ...]]], plain: Sequence[Any]
-) -> Area | None:
+def _area(frames: Sequence[Frame], plain: Sequence[Any]) -> Area | None:
     """Return the pixels in which something opaque may hide a VDI; ``None`` if there are none.
 
     ``plain`` are the props that may, if all of them are plain; otherwise it is empty.
     """
-    area = _around([rectangle(own, bounds) for own, bounds in shown])
+    frame = frames[0]
+    area = _around([own.rectangle(own.bounds) for own in frames])
     if area is not None and plain:
         world = replace(frame, camera=frame.camera.replace(model_transform=frame.to_view))
         hiding = _around([_rectangle_of(prop, world) for prop in plain])
@@ -158,13 +131,12 @@ def _area(
     return left, bottom, right, top
 
 
-def _rectangle_of(prop: Any, world: Frame) -> NDArray[np.float64] | None:
+def _rectangle_of(prop: Any, world: Frame) -> Matrix | None:
     look = prop.GetProperty()
-    width = max(look.GetPointSize(), look.GetLineWidth())
-    return rectangle(world, prop.GetBounds(), margin=width)
+    return world.rectangle(prop.GetBounds(), max(look.GetPointSize(), look.GetLineWidth()))
 
 
-def _around(rectangles: Sequence[NDArray[np.float64] | None]) -> NDArray[np.float64] | None:
+def _around(rectangles: Sequence[Matrix | None]) -> Matrix | None:
     """Return the rectangle around others; ``None`` if there are none."""
     there = [r for r in rectangles if r is not None]
     if not there:

@@ -1,10 +1,11 @@
-"""One frame of a VTK renderer: its camera, its clipping planes and its opaque depth."""
+"""One VDI in the frame that VTK is drawing: one record from the renderer's state to the raycast."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +14,24 @@ from vtkmodules.vtkCommonCore import VTK_FLOAT, vtkFloatArray
 from vtkmodules.vtkRenderingOpenGL2 import vtkPixelBufferObject, vtkTextureObject
 
 from pyvista_vdi.device import aligned_empty
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
+from pyvista_vdi.model.render_options import RenderOptions
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.vtk_pipeline.filters.view import View, as_array
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import WindowClock
+
+T = TypeVar("T")
 
 Matrix = NDArray[np.float64]
+Image = NDArray[np.float32]
 
 #: Left, bottom, right and top in pixels of the viewport; right and top are outside.
 Area = tuple[int, int, int, int]
+
+#: Images, pictures and readings kept: two eyes, and two more for other renderers or a picking pass.
+KEPT = 4
 
 #: Pixels whose depth is converted at a time.
 _BLOCK = 16384
@@ -31,9 +43,9 @@ _GL_DRAW_FRAMEBUFFER_BINDING = 0x8CA6
 _PLANE_SLACK = 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
-    """What a frame being drawn asks of a VDI.
+    """What a renderer's frame asks of a VDI. It lives no longer than the frame: it holds VTK's.
 
     Attributes
     ----------
@@ -50,6 +62,16 @@ class Frame:
     projection : numpy.ndarray
         Rows 2 and 3 of the projection matrix: view space to normalised depth and its
         denominator, (2, 4).
+    renderer, actor, mapper
+        Whose frame it is, and of which VDI.
+    full_size : (int, int)
+        Width and height of the viewport in pixels; the image of a preview is smaller.
+    vdi : VDI or None
+        What is seen: see :meth:`showing`.
+    options : RenderOptions
+        How it looks; clipping planes are in the camera's world.
+    depth : numpy.ndarray or None
+        View depth at which rays end, float32 (H, W), top row first.
     """
 
     size: tuple[int, int]
@@ -57,9 +79,16 @@ class Frame:
     camera: Camera
     to_view: Matrix
     projection: Matrix
+    renderer: Any = None
+    actor: Any = None
+    mapper: Any = None
+    full_size: tuple[int, int] = (0, 0)
+    vdi: VDI | None = None
+    options: RenderOptions = field(default_factory=RenderOptions)
+    depth: Image | None = None
 
     @classmethod
-    def current(cls, renderer: Any, model_transform: Matrix) -> Frame:
+    def current(cls, renderer: Any, actor: Any, mapper: Any) -> Frame:
         """Read the frame that ``renderer`` is drawing."""
         (x, y), (width, height) = viewport(renderer)
         vtk_camera = renderer.GetActiveCamera()
@@ -73,51 +102,63 @@ class Frame:
             eye=np.asarray(vtk_camera.GetPosition()),
             forward=np.asarray(vtk_camera.GetDirectionOfProjection()),
         )
-        camera = Camera(
-            (0, 0, 0), (0, 0, -1), (0, 1, 0), model_transform=to_view @ model_transform, **lens
-        )
-        return cls((width, height), (x, y), camera, to_view, projection[2:])
+        model_transform = to_view @ as_array(actor.GetMatrix())
+        camera = Camera((0, 0, 0), (0, 0, -1), (0, 1, 0), model_transform=model_transform, **lens)
+        size = (width, height)
+        return cls(size, (x, y), camera, to_view, projection[2:], renderer, actor, mapper, size)
+
+    # -- whose ---------------------------------------------------------------------------------
 
     @property
-    def depth_range(self) -> tuple[float, float]:
-        """View depth of the near and of the far plane, world units."""
-        near, far = self.view_depth(np.array([0.0, 1.0]), background=False)
-        return float(near), float(far)
+    def painter(self) -> Any:
+        """What draws the VDI."""
+        return self.mapper.painter
 
-    def view_depth(self, z: NDArray[Any], *, background: bool = True) -> NDArray[np.float32]:
-        """Convert window depth, 0 to 1, to view depth in world units.
+    @cached_property
+    def clock(self) -> WindowClock:
+        """The window's."""
+        return WindowClock.of(self.renderer.GetRenderWindow())
 
-        Parameters
-        ----------
-        z : numpy.ndarray
-            The z-buffer: 0 at the near plane, 1 at the far plane.
-        background : bool
-            Return infinity where z is 1 (nothing was drawn there).
+    @property
+    def model_transform(self) -> Matrix:
+        """The actor's matrix."""
+        return as_array(self.actor.GetMatrix())
 
-        Notes
-        -----
-        With rows p and q of the projection matrix, normalised depth is
-        n = (p_2 Z' + p_3) / (q_2 Z' + q_3) at view coordinate Z' = -Z, in perspective as well as
-        in parallel projection; solved for Z' in float64.
-        """
-        n = 2.0 * z.astype(np.float64) - 1.0
-        (p2, p3), (q2, q3) = self.projection[:, 2:]
-        depth = -(p3 - n * q3) / (n * q2 - p2)
-        return np.where(z >= 1.0, np.inf, depth) if background else depth
+    @cached_property
+    def view(self) -> View:
+        """The renderer's view, between the two eyes of a stereo pair if there are."""
+        try:
+            return View.of(self.renderer, self.model_transform)
+        except UnsupportedError:  # a shear, an off-axis projection: drawn all the same
+            return View(self.camera, self.size)
 
-    def window_depth(self, depth: NDArray[Any]) -> NDArray[np.float32]:
-        """Convert view depth to window depth: what :meth:`view_depth` undoes.
+    # -- what is seen --------------------------------------------------------------------------
 
-        Parameters
-        ----------
-        depth : numpy.ndarray
-            World units; infinite where there is nothing, and so is the result.
-        """
-        (p2, p3), (q2, q3) = self.projection[:, 2:]
-        there = np.isfinite(depth)
-        z = -np.where(there, depth, 1.0).astype(np.float64)
-        n = (z * p2 + p3) / (z * q2 + q3)
-        return np.where(there, (n + 1.0) / 2.0, np.inf).astype(np.float32)
+    def showing(self, vdi: VDI) -> Frame:
+        """Return the frame of this VDI, with all that its mapper says of its looks."""
+        options = RenderOptions(
+            clipping_planes=self._clipping_planes(vdi.bounds),
+            cropping=self.mapper,
+            opacity_multiplier=self.painter.opacity_multiplier,
+            transmittance_cutoff=self.painter.transmittance_cutoff,
+        )
+        return replace(self, vdi=vdi, options=options)
+
+    @property
+    def key(self) -> Any:
+        """What its image is known by, but for the depth; the quality is in it as the two sizes."""
+        return (self.camera, self.size, self.full_size, self.options)
+
+    @property
+    def preview(self) -> bool:
+        """Whether the image is to have fewer pixels than the viewport."""
+        return self.size != self.full_size
+
+    @property
+    def bounds(self) -> tuple[float, ...]:
+        """The VDI's, model frame."""
+        assert self.vdi is not None
+        return self.vdi.bounds
 
     def coarser(self, size: tuple[int, int]) -> Frame:
         """Return the same view with fewer pixels, which fill the viewport just as exactly.
@@ -126,79 +167,106 @@ class Frame:
         filtered texture puts it, so nothing is shifted. Where rounding has changed the aspect, the
         view's x is scaled by as much: the viewport's edges stay, and view depth does.
         """
+        if size == self.size:
+            return self
         (width, height), (wide, high) = self.size, size
         stretch = np.diag([(wide / high) / (width / height), 1.0, 1.0, 1.0])
         camera = self.camera.replace(model_transform=stretch @ self.camera.model_transform)
-        return replace(self, size=size, camera=camera, to_view=stretch @ self.to_view)
+        depth = None if self.depth is None else sampled(self.depth, size)
+        frame = replace(self, size=size, camera=camera, to_view=stretch @ self.to_view, depth=depth)
+        if self.vdi is None:
+            return frame
+        planes = frame._clipping_planes(self.vdi.bounds)
+        return replace(frame, options=self.options.replace(clipping_planes=planes))
 
-    def clipping_planes(self, planes: Any, bounds: tuple[float, ...]) -> Matrix | None:
-        """Return all planes that cut the VDI, (k, 6), in the camera's world; ``None`` if none do.
+    def _clipping_planes(self, bounds: tuple[float, ...]) -> list[list[float]]:
+        """Return all planes that cut a VDI, (k, 6), in the camera's world.
 
-        Parameters
-        ----------
-        planes : vtkPlaneCollection or None
-            The mapper's, world coordinates.
-        bounds : tuple of float
-            The VDI's, model frame: the near and far planes count where they cut them, because
-            VTK's own volumes end there.
+        The mapper's, and the near and far planes where they cut these bounds, because VTK's own
+        volumes end there.
         """
-        rows = []
+        rows: list[list[float]] = []
+        planes = self.mapper.GetClippingPlanes()
         inverse_transpose = np.linalg.inv(self.to_view[:3, :3]).T
         for i in range(planes.GetNumberOfItems() if planes is not None else 0):
             plane = planes.GetItem(i)
             origin = self.to_view[:3, :3] @ plane.GetOrigin() + self.to_view[:3, 3]
             rows.append([*origin, *(inverse_transpose @ plane.GetNormal())])
         nearest, farthest = self.depths_of(bounds)
-        near, far = self.depth_range
+        near, far = (float(d) for d in self.view_depth(np.array([0.0, 1.0]), background=False))
         slack = _PLANE_SLACK * max(abs(nearest), abs(farthest))
         if near > nearest + slack:
             rows.append([0, 0, -near, 0, 0, -1])
         if far < farthest - slack:
             rows.append([0, 0, -far, 0, 0, 1])
-        return np.array(rows, dtype=np.float64) if rows else None
+        return rows
 
-    def in_world(self, planes: Matrix | None) -> Matrix | None:
-        """Return planes of :meth:`clipping_planes` in world coordinates, (k, 6)."""
-        if planes is None:
-            return None
+    def world_options(self) -> RenderOptions:
+        """Return the options with the planes in world coordinates: for the estimate of an error."""
+        if not self.options.clipping_planes:
+            return self.options
+        planes = np.array(self.options.clipping_planes)
         origins = np.column_stack([planes[:, :3], np.ones(len(planes))])
         origins = origins @ np.linalg.inv(self.to_view).T
-        return np.hstack([origins[:, :3], planes[:, 3:] @ self.to_view[:3, :3]])
+        world = np.hstack([origins[:, :3], planes[:, 3:] @ self.to_view[:3, :3]])
+        return self.options.replace(clipping_planes=world)
 
     def depths_of(self, bounds: tuple[float, ...]) -> tuple[float, float]:
         """Return the least and the largest view depth of a box in the model frame."""
         return depths_of(self.camera.model_transform, bounds)
 
-    def opaque_z(self, renderer: Any, area: Area) -> NDArray[np.float32]:
-        """Read the window depth of what has been drawn in an area.
+    def rectangle(self, bounds: tuple[float, ...], margin: float = 0.0) -> Matrix | None:
+        """Return what bounds cover of the viewport, pixels, float64 rows (low, high) by (x, y).
 
-        Parameters
-        ----------
-        renderer : vtkRenderer
-            It is drawing the frame.
-        area : tuple of int
-            Left, bottom, right and top in pixels of the viewport; right and top are outside.
-
-        Returns
-        -------
-        numpy.ndarray
-            float32 (h, w), bottom row first, 1 where nothing is.
+        From the lower left corner, and ``margin`` pixels wider on each side. All of it if they
+        reach behind the eye; ``None`` if none of it.
         """
-        window = renderer.GetRenderWindow()
+        camera, size = self.camera, np.asarray(self.size, dtype=np.float64)
+        corners = np.column_stack([bounds_corners(bounds), np.ones(8)])
+        u, v, _, w = camera.viewport_matrix(self.size) @ (camera.model_to_view @ corners.T)
+        if not camera.parallel_projection and w.min() <= 0:
+            return None if w.max() <= 0 else np.stack([0 * size, size])
+        places = (np.stack([u, v]) / w + 1) / 2 * size[:, None]
+        low, high = places.min(axis=1) - margin, places.max(axis=1) + margin
+        if (high < 0).any() or (low > size).any():
+            return None
+        return np.stack([low, high])
+
+    # -- depth ---------------------------------------------------------------------------------
+
+    def view_depth(self, z: NDArray[Any], *, background: bool = True) -> NDArray[Any]:
+        """Convert window depth, 0 (near) to 1 (far), to view depth in world units.
+
+        Where z is 1 nothing was drawn: with ``background`` its depth is infinite. With rows p and
+        q of the projection matrix, normalised depth is n = (p_2 Z' + p_3) / (q_2 Z' + q_3) at view
+        coordinate Z' = -Z, in perspective as well as in parallel projection; solved for Z' in
+        float64.
+        """
+        n = 2.0 * z.astype(np.float64) - 1.0
+        (p2, p3), (q2, q3) = self.projection[:, 2:]
+        depth = -(p3 - n * q3) / (n * q2 - p2)
+        return np.where(z >= 1.0, np.inf, depth) if background else depth
+
+    def window_depth(self, depth: NDArray[Any]) -> Image:
+        """Convert view depth to window depth, as :meth:`view_depth` back; infinity stays."""
+        (p2, p3), (q2, q3) = self.projection[:, 2:]
+        there = np.isfinite(depth)
+        z = -np.where(there, depth, 1.0).astype(np.float64)
+        n = (z * p2 + p3) / (z * q2 + q3)
+        return np.where(there, (n + 1.0) / 2.0, np.inf).astype(np.float32)
+
+    def opaque_z(self, area: Area) -> Image:
+        """Read the window depth of what has been drawn in an area: (h, w), bottom row first."""
+        window = self.renderer.GetRenderWindow()
         bound = [0]
         window.GetState().vtkglGetIntegerv(_GL_DRAW_FRAMEBUFFER_BINDING, bound)
         left, bottom, right, top = area
-        corner, size = (
-            (self.origin[0] + left, self.origin[1] + bottom),
-            (right - left, top - bottom),
-        )
-        if bound[0] == window.GetRenderFramebuffer().GetFBOIndex():
-            z = _window_depth(window, corner, size)
-        else:
-            z = _framebuffer_depth(window, corner, size)
-        return z.reshape(size[::-1])
+        corner = (self.origin[0] + left, self.origin[1] + bottom)
+        size = (right - left, top - bottom)
+        own = bound[0] == window.GetRenderFramebuffer().GetFBOIndex()
+        return (_window_depth if own else _framebuffer_depth)(window, corner, size)
 
-    def depth_image(self, z: NDArray[np.float32], area: Area) -> NDArray[np.float32] | None:
+    def depth_image(self, z: Image, area: Area) -> Image | None:
         """Return the view depth of what :meth:`opaque_z` has read, float32 (H, W), top row first.
 
         World units; infinite where nothing is. ``None`` if nothing is anywhere.
@@ -215,18 +283,70 @@ class Frame:
         return depth
 
 
-def _window_depth(
-    window: Any, corner: tuple[int, int], size: tuple[int, int]
-) -> NDArray[np.float32]:
+@dataclass(frozen=True)
+class Drawn:
+    """An image that was raycast, kept without what VTK has.
+
+    Attributes
+    ----------
+    image : numpy.ndarray
+        Premultiplied RGBA, float32 (H, W, 4), top row first.
+    full_size : (int, int) or None
+        Width and height of the viewport in pixels; ``None`` for the empty image before the first.
+    depth : numpy.ndarray or None
+        Where its rays ended.
+    number : int or None
+        By which an upload is known.
+    joint : bool
+        Whether it is a part of a picture that other actors show the rest of.
+    pixels : numpy.ndarray or None
+        The memory that the image begins, 1D: another image may be raycast into it when this one is
+        kept no longer.
+    """
+
+    image: Image
+    full_size: tuple[int, int] | None = None
+    depth: Image | None = None
+    number: int | None = None
+    joint: bool = False
+    pixels: Image | None = None
+
+    @property
+    def samples(self) -> int:
+        """Rays that were cast."""
+        return 0 if self.full_size is None else self.image.size // 4
+
+    @property
+    def preview(self) -> bool:
+        """Whether it has fewer pixels than the viewport."""
+        return self.full_size not in (None, self.image.shape[1::-1])
+
+    @property
+    def smooth(self) -> bool:
+        """Whether its pixels are interpolated: not where the neighbours are another actor's."""
+        return self.preview and not self.joint
+
+
+class Recent(dict[Any, T]):
+    """What was kept last, by what it is known by."""
+
+    def keep(self, key: Any, value: T) -> T | None:
+        """Keep something as the newest, and return what is kept no longer in its place."""
+        gone = self.pop(key, None)
+        self[key] = value
+        if len(self) > KEPT:
+            gone = self.pop(next(iter(self)))
+        return gone
+
+
+def _window_depth(window: Any, corner: tuple[int, int], size: tuple[int, int]) -> Image:
     (x, y), (width, height) = corner, size
     values = vtkFloatArray()
     window.GetZbufferData(x, y, x + width - 1, y + height - 1, values)
-    return vtk_to_numpy(values)  # type: ignore[no-any-return]
+    return vtk_to_numpy(values).reshape(height, width)
 
 
-def _framebuffer_depth(
-    window: Any, corner: tuple[int, int], size: tuple[int, int]
-) -> NDArray[np.float32]:
+def _framebuffer_depth(window: Any, corner: tuple[int, int], size: tuple[int, int]) -> Image:
     """Copy the depth of a render pass's own framebuffer (SSAA, EDL, blur ...)."""
     width, height = size
     texture = vtkTextureObject()
@@ -244,7 +364,7 @@ def _framebuffer_depth(
     pixels.ReleaseMemory()
     pixels.UnBind()  # it binds itself to be released, and would catch VTK's next glReadPixels
     texture.ReleaseGraphicsResources(window)
-    return z
+    return z.reshape(height, width)
 
 
 def viewport(renderer: Any) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -255,7 +375,7 @@ def viewport(renderer: Any) -> tuple[tuple[int, int], tuple[int, int]]:
     return (x, y), (width, height)
 
 
-def sampled(depth: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+def sampled(depth: Image, size: tuple[int, int]) -> Image:
     """Return the depth nearest to the centre of each pixel of a coarser image, float32 (H, W).
 
     Depths must not be averaged: between a mesh and what is behind it nothing is.
@@ -265,6 +385,20 @@ def sampled(depth: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.flo
         for n, full in zip(size[::-1], depth.shape, strict=True)
     )
     return np.ascontiguousarray(depth[np.ix_(rows, columns)])
+
+
+def same_depth(a: Image | None, b: Image | None) -> bool:
+    """Whether rays end at the same depths; ``None`` where none end early."""
+    if a is b or a is None or b is None:
+        return a is b
+    return np.array_equal(a, b)
+
+
+def depths_of(to_view: Matrix, bounds: tuple[float, ...]) -> tuple[float, float]:
+    """Return the least and the largest view depth of a box that a matrix brings to view space."""
+    corners = bounds_corners(bounds)
+    depth = -(corners @ to_view[2, :3] + to_view[2, 3])
+    return float(depth.min()), float(depth.max())
 
 
 def view_of(
@@ -317,35 +451,3 @@ def view_of(
         "view_angle": math.degrees(2 * math.atan(half)),
         "window_center": center,
     }
-
-
-def as_array(matrix: Any) -> Matrix:
-    """Return a ``vtkMatrix4x4`` as float64 (4, 4)."""
-    return np.array(matrix.GetData(), dtype=np.float64).reshape(4, 4)
-
-
-def rectangle(
-    frame: Frame, bounds: tuple[float, ...], *, margin: float = 0.0
-) -> NDArray[np.float64] | None:
-    """Return what bounds cover of the viewport, pixels, float64 rows (low, high) by (x, y).
-
-    From the lower left corner, and ``margin`` pixels wider on each side. All of it if they reach
-    behind the eye; ``None`` if none of it.
-    """
-    camera, size = frame.camera, np.asarray(frame.size, dtype=np.float64)
-    corners = np.column_stack([bounds_corners(bounds), np.ones(8)])
-    u, v, _, w = camera.viewport_matrix(frame.size) @ (camera.model_to_view @ corners.T)
-    if not camera.parallel_projection and w.min() <= 0:
-        return None if w.max() <= 0 else np.stack([0 * size, size])
-    places = (np.stack([u, v]) / w + 1) / 2 * size[:, None]
-    low, high = places.min(axis=1) - margin, places.max(axis=1) + margin
-    if (high < 0).any() or (low > size).any():
-        return None
-    return np.stack([low, high])
-
-
-def depths_of(to_view: Matrix, bounds: tuple[float, ...]) -> tuple[float, float]:
-    """Return the least and the largest view depth of a box that a matrix brings to view space."""
-    corners = bounds_corners(bounds)
-    depth = -(corners @ to_view[2, :3] + to_view[2, 3])
-    return float(depth.min()), float(depth.max())

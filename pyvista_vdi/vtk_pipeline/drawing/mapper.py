@@ -20,8 +20,8 @@ from pyvista_vdi.raycasting.raycast import check_transmittance_cutoff
 from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
-from pyvista_vdi.vtk_pipeline.interaction.motion import checked_rate
 from pyvista_vdi.vtk_pipeline.interaction.regeneration import Policy, checked_bound, checked_policy
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import checked_rate
 
 #: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.
 COARSEST = 4.0

@@ -9,58 +9,19 @@ wins, and so does one behind a part that is transparent.
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from vtkmodules.vtkCommonCore import vtkInformation
 from vtkmodules.vtkCommonDataModel import vtkDataObject
 from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLActor
 
-from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, Pick, pick_vdi
 from pyvista_vdi.raycasting.raycast import render_first_hits
-from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
+from pyvista_vdi.vtk_pipeline.drawing.frame import Area, Frame, Image
 from pyvista_vdi.vtk_pipeline.drawing.shader import show_first_hits, show_image
 from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture
-
-Hits = NDArray[np.float32]
-
-
-@dataclass(frozen=True)
-class Seen:
-    """What a pass shows of a VDI.
-
-    Attributes
-    ----------
-    vdi : VDI
-        What is drawn.
-    frame : Frame
-        The viewport's view.
-    planes : numpy.ndarray or None
-        Clipping planes in the frame's world, (k, 6).
-    looks : dict
-        Its cropping and opacity multiplier: arguments of :func:`pyvista_vdi.pick`.
-    """
-
-    vdi: VDI
-    frame: Frame
-    planes: NDArray[np.float64] | None
-    looks: dict[str, Any]
-
-    def area(self, selected: tuple[int, ...]) -> tuple[int, int, int, int]:
-        """Return what of (x0, y0, x1, y1), both ends included, lies in the viewport.
-
-        Returns
-        -------
-        tuple of int
-            Lower left corner, width and height in pixels of the framebuffer; the latter may be 0.
-        """
-        (x, y), (width, height) = self.frame.origin, self.frame.size
-        left, bottom = max(x, selected[0]), max(y, selected[1])
-        right, top = min(x + width, selected[2] + 1), min(y + height, selected[3] + 1)
-        return left, bottom, max(0, right - left), max(0, top - bottom)
 
 
 class Selection:
@@ -77,15 +38,11 @@ class Selection:
     def __init__(self) -> None:
         self.opacity = DEFAULT_OPACITY
         self.accumulated = True
-        self._texture = ImageTexture()
-        self._drawn: tuple[Any, Hits] | None = None
+        self.texture = ImageTexture()
+        self._drawn: tuple[Any, Image] | None = None
         self._uploads = 0
         self._picking = False
-        self._seen: Seen | None = None
-
-    def take_settings(self, other: Selection) -> None:
-        """Take over what another counts as a hit."""
-        self.opacity, self.accumulated = other.opacity, other.accumulated
+        self._seen: Frame | None = None
 
     def enter(self, actor: Any, selector: Any) -> None:
         """Have an actor draw hits, with their depth, in the pass that begins."""
@@ -103,62 +60,39 @@ class Selection:
         if keys is not None:
             keys.Remove(vtkOpenGLActor.GLDepthMaskOverride())
 
-    def show(self, window: Any, selector: Any, seen: Seen | None, device: Any) -> None:
-        """Raycast and bind the hits in a selector's area; none if nothing is seen.
+    def show(self, renderer: Any, seen: Frame | None, device: Any) -> None:
+        """Raycast and bind the hits in the selector's area; none if nothing is seen.
 
         Raises
         ------
         DeviceError
             If OpenCL or OpenGL fails; nothing can be picked then.
         """
+        window, selector = renderer.GetRenderWindow(), renderer.GetSelector()
         if self._picking:
             self._seen = seen
         # VTK draws volumes' numbers only where cells are selected: the points of what is around
         cells = selector.GetFieldAssociation() == vtkDataObject.FIELD_ASSOCIATION_CELLS
-        if seen is None or not cells:
-            self._bind(window, _packed((0, 0, 0, 0), np.empty((0, 0), np.float32)))
+        if seen is None or seen.vdi is None or not cells:
+            nothing = _packed((0, 0, 0, 0), np.empty((0, 0), np.float32))
+            self.texture.show(window, nothing, None, smooth=False)
             return
-        area = seen.area(selector.GetArea())
-        planes = None if seen.planes is None else seen.planes.tobytes()
-        key = (
-            weakref.ref(seen.vdi),
-            seen.frame.camera,
-            area,
-            planes,
-            tuple(seen.looks.values()),
-            self.opacity,
-            self.accumulated,
-        )
+        area = _area(seen, selector.GetArea())
+        key = (weakref.ref(seen.vdi), seen.key, area, self.opacity, self.accumulated)
         if self._drawn is None or self._drawn[0] != key:
             self._drawn = (key, _packed(area, self._depths(seen, area, device)))
             self._uploads += 1
-        self._bind(window, self._drawn[1], self._uploads)
-
-    def let_go(self) -> None:
-        """Let go of the texture unit."""
-        self._texture.let_go()
+        self.texture.show(window, self._drawn[1], self._uploads, smooth=False)
 
     def release(self) -> None:
         """Free the texture."""
-        self._texture.release()
+        self.texture.release()
         self._drawn = None
 
     def pick(self, actor: Any, renderer: Any, x: float, y: float) -> Pick | None:
-        """Return what of an actor's VDI a renderer shows at a place of the window.
+        """Return what of an actor's VDI a renderer shows at a place of the window, in pixels.
 
-        Parameters
-        ----------
-        actor : vtkVolume
-            The VDI's actor.
-        renderer : vtkRenderer
-            It shows the actor.
-        x, y : float
-            Display coordinates, pixels.
-
-        Returns
-        -------
-        Pick or None
-            ``None`` where nothing of it is hit, or something else is in front.
+        ``None`` where nothing of it is hit, or something else is in front.
         """
         # VTK's hardware selection sees nothing through render passes (SSAA, eye-dome lighting ...)
         render_pass = renderer.GetPass()
@@ -173,50 +107,61 @@ class Selection:
             self._picking, self._seen = False, None
         if path is None or path.GetLastNode().GetViewProp() is not actor or seen is None:
             return None
-        left, bottom = seen.frame.origin
+        left, bottom = seen.origin
+        assert seen.vdi is not None
         hit = pick_vdi(
             seen.vdi,
-            seen.frame.camera,
+            seen.camera,
             (int(x) - left, int(y) - bottom),
-            seen.frame.size,
+            seen.size,
             opacity_threshold=self.opacity,
             accumulated=self.accumulated,
-            clipping_planes=seen.planes,
-            **seen.looks,
+            clipping_planes=seen.options.clipping_planes or None,
+            cropping=seen.options.cropping,
+            opacity_multiplier=seen.options.opacity_multiplier,
         )
         if hit is None:  # at the threshold, by rounding
             return None
         # From the frame's world, whose origin is the eye, to the scene's
-        px, py, pz, _ = np.linalg.solve(seen.frame.to_view, [*hit.position, 1.0]).tolist()
+        px, py, pz, _ = np.linalg.solve(seen.to_view, [*hit.position, 1.0]).tolist()
         return replace(hit, position=(px, py, pz))
 
-    def _depths(self, seen: Seen, area: tuple[int, int, int, int], device: Any) -> Hits:
+    def _depths(self, seen: Frame, area: Area, device: Any) -> Image:
         """Return window depth of the hits in an area, (h, w), bottom row first; inf for none."""
         left, bottom, width, height = area
         if width == 0 or height == 0:
             return np.empty((0, 0), np.float32)
-        frame = seen.frame
         corner = (
-            left - frame.origin[0],
-            frame.origin[1] + frame.size[1] - (bottom + height),  # from the top
+            left - seen.origin[0],
+            seen.origin[1] + seen.size[1] - (bottom + height),  # from the top
         )
+        assert seen.vdi is not None
         depth = render_first_hits(
             seen.vdi,
-            frame.camera.tile(frame.size, corner, (width, height)),
+            seen.camera.tile(seen.size, corner, (width, height)),
             (width, height),
             opacity_threshold=self.opacity,
             accumulated=self.accumulated,
-            clipping_planes=seen.planes,
+            clipping_planes=seen.options.clipping_planes or None,
+            cropping=seen.options.cropping,
+            opacity_multiplier=seen.options.opacity_multiplier,
             device=device,
-            **seen.looks,
         )
-        return frame.window_depth(depth[::-1])
-
-    def _bind(self, window: Any, image: Hits, number: int | None = None) -> None:
-        self._texture.show(window, image, number, smooth=False)
+        return seen.window_depth(depth[::-1])
 
 
-def _packed(area: tuple[int, int, int, int], depth: Hits) -> Hits:
+def _area(seen: Frame, selected: tuple[int, ...]) -> Area:
+    """Return what of (x0, y0, x1, y1), both ends included, lies in the viewport.
+
+    Lower left corner, width and height in pixels of the framebuffer; the latter may be 0.
+    """
+    (x, y), (width, height) = seen.origin, seen.size
+    left, bottom = max(x, selected[0]), max(y, selected[1])
+    right, top = min(x + width, selected[2] + 1), min(y + height, selected[3] + 1)
+    return left, bottom, max(0, right - left), max(0, top - bottom)
+
+
+def _packed(area: Area, depth: Image) -> Image:
     """Return the texture that the shader reads: see ``shader.py``."""
     height, width = depth.shape
     image = np.zeros((height + 1, max(1, width), 4), dtype=np.float32)

@@ -13,6 +13,11 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
 
 
+def as_array(matrix: Any) -> NDArray[np.float64]:
+    """Return a ``vtkMatrix4x4`` as float64 (4, 4)."""
+    return np.array(matrix.GetData(), dtype=np.float64).reshape(4, 4)
+
+
 @dataclass(frozen=True)
 class View:
     """A camera, with the actor's matrix in it, and the viewport's size in pixels."""

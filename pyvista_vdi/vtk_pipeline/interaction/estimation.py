@@ -6,11 +6,11 @@ import atexit
 import threading
 import traceback
 import weakref
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import Cancelled
+from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import ViewError, ViewErrorEstimator
 from pyvista_vdi.vtk_pipeline.filters.source import Request
@@ -42,21 +42,17 @@ class Estimation:
         return self._job is not None
 
     def start(
-        self, vdi: VDI, request: Request, view: View, shown: dict[str, Any] | None = None
+        self, vdi: VDI, request: Request, view: View, options: RenderOptions | None = None
     ) -> None:
         """Begin another, in place of the one before.
 
-        Parameters
-        ----------
-        vdi, request, view
-            What is judged, what it was made of, and where it is seen from.
-        shown : dict, optional
-            Clipping planes, cropping and opacity multiplier of the picture: keyword arguments of
-            :meth:`ViewErrorEstimator.estimate`.
+        Judged is a VDI in a view, drawn with these options (clipping planes in world coordinates),
+        against what it was made of.
         """
         self.cancel()
-        self._job = _Job(vdi, request, view, shown or {}, self._estimator)
-        self._job.start()
+        self._job = _Job(vdi, request, view, options or RenderOptions(), self._estimator)
+        _jobs.add(self._job)
+        self._job.thread.start()
 
     def take(self) -> Estimate | None:
         """Return the estimate that was finished, once.
@@ -81,7 +77,7 @@ class Estimation:
         if job is not None:
             job.cancelled.set()
             if wait:
-                job.join()
+                job.thread.join()
 
     def close(self) -> None:
         """Cancel, wait for the thread, and let go of the volume."""
@@ -89,28 +85,24 @@ class Estimation:
         self._estimator = None
 
 
-class _Job(threading.Thread):
-    def __init__(
-        self,
-        vdi: VDI,
-        request: Request,
-        view: View,
-        shown: dict[str, Any],
-        estimator: tuple[Request, ViewErrorEstimator] | None,
-    ) -> None:
-        super().__init__(name="pyvista-vdi estimate", daemon=True)
-        self._vdi = vdi
-        self._request = request
-        self._view = view
-        self._shown = shown
-        self.estimator = estimator
-        self.cancelled = threading.Event()
-        self.done = threading.Event()
-        self.estimate: Estimate | None = None
-        self.failure: BaseException | None = None
-        _jobs.add(self)
+@dataclass(eq=False)
+class _Job:
+    """One estimate, and the thread that makes it."""
 
-    def run(self) -> None:
+    vdi: VDI
+    request: Request
+    view: View
+    options: RenderOptions
+    estimator: tuple[Request, ViewErrorEstimator] | None
+    cancelled: threading.Event = field(default_factory=threading.Event)
+    done: threading.Event = field(default_factory=threading.Event)
+    estimate: Estimate | None = None
+    failure: BaseException | None = None
+
+    def __post_init__(self) -> None:
+        self.thread = threading.Thread(target=self._run, name="pyvista-vdi estimate", daemon=True)
+
+    def _run(self) -> None:
         try:
             self._work()
         except Cancelled:
@@ -122,7 +114,7 @@ class _Job(threading.Thread):
             self.done.set()
 
     def _work(self) -> None:
-        request = self._request
+        request, options = self.request, self.options
         runtime = get_runtime(request.settings["device"])
         with runtime.background(self.cancelled.is_set):
             if self.estimator is None or self.estimator[0].content != request.content:
@@ -138,9 +130,14 @@ class _Job(threading.Thread):
                 )
                 self.estimator = (request, estimator)
             error = self.estimator[1].estimate(
-                self._vdi, self._view.camera, self._view.size, **self._shown
+                self.vdi,
+                self.view.camera,
+                self.view.size,
+                clipping_planes=options.clipping_planes or None,
+                cropping=options.cropping,
+                opacity_multiplier=options.opacity_multiplier,
             )
-        self.estimate = Estimate(self._vdi, self._view, error)
+        self.estimate = Estimate(self.vdi, self.view, error)
 
 
 _jobs: weakref.WeakSet[_Job] = weakref.WeakSet()
@@ -153,4 +150,4 @@ def _end_all() -> None:
     for job in jobs:
         job.cancelled.set()
     for job in jobs:
-        job.join()
+        job.thread.join()

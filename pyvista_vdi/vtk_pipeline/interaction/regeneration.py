@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any, Literal, TypeAlias
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import BackgroundGeneration
 from pyvista_vdi.vtk_pipeline.filters.source import Request, VDISource
@@ -99,7 +100,7 @@ class Regeneration:
         self._stamp: Any = None
         self._failed_at: Any = None
         self._view: View | None = None
-        self._shown: dict[str, Any] = {}
+        self._options = RenderOptions()
         self._moved_at = 0.0
         self._estimated_at = -math.inf
         self._moving = False
@@ -131,7 +132,7 @@ class Regeneration:
         *,
         moving: bool,
         ask: Callable[[], VDIStatus],
-        shown: dict[str, Any],
+        options: RenderOptions,
     ) -> None:
         """Look at the frame's view and at what the VDI was made of, and begin what is needed.
 
@@ -147,9 +148,9 @@ class Regeneration:
             Whether the window is interactive.
         ask : callable
             Gives the status for a policy that is a callable.
-        shown : dict
-            What the picture leaves out or shows otherwise, for the estimate. A change of it needs
-            no new VDI, and by itself no new estimate: that is of the view.
+        options : RenderOptions
+            How it is drawn (clipping planes in world coordinates), for the estimate. A change
+            needs no new VDI, and by itself no new estimate: that is of the view.
 
         Raises
         ------
@@ -157,7 +158,7 @@ class Regeneration:
             If what has changed cannot be made a VDI of; it is said once.
         """
         self._notice(source, view, moving)
-        self._shown = shown
+        self._options = options
         if stamp != self._stamp:
             self._stamp = stamp
             self._follow_changes(source, view)
@@ -241,7 +242,7 @@ class Regeneration:
             now = time.perf_counter()
             if resting or now - self._estimated_at >= _ESTIMATE_PERIOD_IN_MOTION:
                 self._estimated_at = now
-                self._estimation.start(vdi, made, view, self._shown)
+                self._estimation.start(vdi, made, view, self._options)
             return
         allowed = (1 - self.bound) * (1 if resting else _PATIENCE_IN_MOTION)
         if estimate.error.ssim < 1 - allowed:

@@ -1,7 +1,9 @@
-"""What a person wants to know of a VDI on the screen, and a corner text that says it."""
+"""What a person is told of a VDI on the screen: its status, corner texts and warnings."""
 
 from __future__ import annotations
 
+import logging
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -9,9 +11,11 @@ from typing import Any, Literal
 from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkRenderingAnnotation import vtkCornerAnnotation
 
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.dial import describe
+
+_log = logging.getLogger(__name__)
 
 #: VTK's names of the corners.
 CORNERS = {
@@ -151,3 +155,29 @@ class CornerTexts:
         if progress is None or self._progress is None:
             return True
         return abs(progress - self._progress) >= _PROGRESS_STEP
+
+
+class Warnings:
+    """Says each thing once, as a :class:`~pyvista_vdi.VDIWarning`.
+
+    Exceptions cannot pass through VTK's renderer.
+    """
+
+    def __init__(self) -> None:
+        self._said: set[str] = set()
+
+    def warn(self, message: str, error: BaseException | None = None) -> None:
+        """Say it, unless it was said before; the error's traceback goes to the log."""
+        if error is not None:
+            _log.debug("%s", message, exc_info=error)
+        if message in self._said:
+            return
+        self._said.add(message)
+        try:
+            warnings.warn(message, VDIWarning, stacklevel=3)
+        except VDIWarning:  # warnings are errors: the log is what is left
+            _log.error(message)
+
+    def forget(self) -> None:
+        """Say everything again if it comes up again."""
+        self._said.clear()

@@ -7,13 +7,15 @@ import math
 import time
 import weakref
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLGL2PSHelper
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.quality.frame_rate import FrameRateController
+
+T = TypeVar("T")
 
 #: Cameras remembered per window; more than any scene has viewports that are turned in turn.
 _KNOWN_CAMERAS = 16
@@ -129,6 +131,7 @@ class WindowClock:
         self._window = vtkWeakReference()
         self._window.Set(window)
         self._painters: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._shared: dict[type, Any] = {}
         self._watched: set[str] = set()
         self._known: list[vtkWeakReference] = []
         self._controller: FrameRateController | None = None
@@ -153,6 +156,10 @@ class WindowClock:
         if clock is None or clock._window.Get() is not window:
             clock = _clocks[address] = cls(window)
         return clock
+
+    def shared(self, kind: type[T]) -> T:
+        """Return what those who draw in this window share of a kind, made on first use."""
+        return self._shared.setdefault(kind, kind())
 
     def join(self, painter: Any, renderer: Any) -> None:
         """Note that a painter draws in this window; called in each of its frames."""

@@ -4,53 +4,20 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import angle_from_generating_view
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.view import View
-from pyvista_vdi.vtk_pipeline.interaction.motion import Interaction, WindowClock
 from pyvista_vdi.vtk_pipeline.interaction.regeneration import Regeneration
-from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus
+from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus, Warnings
 from pyvista_vdi.vtk_pipeline.interaction.ticker import Ticker
-from pyvista_vdi.vtk_pipeline.interaction.warnings import Voice
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import Interaction, WindowClock
 
 #: Views that a VDI is made to serve, degrees from V_O, where its metadata do not say.
 _VIEW_CONE = 60.0
-
-
-@dataclass(frozen=True)
-class Scene:
-    """Where a frame shows the VDI.
-
-    Attributes
-    ----------
-    renderer : vtkRenderer
-        It draws the frame.
-    model_transform : numpy.ndarray
-        The actor's matrix.
-    view : View
-        The renderer's, between the two eyes of a stereo pair.
-    clock : WindowClock
-        Its window's.
-    only : bool
-        Whether no other renderer shows the actor.
-    shown : dict
-        Clipping planes (world coordinates), cropping and opacity multiplier of its picture:
-        arguments of :meth:`ViewErrorEstimator.estimate`.
-    """
-
-    renderer: Any
-    model_transform: NDArray[np.float64]
-    view: View
-    clock: WindowClock
-    only: bool
-    shown: dict[str, Any]
 
 
 class Upkeep:
@@ -63,18 +30,18 @@ class Upkeep:
     ----------
     interaction : Interaction
         Says where somebody watches.
-    voice : Voice
+    warnings : Warnings
         For what goes wrong.
     texts : CornerTexts
         They may have to be drawn again though nothing else has changed.
     """
 
-    def __init__(self, interaction: Interaction, voice: Voice, texts: CornerTexts) -> None:
+    def __init__(self, interaction: Interaction, warnings: Warnings, texts: CornerTexts) -> None:
         self.input: Input | None = None
         self.automatic_view = True
         self.regeneration = Regeneration()
         self._interaction = interaction
-        self._voice = voice
+        self._warnings = warnings
         self._texts = texts
         self._ticker = Ticker(self._tick)
         self._clock: weakref.ref[WindowClock] | None = None
@@ -102,7 +69,7 @@ class Upkeep:
         """Try again what failed before, and give up what is being made in the background."""
         self.regeneration.cancel()
         self._failed_at = None
-        self._voice.forget()
+        self._warnings.forget()
 
     def close(self) -> None:
         """End what goes on; the next frame may begin anew."""
@@ -111,40 +78,36 @@ class Upkeep:
 
     # -- in a frame ------------------------------------------------------------------------------
 
-    def current(self, scene: Scene, ask: Callable[[], VDIStatus]) -> VDI | None:
+    def current(self, frame: Frame, ask: Callable[[], VDIStatus], *, only: bool) -> VDI | None:
         """Return the VDI that a frame is to draw.
 
-        Parameters
-        ----------
-        scene : Scene
-            Where it is drawn.
-        ask : callable
-            Gives the status, for a policy that is a callable.
+        ``ask`` gives the status, for a policy that is a callable; ``only`` says whether no other
+        renderer shows the actor.
         """
         source = self.input
         if source is None:
             return None
-        self._clock = weakref.ref(scene.clock)
+        self._clock = weakref.ref(frame.clock)
         if self.automatic_view:
-            source.set_view_if_missing(scene.renderer, scene.model_transform)
+            source.set_view_if_missing(frame.renderer, frame.model_transform)
         if not isinstance(source, SourceInput):
             vdi = self._updated(source)
-            self._mind_the_angle(vdi, scene.view)
+            self._mind_the_angle(vdi, frame.view)
             return vdi
         # Once for both eyes of a stereo pair, and not between the tiles of a picture
-        now = (scene.clock.number, id(scene.clock))
-        decide, self._looked_at = scene.clock.whole_picture and now != self._looked_at, now
+        now = (frame.clock.number, id(frame.clock))
+        decide, self._looked_at = frame.clock.whole_picture and now != self._looked_at, now
         if source.last() is None:
             return self._updated(source)
         # A VDI that is drawn in several views is out of date in none of them by itself
-        one_view = scene.only and source.alone
-        if one_view and self._interaction.asynchronous(scene.renderer.GetRenderWindow()):
+        one_view = only and source.alone
+        if one_view and self._interaction.asynchronous(frame.renderer.GetRenderWindow()):
             if decide:
-                self._look(source, scene, ask)
+                self._look(source, frame, ask)
             return source.last()
         if one_view and decide and self._asked_for(ask):
-            source.source.SetCamera(scene.view.camera)
-            source.source.SetWindowSize(scene.view.size)
+            source.source.SetCamera(frame.view.camera)
+            source.source.SetWindowSize(frame.view.size)
         return self._updated(source)
 
     def tick(self, window: Any) -> None:
@@ -174,16 +137,19 @@ class Upkeep:
             self._complain(error)
             return False
 
-    def _look(self, source: SourceInput, scene: Scene, ask: Callable[[], VDIStatus]) -> None:
-        moving = self._interaction.moving(scene.renderer.GetRenderWindow())
+    def _look(self, source: SourceInput, frame: Frame, ask: Callable[[], VDIStatus]) -> None:
+        moving = self._interaction.moving(frame.renderer.GetRenderWindow())
+        vdi = source.last()
+        assert vdi is not None
+        options = frame.showing(vdi).world_options()
         try:
             self.regeneration.look(
                 source.source,
                 source.stamp(),
-                scene.view,
+                frame.view,
                 moving=moving,
                 ask=ask,
-                shown=scene.shown,
+                options=options,
             )
         except Exception as error:  # what is shown can still be drawn
             self._complain(error)
@@ -197,7 +163,7 @@ class Upkeep:
         served = stored if isinstance(stored, int | float) else _VIEW_CONE
         if angle > served:
             self._said_far = True
-            self._voice.warn(
+            self._warnings.warn(
                 f"the view is {angle:.0f} degrees from the VDI's generating view, which was to "
                 f"serve {served:.0f}: without its volume it cannot be made anew, and shows less "
                 "and less of what was hidden; regenerate='never' takes this as it is"
@@ -225,7 +191,7 @@ class Upkeep:
             clock.render()
 
     def _complain(self, error: Exception) -> None:
-        self._voice.warn(
+        self._warnings.warn(
             f"the VDI cannot be made anew: {type(error).__name__}: {error}; what was shown stays, "
             "and actor.regenerate() tries again",
             error,
