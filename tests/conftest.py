@@ -24,6 +24,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import settings
+from kernel_calls import Caller
 
 import pyvista_vdi
 from pyvista_vdi.device import DeviceInfo, Runtime, get_runtime, list_devices
@@ -97,6 +98,12 @@ def runtime(request: pytest.FixtureRequest) -> Runtime:
     if request.param is None:
         no_device(usable_test_devices()[1])
     return get_runtime(request.param)
+
+
+@pytest.fixture
+def call(runtime, request):
+    """What launches the kernels of the ``.cl`` files beside a test, on each device."""
+    return Caller(runtime, request.path.parent)
 
 
 @pytest.fixture(scope="session")

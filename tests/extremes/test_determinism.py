@@ -95,7 +95,7 @@ print(test_determinism.digest(get_runtime(info)))
 @pytest.mark.parametrize("threads", ["all", "1"])
 def test_across_processes_and_thread_counts(runtime, threads):
     """CPU drivers start a thread per processor that they may run on."""
-    tests = Path(__file__).resolve().parents[1]
+    tests = Path(__file__).resolve().parents[1] / "support"
     environment = {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(

@@ -31,7 +31,7 @@ posix = pytest.mark.skipif(os.name != "posix", reason="POSIX signals and limits"
 formats = pytest.mark.parametrize("suffix", io.SUFFIXES)
 
 #: Where this process finds what tests share.
-TESTS = str(Path(__file__).parents[1])
+SUPPORT = Path(__file__).parents[1] / "support"
 
 #: Seconds after which a test that waits for another process gives up.
 PATIENCE = 60
@@ -164,7 +164,7 @@ def test_a_limit_of_the_size_of_files(suffix, tmp_path):
     done = run_python(
         f"""
 import resource, sys
-sys.path.insert(0, {TESTS!r})
+sys.path.insert(0, {str(SUPPORT)!r})
 import numpy as np
 from strategies import random_vdi
 from pyvista_vdi.errors import VDIFileError
@@ -259,7 +259,7 @@ time.sleep(3600)
 
 def killed_at(moment, path):
     """Kill a process that saves at a moment; what it had said by then."""
-    code = SAVE_AND_STOP.format(tests=TESTS, moment=moment, path=str(path))
+    code = SAVE_AND_STOP.format(tests=str(SUPPORT), moment=moment, path=str(path))
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
     try:
         said = process.stdout.readline().strip()
@@ -318,7 +318,7 @@ def test_two_processes_that_save_to_one_name(suffix, tmp_path):
         subprocess.Popen(
             [
                 *(sys.executable, "-c"),
-                SAVE_OFTEN.format(tests=TESTS, seed=seed, times=60, path=str(path)),
+                SAVE_OFTEN.format(tests=str(SUPPORT), seed=seed, times=60, path=str(path)),
             ],
             stdin=subprocess.PIPE,
             text=True,
@@ -354,7 +354,7 @@ def test_reading_opens_nothing_else_and_runs_nothing(tmp_path):
     """Python's audit events of reading every file that fuzzing keeps, and whole ones."""
     files = [str(vdi_number(1).save(tmp_path / f"a{suffix}")) for suffix in io.SUFFIXES]
     for kind, suffix in (("vdi_bytes", ".vdi"), ("exr_bytes", ".exr")):
-        for path in sorted(Path(TESTS, "fuzz", "corpus", kind).iterdir()):
+        for path in sorted((SUPPORT.parent / "fuzz" / "corpus" / kind).iterdir()):
             target = tmp_path / (path.name + suffix)
             shutil.copy(path, target)
             files.append(str(target))

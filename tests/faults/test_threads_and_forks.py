@@ -25,7 +25,7 @@ PATIENCE = 100
 
 def finished(code, *arguments):
     """Run code in a new process, which must end; its output."""
-    tests = str(Path(__file__).parents[1])
+    tests = str(Path(__file__).parents[1] / "support")
     head = f"import sys\nsys.path.insert(0, {tests!r})\n"
     done = subprocess.run(
         [sys.executable, "-c", head + code, *arguments],

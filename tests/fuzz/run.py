@@ -30,7 +30,7 @@ HERE_ONLY = "--here"
 
 def main() -> int:
     """Fuzz, each target in a process of its own."""
-    sys.path.insert(0, str(HERE.parent))
+    sys.path[:0] = [str(HERE.parent), str(HERE.parent / "support")]
     if HERE_ONLY in sys.argv:
         _import_instrumented()
     options = _parse()

@@ -1,7 +1,7 @@
 """Rays in packets and blocks: when they are, how those lie in the window, that none is left out.
 
 That they meet what rays that are followed one by one meet is tested where those are:
-``tests/properties/test_raycast_oracle.py`` and ``test_skipping.py``.
+``tests/raycasting/test_raycast_oracle.py`` and ``test_skipping.py``.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ def test_no_channel_loses_more_than_the_cutoff(runtime, seed):
     for cutoff in (1e-6, 0.004, 0.1, 0.9):
         image = render_vdi(vdi, camera, transmittance_cutoff=cutoff, device=runtime)
         lost = whole - image
-        assert lost.max() <= cutoff + TOLERANCE  # that of sums, see tests/oracle.py
+        assert lost.max() <= cutoff + TOLERANCE  # that of sums, see tests/support/oracle.py
         assert lost.min() >= -TOLERANCE
 
 

@@ -1,6 +1,6 @@
 """Thousands of frames of a plotter that is used as people use it, and what they leave behind.
 
-    python tests/long_load.py --frames 10000 --json long_load.json
+    python tests/support/long_load.py --frames 10000 --json long_load.json
 
 Random views; windows that are resized; transfer functions that are edited; regenerations, in the
 frame and in the background between previews; volumes that come and go. Memory of the process and of

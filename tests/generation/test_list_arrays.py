@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
 
 from pyvista_vdi import Camera
 from pyvista_vdi.device import GrowingArray, Runtime
@@ -12,7 +13,6 @@ from pyvista_vdi.generation import list_arrays as growing_lists
 from pyvista_vdi.generation import slices
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.generation.march import March
-from tests.faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
 
 #: Looks past the volume, so that first all and then no lists have something in them.
 HALF_BESIDE = Camera((3.5, -4.0, 30), (3.5, -4.0, 3.5), (0, 1, 0))

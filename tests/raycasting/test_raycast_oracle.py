@@ -1,7 +1,7 @@
 """The device's raycaster against the float64 oracle: random VDIs, random views, every platform.
 
 Every channel of every pixel lies within 2e-5 of the oracle's range over the ray moved by the
-roundings of list coordinates (tests/oracle.py says why 2e-5). The share of pixels that
+roundings of list coordinates (tests/support/oracle.py says why 2e-5). The share of pixels that
 the unmoved ray does not explain is reported, and bounded by 2 % over all views together.
 """
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 EPS = 2.0**-24  # unit roundoff of float32
-FILE = "pair_functions.cl"
+FILE = "double_float.cl"
 
 
 def pairs(values):

@@ -1,6 +1,6 @@
 """Cropping and the opacity multiplier: the device against the float64 oracle, and against laws.
 
-The bound for each channel is that of tests/oracle.py: crossings of
+The bound for each channel is that of tests/support/oracle.py: crossings of
 cropping planes are found with as many roundings as the ends of a ray, and the oracle's range moves
 the ends of every part that cropping leaves of it.
 """

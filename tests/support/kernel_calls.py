@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from pathlib import Path
 
 import numpy as np
-import pytest
 
-HERE = Path(__file__).parent
 GROUP = 64
 
 
@@ -20,10 +17,11 @@ class Output:
 
 
 class Caller:
-    """Launches the kernels beside this file on one device."""
+    """Launches the kernels of one folder on one device."""
 
-    def __init__(self, runtime):
+    def __init__(self, runtime, folder):
         self._runtime = runtime
+        self._folder = folder
 
     #: An argument that starts as an array and is returned.
     out = Output
@@ -41,7 +39,7 @@ class Caller:
         The kernel's first parameter is ``items``. Arrays are uploaded but for those whose place
         is in ``by_value`` (vectors).
         """
-        function = self._runtime.kernel(HERE / file, kernel, defines)
+        function = self._runtime.kernel(self._folder / file, kernel, defines)
         with ExitStack() as stack:
             given, written = [], []
             for place, argument in enumerate(arguments):
@@ -59,9 +57,3 @@ class Caller:
             self._runtime.launch(function, padded, GROUP, np.int32(items), *given)
             results = [self._runtime.download(buffer) for buffer in written]
         return results[0] if len(results) == 1 else results
-
-
-@pytest.fixture
-def call(runtime):
-    """A :class:`Caller` on each device."""
-    return Caller(runtime)

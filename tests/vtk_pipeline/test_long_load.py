@@ -1,4 +1,4 @@
-"""Frames upon frames, which ``tests/long_load.py`` draws: nothing grows, pictures stay right."""
+"""Frames upon frames (``tests/support/long_load.py``): nothing grows, pictures stay right."""
 
 from __future__ import annotations
 
