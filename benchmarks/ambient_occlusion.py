@@ -13,12 +13,18 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from common import add_size, new_parser, save, subject_of, write_text  # beside this file
+from common import (  # beside this file
+    add_size,
+    new_parser,
+    save,
+    subject_of,
+)
 from tqdm import tqdm
 
 from pyvista_vdi import AmbientOcclusion
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.report import write_text
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images

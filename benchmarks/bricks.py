@@ -16,13 +16,13 @@ from common import (  # beside this file
     at_hand,
     new_parser,
     subject_of,
-    table,
     timed,
 )
 
 from pyvista_vdi import VDI
 from pyvista_vdi.generation.estimate import estimate
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.report import table
 
 
 def main() -> int:

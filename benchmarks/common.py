@@ -15,7 +15,8 @@ from pyvista_vdi import examples
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.io import read, whole_file
-from pyvista_vdi.measure.compare.measure import without_infinities
+from pyvista_vdi.measure.clock import take_turns
+from pyvista_vdi.measure.report import without_infinities
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
@@ -175,23 +176,6 @@ def save(results: Mapping[str, Any], target: Path) -> None:
         stream.write(json.dumps(without_infinities(dict(results)), indent=1).encode() + b"\n")
 
 
-def write_text(target: Path, text: str) -> None:
-    """Write a report, whole."""
-    with whole_file(target) as stream:
-        stream.write(text.encode())
-
-
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Return the lines of a Markdown table."""
-    lines = [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"]
-    return [*lines, *(f"| {' | '.join(row)} |" for row in rows)]
-
-
-def system_line(system: Mapping[str, str]) -> str:
-    """Return in one line what a figure depends on."""
-    return ", ".join(f"{name} {value}" for name, value in system.items())
-
-
 def looks_of(options: argparse.Namespace, look: str | None = None) -> dict[str, Any]:
     """Return the arguments of ``add_volume`` that the options stand for, or another look's."""
     chosen = TRANSFER_FUNCTIONS[options.tf if look is None else look]
@@ -255,16 +239,11 @@ def clock_of(options: argparse.Namespace, runtime: Runtime) -> Callable[[], floa
 
 def timed(ways: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, dict[str, Any]]:
     """Time several ways in turns: seconds by wall clock and by CPU, with the spread."""
-    taken: dict[str, list[tuple[float, float]]] = {name: [] for name in ways}
-    for _ in range(repeats):
-        for name, way in ways.items():
-            wall, cpu = time.perf_counter(), time.process_time()
-            way()
-            taken[name].append((time.perf_counter() - wall, time.process_time() - cpu))
+    clocks = {"wall": time.perf_counter, "cpu": time.process_time}
     return {
         name: {
             clock: {"median": statistics.median(s), "least": min(s), "most": max(s)}
-            for clock, s in zip(("wall", "cpu"), zip(*pairs, strict=True), strict=True)
+            for clock, s in taken.items()
         }
-        for name, pairs in taken.items()
+        for name, taken in take_turns(ways, repeats, warm_up=False, clocks=clocks).items()
     }

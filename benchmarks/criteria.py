@@ -22,12 +22,11 @@ from common import (  # beside this file
     new_parser,
     save,
     subject_of,
-    write_text,
 )
 from tqdm import tqdm
 
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.measure.report import describe_system, write_text
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS

@@ -20,7 +20,13 @@ from itertools import product
 from typing import Any, TypeAlias
 
 import numpy as np
-from common import add_size, add_volumes, at_hand, new_parser, save, write_text  # beside this file
+from common import (  # beside this file
+    add_size,
+    add_volumes,
+    at_hand,
+    new_parser,
+    save,
+)
 from numpy.typing import NDArray
 from standard_table import SOFT_ONLY
 from tqdm import tqdm
@@ -28,6 +34,7 @@ from tqdm import tqdm
 from pyvista_vdi import examples
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.report import write_text
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.metrics import compare_images

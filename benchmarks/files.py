@@ -23,15 +23,13 @@ from common import (  # beside this file
     begun,
     new_parser,
     save,
-    system_line,
     timed,
     vdi_of,
-    write_text,
 )
 from tqdm import tqdm
 
 from pyvista_vdi.io import FORMAT_VERSION, read, read_info
-from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.measure.report import describe_system, system_line, write_text
 from pyvista_vdi.model.vdi import VDI
 
 #: Bytes of a supersegment in the dense form: two depths, four colour components, float32.

@@ -30,7 +30,7 @@ from common import (  # beside this file
 )
 
 from pyvista_vdi.device import Runtime, get_runtime
-from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.measure.report import describe_system
 from pyvista_vdi.model.vdi import VDI
 
 #: Degrees by which the camera turns from frame to frame where it moves.

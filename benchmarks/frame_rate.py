@@ -17,12 +17,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import add_looks, add_size, looks_of, new_parser, save, subject_of  # beside this file
+from common import (  # beside this file
+    add_looks,
+    add_size,
+    looks_of,
+    new_parser,
+    save,
+    subject_of,
+)
 from tqdm import tqdm
 
 from pyvista_vdi import examples
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.measure.report import describe_system
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.frame_rate import FLOOR, RECENT_FRAMES, FrameRateController

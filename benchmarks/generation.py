@@ -35,16 +35,14 @@ from common import (  # beside this file
     new_parser,
     save,
     subject_of,
-    write_text,
 )
 from tqdm import tqdm
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.compare import describe_system
 from pyvista_vdi.measure.compare.bounds import FRAME_RATIO_ANGLE
-from pyvista_vdi.measure.vtk_baselines import MAPPERS, PeerRenderer
-from pyvista_vdi.plotting.cli_support import add_volume_property
+from pyvista_vdi.measure.report import describe_system, write_text
+from pyvista_vdi.measure.vtk_baselines import MAPPERS, VTKBaseline, add_volume_property
 from pyvista_vdi.volume.render import raycast_volume
 
 #: Ratios: title, what is divided, and by which candidate or by the fastest of which.
@@ -135,7 +133,7 @@ def measured(subject: Subject, options: argparse.Namespace) -> dict[str, Any]:
     with ExitStack() as stack:
         for mapper in MAPPERS:
             prop = add_volume_property(volume, looks_of(options))
-            peer = PeerRenderer(volume, prop, options.size, mapper, voxel)
+            peer = VTKBaseline(volume, prop, options.size, mapper, voxel)
             stack.callback(peer.close)
             candidates[mapper] = partial(peer.render, turned)
         seconds = in_turns(candidates, options.repeats)

@@ -26,9 +26,6 @@ from common import (  # beside this file
     clock_of,
     new_parser,
     save,
-    system_line,
-    table,
-    write_text,
 )
 from machine import Rates
 from model import Model, around_work, hosted_work
@@ -38,16 +35,11 @@ from tqdm import tqdm
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.benchmark import find_dataset
-from pyvista_vdi.measure.benchmark.candidates import (
-    CANDIDATES,
-    VDIRenderer,
-    VolumeRenderers,
-    median,
-    take_turns,
-)
-from pyvista_vdi.measure.benchmark.datasets import label_of, require_allocation
-from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.measure.clock import median, take_turns
+from pyvista_vdi.measure.paper import find_dataset
+from pyvista_vdi.measure.paper.datasets import label_of, require_allocation
+from pyvista_vdi.measure.report import describe_system, system_line, table, write_text
+from pyvista_vdi.measure.session import CANDIDATES, VDIRenderer, VolumeRenderers
 from pyvista_vdi.model.standard_cases import ANGLES, filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.raycast import PreparedVDI
@@ -172,7 +164,8 @@ def measured(
             camera = view.azimuth(angle)
             frames = {**draw.frames(camera), **renderers.frames(camera)}
             steps = {n: frames[n] for n in (_OURS, _OUR_VOLUME, *_PEERS) if n in frames}
-            taken = take_turns(runtime, steps, options.repeats, clock=clock_of(options, runtime))
+            clocks = {"clock": clock_of(options, runtime)}
+            taken = take_turns(steps, options.repeats, runtime=runtime, clocks=clocks)
             found["angles"].append(
                 {
                     "angle": angle,
@@ -223,8 +216,9 @@ def _generation(
     generate(_WARM_UP_SIZE)
     raycast(_WARM_UP_SIZE)
     steps = {"generation": partial(generate, size), "render_volume": partial(raycast, size)}
-    clock = clock_of(options, runtime)
-    taken = take_turns(runtime, steps, options.generations, warm_up=False, clock=clock)
+    clocks = {"clock": clock_of(options, runtime)}
+    n = options.generations
+    taken = take_turns(steps, n, runtime=runtime, warm_up=False, clocks=clocks)
     return made[0], {name: median(t) for name, t in taken.items()}
 
 

@@ -16,7 +16,13 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from common import add_looks, add_size, add_vdi_cache, new_parser, vdi_of  # beside this file
+from common import (  # beside this file
+    add_looks,
+    add_size,
+    add_vdi_cache,
+    new_parser,
+    vdi_of,
+)
 from numpy.typing import NDArray
 
 from pyvista_vdi.model.vdi import VDI

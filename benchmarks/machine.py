@@ -19,11 +19,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import add_clock, clock_of, new_parser, save, table  # beside this file
+from common import (  # beside this file
+    add_clock,
+    clock_of,
+    new_parser,
+    save,
+)
 from tqdm import tqdm
 
 from pyvista_vdi.device import Runtime, aligned_empty, get_runtime
-from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.measure.report import describe_system, table
 
 KERNELS = Path(__file__).with_name("machine.cl")
 

@@ -21,11 +21,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import INTERPOLATIONS, at_hand, table, window_size  # beside this file
+from common import (  # beside this file
+    INTERPOLATIONS,
+    at_hand,
+    window_size,
+)
 
 from pyvista_vdi import Volume, examples
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.report import table
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera

@@ -26,9 +26,6 @@ from common import (  # beside this file
     clock_of,
     new_parser,
     save,
-    system_line,
-    table,
-    write_text,
 )
 from counting import (
     CountedVDI,
@@ -46,9 +43,9 @@ from tqdm import tqdm
 
 from pyvista_vdi.device import Profile, Runtime, get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.benchmark import find_dataset
-from pyvista_vdi.measure.benchmark.candidates import VDIRenderer
-from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.measure.paper import find_dataset
+from pyvista_vdi.measure.report import describe_system, system_line, table, write_text
+from pyvista_vdi.measure.session import VDIRenderer
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import ANGLES, filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction

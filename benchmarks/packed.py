@@ -19,17 +19,15 @@ from common import (  # beside this file
     begun,
     new_parser,
     save,
-    system_line,
     timed,
     vdi_of,
     window_size,
-    write_text,
 )
 from files import DENSE_BYTES, mebibytes
 from tqdm import tqdm
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.measure.report import describe_system, system_line, write_text
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.vdi import VDI

@@ -18,11 +18,11 @@ from common import (  # beside this file
     new_parser,
     save,
     subject_of,
-    write_text,
 )
 from tqdm import tqdm
 
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.report import write_text
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume

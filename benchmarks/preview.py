@@ -24,15 +24,14 @@ from common import (  # beside this file
     new_parser,
     save,
     subject_of,
-    write_text,
 )
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.benchmark.preview import enlarged
-from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.measure.report import describe_system, write_text
+from pyvista_vdi.measure.session import enlarged
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.vdi import VDI

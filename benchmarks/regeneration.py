@@ -28,7 +28,7 @@ from tqdm import tqdm
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.measure.report import describe_system
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import VDI

@@ -31,19 +31,17 @@ from common import (  # beside this file
     clock_of,
     new_parser,
     save,
-    system_line,
-    table,
-    write_text,
 )
 from tqdm import tqdm
 
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.io import whole_file
-from pyvista_vdi.measure.benchmark import find_dataset
-from pyvista_vdi.measure.benchmark.candidates import VDIRenderer, take_turns
-from pyvista_vdi.measure.benchmark.procedural import PROCEDURAL
-from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.measure.clock import take_turns
+from pyvista_vdi.measure.paper import find_dataset
+from pyvista_vdi.measure.paper.procedural import PROCEDURAL
+from pyvista_vdi.measure.report import describe_system, system_line, table, write_text
+from pyvista_vdi.measure.session import VDIRenderer
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -213,7 +211,8 @@ def measured_axis(
     """Time every point of a sweep: medians in seconds by quantity."""
     rows = []
     for value, case in points:
-        taken = take_turns(runtime, bench.steps(case, axis.quantities), repeats, clock=clock)
+        steps = bench.steps(case, axis.quantities)
+        taken = take_turns(steps, repeats, runtime=runtime, clocks={"clock": clock})
         seconds = {name: statistics.median(found["clock"]) for name, found in taken.items()}
         rows.append({"value": value, "seconds": seconds})
     return rows

@@ -17,16 +17,14 @@ from common import (  # beside this file
     begun,
     new_parser,
     save,
-    system_line,
     timed,
     vdi_of,
-    write_text,
 )
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from pyvista_vdi.device import Runtime, get_runtime
-from pyvista_vdi.measure.compare import describe_system
+from pyvista_vdi.measure.report import describe_system, system_line, write_text
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.occupancy import OccupancyGrid

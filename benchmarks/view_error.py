@@ -30,12 +30,12 @@ from common import (  # beside this file
     new_parser,
     save,
     subject_of,
-    write_text,
 )
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.report import write_text
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import filling_camera

@@ -21,7 +21,7 @@ _PACKAGE = "pyvista_vdi"
 MODULES = {
     "ambient_occlusion": "model.ambient_occlusion",
     "background": "quality.background",
-    "benchmark": "measure.benchmark",
+    "benchmark": "measure.paper",
     "camera": "model.camera",
     "compare": "measure.compare",
     "cropping": "model.cropping",

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from pyvista_vdi import examples
+from pyvista_vdi.cli.inputs import has_vtk, measuring, require_new, say_written
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.io import check_writable, whole_file
-from pyvista_vdi.measure.benchmark import (
+from pyvista_vdi.io import check_writable
+from pyvista_vdi.measure.paper import (
     PROFILES,
     Plan,
     Results,
@@ -21,9 +21,8 @@ from pyvista_vdi.measure.benchmark import (
     read_results,
     run,
 )
-from pyvista_vdi.measure.benchmark.plot import write_plot
-from pyvista_vdi.measure.compare import describe_system
-from pyvista_vdi.plotting.progress import DelayedBar
+from pyvista_vdi.measure.paper.plot import write_plot
+from pyvista_vdi.measure.report import describe_system, write_text
 
 
 def benchmark(options: argparse.Namespace) -> int:
@@ -34,16 +33,12 @@ def benchmark(options: argparse.Namespace) -> int:
         return 0
     plan = _plan(options)
     results = _results(options, plan)
-    bar = DelayedBar(label="benchmark")
     try:
-        run(plan, results, options.device, bar)
-    except KeyboardInterrupt:
-        print(f"\nWhat was measured is in {results.path}: --resume goes on", file=sys.stderr)
-        raise
+        with measuring("benchmark", results.path) as bar:
+            run(plan, results, options.device, bar)
     finally:
-        bar.close()
         written = _write_tables(results)
-    print("Written: " + ", ".join(str(path) for path in written))
+    say_written(written)
     return 0
 
 
@@ -73,11 +68,7 @@ def _plan(options: argparse.Namespace) -> Plan:
             chosen["preview"] = None
         if 1 not in options.tables:
             chosen["datasets"] = ()
-    vtk = not options.no_vtk
-    if vtk and find_spec("vtkmodules") is None:
-        print("VTK is not installed: its mappers are left out", file=sys.stderr)
-        vtk = False
-    return Plan(profile=options.profile, vtk=vtk, **chosen)
+    return Plan(profile=options.profile, vtk=has_vtk(options), **chosen)
 
 
 def _preview(chosen: dict[str, Any]) -> tuple[str, tuple[int, int], int, float]:
@@ -104,10 +95,7 @@ def _results(options: argparse.Namespace, plan: Plan) -> Results:
         raise InvalidArgumentError(
             f"--out must name a .json file (tables and plot go beside it); got {options.out!r}"
         )
-    if path.exists() and not options.resume:
-        raise InvalidArgumentError(
-            f"{path} is there already: --resume goes on with it, or choose another --out"
-        )
+    require_new(path, options)
     check_writable(path)
     system = describe_system(options.device)
     if path.exists():
@@ -120,8 +108,7 @@ def _results(options: argparse.Namespace, plan: Plan) -> Results:
 def _write_tables(results: Results) -> list[Path]:
     """Write the Markdown, and the plot where Matplotlib is installed."""
     tables, plot = (results.path.with_suffix(suffix) for suffix in (".md", ".png"))
-    with whole_file(tables) as stream:
-        stream.write(describe(results.data).encode())
+    write_text(tables, describe(results.data))
     written = [results.path, tables]
     if find_spec("matplotlib") is not None and write_plot(results.data, plot):
         written.append(plot)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pyvista_vdi.cli.text import printable
+from pyvista_vdi.cli.text import mebibytes, printable
+
+if TYPE_CHECKING:
+    from pyvista_vdi.io import FileInfo
 
 
 def devices(options: argparse.Namespace) -> int:
@@ -24,17 +27,18 @@ def devices(options: argparse.Namespace) -> int:
 
 def info(options: argparse.Namespace) -> int:
     """Print what a file says about itself."""
-    from pyvista_vdi.io import FileInfo, read_info
+    from pyvista_vdi.io import read_info
 
-    about: FileInfo = read_info(options.file)
-    print(json.dumps(_plain(about), indent=1) if options.json else _text(about))
+    about = read_info(options.file)
+    state = {**vars(about), "path": str(about.path), "camera": about.camera.to_dict()}
+    print(json.dumps(state, indent=1) if options.json else _text(about))
     return 0
 
 
 def convert(options: argparse.Namespace) -> int:
     """Read a VDI and write it in the format of another name."""
     from pyvista_vdi.api import read
-    from pyvista_vdi.cli.inputs import file_options, given_camera
+    from pyvista_vdi.cli.inputs import file_options, given_camera, say_vdi
     from pyvista_vdi.io import checked_target
 
     target = checked_target(options.output)
@@ -42,22 +46,11 @@ def convert(options: argparse.Namespace) -> int:
     foreign = {"camera": given_camera(options), "thickness": options.thickness}
     vdi = read(options.file, **{name: v for name, v in foreign.items() if v is not None})
     vdi.save(target, **file_arguments)
-    print(
-        f"{printable(options.output)}: {vdi.n_supersegments} supersegments in "
-        f"{vdi.window_size[0]} x {vdi.window_size[1]} lists, "
-        f"{_mebibytes(target.stat().st_size)}"
-    )
+    say_vdi(options, vdi)
     return 0
 
 
-def _plain(about: Any) -> dict[str, Any]:
-    state: dict[str, Any] = {**vars(about)}
-    state["path"] = str(about.path)
-    state["camera"] = about.camera.to_dict()
-    return state
-
-
-def _text(about: Any) -> str:
+def _text(about: FileInfo) -> str:
     width, height = about.window_size
     view = about.camera
     lens = (
@@ -66,13 +59,13 @@ def _text(about: Any) -> str:
         else f"view angle {view.view_angle:g} degrees"
     )
     rows = {
-        "file": f"{about.path}, {_mebibytes(about.file_bytes)}, {about.codec}",
+        "file": f"{about.path}, {mebibytes(about.file_bytes)}, {about.codec}",
         "written by": f"{about.written_by}, format version {about.format_version}",
         "lists": f"{width} x {height}",
         "supersegments": f"{about.n_supersegments}, "
         f"{about.n_supersegments / (width * height):.2f} per list",
         "precision": about.precision,
-        "in memory": _mebibytes(about.memory_bytes),
+        "in memory": mebibytes(about.memory_bytes),
         "eye": _vector(view.position),
         "looking at": f"{_vector(view.focal_point)}, up {_vector(view.view_up)}, {lens}",
         "bounds": _vector(about.bounds),
@@ -91,7 +84,3 @@ def _short(value: Any, longest: int = 100) -> str:
     """Return a metadata entry in one line; tables are left to ``--json``."""
     text = json.dumps(value)
     return text if len(text) <= longest else text[: longest - 4] + " ..."
-
-
-def _mebibytes(n: int) -> str:
-    return f"{n / 2**20:.1f} MiB"

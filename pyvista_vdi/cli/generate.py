@@ -13,16 +13,16 @@ from pyvista_vdi.cli.inputs import (
     classification,
     file_options,
     has_own_place,
+    measuring,
     read_volume,
+    say_vdi,
 )
-from pyvista_vdi.cli.text import printable
 from pyvista_vdi.generation.estimate import estimate
 from pyvista_vdi.io import checked_target
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.plotting.progress import DelayedBar
 from pyvista_vdi.quality.dial import Dial, describe
 
 #: Options that are arguments of ``generate`` of the same name: what a VDI is to reach.
@@ -40,8 +40,6 @@ def generate(options: argparse.Namespace) -> int:
     looks = Classification(arguments, "generate")  # refused before the volume is read
     occlusion = ambient_occlusion(options)
     volume = read_volume(options)
-    for name in ("scalars", "preference"):  # the array has been chosen
-        arguments.pop(name, None)
     view = generating_view(options, volume)
     needed = estimate(
         volume,
@@ -62,9 +60,8 @@ def generate(options: argparse.Namespace) -> int:
         ),
         file=sys.stderr,
     )
-    bar = DelayedBar()
     start = time.perf_counter()
-    try:
+    with measuring("generating a VDI") as bar:
         vdi = generate_vdi(
             volume,
             view,
@@ -82,15 +79,9 @@ def generate(options: argparse.Namespace) -> int:
             progress=bar,
             **arguments,
         )
-    finally:
-        bar.close()
     seconds = time.perf_counter() - start
     vdi.save(target, **file_arguments)
-    print(
-        f"{printable(options.output)}: {vdi.n_supersegments} supersegments in "
-        f"{vdi.window_size[0]} x {vdi.window_size[1]} lists, "
-        f"{target.stat().st_size / 2**20:.1f} MiB, {seconds:.1f} s"
-    )
+    say_vdi(options, vdi, f", {seconds:.1f} s")
     chosen = describe(vdi.metadata)
     if chosen is not None:
         print(chosen)

@@ -1,41 +1,34 @@
-"""What several verbs read: volumes, cameras, transfer functions, classification options."""
+"""What verbs share: volumes, cameras and looks that they read, files and bars that they show."""
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pyvista_vdi.api import as_volume
-from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.io import check_write_options
+from pyvista_vdi.cli.text import mebibytes, printable
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.io import check_writable, check_write_options
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.plotting.progress import DelayedBar
 
 _T = TypeVar("_T")
 
 #: Options that are arguments of the same name, given only if the user gave them.
 _CLASSIFICATION = (
-    "cmap",
-    "opacity",
-    "clim",
-    "n_colors",
-    "flip_scalars",
-    "log_scale",
-    "opacity_unit_distance",
-    "scalars",
-    "preference",
-    "interpolation",
-    "shade",
-    "ambient",
-    "diffuse",
-    "specular",
-    "specular_power",
+    *("cmap", "opacity", "clim", "n_colors", "flip_scalars", "log_scale", "opacity_unit_distance"),
+    *("interpolation", "shade", "ambient", "diffuse", "specular", "specular_power"),
 )
 
 
@@ -45,20 +38,10 @@ def read_volume(options: argparse.Namespace) -> Volume:
         from pyvista_vdi import examples
 
         volume: Any = examples.load_data(options.example, as_volume=True)
-    elif Path(options.volume).suffix.lower() in (".nrrd", ".nhdr"):
-        # By pynrrd: it needs no PyVista, and VTK takes the first axis for components in files
-        # that do not say what their axes are
-        from pyvista_vdi.examples import read_nrrd
-
-        volume = read_nrrd(Path(options.volume), "values")
-    elif Path(options.volume).suffix.lower() in (".raw", ".npy"):
-        from pyvista_vdi.measure.benchmark.datasets import read_file
+    else:
+        from pyvista_vdi.measure.volumes import read_file
 
         volume = read_file(Path(options.volume))
-    else:
-        from pyvista_vdi.plotting.cli_support import read_volume as read_by_pyvista
-
-        volume = read_by_pyvista(options.volume)
     return as_volume(volume, options.scalars, options.preference or "point")
 
 
@@ -68,7 +51,7 @@ def volume_name(options: argparse.Namespace) -> str:
 
 
 def classification(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the classification arguments that the options stand for."""
+    """Return the arguments that say how the volume looks; which array it is, the volume says."""
     given = dict(TRANSFER_FUNCTIONS[options.tf]) if options.tf else {}
     for name in _CLASSIFICATION:
         if getattr(options, name) is not None:
@@ -81,6 +64,56 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
     return given
 
 
+def has_vtk(options: argparse.Namespace) -> bool:
+    """Whether VTK's mappers take part; says so where they cannot."""
+    if not options.no_vtk and find_spec("vtkmodules") is None:
+        print("VTK is not installed: its mappers are left out", file=sys.stderr)
+        return False
+    return not options.no_vtk
+
+
+def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> dict[str, Path]:
+    """Return where ``--out`` has the files go, after finding that they can be written there."""
+    folder = Path(options.out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise VDIFileError(
+            f"the folder {folder} cannot be made: {error.strerror}; choose another --out"
+        ) from error
+    return {kind: check_writable(folder / f"{stem}.{kind}") for kind in kinds}
+
+
+def require_new(path: Path, options: argparse.Namespace) -> None:
+    """Refuse to replace results that ``--resume`` could go on with."""
+    if path.exists() and not options.resume:
+        raise InvalidArgumentError(
+            f"{path} is there already: --resume goes on with it, or choose another --out"
+        )
+
+
+@contextmanager
+def measuring(label: str, results: Path | None = None) -> Iterator[DelayedBar]:
+    """Show a bar; after Ctrl-C say what ``--resume`` can go on with."""
+    bar = DelayedBar(label=label)
+    try:
+        yield bar
+    except KeyboardInterrupt:
+        if results is not None and results.exists():
+            print(
+                f"\nWhat was measured is in {printable(results)}: --resume goes on",
+                file=sys.stderr,
+            )
+        raise
+    finally:
+        bar.close()
+
+
+def say_written(files: Iterable[Path]) -> None:
+    """Name the files that were written."""
+    print("Written: " + ", ".join(printable(path) for path in files))
+
+
 def ambient_occlusion(options: argparse.Namespace) -> AmbientOcclusion | None:
     """Return the ambient occlusion that the options ask for, if any."""
     values = {n: getattr(options, f"occlusion_{n}") for n in ("radius", "strength")}
@@ -90,9 +123,7 @@ def ambient_occlusion(options: argparse.Namespace) -> AmbientOcclusion | None:
 
 def camera(options: argparse.Namespace, default: Camera) -> Camera:
     """Return the view that the camera options make of a default."""
-    view = default
-    if options.camera_json is not None:
-        view = _from_json(options.camera_json, Camera.from_dict, "camera")
+    view = given_camera(options) or default
     names = ("position", "focal_point", "view_up", "view_angle")
     changes = {n: getattr(options, n) for n in names if getattr(options, n) is not None}
     if options.parallel_scale is not None:
@@ -121,6 +152,15 @@ def file_options(options: argparse.Namespace) -> dict[str, Any]:
         given["exact"] = False
     check_write_options(options.output, given)
     return given
+
+
+def say_vdi(options: argparse.Namespace, vdi: VDI, more: str = "") -> None:
+    """Say what was written to ``--output``."""
+    width, height = vdi.window_size
+    print(
+        f"{printable(options.output)}: {vdi.n_supersegments} supersegments in {width} x {height} "
+        f"lists, {mebibytes(Path(options.output).stat().st_size)}{more}"
+    )
 
 
 def has_own_place(options: argparse.Namespace) -> bool:

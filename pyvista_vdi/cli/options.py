@@ -9,176 +9,14 @@ from typing import Any
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import check_window_size
 from pyvista_vdi.model.checks import memory_limit_bytes
+from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.quality.dial import QUALITIES, TARGET_ANGLE
 
+#: Where options go: a verb's parser, or a group of it.
+Options = argparse._ActionsContainer
 
-def add_volume(parser: argparse.ArgumentParser) -> None:
-    """Add the volume: a file's name, or one that is known."""
-    source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument(
-        "volume",
-        metavar="VOLUME",
-        nargs="?",
-        help="a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), .npy, "
-        "a raw file named like x_1024x1024x795_uint8.raw, or a folder of DICOM slices",
-    )
-    source.add_argument("--example", metavar="NAME", help="a volume known by name, e.g. brain")
-
-
-def add_size(parser: argparse.ArgumentParser, default: tuple[int, int] | None) -> None:
-    """Add the window's size, pixels; the VDI's own without a default."""
-    shown = "the VDI's" if default is None else f"{default[0]}x{default[1]}"
-    parser.add_argument(
-        "--size",
-        type=parse_size,
-        metavar="WxH",
-        default=default,
-        help=f"window size in pixels (default: {shown})",
-    )
-
-
-def add_camera(parser: argparse.ArgumentParser, default: str) -> None:
-    """Add the view; ``default`` says in words what it is without these options."""
-    group = parser.add_argument_group("camera", f"By default {default}.")
-    triple: dict[str, Any] = {"nargs": 3, "type": float, "metavar": ("X", "Y", "Z")}
-    group.add_argument("--position", **triple, help="eye, world coordinates")
-    group.add_argument("--focal-point", **triple, help="point looked at, world coordinates")
-    group.add_argument("--view-up", **triple, help="direction that is up")
-    group.add_argument("--view-angle", type=float, metavar="DEGREES", help="vertical, full")
-    group.add_argument(
-        "--parallel-scale",
-        type=float,
-        metavar="LENGTH",
-        help="half the viewport's height in world units; makes the projection parallel",
-    )
-    group.add_argument("--camera-json", metavar="FILE", help="Camera.to_dict() as JSON")
-    group.add_argument("--azimuth", type=float, default=0.0, metavar="DEGREES", help="turn by")
-    group.add_argument("--elevation", type=float, default=0.0, metavar="DEGREES", help="lift by")
-
-
-def add_classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> None:
-    """Add how the volume looks; ``tables``: also its transfer function as a file."""
-    group = parser.add_argument_group(
-        "classification", "Names, defaults and meaning are those of PyVista's add_volume."
-    )
-    group.add_argument(
-        "--tf",
-        choices=tuple(TRANSFER_FUNCTIONS),
-        help="a standard transfer function; --cmap and --opacity change parts of it",
-    )
-    group.add_argument("--cmap", metavar="NAME", help="colour map")
-    group.add_argument(
-        "--opacity", type=parse_opacity, metavar="NAME|A,B,...", help="name, or values from 0 to 1"
-    )
-    group.add_argument("--clim", nargs=2, type=float, metavar=("LOW", "HIGH"))
-    group.add_argument("--n-colors", type=int, metavar="N")
-    group.add_argument("--flip-scalars", action="store_true", default=None)
-    group.add_argument("--log-scale", action="store_true", default=None)
-    group.add_argument("--opacity-unit-distance", type=float, metavar="LENGTH")
-    group.add_argument("--scalars", metavar="NAME", help="which array")
-    group.add_argument("--preference", choices=("point", "cell"))
-    group.add_argument("--interpolation", choices=("nearest", "linear"))
-    group.add_argument("--shade", action="store_true", default=None, help="lit by a headlight")
-    for name in ("--ambient", "--diffuse", "--specular", "--specular-power"):
-        group.add_argument(name, type=float, metavar="X", help="of a shaded volume")
-    if tables:
-        group.add_argument(
-            "--transfer-function",
-            metavar="FILE",
-            help="TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista",
-        )
-
-
-def add_occlusion(parser: argparse.ArgumentParser) -> None:
-    """Add ambient occlusion."""
-    group = parser.add_argument_group("ambient occlusion", "Either option below turns it on, too.")
-    group.add_argument(
-        "--ambient-occlusion",
-        action="store_true",
-        help="darken what is hidden from the light around it",
-    )
-    group.add_argument(
-        "--occlusion-radius",
-        type=float,
-        metavar="LENGTH",
-        help="how far something hides, model units (default: 0.05 of the bounds' diagonal)",
-    )
-    group.add_argument(
-        "--occlusion-strength", type=float, metavar="S", help="0 to 1 (default: 0.1; 1 is darkest)"
-    )
-
-
-def add_limits(parser: argparse.ArgumentParser) -> None:
-    """Add how much a VDI may hold, and how finely the volume is sampled."""
-    group = parser.add_argument_group("limits")
-    group.add_argument(
-        "--max-supersegments", type=int, default=20, metavar="N", help="longest list (default: 20)"
-    )
-    group.add_argument(
-        "--criterion",
-        default="least-error",
-        metavar="NAME",
-        help="where lists are cut: least-error (default), homogeneity, length, "
-        "transmittance or optical-depth",
-    )
-    group.add_argument(
-        "--sample-distance",
-        type=float,
-        metavar="LENGTH",
-        help="step along the ray, model units (default: half the smallest spacing)",
-    )
-    group.add_argument("--tolerance", type=float, default=0.0, help="error traded for length")
-    group.add_argument(
-        "--view-cone",
-        type=float,
-        default=60.0,
-        metavar="DEGREES",
-        help="half angle of the cone of new views to serve (default: 60)",
-    )
-    group.add_argument(
-        "--memory-limit",
-        type=parse_bytes,
-        metavar="SIZE",
-        help="most memory to take on the device, like 2GiB; a volume that does not fit goes there "
-        "brick by brick (default: what the device has)",
-    )
-
-
-def add_dial(parser: argparse.ArgumentParser) -> None:
-    """Add goals, from which the limits are chosen."""
-    group = parser.add_argument_group(
-        "dial",
-        "Choose lists, their length and precision from a short measurement on this device; --size "
-        "is then that of the pictures. Not with --max-supersegments, --tolerance or --precision.",
-    )
-    group.add_argument(
-        "--quality",
-        choices=tuple(QUALITIES),
-        help="SSIM of "
-        + ", ".join(f"{ssim:g} ({name})" for name, ssim in QUALITIES.items() if ssim is not None)
-        + " against volume rendering; reference: what is made without a dial",
-    )
-    group.add_argument("--target-ssim", type=float, metavar="S", help="the same by a number")
-    group.add_argument(
-        "--target-fps", type=float, metavar="RATE", help="least full frames per second"
-    )
-    group.add_argument(
-        "--max-bytes", type=float, metavar="N", help="most bytes on the device; files are smaller"
-    )
-    group.add_argument(
-        "--target-angle",
-        type=float,
-        default=TARGET_ANGLE,
-        metavar="DEGREES",
-        help=f"turn of the view for which the SSIM is predicted (default: {TARGET_ANGLE:g})",
-    )
-
-
-def add_device(parser: argparse.ArgumentParser) -> None:
-    """Add the OpenCL device."""
-    parser.add_argument("--device", metavar="NAME", help="OpenCL device, see pyvista-vdi devices")
-
+VDI_FILE = "a .vdi file, an .exr deep image, or a VDI as .vti"
 
 # -- types of options ------------------------------------------------------------------------------
 
@@ -253,3 +91,208 @@ def parse_color(text: str) -> tuple[float, ...]:
             f"{text!r} is no colour: give a name, #rrggbb or R,G,B from 0 to 1"
         ) from error
     return red / 255, green / 255, blue / 255
+
+
+# -- options ---------------------------------------------------------------------------------------
+
+
+def option(
+    options: Options,
+    name: str,
+    text: str | None,
+    metavar: Any = None,
+    kind: Any = None,
+    **more: Any,
+) -> None:
+    """Add an option that takes a value, or an argument."""
+    options.add_argument(name, help=text, metavar=metavar, type=kind, **more)
+
+
+def switch(options: Options, name: str, text: str | None = None, **more: Any) -> None:
+    """Add an option that takes none."""
+    options.add_argument(name, help=text, action="store_true", **more)
+
+
+def add_file(options: Options) -> None:
+    """Add the VDI to read."""
+    option(options, "file", VDI_FILE, "FILE")
+
+
+def add_output(options: Options, text: str = ".vdi, .exr or .vti to write") -> None:
+    """Add the file to write."""
+    options.add_argument("-o", "--output", metavar="FILE", required=True, help=text)
+
+
+def add_volume(options: Options) -> None:
+    """Add the volume: a file's name, or one that is known."""
+    source = options.add_mutually_exclusive_group(required=True)
+    option(
+        source,
+        "volume",
+        "a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), .npy, "
+        "a raw file named like x_1024x1024x795_uint8.raw, or a folder of DICOM slices",
+        "VOLUME",
+        nargs="?",
+    )
+    option(source, "--example", "a volume known by name, e.g. brain", "NAME")
+
+
+def add_size(options: Options, default: tuple[int, int] | None) -> None:
+    """Add the window's size, pixels; the VDI's own without a default."""
+    shown = "the VDI's" if default is None else f"{default[0]}x{default[1]}"
+    text = f"window size in pixels (default: {shown})"
+    option(options, "--size", text, "WxH", parse_size, default=default)
+
+
+def add_angles(options: Options, text: str, default: tuple[float, ...] | None = None) -> None:
+    """Add the new views."""
+    option(options, "--angles", text, "A,B,...", parse_numbers, default=default)
+
+
+def add_repeats(
+    options: Options, text: str, default: int | None = None, metavar: str | None = "N"
+) -> None:
+    """Add how often frames are timed."""
+    option(options, "--repeats", text, metavar, parse_count, default=default)
+
+
+def add_no_vtk(options: Options) -> None:
+    """Add the way to do without VTK."""
+    switch(options, "--no-vtk", "leave out VTK's mappers")
+
+
+def add_camera(parser: argparse.ArgumentParser, default: str) -> None:
+    """Add the view; ``default`` says in words what it is without these options."""
+    group = parser.add_argument_group("camera", f"By default {default}.")
+    for name, text in (
+        ("--position", "eye, world coordinates"),
+        ("--focal-point", "point looked at, world coordinates"),
+        ("--view-up", "direction that is up"),
+    ):
+        option(group, name, text, ("X", "Y", "Z"), float, nargs=3)
+    option(group, "--view-angle", "vertical, full", "DEGREES", float)
+    parallel = "half the viewport's height in world units; makes the projection parallel"
+    option(group, "--parallel-scale", parallel, "LENGTH", float)
+    option(group, "--camera-json", "Camera.to_dict() as JSON", "FILE")
+    option(group, "--azimuth", "turn by", "DEGREES", float, default=0.0)
+    option(group, "--elevation", "lift by", "DEGREES", float, default=0.0)
+
+
+def add_classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> None:
+    """Add how the volume looks; ``tables``: also its transfer function as a file."""
+    group = parser.add_argument_group(
+        "classification", "Names, defaults and meaning are those of PyVista's add_volume."
+    )
+    standard = "a standard transfer function; --cmap and --opacity change parts of it"
+    option(group, "--tf", standard, choices=tuple(TRANSFER_FUNCTIONS))
+    option(group, "--cmap", "colour map", "NAME")
+    option(group, "--opacity", "name, or values from 0 to 1", "NAME|A,B,...", parse_opacity)
+    option(group, "--clim", None, ("LOW", "HIGH"), float, nargs=2)
+    option(group, "--n-colors", None, "N", int)
+    switch(group, "--flip-scalars", default=None)
+    switch(group, "--log-scale", default=None)
+    option(group, "--opacity-unit-distance", None, "LENGTH", float)
+    option(group, "--scalars", "which array", "NAME")
+    option(group, "--preference", None, choices=("point", "cell"))
+    option(group, "--interpolation", None, choices=("nearest", "linear"))
+    switch(group, "--shade", "lit by a headlight", default=None)
+    for name in ("--ambient", "--diffuse", "--specular", "--specular-power"):
+        option(group, name, "of a shaded volume", "X", float)
+    if tables:
+        text = "TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista"
+        option(group, "--transfer-function", text, "FILE")
+
+
+def add_occlusion(parser: argparse.ArgumentParser) -> None:
+    """Add ambient occlusion."""
+    group = parser.add_argument_group("ambient occlusion", "Either option below turns it on, too.")
+    switch(group, "--ambient-occlusion", "darken what is hidden from the light around it")
+    radius = "how far something hides, model units (default: 0.05 of the bounds' diagonal)"
+    option(group, "--occlusion-radius", radius, "LENGTH", float)
+    strength = "0 to 1 (default: 0.1; 1 is darkest)"
+    option(group, "--occlusion-strength", strength, "S", float)
+
+
+def add_longest(options: Options, text: str | None = None) -> None:
+    """Add how long lists may be."""
+    option(options, "--max-supersegments", text, "N", int, default=20)
+
+
+def add_step(options: Options, text: str | None = None) -> None:
+    """Add how finely the volume is sampled."""
+    option(options, "--sample-distance", text, "LENGTH", float)
+
+
+def add_limits(parser: argparse.ArgumentParser) -> None:
+    """Add how much a VDI may hold, and how finely the volume is sampled."""
+    group = parser.add_argument_group("limits")
+    add_longest(group, "longest list (default: 20)")
+    option(
+        group,
+        "--criterion",
+        "where lists are cut: least-error (default), homogeneity, length, "
+        "transmittance or optical-depth",
+        "NAME",
+        default="least-error",
+    )
+    add_step(group, "step along the ray, model units (default: half the smallest spacing)")
+    option(group, "--tolerance", "error traded for length", kind=float, default=0.0)
+    cone = "half angle of the cone of new views to serve (default: 60)"
+    option(group, "--view-cone", cone, "DEGREES", float, default=60.0)
+    option(
+        group,
+        "--memory-limit",
+        "most memory to take on the device, like 2GiB; a volume that does not fit goes there "
+        "brick by brick (default: what the device has)",
+        "SIZE",
+        parse_bytes,
+    )
+
+
+def add_dial(parser: argparse.ArgumentParser) -> None:
+    """Add goals, from which the limits are chosen."""
+    group = parser.add_argument_group(
+        "dial",
+        "Choose lists, their length and precision from a short measurement on this device; --size "
+        "is then that of the pictures. Not with --max-supersegments, --tolerance or --precision.",
+    )
+    known = ", ".join(f"{ssim:g} ({name})" for name, ssim in QUALITIES.items() if ssim is not None)
+    option(
+        group,
+        "--quality",
+        f"SSIM of {known} against volume rendering; reference: what is made without a dial",
+        choices=tuple(QUALITIES),
+    )
+    option(group, "--target-ssim", "the same by a number", "S", float)
+    option(group, "--target-fps", "least full frames per second", "RATE", float)
+    option(group, "--max-bytes", "most bytes on the device; files are smaller", "N", float)
+    turn = f"turn of the view for which the SSIM is predicted (default: {TARGET_ANGLE:g})"
+    option(group, "--target-angle", turn, "DEGREES", float, default=TARGET_ANGLE)
+
+
+def add_format(parser: argparse.ArgumentParser) -> None:
+    """Add how a VDI is written."""
+    group = parser.add_argument_group("file")
+    option(
+        group,
+        "--compression",
+        "of .vdi: lz4 (default), zstd or none; of .exr: zips (default) or none; of .vti: lz4 "
+        "(default), zlib, lzma or none",
+        choices=("lz4", "zstd", "zips", "zlib", "lzma", "none"),
+    )
+    level = "1 (fast) to 9 (small); by default 9 for lz4 and 1 for the others"
+    option(group, "--level", level, "N", int)
+    option(
+        group,
+        "--precision",
+        "of .vdi: exact (24 bytes per supersegment before they are compressed; default of "
+        "generate), 16-byte or 8-byte; convert keeps what the file has",
+        choices=PRECISIONS,
+    )
+    standard = "leave out of an .exr what makes it exact: tau, and corrections"
+    switch(group, "--standard-channels", standard)
+
+
+def add_device(options: Options) -> None:
+    """Add the OpenCL device."""
+    option(options, "--device", "OpenCL device, see pyvista-vdi devices", "NAME")

@@ -11,28 +11,33 @@ from typing import Any, NoReturn
 
 from pyvista_vdi._version import __version__
 from pyvista_vdi.cli.options import (
+    VDI_FILE,
+    add_angles,
     add_camera,
     add_classification,
     add_device,
     add_dial,
+    add_file,
+    add_format,
     add_limits,
+    add_longest,
+    add_no_vtk,
     add_occlusion,
+    add_output,
+    add_repeats,
     add_size,
+    add_step,
     add_volume,
+    option,
     parse_color,
     parse_count,
-    parse_numbers,
     parse_rate,
     parse_size,
+    switch,
 )
-from pyvista_vdi.cli.tradeoff_options import add_sweep_options
-from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.standard_cases import ANGLES, ELEVATION, WINDOW_SIZE
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
-
-_VDI_FILE = "a .vdi file, an .exr deep image, or a VDI as .vti"
-_VDI_TARGET = ".vdi, .exr or .vti to write"
 
 
 class UsageError(Exception):
@@ -141,212 +146,193 @@ def _make_parser() -> tuple[_Parser, dict[str, _Parser]]:
 
 
 def _add_devices(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    switch(parser, "--json", "print JSON")
 
 
 def _add_info(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help=_VDI_FILE)
-    parser.add_argument("--json", action="store_true", help="print JSON, with all metadata")
+    add_file(parser)
+    switch(parser, "--json", "print JSON, with all metadata")
 
 
 def _add_generate(parser: argparse.ArgumentParser) -> None:
     add_volume(parser)
-    parser.add_argument("-o", "--output", metavar="FILE", required=True, help=_VDI_TARGET)
+    add_output(parser)
     add_size(parser, WINDOW_SIZE)
     add_camera(parser, f"the view that the volume fills, {ELEVATION:g} degrees above its middle")
     add_classification(parser)
     add_occlusion(parser)
     add_limits(parser)
     add_dial(parser)
-    _add_file(parser)
+    add_format(parser)
     add_device(parser)
 
 
 def _add_convert(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help=_VDI_FILE)
-    parser.add_argument("-o", "--output", metavar="FILE", required=True, help=_VDI_TARGET)
-    _add_file(parser)
+    add_file(parser)
+    add_output(parser)
+    add_format(parser)
     group = parser.add_argument_group("deep images of other programs")
-    group.add_argument(
-        "--camera-json",
-        metavar="FILE",
-        help="the view that the image shows, where it does not say it: Camera.to_dict() as JSON",
-    )
-    group.add_argument(
-        "--thickness",
-        type=float,
-        metavar="LENGTH",
-        help="world units, given to samples that have none (surfaces)",
-    )
+    view = "the view that the image shows, where it does not say it: Camera.to_dict() as JSON"
+    option(group, "--camera-json", view, "FILE")
+    thickness = "world units, given to samples that have none (surfaces)"
+    option(group, "--thickness", thickness, "LENGTH", float)
 
 
 def _add_paraview(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
+    switch(
+        parser,
         "--environment",
-        action="store_true",
-        help="print, for a shell's eval, the variables that make ParaView find this package and "
+        "print, for a shell's eval, the variables that make ParaView find this package and "
         "load the plugin",
     )
 
 
-def _add_file(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("file")
-    group.add_argument(
-        "--compression",
-        choices=("lz4", "zstd", "zips", "zlib", "lzma", "none"),
-        help="of .vdi: lz4 (default), zstd or none; of .exr: zips (default) or none; of .vti: lz4 "
-        "(default), zlib, lzma or none",
-    )
-    group.add_argument(
-        "--level",
-        type=int,
-        metavar="N",
-        help="1 (fast) to 9 (small); by default 9 for lz4 and 1 for the others",
-    )
-    group.add_argument(
-        "--precision",
-        choices=PRECISIONS,
-        help="of .vdi: exact (24 bytes per supersegment before they are compressed; default of "
-        "generate), 16-byte or 8-byte; convert keeps what the file has",
-    )
-    group.add_argument(
-        "--standard-channels",
-        action="store_true",
-        help="leave out of an .exr what makes it exact: tau, and corrections",
-    )
-
-
 def _add_render(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
+    option(
+        parser,
         "files",
-        nargs="+",
-        metavar="FILE",
-        help=f"{_VDI_FILE}; several are merged by depth, each where it was generated, and the "
+        f"{VDI_FILE}; several are merged by depth, each where it was generated, and the "
         "view and the size are those of the first unless they are given",
+        "FILE",
+        nargs="+",
     )
-    parser.add_argument("-o", "--output", metavar="FILE", required=True, help=".png to write")
+    add_output(parser, ".png to write")
     add_size(parser, None)
-    parser.add_argument(
+    option(
+        parser,
         "--background",
-        type=parse_color,
-        metavar="COLOR",
-        help="blend over this: a name, #rrggbb or R,G,B from 0 to 1; otherwise the picture is "
+        "blend over this: a name, #rrggbb or R,G,B from 0 to 1; otherwise the picture is "
         "transparent where the volume is",
+        "COLOR",
+        parse_color,
     )
-    parser.add_argument(
+    option(
+        parser,
         "--transmittance-cutoff",
-        type=float,
-        metavar="LIGHT",
-        help="end rays where less than this is left, 0 to below 1 (0.000001): what a channel may "
+        "end rays where less than this is left, 0 to below 1 (0.000001): what a channel may "
         "lose; VTK's mappers stop at about 0.004. For a single file",
+        "LIGHT",
+        float,
     )
     add_camera(parser, "the VDI's generating view")
     add_device(parser)
 
 
 def _add_view(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help=_VDI_FILE)
+    add_file(parser)
     add_size(parser, None)
-    parser.add_argument("--screenshot", metavar="FILE", help="write this .png, open no window")
+    option(parser, "--screenshot", "write this .png, open no window", "FILE")
     group = parser.add_argument_group("while the view moves")
-    group.add_argument(
-        "--target-fps",
-        type=parse_rate,
-        metavar="RATE",
-        default=30.0,
-        help="frames per second to keep, by fewer pixels; 0: every frame is full (default: 30)",
-    )
-    group.add_argument(
+    rate = "frames per second to keep, by fewer pixels; 0: every frame is full (default: 30)"
+    option(group, "--target-fps", rate, "RATE", parse_rate, default=30.0)
+    option(
+        group,
         "--regenerate",
+        "auto (default): say once that the view is beyond what the VDI was made to serve (a "
+        "file holds no volume to make another from); never: take it as it is",
         choices=("auto", "never"),
         default="auto",
-        help="auto (default): say once that the view is beyond what the VDI was made to serve (a "
-        "file holds no volume to make another from); never: take it as it is",
     )
-    group.add_argument(
+    switch(
+        group,
         "--status",
-        action="store_true",
-        help="show in a corner how it is drawn: pixels, frames per second, angle from the "
+        "show in a corner how it is drawn: pixels, frames per second, angle from the "
         "generating view",
     )
 
 
 def _add_compare(parser: argparse.ArgumentParser) -> None:
     add_volume(parser)
-    parser.add_argument("--out", metavar="FOLDER", default=".", help="where the files go")
+    option(parser, "--out", "where the files go", "FOLDER", default=".")
     add_size(parser, WINDOW_SIZE)
-    parser.add_argument(
-        "--angles",
-        type=parse_numbers,
-        metavar="A,B,...",
-        default=ANGLES,
-        help=f"degrees from V_O (default: {','.join(f'{a:g}' for a in ANGLES)})",
-    )
-    parser.add_argument(
-        "--repeats", type=parse_count, default=3, help="timed frames of each kind (default: 3)"
-    )
-    parser.add_argument("--no-vtk", action="store_true", help="leave out VTK's mappers")
+    add_angles(parser, f"degrees from V_O (default: {','.join(f'{a:g}' for a in ANGLES)})", ANGLES)
+    add_repeats(parser, "timed frames of each kind (default: 3)", 3, metavar=None)
+    add_no_vtk(parser)
     add_classification(parser, tables=False)
-    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
-    parser.add_argument("--sample-distance", type=float, metavar="LENGTH")
+    add_longest(parser)
+    add_step(parser)
     add_device(parser)
 
 
 def _add_benchmark(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
+    option(
+        parser,
         "--profile",
+        "quick (default): small volumes, minutes; full: the paper's sizes and all volumes at "
+        "hand, hours",
         choices=("quick", "full"),
         default="quick",
-        help="quick (default): small volumes, minutes; full: the paper's sizes and all volumes at "
-        "hand, hours",
     )
-    parser.add_argument(
+    option(
+        parser,
         "--out",
-        metavar="FILE",
+        ".json to write; a table (.md) and a plot (.png) go beside it (default: benchmark.json)",
+        "FILE",
         default="benchmark.json",
-        help=".json to write; a table (.md) and a plot (.png) go beside it (default: "
-        "benchmark.json)",
     )
-    parser.add_argument("--resume", action="store_true", help="go on with FILE where it was left")
-    parser.add_argument(
-        "--compare",
-        nargs=2,
-        metavar=("A", "B"),
-        help="measure nothing: say what changed between two files beyond noise",
-    )
+    switch(parser, "--resume", "go on with FILE where it was left")
+    changed = "measure nothing: say what changed between two files beyond noise"
+    option(parser, "--compare", changed, ("A", "B"), nargs=2)
     group = parser.add_argument_group("what is measured", "In place of the profile's.")
-    group.add_argument(
+    option(
+        group,
         "--datasets",
-        nargs="+",
-        metavar="NAME",
-        help="volumes known by name, and kingsnake_like, beechnut_like, richtmyer_meshkov_like: "
+        "volumes known by name, and kingsnake_like, beechnut_like, richtmyer_meshkov_like: "
         "made at the paper's sizes, or with @4 behind the name at a quarter along each edge",
+        "NAME",
+        nargs="+",
     )
-    group.add_argument(
+    option(
+        group,
         "--volume",
-        action="append",
-        metavar="[NAME=]FILE",
-        help="a file, may be repeated; a NAME of kingsnake, beechnut or richtmyer_meshkov says "
+        "a file, may be repeated; a NAME of kingsnake, beechnut or richtmyer_meshkov says "
         "that it is the paper's; raw files are named like x_1024x1024x795_uint8.raw",
+        "[NAME=]FILE",
+        action="append",
     )
-    group.add_argument("--sizes", nargs="+", type=parse_size, metavar="WxH", help="windows, pixels")
-    group.add_argument("--max-supersegments", nargs="+", type=parse_count, metavar="N")
-    group.add_argument("--angles", type=parse_numbers, metavar="A,B,...", help="degrees from V_O")
-    group.add_argument(
-        "--repeats", type=parse_count, metavar="N", help="timed frames of each kind and view (5)"
-    )
-    group.add_argument("--interpolation", choices=("nearest", "linear"), help="(nearest)")
-    group.add_argument("--seed", type=parse_count, metavar="N", help="of the made volumes (1)")
-    group.add_argument(
-        "--tables", nargs="+", type=int, choices=(1, 2), help="which of the paper's tables (both)"
-    )
-    parser.add_argument("--no-vtk", action="store_true", help="leave out VTK's mappers")
+    option(group, "--sizes", "windows, pixels", "WxH", parse_size, nargs="+")
+    option(group, "--max-supersegments", None, "N", parse_count, nargs="+")
+    add_angles(group, "degrees from V_O")
+    add_repeats(group, "timed frames of each kind and view (5)")
+    option(group, "--interpolation", "(nearest)", choices=("nearest", "linear"))
+    option(group, "--seed", "of the made volumes (1)", "N", parse_count)
+    tables = "which of the paper's tables (both)"
+    option(group, "--tables", tables, kind=int, nargs="+", choices=(1, 2))
+    add_no_vtk(parser)
     add_device(parser)
 
 
 def _add_tradeoff(parser: argparse.ArgumentParser) -> None:
     add_volume(parser)
-    add_sweep_options(parser)
+    results = "where tradeoff-NAME.json (every figure), .md (tables) and .png (plot) go"
+    option(parser, "--out", results, "FOLDER", default=".")
+    option(parser, "--name", "in place of the volume's own, for several runs of one")
+    switch(parser, "--resume", "go on with what is there")
+    switch(parser, "--quick", "fewer settings and angles in a smaller window")
+    parser.add_argument(
+        "--size",
+        "--window-size",
+        type=parse_size,
+        metavar="WxH",
+        help="of all frames, pixels (default: 640x360; with --quick 320x180)",
+    )
+    add_angles(parser, "degrees from V_O (default: 5,30,60; with --quick 5,30)")
+    option(
+        parser,
+        "--sweep",
+        "which settings, with values other than the usual ones: max-supersegments, "
+        "tolerance, lists (along an edge, per pixel), precision, skip-empty, preview (share of the "
+        "pixels along an edge); and on request criterion, view-cone, sample-distance (voxels)",
+        "AXIS[=A,B,...]",
+        nargs="+",
+    )
+    among = parser.add_mutually_exclusive_group()
+    switch(among, "--alone", "change one setting at a time, and no two together")
+    switch(among, "--product", "measure every combination")
+    add_repeats(parser, "timed frames (default: 5)", 5)
+    generations = "timed generations of each VDI (default: 5)"
+    option(parser, "--generations", generations, "N", parse_count, default=5)
+    add_no_vtk(parser)
     add_classification(parser)
     add_device(parser)
 

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import warnings
+
+import numpy as np
 
 from pyvista_vdi.api import read
 from pyvista_vdi.api import render as render_vdi
 from pyvista_vdi.cli.inputs import camera
 from pyvista_vdi.cli.text import printable
+from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.io import checked_png_target, to_bytes, write_png
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.plotting.imports import import_pyvista
 
 
 def render(options: argparse.Namespace) -> int:
@@ -17,23 +23,16 @@ def render(options: argparse.Namespace) -> int:
     vdis = [read(file) for file in options.files]
     first = vdis[0]
     view = camera(options, first.camera)
-    if len(vdis) == 1:
-        image = render_vdi(
-            first,
-            view,
-            options.size,
-            transmittance_cutoff=options.transmittance_cutoff,
-            device=options.device,
-        )
-    else:
-        image = render_vdi(
-            vdis,
-            view,
-            options.size or first.window_size,
-            model_transforms=[vdi.camera.model_transform for vdi in vdis],
-            transmittance_cutoff=options.transmittance_cutoff,
-            device=options.device,
-        )
+    several = len(vdis) > 1
+    transforms = [vdi.camera.model_transform for vdi in vdis]
+    image = render_vdi(
+        vdis if several else first,
+        view,
+        options.size or first.window_size,
+        model_transforms=transforms if several else None,
+        transmittance_cutoff=options.transmittance_cutoff,
+        device=options.device,
+    )
     write_png(to_bytes(image, options.background), target)
     print(f"{printable(options.output)}: {image.shape[1]} x {image.shape[0]}")
     return 0
@@ -45,16 +44,47 @@ def view(options: argparse.Namespace) -> int:
     if options.screenshot is not None:
         screenshot = str(checked_png_target(options.screenshot))
     vdi = read(options.file)
-    from pyvista_vdi.plotting.cli_support import show
-
-    show(
-        vdi,
-        options.size,
-        screenshot,
-        target_fps=options.target_fps,
-        regenerate=options.regenerate,
-        status=options.status,
-    )
+    _show(vdi, options, screenshot)
     if screenshot is not None:
         print(f"{printable(options.screenshot)}: written")
     return 0
+
+
+def _show(vdi: VDI, options: argparse.Namespace, screenshot: str | None) -> None:
+    """Open a plotter that shows a VDI from its own view, or write what it shows.
+
+    No file is written where the picture cannot be drawn or is interrupted.
+    """
+    pv = import_pyvista()
+    with pv.vtk_verbosity("off"):
+        plotter = pv.Plotter(
+            off_screen=screenshot is not None, window_size=list(options.size or vdi.window_size)
+        )
+    try:
+        actor = plotter.add_vdi(
+            vdi,
+            target_fps=options.target_fps,
+            regenerate=options.regenerate,
+            status=options.status,
+        )
+        view, camera = vdi.camera, plotter.camera
+        camera.position, camera.focal_point = view.position, view.focal_point
+        camera.up = view.view_up
+        camera.SetUseHorizontalViewAngle(view.use_horizontal_view_angle)
+        camera.view_angle = view.view_angle
+        camera.parallel_projection = view.parallel_projection
+        camera.parallel_scale = view.parallel_scale
+        camera.SetWindowCenter(*view.window_center)
+        plotter.renderer.reset_camera_clipping_range()
+        if screenshot is None:
+            plotter.show()
+            return
+        with warnings.catch_warnings():
+            # The error itself is raised below
+            warnings.filterwarnings("ignore", "the VDI cannot be drawn", VDIWarning)
+            warnings.filterwarnings("ignore", "generating the VDI was interrupted", VDIWarning)
+            picture = plotter.screenshot(return_img=True)
+        actor.mapper.painter.raise_trouble()
+        write_png(np.asarray(picture), screenshot)
+    finally:
+        plotter.close()

@@ -12,3 +12,8 @@ def printable(text: object) -> str:
     return "".join(
         c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in str(text)
     )
+
+
+def mebibytes(n: int) -> str:
+    """Return bytes in MiB."""
+    return f"{n / 2**20:.1f} MiB"

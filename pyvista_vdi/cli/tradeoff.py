@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi.cli.inputs import classification, read_volume, volume_name
-from pyvista_vdi.cli.text import printable
-from pyvista_vdi.cli.tradeoff_options import ANGLES, SIZES
-from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-from pyvista_vdi.io import check_writable, whole_file
-from pyvista_vdi.measure.benchmark.datasets import look
-from pyvista_vdi.measure.tradeoff import AXES, Setting, Tradeoff, measure_tradeoff, sweep
-from pyvista_vdi.measure.tradeoff.report import describe, summary
+from pyvista_vdi.cli.inputs import (
+    classification,
+    has_vtk,
+    measuring,
+    output_files,
+    read_volume,
+    require_new,
+    say_written,
+    volume_name,
+)
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.measure.report import write_text
+from pyvista_vdi.measure.tradeoff import AXES, Setting, measure_tradeoff, sweep
+from pyvista_vdi.measure.tradeoff.report import summary
 from pyvista_vdi.measure.tradeoff.settings import DEFAULT_AXES, QUICK_AXES
+from pyvista_vdi.measure.volumes import look
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.plotting.progress import DelayedBar
+
+#: Frames and views, without and with ``--quick``.
+_SIZES = ((640, 360), (320, 180))
+_ANGLES = ((5.0, 30.0, 60.0), (5.0, 30.0))
 
 #: How the volume looks where nothing is said: a ramp from transparent black to opaque white, which
 #: needs no PyVista.
@@ -34,21 +43,16 @@ def tradeoff(options: argparse.Namespace) -> int:
     name = options.name or volume_name(options)
     if Path(name).name != name:
         raise InvalidArgumentError(f"--name becomes a file's, without a folder; got {name!r}")
-    files = _checked_files(Path(options.out), f"tradeoff-{name}", resume=options.resume)
+    files = output_files(options, f"tradeoff-{name}", "json", "md", "png")
+    require_new(files["json"], options)
     volume = read_volume(options)
-    for chosen in ("scalars", "preference"):  # the array is one of the file's by now
-        arguments.pop(chosen, None)
-    vtk = not options.no_vtk
-    if vtk and find_spec("vtkmodules") is None:
-        print("VTK is not installed: its mappers are left out", file=sys.stderr)
-        vtk = False
-    bar = DelayedBar(label="tradeoff")
-    try:
+    vtk = has_vtk(options)
+    with measuring("tradeoff", files["json"]) as bar:
         found = measure_tradeoff(
             volume,
             settings,
-            window_size=options.size or SIZES[options.quick],
-            angles=options.angles or ANGLES[options.quick],
+            window_size=options.size or _SIZES[options.quick],
+            angles=options.angles or _ANGLES[options.quick],
             repeats=options.repeats,
             generations=options.generations,
             vtk=vtk,
@@ -59,18 +63,13 @@ def tradeoff(options: argparse.Namespace) -> int:
             progress=bar,
             **_looks(arguments, volume),
         )
-    except KeyboardInterrupt:
-        if files["json"].exists():
-            print(
-                f"\nWhat was measured is in {printable(files['json'])}: --resume goes on",
-                file=sys.stderr,
-            )
-        raise
-    finally:
-        bar.close()
-    print(summary(found))
-    written = _write_tables(found, files)
-    print("Written: " + ", ".join(printable(path) for path in written))
+    print(summary(found.points))
+    write_text(files["md"], found.table())
+    if find_spec("matplotlib") is None or not found.points:
+        del files["png"]
+    else:
+        found.save_plot(files["png"])
+    say_written(files.values())
     return 0
 
 
@@ -118,29 +117,3 @@ def _looks(arguments: dict[str, Any], volume: Volume) -> dict[str, Any]:
         return arguments
     interpolation = arguments.get("interpolation", "nearest")
     return {"transfer_function": look(_DEFAULT_LOOK, volume.finite_range(), interpolation)}
-
-
-def _checked_files(folder: Path, stem: str, *, resume: bool) -> dict[str, Path]:
-    """Return where the files go, after finding that they can be written there."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise VDIFileError(
-            f"the folder {folder} cannot be made: {error.strerror}; choose another --out"
-        ) from error
-    files = {kind: check_writable(folder / f"{stem}.{kind}") for kind in ("json", "md", "png")}
-    if files["json"].exists() and not resume:
-        raise InvalidArgumentError(
-            f"{files['json']} is there already: --resume goes on with it, or choose another --out"
-        )
-    return files
-
-
-def _write_tables(found: Tradeoff, files: dict[str, Path]) -> list[Path]:
-    """Write the Markdown, and the plot where Matplotlib is installed."""
-    with whole_file(files["md"]) as stream:
-        stream.write(describe(found).encode())
-    written = [files["json"], files["md"]]
-    if find_spec("matplotlib") is not None and found.points:
-        written.append(found.save_plot(files["png"]))
-    return written

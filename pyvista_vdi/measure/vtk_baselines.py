@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from pyvista_vdi.errors import DeviceError, InvalidArgumentError, MissingDepende
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.plotting.imports import explain_import_error, import_pyvista
 
 #: VTK's mappers by the names that ``Plotter.add_volume(mapper=...)`` has for them.
 MAPPERS = ("gpu", "fixed_point")
@@ -23,73 +25,14 @@ _WINDOW_REMEDY = (
     "libgl1-mesa-dri' or 'libosmesa6', or leave VTK out with --no-vtk"
 )
 
-#: Debian's packages of the libraries that VTK's wheels link to and do not bring.
-_PACKAGES = {
-    "libGL.so.1": "libgl1",
-    "libEGL.so.1": "libegl1",
-    "libX11.so.6": "libx11-6",
-    "libXrender.so.1": "libxrender1",
-    "libXcursor.so.1": "libxcursor1",
-    "libXft.so.2": "libxft2",
-    "libXt.so.6": "libxt6",
-    "libSM.so.6": "libsm6",
-    "libICE.so.6": "libice6",
-}
 
+class VTKBaseline:
+    """One volume in one of VTK's mappers, "gpu" or "fixed_point", in an off-screen window.
 
-def explain_import_error(error: ImportError) -> MissingDependencyError:
-    """Return the error that tells how to make VTK importable.
-
-    Parameters
-    ----------
-    error : ImportError
-        What ``import vtk`` raised.
-
-    Returns
-    -------
-    MissingDependencyError
-        It names the Debian package of a system library that is missing, or VTK itself.
-    """
-    text = str(error)
-    for library, package in _PACKAGES.items():
-        if library in text:
-            return MissingDependencyError(
-                f"VTK cannot be loaded, because the system library {library} is missing: on "
-                f"Debian and Ubuntu install '{package}' (and 'libegl1 libgl1-mesa-dri' to render "
-                "off-screen)"
-            )
-    return MissingDependencyError(
-        f'VTK cannot be loaded ({text}): install it by pip install "pyvista-vdi[plot]"'
-    )
-
-
-class PeerRenderer:
-    """One volume in one of VTK's mappers, in an off-screen window of its own.
-
-    Parameters
-    ----------
-    volume : Volume
-        What is drawn.
-    volume_property : vtkVolumeProperty
-        How it looks.
-    window_size : (int, int)
-        Width and height in pixels.
-    mapper : {"gpu", "fixed_point"}
-        ``vtkGPUVolumeRayCastMapper`` or ``vtkFixedPointVolumeRayCastMapper``.
-    sample_distance : float
-        Length of a step along the ray, world units; VTK does not adjust it.
-
-    Raises
-    ------
-    MissingDependencyError
-        If VTK or an off-screen window cannot be had; the message names the system packages.
-    InvalidArgumentError
-        If the mapper is unknown or cannot draw the volume.
-
-    Notes
-    -----
+    ``sample_distance`` is the length of a step along the ray, world units; VTK does not adjust it.
     The framebuffer has eight bits per channel, so a picture is within half of 1/255 of what VTK
     computed. Its rays start half a step from ours at most; at converged steps this is invisible.
+    Without VTK or an off-screen window MissingDependencyError names the system packages.
     """
 
     def __init__(
@@ -144,22 +87,9 @@ class PeerRenderer:
         self._window.WaitForCompletion()
 
     def image(self, camera: Camera) -> NDArray[np.float32]:
-        """Draw a frame and read it.
+        """Return a frame: RGB over black, float32 (H, W, 3), top row first, in steps of 1/255.
 
-        Parameters
-        ----------
-        camera : Camera
-            The view.
-
-        Returns
-        -------
-        numpy.ndarray
-            RGB over black, float32 (H, W, 3), top row first, in steps of 1/255.
-
-        Raises
-        ------
-        DeviceError
-            If the picture is blank: VTK has drawn nothing.
+        A blank one, in which VTK has drawn nothing, raises DeviceError.
         """
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
@@ -185,6 +115,8 @@ class PeerRenderer:
         self._window.Finalize()
 
     def _look(self, camera: Camera) -> None:
+        from vtkmodules.vtkCommonMath import vtkMatrix4x4
+
         active = self._renderer.GetActiveCamera()
         active.SetPosition(camera.position)
         active.SetFocalPoint(camera.focal_point)
@@ -194,23 +126,14 @@ class PeerRenderer:
         active.SetParallelProjection(camera.parallel_projection)
         active.SetParallelScale(camera.parallel_scale)
         active.SetWindowCenter(*camera.window_center)
-        self._volume.SetUserMatrix(_matrix(camera.model_transform))
+        matrix = vtkMatrix4x4()
+        matrix.DeepCopy(camera.model_transform.ravel().tolist())
+        self._volume.SetUserMatrix(matrix)
         self._renderer.ResetCameraClippingRange()
 
 
 def image_from_volume(volume: Volume) -> Any:
-    """Return a volume as a ``vtkImageData`` that shares its memory.
-
-    Parameters
-    ----------
-    volume : Volume
-        Scalars, spacing, origin and direction.
-
-    Returns
-    -------
-    vtkImageData
-        The same grid; the scalars are its active point scalars.
-    """
+    """Return a volume as a ``vtkImageData`` that shares its memory."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonDataModel import vtkImageData
 
@@ -227,24 +150,9 @@ def image_from_volume(volume: Volume) -> Any:
 
 
 def property_from_transfer_function(volume: Volume, table: TransferFunction) -> Any:
-    """Return the property with which VTK's mappers draw a volume as our raycaster does.
+    """Return the ``vtkVolumeProperty`` with which VTK draws a volume as our raycaster does.
 
-    Parameters
-    ----------
-    volume : Volume
-        What is drawn; it gives the unit distance where the table has none.
-    table : TransferFunction
-        Without shading and gradient opacity.
-
-    Returns
-    -------
-    vtkVolumeProperty
-        With a node at every entry of the table.
-
-    Raises
-    ------
-    MissingDependencyError
-        If VTK cannot be loaded.
+    ``table`` is without shading and gradient opacity; the property has a node at each entry.
     """
     try:
         from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
@@ -264,24 +172,42 @@ def property_from_transfer_function(volume: Volume, table: TransferFunction) -> 
     return prop
 
 
+def add_volume_property(volume: Volume, arguments: Mapping[str, Any]) -> Any:
+    """Return the property that ``Plotter.add_volume`` makes of arguments and ``interpolation``."""
+    pv = import_pyvista()
+    from pyvista_vdi.plotting.convert import to_image_data
+
+    arguments = dict(arguments)
+    interpolation = arguments.pop("interpolation", "nearest")
+    # VTK warns that there is no X server while it looks for a window that can do without
+    with pv.vtk_verbosity("off"):
+        plotter = pv.Plotter(off_screen=True)
+    try:
+        grid = to_image_data(volume)
+        prop = plotter.add_volume(grid, show_scalar_bar=False, render=False, **arguments).prop
+    finally:
+        plotter.close()
+    if interpolation == "linear":
+        prop.SetInterpolationTypeToLinear()
+    else:
+        prop.SetInterpolationTypeToNearest()
+    return prop
+
+
 def _make_mapper(name: str) -> Any:
     try:
         from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
         from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
     except ImportError as error:
         raise explain_import_error(error) from error
-    if name == "gpu":
-        gpu = vtkOpenGLGPUVolumeRayCastMapper()
-        gpu.SetAutoAdjustSampleDistances(False)
-        gpu.SetLockSampleDistanceToInputSpacing(False)
-        gpu.SetUseJittering(False)
-        gpu.SetImageSampleDistance(1.0)
-        return gpu
-    fixed_point = vtkFixedPointVolumeRayCastMapper()
-    fixed_point.SetAutoAdjustSampleDistances(False)
-    fixed_point.SetLockSampleDistanceToInputSpacing(False)
-    fixed_point.SetImageSampleDistance(1.0)
-    return fixed_point
+    gpu = name == "gpu"
+    mapper = vtkOpenGLGPUVolumeRayCastMapper() if gpu else vtkFixedPointVolumeRayCastMapper()
+    mapper.SetAutoAdjustSampleDistances(False)
+    mapper.SetLockSampleDistanceToInputSpacing(False)
+    mapper.SetImageSampleDistance(1.0)
+    if gpu:
+        mapper.SetUseJittering(False)
+    return mapper
 
 
 def _off_screen_window(size: tuple[int, int]) -> Any:
@@ -305,11 +231,3 @@ def _off_screen_window(size: tuple[int, int]) -> Any:
         if window.SupportsOpenGL():
             return window
     raise MissingDependencyError(f"VTK finds no OpenGL to render with: {_WINDOW_REMEDY}")
-
-
-def _matrix(values: NDArray[np.float64]) -> Any:
-    from vtkmodules.vtkCommonMath import vtkMatrix4x4
-
-    matrix = vtkMatrix4x4()
-    matrix.DeepCopy(values.ravel().tolist())
-    return matrix

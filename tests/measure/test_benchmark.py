@@ -16,7 +16,9 @@ from json_schema import read_checked
 from pyvista_vdi import cli, examples
 from pyvista_vdi.cli import parser
 from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError, InvalidVolumeError
-from pyvista_vdi.measure.benchmark import (
+from pyvista_vdi.measure.clock import rank_sum_chance
+from pyvista_vdi.measure.compare.bounds import SSIM_TO_VTK
+from pyvista_vdi.measure.paper import (
     PROFILES,
     Plan,
     Results,
@@ -28,11 +30,9 @@ from pyvista_vdi.measure.benchmark import (
     read_results,
     session,
 )
-from pyvista_vdi.measure.benchmark import datasets as datasets_module
-from pyvista_vdi.measure.benchmark.changes import rank_sum_chance
-from pyvista_vdi.measure.benchmark.paper import paper_tables, paper_targets
-from pyvista_vdi.measure.benchmark.procedural import PROCEDURAL, make
-from pyvista_vdi.measure.compare.bounds import SSIM_TO_VTK
+from pyvista_vdi.measure.paper.procedural import PROCEDURAL, make
+from pyvista_vdi.measure.paper.published import paper_tables, paper_targets
+from pyvista_vdi.measure.volumes import read_file
 
 SCHEMA = Path(__file__).parents[2] / "docs" / "benchmark_schema.json"
 
@@ -485,4 +485,4 @@ def test_raw_files_must_say_what_they_hold(tmp_path):
     ]:
         (tmp_path / name).write_bytes(b"12345")
         with pytest.raises(InvalidVolumeError, match=message):
-            datasets_module.read_file(tmp_path / name)
+            read_file(tmp_path / name)

@@ -41,7 +41,7 @@ def measured(volume, default_runtime):
 @pytest.fixture(scope="module")
 def peer_property(volume):
     pytest.importorskip("pyvista")
-    from pyvista_vdi.plotting.cli_support import add_volume_property
+    from pyvista_vdi.measure.vtk_baselines import add_volume_property
 
     return add_volume_property(volume, LOOKS)
 
@@ -97,7 +97,7 @@ def test_the_report_becomes_json_and_text(measured):
 @pytest.mark.parametrize("mapper", ["gpu", "fixed_point"])
 @pytest.mark.parametrize("parallel", [False, True])
 def test_peers_see_the_view_as_we_do(mapper, parallel, volume, peer_property, default_runtime):
-    from pyvista_vdi.measure.vtk_baselines import PeerRenderer
+    from pyvista_vdi.measure.vtk_baselines import VTKBaseline
 
     matrix = np.diag([1.0, -1.3, 0.8, 1.0])  # mirrored, scaled
     matrix[:3, 3] = (0.5, 2.0, -1.0)
@@ -112,7 +112,7 @@ def test_peers_see_the_view_as_we_do(mapper, parallel, volume, peer_property, de
         window_center=(0.1, -0.2),
         model_transform=matrix,
     )
-    peer = PeerRenderer(volume, peer_property, SIZE, mapper, 0.2)
+    peer = VTKBaseline(volume, peer_property, SIZE, mapper, 0.2)
     try:
         theirs = peer.image(camera)
     finally:
@@ -206,7 +206,7 @@ def test_a_vtk_that_cannot_be_loaded_names_the_package(text, message):
 def test_a_machine_without_opengl_names_the_packages(volume, peer_property, monkeypatch):
     from vtkmodules import vtkRenderingOpenGL2
 
-    from pyvista_vdi.measure.vtk_baselines import PeerRenderer
+    from pyvista_vdi.measure.vtk_baselines import VTKBaseline
 
     class NoWindow:
         def __getattr__(self, name):
@@ -221,7 +221,7 @@ def test_a_machine_without_opengl_names_the_packages(volume, peer_property, monk
         MissingDependencyError,
         match="VTK finds no OpenGL .* 'libegl1 libgl1-mesa-dri' or 'libosmesa6'.* --no-vtk",
     ):
-        PeerRenderer(volume, peer_property, SIZE, "gpu", 0.5)
+        VTKBaseline(volume, peer_property, SIZE, "gpu", 0.5)
 
 
 @pytest.mark.gl

@@ -90,14 +90,14 @@ def coloured(volume):
 @pytest.mark.parametrize("name", list(CASES))
 def test_pictures_are_those_of_vtk(name, default_runtime):
     pytest.importorskip("pyvista")
-    from pyvista_vdi.measure.vtk_baselines import PeerRenderer
+    from pyvista_vdi.measure.vtk_baselines import VTKBaseline
 
     case = CASES[name]
     volume = examples.load_brain(as_volume=True)
     if case.get("rgba"):
         volume = coloured(volume)
     prop = the_property(volume, case)
-    peer = PeerRenderer(volume, prop, WINDOW, "gpu", min(volume.spacing) / 2)
+    peer = VTKBaseline(volume, prop, WINDOW, "gpu", min(volume.spacing) / 2)
     lights = None
     if "lights" in case:
         put_lights(peer.renderer, case["lights"])

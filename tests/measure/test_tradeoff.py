@@ -178,7 +178,7 @@ def test_python_and_the_command_measure_the_same(default_runtime, folder, tmp_pa
     run = (folder / "ball_20x18x14_uint8.raw", *TINY_RUN, "--sweep", "lists=0.5", "--no-vtk")
     assert tradeoff(*run, "--out", tmp_path, "--device", default_runtime.info.selector) == 0
     commanded = Tradeoff.read(tmp_path / "tradeoff-ball_20x18x14_uint8.json")
-    table = pvdi.measure.benchmark.datasets.look("ramp", (0.0, 255.0), "nearest")
+    table = pvdi.measure.volumes.look("ramp", (0.0, 255.0), "nearest")
     ours = measure_tradeoff(
         pvdi.Volume(shell()),
         sweep({"lists": (0.5,)}),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pyvista_vdi.measure.compare.bounds import Check, judge_times, judge_vdi, judge_vtk
 from pyvista_vdi.measure.compare.measure import AngleResult, Report, Settings, Timing, measure
 from pyvista_vdi.measure.compare.sheet import contact_sheet, table
-from pyvista_vdi.measure.compare.system import describe_system
 
 __all__ = [
     "AngleResult",
@@ -14,7 +13,6 @@ __all__ = [
     "Settings",
     "Timing",
     "contact_sheet",
-    "describe_system",
     "judge_times",
     "judge_vdi",
     "judge_vtk",

@@ -1,8 +1,7 @@
 """What the standard cases must reach: the bounds of the project, and whether a report keeps them.
 
 A bound applies to the standard cases (:mod:`pyvista_vdi.model.standard_cases`) with 20
-supersegments in
-1280 x 720; at other sizes a report can be judged by them, but they promise nothing there.
+supersegments in 1280 x 720; at other sizes it promises nothing.
 """
 
 from __future__ import annotations

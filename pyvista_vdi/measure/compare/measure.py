@@ -8,9 +8,7 @@ frame each that is not counted, and the median is reported.
 
 from __future__ import annotations
 
-import math
 import statistics
-import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
@@ -18,17 +16,24 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.compare.system import describe_system
+from pyvista_vdi.measure.clock import Step, Times, take_turns
+from pyvista_vdi.measure.report import describe_system, without_infinities
+from pyvista_vdi.measure.session import (
+    WARM_UP_SIZE,
+    Image,
+    Steps,
+    check_angles,
+    check_count,
+    seen,
+)
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.metrics import Comparison, compare_images
 from pyvista_vdi.model.standard_cases import ANGLES, WINDOW_SIZE, filling_camera
-from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.raycast import render_vdi
@@ -42,14 +47,15 @@ NAMES = {
     "fixed_point": "VTK fixed-point mapper",
 }
 
-#: Window in which everything is drawn once before anything is timed, pixels.
-_WARM_UP_SIZE = (64, 36)
+#: What to do where the volume is not seen.
+_TRANSPARENT = (
+    ": the transfer function leaves the whole volume transparent; choose another opacity or clim"
+)
 
 #: Bytes of a supersegment in the dense, uncompressed form that sizes are compared with.
 _DENSE_BYTES = 24
 
-Images = dict[str, NDArray[np.float32]]
-Progress = Callable[[float], object]
+Images = dict[str, Image]
 
 
 @dataclass(frozen=True)
@@ -89,12 +95,8 @@ class Settings:
     name: str = "volume"
 
     def __post_init__(self) -> None:
-        if isinstance(self.repeats, bool) or not 0 <= self.repeats <= 1000:
-            raise InvalidArgumentError(f"repeats must be from 0 to 1000; got {self.repeats!r}")
-        if not self.angles or not all(math.isfinite(a) for a in self.angles):
-            raise InvalidArgumentError(
-                f"angles must be one or more numbers of degrees; got {self.angles!r}"
-            )
+        check_count("repeats", self.repeats, least=0)
+        check_angles(self.angles)
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,11 @@ class Timing:
 
     median: float
     worst: float
+
+    @classmethod
+    def of(cls, taken: Times) -> Timing:
+        """Return what repetitions by the wall's clock come to."""
+        return cls(statistics.median(taken["clock"]), max(taken["clock"]))
 
 
 @dataclass(frozen=True)
@@ -188,7 +195,7 @@ class Report:
 
 
 def measure(
-    volume: Volume, settings: Settings, progress: Progress | None = None
+    volume: Volume, settings: Settings, progress: Callable[[float], object] | None = None
 ) -> tuple[Report, VDI, dict[float, Images]]:
     """Render one volume in every way, compare the pictures and time the frames.
 
@@ -220,56 +227,55 @@ def measure(
         If the transfer function leaves nothing to see.
     """
     looks = Classification(settings.classification, "compare")
-    table = looks.transfer_function(volume)
-    bench = _Bench(volume, table, settings)
-    done = _Counter(progress, bench.n_steps)
     with ExitStack() as stack:
-        peers = _peers(volume, settings, bench.step) if settings.vtk else {}
-        for peer in peers.values():
-            stack.callback(peer.close)
-        vdi, generation, full_raycast = bench.generate(done)
-        images = {angle: bench.images(vdi, angle, peers, done) for angle in settings.angles}
-        results = [
-            _judged(angle, images[angle], bench.frame_times(vdi, angle, peers, done))
-            for angle in settings.angles
-        ]
-        system = _system(settings, peers)
-    report = Report(
-        case=_case(volume, settings, looks, bench),
-        system=system,
-        sizes=_sizes(volume, vdi, settings),
-        generation_seconds=generation,
-        full_raycast_seconds=full_raycast,
-        angles=results,
-    )
-    return report, vdi, images
+        return _Bench(volume, settings, looks, progress).everything(stack)
 
 
 class _Bench:
-    """Our side of the comparison: one volume, one table, one generating view."""
+    """One volume, one table and one generating view, and everybody who draws them."""
 
-    def __init__(self, volume: Volume, table: TransferFunction, settings: Settings) -> None:
-        self._volume, self._table, self._settings = volume, table, settings
+    def __init__(
+        self, volume: Volume, settings: Settings, looks: Classification, progress: Any
+    ) -> None:
+        self._volume, self._settings = volume, settings
+        self._table = looks.transfer_function(volume)
+        self._looks = looks.describe()
         self.voxel = min(volume.spacing)
         self.step = settings.sample_distance or self.voxel / 2
         self.view = filling_camera(volume.bounds, settings.window_size)
         self._device = get_runtime(settings.device)
+        self._baselines: dict[str, Any] = {}
+        repeats = settings.repeats
+        a_view = (4 if settings.vtk else 2) * (1 + (1 + repeats if repeats else 0))
+        steps = Steps(progress, 2 * repeats + len(settings.angles) * a_view)
+        self._done = partial(steps, finished=1)
 
-    @property
-    def n_steps(self) -> int:
-        """How often the progress is reported."""
-        n_angles, n_candidates = len(self._settings.angles), 4 if self._settings.vtk else 2
-        repeats = self._settings.repeats
-        frames = 1 + repeats if repeats else 0
-        return 2 * repeats + n_angles * n_candidates * (1 + frames)
+    def everything(self, stack: ExitStack) -> tuple[Report, VDI, dict[float, Images]]:
+        """Generate, draw and time; ``stack`` closes VTK's windows."""
+        settings = self._settings
+        if settings.vtk:
+            self._baselines = _baselines(self._volume, settings, self.step)
+            for baseline in self._baselines.values():
+                stack.callback(baseline.close)
+        vdi, generation, full_raycast = self._timed_generation()
+        images = {angle: self._images(vdi, angle) for angle in settings.angles}
+        results = [
+            _judged(angle, images[angle], self._frame_times(vdi, angle))
+            for angle in settings.angles
+        ]
+        system = describe_system(settings.device)
+        if self._baselines:
+            system["opengl"] = self._baselines["gpu"].opengl
+        report = Report(self._case(), system, self._sizes(vdi), generation, full_raycast, results)
+        return report, vdi, images
 
-    def generate(self, done: Callable[[], None]) -> tuple[VDI, Timing | None, Timing | None]:
+    def _timed_generation(self) -> tuple[VDI, Timing | None, Timing | None]:
         """Generate the VDI, in turn with a full raycast at the same step where that is timed."""
         size = self._settings.window_size
         if self._settings.repeats == 0:
             return self._generated(size), None, None
-        self._generated(_WARM_UP_SIZE)
-        self._raycast(self.view, _WARM_UP_SIZE, self.step, early_termination=False)
+        self._generated(WARM_UP_SIZE)
+        self._raycast(self.view, WARM_UP_SIZE, self.step, early_termination=False)
         vdi: list[VDI] = []
 
         def generate() -> None:
@@ -278,50 +284,39 @@ class _Bench:
         def raycast() -> None:
             self._raycast(self.view, size, self.step, early_termination=False)
 
-        seconds = _take_turns(
-            {"generate": generate, "raycast": raycast}, self._settings.repeats, done
-        )
-        return vdi[0], seconds["generate"], seconds["raycast"]
+        work = {"generate": generate, "raycast": raycast}
+        taken = take_turns(work, self._settings.repeats, warm_up=False, done=self._done)
+        return vdi[0], Timing.of(taken["generate"]), Timing.of(taken["raycast"])
 
-    def images(
-        self, vdi: VDI, angle: float, peers: Mapping[str, Any], done: Callable[[], None]
-    ) -> Images:
+    def _images(self, vdi: VDI, angle: float) -> Images:
         """Render the accurate pictures of one view."""
         camera, size = self.view.azimuth(angle), self._settings.window_size
         images: Images = {}
-        for name, peer in peers.items():
-            peer.set_sample_distance(self.step)
-            images[name] = peer.image(camera)
-            done()
+        for name, baseline in self._baselines.items():
+            baseline.set_sample_distance(self.step)
+            images[name] = baseline.image(camera)
+            self._done()
         images["raycaster"] = self._raycast(camera, size, self.step)
-        done()
+        self._done()
         images["vdi"] = render_vdi(vdi, camera, size, device=self._device)
-        done()
-        if not images["raycaster"].any():
-            raise InvalidArgumentError(
-                f"nothing is to be seen at {angle:g} degrees: the transfer function leaves the "
-                "whole volume transparent; choose another opacity or clim"
-            )
+        self._done()
+        seen(images["raycaster"], angle, _TRANSPARENT)
         return images
 
-    def frame_times(
-        self, vdi: VDI, angle: float, peers: Mapping[str, Any], done: Callable[[], None]
-    ) -> dict[str, Timing]:
+    def _frame_times(self, vdi: VDI, angle: float) -> dict[str, Timing]:
         """Time frames at steps of one voxel."""
         if self._settings.repeats == 0:
             return {}
         camera, size = self.view.azimuth(angle), self._settings.window_size
-        frames: dict[str, Callable[[], Any]] = {
+        frames: dict[str, Step] = {
             "vdi": lambda: render_vdi(vdi, camera, size, device=self._device),
             "raycaster": lambda: self._raycast(camera, size, self.voxel),
         }
-        for name, peer in peers.items():
-            peer.set_sample_distance(self.voxel)
-            frames[name] = partial(peer.render, camera)
-        for frame in frames.values():  # not counted: kernels and shaders are compiled
-            frame()
-            done()
-        return _take_turns(frames, self._settings.repeats, done)
+        for name, baseline in self._baselines.items():
+            baseline.set_sample_distance(self.voxel)
+            frames[name] = partial(baseline.render, camera)
+        taken = take_turns(frames, self._settings.repeats, done=self._done)
+        return {name: Timing.of(times) for name, times in taken.items()}
 
     def _generated(self, size: tuple[int, int]) -> VDI:
         return generate_vdi(
@@ -336,7 +331,7 @@ class _Bench:
 
     def _raycast(
         self, camera: Camera, size: tuple[int, int], step: float, *, early_termination: bool = True
-    ) -> NDArray[np.float32]:
+    ) -> Image:
         return raycast_volume(
             self._volume,
             camera,
@@ -348,37 +343,37 @@ class _Bench:
             device=self._device,
         )
 
+    def _case(self) -> dict[str, Any]:
+        volume, settings = self._volume, self._settings
+        return {
+            "name": settings.name,
+            "dimensions": list(volume.dimensions),
+            "spacing": list(volume.spacing),
+            "dtype": str(volume.array.dtype),
+            "classification": self._looks,
+            "window_size": list(settings.window_size),
+            "max_supersegments": settings.max_supersegments,
+            "sample_distance": self.step,
+            "timing_sample_distance": self.voxel,
+            "repeats": settings.repeats,
+            "camera": self.view.to_dict(),
+        }
 
-class _Counter:
-    """Counts finished pieces of work and reports their share."""
-
-    def __init__(self, progress: Progress | None, total: int) -> None:
-        self._progress, self._total, self._done = progress, total, 0
-
-    def __call__(self) -> None:
-        self._done += 1
-        if self._progress is not None:
-            self._progress(min(1.0, self._done / self._total))
-
-
-def _take_turns(
-    work: Mapping[str, Callable[[], Any]], repeats: int, done: Callable[[], None]
-) -> dict[str, Timing]:
-    """Time each piece of work ``repeats`` times, one after the other in turn."""
-    seconds: dict[str, list[float]] = {name: [] for name in work}
-    for _ in range(repeats):
-        for name, run in work.items():
-            start = time.perf_counter()
-            run()
-            seconds[name].append(time.perf_counter() - start)
-            done()
-    return {name: Timing(statistics.median(s), max(s)) for name, s in seconds.items()}
+    def _sizes(self, vdi: VDI) -> dict[str, int]:
+        width, height = self._settings.window_size
+        return {
+            "volume_bytes": self._volume.array.nbytes,
+            "supersegments": vdi.n_supersegments,
+            "occupied_lists": int(np.count_nonzero(vdi.counts)),
+            "lists": width * height,
+            "vdi_bytes": vdi.nbytes,
+            "dense_bytes": width * height * self._settings.max_supersegments * _DENSE_BYTES,
+        }
 
 
-def _peers(volume: Volume, settings: Settings, step: float) -> dict[str, Any]:
+def _baselines(volume: Volume, settings: Settings, step: float) -> dict[str, Any]:
     """Return VTK's mappers, with the property that ``add_volume`` would give them."""
-    from pyvista_vdi.measure.vtk_baselines import MAPPERS, PeerRenderer
-    from pyvista_vdi.plotting.cli_support import add_volume_property
+    from pyvista_vdi.measure.vtk_baselines import MAPPERS, VTKBaseline, add_volume_property
 
     arguments = dict(settings.classification)
     if "transfer_function" in arguments:
@@ -389,63 +384,19 @@ def _peers(volume: Volume, settings: Settings, step: float) -> dict[str, Any]:
     for name in ("scalars", "preference"):  # the array has been chosen
         arguments.pop(name, None)
     prop = arguments.get("volume_property") or add_volume_property(volume, arguments)
-    return {name: PeerRenderer(volume, prop, settings.window_size, name, step) for name in MAPPERS}
+    size = settings.window_size
+    return {name: VTKBaseline(volume, prop, size, name, step) for name in MAPPERS}
 
 
 def _judged(angle: float, images: Images, seconds: dict[str, Timing]) -> AngleResult:
-    with_vtk = "gpu" in images
+    def compared(one: str, other: str) -> Comparison | None:
+        both = one in images and other in images
+        return compare_images(images[one], images[other]) if both else None
+
     return AngleResult(
         angle=angle,
         vdi_to_raycaster=compare_images(images["vdi"], images["raycaster"]),
-        raycaster_to_gpu=compare_images(images["raycaster"], images["gpu"]) if with_vtk else None,
-        fixed_point_to_gpu=(
-            compare_images(images["fixed_point"], images["gpu"]) if with_vtk else None
-        ),
+        raycaster_to_gpu=compared("raycaster", "gpu"),
+        fixed_point_to_gpu=compared("fixed_point", "gpu"),
         seconds=seconds,
     )
-
-
-def _case(
-    volume: Volume, settings: Settings, looks: Classification, bench: _Bench
-) -> dict[str, Any]:
-    return {
-        "name": settings.name,
-        "dimensions": list(volume.dimensions),
-        "spacing": list(volume.spacing),
-        "dtype": str(volume.array.dtype),
-        "classification": looks.describe(),
-        "window_size": list(settings.window_size),
-        "max_supersegments": settings.max_supersegments,
-        "sample_distance": bench.step,
-        "timing_sample_distance": bench.voxel,
-        "repeats": settings.repeats,
-        "camera": bench.view.to_dict(),
-    }
-
-
-def _system(settings: Settings, peers: Mapping[str, Any]) -> dict[str, str]:
-    described = describe_system(settings.device)
-    return {**described, "opengl": peers["gpu"].opengl} if peers else described
-
-
-def _sizes(volume: Volume, vdi: VDI, settings: Settings) -> dict[str, int]:
-    width, height = settings.window_size
-    return {
-        "volume_bytes": volume.array.nbytes,
-        "supersegments": vdi.n_supersegments,
-        "occupied_lists": int(np.count_nonzero(np.diff(vdi.offsets))),
-        "lists": width * height,
-        "vdi_bytes": vdi.nbytes,
-        "dense_bytes": width * height * settings.max_supersegments * _DENSE_BYTES,
-    }
-
-
-def without_infinities(value: Any) -> Any:
-    """Return a value with null for numbers that JSON does not have."""
-    if isinstance(value, dict):
-        return {key: without_infinities(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [without_infinities(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

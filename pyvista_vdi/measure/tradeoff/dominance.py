@@ -23,7 +23,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.measure.benchmark.changes import CHANCE, rank_sum_chance
+from pyvista_vdi.measure.clock import CHANCE, rank_sum_chance
 
 
 @dataclass(frozen=True)

@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import math
-import os
 import statistics
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.io import whole_file
-from pyvista_vdi.measure.benchmark.candidates import median
+from pyvista_vdi.measure.clock import ratios, spread
 from pyvista_vdi.measure.tradeoff.dominance import Figure, find_dominated, front, told_apart
-from pyvista_vdi.measure.tradeoff.results import TradeoffFile
 from pyvista_vdi.measure.tradeoff.settings import Setting
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Plot
 
 #: What SSIM is traded for, by the keys of the findings, and how tables call it.
 COSTS: MappingProxyType[str, str] = MappingProxyType(
@@ -106,153 +100,53 @@ class Point:
         }[kind]
 
 
-class Tradeoff:
-    """What :func:`measure_tradeoff` found.
-
-    Parameters
-    ----------
-    data : dict
-        What the JSON holds, see ``docs/tradeoff_schema.json``.
-
-    Attributes
-    ----------
-    data : dict
-        The same.
-    points : list of Point
-        Every setting that was measured.
-    """
-
-    def __init__(self, data: dict[str, Any]) -> None:
-        self.data = data
-        self.points = [_point(entry) for entry in data["points"] if entry["refused"] is None]
-
-    @classmethod
-    def read(cls, path: str | os.PathLike[str]) -> Tradeoff:
-        """Read the JSON of an earlier run.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it cannot be read, or is something else.
-        """
-        return cls(TradeoffFile.read(path).data)
-
-    def point(self, name: str) -> Point:
-        """Return a setting's figures by its name.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If no setting of that name was measured.
-        """
-        for one in self.points:
-            if one.name == name:
-                return one
-        raise InvalidArgumentError(
-            f"no setting {name!r} was measured: there are "
-            + "; ".join(repr(one.name) for one in self.points)
-        )
-
-    def front(self, kind: str) -> list[str]:
-        """Return the settings that no other dominates in SSIM and one kind of cost.
-
-        Of those that cannot be told apart the one with the fewest changes is returned.
-
-        Parameters
-        ----------
-        kind : {"frame", "memory", "file", "generation"}
-            The cost.
-
-        Returns
-        -------
-        list of str
-            Names, the cheapest first.
-        """
-        if kind not in COSTS:
-            raise InvalidArgumentError(f"kind must be one of {', '.join(COSTS)}; got {kind!r}")
-        judged = {
-            one.name: [one.figures[kind], one.figures["loss"]]
-            for one in self.points
-            if kind in one.figures
-        }
-        simplest_first = sorted(front(judged), key=lambda name: len(self.point(name).changes))
-        kept = told_apart(simplest_first, judged)
-        return sorted(kept, key=lambda name: self.point(name).cost(kind) or math.inf)
-
-    def dominated(self) -> dict[str, list[str]]:
-        """Return the settings that nobody should choose, and those that are better.
-
-        Of each there is another that is nowhere worse by what counts, in the frame time and the
-        SSIM at any angle, in memory, file and generation, and somewhere better beyond the measured
-        noise: see :func:`dominates`.
-
-        Returns
-        -------
-        dict of str to list of str
-            Names.
-        """
-        # At each angle, and not over all: worse at one of them is worse
-        kinds = [
-            kind
-            for kind in (self.points[0].figures if self.points else ())
-            if kind not in ("frame", "loss") and all(kind in one.figures for one in self.points)
-        ]
-        judged = {one.name: [one.figures[kind] for kind in kinds] for one in self.points}
-        return find_dominated(judged)
-
-    def table(self) -> str:
-        """Return the tables as Markdown."""
-        from pyvista_vdi.measure.tradeoff.report import describe
-
-        return describe(self)
-
-    def plot(self) -> Plot:
-        """Draw the fronts of frame time, bytes and generation time against SSIM.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Which notebooks show as it is.
-
-        Raises
-        ------
-        MissingDependencyError
-            If Matplotlib is not installed.
-        InvalidArgumentError
-            If nothing was measured.
-        """
-        from pyvista_vdi.measure.tradeoff.plot import draw
-
-        return draw(self)
-
-    def save_plot(self, path: str | os.PathLike[str]) -> Path:
-        """Write the plot as PNG; the file appears whole or not at all."""
-        figure = self.plot()
-        with whole_file(path) as stream:
-            figure.savefig(stream, dpi=110, format="png")
-        return Path(path)
+def points_of(data: dict[str, Any]) -> list[Point]:
+    """Return every setting that was measured."""
+    return [_point(entry) for entry in data["points"] if entry["refused"] is None]
 
 
-def find(data: dict[str, Any]) -> dict[str, Any]:
-    """Return what the JSON's ``findings`` hold."""
-    found = Tradeoff(data)
-    return {
-        "fronts": {kind: found.front(kind) for kind in COSTS},
-        "dominated": found.dominated(),
+def best(points: Sequence[Point], kind: str) -> list[Point]:
+    """Return the front of SSIM and a kind of cost, see :meth:`.Tradeoff.front`."""
+    if kind not in COSTS:
+        raise InvalidArgumentError(f"kind must be one of {', '.join(COSTS)}; got {kind!r}")
+    judged = {
+        one.name: [one.figures[kind], one.figures["loss"]] for one in points if kind in one.figures
     }
+    on_front = front(judged)
+    simplest_first = sorted(
+        (one for one in points if one.name in on_front), key=lambda one: len(one.changes)
+    )
+    kept = told_apart([one.name for one in simplest_first], judged)
+    return sorted(
+        (one for one in simplest_first if one.name in kept),
+        key=lambda one: one.cost(kind) or math.inf,
+    )
+
+
+def dominated(points: Sequence[Point]) -> dict[str, list[str]]:
+    """Return settings that nobody should choose, see :meth:`.Tradeoff.dominated`."""
+    # At each angle, and not over all: worse at one of them is worse
+    kinds = [
+        kind
+        for kind in (points[0].figures if points else ())
+        if kind not in ("frame", "loss") and all(kind in one.figures for one in points)
+    ]
+    return find_dominated({one.name: [one.figures[kind] for kind in kinds] for one in points})
 
 
 def _point(entry: dict[str, Any]) -> Point:
     rows, generation = entry["angles"], entry["generation"]
-    at = {row["angle"]: _ratios(row["seconds"]["clock"], row["volume_seconds"]) for row in rows}
+    at = {
+        row["angle"]: ratios(row["seconds"]["clock"], row["volume_seconds"]["clock"])
+        for row in rows
+    }
     frames = [math.exp(_mean([math.log(r) for r in one])) for one in zip(*at.values(), strict=True)]
     ssims = {row["angle"]: row["to_volume"]["ssim"] for row in rows}
     made = generation["seconds"]["clock"]
     if generation["packing"] is not None:
         made = [a + b for a, b in zip(made, generation["packing"]["clock"], strict=True)]
-    generations = _ratios(made, generation["volume_seconds"])
+    generations = ratios(made, generation["volume_seconds"]["clock"])
     vdi = entry["vdi"]
-    middle = statistics.median(frames)
     figures = {
         "frame": Figure.of_times(frames, TIME_TOLERANCE),
         "loss": Figure(1 - _mean(list(ssims.values())), SSIM_TOLERANCE),
@@ -261,18 +155,19 @@ def _point(entry: dict[str, Any]) -> Point:
     }
     if vdi["bytes_file"] is not None:
         figures["file"] = Figure(math.log(vdi["bytes_file"]), BYTES_TOLERANCE)
-    for angle, ratios in at.items():
-        figures[f"frame {angle:g}"] = Figure.of_times(ratios, TIME_TOLERANCE)
+    for angle, paired in at.items():
+        figures[f"frame {angle:g}"] = Figure.of_times(paired, TIME_TOLERANCE)
         figures[f"loss {angle:g}"] = Figure(1 - ssims[angle], SSIM_TOLERANCE)
     return Point(
         name=entry["name"],
         setting=entry["setting"],
-        frame=middle,
-        frame_spread=(max(frames) - min(frames)) / 2 / middle,
-        frames={angle: statistics.median(ratios) for angle, ratios in at.items()},
+        frame=statistics.median(frames),
+        frame_spread=spread(frames),
+        frames={angle: statistics.median(paired) for angle, paired in at.items()},
         ssim=_mean(list(ssims.values())),
         ssims=ssims,
-        psnr=min(_or_infinite(row["to_volume"]["psnr"]) for row in rows),
+        # Equal pictures: JSON has no infinity
+        psnr=min(math.inf if (p := row["to_volume"]["psnr"]) is None else p for row in rows),
         worst_pixel=max(row["to_volume"]["worst_pixel"] for row in rows),
         bytes_memory=vdi["bytes_memory"],
         bytes_file=vdi["bytes_file"],
@@ -282,26 +177,17 @@ def _point(entry: dict[str, Any]) -> Point:
     )
 
 
-def _or_infinite(value: float | None) -> float:
-    return math.inf if value is None else value
-
-
-def _ratios(ours: list[float], volume: dict[str, list[float]]) -> list[float]:
-    """Return each repetition over the volume's in the same round."""
-    return [a / b for a, b in zip(ours, volume["clock"], strict=True)]
-
-
 def _mean(values: list[float]) -> float:
     return math.fsum(values) / len(values)
 
 
-def peers(data: dict[str, Any]) -> dict[float, dict[str, float]]:
+def volume_renderers(data: dict[str, Any]) -> dict[float, dict[str, float]]:
     """Return by angle what volume renderers take, over ``render_volume``; medians of pairs."""
     found = {}
     for row in data["baselines"]:
         base = row["seconds"]["volume_skipping"]
         found[row["angle"]] = {
-            name: statistics.median(_ratios(taken["clock"], base))
+            name: statistics.median(ratios(taken["clock"], base["clock"]))
             for name, taken in row["seconds"].items()
         }
     return found
@@ -311,14 +197,6 @@ def faster_vtk(data: dict[str, Any]) -> dict[float, float]:
     """Return by angle the frame time of VTK's faster mapper over that of ``render_volume``."""
     return {
         angle: min(theirs)
-        for angle, ratios in peers(data).items()
-        if (theirs := [ratio for name, ratio in ratios.items() if name.startswith("vtk_")])
-    }
-
-
-def volume_milliseconds(data: dict[str, Any]) -> dict[float, float]:
-    """Return by angle the median frame of ``render_volume``, milliseconds."""
-    return {
-        row["angle"]: 1e3 * (median(row["seconds"]["volume_skipping"]) or math.nan)
-        for row in data["baselines"]
+        for angle, taken in volume_renderers(data).items()
+        if (theirs := [over for name, over in taken.items() if name.startswith("vtk_")])
     }

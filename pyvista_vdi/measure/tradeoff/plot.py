@@ -9,7 +9,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
-from pyvista_vdi.measure.tradeoff.findings import Point, Tradeoff, faster_vtk
+from pyvista_vdi.measure.report import across, new_figure
+from pyvista_vdi.measure.tradeoff.findings import Point, best, faster_vtk
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,57 +77,44 @@ _DIRECTIONS = (
 _SIDES = {"left": 0.0, "center": 0.5, "right": 1.0, "bottom": 0.0, "top": 1.0}
 
 
-def draw(found: Tradeoff) -> Figure:
-    """Return the plot: a panel for each cost.
-
-    Raises
-    ------
-    MissingDependencyError
-        If Matplotlib is not installed.
-    InvalidArgumentError
-        If nothing was measured.
-    """
+def draw(data: dict[str, Any], points: Sequence[Point]) -> Figure:
+    """Return the plot: a panel for each cost; see :meth:`.Tradeoff.plot`."""
     if find_spec("matplotlib") is None:
         raise MissingDependencyError(
             "plots are drawn by Matplotlib, which is not installed: install it by pip install "
             '"pyvista-vdi[plot]"'
         )
-    if not found.points:
+    if not points:
         raise InvalidArgumentError("nothing was measured, so there is nothing to draw")
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(15.5, 6.4))
-    FigureCanvasAgg(figure)
+    figure = new_figure((15.5, 6.4))
     panels = figure.subplots(1, len(_PANELS), sharey=True)
-    for panel, (kind, label) in zip(panels, _PANELS.items(), strict=True):
-        _draw_panel(panel, found, kind)
+    fronts = [best(points, kind) for kind in _PANELS]
+    for panel, (kind, label), front in zip(panels, _PANELS.items(), fronts, strict=True):
+        _draw_panel(panel, points, front, kind)
         panel.set_xlabel(label)
     _set_room(panels)
     for panel, kind in zip(panels, _PANELS, strict=True):
-        _draw_limits(panel, found, kind)
-    volume, (width, height) = found.data["plan"]["volume"], found.data["plan"]["window_size"]
-    angles = ", ".join(f"{angle:g}" for angle in found.data["plan"]["angles"])
+        _draw_limits(panel, data, kind)
+    angles = ", ".join(f"{angle:g}" for angle in data["plan"]["angles"])
     panels[0].set_ylabel(f"SSIM to render_volume, mean of {angles} degrees")
     figure.suptitle(
-        f"{volume['name']}, {width} x {height}: what a VDI's settings cost and give "
-        "(better: up and left)"
+        f"{data['plan']['volume']['name']}, {across(data['plan']['window_size'], ' x ')}: what a "
+        "VDI's settings cost and give (better: up and left)"
     )
-    handles = [_marker(color, label) for label, color in _legend(found)]
+    handles = [_marker(color, label) for label, color in _legend(points)]
     handles.append(_marker("none", "not on the front"))
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), fontsize="small")
     figure.subplots_adjust(left=0.062, right=0.99, top=0.92, bottom=0.15, wspace=0.06)
-    for panel, kind in zip(panels, _PANELS, strict=True):
-        _name_front(figure, panel, found, kind)
+    for panel, kind, front in zip(panels, _PANELS, fronts, strict=True):
+        _name_front(figure, panel, points, front, kind)
     return figure
 
 
-def _draw_panel(panel: Axes, found: Tradeoff, kind: str) -> None:
-    front = found.front(kind)
-    for one in found.points:
+def _draw_panel(panel: Axes, points: Sequence[Point], front: Sequence[Point], kind: str) -> None:
+    for one in points:
         x, y = _place(one, kind)
         color = _color(one)
-        on = one.name in front
+        on = one in front
         panel.plot(
             [x],
             [y],
@@ -138,23 +126,23 @@ def _draw_panel(panel: Axes, found: Tradeoff, kind: str) -> None:
             alpha=1.0 if on else 0.75,
             zorder=3 if on else 2,
         )
-    line = [_place(found.point(name), kind) for name in front]
+    line = [_place(one, kind) for one in front]
     panel.plot(*zip(*line, strict=True), drawstyle="steps-post", color="#aaaaaa", lw=1, zorder=1)
     panel.set(xscale="log", yscale="log")
     panel.grid(alpha=0.25, which="major")
     _set_ticks(panel)
 
 
-def _draw_limits(panel: Axes, found: Tradeoff, kind: str) -> None:
+def _draw_limits(panel: Axes, data: dict[str, Any], kind: str) -> None:
     """Draw what a VDI competes with, where that lies within the panel."""
     limits: dict[str, float] = {}
     if kind == "frame":
         limits["render_volume"] = 1.0
-        vtk = faster_vtk(found.data)
+        vtk = faster_vtk(data)
         if vtk:
             limits["VTK, faster mapper"] = sorted(vtk.values())[len(vtk) // 2]
     if kind == "memory":
-        limits["the volume"] = found.data["plan"]["volume"]["bytes"] / 2**20
+        limits["the volume"] = data["plan"]["volume"]["bytes"] / 2**20
     low, high = panel.get_xlim()
     for label, x in limits.items():
         if low < x < high:
@@ -206,9 +194,9 @@ def _color(one: Point) -> str:
     return _COLORS[changed[0]] if len(changed) == 1 else _SEVERAL_COLOR
 
 
-def _legend(found: Tradeoff) -> Iterator[tuple[str, str]]:
+def _legend(points: Sequence[Point]) -> Iterator[tuple[str, str]]:
     """Yield labels and colours of what there is, the default first and several changes last."""
-    there = {_color(one) for one in found.points}
+    there = {_color(one) for one in points}
     names = [("default", _DEFAULT_COLOR)]
     names += [(_LABELS.get(axis, axis), color) for axis, color in _COLORS.items()]
     names.append(("several changes", _SEVERAL_COLOR))
@@ -230,18 +218,20 @@ def _marker(color: str, label: str) -> Any:
     )
 
 
-def _name_front(figure: Figure, panel: Axes, found: Tradeoff, kind: str) -> None:
+def _name_front(
+    figure: Figure, panel: Axes, points: Sequence[Point], front: Sequence[Point], kind: str
+) -> None:
     """Write the names of the front's settings where they cover neither points nor each other."""
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
     border = panel.get_window_extent(renderer)
-    places = [panel.transData.transform(_place(one, kind)) for one in found.points]
+    places = [panel.transData.transform(_place(one, kind)) for one in points]
     radius = 4.5 * figure.dpi / 72
     taken = [(x - radius, y - radius, x + radius, y + radius) for x, y in places]
     taken += [_corners(text.get_window_extent(renderer)) for text in panel.texts]
-    for name in found.front(kind):
+    for one in front:
         style = {
-            "text": name,
-            "xy": _place(found.point(name), kind),
+            "text": one.name,
+            "xy": _place(one, kind),
             "textcoords": "offset points",
             "fontsize": _LABEL_SIZE,
             "zorder": 4,

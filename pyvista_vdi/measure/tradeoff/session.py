@@ -2,48 +2,111 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
-import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from pyvista_vdi.api import as_volume
 from pyvista_vdi.device import Runtime, get_runtime
-from pyvista_vdi.errors import VDIError
+from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.benchmark.candidates import (
+from pyvista_vdi.measure.clock import Step, Times, take_turns
+from pyvista_vdi.measure.report import describe_system
+from pyvista_vdi.measure.session import (
     Image,
-    Step,
+    Progress,
+    Steps,
     VDIRenderer,
     VolumeRenderers,
     accuracy,
-    take_turns,
+    check_angles,
+    check_count,
+    enlarged,
+    refusal,
+    sizes_of,
+    timed_generation,
 )
-from pyvista_vdi.measure.benchmark.preview import enlarged
-from pyvista_vdi.measure.compare import describe_system
-from pyvista_vdi.measure.tradeoff.findings import Tradeoff, find
-from pyvista_vdi.measure.tradeoff.results import Plan, TradeoffFile
+from pyvista_vdi.measure.tradeoff.results import Tradeoff, TradeoffFile
 from pyvista_vdi.measure.tradeoff.settings import Setting, sweep
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.classification import IN_PLACE, Classification
+from pyvista_vdi.model.metrics import SSIM_WINDOW
 from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.raycast import PreparedVDI
 
-#: Window in which a VDI is generated once before generation is timed, pixels.
-_WARM_UP_SIZE = (64, 36)
-
-#: What frames are ratios to, by the benchmark's keys: what ``render_volume`` does by default.
+#: What frames are ratios to, by the keys of the results: what ``render_volume`` does by default.
 _BASELINE = "volume_skipping"
 
-#: Called with the finished fraction, 0 to 1, and what is being done.
-Progress = Callable[[float, str], object]
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run measures: arguments of :func:`measure_tradeoff`, checked.
+
+    ``looks`` are the classification arguments, for people; ``table`` is what counts.
+    """
+
+    name: str
+    volume: Volume
+    looks: dict[str, Any]
+    table: TransferFunction
+    camera: Camera
+    settings: tuple[Setting, ...]
+    window_size: tuple[int, int]
+    angles: tuple[float, ...]
+    repeats: int
+    generations: int
+    vtk: bool
+
+    def __post_init__(self) -> None:
+        check_count("repeats", self.repeats)
+        check_count("generations", self.generations)
+        check_angles(self.angles)
+        if len(set(self.angles)) < len(self.angles):
+            raise InvalidArgumentError(f"an angle is given twice: {self.angles!r}")
+        if min(check_window_size(self.window_size)) < SSIM_WINDOW:
+            raise InvalidArgumentError(
+                f"a window of {self.window_size[0]} x {self.window_size[1]} has no SSIM: each edge "
+                f"must have {SSIM_WINDOW} pixels or more"
+            )
+        if not self.settings:
+            raise InvalidArgumentError("there are no settings to compare: give one or more")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything in values that JSON can hold, the volume by its description."""
+        volume = self.volume
+        # What tells two transfer functions apart: the start of their JSON's SHA-256
+        table = json.dumps(self.table.to_dict(), sort_keys=True).encode()
+        own = [name for name in self.looks if name in IN_PLACE]
+        described = {
+            "volume": {
+                "name": self.name,
+                "dimensions": volume.dimensions,
+                "spacing": volume.spacing,
+                "dtype": volume.array.dtype.name,
+                "bytes": volume.array.nbytes,
+            },
+            "looks": {**self.looks, **dict.fromkeys(own, "given")},
+            "transfer_function": hashlib.sha256(table).hexdigest()[:16],
+            "interpolation": self.table.interpolation,
+            "camera": self.camera.to_dict(),
+            "window_size": self.window_size,
+            "angles": self.angles,
+            "repeats": self.repeats,
+            "generations": self.generations,
+            "vtk": self.vtk,
+            "settings": [setting.to_dict() for setting in self.settings],
+        }
+        plain: dict[str, Any] = json.loads(json.dumps(described))
+        return plain
 
 
 def measure_tradeoff(
@@ -134,6 +197,7 @@ def measure_tradeoff(
     view = Camera.from_any(camera) if camera is not None else None
     plan = Plan(
         name=name,
+        volume=volume,
         looks=looks.describe(),
         table=looks.transfer_function(volume),
         camera=view or filling_camera(volume.bounds, (width, height)),
@@ -144,67 +208,43 @@ def measure_tradeoff(
         generations=generations,
         vtk=find_spec("vtkmodules") is not None if vtk is None else vtk,
     )
-    system, described = describe_system(device), plan.to_dict(volume)
+    system = describe_system(device)
     if resume and path is not None and Path(path).exists():
-        results = TradeoffFile.read(path)
-        results.require_same(described, system)
+        results = TradeoffFile.resumed(path, plan, system)
     else:
-        results = TradeoffFile.begun(path, described, system)
+        results = TradeoffFile.begun(path, plan, system)
         results.save()
-    run(plan, volume, results, device, progress)
+    there = {point["name"] for point in results.data["points"]}
+    missing = [setting for setting in plan.settings if setting.name not in there]
+    if missing or not results.data["baselines"]:
+        _Run(plan, results, missing, get_runtime(device), progress).everything()
+    results.find()
+    results.save()
     return Tradeoff(results.data)
 
 
 _KEYWORDS = tuple(measure_tradeoff.__kwdefaults__ or ())
 
 
-def run(
-    plan: Plan,
-    volume: Volume,
-    results: TradeoffFile,
-    device: Any = None,
-    progress: Progress | None = None,
-) -> None:
-    """Measure what is missing, and write the file after every VDI.
-
-    Parameters
-    ----------
-    plan : Plan
-        What is measured.
-    volume : Volume
-        Of what.
-    results : TradeoffFile
-        Where it goes; settings that are there are not measured again.
-    device : optional
-        See :func:`pyvista_vdi.list_devices`.
-    progress : callable, optional
-        Called with the finished fraction and what is being done.
-    """
-    missing = [setting for setting in plan.settings if not results.has(setting)]
-    if missing or not results.data["baselines"]:
-        _Run(plan, volume, results, missing, get_runtime(device), progress).everything()
-    results.data["findings"] = find(results.data)
-    results.save()
-
-
 class _Run:
     def __init__(
         self,
         plan: Plan,
-        volume: Volume,
         results: TradeoffFile,
         missing: list[Setting],
         runtime: Runtime,
         progress: Progress | None,
     ) -> None:
-        self._plan, self._volume, self._results = plan, volume, results
-        self._runtime, self._progress = runtime, progress
+        self._plan, self._results, self._runtime = plan, results, runtime
         # Settings that differ only in what is chosen after generation share a VDI
         self._groups: dict[Setting, list[Setting]] = {}
         for setting in missing:
             self._groups.setdefault(setting.generated, []).append(setting)
-        self._renderers = VolumeRenderers(runtime, volume, plan.table, plan.window_size, plan.vtk)
-        self._done, self._total = 0, (1 + len(missing)) * len(plan.angles) + len(self._groups)
+        self._renderers = VolumeRenderers(
+            runtime, plan.volume, plan.table, plan.window_size, plan.vtk
+        )
+        steps = Steps(progress, (1 + len(missing)) * len(plan.angles) + len(self._groups))
+        self._step = steps.begin
 
     def everything(self) -> None:
         """Measure what is missing."""
@@ -228,11 +268,6 @@ class _Run:
         finally:
             self._renderers.close()
 
-    def _step(self, doing: str) -> None:
-        if self._progress is not None:
-            self._progress(min(1.0, self._done / self._total), doing)
-        self._done += 1
-
     # -- what all is compared with -----------------------------------------------------------------
 
     def _baseline(self, angle: float) -> dict[str, Any]:
@@ -244,7 +279,7 @@ class _Run:
         return {
             "angle": angle,
             "volume_to_vtk_gpu": near,
-            "seconds": take_turns(self._runtime, steps, self._plan.repeats),
+            "seconds": take_turns(steps, self._plan.repeats, runtime=self._runtime),
         }
 
     # -- a VDI, and the settings that share it -----------------------------------------------------
@@ -253,11 +288,17 @@ class _Run:
         self._step(f"{generated.name}: generating")
         precisions = tuple(dict.fromkeys(setting.precision for setting in settings))
         forms, seconds = self._forms(generated, precisions)
-        sizes = {precision: _sizes(vdi) for precision, vdi in forms.items()}
+        sizes: dict[str, dict[str, Any]] = {}
         renderers: dict[str, VDIRenderer] = {}
         for precision, vdi in forms.items():
             prepared = PreparedVDI(self._runtime, vdi)
-            sizes[precision]["bytes_memory"] = prepared.list_bytes
+            found = sizes_of(vdi)
+            sizes[precision] = {
+                "window_size": list(vdi.window_size),
+                **{n: found[n] for n in ("supersegments", "mean_length", "longest_list")},
+                "bytes_file": found["bytes_saved"],
+                "bytes_memory": prepared.list_bytes,
+            }
             renderers[precision] = VDIRenderer(self._runtime, prepared, self._plan.window_size)
         points: list[dict[str, Any]] = [
             {
@@ -282,40 +323,31 @@ class _Run:
 
     def _forms(
         self, setting: Setting, precisions: tuple[str, ...]
-    ) -> tuple[dict[str, VDI], dict[str, dict[str, list[float]]]]:
-        """Generate the VDI and pack it, as often as is timed; kernels are compiled before."""
-        width, height = self._plan.window_size
-        size = (max(1, round(width * setting.lists)), max(1, round(height * setting.lists)))
-        forms: dict[str, VDI] = {}
+    ) -> tuple[dict[str, VDI], dict[str, Times]]:
+        """Generate the VDI and pack it, as often as is timed."""
 
         def generate(size: tuple[int, int]) -> VDI:
             return generate_vdi(
-                self._volume,
+                self._plan.volume,
                 self._plan.camera,
                 size,
                 self._plan.table,
                 max_supersegments=setting.max_supersegments,
                 criterion=setting.criterion,
-                sample_distance=setting.sample_distance * min(self._volume.spacing),
+                sample_distance=setting.sample_distance * min(self._plan.volume.spacing),
                 tolerance=setting.tolerance,
                 view_cone=setting.view_cone,
                 device=self._runtime,
             )
 
-        def timed() -> None:
-            forms.clear()
-            forms["exact"] = generate(size)
-
-        def pack(precision: str) -> None:
-            forms[precision] = forms["exact"].with_precision(precision)
-
-        generate(_WARM_UP_SIZE)
-        work: dict[str, Step] = {
-            "volume": partial(self._renderers.image, self._plan.camera),
-            "generate": timed,
-            **{p: partial(pack, p) for p in precisions if p != "exact"},
-        }
-        seconds = take_turns(self._runtime, work, self._plan.generations, warm_up=False)
+        forms, seconds = timed_generation(
+            self._runtime,
+            generate,
+            self._share(setting.lists),
+            self._plan.generations,
+            before={"volume": partial(self._renderers.image, self._plan.camera)},
+            forms=precisions,
+        )
         return {precision: forms[precision] for precision in precisions}, seconds
 
     def _rows(
@@ -331,13 +363,13 @@ class _Run:
             frame = partial(
                 renderers[setting.precision].image,
                 camera,
-                self._drawn_size(setting),
+                self._share(setting.preview),
                 skip_empty=setting.skip_empty,
             )
             image: Image = frame()
             near.append(accuracy(enlarged(image, self._plan.window_size), reference))
             frames[setting.name] = frame
-        seconds = take_turns(self._runtime, frames, self._plan.repeats)
+        seconds = take_turns(frames, self._plan.repeats, runtime=self._runtime)
         return [
             {
                 "angle": angle,
@@ -348,35 +380,17 @@ class _Run:
             for setting, one in zip(settings, near, strict=True)
         ]
 
-    def _drawn_size(self, setting: Setting) -> tuple[int, int]:
+    def _share(self, edge: float) -> tuple[int, int]:
+        """Return a window whose edges are a share of the frame's."""
         width, height = self._plan.window_size
-        return max(1, round(width * setting.preview)), max(1, round(height * setting.preview))
-
-
-def _sizes(vdi: VDI) -> dict[str, Any]:
-    """Return how large a VDI is; ``bytes_file`` is of a ``.vdi`` in the default compression."""
-    counts = vdi.counts
-    occupied = int(np.count_nonzero(counts))
-    saved: int | None
-    with tempfile.TemporaryDirectory() as folder:
-        try:
-            saved = vdi.save(Path(folder) / "vdi.vdi").stat().st_size
-        except VDIError:  # no room for it: nothing else is lost
-            saved = None
-    return {
-        "window_size": list(vdi.window_size),
-        "supersegments": vdi.n_supersegments,
-        "mean_length": vdi.n_supersegments / occupied if occupied else 0.0,
-        "longest_list": int(counts.max()),
-        "bytes_file": saved,
-    }
+        return max(1, round(width * edge)), max(1, round(height * edge))
 
 
 def _refused(setting: Setting, error: BaseException) -> dict[str, Any]:
     return {
         "name": setting.name,
         "setting": setting.to_dict(),
-        "refused": f"{type(error).__name__}: {error}",
+        "refused": refusal(error),
         "vdi": None,
         "generation": None,
         "angles": [],

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from tokenize import TokenError
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi import examples
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError
-from pyvista_vdi.measure.benchmark.paper import paper_tables
-from pyvista_vdi.measure.benchmark.procedural import PROCEDURAL, Procedural, Progress, make
+from pyvista_vdi.api import as_volume
+from pyvista_vdi.device import Runtime
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.measure.paper.procedural import PROCEDURAL, Procedural, Progress, make
+from pyvista_vdi.measure.paper.published import paper_tables
+from pyvista_vdi.measure.volumes import look, read_file
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
+from pyvista_vdi.model.volume import Volume
 
 #: Seed of the procedural volumes where none is given.
 DEFAULT_SEED = 1
@@ -27,26 +27,7 @@ DEFAULT_SEED = 1
 #: Noise and planes while a procedural volume is made, bytes: at most.
 _WORKING_BYTES = 2**30
 
-#: Entries of the transfer functions, as ``add_volume`` has them by default.
-_ENTRIES = 256
-
-#: Opacity at equidistant scalars, by look.
-_OPACITIES: MappingProxyType[str, tuple[float, ...]] = MappingProxyType(
-    {
-        # What add_volume's opacity="linear" is
-        "ramp": (0.0, 1.0),
-        # Air and its noise are transparent; tissue is translucent, bone is not
-        "empty below a fifth": (0.0, 0.0, 0.02, 0.05, 0.3, 0.8),
-        # One fluid is transparent, the other translucent
-        "one of two fluids": (0.0, 0.0, 0.0, 0.01, 0.05, 0.15, 0.05, 0.01, 0.005),
-    }
-)
-#: What NumPy raises for files that are no arrays: their header is a Python expression.
-_BAD_ARRAY = (ValueError, TypeError, SyntaxError, OverflowError, RecursionError, TokenError)
-
-#: RGB at equidistant scalars: black, blue-grey, white.
-_COLORS = ((0.0, 0.0, 0.0), (0.25, 0.3, 0.45), (0.7, 0.7, 0.6), (1.0, 1.0, 1.0))
-
+#: Looks of the paper's data sets.
 _LOOKS = MappingProxyType(
     {
         "kingsnake": "empty below a fifth",
@@ -108,16 +89,6 @@ class Dataset:
         }
 
 
-def look(name: str, scalar_range: tuple[float, float], interpolation: str) -> TransferFunction:
-    """Return a transfer function by its name: a key of the opacities above."""
-    return TransferFunction(
-        np.stack([_resampled(channel) for channel in zip(*_COLORS, strict=True)], axis=1),
-        _resampled(_OPACITIES[name]),
-        scalar_range,
-        interpolation=interpolation,
-    )
-
-
 def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
     """Return a data set by its name.
 
@@ -136,9 +107,9 @@ def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
     InvalidArgumentError
         If nothing has that name.
     """
-    base, _, factor = name.partition("@")
+    base = name.partition("@")[0]
     if base in PROCEDURAL:
-        return _procedural(name, PROCEDURAL[base], _factor(name, factor), seed)
+        return _procedural(name, PROCEDURAL[base], _factor(name), seed)
     if name in examples.VOLUMES:
         return Dataset(
             name,
@@ -165,7 +136,7 @@ def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
         file.name,
         _LOOKS.get(label, "ramp"),
         None,
-        lambda progress: read_file(file),
+        lambda progress: as_volume(read_file(file), None, "point"),
     )
 
 
@@ -175,76 +146,6 @@ def label_of(name: str) -> str:
         return name
     label, _, path = name.rpartition("=")
     return label or Path(path).name.split(".")[0]
-
-
-def read_file(file: Path) -> Volume:
-    """Read a volume of any format that can be read here.
-
-    Raw files are those of the Open Scientific Visualization Datasets, whose names tell what they
-    hold: ``kingsnake_1024x1024x795_uint8.raw``. NumPy's ``.npy`` holds scalars (nz, ny, nx). These
-    and NRRD need no PyVista; other formats do.
-
-    Parameters
-    ----------
-    file : pathlib.Path
-        An existing file, or a folder of DICOM slices.
-
-    Returns
-    -------
-    Volume
-        The first array.
-
-    Raises
-    ------
-    InvalidVolumeError
-        If it cannot be read.
-    MissingDependencyError
-        If PyVista is needed and not installed.
-    """
-    suffix = file.suffix.lower()
-    if suffix == ".raw":
-        return _read_raw(file)
-    if suffix == ".npy":
-        return _read_npy(file)
-    if suffix in (".nrrd", ".nhdr"):
-        return examples.read_nrrd(file, "values")
-    from pyvista_vdi.api import as_volume
-    from pyvista_vdi.plotting.cli_support import read_volume
-
-    return as_volume(read_volume(file), None, "point")
-
-
-def _read_raw(file: Path) -> Volume:
-    found = re.search(r"_(\d+)x(\d+)x(\d+)_([a-z]+\d+)\.raw$", file.name, re.IGNORECASE)
-    if found is None or found[4].lower() not in VOXEL_TYPES:
-        raise InvalidVolumeError(
-            f"{file} does not say what it holds: name raw files like "
-            f"kingsnake_1024x1024x795_uint8.raw, with a type of {', '.join(VOXEL_TYPES)}"
-        )
-    nx, ny, nz = (int(found[i]) for i in (1, 2, 3))
-    dtype = np.dtype(found[4].lower()).newbyteorder("<")
-    expected = nx * ny * nz * dtype.itemsize
-    if file.stat().st_size != expected:
-        raise InvalidVolumeError(
-            f"{file} has {file.stat().st_size} bytes; {nx} x {ny} x {nz} of {found[4].lower()} "
-            f"are {expected}"
-        )
-    require_free_memory(expected, f"the volume in {file.name}", "take a smaller one")
-    array: NDArray[Any] = np.fromfile(file, dtype).reshape(nz, ny, nx)
-    return Volume(array.astype(dtype.newbyteorder("="), copy=False))
-
-
-def _read_npy(file: Path) -> Volume:
-    try:
-        # In place: what a header declares is held against the file's size, and objects are refused
-        array = np.lib.format.open_memmap(file, mode="r")
-    except OSError as error:
-        raise InvalidVolumeError(f"{file} cannot be read: {error.strerror or error}") from error
-    except _BAD_ARRAY as error:
-        raise InvalidVolumeError(
-            f"{file} cannot be read as an array ({error}): write one by numpy.save"
-        ) from error
-    return Volume(array)
 
 
 def _procedural(name: str, kind: Procedural, factor: int, seed: int) -> Dataset:
@@ -271,32 +172,20 @@ def _procedural(name: str, kind: Procedural, factor: int, seed: int) -> Dataset:
     )
 
 
-def _factor(name: str, text: str) -> int:
-    if not text:
-        return 1 if "@" not in name else _refuse_factor(name)
-    return int(text) if text.isdecimal() and 1 <= int(text) <= 128 else _refuse_factor(name)
-
-
-def _refuse_factor(name: str) -> int:
+def _factor(name: str) -> int:
+    _, at, text = name.partition("@")
+    if not at:
+        return 1
+    if text.isdecimal() and 1 <= int(text) <= 128:
+        return int(text)
     raise InvalidArgumentError(
         f"{name!r} does not say how much smaller: write a whole number from 1 to 128 behind the @, "
         "as in kingsnake_like@4"
     )
 
 
-def _resampled(nodes: tuple[float, ...]) -> NDArray[np.float64]:
-    at = np.linspace(0, len(nodes) - 1, _ENTRIES)
-    return np.interp(at, np.arange(len(nodes)), nodes)
-
-
-def require_allocation(runtime: Any, dataset: Dataset) -> None:
-    """Let the engine refuse a volume that no buffer of the device can hold, before it is made.
-
-    Raises
-    ------
-    DeviceMemoryError
-        The engine's own.
-    """
+def require_allocation(runtime: Runtime, dataset: Dataset) -> None:
+    """Let the engine refuse a volume that no buffer of the device can hold, before it is made."""
     if dataset.nbytes is not None:
         with runtime.buffer((dataset.nbytes,), np.uint8, f"volume {dataset.name!r}"):
             pass

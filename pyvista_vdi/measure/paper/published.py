@@ -43,7 +43,7 @@ class PaperCell:
 @cache
 def paper_tables() -> dict[str, Any]:
     """Return the data file: ``source``, ``device``, ``table1`` and ``table2``."""
-    file = resources.files("pyvista_vdi.measure.benchmark") / "paper_tables.json"
+    file = resources.files("pyvista_vdi.measure.paper") / "paper_tables.json"
     tables: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     return tables
 

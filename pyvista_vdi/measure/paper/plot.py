@@ -5,42 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi.io import whole_file
-from pyvista_vdi.measure.benchmark.candidates import median
-from pyvista_vdi.measure.benchmark.paper import paper_cell
+from pyvista_vdi.measure.clock import median
+from pyvista_vdi.measure.paper.published import paper_cell
+from pyvista_vdi.measure.report import new_figure, save_figure
 
 
 def write_plot(data: dict[str, Any], target: Path) -> bool:
     """Write a PNG: a column per window and N_S, speed-up above, SSIM below.
 
-    Parameters
-    ----------
-    data : dict
-        What the JSON holds.
-    target : pathlib.Path
-        The file.
-
-    Returns
-    -------
-    bool
-        Whether there was anything to draw.
-
-    Raises
-    ------
-    ImportError
-        If Matplotlib is not installed.
+    Returns whether there was anything to draw; without Matplotlib ImportError is raised.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     cells = [cell for cell in data["cells"] if cell["angles"]]
     kinds = list(
         dict.fromkeys((tuple(cell["window_size"]), cell["max_supersegments"]) for cell in cells)
     )
     if not kinds:
         return False
-    figure = Figure(figsize=(1.5 + 3.6 * len(kinds), 6.0), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure((1.5 + 3.6 * len(kinds), 6.0), layout="constrained")
     panels = figure.subplots(2, len(kinds), squeeze=False, sharex=True, sharey="row")
     names = list(dict.fromkeys(cell["dataset"] for cell in cells))
     for (speed, ssim), (size, limit) in zip(panels.T, kinds, strict=True):
@@ -55,8 +36,7 @@ def write_plot(data: dict[str, Any], target: Path) -> bool:
     panels[1][0].set_ylabel("SSIM to render_volume")
     handles, labels = panels[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize="small")
-    with whole_file(target) as stream:
-        figure.savefig(stream, dpi=110, format="png")
+    save_figure(figure, target)
     return True
 
 

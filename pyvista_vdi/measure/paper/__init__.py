@@ -6,13 +6,13 @@ rates. Everything runs without VTK and PyVista; where VTK is installed its mappe
 
 from __future__ import annotations
 
-from pyvista_vdi.measure.benchmark.changes import Change, compare_results, describe_changes
-from pyvista_vdi.measure.benchmark.datasets import DEFAULT_SEED, Dataset, find_dataset
-from pyvista_vdi.measure.benchmark.paper import PaperCell, paper_cell
-from pyvista_vdi.measure.benchmark.plan import PROFILES, Plan
-from pyvista_vdi.measure.benchmark.report import describe
-from pyvista_vdi.measure.benchmark.results import Results, read_results
-from pyvista_vdi.measure.benchmark.session import run
+from pyvista_vdi.measure.paper.changes import Change, compare_results, describe_changes
+from pyvista_vdi.measure.paper.datasets import DEFAULT_SEED, Dataset, find_dataset
+from pyvista_vdi.measure.paper.plan import PROFILES, Plan
+from pyvista_vdi.measure.paper.published import PaperCell, paper_cell
+from pyvista_vdi.measure.paper.report import describe
+from pyvista_vdi.measure.paper.results import Results, read_results
+from pyvista_vdi.measure.paper.session import run
 
 __all__ = [
     "DEFAULT_SEED",

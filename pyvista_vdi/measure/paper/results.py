@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+from types import MappingProxyType
 from typing import Any
 
-from pyvista_vdi.measure.benchmark.plan import Plan, cell_name
-from pyvista_vdi.measure.benchmark.results_file import ResultsFile
+from pyvista_vdi.measure.paper.plan import Plan
+from pyvista_vdi.measure.report import across
+from pyvista_vdi.measure.results import ResultsFile
 
-#: What the file says it is; ``docs/benchmark_schema.json`` describes it.
-FORMAT = "pyvista-vdi benchmark"
-FORMAT_VERSION = 1
+
+def _cell_name(dataset: str, size: tuple[int, int], limit: int) -> str:
+    """Return a cell's name in the results: ``brain/1280x720/15``."""
+    return f"{dataset}/{across(size)}/{limit}"
 
 
 class Results(ResultsFile):
@@ -29,34 +32,12 @@ class Results(ResultsFile):
         See ``docs/benchmark_schema.json``.
     """
 
-    form, version = FORMAT, FORMAT_VERSION
-    parts = frozenset({"datasets", "cells", "previews"})
-
-    @classmethod
-    def begun(cls, path: str | os.PathLike[str], plan: Plan, system: dict[str, str]) -> Results:
-        """Return what holds nothing yet."""
-        return cls(
-            path, cls.new(plan.to_dict(), system, {"datasets": {}, "cells": [], "previews": []})
-        )
-
-    @classmethod
-    def resumed(cls, path: str | os.PathLike[str], plan: Plan, system: dict[str, str]) -> Results:
-        """Return what an earlier run of the same plan, on the same device, has left.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If the file is no such results, or holds those of another plan or device.
-        """
-        results = read_results(path)
-        results.require_same(plan.to_dict(), system)
-        return results
-
-    # -- cells -------------------------------------------------------------------------------------
+    form, version = "pyvista-vdi benchmark", 1
+    empty = MappingProxyType({"datasets": {}, "cells": [], "previews": []})
 
     def cell(self, dataset: str, size: tuple[int, int], limit: int) -> dict[str, Any] | None:
         """Return a cell that is there, or None."""
-        name = cell_name(dataset, size, limit)
+        name = _cell_name(dataset, size, limit)
         return next((cell for cell in self.data["cells"] if cell["name"] == name), None)
 
     def new_cell(self, dataset: str, size: tuple[int, int], limit: int) -> dict[str, Any]:
@@ -64,7 +45,7 @@ class Results(ResultsFile):
         found = self.cell(dataset, size, limit)
         if found is None:
             found = {
-                "name": cell_name(dataset, size, limit),
+                "name": _cell_name(dataset, size, limit),
                 "dataset": dataset,
                 "window_size": list(size),
                 "max_supersegments": limit,
@@ -94,4 +75,4 @@ def read_results(path: str | os.PathLike[str]) -> Results:
     InvalidArgumentError
         If it cannot be read, or is something else.
     """
-    return Results(path, Results.checked(path))
+    return Results.read(path)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import time
+import statistics
 from collections.abc import Callable
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.measure.benchmark.candidates import Image, VDIRenderer, accuracy, median
-from pyvista_vdi.measure.benchmark.paper import paper_targets
+from pyvista_vdi.measure.clock import Times, take_turns
+from pyvista_vdi.measure.paper.published import paper_targets
+from pyvista_vdi.measure.session import Image, VDIRenderer, accuracy, enlarged
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.quality.frame_rate import FrameRateController
 
@@ -28,36 +28,17 @@ def measure_preview(
     draw: VDIRenderer,
     camera: Camera,
     size: tuple[int, int],
-    full: dict[str, list[float]],
+    full: Times,
     reference: Image,
 ) -> list[dict[str, Any]]:
-    """Keep each target rate of the paper's Table 2 and look at the picture.
+    """Keep each target rate of the paper's Table 2 and look at the picture; a row per way and rate.
 
-    The rates are multiples of the full frame's, as the paper's are of its 24 frames per second,
-    so that they ask the same of every device.
-
-    Parameters
-    ----------
-    draw : VDIRenderer
-        The VDI.
-    camera : Camera
-        The view.
-    size : (int, int)
-        Window, pixels.
-    full : dict
-        Times of the full frame with skipping, see :func:`.candidates.take_turns`.
-    reference : numpy.ndarray
-        The volume's own picture.
-
-    Returns
-    -------
-    list of dict
-        A row per way and target.
+    The rates are multiples of the full frame's, as the paper's are of its 24 frames per second, so
+    that they ask the same of every device. ``full`` holds the times of the full frame with
+    skipping, ``reference`` the volume's own picture.
     """
     whole = draw.image(camera)
-    full_seconds = median(full)
-    if full_seconds is None:
-        raise InvalidArgumentError("the full frame has no times: repeats must be 1 or more")
+    full_seconds = statistics.median(full["clock"])
     width, height = size
 
     def fewer_pixels(pixels: int) -> Image:
@@ -95,28 +76,17 @@ def _kept(way: Way, most: int, target_fps: float) -> tuple[int, list[float], Ima
     """Let the controller find its choice; return it, the frames' times and the last picture."""
     way(most)  # not counted: its kernel may have to be compiled
     controller = FrameRateController(target_fps, floor=1 / most)
+    image: list[Image] = []
+
+    def frames(samples: int, repeats: int) -> list[float]:
+        def frame() -> None:
+            image[:] = [way(samples)]
+
+        return take_turns({"way": frame}, repeats, warm_up=False)["way"]["clock"]
+
     for _ in range(_SETTLING_FRAMES):
         samples = controller.choose(most)
-        seconds, _ = _timed(way, samples)
+        (seconds,) = frames(samples, 1)
         controller.record(samples, seconds, seconds)
     samples = controller.choose(most)
-    frames = [_timed(way, samples) for _ in range(_MEASURED_FRAMES)]
-    return samples, [seconds for seconds, _ in frames], frames[-1][1]
-
-
-def _timed(way: Way, samples: int) -> tuple[float, Image]:
-    begin = time.perf_counter()
-    image = way(samples)
-    return time.perf_counter() - begin, image
-
-
-def enlarged(image: Image, size: tuple[int, int]) -> Image:
-    """Return an image in the window's size, by linear interpolation as the texture unit's."""
-    from skimage.transform import resize  # loads SciPy
-
-    width, height = size
-    if image.shape[:2] == (height, width):
-        return image
-    # Pixel centres keep their places and edges are extended, as GL_LINEAR and CLAMP_TO_EDGE do
-    whole: Image = resize(image, (height, width, 4), order=1, mode="edge", anti_aliasing=False)
-    return whole
+    return samples, frames(samples, _MEASURED_FRAMES), image[0]

@@ -11,15 +11,13 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
-from pyvista_vdi.measure.benchmark.candidates import CANDIDATES
+from pyvista_vdi.measure.clock import CHANCE, rank_sum_chance, ratios
+from pyvista_vdi.measure.session import CANDIDATES
 
-#: Chance of a separation by noise up to which a time counts as changed.
-CHANCE = 0.01
 #: Relative change of a median below which nothing counts as changed.
 LEAST_CHANGE = 0.05
 
@@ -67,7 +65,7 @@ def compare_results(before: dict[str, Any], after: dict[str, Any]) -> list[Chang
     Parameters
     ----------
     before, after : dict
-        What two files hold, see :func:`pyvista_vdi.measure.benchmark.read_results`.
+        What two files hold, see :func:`pyvista_vdi.measure.paper.read_results`.
 
     Returns
     -------
@@ -85,25 +83,25 @@ def describe_changes(before: dict[str, Any], after: dict[str, Any]) -> str:
         f"A time changed where its median did by more than {LEAST_CHANGE:.0%}, and noise alone "
         f"separates the repetitions as much in at most {CHANCE:.0%} of cases (rank sum)."
     )
+    tested = sum(change.chance is not None for change in found)
     lines = [
         f"Figures in both: {len(found)}; changed beyond noise: {len(changed)}.",
         rule,
+        f"Of {tested} times, about {CHANCE * tested:.1f} pass the second test by chance.",
     ]
-    tested = sum(change.chance is not None for change in found)
-    lines.append(f"Of {tested} times, about {CHANCE * tested:.1f} pass the second test by chance.")
-    too_few = _too_few(before, after)
-    if too_few:
+    n, m = before["plan"]["repeats"], after["plan"]["repeats"]
+    if 2 / math.comb(n + m, n) > CHANCE:
         lines.append(
             "The runs have too few repetitions for any time to count as changed: 5 and 5 are enough"
         )
-    for name in ("device", "driver", "opengl"):
-        ours, theirs = (run["system"].get(name) for run in (before, after))
-        if ours != theirs:
-            lines.append(f"The {name} differs: {ours}; {theirs}. Look at times in pairs only.")
-    for name in ("interpolation", "seed"):
-        ours, theirs = (run["plan"].get(name) for run in (before, after))
-        if ours != theirs:
-            lines.append(f"The {name} differs: {ours}; {theirs}. Other pictures were drawn.")
+    for part, names, what in (
+        ("system", ("device", "driver", "opengl"), "Look at times in pairs only."),
+        ("plan", ("interpolation", "seed"), "Other pictures were drawn."),
+    ):
+        for name in names:
+            ours, theirs = (run[part].get(name) for run in (before, after))
+            if ours != theirs:
+                lines.append(f"The {name} differs: {ours}; {theirs}. {what}")
     lines.append("")
     for change in changed:
         chance = "" if change.chance is None else f"  (chance {change.chance:.2g})"
@@ -113,39 +111,6 @@ def describe_changes(before: dict[str, Any], after: dict[str, Any]) -> str:
         )
     lines += _only_in_one(before, after)
     return "\n".join(lines).rstrip() + "\n"
-
-
-def rank_sum_chance(a: Sequence[float], b: Sequence[float]) -> float:
-    """Return the chance that samples of one distribution are separated as much as these.
-
-    Wilcoxon's rank sum test, exact and two-sided; ties count as half.
-
-    Parameters
-    ----------
-    a, b : sequence of float
-        Repetitions.
-
-    Returns
-    -------
-    float
-        0 to 1.
-    """
-    n, m = len(a), len(b)
-    wins = sum(1.0 if x > y else 0.5 if x == y else 0.0 for x in a for y in b)
-    least = math.floor(min(wins, n * m - wins))
-    tail = sum(_arrangements(n, m, u) for u in range(least + 1))
-    return min(1.0, 2 * tail / math.comb(n + m, n))
-
-
-@cache
-def _arrangements(n: int, m: int, wins: int) -> int:
-    """Return how many orders of n and m samples give the first so many wins over the second."""
-    if wins < 0:
-        return 0
-    if n == 0 or m == 0:
-        return int(wins == 0)
-    # The largest of all is one of the first, which then wins m times, or one of the second
-    return _arrangements(n - 1, m, wins - m) + _arrangements(n, m - 1, wins)
 
 
 def _changes(before: dict[str, Any], after: dict[str, Any]) -> Iterator[Change]:
@@ -183,14 +148,12 @@ def _row_changes(at: str, before: dict[str, Any], after: dict[str, Any]) -> Iter
         old, new = (row["seconds"][name]["clock"] for row in (before, after))
         yield _timed(at, f"{label}, s", old, new)
         if name != "volume":
-            old, new = (_paired(row["seconds"], name) for row in (before, after))
+            # Each repetition over that of render_volume beside it
+            old, new = (
+                ratios(row["seconds"][name]["clock"], row["seconds"]["volume"]["clock"])
+                for row in (before, after)
+            )
             yield _timed(at, f"{label} / render_volume", old, new)
-
-
-def _paired(seconds: dict[str, Any], name: str) -> list[float]:
-    """Return each repetition over that of ``render_volume`` beside it."""
-    pairs = zip(seconds[name]["clock"], seconds["volume"]["clock"], strict=True)
-    return [ours / volume for ours, volume in pairs]
 
 
 def _timed(cell: str, figure: str, before: list[float], after: list[float]) -> Change:
@@ -202,11 +165,6 @@ def _timed(cell: str, figure: str, before: list[float], after: list[float]) -> C
 
 def _exact(cell: str, figure: str, before: float, after: float, limit: float) -> Change:
     return Change(cell, figure, before, after, None, abs(after - before) > limit)
-
-
-def _too_few(before: dict[str, Any], after: dict[str, Any]) -> bool:
-    n, m = before["plan"]["repeats"], after["plan"]["repeats"]
-    return bool(2 / math.comb(n + m, n) > CHANCE)
 
 
 def _only_in_one(before: dict[str, Any], after: dict[str, Any]) -> Iterator[str]:

@@ -30,6 +30,7 @@ _TURBULENT = -11.0 / 6.0
 Plane = NDArray[np.float32]
 #: Scalars of slab k as float32 (ny, nx), in units of the type's values.
 Slab = Callable[[int], Plane]
+#: Called with the finished fraction.
 Progress = Callable[[float], object]
 
 
@@ -37,18 +38,8 @@ Progress = Callable[[float], object]
 class Procedural:
     """How one volume is made.
 
-    Parameters
-    ----------
-    paper : str
-        The data set of the paper's that it stands in for.
-    dimensions : (int, int, int)
-        Points along x, y, z at full size.
-    dtype : str
-        Voxel type.
-    description : str
-        What it shows.
-    prepare : callable
-        ``prepare(dimensions, rng)`` returns what makes a slab.
+    ``paper`` is the data set of the paper's that it stands in for, ``dimensions`` are points along
+    x, y, z at full size; ``prepare(dimensions, rng)`` returns what makes a slab.
     """
 
     paper: str
@@ -71,26 +62,7 @@ class Procedural:
 def make(
     kind: Procedural, factor: int, seed: int, name: str, progress: Progress | None = None
 ) -> Volume:
-    """Make a volume.
-
-    Parameters
-    ----------
-    kind : Procedural
-        Which.
-    factor : int
-        1 for the full size, n for 1 / n of it along each edge.
-    seed : int
-        Equal seeds give equal volumes.
-    name : str
-        What its scalars are called.
-    progress : callable, optional
-        Called with the finished fraction.
-
-    Returns
-    -------
-    Volume
-        Spacing 1.
-    """
+    """Make a volume at 1 / ``factor`` of the full size; equal seeds give equal volumes."""
     dimensions = kind.reduced(factor)
     nx, ny, nz = dimensions
     slab = kind.prepare(dimensions, np.random.default_rng(seed))

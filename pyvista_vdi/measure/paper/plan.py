@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from itertools import product
@@ -10,7 +10,8 @@ from types import MappingProxyType
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.measure.benchmark.datasets import DEFAULT_SEED, label_of
+from pyvista_vdi.measure.paper.datasets import DEFAULT_SEED, label_of
+from pyvista_vdi.measure.session import check_angles, check_count
 
 #: The paper's windows, supersegments and angles; and angles beyond the paper's.
 SIZES = ((1280, 720), (1920, 1080))
@@ -30,7 +31,7 @@ class Plan:
     profile : str
         Name of what the rest began as.
     datasets : tuple of str
-        Names that :func:`pyvista_vdi.measure.benchmark.find_dataset` knows.
+        Names that :func:`pyvista_vdi.measure.paper.find_dataset` knows.
     sizes : tuple of (int, int)
         Windows, pixels.
     limits : tuple of int
@@ -69,21 +70,15 @@ class Plan:
     seed: int = DEFAULT_SEED
 
     def __post_init__(self) -> None:
-        for name in ("repeats", "generations"):
-            if not 1 <= getattr(self, name) <= 1000:
-                raise InvalidArgumentError(
-                    f"{name} must be from 1 to 1000; got {getattr(self, name)!r}"
-                )
+        check_count("repeats", self.repeats)
+        check_count("generations", self.generations)
         labels = [label_of(name) for name in self.datasets]
         twice = sorted({name for name in labels if labels.count(name) > 1})
         if twice:
             raise InvalidArgumentError(
                 f"{twice[0]!r} is given twice: name files differently, as in kingsnake=FILE"
             )
-        if not self.angles or not all(math.isfinite(a) for a in self.angles):
-            raise InvalidArgumentError(
-                f"angles must be one or more numbers of degrees; got {self.angles!r}"
-            )
+        check_angles(self.angles)
         if self.seed < 0:
             raise InvalidArgumentError(f"seed must be 0 or above; got {self.seed!r}")
 
@@ -103,19 +98,8 @@ class Plan:
                 "max_supersegments": limit,
                 "angle": angle,
             }
-        plain: dict[str, Any] = _lists(described)
+        plain: dict[str, Any] = json.loads(json.dumps(described))
         return plain
-
-
-def cell_name(dataset: str, size: tuple[int, int], limit: int) -> str:
-    """Return a cell's name in the results: ``brain/1280x720/15``."""
-    return f"{dataset}/{size[0]}x{size[1]}/{limit}"
-
-
-def _lists(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _lists(item) for key, item in value.items()}
-    return [_lists(item) for item in value] if isinstance(value, tuple | list) else value
 
 
 #: Arguments of :class:`Plan` by the name of a profile. ``full`` also takes every volume in the

@@ -2,44 +2,39 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.benchmark.candidates import (
-    VDIRenderer,
-    VolumeRenderers,
-    accuracy,
-    take_turns,
-)
-from pyvista_vdi.measure.benchmark.datasets import (
+from pyvista_vdi.measure.clock import Times, take_turns
+from pyvista_vdi.measure.paper.datasets import (
     Dataset,
     find_dataset,
     label_of,
     require_allocation,
 )
-from pyvista_vdi.measure.benchmark.plan import Plan
-from pyvista_vdi.measure.benchmark.preview import measure_preview
-from pyvista_vdi.measure.benchmark.results import Results
+from pyvista_vdi.measure.paper.plan import Plan
+from pyvista_vdi.measure.paper.preview import measure_preview
+from pyvista_vdi.measure.paper.results import Results
+from pyvista_vdi.measure.report import across
+from pyvista_vdi.measure.session import (
+    Progress,
+    Steps,
+    VDIRenderer,
+    VolumeRenderers,
+    accuracy,
+    refusal,
+    sizes_of,
+    timed_generation,
+)
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.raycast import PreparedVDI
-
-#: Window in which a VDI is generated once before generation is timed, pixels.
-_WARM_UP_SIZE = (64, 36)
-
-#: Called with the finished fraction, 0 to 1, and what is being done.
-Progress = Callable[[float, str], object]
 
 
 def run(plan: Plan, results: Results, device: Any = None, progress: Progress | None = None) -> None:
@@ -67,14 +62,13 @@ class _Run:
         self, plan: Plan, results: Results, runtime: Runtime, progress: Progress | None
     ) -> None:
         self._plan, self._results, self._runtime = plan, results, runtime
-        self._progress = progress
         self._measured = [label_of(name) for name in plan.datasets]
         self._previewed = None if plan.preview is None else label_of(plan.preview[0])
         # In the order of the plan; that of Table 2 last where it is no other's
         names = [*plan.datasets, *([plan.preview[0]] if plan.preview else [])]
         self._datasets = [find_dataset(name, plan.seed) for name in dict.fromkeys(names)]
-        self._done = 0
-        self._total = max(1, sum(self._missing(dataset.name) for dataset in self._datasets))
+        rows = sum(self._missing(dataset.name) for dataset in self._datasets)
+        self._step = Steps(progress, rows)
 
     def everything(self) -> None:
         """Measure what is missing."""
@@ -97,11 +91,6 @@ class _Run:
 
     def _preview_missing(self, name: str) -> bool:
         return name == self._previewed and not self._results.data["previews"]
-
-    def _step(self, doing: str, rows: int = 0) -> None:
-        self._done += rows
-        if self._progress is not None:
-            self._progress(min(1.0, self._done / self._total), doing)
 
     # -- a data set --------------------------------------------------------------------------------
 
@@ -129,15 +118,15 @@ class _Run:
     def _refuse(
         self, name: str, cells: list[tuple[tuple[int, int], int]], error: BaseException
     ) -> None:
-        reason = f"{type(error).__name__}: {error}"
+        reason = refusal(error)
         for size, limit in cells:
             rows = self._results.missing_angles(self._plan, name, size, limit)
             if rows:
                 self._results.new_cell(name, size, limit)["refused"] = reason
-            self._step(f"{name}: refused", rows)
+            self._step(f"{name}: refused", finished=rows)
         if self._preview_missing(name):
             self._results.data["previews"].append(self._preview_entry(reason))
-            self._step(f"{name}: refused", 1)
+            self._step(f"{name}: refused", finished=1)
         self._results.save()
 
     def _window(
@@ -177,23 +166,23 @@ class _Run:
         limit: int,
         renderers: VolumeRenderers,
     ) -> None:
-        view = filling_camera(volume.bounds, size)
-        self._step(f"{name}, {size[0]}x{size[1]}, N_S {limit}: generating")
+        view, doing = filling_camera(volume.bounds, size), f"{name}, {across(size)}, N_S {limit}"
+        self._step(f"{doing}: generating")
         vdi, seconds = self._generated(volume, table, view, size, limit)
         cell = self._results.new_cell(name, size, limit)
         if cell["vdi"] is None:
-            cell["vdi"] = {"generation_seconds": seconds, **_sizes(vdi)}
+            cell["vdi"] = {"generation_seconds": seconds, **sizes_of(vdi)}
         draw = VDIRenderer(self._runtime, PreparedVDI(self._runtime, vdi), size)
         there = {row["angle"] for row in cell["angles"]}
         for angle in self._plan.angles:
             if angle in there:
                 continue
-            self._step(f"{name}, {size[0]}x{size[1]}, N_S {limit}: {angle:g} degrees")
+            self._step(f"{doing}: {angle:g} degrees")
             cell["angles"].append(self._row(view.azimuth(angle), angle, draw, renderers))
             cell["angles"].sort(key=lambda row: row["angle"])
             cell["left_out"] = dict(renderers.left_out)
             self._results.save()
-            self._step(f"{name}, {size[0]}x{size[1]}, N_S {limit}", 1)
+            self._step(doing, finished=1)
 
     def _generated(
         self,
@@ -202,8 +191,8 @@ class _Run:
         view: Camera,
         size: tuple[int, int],
         limit: int,
-    ) -> tuple[VDI, dict[str, list[float]]]:
-        """Generate the VDI as often as is timed; kernels are compiled before."""
+    ) -> tuple[VDI, Times]:
+        """Generate the VDI as often as is timed."""
 
         def generate(size: tuple[int, int]) -> VDI:
             return generate_vdi(
@@ -216,15 +205,8 @@ class _Run:
                 device=self._runtime,
             )
 
-        generate(_WARM_UP_SIZE)
-        made: list[VDI] = []
-
-        def timed() -> None:
-            made[:] = [generate(size)]
-
-        work = {"generate": timed}
-        seconds = take_turns(self._runtime, work, self._plan.generations, warm_up=False)
-        return made[0], seconds["generate"]
+        made, seconds = timed_generation(self._runtime, generate, size, self._plan.generations)
+        return made["exact"], seconds["generate"]
 
     def _row(
         self, camera: Camera, angle: float, draw: VDIRenderer, renderers: VolumeRenderers
@@ -236,7 +218,7 @@ class _Run:
             "angle": angle,
             "vdi_to_volume": accuracy(draw.image(camera), reference),
             "volume_to_vtk_gpu": vtk_accuracy,
-            "seconds": take_turns(self._runtime, frames, self._plan.repeats),
+            "seconds": take_turns(frames, self._plan.repeats, runtime=self._runtime),
         }
 
     # -- Table 2 -----------------------------------------------------------------------------------
@@ -253,42 +235,19 @@ class _Run:
             draw = VDIRenderer(self._runtime, PreparedVDI(self._runtime, vdi), size)
             camera = view.azimuth(angle)
             reference = renderers.image(camera)
-            frames = take_turns(self._runtime, draw.frames(camera), self._plan.repeats)
+            frames = draw.frames(camera)
+            full = take_turns(frames, self._plan.repeats, runtime=self._runtime)["vdi_skipping"]
             entry["full"] = {
-                "seconds": frames["vdi_skipping"],
+                "seconds": full,
                 "to_volume": accuracy(draw.image(camera), reference),
             }
-            full = frames["vdi_skipping"]
             entry["rows"] = measure_preview(draw, camera, size, full, reference)
         except (VDIError, MemoryError) as error:
-            entry["refused"] = f"{type(error).__name__}: {error}"
+            entry["refused"] = refusal(error)
         self._results.data["previews"].append(entry)
         self._results.save()
-        self._step(f"{name}: previews", 1)
+        self._step(f"{name}: previews", finished=1)
 
     def _preview_entry(self, reason: str | None) -> dict[str, Any]:
         entry = self._plan.to_dict()["preview"]
         return {**entry, "refused": reason, "full": None, "rows": []}
-
-
-def _sizes(vdi: VDI) -> dict[str, Any]:
-    """Return how large a VDI is; ``bytes_saved`` is of a file in the default compression."""
-    counts = vdi.counts
-    occupied = int(np.count_nonzero(counts))
-    with tempfile.TemporaryDirectory() as folder:
-        begin = time.perf_counter()
-        try:
-            saved = vdi.save(Path(folder) / "vdi.vdi").stat().st_size
-        except VDIError:  # no room for it: nothing else is lost
-            saved = None
-        seconds = time.perf_counter() - begin
-    return {
-        "lists": int(counts.size),
-        "occupied_lists": occupied,
-        "supersegments": vdi.n_supersegments,
-        "mean_length": vdi.n_supersegments / occupied if occupied else 0.0,
-        "longest_list": int(counts.max()),
-        "bytes_raw": vdi.nbytes,
-        "bytes_saved": saved,
-        "save_seconds": seconds if saved is not None else None,
-    }
