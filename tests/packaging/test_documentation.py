@@ -142,7 +142,7 @@ def test_pages_name_files_that_exist():
             continue
         text = page.read_text(encoding="utf-8")
         roots = r"(?:pyvista_vdi|opencl|tests|benchmarks|examples|docs|tools)"
-        for name in re.findall(rf"`({roots}/[\w/.-]+\.(?:py|cl|md|json|sh))`", text):
+        for name in re.findall(rf"(?<![\w/.-])({roots}/[\w/.-]+\.(?:py|cl|md|json|sh))\b", text):
             if not (CHECKOUT / name).is_file():
                 missing.add(f"{page.name}: {name}")
     assert not missing, sorted(missing)
