@@ -194,7 +194,7 @@ def test_what_is_made_in_the_background_is_chosen_there():
     keywords = {k: v for k, v in request.keywords.items() if k != "device"}
     with BackgroundGeneration() as background:
         background.start(*request.arguments, **keywords)
-        background._desk.join()
+        background._worker.join()
         made = background.take()
     assert made.equals(source.GetVDI())
     assert made.metadata["dial"]["asked"] == {"quality": "balanced"}

@@ -639,10 +639,11 @@ def test_an_estimate_that_ends_between_two_looks_is_not_asked_for_again(
     take, missed = estimation.Estimation.take, []
 
     def too_early(self):
-        job = self._job
+        job = self._worker.job
         if job is None or missed:
             return take(self)
-        assert job.done.wait(LONG)  # it ends right after this look
+        self._worker.join()  # it ends right after this look
+        assert not self._worker.running
         missed.append(job)
         return None
 
