@@ -1,9 +1,10 @@
-"""Fixtures of the whole suite: a runtime on every usable OpenCL device, and hypothesis profiles.
+"""Fixtures of the whole suite: a runtime on each OpenCL device to test, hypothesis profiles.
 
 Environment
 -----------
 PYVISTA_VDI_TEST_DEVICES
-    Comma separated parts of "platform / device": tests run on the devices that contain one.
+    Comma separated parts of "platform / device": tests that need a device run on those that
+    contain one; "all": on every usable one. By default on the one that users get.
 PYVISTA_VDI_REQUIRE_DEVICE
     "1": having no usable device is a failure, as in CI; otherwise such tests are skipped.
 PYVISTA_VDI_REQUIRE_INSTALLED
@@ -58,7 +59,15 @@ def usable_test_devices() -> tuple[list[DeviceInfo], str]:
     usable = [info for info in infos if info.usable]
     wanted = os.environ.get("PYVISTA_VDI_TEST_DEVICES", "")
     parts = [part.strip().lower() for part in wanted.split(",") if part.strip()]
-    chosen = [i for i in usable if not parts or any(p in i.full_name.lower() for p in parts)]
+    if not parts:
+        try:
+            chosen = [get_runtime().info]
+        except NoDeviceError as exc:
+            return [], str(exc)
+    elif parts == ["all"]:
+        chosen = usable
+    else:
+        chosen = [info for info in usable if any(p in info.full_name.lower() for p in parts)]
     reasons = "; ".join(
         f"{info.full_name}: {info.reason or 'left out by PYVISTA_VDI_TEST_DEVICES'}"
         for info in infos
@@ -75,7 +84,7 @@ def device_id(info: DeviceInfo) -> str:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Run tests that take ``runtime`` once per usable device."""
+    """Run tests that take ``runtime`` once on each device to test."""
     if "runtime" not in metafunc.fixturenames:
         return
     infos, _ = usable_test_devices()
@@ -83,6 +92,14 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     metafunc.parametrize(
         "runtime", infos or [None], ids=ids or ["no-device"], indirect=True, scope="session"
     )
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what runs on each device to test, for a run on another OpenCL implementation."""
+    for item in items:
+        if "runtime" in getattr(item, "fixturenames", ()):
+            item.add_marker("device")
 
 
 def no_device(reason: str) -> None:
@@ -94,7 +111,7 @@ def no_device(reason: str) -> None:
 
 @pytest.fixture(scope="session")
 def runtime(request: pytest.FixtureRequest) -> Runtime:
-    """A runtime on one of the usable devices; tests that take it run on each."""
+    """A runtime on one of the devices to test; tests that take it run on each."""
     if request.param is None:
         no_device(usable_test_devices()[1])
     return get_runtime(request.param)

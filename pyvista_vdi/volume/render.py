@@ -17,9 +17,9 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import memory_limit_bytes
 from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
 from pyvista_vdi.model.lighting import Lights
+from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.raycast import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.volume.bricks import SAMPLE_BYTES, Room, StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 

@@ -1,8 +1,8 @@
 """The arrows of the house: who may import whom, read from the source and seen in a fresh process.
 
-plotting -> vtk_pipeline -> engine -> opencl_runtime -> core, and paraview -> vtk_pipeline; vtk,
-pyvista, paraview and pyopencl each have one place. The engine must run where neither VTK nor
-PyVista is installed.
+Every import counts: those of a module's head, those that a function makes when it is called, and
+those for the checker of types. There are no exemptions. What a lower room needs of an upper one is
+handed in: see ``pyvista_vdi/model/providers.py``.
 """
 
 from __future__ import annotations
@@ -21,39 +21,42 @@ import pyvista_vdi
 
 PACKAGE = Path(pyvista_vdi.__file__).parent
 
-#: The only layers that may import each of these. What renders through PyVista may speak to the
-#: VTK objects behind it.
+#: The only rooms that may import each of these. What renders through PyVista may speak to the VTK
+#: objects behind it, and what measures compares with VTK.
 OWNERS = {
     "paraview": ("paraview",),
-    "pyopencl": ("opencl_runtime",),
-    "pyvista": ("plotting",),
-    "vtk": ("vtk_pipeline", "plotting", "paraview"),
-    "vtkmodules": ("vtk_pipeline", "plotting", "paraview"),
+    "pyopencl": ("device",),
+    "pyvista": ("plotting", "examples", "measure", "cli"),
+    "vtk": ("vtk_pipeline", "plotting", "paraview", "measure"),
+    "vtkmodules": ("vtk_pipeline", "plotting", "paraview", "measure"),
 }
 
-CORE = {
-    "checks",
-    "_version",
-    "ambient_occlusion",
-    "camera",
-    "compositing",
-    "cropping",
-    "errors",
-    "host_memory",
-    "lighting",
-    "numerics",
-    "precision",
-    "transfer_function",
-    "vdi",
-    "volume",
+#: Rooms and loose modules from the lowest to the highest; what stands in one line may not import
+#: each other. Only ``__init__``, which hands in what lower rooms need of upper ones, has no place.
+LEVELS = (
+    ("errors", "_version", "_moved"),
+    ("model",),
+    ("reference", "device", "io"),
+    ("volume",),
+    ("generation", "raycasting"),
+    ("quality",),
+    ("api",),
+    ("vtk_pipeline",),
+    ("plotting", "paraview"),
+    ("examples",),
+    ("measure",),
+    ("cli",),
+    ("__main__",),
+)
+
+#: Rooms in a room, likewise from the lowest to the highest.
+LEVELS_WITHIN = {
+    "io": (("whole_file",), ("png", "vdi_file"), ("deep_exr",), ("files",)),
+    "vtk_pipeline": (("filters",), ("interaction",), ("drawing",)),
 }
 
-#: Imports from low layers upwards that run only when they are needed: ``VDI.save``, and sizes of
-#: work-groups that are written into a file.
-DEFERRED_UPWARDS = {("vdi", "io"), ("opencl_runtime", "io")}
-
-#: Layers that nothing below them may need in order to be imported.
-TOP_LAYERS = ("vtk_pipeline", "plotting", "paraview", "cli")
+#: Rooms that need VTK or PyVista in order to be imported.
+WITH_VTK = ("vtk_pipeline", "plotting", "paraview")
 
 #: Slow to import, or optional: never loaded by ``import pyvista_vdi``.
 HEAVY = (
@@ -77,10 +80,10 @@ def _part(path):
     return path.relative_to(PACKAGE)
 
 
-def _top_level(path):
-    """Return the layer a file belongs to: its folder, or its own name at the package's top."""
-    part = _part(path)
-    return part.parts[0] if len(part.parts) > 1 else part.stem
+def _name(path):
+    """Return a file's dotted name without the package's."""
+    parts = _part(path).with_suffix("").parts
+    return ".".join(parts[:-1] if len(parts) > 1 and parts[-1] == "__init__" else parts)
 
 
 class Import(NamedTuple):
@@ -88,25 +91,12 @@ class Import(NamedTuple):
 
     name: str
     line: int
-    typing_only: bool
-    deferred: bool  # runs when a function is called, not when the module is imported
 
 
 def _imports(path):
-    """Yield an `Import` for every name that a file imports."""
-    tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
-    typing_only = _nodes_within(
-        node
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
-    )
-    deferred = _nodes_within(
-        node
-        for node in ast.walk(tree)
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
-    )
+    """Yield an `Import` for every name that a file imports, wherever it does."""
     package = ("pyvista_vdi", *_part(path).parts[:-1])
-    for node in ast.walk(tree):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), filename=str(path))):
         names = []
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
@@ -115,84 +105,119 @@ def _imports(path):
             module = ".".join(filter(None, (base, node.module)))
             names = [f"{module}.{alias.name}" for alias in node.names]
         for name in names:
-            yield Import(name, node.lineno, id(node) in typing_only, id(node) in deferred)
+            yield Import(name, node.lineno)
 
 
-def _nodes_within(roots):
-    return {id(inner) for root in roots for inner in ast.walk(root)}
-
-
-def _own_layer(name):
-    """Return the layer that a dotted name of this package belongs to, or None."""
-    parts = name.split(".")
-    if parts[0] != "pyvista_vdi" or len(parts) < 2:
-        return None
-    layer = parts[1]
-    exists = (PACKAGE / layer).is_dir() or (PACKAGE / f"{layer}.py").is_file()
-    return layer if exists else None
-
-
-def _report(offences):
-    return "\n".join(f"{_part(path)}:{item.line} imports {item.name}" for path, item in offences)
-
-
-def _at_run_time(paths):
-    """Yield (path, Import) of everything that is imported when the program runs."""
-    for path in paths:
+@pytest.fixture(scope="module")
+def arrows():
+    """Return {module: {module that it imports: line}}, both by their dotted names."""
+    names = {_name(path): path for path in _modules()}
+    found = {}
+    for name, path in names.items():
+        own = found.setdefault(name, {})
         for item in _imports(path):
-            if not item.typing_only:
-                yield path, item
+            target = item.name.removeprefix("pyvista_vdi").removeprefix(".")
+            if item.name.partition(".")[0] != "pyvista_vdi":
+                continue
+            while target and target not in names:  # a name in a module
+                target = target.rpartition(".")[0]
+            if (target or "__init__") != name:
+                own.setdefault(target or "__init__", item.line)
+    return found
+
+
+def _floor(levels, name):
+    floors = [i for i, level in enumerate(levels) if name in level]
+    assert len(floors) == 1, f"{name} has no place in the levels of this test"
+    return floors[0]
 
 
 def test_each_foreign_library_has_one_place():
     offences = []
-    for path, item in _at_run_time(_modules()):
-        owners = OWNERS.get(item.name.split(".")[0])
-        if owners is not None and _top_level(path) not in owners:
-            offences.append((path, item))
-    assert not offences, _report(offences)
+    for path in _modules():
+        room = _name(path).partition(".")[0]
+        for item in _imports(path):
+            if room not in OWNERS.get(item.name.partition(".")[0], (room,)):
+                offences.append(f"{_part(path)}:{item.line} imports {item.name}")
+    assert not offences, "\n".join(offences)
 
 
-def test_lower_layers_do_not_import_upper_ones_when_loaded():
+def test_arrows_point_down(arrows):
     offences = []
-    for path, item in _at_run_time(_modules()):
-        layer, target = _top_level(path), _own_layer(item.name)
-        if layer == target:
-            continue
-        allowed = {
-            "cli": ("vtk_pipeline", "plotting"),
-            "paraview": ("vtk_pipeline",),
-            "plotting": ("vtk_pipeline",),
-        }.get(layer, ())
-        if not item.deferred and target in TOP_LAYERS and target not in allowed:
-            offences.append((path, item))
-    assert not offences, _report(offences)
+    for name, targets in arrows.items():
+        room = name.partition(".")[0]
+        for target, line in targets.items():
+            to = target.partition(".")[0]
+            if name == "__init__" or to == room:
+                continue
+            floor = len(LEVELS) if to == "__init__" else _floor(LEVELS, to)
+            if floor >= _floor(LEVELS, room):
+                offences.append(f"{name}:{line} imports {target}")
+    assert not offences, "\n".join(offences)
 
 
-@pytest.mark.parametrize("layer", ["core", "reference", "opencl_runtime"])
-def test_low_layers_import_only_the_core(layer):
-    members = CORE if layer == "core" else {layer}
-    files = [path for path in _modules() if _top_level(path) in members]
-    assert files, f"there is no {layer}"
-    offences = [
-        (path, item)
-        for path, item in _at_run_time(files)
-        if (target := _own_layer(item.name)) is not None
-        and target not in CORE | members
-        and not (item.deferred and (_top_level(path), target) in DEFERRED_UPWARDS)
-    ]
-    assert not offences, _report(offences)
+@pytest.mark.parametrize("room", list(LEVELS_WITHIN))
+def test_arrows_point_down_within(room, arrows):
+    levels = LEVELS_WITHIN[room]
+    offences = []
+    for name, targets in arrows.items():
+        for target, line in targets.items():
+            parts, to = name.split("."), target.split(".")
+            if parts[0] != room or to[0] != room or len(parts) < 2 or len(to) < 2:
+                continue
+            if parts[1] != to[1] and _floor(levels, to[1]) >= _floor(levels, parts[1]):
+                offences.append(f"{name}:{line} imports {target}")
+    assert not offences, "\n".join(offences)
+
+
+def test_no_modules_import_each_other_in_a_circle(arrows):
+    circle = _circle({name: set(targets) for name, targets in arrows.items()})
+    assert not circle, " -> ".join(circle)
+
+
+def _circle(graph):
+    """Return one circle of a graph {name: names}, or an empty list."""
+    state, stack = {}, []
+
+    def visit(name):
+        state[name] = "open"
+        stack.append(name)
+        for target in sorted(graph.get(name, ())):
+            if state.get(target) == "open":
+                return [*stack[stack.index(target) :], target]
+            if target not in state and (found := visit(target)):
+                return found
+        state[name] = "done"
+        stack.pop()
+        return []
+
+    for name in sorted(graph):
+        if name not in state and (found := visit(name)):
+            return found
+    return []
+
+
+def test_the_search_for_circles_finds_one():
+    assert _circle({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == ["a", "b", "c", "a"]
+    assert _circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
+
+
+def test_the_house_has_few_rooms_and_few_loose_modules():
+    modules = {_name(path).partition(".")[0] for path in _modules()}
+    rooms = {path.parent.name for path in PACKAGE.glob("*/__init__.py")} - {"opencl"}
+    loose = modules - rooms - {"__init__", "__main__", "_version", "vdi_plugin"} - {"paraview"}
+    assert len(rooms | {"paraview"}) <= 14, sorted(rooms)
+    assert len(loose) <= 4, sorted(loose)
 
 
 def _engine_modules():
     """Return the dotted names of every module that must import without VTK and PyVista."""
-    names = []
-    for path in _modules():
-        if _top_level(path) in ("vtk_pipeline", "plotting", "paraview"):
-            continue
-        parts = ("pyvista_vdi", *_part(path).with_suffix("").parts)
-        names.append(".".join(parts[:-1] if parts[-1] == "__init__" else parts))
-    return sorted(set(names) - {"pyvista_vdi.__main__"})
+    names = [_name(path) for path in _modules()]
+    return sorted(
+        f"pyvista_vdi.{name}"
+        for name in names
+        if name.partition(".")[0] not in (*WITH_VTK, "__main__", "__init__")
+    )
 
 
 def _run(code):
