@@ -12,6 +12,7 @@ from collections import deque
 from typing import Any, NamedTuple
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.checks import as_float
 
 #: Frames whose mean rate is reported, and the fewest that show a trend (paper section 5).
 RECENT_FRAMES = 5
@@ -111,7 +112,7 @@ class FrameRateController:
     ) -> None:
         self.target_fps = target_fps
         self.threshold = threshold
-        self._floor = _number(floor)
+        self._floor = as_float(floor)
         if not 0 < self._floor <= 1:
             raise InvalidArgumentError(
                 f"floor must be a share of the full frame, above 0 and at most 1; got {floor!r}"
@@ -131,7 +132,7 @@ class FrameRateController:
 
     @target_fps.setter
     def target_fps(self, value: float) -> None:
-        rate = _number(value)
+        rate = as_float(value)
         if not (math.isfinite(rate) and rate > 0):
             raise InvalidArgumentError(
                 f"target_fps must be a number of frames per second above 0; got {value!r}"
@@ -145,7 +146,7 @@ class FrameRateController:
 
     @threshold.setter
     def threshold(self, value: float) -> None:
-        share = _number(value)
+        share = as_float(value)
         if not 0 < share < 1:
             raise InvalidArgumentError(
                 "threshold must be a relative deviation between 0 and 1, both excluded, such as "
@@ -216,7 +217,7 @@ class FrameRateController:
         well; then that interaction need not begin with a frame in full quality.
         """
         samples = _samples("samples", samples)
-        work, seconds = _number(work_seconds), _number(frame_seconds)
+        work, seconds = as_float(work_seconds), as_float(frame_seconds)
         least, most = _DURATIONS
         if not (least <= work <= most and least <= seconds <= most):
             return
@@ -312,15 +313,7 @@ class FrameRateController:
 
 
 def _samples(name: str, value: Any) -> int:
-    count = _number(value)
+    count = as_float(value)
     if not 1 <= count < math.inf:
         raise InvalidArgumentError(f"{name} must be a count of at least 1; got {value!r}")
     return int(count)
-
-
-def _number(value: Any) -> float:
-    """Return ``value`` as a float, NaN where it is no number: range checks then refuse it."""
-    try:
-        return float(value)
-    except (TypeError, ValueError, OverflowError):
-        return math.nan

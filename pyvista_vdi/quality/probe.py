@@ -336,17 +336,7 @@ def _loss(
 def viewport_planes(camera: Camera, window_size: tuple[int, int]) -> NDArray[np.float64]:
     """Return the four sides of what a view covers, as clipping planes that keep it.
 
-    Parameters
-    ----------
-    camera : Camera
-        The view.
-    window_size : (int, int)
-        Width and height of its window.
-
-    Returns
-    -------
-    numpy.ndarray
-        float64 (4, 6): origin and inward normal of each, world coordinates.
+    float64 (4, 6): origin and inward normal of each, world coordinates.
     """
     # 1 - u, 1 + u, 1 - v and 1 + v, times the homogeneous denominator, of world points
     matrix = camera.viewport_matrix(window_size) @ camera.view_matrix
@@ -384,23 +374,8 @@ def lists_met(
 ) -> tuple[tuple[int, int], tuple[int, int]] | None:
     """Return the rectangle of V_O's lists that the rays of a picture meet within bounds.
 
-    Parameters
-    ----------
-    lens : Camera
-        The view of the picture.
-    size : (int, int)
-        Width and height of the picture in pixels.
-    bounds : sequence of float, shape (6,)
-        Of the volume, model frame.
-    camera : Camera
-        The generating view V_O.
-    window : (int, int)
-        Width and height of V_O's window in lists.
-
-    Returns
-    -------
-    corner, size : (int, int)
-        First column and row from the top left, and how many; ``None`` if there are none.
+    ``lens`` is the view of the picture and ``size`` its pixels; ``camera`` is V_O and ``window``
+    its lists. The first column and row from the top left, and how many; None if there are none.
     """
     pixel_rays = rays.pixel_rays(lens, size, bounds)
     width, height = size

@@ -90,16 +90,7 @@ class Region:
 
 
 class Cells:
-    """A region cut into cells, each the part of a tile whose SSIM the tile tells.
-
-    Parameters
-    ----------
-    region : Region
-        What they cover.
-    size : (int, int)
-        The window, pixels.
-    edge : int
-        Of a cell, pixels; less where the window has fewer.
+    """A region of a window cut into cells, each the part of a tile whose SSIM the tile tells.
 
     Attributes
     ----------
@@ -107,8 +98,6 @@ class Cells:
         int64 (n, 2), column and row of each **tile's** first pixel, along a space-filling curve.
     tile_size : (int, int)
         Width and height of a tile, pixels.
-    area : int
-        Pixels that the cells cover together.
     """
 
     def __init__(self, region: Region, size: tuple[int, int], edge: int) -> None:
@@ -286,12 +275,7 @@ def _ratio_estimate(
 ) -> tuple[float, float]:
     """Total loss of all cells, and its standard error, from those that were chosen.
 
-    Parameters
-    ----------
-    losses, chances, guess : numpy.ndarray
-        Of the chosen cells, float64 (k,).
-    guessed : float
-        Sum of the guesses for all cells.
+    ``guessed`` is the sum of the guesses for all cells, the arrays are of the chosen ones.
     """
     seen, expected = float((losses / chances).sum()), float((guess / chances).sum())
     ratio = seen / expected if expected > 0 else 0.0

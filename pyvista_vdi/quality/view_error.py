@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -146,36 +146,6 @@ def magnification(vdi: VDI, camera: Any, window_size: Sequence[int] | None = Non
     if pixel == math.inf:
         return 0.0
     return width / pixel
-
-
-def estimate_view_error(
-    vdi: VDI,
-    volume: Volume,
-    transfer_function: TransferFunction,
-    camera: Any,
-    window_size: Sequence[int] | None = None,
-    medium: MediumOptions | None = None,
-    *,
-    tiles: int = TILES,
-    tile_size: int = TILE_SIZE,
-    device: Any = None,
-    **options: Any,
-) -> ViewError:
-    """Estimate a VDI's error in one view; see :class:`ViewErrorEstimator` for several.
-
-    The options are those of :class:`MediumOptions` and of :meth:`ViewErrorEstimator.estimate`.
-    """
-    of_medium = {f.name: options.pop(f.name) for f in fields(MediumOptions) if f.name in options}
-    estimator = ViewErrorEstimator(
-        volume,
-        transfer_function,
-        medium,
-        tiles=tiles,
-        tile_size=tile_size,
-        device=device,
-        **of_medium,
-    )
-    return estimator.estimate(vdi, camera, window_size, **options)
 
 
 class ViewErrorEstimator:

@@ -24,7 +24,6 @@ from pyvista_vdi.quality.view_error import (
     TILES,
     ViewErrorEstimator,
     angle_from_generating_view,
-    estimate_view_error,
     magnification,
 )
 from pyvista_vdi.raycasting.raycast import render_vdi
@@ -269,7 +268,8 @@ def test_a_moved_actor_is_judged_where_it_is(scene):
 def test_the_same_question_has_the_same_answer(scene):
     vdi, camera = scene.vdi("coarse"), VIEW.azimuth(33)
     answers = {scene.estimator().estimate(vdi, camera, WINDOW) for _ in range(3)}
-    answers.add(estimate_view_error(vdi, VOLUME, TRANSFER, camera, WINDOW, device=scene.runtime))
+    another = ViewErrorEstimator(VOLUME, TRANSFER, device=scene.runtime)
+    answers.add(another.estimate(vdi, camera, WINDOW))
     assert len(answers) == 1
 
 

@@ -19,7 +19,7 @@ from pyvista_vdi import (
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.quality.view_error import estimate_view_error
+from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.reference.generate import node_occlusion
 from pyvista_vdi.reference.occlusion import _trilinear as trilinear
@@ -309,6 +309,7 @@ def test_an_occluded_vdi_is_judged_by_the_occluded_volume(default_runtime):
     camera = Camera((9, -70, 25), (9.5, 9.5, 9.5), (0, 0, 1))
     occlusion = AmbientOcclusion(8.0, 1.0)
     vdi = generate_vdi(volume, camera, (64, 48), function, ambient_occlusion=occlusion)
-    given = (vdi, volume, function, camera)
-    assert estimate_view_error(*given, ambient_occlusion=occlusion).ssim > 0.9999
-    assert estimate_view_error(*given).ssim < 0.99
+    with_it = ViewErrorEstimator(volume, function, ambient_occlusion=occlusion)
+    without = ViewErrorEstimator(volume, function)
+    assert with_it.estimate(vdi, camera).ssim > 0.9999
+    assert without.estimate(vdi, camera).ssim < 0.99

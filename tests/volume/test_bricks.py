@@ -15,7 +15,7 @@ from pyvista_vdi.generation.estimate import estimate
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.checks import memory_limit_bytes
 from pyvista_vdi.model.lighting import Shading
-from pyvista_vdi.quality.view_error import estimate_view_error
+from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.volume import bricks
 from pyvista_vdi.volume.bricks import BrickLayout, DeviceBricks, fitting_layout, in_parts
 from pyvista_vdi.volume.render import raycast_volume
@@ -229,10 +229,9 @@ def test_views_are_judged_within_the_limit(runtime, used):
     vdi = make(runtime, volume, camera, function)
     options = {"sample_distance": 1.0, "device": runtime}
     view, window = camera.azimuth(20), (90, 60)
-    judged = estimate_view_error(vdi, volume, function, view, window, **options)
-    limited = estimate_view_error(
-        vdi, volume, function, view, window, memory_limit=2.9 * 2**20, **options
-    )
+    free = ViewErrorEstimator(volume, function, **options)
+    short = ViewErrorEstimator(volume, function, memory_limit=2.9 * 2**20, **options)
+    judged, limited = (one.estimate(vdi, view, window) for one in (free, short))
     assert used
     assert limited == judged
 
