@@ -191,9 +191,8 @@ def test_what_is_made_in_the_background_is_chosen_there():
     source.SetDial("balanced")
     request = source.MakeRequest()
     dial_measurement.forget()
-    keywords = {k: v for k, v in request.keywords.items() if k != "device"}
     with BackgroundGeneration() as background:
-        background.start(*request.arguments, **keywords)
+        background.start(*request.arguments, request.options, dial=request.dial)
         background._worker.join()
         made = background.take()
     assert made.equals(source.GetVDI())

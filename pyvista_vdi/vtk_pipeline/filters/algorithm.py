@@ -1,4 +1,4 @@
-"""What this package's VTK algorithms share: how they say what went wrong."""
+"""What this package's VTK algorithms share: how they say what went wrong, and what they ask for."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
 from vtkmodules.vtkCommonCore import vtkOutputWindow
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+
+from pyvista_vdi.errors import Cancelled
 
 
 class Algorithm(VTKPythonAlgorithmBase):
@@ -22,18 +24,32 @@ class Algorithm(VTKPythonAlgorithmBase):
         self._error: BaseException | None = None
         self._python_waits = False
 
-    def Update(self, *args: Any) -> Any:
+    def Update(self, *args: Any) -> None:
         """Bring the output up to date, and raise what went wrong."""
+        self._update(*args)
+
+    def _update(self, *args: Any) -> bool:
+        """Do so, and return whether what is before this algorithm went well."""
         self._python_waits = True
         try:
-            result = super().Update(*args)
+            if args:
+                super().Update(*args)
+                done = True
+            else:  # what vtkAlgorithm.Update() does, which does not say whether it went well
+                done = self.GetExecutive().Update(0 if self.GetNumberOfOutputPorts() else -1)
         finally:
             self._python_waits = False
         error, self._error = self._error, None
         if error is not None:
             self.Modified()  # so that the next update tries again
             raise error
-        return result
+        return bool(done)
+
+    def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Ask for the whole input, whatever part of the output is wanted."""
+        if self.GetNumberOfInputPorts():
+            ask_for_all(inputs)
+        return 1
 
     def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Execute; VTK's request."""
@@ -42,7 +58,7 @@ class Algorithm(VTKPythonAlgorithmBase):
             self._execute(inputs, outputs)
         except BaseException as error:  # VTK would print it and go on (or exit, on Ctrl-C)
             self._error = error
-            if not self._python_waits:
+            if not self._python_waits and not isinstance(error, Cancelled):
                 name = type(self).__name__
                 vtkOutputWindow.GetInstance().DisplayErrorText(f"{name}: {error}\n")
             if self.GetNumberOfOutputPorts():
@@ -58,12 +74,18 @@ class Algorithm(VTKPythonAlgorithmBase):
             self.Modified()
 
 
+def whole_extent(information: Any) -> tuple[int, ...] | None:
+    """Return the extent that a port announces, if it does."""
+    key = vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
+    return information.Get(key) if information is not None and information.Has(key) else None
+
+
 def announce(outputs: Any, window_size: tuple[int, int]) -> None:
     """Tell the pipeline that an image of one point per pixel will come."""
     width, height = window_size
     information = outputs.GetInformationObject(0)
-    executive = vtkStreamingDemandDrivenPipeline
-    information.Set(executive.WHOLE_EXTENT(), (0, width - 1, 0, height - 1, 0, 0), 6)
+    extent = (0, width - 1, 0, height - 1, 0, 0)
+    information.Set(vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT(), extent, 6)
     information.Set(vtkImageData.SPACING(), (1.0, 1.0, 1.0), 3)
     information.Set(vtkImageData.ORIGIN(), (0.0, 0.0, 0.0), 3)
 
@@ -71,6 +93,6 @@ def announce(outputs: Any, window_size: tuple[int, int]) -> None:
 def ask_for_all(inputs: Any) -> None:
     """Ask for the whole input, whatever part of the output is wanted."""
     information = inputs[0].GetInformationObject(0)
-    executive = vtkStreamingDemandDrivenPipeline
-    if information is not None and information.Has(executive.WHOLE_EXTENT()):
-        information.Set(executive.UPDATE_EXTENT(), information.Get(executive.WHOLE_EXTENT()), 6)
+    extent = whole_extent(information)
+    if extent is not None:
+        information.Set(vtkStreamingDemandDrivenPipeline.UPDATE_EXTENT(), extent, 6)

@@ -5,15 +5,14 @@ from __future__ import annotations
 import warnings
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from inspect import Parameter, Signature
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
-from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkWeakReference
+from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkRenderingCore import vtkVolumeProperty
 
 from pyvista_vdi.errors import (
@@ -23,19 +22,21 @@ from pyvista_vdi.errors import (
     VDIError,
     VDIWarning,
 )
-from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import memory_limit_bytes
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.lighting import Lights
-from pyvista_vdi.model.options import check_criterion, check_max_supersegments
-from pyvista_vdi.model.packing import check_precision
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, warn_missed
 from pyvista_vdi.quality.probe import generate_by_dial
-from pyvista_vdi.vtk_pipeline.filters.algorithm import announce, ask_for_all
+from pyvista_vdi.vtk_pipeline.filters.algorithm import (
+    Algorithm,
+    announce,
+    ask_for_all,
+    whole_extent,
+)
 from pyvista_vdi.vtk_pipeline.filters.convert import (
     require_image,
     require_image_port,
@@ -47,13 +48,14 @@ from pyvista_vdi.vtk_pipeline.filters.properties import (
     color_function,
     transfer_function_from_property,
 )
-from pyvista_vdi.vtk_pipeline.filters.tracking import TrackedCamera
-from pyvista_vdi.vtk_pipeline.filters.view import View
+from pyvista_vdi.vtk_pipeline.filters.view import TrackedCamera, View
 
 #: What a VDI's window covers.
 COVERAGES = ("bounds", "view")
 
 Progress = Callable[[float], object]
+
+_NO_INPUT = "VDISource has no input: call SetInputDataObject(volume)"
 
 
 @dataclass(frozen=True)
@@ -70,8 +72,14 @@ class Request:
         The view on the screen.
     generating : (Camera, (int, int))
         The generating view V_O and its window, after coverage.
-    settings, metadata : dict
-        Keyword arguments of ``generate_by_dial``.
+    options : GenerationOptions
+        How it is made.
+    dial : Dial or None
+        What chooses some of the options.
+    device
+        Where.
+    metadata : dict
+        What is added to the VDI's.
     content : tuple
         Equal where what is generated from is equal, the view apart.
     """
@@ -80,7 +88,9 @@ class Request:
     transfer_function: TransferFunction
     screen: View
     generating: tuple[Camera, tuple[int, int]]
-    settings: dict[str, Any]
+    options: GenerationOptions
+    dial: Dial | None
+    device: Any
     metadata: dict[str, Any]
     content: Any = field(repr=False)
 
@@ -91,16 +101,36 @@ class Request:
 
     @property
     def arguments(self) -> tuple[Volume, Camera, tuple[int, int], TransferFunction]:
-        """The positional arguments of ``generate_by_dial``."""
+        """The first arguments of whatever generates."""
         return (self.volume, *self.generating, self.transfer_function)
 
-    @property
-    def keywords(self) -> dict[str, Any]:
-        """The keyword arguments of ``generate_by_dial``."""
-        return {"metadata": {"scalars": self.volume.name, **self.metadata}, **self.settings}
+
+def _option(name: str, argument: str, meaning: str, more: str = "") -> tuple[Any, Any]:
+    """Return the setter and the getter of one of the :class:`GenerationOptions`.
+
+    The setter's ``argument`` is checked by the options.
+    """
+
+    def set_option(self: VDISource, value: Any) -> None:
+        self.SetOptions(replace(self._options, **{name: value}))
+
+    def get_option(self: VDISource) -> Any:
+        return getattr(self._options, name)
+
+    as_vtk = "".join(word.capitalize() for word in name.split("_"))
+    kind = Parameter.POSITIONAL_OR_KEYWORD
+    for function, verb, names in (
+        (set_option, "Set", ["self", argument]),
+        (get_option, "Get", ["self"]),
+    ):
+        function.__name__, function.__qualname__ = verb + as_vtk, f"VDISource.{verb}{as_vtk}"
+        function.__signature__ = Signature([Parameter(each, kind) for each in names])  # type: ignore[union-attr]
+    set_option.__doc__ = f"Set {meaning}.\n\n{more}As ``{name}`` of :func:`pyvista_vdi.generate`."
+    get_option.__doc__ = f"Return {meaning}."
+    return set_option, get_option
 
 
-class VDISource(VTKPythonAlgorithmBase):
+class VDISource(Algorithm):
     """Generate a VDI from the volume at its input.
 
     One ``vtkImageData`` in; out comes the VDI in its canonical VTK form (see
@@ -140,18 +170,9 @@ class VDISource(VTKPythonAlgorithmBase):
         self._coverage = "view"
         self._scalars: str | None = None
         self._preference = "point"
-        self._settings: dict[str, Any] = {
-            "max_supersegments": 20,
-            "criterion": "least-error",
-            "sample_distance": None,
-            "tolerance": 0.0,
-            "view_cone": 60.0,
-            "precision": "exact",
-            "dial": None,
-            "ambient_occlusion": None,
-            "memory_limit": None,
-            "device": None,
-        }
+        self._options = GenerationOptions()
+        self._dial: Dial | None = None
+        self._device: Any = None
         self._lights: Lights | None = None
         self._lit_by = vtkWeakReference()
         self._property: vtkVolumeProperty | None = None
@@ -162,8 +183,6 @@ class VDISource(VTKPythonAlgorithmBase):
         self._volume_key: Any = None
         self._vdi: VDI | None = None
         self._request: Request | None = None
-        self._error: BaseException | None = None
-        self._python_waits = False
         self.AddObserver("EndEvent", _end_abort)
         self.inputs: weakref.WeakSet[Any] = weakref.WeakSet()  # mappers' inputs that draw this
 
@@ -331,79 +350,64 @@ class VDISource(VTKPythonAlgorithmBase):
 
     def CheckLights(self) -> None:
         """Be out of date if the renderer that lights the volume has other lights by now."""
-        lit = None if self._request is None else self._request.settings["lights"]
-        if lit is not None and lit != self.GetLights():
+        made = self._request
+        lit = made is not None and made.transfer_function.shading is not None
+        if made is not None and lit and made.options.lights != self.GetLights():
             self.Modified()
 
-    def SetMaxSupersegments(self, limit: int) -> None:
-        """Set the longest list, 1 to 4096."""
-        self._set("max_supersegments", check_max_supersegments(limit))
-
-    def GetMaxSupersegments(self) -> int:
-        """Return the longest list."""
-        return self._settings["max_supersegments"]  # type: ignore[no-any-return]
-
-    def SetCriterion(self, criterion: str) -> None:
-        """Choose what decides where a list that must be shortened is cut.
-
-        Parameters
-        ----------
-        criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
-            As for :func:`pyvista_vdi.generate`.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is none of these.
-        """
-        self._set("criterion", check_criterion(criterion))
-
-    def GetCriterion(self) -> str:
-        """Return what decides where a list is cut."""
-        return self._settings["criterion"]  # type: ignore[no-any-return]
-
-    def SetSampleDistance(self, distance: float | None) -> None:
-        """Set the length of a step, model units; ``None`` is half the smallest spacing."""
+    def SetOptions(self, options: GenerationOptions) -> None:
+        """Set how the VDI is made, all of it at once; lights are set by :meth:`SetLights`."""
+        distance = options.sample_distance
         if distance is not None and not (np.isfinite(distance) and distance > 0):
             raise InvalidArgumentError(
                 f"sample_distance must be a positive length in model units; got {distance!r}"
             )
-        self._set("sample_distance", distance)
+        self._change("_options", options)
 
-    def GetSampleDistance(self) -> float | None:
-        """Return the length of a step, model units."""
-        return self._settings["sample_distance"]  # type: ignore[no-any-return]
+    def GetOptions(self) -> GenerationOptions:
+        """Return how the VDI is made."""
+        return self._options
 
-    def SetTolerance(self, tolerance: float) -> None:
-        """Set the error that may be traded for shorter lists; 0 merges only what is homogeneous."""
-        if not (np.isfinite(tolerance) and tolerance >= 0):
-            raise InvalidArgumentError(f"tolerance must be 0 or above; got {tolerance!r}")
-        self._set("tolerance", tolerance)
-
-    def GetTolerance(self) -> float:
-        """Return the tolerance."""
-        return self._settings["tolerance"]  # type: ignore[no-any-return]
-
-    def SetViewCone(self, degrees: float) -> None:
-        """Set the half angle of the cone of views that must be served, 0 to 90 degrees."""
-        if not 0 <= degrees <= 90:
-            raise InvalidArgumentError(f"view_cone must be 0 to 90 degrees; got {degrees!r}")
-        self._set("view_cone", degrees)
-
-    def GetViewCone(self) -> float:
-        """Return the half angle of the cone of views, degrees."""
-        return self._settings["view_cone"]  # type: ignore[no-any-return]
-
-    def SetPrecision(self, precision: str) -> None:
-        """Choose what a supersegment takes: "exact", "16-byte" or "8-byte".
-
-        As :meth:`pyvista_vdi.VDI.with_precision`.
-        """
-        self._set("precision", check_precision(precision))
-
-    def GetPrecision(self) -> str:
-        """Return what a supersegment takes, where no dial chooses it."""
-        return self._settings["precision"]  # type: ignore[no-any-return]
+    SetMaxSupersegments, GetMaxSupersegments = _option(
+        "max_supersegments", "limit", "the longest list, 1 to 4096"
+    )
+    SetCriterion, GetCriterion = _option(
+        "criterion", "criterion", "what decides where a list that must be shortened is cut"
+    )
+    SetSampleDistance, GetSampleDistance = _option(
+        "sample_distance",
+        "distance",
+        "the length of a step, model units; ``None`` is half the smallest spacing",
+    )
+    SetTolerance, GetTolerance = _option(
+        "tolerance",
+        "tolerance",
+        "the error that may be traded for shorter lists; 0 merges only what is homogeneous",
+    )
+    SetViewCone, GetViewCone = _option(
+        "view_cone",
+        "degrees",
+        "the half angle of the cone of views that must be served, 0 to 90 degrees",
+    )
+    SetPrecision, GetPrecision = _option(
+        "precision",
+        "precision",
+        'what a supersegment takes, where no dial chooses it: "exact", "16-byte" or "8-byte"',
+    )
+    SetAmbientOcclusion, GetAmbientOcclusion = _option(
+        "ambient_occlusion",
+        "occlusion",
+        "whether what is hidden from the light around it is darkened; ``None`` where it is not",
+        "``None`` or ``False``: no, which is the default; ``True``: with the default radius; a\n"
+        "number: with this radius, model units; or an ``AmbientOcclusion``.\n\n",
+    )
+    SetMemoryLimit, GetMemoryLimit = _option(
+        "memory_limit",
+        "limit",
+        "the most bytes that generating may take on the device, if they are limited",
+        'Bytes, or a text such as ``"2 GiB"``; ``None``, the default, is what the device has. The\n'
+        "estimate whether a view needs a VDI of its own keeps to the limit by itself.\n\n",
+    )
 
     def SetDial(
         self,
@@ -430,60 +434,20 @@ class VDISource(VTKPythonAlgorithmBase):
         InvalidArgumentError
             If one is out of range, or they contradict each other.
         """
-        self._set("dial", Dial.of(quality, target_ssim, target_fps, max_bytes, target_angle))
+        dial = Dial.of(quality, target_ssim, target_fps, max_bytes, target_angle)
+        self._change("_dial", dial)
 
     def GetDial(self) -> Dial | None:
         """Return what the VDI is to reach; ``None`` where nothing is to be chosen."""
-        return self._settings["dial"]  # type: ignore[no-any-return]
-
-    def SetAmbientOcclusion(self, occlusion: Any) -> None:
-        """Choose whether what is hidden from the light around it is darkened.
-
-        Parameters
-        ----------
-        occlusion : None, bool, float or AmbientOcclusion
-            ``None`` or ``False``: no, which is the default; ``True``: with the default radius; a
-            number: with this radius, model units.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is none of these, or the radius is not positive.
-        """
-        self._set("ambient_occlusion", AmbientOcclusion.from_any(occlusion))
-
-    def GetAmbientOcclusion(self) -> AmbientOcclusion | None:
-        """Return the ambient occlusion, ``None`` where there is none."""
-        return self._settings["ambient_occlusion"]  # type: ignore[no-any-return]
-
-    def SetMemoryLimit(self, limit: float | str | None) -> None:
-        """Set the most bytes that generating may take on the device.
-
-        Parameters
-        ----------
-        limit : None, int, float or str
-            Bytes, or a text such as ``"2 GiB"``; ``None``, the default, is what the device has. A
-            volume that does not fit goes there brick by brick, for the same VDI. The estimate
-            whether a view needs a VDI of its own keeps to the limit by itself.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is no size above 0.
-        """
-        self._set("memory_limit", memory_limit_bytes(limit))
-
-    def GetMemoryLimit(self) -> int | None:
-        """Return the most bytes that generating may take on the device, if they are limited."""
-        return self._settings["memory_limit"]  # type: ignore[no-any-return]
+        return self._dial
 
     def SetDevice(self, device: Any) -> None:
         """Choose the OpenCL device; ``None`` is the default one."""
-        self._set("device", device)
+        self._change("_device", device)
 
     def GetDevice(self) -> Any:
         """Return the device as it was set."""
-        return self._settings["device"]
+        return self._device
 
     def SetProgressCallback(self, progress: Progress | None) -> None:
         """Set a callable that gets the fraction done; if it returns ``False`` the work stops.
@@ -501,23 +465,12 @@ class VDISource(VTKPythonAlgorithmBase):
     def Update(self, *args: Any) -> Any:
         """Bring the output up to date, and raise what went wrong."""
         self.CheckLights()
-        self._python_waits = True
-        try:
-            # What vtkAlgorithm.Update() does, which does not say whether it went well
-            done = super().Update(*args) if args else self.GetExecutive().Update(0)
-        finally:
-            self._python_waits = False
-        error, self._error = self._error, None
-        if error is not None:
-            self.Modified()  # so that the next update tries again
-            raise error
-        if not args and not done:
+        if not self._update(*args):
             raise InvalidVolumeError(
                 "what is before VDISource failed: VTK's output window says why"
                 if self.GetNumberOfInputConnections(0) > 0
-                else "VDISource has no input: call SetInputDataObject(volume)"
+                else _NO_INPUT
             )
-        return None
 
     def GetVDI(self) -> VDI:
         """Return the VDI, brought up to date.
@@ -551,11 +504,9 @@ class VDISource(VTKPythonAlgorithmBase):
         VDIError
             What :meth:`GetVDI` would raise before it generates.
         """
-        if self.GetNumberOfInputConnections(0) == 0:
-            raise InvalidVolumeError("VDISource has no input: call SetInputDataObject(volume)")
-        self.GetInputAlgorithm(0, 0).Update()
+        data = self._input()
         return self._make_request(
-            self.GetInputDataObject(0, 0),
+            data,
             self.GetCamera() if view is None else view.camera,
             self._window_size if view is None else view.size,
             warn=False,
@@ -570,17 +521,15 @@ class VDISource(VTKPythonAlgorithmBase):
         self.Modified()  # the output is another
 
     def GetVolume(self) -> Volume:
-        """Return the volume at the input, read again only if it has changed.
+        """Return the volume at the input, read again only if it has changed; raises if none is."""
+        return self._read(self._input())
 
-        Raises
-        ------
-        InvalidVolumeError, UnsupportedError
-            If there is none that a VDI can be made from.
-        """
+    def _input(self) -> Any:
+        """Return the data at the input, brought up to date."""
         if self.GetNumberOfInputConnections(0) == 0:
-            raise InvalidVolumeError("VDISource has no input: call SetInputDataObject(volume)")
+            raise InvalidVolumeError(_NO_INPUT)
         self.GetInputAlgorithm(0, 0).Update()
-        return self._read(self.GetInputDataObject(0, 0))
+        return self.GetInputDataObject(0, 0)
 
     def GetInputBounds(self) -> tuple[float, ...] | None:
         """Return the volume's bounds, model frame, without making a VDI; ``None`` without input."""
@@ -602,41 +551,35 @@ class VDISource(VTKPythonAlgorithmBase):
         announce(outputs, (width, height))
         return 1
 
-    def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Ask for the whole volume, whatever part of the VDI is wanted."""
-        ask_for_all(inputs)
-        return 1
-
     def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Generate, unless nothing that matters has changed."""
-        output = vtkImageData.GetData(outputs, 0)
-        self._error = None
-        try:
-            if self._aborted():
-                raise Cancelled("generating a VDI was aborted before it began")
-            vdi = self._generated(vtkDataObject.GetData(inputs[0], 0))
-        except BaseException as error:  # VTK would print it and go on (or exit, on Ctrl-C)
-            self._report(error)
-            output.Initialize()
-            self.SetAbortOutput(isinstance(error, Cancelled))  # then the next update tries again
-            return 1
-        output.ShallowCopy(vdi_to_image(vdi))
-        if self._settings["dial"] is not None:
-            announce(outputs, vdi.window_size)  # which it has chosen only now
-            ask_for_all([outputs])
+        super().RequestData(request, inputs, outputs)
+        if self._error is not None:  # aborted, the next update tries again
+            self.SetAbortOutput(isinstance(self._error, Cancelled))
         return 1
 
     # -- how -------------------------------------------------------------------------------------
 
-    def _generated(self, image: Any) -> VDI:
+    def _execute(self, inputs: Any, outputs: Any) -> None:
+        if self._aborted():
+            raise Cancelled("generating a VDI was aborted before it began")
+        image = vtkDataObject.GetData(inputs[0], 0)
         request = self._make_request(image, self.GetCamera(), self._window_size, warn=True)
         if self._vdi is None or self._request is None or request.key != self._request.key:
             self._vdi = generate_by_dial(
-                *request.arguments, progress=self._advance, **request.keywords
+                *request.arguments,
+                request.dial,
+                request.options,
+                device=request.device,
+                progress=self._advance,
+                metadata=request.metadata,
             )
             self._request = request
             warn_missed(self._vdi, stacklevel=2)
-        return self._vdi
+        vtkImageData.GetData(outputs, 0).ShallowCopy(vdi_to_image(self._vdi))
+        if self._dial is not None:
+            announce(outputs, self._vdi.window_size)  # which it has chosen only now
+            ask_for_all([outputs])
 
     def _make_request(
         self,
@@ -661,15 +604,18 @@ class VDISource(VTKPythonAlgorithmBase):
         assert window_size is not None
         volume = self._read(image)
         table = transfer_function_from_property(self._property, rgba=volume.rgba)
-        settings = {**self._settings, "lights": self.GetLights() if table.shading else None}
+        lights = self.GetLights() if table.shading else Lights()
+        options = replace(self._options, lights=lights)
         return Request(
             volume,
             table,
             View(camera, window_size),
             self._view(image, camera, window_size, warn=warn),
-            settings,
-            dict(self._metadata),
-            (self._volume_key, table, tuple(settings.items()), self._metadata),
+            options,
+            self._dial,
+            self._device,
+            {"scalars": volume.name, **self._metadata},
+            (self._volume_key, table, options, self._dial, self._device, self._metadata),
         )
 
     def _read(self, image: Any) -> Volume:
@@ -717,7 +663,7 @@ class VDISource(VTKPythonAlgorithmBase):
         producer = self.GetInputAlgorithm(0, 0)
         producer.UpdateInformation()
         information = self.GetInputInformation(0, 0)
-        executive = vtkStreamingDemandDrivenPipeline
+        extent = whole_extent(information)
         grid = vtkImageData()
         data = self.GetInputDataObject(0, 0)
         if data is not None and not isinstance(data, vtkImageData):
@@ -725,9 +671,9 @@ class VDISource(VTKPythonAlgorithmBase):
         if data is not None and data.GetNumberOfPoints() > 0:
             grid.CopyStructure(data)
             return grid
-        if information is None or not information.Has(executive.WHOLE_EXTENT()):
+        if extent is None:
             return None
-        grid.SetExtent(information.Get(executive.WHOLE_EXTENT()))
+        grid.SetExtent(extent)
         for key, put in (
             (vtkImageData.SPACING(), grid.SetSpacing),
             (vtkImageData.ORIGIN(), grid.SetOrigin),
@@ -749,21 +695,6 @@ class VDISource(VTKPythonAlgorithmBase):
     def _watch_camera(self) -> None:
         if self._given is not None:
             self._given.watch(VDISource.Modified if self._track else None)
-
-    def _report(self, error: BaseException) -> None:
-        self._error = error
-        if not self._python_waits and not isinstance(error, Cancelled):
-            vtkOutputWindow.GetInstance().DisplayErrorText(f"VDISource: {error}\n")
-
-    def _set(self, name: str, value: Any) -> None:
-        if self._settings[name] != value:
-            self._settings[name] = value
-            self.Modified()
-
-    def _change(self, attribute: str, value: Any) -> None:
-        if getattr(self, attribute) != value:
-            setattr(self, attribute, value)
-            self.Modified()
 
     def _observe_property(self) -> None:
         """Let changes to the property or its functions reach this algorithm's time stamp."""

@@ -1,13 +1,15 @@
-"""A view on the screen, and how far two of them are apart."""
+"""A view on the screen, how far two of them are apart, and a camera whose views are followed."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from vtkmodules.vtkCommonCore import vtkWeakReference
 
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
@@ -39,22 +41,12 @@ class View:
         return cls(camera, (max(1, width), max(1, height)))
 
     def distance(self, other: View, bounds: tuple[float, ...]) -> float:
-        """Return by how much the bounds' corners differ between two pictures.
+        """Return by how much the corners of a volume's bounds differ between two pictures.
 
-        Parameters
-        ----------
-        other : View
-            The other view.
-        bounds : tuple of float
-            Of the volume, model frame.
-
-        Returns
-        -------
-        float
-            Largest distance of a corner's places in the two pictures, each from the picture's
-            centre ray and in its own pixels, over half this picture's height. 0 for the same view;
-            about the angle in radians where an object that fills the picture is turned; infinite
-            where a corner is behind an eye. It sees turning, panning, zooming and resizing alike.
+        Largest distance of a corner's places in the two pictures, each from the picture's centre
+        ray and in its own pixels, over half this picture's height. 0 for the same view; about the
+        angle in radians where an object that fills the picture is turned; infinite where a corner
+        is behind an eye. It sees turning, panning, zooming and resizing alike.
         """
         if self == other:
             return 0.0
@@ -74,3 +66,68 @@ class View:
         if camera.parallel_projection:
             return places
         return None if z.min() <= 0 else places / z[:, None]
+
+
+class TrackedCamera:
+    """A ``vtkCamera`` that a :class:`VDISource` follows, and whether it has moved since.
+
+    The camera is kept, and the source is held weakly. ``model_transform``, (4, 4), says where the
+    volume stands in the camera's world.
+    """
+
+    def __init__(self, camera: Any, model_transform: ArrayLike | None, source: Any) -> None:
+        self.camera = camera
+        self._model_transform = model_transform
+        self._pose = _pose(camera)
+        self._source = vtkWeakReference()
+        self._source.Set(source)
+        self._tag: int | None = None
+
+    def watch(self, moved: Callable[[Any], None] | None) -> None:
+        """Call ``moved(source)`` whenever the camera has moved; ``None`` ends it."""
+        if self._tag is not None:
+            self.camera.RemoveObserver(self._tag)
+            self._tag = None
+        if moved is None:
+            return
+        weak, seen = self._source, [_pose(self.camera)]
+
+        def changed(camera: Any, _: str) -> None:
+            pose, source = _pose(camera), weak.Get()
+            # Renderers modify their cameras in every frame, by the clipping range
+            if source is not None and pose != seen[0]:
+                seen[0] = pose
+                moved(source)
+
+        self._tag = self.camera.AddObserver("ModifiedEvent", changed)
+
+    @property
+    def has_moved(self) -> bool:
+        """Whether it stands elsewhere than it did when it was read."""
+        return _pose(self.camera) != self._pose
+
+    def read(self) -> Camera:
+        """Return the view as it is now; raises what :meth:`Camera.from_any` does."""
+        view = Camera.from_any(self.camera, model_transform=self._model_transform)
+        self._pose = _pose(self.camera)
+        return view
+
+
+def _pose(camera: Any) -> tuple[Any, ...]:
+    """Return everything that makes another view; not checked, a camera on its way may be none."""
+    transform = camera.GetUserViewTransform()
+    return (
+        camera.GetPosition(),
+        camera.GetFocalPoint(),
+        camera.GetViewUp(),
+        camera.GetViewAngle(),
+        camera.GetUseHorizontalViewAngle(),
+        camera.GetParallelProjection(),
+        camera.GetParallelScale(),
+        camera.GetWindowCenter(),
+        camera.GetViewShear(),
+        camera.GetUseOffAxisProjection(),
+        camera.GetUseExplicitProjectionTransformMatrix(),
+        tuple(camera.GetModelTransformMatrix().GetData()),
+        0 if transform is None else transform.GetMTime(),
+    )

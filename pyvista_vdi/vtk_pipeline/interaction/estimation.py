@@ -60,7 +60,7 @@ class Estimation:
             )
             return Estimate(vdi, view, error)
 
-        self._worker.put(Job(judge, request.settings["device"]))
+        self._worker.put(Job(judge, request.device))
 
     def take(self) -> Estimate | None:
         """Return the estimate that was finished, once.
@@ -94,13 +94,7 @@ class _Estimators:
         if self._estimator is None or self._content != request.content:
             self._estimator = None  # its buffers go before others are taken
             self._estimator = ViewErrorEstimator(
-                request.volume,
-                request.transfer_function,
-                sample_distance=request.settings["sample_distance"],
-                lights=request.settings["lights"],
-                ambient_occlusion=request.settings["ambient_occlusion"],
-                memory_limit=request.settings["memory_limit"],
-                device=runtime,
+                request.volume, request.transfer_function, request.options, device=runtime
             )
             self._content = request.content
         return self._estimator

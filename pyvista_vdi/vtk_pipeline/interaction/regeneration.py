@@ -275,15 +275,20 @@ class Regeneration:
     def _start(self, request: Request, *, for_view: bool = False) -> None:
         """Have a VDI made: because of the view alone, or whatever the view does meanwhile."""
         self._for_view = for_view
-        device = request.settings["device"]
+        device = request.device
         if self._background is None or device != self._device:
             if self._background is not None:
                 self._background.close()
             self._background, self._device = BackgroundGeneration(device), device
         self._estimation.cancel()
         self._target = request
-        keywords = {k: v for k, v in request.keywords.items() if k != "device"}
-        self._background.start(*request.arguments, key=request.key, **keywords)
+        self._background.start(
+            *request.arguments,
+            request.options,
+            key=request.key,
+            dial=request.dial,
+            metadata=request.metadata,
+        )
 
     def _drop_if_outdated(self) -> None:
         """Give up a VDI that is made for a view which the hand has left behind."""
