@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import sys
 import warnings
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,32 +30,34 @@ from pyvista_vdi.vtk_pipeline.filters.properties import (
 _MAX_COLORS = 4096
 
 
-def transfer_function_from_arguments(
-    scalars: NDArray[Any],
-    *,
-    clim: float | ArrayLike | None = None,
-    n_colors: int = 256,
-    opacity: Any = "linear",
-    cmap: Any = None,
-    flip_scalars: bool = False,
-    log_scale: bool = False,
-    opacity_unit_distance: float | None = None,
-    interpolation: str = "nearest",
-    shade: bool = False,
-    ambient: float | None = None,
-    diffuse: float = 0.7,
-    specular: float = 0.2,
-    specular_power: float = 10.0,
-    rgba: bool = False,
-) -> TransferFunction:
-    """Return the transfer function that ``Plotter.add_volume`` would draw with.
+@dataclass(frozen=True, kw_only=True)
+class Looks:
+    """``add_volume``'s arguments that say what a scalar looks like, with its names and defaults.
+
+    What cannot be used is refused where it is used.
 
     Parameters
     ----------
-    scalars : numpy.ndarray
-        The volume's values, of any shape; for the default ``clim``.
-    clim, n_colors, opacity, cmap, flip_scalars, log_scale
-        ``add_volume``'s, with its defaults and meaning: see :func:`lookup_table`.
+    clim : float or (float, float), optional
+        Range; one number means from minus to plus it; all finite values by default.
+    n_colors : int
+        Number of entries.
+    opacity : str or float or array_like
+        A name, one number 0 to 1, an array of other length than ``n_colors`` (0 to 1,
+        interpolated) or of that length (taken as it is, 0 to 255).
+    cmap : str, list, matplotlib colour map or pyvista.LookupTable, optional
+        A lookup table is used as it is, with its own range and opacities; what else makes a table
+        then has no effect.
+    flip_scalars : bool
+        Reverse the colour map.
+    log_scale : bool
+        Map values to colours by their logarithm.
+    categories : bool or int
+        Take as many colours as there are different values, or this many.
+    annotations : dict, optional
+        Labels on the scalar bar, by value.
+    theme : pyvista.plotting.themes.Theme, optional
+        Whose default colour map is used; the global one by default.
     opacity_unit_distance : float, optional
         Model units; ``None`` leaves it to the volume.
     interpolation : {"nearest", "linear"}
@@ -63,9 +66,114 @@ def transfer_function_from_arguments(
         Whether samples reflect light.
     ambient, diffuse, specular, specular_power
         How a shaded volume does: see :class:`~pyvista_vdi.Shading`.
+    """
+
+    clim: float | ArrayLike | None = None
+    n_colors: int = 256
+    opacity: Any = "linear"
+    cmap: Any = None
+    flip_scalars: bool = False
+    log_scale: bool = False
+    categories: bool | int = False
+    annotations: dict[float, str] | None = None
+    theme: Any = None
+    opacity_unit_distance: float | None = None
+    interpolation: str = "nearest"
+    shade: bool = False
+    ambient: float | None = None
+    diffuse: float = 0.7
+    specular: float = 0.2
+    specular_power: float = 10.0
+
+    def of_rgba(self) -> Looks:
+        """Return those of RGBA scalars: opacity is linear over ``clim``, as in ``add_volume``."""
+        if not (isinstance(self.opacity, str) and self.opacity == "linear"):
+            warnings.warn("opacity is ignored: RGBA scalars bring theirs", VDIWarning, stacklevel=3)
+        return replace(self, opacity="linear")
+
+    def lookup_table(self, scalars: NDArray[Any]) -> pv.LookupTable:
+        """Return the lookup table that ``Plotter.add_volume`` would build for some values.
+
+        Raises
+        ------
+        InvalidArgumentError, InvalidVolumeError, MissingDependencyError
+            See :func:`transfer_function_from_arguments`.
+        """
+        if isinstance(self.cmap, pv.LookupTable):
+            return self.cmap
+        low, high = _scalar_range(scalars, self.clim)
+        if self.log_scale and low <= 0:
+            low = sys.float_info.min
+        n_colors = self.n_colors
+        if self.categories:
+            count = self.categories
+            n_colors = len(np.unique(scalars)) if count is True else int(count)
+        if not (isinstance(n_colors, int | np.integer) and 1 <= n_colors <= _MAX_COLORS):
+            raise InvalidArgumentError(
+                f"n_colors must be a whole number from 1 to {_MAX_COLORS}; got {n_colors!r}"
+            )
+        theme = self.theme or pv.global_theme
+        colors = _color_map(theme.cmap if self.cmap is None else self.cmap)
+        table = pv.LookupTable()
+        table.apply_cmap(colors.reversed() if self.flip_scalars else colors, int(n_colors))
+        _apply_opacity(table, self.opacity, int(n_colors))
+        table.scalar_range = (low, high)
+        table.log_scale = bool(self.log_scale)
+        if isinstance(self.annotations, dict):
+            table.annotations = self.annotations
+        return table
+
+    def volume_property(
+        self, table: pv.LookupTable, default_distance: float | None = None, *, rgba: bool = False
+    ) -> pv.VolumeProperty:
+        """Return the volume property that ``Plotter.add_volume`` would build, without shading.
+
+        ``default_distance`` is the opacity unit distance where none is given. ``add_volume``
+        leaves VTK's unit distance of an RGBA volume's fourth component, 1, whatever is asked for;
+        an explicit one is honoured here.
+        """
+        if self.interpolation not in ("nearest", "linear"):
+            raise InvalidArgumentError(
+                f"interpolation must be 'nearest' or 'linear'; got {self.interpolation!r}"
+            )
+        given = self.opacity_unit_distance
+        if given is not None and not 0 < as_float(given) < np.inf:
+            raise InvalidArgumentError(
+                f"opacity_unit_distance must be a positive length in model units; got {given!r}"
+            )
+        prop = pv.VolumeProperty(
+            lookup_table=table,
+            interpolation_type=self.interpolation,
+            opacity_unit_distance=default_distance if given is None else given,
+        )
+        if rgba:
+            prop.independent_components = False
+            if given is not None:
+                prop.SetScalarOpacityUnitDistance(RGBA_OPACITY, given)
+        return prop
+
+    def light(self, prop: pv.VolumeProperty) -> None:
+        """Set how a property reflects light; ``None`` leaves its ambient coefficient."""
+        ambient = prop.ambient if self.ambient is None else self.ambient
+        checked = Shading(ambient, self.diffuse, self.specular, self.specular_power)
+        prop.ambient, prop.diffuse = checked.ambient, checked.diffuse
+        prop.specular, prop.specular_power = checked.specular, checked.specular_power
+        prop.shade = bool(self.shade)
+
+
+def transfer_function_from_arguments(
+    scalars: NDArray[Any], *, rgba: bool = False, **arguments: Any
+) -> TransferFunction:
+    """Return the transfer function that ``Plotter.add_volume`` would draw with.
+
+    Parameters
+    ----------
+    scalars : numpy.ndarray
+        The volume's values, of any shape; for the default ``clim``.
     rgba : bool
-        Whether the values are RGBA: their opacity is then linear over ``clim``, whatever is asked
-        for, as in ``add_volume``.
+        Whether they are RGBA.
+    **arguments
+        Those of :class:`Looks`.
 
     Returns
     -------
@@ -82,150 +190,16 @@ def transfer_function_from_arguments(
     MissingDependencyError
         If the colour map is of a package that is not installed.
     """
-    table = lookup_table(
-        scalars,
-        clim=clim,
-        n_colors=n_colors,
-        opacity=rgba_opacity(opacity) if rgba else opacity,
-        cmap=cmap,
-        flip_scalars=flip_scalars,
-        log_scale=log_scale,
-    )
-    prop = volume_property(table, opacity_unit_distance, interpolation)
-    if shade:
-        prop.shade = True
-        light(prop, ambient, diffuse, specular, specular_power)
+    looks = Looks(**arguments)
     if rgba:
-        depend_on_alpha(prop, opacity_unit_distance)
+        looks = looks.of_rgba()
+    prop = looks.volume_property(looks.lookup_table(scalars), rgba=rgba)
+    if looks.shade:
+        looks.light(prop)
     function = transfer_function_from_property(prop, rgba=rgba)
-    if rgba or opacity_unit_distance is not None:
+    if rgba or looks.opacity_unit_distance is not None:
         return function
     return function.replace(unit_distance=None)
-
-
-def lookup_table(
-    scalars: NDArray[Any],
-    *,
-    clim: float | ArrayLike | None = None,
-    n_colors: int = 256,
-    opacity: Any = "linear",
-    cmap: Any = None,
-    flip_scalars: bool = False,
-    log_scale: bool = False,
-    categories: bool | int = False,
-    annotations: dict[float, str] | None = None,
-    theme: Any = None,
-) -> pv.LookupTable:
-    """Return the lookup table that ``Plotter.add_volume`` would build.
-
-    Parameters
-    ----------
-    scalars : numpy.ndarray
-        The values, for the default ``clim`` and for ``categories``.
-    clim : float or (float, float), optional
-        Range; one number means from minus to plus it; all finite values by default.
-    n_colors : int
-        Number of entries.
-    opacity : str or float or array_like
-        A name, one number 0 to 1, an array of other length than ``n_colors`` (0 to 1,
-        interpolated) or of that length (taken as it is, 0 to 255).
-    cmap : str, list, matplotlib colour map or pyvista.LookupTable, optional
-        A lookup table is used as it is, with its own range and opacities; the other arguments
-        then have no effect.
-    flip_scalars : bool
-        Reverse the colour map.
-    log_scale : bool
-        Map values to colours by their logarithm.
-    categories : bool or int
-        Take as many colours as there are different values, or this many.
-    annotations : dict, optional
-        Labels on the scalar bar, by value.
-    theme : pyvista.plotting.themes.Theme, optional
-        Whose default colour map is used; the global one by default.
-
-    Returns
-    -------
-    pyvista.LookupTable
-        As it would stand behind the volume and its scalar bar.
-
-    Raises
-    ------
-    InvalidArgumentError, InvalidVolumeError, MissingDependencyError
-        See :func:`transfer_function_from_arguments`.
-    """
-    if isinstance(cmap, pv.LookupTable):
-        return cmap
-    low, high = _scalar_range(scalars, clim)
-    if log_scale and low <= 0:
-        low = sys.float_info.min
-    if categories:
-        n_colors = len(np.unique(scalars)) if categories is True else int(categories)
-    if not (isinstance(n_colors, int | np.integer) and 1 <= n_colors <= _MAX_COLORS):
-        raise InvalidArgumentError(
-            f"n_colors must be a whole number from 1 to {_MAX_COLORS}; got {n_colors!r}"
-        )
-    colors = _color_map((theme or pv.global_theme).cmap if cmap is None else cmap)
-    table = pv.LookupTable()
-    table.apply_cmap(colors.reversed() if flip_scalars else colors, int(n_colors))
-    _apply_opacity(table, opacity, int(n_colors))
-    table.scalar_range = (low, high)
-    table.log_scale = bool(log_scale)
-    if isinstance(annotations, dict):
-        table.annotations = annotations
-    return table
-
-
-def volume_property(
-    table: pv.LookupTable, opacity_unit_distance: float | None, interpolation: str = "nearest"
-) -> pv.VolumeProperty:
-    """Return the volume property that ``Plotter.add_volume`` would build, without shading."""
-    if interpolation not in ("nearest", "linear"):
-        raise InvalidArgumentError(
-            f"interpolation must be 'nearest' or 'linear'; got {interpolation!r}"
-        )
-    if opacity_unit_distance is not None and not 0 < as_float(opacity_unit_distance) < np.inf:
-        raise InvalidArgumentError(
-            "opacity_unit_distance must be a positive length in model units; "
-            f"got {opacity_unit_distance!r}"
-        )
-    return pv.VolumeProperty(
-        lookup_table=table,
-        interpolation_type=interpolation,
-        opacity_unit_distance=opacity_unit_distance,
-    )
-
-
-def rgba_opacity(opacity: Any) -> str:
-    """Return the opacity that ``add_volume`` gives RGBA scalars; say so where another is given."""
-    if not (isinstance(opacity, str) and opacity == "linear"):
-        warnings.warn("opacity is ignored: RGBA scalars bring theirs", VDIWarning, stacklevel=3)
-    return "linear"
-
-
-def depend_on_alpha(prop: pv.VolumeProperty, opacity_unit_distance: float | None) -> None:
-    """Make a property one of an RGBA volume.
-
-    ``add_volume`` leaves VTK's unit distance of the fourth component, 1, whatever is asked for; an
-    explicit one is honoured here.
-    """
-    prop.independent_components = False
-    if opacity_unit_distance is not None:
-        prop.SetScalarOpacityUnitDistance(RGBA_OPACITY, opacity_unit_distance)
-
-
-def light(
-    prop: pv.VolumeProperty,
-    ambient: float | None,
-    diffuse: float,
-    specular: float,
-    specular_power: float,
-) -> None:
-    """Set how a property reflects light; ``None`` leaves its ambient coefficient."""
-    checked = Shading(
-        prop.ambient if ambient is None else ambient, diffuse, specular, specular_power
-    )
-    prop.ambient, prop.diffuse = checked.ambient, checked.diffuse
-    prop.specular, prop.specular_power = checked.specular, checked.specular_power
 
 
 def _scalar_range(scalars: NDArray[Any], clim: float | ArrayLike | None) -> tuple[float, float]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -18,13 +19,7 @@ from pyvista_vdi.model.classification import DEFAULTS, Classification, refuse_un
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
-from pyvista_vdi.plotting.classify import (
-    depend_on_alpha,
-    light,
-    lookup_table,
-    rgba_opacity,
-    volume_property,
-)
+from pyvista_vdi.plotting.classify import Looks
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.volumes import as_image
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, refuse_settings
@@ -44,31 +39,6 @@ _ALIASES = {"rng": "clim", "colormap": "cmap", "backface_culling": "culling"}
 
 #: SSIM by which a view may fall below what was asked for before it regenerates.
 _BELOW_GOAL = 0.02
-
-#: What only a volume can honour, with the defaults: refused by name where a VDI is added.
-_OF_VOLUMES = {
-    **{name: value for name, value in DEFAULTS.items() if name not in ("diffuse", "specular")},
-    "resolution": None,
-    "categories": False,
-    "multi_colors": False,
-    "diffuse": 0.7,
-    "specular": 0.2,
-    "max_supersegments": 20,
-    "criterion": "least-error",
-    "sample_distance": None,
-    "tolerance": 0.0,
-    "view_cone": 60.0,
-    "precision": "exact",
-    "quality": None,
-    "target_ssim": None,
-    "full_fps": None,
-    "max_bytes": None,
-    "target_angle": TARGET_ANGLE,
-    "ambient_occlusion": None,
-    "memory_limit": None,
-    "camera": None,
-    "coverage": "bounds",
-}
 
 
 @pv.register_plotter_component("add_vdi")
@@ -283,18 +253,156 @@ class AddVDI:
         >>> actor = plotter.add_vdi(pyvista_vdi.examples.load_brain(), cmap="bone")
         >>> plotter.show()  # doctest: +SKIP
         """
-        given = {k: v for k, v in locals().items() if k not in ("self", "aliases")}
-        refuse_unknown(aliases, "add_vdi", (*_ALIASES, *given))
-        for alias, value in aliases.items():
-            given[_ALIASES[alias]] = value
+        refuse_unknown(aliases, "add_vdi", (*_ALIASES, *_DEFAULTS))
+        clim, cmap = aliases.get("rng", clim), aliases.get("colormap", cmap)
+        culling = aliases.get("backface_culling", culling)
         plotter = self._plotter()
         if plotter is None:
             raise InvalidArgumentError("the plotter of this add_vdi is gone: make another")
-        _refuse(given)
+        if mapper is not None:
+            raise UnsupportedError(
+                f"mapper={mapper!r} chooses among VTK's volume mappers; a VDI has its own: "
+                "leave it out, or use add_volume"
+            )
+        if multi_colors:
+            raise UnsupportedError(
+                "multi_colors is for multi-block data sets: add the blocks one by one, each with "
+                "its cmap"
+            )
+        if target_fps is not None:
+            checked_rate("target_fps", target_fps)
+        checked_policy(regenerate)
+        checked_bound(regenerate_below)
+        dial = Dial.of(quality, target_ssim, full_fps, max_bytes, target_angle)
+        options = GenerationOptions(
+            max_supersegments=max_supersegments,
+            criterion=criterion,
+            sample_distance=sample_distance,
+            tolerance=tolerance,
+            view_cone=view_cone,
+            precision=precision,
+            ambient_occlusion=ambient_occlusion,
+            memory_limit=memory_limit,  # type: ignore[arg-type]
+        )
+        refuse_settings(dial, options)
+        looks = Looks(
+            clim=clim,
+            n_colors=n_colors,
+            opacity=opacity,
+            cmap=cmap,
+            flip_scalars=flip_scalars,
+            log_scale=log_scale,
+            categories=categories,
+            annotations=annotations,
+            theme=plotter._theme,
+            opacity_unit_distance=opacity_unit_distance,
+            interpolation=interpolation,
+            shade=shade,
+            ambient=ambient,
+            diffuse=diffuse,
+            specular=specular,
+            specular_power=specular_power,
+        )
         get_runtime(device)  # a missing device is said here, not while a frame is drawn
+        classified = {"scalars": scalars, "preference": preference, "blending": blending}
+        changed = _changed({**classified, **vars(looks)}, DEFAULTS)
+        shown: VDI | VDISource
+        prop: Any = None
         if isinstance(volume, VDI) or is_vdi_image(volume):
-            return self._add_made(plotter, given)
-        return self._add_volume(plotter, given)
+            chosen = {"quality": quality, "target_ssim": target_ssim, "full_fps": full_fps}
+            chosen |= {"max_bytes": max_bytes, "target_angle": target_angle}
+            others = {"resolution": resolution, "categories": categories, "camera": camera}
+            others |= {"coverage": coverage, **chosen, **vars(options)}
+            extra = [*changed, *_changed(others, _DEFAULTS)]
+            if extra:
+                raise UnsupportedError(
+                    f"{', '.join(sorted(extra))} cannot be given with a VDI: its classification, "
+                    "view and lists were fixed when it was generated; generate another from the "
+                    "volume"
+                )
+            shown = volume if isinstance(volume, VDI) else vdi_from_image(volume)
+            title = str(shown.metadata.get("scalars") or "Data")
+            table = _stored_table(shown)
+            if table is None:
+                if show_scalar_bar or scalar_bar_args or annotations:
+                    raise UnsupportedError(
+                        "this VDI's metadata holds no transfer function, so there is no scalar bar "
+                        "to show: leave out show_scalar_bar, scalar_bar_args and annotations"
+                    )
+                show_scalar_bar, table = False, pv.LookupTable()
+            if annotations:
+                table.annotations = annotations
+        else:
+            shown = source = VDISource()
+            image, array_name = as_image(volume, scalars, resolution)
+            described = Classification(changed, "add_vdi").describe()
+            source.SetMetadata({"classification": described})
+            source.SetInputDataObject(image)
+            source.SetScalars(array_name, preference)
+            source.SetOptions(options)
+            source.SetDial(
+                quality,
+                target_ssim=target_ssim,
+                target_fps=full_fps,
+                max_bytes=max_bytes,
+                target_angle=target_angle,
+            )
+            source.SetCoverage(coverage)
+            source.SetDevice(device)
+            source.SetProgressCallback(progress_callback(progress_bar))
+            read = source.GetVolume()
+            title = read.name
+            if read.rgba:
+                looks, show_scalar_bar = looks.of_rgba(), False
+            table = looks.lookup_table(read.array)
+            prop = looks.volume_property(table, read.default_unit_distance, rgba=read.rgba)
+            looks.light(prop)
+            source.SetLights(plotter.renderer)
+            source.SetVolumeProperty(prop)
+            if camera is not None:
+                source.SetCamera(camera, _matrix(plotter, user_matrix))
+
+        vdi_mapper = PlotterVDIMapper(theme=plotter._theme)
+        vdi_mapper.lookup_table = table
+        vdi_mapper.scalar_range = table.scalar_range
+        vdi_mapper.SetDevice(device)
+        vdi_mapper.SetTargetFrameRate(target_fps)
+        vdi_mapper.SetRegenerate(regenerate)
+        if dial is not None and dial.ssim is not None:  # not above what the VDI is made for
+            regenerate_below = min(regenerate_below, max(0.0, dial.ssim - _BELOW_GOAL))
+        vdi_mapper.SetRegenerateBelow(regenerate_below)
+        actor = PlotterVDIActor()
+        if prop is not None:
+            actor.prop = prop
+            if not prop.independent_components:
+                vdi_mapper.painter.give_proxy(4)
+        if isinstance(shown, VDI):
+            vdi_mapper.SetVDI(shown)
+        else:
+            vdi_mapper.SetInputConnection(shown.GetOutputPort())
+        actor.mapper = vdi_mapper
+        actor.user_matrix = np.eye(4) if user_matrix is None else user_matrix
+
+        # Into the scene, as add_volume does
+        weak = vtkWeakReference()
+        weak.Set(actor)
+        self._actors.append(weak)
+        plotter.mapper, plotter.volume = vdi_mapper, actor
+        plotter.add_actor(
+            actor,
+            reset_camera=reset_camera,
+            name=name,
+            culling="backface" if culling is True else culling,
+            pickable=pickable,
+            render=not plotter._first_time if render is None else render,
+        )
+        themed = plotter._theme.show_scalar_bar or scalar_bar_args
+        if themed if show_scalar_bar is None else show_scalar_bar:
+            plotter.add_scalar_bar(**{"title": title, **(scalar_bar_args or {})})
+        if status:
+            actor.show_status(plotter)
+        plotter.renderer.Modified()
+        return actor
 
     def __plotter_close__(self) -> None:
         """Let go of images and textures, even where the user keeps an actor."""
@@ -307,176 +415,29 @@ class AddVDI:
     def __plotter_deep_clean__(self) -> None:
         """Nothing else is held."""
 
-    # -- the two ways ----------------------------------------------------------------------------
 
-    def _add_volume(self, plotter: Any, given: dict[str, Any]) -> PlotterVDIActor:
-        image, array_name = as_image(given["volume"], given["scalars"], given["resolution"])
-        looks = Classification(_changed(given), "add_vdi")
-        source = VDISource()
-        source.SetInputDataObject(image)
-        source.SetScalars(array_name, given["preference"])
-        source.SetMaxSupersegments(given["max_supersegments"])
-        source.SetCriterion(given["criterion"])
-        source.SetSampleDistance(given["sample_distance"])
-        source.SetTolerance(given["tolerance"])
-        source.SetViewCone(given["view_cone"])
-        source.SetPrecision(given["precision"])
-        source.SetDial(
-            given["quality"],
-            **{k: given[k] for k in ("target_ssim", "max_bytes", "target_angle")},
-            target_fps=given["full_fps"],
-        )
-        source.SetAmbientOcclusion(given["ambient_occlusion"])
-        source.SetMemoryLimit(given["memory_limit"])
-        source.SetCoverage(given["coverage"])
-        source.SetDevice(given["device"])
-        source.SetProgressCallback(progress_callback(given["progress_bar"]))
-        volume = source.GetVolume()
-        if volume.rgba:
-            given = {**given, "opacity": rgba_opacity(given["opacity"]), "show_scalar_bar": False}
-        table = lookup_table(
-            volume.array,
-            **{k: given[k] for k in ("clim", "n_colors", "opacity", "cmap", "flip_scalars")},
-            **{k: given[k] for k in ("log_scale", "categories", "annotations")},
-            theme=plotter._theme,
-        )
-        distance = given["opacity_unit_distance"]
-        prop = volume_property(
-            table,
-            volume.default_unit_distance if distance is None else distance,
-            given["interpolation"],
-        )
-        light(prop, *(given[k] for k in ("ambient", "diffuse", "specular", "specular_power")))
-        prop.shade = bool(given["shade"])
-        if volume.rgba:
-            depend_on_alpha(prop, distance)
-        source.SetLights(plotter.renderer)
-        source.SetVolumeProperty(prop)
-        source.SetMetadata({"classification": looks.describe()})
-        if given["camera"] is not None:
-            source.SetCamera(given["camera"], _matrix(plotter, given["user_matrix"]))
-        return self._add(plotter, given, source, table, prop, volume.name)
-
-    def _add_made(self, plotter: Any, given: dict[str, Any]) -> PlotterVDIActor:
-        extra = [k for k, default in _OF_VOLUMES.items() if not _is_default(given[k], default)]
-        if extra:
-            raise UnsupportedError(
-                f"{', '.join(sorted(extra))} cannot be given with a VDI: its classification, view "
-                "and lists were fixed when it was generated; generate another from the volume"
-            )
-        vdi = given["volume"] if isinstance(given["volume"], VDI) else None
-        vdi = vdi_from_image(given["volume"]) if vdi is None else vdi
-        table = _stored_table(vdi)
-        if table is None:
-            if given["show_scalar_bar"] or given["scalar_bar_args"] or given["annotations"]:
-                raise UnsupportedError(
-                    "this VDI's metadata holds no transfer function, so there is no scalar bar to "
-                    "show: leave out show_scalar_bar, scalar_bar_args and annotations"
-                )
-            given = {**given, "show_scalar_bar": False}
-            table = pv.LookupTable()
-        if given["annotations"]:
-            table.annotations = given["annotations"]
-        title = vdi.metadata.get("scalars") or "Data"
-        return self._add(plotter, given, vdi, table, None, str(title))
-
-    def _add(
-        self,
-        plotter: Any,
-        given: dict[str, Any],
-        shown: VDISource | VDI,
-        table: pv.LookupTable,
-        prop: Any,
-        title: str,
-    ) -> PlotterVDIActor:
-        """Put the actor into the scene as ``add_volume`` does."""
-        mapper = PlotterVDIMapper(theme=plotter._theme)
-        mapper.lookup_table = table
-        mapper.scalar_range = table.scalar_range
-        mapper.SetDevice(given["device"])
-        mapper.SetTargetFrameRate(given["target_fps"])
-        mapper.SetRegenerate(given["regenerate"])
-        mapper.SetRegenerateBelow(_bound(given))
-        actor = PlotterVDIActor()
-        if prop is not None:
-            actor.prop = prop
-            if not prop.independent_components:
-                mapper.painter.give_proxy(4)
-        if isinstance(shown, VDI):
-            mapper.SetVDI(shown)
-        else:
-            mapper.SetInputConnection(shown.GetOutputPort())
-        actor.mapper = mapper
-        actor.user_matrix = np.eye(4) if given["user_matrix"] is None else given["user_matrix"]
-        weak = vtkWeakReference()
-        weak.Set(actor)
-        self._actors.append(weak)
-        plotter.mapper, plotter.volume = mapper, actor
-        bar = given["show_scalar_bar"]
-        if bar is None:
-            bar = plotter._theme.show_scalar_bar or given["scalar_bar_args"]
-        culling = given["culling"]
-        plotter.add_actor(
-            actor,
-            reset_camera=given["reset_camera"],
-            name=given["name"],
-            culling="backface" if culling is True else culling,
-            pickable=given["pickable"],
-            render=not plotter._first_time if given["render"] is None else given["render"],
-        )
-        if bar:
-            plotter.add_scalar_bar(**{"title": title, **(given["scalar_bar_args"] or {})})
-        if given["status"]:
-            actor.show_status(plotter)
-        plotter.renderer.Modified()
-        return actor
+#: ``add_vdi``'s arguments and their defaults.
+_DEFAULTS = {
+    name: parameter.default
+    for name, parameter in inspect.signature(AddVDI.__call__).parameters.items()
+    if name not in ("self", "aliases")
+}
 
 
-# -- refusals --------------------------------------------------------------------------------------
-
-
-def _refuse(given: dict[str, Any]) -> None:
-    """Refuse by name what add_volume takes and a VDI cannot honour."""
-    if given["mapper"] is not None:
-        raise UnsupportedError(
-            f"mapper={given['mapper']!r} chooses among VTK's volume mappers; a VDI has its own: "
-            "leave it out, or use add_volume"
-        )
-    if given["multi_colors"]:
-        raise UnsupportedError(
-            "multi_colors is for multi-block data sets: add the blocks one by one, each with "
-            "its cmap"
-        )
-    if given["target_fps"] is not None:
-        checked_rate("target_fps", given["target_fps"])
-    checked_policy(given["regenerate"])
-    checked_bound(given["regenerate_below"])
-    chosen_by = {k: given[k] for k in ("quality", "target_ssim", "max_bytes", "target_angle")}
-    refuse_settings(
-        Dial.of(**chosen_by, target_fps=given["full_fps"]),
-        GenerationOptions(**{k: given[k] for k in ("max_supersegments", "tolerance", "precision")}),
-    )
-
-
-def _bound(given: dict[str, Any]) -> float:
-    """Return the SSIM below which views regenerate: not above what the VDI is made for."""
-    goal = Dial.of(given["quality"], given["target_ssim"])
-    if goal is None or goal.ssim is None:
-        return given["regenerate_below"]  # type: ignore[no-any-return]
-    return min(given["regenerate_below"], max(0.0, goal.ssim - _BELOW_GOAL))
-
-
-def _changed(given: dict[str, Any]) -> dict[str, Any]:
-    """Return the classification arguments that differ from their defaults."""
-    return {k: given[k] for k, default in DEFAULTS.items() if not _is_default(given[k], default)}
+def _changed(given: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arguments that differ from their defaults."""
+    return {
+        name: value
+        for name, value in given.items()
+        if name in defaults and not _is_default(value, defaults[name])
+    }
 
 
 def _is_default(value: Any, default: Any) -> bool:
     if value is default:
         return True
-    return (
-        isinstance(value, str | int | float) and type(value) is type(default) and (value == default)
-    )
+    simple = isinstance(value, str | int | float) and type(value) is type(default)
+    return simple and bool(value == default)
 
 
 def _matrix(plotter: Any, user_matrix: Any) -> NDArray[np.float64]:

@@ -89,10 +89,11 @@ def test_vtk_objects_give_the_same_as_ours(volume, camera, default_runtime):
 
 def test_a_volume_property_stands_in_place_of_arguments(volume, camera, default_runtime):
     pv = pytest.importorskip("pyvista")
-    from pyvista_vdi.plotting.classify import lookup_table, volume_property
+    from pyvista_vdi.plotting.classify import Looks
 
-    table = lookup_table(volume.array, cmap="bone", opacity="linear")
-    prop = volume_property(table, volume.default_unit_distance)
+    looks = Looks(cmap="bone", opacity="linear")
+    table = looks.lookup_table(volume.array)
+    prop = looks.volume_property(table, volume.default_unit_distance)
     assert isinstance(prop, pv.VolumeProperty)
     a = api.render_volume(volume, camera, SIZE, volume_property=prop)
     b = api.render_volume(volume, camera, SIZE, cmap="bone", opacity="linear")

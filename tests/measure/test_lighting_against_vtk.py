@@ -34,14 +34,15 @@ CASES = {
 def the_property(volume, case):
     from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
 
-    from pyvista_vdi.plotting.classify import depend_on_alpha, lookup_table, volume_property
+    from pyvista_vdi.plotting.classify import Looks
 
-    table = lookup_table(volume.array, **TRANSFER_FUNCTIONS["soft"])
-    prop = volume_property(table, volume.default_unit_distance, "linear")
+    distance = volume.default_unit_distance
+    looks = Looks(
+        interpolation="linear", opacity_unit_distance=distance, **TRANSFER_FUNCTIONS["soft"]
+    )
+    prop = looks.volume_property(looks.lookup_table(volume.array), rgba=volume.rgba)
     prop.shade = case.get("shade", False)
     prop.diffuse, prop.specular, prop.specular_power = 0.7, 0.2, 10.0
-    if volume.rgba:
-        depend_on_alpha(prop, volume.default_unit_distance)
     if "gradient" in case:
         function = vtkPiecewiseFunction()
         for node in case["gradient"]:
