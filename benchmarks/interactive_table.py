@@ -39,7 +39,7 @@ from pyvista_vdi.measure.clock import median, take_turns
 from pyvista_vdi.measure.paper import find_dataset
 from pyvista_vdi.measure.paper.datasets import label_of, require_allocation
 from pyvista_vdi.measure.report import describe_system, system_line, table, write_text
-from pyvista_vdi.measure.session import CANDIDATES, VDIRenderer, VolumeRenderers
+from pyvista_vdi.measure.session import CANDIDATES, Bench, VDIRenderer
 from pyvista_vdi.model.standard_cases import ANGLES, filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.raycast import PreparedVDI
@@ -143,7 +143,7 @@ def measured(
         volume = dataset.load(None)
         done(f"{name}: generation")
         function = dataset.transfer_function(volume, options.interpolation)
-        renderers = VolumeRenderers(runtime, volume, function, tuple(options.size), options.vtk)
+        renderers = Bench(runtime, volume, function, tuple(options.size), options.vtk)
     except (VDIError, MemoryError) as error:
         return {"refused": f"{type(error).__name__}: {error}"}
     model = Model(runtime, rates, volume, function, tuple(options.size), _EVERY)

@@ -13,6 +13,7 @@ from pyvista_vdi.cli.inputs import camera
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.io import checked_png_target, to_bytes, write_png
+from pyvista_vdi.measure.vtk_baselines import aim
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.imports import import_pyvista
 
@@ -67,14 +68,8 @@ def _show(vdi: VDI, options: argparse.Namespace, screenshot: str | None) -> None
             regenerate=options.regenerate,
             status=options.status,
         )
-        view, camera = vdi.camera, plotter.camera
-        camera.position, camera.focal_point = view.position, view.focal_point
-        camera.up = view.view_up
-        camera.SetUseHorizontalViewAngle(view.use_horizontal_view_angle)
-        camera.view_angle = view.view_angle
-        camera.parallel_projection = view.parallel_projection
-        camera.parallel_scale = view.parallel_scale
-        camera.SetWindowCenter(*view.window_center)
+        aim(plotter.camera, vdi.camera)
+        plotter.camera_set = True
         plotter.renderer.reset_camera_clipping_range()
         if screenshot is None:
             plotter.show()

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
+from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.clock import Step, Times, take_turns
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.host_memory import require_free_memory
@@ -29,16 +29,14 @@ from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import raycast_medium
 
 #: Who takes part, by the keys of the results, and what tables call them.
-CANDIDATES: MappingProxyType[str, str] = MappingProxyType(
-    {
-        "vdi": "VDI, f",
-        "vdi_skipping": "VDI, f_e",
-        "volume": "render_volume",
-        "volume_skipping": "render_volume, skipping",
-        "vtk_gpu": "VTK GPU",
-        "vtk_fixed_point": "VTK fixed point",
-    }
-)
+CANDIDATES: Mapping[str, str] = {
+    "vdi": "VDI, f",
+    "vdi_skipping": "VDI, f_e",
+    "volume": "render_volume",
+    "volume_skipping": "render_volume, skipping",
+    "vtk_gpu": "VTK GPU",
+    "vtk_fixed_point": "VTK fixed point",
+}
 
 #: Window in which everything is drawn or generated once before anything is timed, pixels.
 WARM_UP_SIZE = (64, 36)
@@ -88,35 +86,6 @@ def check_angles(angles: Sequence[float]) -> None:
         raise InvalidArgumentError(f"angles must be one or more numbers of degrees; got {angles!r}")
 
 
-def timed_generation(
-    runtime: Runtime,
-    generate: Callable[[tuple[int, int]], VDI],
-    size: tuple[int, int],
-    repeats: int,
-    *,
-    before: Mapping[str, Step] = MappingProxyType({}),
-    forms: Sequence[str] = (),
-) -> tuple[dict[str, VDI], dict[str, Times]]:
-    """Generate a VDI as often as is timed, in turn with other work; kernels are compiled before.
-
-    Returns it as ``exact``, and in packed ``forms`` under their precisions; and the times of
-    ``generate``, of packing, and of the other work.
-    """
-    made: dict[str, VDI] = {}
-
-    def timed() -> None:
-        made.clear()
-        made["exact"] = generate(size)
-
-    def pack(precision: str) -> None:
-        made[precision] = made["exact"].with_precision(precision)
-
-    generate(WARM_UP_SIZE)
-    packing = {form: partial(pack, form) for form in forms if form != "exact"}
-    work: dict[str, Step] = {**before, "generate": timed, **packing}
-    return made, take_turns(work, repeats, runtime=runtime, warm_up=False)
-
-
 def sizes_of(vdi: VDI) -> dict[str, Any]:
     """Return how large a VDI is, on the host and as a ``.vdi`` in the default compression."""
     counts = vdi.counts
@@ -164,8 +133,8 @@ def enlarged(image: Image, size: tuple[int, int]) -> Image:
     return whole
 
 
-class VolumeRenderers:
-    """One volume in our raycaster and in VTK's mappers, for one window.
+class Bench:
+    """One volume in our raycaster and in VTK's mappers, for one window; and VDIs of it.
 
     Frames are timed with steps of one voxel and compared with steps of half a voxel, which is the
     step that VDIs are generated with. ``left_out`` names the candidates that cannot draw it, and
@@ -180,7 +149,7 @@ class VolumeRenderers:
         size: tuple[int, int],
         vtk: bool,
     ) -> None:
-        self._runtime, self._size = runtime, size
+        self._runtime, self._volume, self._table, self._size = runtime, volume, table, size
         self.voxel = min(volume.spacing)
         self.step = self.voxel / 2
         self._accurate = DeviceVolume(runtime, volume, table, self.step)
@@ -199,6 +168,38 @@ class VolumeRenderers:
     def opengl(self) -> str | None:
         """OpenGL renderer and version of VTK's GPU mapper, if it takes part."""
         return self._baselines["vtk_gpu"].opengl if "vtk_gpu" in self._baselines else None
+
+    def generate(
+        self,
+        view: Camera,
+        size: tuple[int, int],
+        repeats: int,
+        *,
+        before: Mapping[str, Step] | None = None,
+        forms: Sequence[str] = (),
+        **options: Any,
+    ) -> tuple[dict[str, VDI], dict[str, Times]]:
+        """Generate a VDI as often as is timed, in turn with other work; kernels are compiled first.
+
+        Returns it as ``exact``, and in packed ``forms`` under their precisions; and the times of
+        ``generate``, of packing, and of the other work.
+        """
+        made: dict[str, VDI] = {}
+
+        def generate(size: tuple[int, int]) -> None:
+            made.clear()
+            device = self._runtime
+            made["exact"] = generate_vdi(
+                self._volume, view, size, self._table, device=device, **options
+            )
+
+        def pack(precision: str) -> None:
+            made[precision] = made["exact"].with_precision(precision)
+
+        generate(WARM_UP_SIZE)
+        packing = {form: partial(pack, form) for form in forms if form != "exact"}
+        work: dict[str, Step] = {**(before or {}), "generate": partial(generate, size), **packing}
+        return made, take_turns(work, repeats, runtime=self._runtime, warm_up=False)
 
     def image(self, camera: Camera) -> Image:
         """Draw at the accurate step, premultiplied RGBA (H, W, 4)."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from tokenize import TokenError
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -21,16 +21,14 @@ from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
 _ENTRIES = 256
 
 #: Opacity at equidistant scalars, by look.
-_OPACITIES: MappingProxyType[str, tuple[float, ...]] = MappingProxyType(
-    {
-        # What add_volume's opacity="linear" is
-        "ramp": (0.0, 1.0),
-        # Air and its noise are transparent; tissue is translucent, bone is not
-        "empty below a fifth": (0.0, 0.0, 0.02, 0.05, 0.3, 0.8),
-        # One fluid is transparent, the other translucent
-        "one of two fluids": (0.0, 0.0, 0.0, 0.01, 0.05, 0.15, 0.05, 0.01, 0.005),
-    }
-)
+_OPACITIES: Mapping[str, tuple[float, ...]] = {
+    # What add_volume's opacity="linear" is
+    "ramp": (0.0, 1.0),
+    # Air and its noise are transparent; tissue is translucent, bone is not
+    "empty below a fifth": (0.0, 0.0, 0.02, 0.05, 0.3, 0.8),
+    # One fluid is transparent, the other translucent
+    "one of two fluids": (0.0, 0.0, 0.0, 0.01, 0.05, 0.15, 0.05, 0.01, 0.005),
+}
 
 #: RGB at equidistant scalars: black, blue-grey, white.
 _COLORS = ((0.0, 0.0, 0.0), (0.25, 0.3, 0.45), (0.7, 0.7, 0.6), (1.0, 1.0, 1.0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -45,19 +46,16 @@ class VTKBaseline:
     ) -> None:
         if mapper not in MAPPERS:
             raise InvalidArgumentError(f"mapper must be one of {MAPPERS}; got {mapper!r}")
-        try:
-            from vtkmodules.vtkRenderingCore import vtkRenderer, vtkVolume
-        except ImportError as error:
-            raise explain_import_error(error) from error
+        core = _vtk("vtkRenderingCore")
         self.name = mapper
         self._window = _off_screen_window(check_window_size(window_size))
-        self._renderer = vtkRenderer()
+        self._renderer = core.vtkRenderer()
         self._renderer.SetBackground(0, 0, 0)
         self._window.AddRenderer(self._renderer)
         self._mapper = _make_mapper(mapper)
         self._mapper.SetInputData(image_from_volume(volume))
         self.set_sample_distance(sample_distance)
-        self._volume = vtkVolume()
+        self._volume = core.vtkVolume()
         self._volume.SetMapper(self._mapper)
         self._volume.SetProperty(volume_property)
         self._renderer.AddVolume(self._volume)
@@ -91,16 +89,13 @@ class VTKBaseline:
 
         A blank one, in which VTK has drawn nothing, raises DeviceError.
         """
-        from vtkmodules.util.numpy_support import vtk_to_numpy
-        from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
-
         self.render(camera)
         width, height = self._window.GetSize()
-        pixels = vtkUnsignedCharArray()
+        pixels = _vtk("vtkCommonCore").vtkUnsignedCharArray()
         front_buffer = 0  # what has been drawn lies in the back buffer, off-screen as well
         right_eye = 0
         self._window.GetPixelData(0, 0, width - 1, height - 1, front_buffer, pixels, right_eye)
-        bottom_up = vtk_to_numpy(pixels).reshape(height, width, 3)
+        bottom_up = _vtk("util.numpy_support").vtk_to_numpy(pixels).reshape(height, width, 3)
         if not bottom_up.any():
             raise DeviceError(
                 f"VTK's {self.name} mapper drew nothing: every pixel is black; check that the "
@@ -115,35 +110,44 @@ class VTKBaseline:
         self._window.Finalize()
 
     def _look(self, camera: Camera) -> None:
-        from vtkmodules.vtkCommonMath import vtkMatrix4x4
-
-        active = self._renderer.GetActiveCamera()
-        active.SetPosition(camera.position)
-        active.SetFocalPoint(camera.focal_point)
-        active.SetViewUp(camera.view_up)
-        active.SetUseHorizontalViewAngle(camera.use_horizontal_view_angle)
-        active.SetViewAngle(camera.view_angle)
-        active.SetParallelProjection(camera.parallel_projection)
-        active.SetParallelScale(camera.parallel_scale)
-        active.SetWindowCenter(*camera.window_center)
-        matrix = vtkMatrix4x4()
+        aim(self._renderer.GetActiveCamera(), camera)
+        matrix = _vtk("vtkCommonMath").vtkMatrix4x4()
         matrix.DeepCopy(camera.model_transform.ravel().tolist())
         self._volume.SetUserMatrix(matrix)
         self._renderer.ResetCameraClippingRange()
 
 
+def aim(theirs: Any, camera: Camera) -> None:
+    """Give a ``vtkCamera`` a view; a model transform is the prop's."""
+    theirs.SetPosition(camera.position)
+    theirs.SetFocalPoint(camera.focal_point)
+    theirs.SetViewUp(camera.view_up)
+    theirs.SetUseHorizontalViewAngle(camera.use_horizontal_view_angle)
+    theirs.SetViewAngle(camera.view_angle)
+    theirs.SetParallelProjection(camera.parallel_projection)
+    theirs.SetParallelScale(camera.parallel_scale)
+    theirs.SetWindowCenter(*camera.window_center)
+
+
+def _vtk(module: str) -> Any:
+    """Return one of VTK's modules; MissingDependencyError says how to get it."""
+    try:
+        return import_module(f"vtkmodules.{module}")
+    except ImportError as error:
+        raise explain_import_error(error) from error
+
+
 def image_from_volume(volume: Volume) -> Any:
     """Return a volume as a ``vtkImageData`` that shares its memory."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-    from vtkmodules.vtkCommonDataModel import vtkImageData
-
-    image = vtkImageData()
+    image = _vtk("vtkCommonDataModel").vtkImageData()
     image.SetDimensions(volume.dimensions)
     image.SetSpacing(volume.spacing)
     image.SetOrigin(volume.origin)
     image.SetDirectionMatrix(volume.direction.ravel().tolist())
     # x runs fastest in VTK's point order, as it does in a C-ordered [z, y, x] array
-    scalars = numpy_to_vtk(volume.array.reshape((-1, 4) if volume.rgba else -1))
+    scalars = _vtk("util.numpy_support").numpy_to_vtk(
+        volume.array.reshape((-1, 4) if volume.rgba else -1)
+    )
     scalars.SetName(volume.name)
     image.GetPointData().SetScalars(scalars)
     return image
@@ -154,14 +158,11 @@ def property_from_transfer_function(volume: Volume, table: TransferFunction) -> 
 
     ``table`` is without shading and gradient opacity; the property has a node at each entry.
     """
-    try:
-        from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
-        from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
-    except ImportError as error:
-        raise explain_import_error(error) from error
+    core = _vtk("vtkRenderingCore")
+    color, prop = core.vtkColorTransferFunction(), core.vtkVolumeProperty()
+    opacity = _vtk("vtkCommonDataModel").vtkPiecewiseFunction()
     low, high = table.scalar_range
     n = len(table.opacities)
-    color, opacity, prop = vtkColorTransferFunction(), vtkPiecewiseFunction(), vtkVolumeProperty()
     color.BuildFunctionFromTable(low, high, n, table.colors.astype(np.float64).ravel())
     opacity.BuildFunctionFromTable(low, high, n, table.opacities.astype(np.float64))
     prop.SetColor(color)
@@ -195,13 +196,12 @@ def add_volume_property(volume: Volume, arguments: Mapping[str, Any]) -> Any:
 
 
 def _make_mapper(name: str) -> Any:
-    try:
-        from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
-        from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
-    except ImportError as error:
-        raise explain_import_error(error) from error
     gpu = name == "gpu"
-    mapper = vtkOpenGLGPUVolumeRayCastMapper() if gpu else vtkFixedPointVolumeRayCastMapper()
+    mapper = (
+        _vtk("vtkRenderingVolumeOpenGL2").vtkOpenGLGPUVolumeRayCastMapper()
+        if gpu
+        else _vtk("vtkRenderingVolume").vtkFixedPointVolumeRayCastMapper()
+    )
     mapper.SetAutoAdjustSampleDistances(False)
     mapper.SetLockSampleDistanceToInputSpacing(False)
     mapper.SetImageSampleDistance(1.0)
@@ -212,17 +212,13 @@ def _make_mapper(name: str) -> Any:
 
 def _off_screen_window(size: tuple[int, int]) -> Any:
     """Return an off-screen window that can draw; EGL, then OSMesa, where there is no display."""
-    try:
-        from vtkmodules import vtkRenderingOpenGL2
-        from vtkmodules.vtkRenderingCore import vtkRenderWindow
-    except ImportError as error:
-        raise explain_import_error(error) from error
-    kinds = [vtkRenderWindow]
+    opengl = _vtk("vtkRenderingOpenGL2")
+    kinds = [_vtk("vtkRenderingCore").vtkRenderWindow]
     chosen = os.environ.get("VTK_DEFAULT_OPENGL_WINDOW")
     if sys.platform.startswith("linux") and not chosen and not os.environ.get("DISPLAY"):
         # Asked by name: VTK's own search tries an X server first and warns that there is none
         names = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
-        kinds = [getattr(vtkRenderingOpenGL2, n) for n in names if hasattr(vtkRenderingOpenGL2, n)]
+        kinds = [getattr(opengl, n) for n in names if hasattr(opengl, n)]
     for kind in kinds:
         window = kind()
         window.SetOffScreenRendering(True)

@@ -20,6 +20,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import cli
 from pyvista_vdi.cli import parser
 from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.measure import session as shared
 from pyvista_vdi.measure.tradeoff import AXES, Setting, Tradeoff, measure_tradeoff, session, sweep
 from pyvista_vdi.measure.tradeoff.settings import DEFAULT_AXES, ON_REQUEST, PAIRS, QUICK_AXES
 
@@ -314,14 +315,14 @@ def test_ctrl_c_leaves_no_half_file(folder, default_runtime, tmp_path):
 
 
 def test_a_vdi_beyond_the_device_is_a_refused_row(default_runtime, folder, tmp_path, monkeypatch):
-    whole = session.generate_vdi
+    whole = shared.generate_vdi
 
     def too_large(*arguments, max_supersegments, **others):
         if max_supersegments == 3:
             raise DeviceMemoryError("the lists need 9 GiB; 'X' allows 1 GiB")
         return whole(*arguments, max_supersegments=max_supersegments, **others)
 
-    monkeypatch.setattr(session, "generate_vdi", too_large)
+    monkeypatch.setattr(shared, "generate_vdi", too_large)
     run = (*TINY_RUN, "--sweep", "max-supersegments=2,3", "--no-vtk", "--out", tmp_path)
     assert tradeoff(folder / "ball.npy", *run) == 0
     data = checked(tmp_path / "tradeoff-ball.json")

@@ -7,9 +7,8 @@ supersegments in 1280 x 720; at other sizes it promises nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Literal
 
 from pyvista_vdi.measure.compare.measure import AngleResult, Report
@@ -20,21 +19,19 @@ SSIM_AT_GENERATING_VIEW = 0.999
 WORST_PIXEL_AT_GENERATING_VIEW = 2.0  # in 1/255
 
 #: SSIM from new views, by degrees from V_O and by standard transfer function.
-SSIM_FROM_NEW_VIEWS: MappingProxyType[tuple[float, str], float] = MappingProxyType(
-    {
-        (5.0, "soft"): 0.985,
-        (5.0, "steep"): 0.985,
-        (5.0, "nearly-opaque"): 0.975,
-        (30.0, "soft"): 0.97,
-        (30.0, "steep"): 0.97,
-        (30.0, "nearly-opaque"): 0.95,
-    }
-)
+SSIM_FROM_NEW_VIEWS: Mapping[tuple[float, str], float] = {
+    (5.0, "soft"): 0.985,
+    (5.0, "steep"): 0.985,
+    (5.0, "nearly-opaque"): 0.975,
+    (30.0, "soft"): 0.97,
+    (30.0, "steep"): 0.97,
+    (30.0, "nearly-opaque"): 0.95,
+}
 
 #: The same for a volume of two values that is solid everywhere, with every transfer function: its
 #: rays cross more faces than a list has supersegments.
 BINARY_SOLID = ("berea",)
-SSIM_OF_BINARY_SOLID: MappingProxyType[float, float] = MappingProxyType({5.0: 0.94, 30.0: 0.85})
+SSIM_OF_BINARY_SOLID: Mapping[float, float] = {5.0: 0.94, 30.0: 0.85}
 
 #: How far mean brightness from a new view may be from the raycaster's, as a share of it.
 BRIGHTNESS_TOLERANCE = 0.02

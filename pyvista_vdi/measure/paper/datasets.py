@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -28,13 +27,11 @@ DEFAULT_SEED = 1
 _WORKING_BYTES = 2**30
 
 #: Looks of the paper's data sets.
-_LOOKS = MappingProxyType(
-    {
-        "kingsnake": "empty below a fifth",
-        "beechnut": "empty below a fifth",
-        "richtmyer_meshkov": "one of two fluids",
-    }
-)
+_LOOKS = {
+    "kingsnake": "empty below a fifth",
+    "beechnut": "empty below a fifth",
+    "richtmyer_meshkov": "one of two fluids",
+}
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from itertools import product
-from types import MappingProxyType
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
@@ -104,29 +103,20 @@ class Plan:
 
 #: Arguments of :class:`Plan` by the name of a profile. ``full`` also takes every volume in the
 #: folder that ``PYVISTA_VDI_DATA`` names.
-PROFILES: MappingProxyType[str, MappingProxyType[str, Any]] = MappingProxyType(
-    {
-        # Sized for ten minutes on two cores
-        "quick": MappingProxyType(
-            {
-                "datasets": (
-                    "brain",
-                    "rayleigh_taylor",
-                    "kingsnake_like@4",
-                    "beechnut_like@4",
-                    "richtmyer_meshkov_like@8",
-                ),
-                "sizes": SIZES[:1],
-                "angles": (0.0, 5.0, 30.0),
-                "generations": 1,
-                "preview": ("beechnut_like@4", SIZES[0], 15, 30.0),
-            }
+PROFILES: Mapping[str, Mapping[str, Any]] = {
+    # Sized for ten minutes on two cores
+    "quick": {
+        "datasets": (
+            *("brain", "rayleigh_taylor"),
+            *("kingsnake_like@4", "beechnut_like@4", "richtmyer_meshkov_like@8"),
         ),
-        "full": MappingProxyType(
-            {
-                "datasets": ("kingsnake_like", "beechnut_like", "richtmyer_meshkov_like"),
-                "preview": ("beechnut_like", SIZES[1], 15, 30.0),
-            }
-        ),
-    }
-)
+        "sizes": SIZES[:1],
+        "angles": (0.0, 5.0, 30.0),
+        "generations": 1,
+        "preview": ("beechnut_like@4", SIZES[0], 15, 30.0),
+    },
+    "full": {
+        "datasets": ("kingsnake_like", "beechnut_like", "richtmyer_meshkov_like"),
+        "preview": ("beechnut_like", SIZES[1], 15, 30.0),
+    },
+}

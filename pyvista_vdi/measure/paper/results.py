@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from types import MappingProxyType
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from pyvista_vdi.measure.paper.plan import Plan
 from pyvista_vdi.measure.report import across
@@ -33,7 +33,7 @@ class Results(ResultsFile):
     """
 
     form, version = "pyvista-vdi benchmark", 1
-    empty = MappingProxyType({"datasets": {}, "cells": [], "previews": []})
+    empty: ClassVar[Mapping[str, Any]] = {"datasets": {}, "cells": [], "previews": []}
 
     def cell(self, dataset: str, size: tuple[int, int], limit: int) -> dict[str, Any] | None:
         """Return a cell that is there, or None."""

@@ -7,7 +7,6 @@ from typing import Any
 
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.clock import Times, take_turns
 from pyvista_vdi.measure.paper.datasets import (
     Dataset,
@@ -20,14 +19,13 @@ from pyvista_vdi.measure.paper.preview import measure_preview
 from pyvista_vdi.measure.paper.results import Results
 from pyvista_vdi.measure.report import across
 from pyvista_vdi.measure.session import (
+    Bench,
     Progress,
     Steps,
     VDIRenderer,
-    VolumeRenderers,
     accuracy,
     refusal,
     sizes_of,
-    timed_generation,
 )
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -140,35 +138,30 @@ class _Run:
         if not limits:
             return
         try:
-            renderers = VolumeRenderers(self._runtime, volume, table, size, self._plan.vtk)
+            bench = Bench(self._runtime, volume, table, size, self._plan.vtk)
         except (VDIError, MemoryError) as error:
             self._refuse(name, [(size, limit) for limit in limits], error)
             return
         try:
-            if renderers.opengl is not None:
-                self._results.data["system"]["opengl"] = renderers.opengl
+            view = filling_camera(volume.bounds, size)
+            if bench.opengl is not None:
+                self._results.data["system"]["opengl"] = bench.opengl
             for limit in limits:
                 try:
-                    self._cell(name, volume, table, size, limit, renderers)
+                    self._cell(name, view, size, limit, bench)
                 except (VDIError, MemoryError) as error:
                     self._refuse(name, [(size, limit)], error)
         finally:
-            renderers.close()
+            bench.close()
 
     # -- a VDI -------------------------------------------------------------------------------------
 
     def _cell(
-        self,
-        name: str,
-        volume: Volume,
-        table: TransferFunction,
-        size: tuple[int, int],
-        limit: int,
-        renderers: VolumeRenderers,
+        self, name: str, view: Camera, size: tuple[int, int], limit: int, bench: Bench
     ) -> None:
-        view, doing = filling_camera(volume.bounds, size), f"{name}, {across(size)}, N_S {limit}"
+        doing = f"{name}, {across(size)}, N_S {limit}"
         self._step(f"{doing}: generating")
-        vdi, seconds = self._generated(volume, table, view, size, limit)
+        vdi, seconds = self._generated(bench, view, size, limit)
         cell = self._results.new_cell(name, size, limit)
         if cell["vdi"] is None:
             cell["vdi"] = {"generation_seconds": seconds, **sizes_of(vdi)}
@@ -178,42 +171,29 @@ class _Run:
             if angle in there:
                 continue
             self._step(f"{doing}: {angle:g} degrees")
-            cell["angles"].append(self._row(view.azimuth(angle), angle, draw, renderers))
+            cell["angles"].append(self._row(view.azimuth(angle), angle, draw, bench))
             cell["angles"].sort(key=lambda row: row["angle"])
-            cell["left_out"] = dict(renderers.left_out)
+            cell["left_out"] = dict(bench.left_out)
             self._results.save()
             self._step(doing, finished=1)
 
     def _generated(
-        self,
-        volume: Volume,
-        table: TransferFunction,
-        view: Camera,
-        size: tuple[int, int],
-        limit: int,
+        self, bench: Bench, view: Camera, size: tuple[int, int], limit: int
     ) -> tuple[VDI, Times]:
         """Generate the VDI as often as is timed."""
-
-        def generate(size: tuple[int, int]) -> VDI:
-            return generate_vdi(
-                volume,
-                view,
-                size,
-                table,
-                max_supersegments=limit,
-                sample_distance=min(volume.spacing) / 2,
-                device=self._runtime,
-            )
-
-        made, seconds = timed_generation(self._runtime, generate, size, self._plan.generations)
+        made, seconds = bench.generate(
+            view,
+            size,
+            self._plan.generations,
+            max_supersegments=limit,
+            sample_distance=bench.step,
+        )
         return made["exact"], seconds["generate"]
 
-    def _row(
-        self, camera: Camera, angle: float, draw: VDIRenderer, renderers: VolumeRenderers
-    ) -> dict[str, Any]:
+    def _row(self, camera: Camera, angle: float, draw: VDIRenderer, bench: Bench) -> dict[str, Any]:
         """Compare the pictures of one view, and time everybody's frames."""
-        reference, vtk_accuracy = renderers.reference(camera, angle)
-        frames = {**draw.frames(camera), **renderers.frames(camera)}
+        reference, vtk_accuracy = bench.reference(camera, angle)
+        frames = {**draw.frames(camera), **bench.frames(camera)}
         return {
             "angle": angle,
             "vdi_to_volume": accuracy(draw.image(camera), reference),
@@ -229,12 +209,12 @@ class _Run:
         self._step(f"{name}: previews at target rates")
         entry = self._preview_entry(None)
         try:
-            renderers = VolumeRenderers(self._runtime, volume, table, size, vtk=False)
+            bench = Bench(self._runtime, volume, table, size, vtk=False)
             view = filling_camera(volume.bounds, size)
-            vdi, _ = self._generated(volume, table, view, size, limit)
+            vdi, _ = self._generated(bench, view, size, limit)
             draw = VDIRenderer(self._runtime, PreparedVDI(self._runtime, vdi), size)
             camera = view.azimuth(angle)
-            reference = renderers.image(camera)
+            reference = bench.image(camera)
             frames = draw.frames(camera)
             full = take_turns(frames, self._plan.repeats, runtime=self._runtime)["vdi_skipping"]
             entry["full"] = {

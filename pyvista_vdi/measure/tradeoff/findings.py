@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
@@ -15,14 +14,12 @@ from pyvista_vdi.measure.tradeoff.dominance import Figure, find_dominated, front
 from pyvista_vdi.measure.tradeoff.settings import Setting
 
 #: What SSIM is traded for, by the keys of the findings, and how tables call it.
-COSTS: MappingProxyType[str, str] = MappingProxyType(
-    {
-        "frame": "frame time",
-        "memory": "bytes on the device",
-        "file": "bytes in the file",
-        "generation": "generation time",
-    }
-)
+COSTS: Mapping[str, str] = {
+    "frame": "frame time",
+    "memory": "bytes on the device",
+    "file": "bytes in the file",
+    "generation": "generation time",
+}
 
 #: Differences that do not count: of SSIM, what devices that round differently may differ by; of
 #: times and bytes, relative.

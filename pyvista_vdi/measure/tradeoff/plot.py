@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
@@ -17,37 +16,31 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: What is drawn, by the keys of :data:`.findings.COSTS`, and the axis that it gets.
-_PANELS: MappingProxyType[str, str] = MappingProxyType(
-    {
-        "frame": "frame time / render_volume",
-        "memory": "MiB on the device",
-        "generation": "generation time / a frame of render_volume at half a voxel",
-    }
-)
+_PANELS: Mapping[str, str] = {
+    "frame": "frame time / render_volume",
+    "memory": "MiB on the device",
+    "generation": "generation time / a frame of render_volume at half a voxel",
+}
 
 #: Colour of a setting by the one axis on which it differs from the default.
-_COLORS: MappingProxyType[str, str] = MappingProxyType(
-    {
-        "max_supersegments": "#0072b2",
-        "tolerance": "#56b4e9",
-        "lists": "#d55e00",
-        "precision": "#009e73",
-        "skip_empty": "#8c6d31",
-        "preview": "#cc79a7",
-        "criterion": "#e69f00",
-        "view_cone": "#7b4fa3",
-        "sample_distance": "#3b3b98",
-    }
-)
-_LABELS: MappingProxyType[str, str] = MappingProxyType(
-    {
-        "max_supersegments": "N_S",
-        "lists": "number of lists",
-        "skip_empty": "no skipping",
-        "view_cone": "view cone",
-        "sample_distance": "steps of generation",
-    }
-)
+_COLORS: Mapping[str, str] = {
+    "max_supersegments": "#0072b2",
+    "tolerance": "#56b4e9",
+    "lists": "#d55e00",
+    "precision": "#009e73",
+    "skip_empty": "#8c6d31",
+    "preview": "#cc79a7",
+    "criterion": "#e69f00",
+    "view_cone": "#7b4fa3",
+    "sample_distance": "#3b3b98",
+}
+_LABELS: Mapping[str, str] = {
+    "max_supersegments": "N_S",
+    "lists": "number of lists",
+    "skip_empty": "no skipping",
+    "view_cone": "view cone",
+    "sample_distance": "steps of generation",
+}
 _DEFAULT_COLOR, _SEVERAL_COLOR = "black", "#777777"
 
 #: SSIM at which the axis may have ticks; it is logarithmic in 1 - SSIM.

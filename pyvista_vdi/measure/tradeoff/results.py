@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from pyvista_vdi.errors import InvalidArgumentError
@@ -18,11 +18,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+_NOTHING: Mapping[str, Any] = {"baselines": [], "left_out": {}, "points": [], "findings": None}
+
+
 class TradeoffFile(ResultsFile):
     """What was measured, as the JSON has it: see ``docs/tradeoff_schema.json``."""
 
     form, version = "pyvista-vdi tradeoff", 1
-    empty = MappingProxyType({"baselines": [], "left_out": {}, "points": [], "findings": None})
+    empty = _NOTHING
 
     def find(self) -> None:
         """Add what the figures say."""

@@ -15,22 +15,20 @@ from typing import Any
 from pyvista_vdi.api import as_volume
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
-from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.clock import Step, Times, take_turns
+from pyvista_vdi.measure.clock import Step, take_turns
 from pyvista_vdi.measure.report import describe_system
 from pyvista_vdi.measure.session import (
+    Bench,
     Image,
     Progress,
     Steps,
     VDIRenderer,
-    VolumeRenderers,
     accuracy,
     check_angles,
     check_count,
     enlarged,
     refusal,
     sizes_of,
-    timed_generation,
 )
 from pyvista_vdi.measure.tradeoff.results import Tradeoff, TradeoffFile
 from pyvista_vdi.measure.tradeoff.settings import Setting, sweep
@@ -39,7 +37,6 @@ from pyvista_vdi.model.classification import IN_PLACE, Classification
 from pyvista_vdi.model.metrics import SSIM_WINDOW
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.raycast import PreparedVDI
 
@@ -240,9 +237,7 @@ class _Run:
         self._groups: dict[Setting, list[Setting]] = {}
         for setting in missing:
             self._groups.setdefault(setting.generated, []).append(setting)
-        self._renderers = VolumeRenderers(
-            runtime, plan.volume, plan.table, plan.window_size, plan.vtk
-        )
+        self._bench = Bench(runtime, plan.volume, plan.table, plan.window_size, plan.vtk)
         steps = Steps(progress, (1 + len(missing)) * len(plan.angles) + len(self._groups))
         self._step = steps.begin
 
@@ -250,23 +245,23 @@ class _Run:
         """Measure what is missing."""
         data = self._results.data
         try:
-            if self._renderers.opengl is not None:
-                data["system"]["opengl"] = self._renderers.opengl
+            if self._bench.opengl is not None:
+                data["system"]["opengl"] = self._bench.opengl
             if not data["baselines"]:
                 data["baselines"] = [self._baseline(angle) for angle in self._plan.angles]
-                data["left_out"] = dict(self._renderers.left_out)
+                data["left_out"] = dict(self._bench.left_out)
                 self._results.save()
             for generated, settings in self._groups.items():
                 try:
                     points = self._group(generated, settings)
                 except (VDIError, MemoryError) as error:
-                    points = [_refused(setting, error) for setting in settings]
+                    points = [_point(setting, refused=refusal(error)) for setting in settings]
                 data["points"] += points
                 order = {setting.name: i for i, setting in enumerate(self._plan.settings)}
                 data["points"].sort(key=lambda point: order[point["name"]])
                 self._results.save()
         finally:
-            self._renderers.close()
+            self._bench.close()
 
     # -- what all is compared with -----------------------------------------------------------------
 
@@ -274,8 +269,8 @@ class _Run:
         """Time the volume renderers, and compare ours with VTK's."""
         self._step(f"volume rendering at {angle:g} degrees")
         camera = self._plan.camera.azimuth(angle)
-        _, near = self._renderers.reference(camera, angle)
-        steps = self._renderers.frames(camera)
+        _, near = self._bench.reference(camera, angle)
+        steps = self._bench.frames(camera)
         return {
             "angle": angle,
             "volume_to_vtk_gpu": near,
@@ -287,10 +282,22 @@ class _Run:
     def _group(self, generated: Setting, settings: list[Setting]) -> list[dict[str, Any]]:
         self._step(f"{generated.name}: generating")
         precisions = tuple(dict.fromkeys(setting.precision for setting in settings))
-        forms, seconds = self._forms(generated, precisions)
+        forms, seconds = self._bench.generate(
+            self._plan.camera,
+            self._share(generated.lists),
+            self._plan.generations,
+            before={"volume": partial(self._bench.image, self._plan.camera)},
+            forms=precisions,
+            max_supersegments=generated.max_supersegments,
+            criterion=generated.criterion,
+            sample_distance=generated.sample_distance * self._bench.voxel,
+            tolerance=generated.tolerance,
+            view_cone=generated.view_cone,
+        )
         sizes: dict[str, dict[str, Any]] = {}
         renderers: dict[str, VDIRenderer] = {}
-        for precision, vdi in forms.items():
+        for precision in precisions:
+            vdi = forms[precision]
             prepared = PreparedVDI(self._runtime, vdi)
             found = sizes_of(vdi)
             sizes[precision] = {
@@ -300,19 +307,16 @@ class _Run:
                 "bytes_memory": prepared.list_bytes,
             }
             renderers[precision] = VDIRenderer(self._runtime, prepared, self._plan.window_size)
-        points: list[dict[str, Any]] = [
-            {
-                "name": setting.name,
-                "setting": setting.to_dict(),
-                "refused": None,
-                "vdi": sizes[setting.precision],
-                "generation": {
+        points = [
+            _point(
+                setting,
+                vdi=sizes[setting.precision],
+                generation={
                     "seconds": seconds["generate"],
                     "packing": seconds.get(setting.precision),
                     "volume_seconds": seconds["volume"],
                 },
-                "angles": [],
-            }
+            )
             for setting in settings
         ]
         for angle in self._plan.angles:
@@ -321,42 +325,13 @@ class _Run:
                 point["angles"].append(row)
         return points
 
-    def _forms(
-        self, setting: Setting, precisions: tuple[str, ...]
-    ) -> tuple[dict[str, VDI], dict[str, Times]]:
-        """Generate the VDI and pack it, as often as is timed."""
-
-        def generate(size: tuple[int, int]) -> VDI:
-            return generate_vdi(
-                self._plan.volume,
-                self._plan.camera,
-                size,
-                self._plan.table,
-                max_supersegments=setting.max_supersegments,
-                criterion=setting.criterion,
-                sample_distance=setting.sample_distance * min(self._plan.volume.spacing),
-                tolerance=setting.tolerance,
-                view_cone=setting.view_cone,
-                device=self._runtime,
-            )
-
-        forms, seconds = timed_generation(
-            self._runtime,
-            generate,
-            self._share(setting.lists),
-            self._plan.generations,
-            before={"volume": partial(self._renderers.image, self._plan.camera)},
-            forms=precisions,
-        )
-        return {precision: forms[precision] for precision in precisions}, seconds
-
     def _rows(
         self, angle: float, settings: list[Setting], renderers: dict[str, VDIRenderer]
     ) -> list[dict[str, Any]]:
         """Compare and time a group's settings at one view, in turn with the volume."""
         camera = self._plan.camera.azimuth(angle)
-        reference, _ = self._renderers.reference(camera, angle)
-        frames: dict[str, Step] = {"volume": self._renderers.frames(camera)[_BASELINE]}
+        reference, _ = self._bench.reference(camera, angle)
+        frames: dict[str, Step] = {"volume": self._bench.frames(camera)[_BASELINE]}
         near = []
         for setting in settings:
             self._step(f"{setting.name}: {angle:g} degrees")
@@ -386,12 +361,7 @@ class _Run:
         return max(1, round(width * edge)), max(1, round(height * edge))
 
 
-def _refused(setting: Setting, error: BaseException) -> dict[str, Any]:
-    return {
-        "name": setting.name,
-        "setting": setting.to_dict(),
-        "refused": refusal(error),
-        "vdi": None,
-        "generation": None,
-        "angles": [],
-    }
+def _point(setting: Setting, **found: Any) -> dict[str, Any]:
+    """Return what the results have of a setting that is measured or refused."""
+    empty: dict[str, Any] = {"refused": None, "vdi": None, "generation": None, "angles": []}
+    return {"name": setting.name, "setting": setting.to_dict(), **empty, **found}

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import product as combinations
-from types import MappingProxyType
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
@@ -99,68 +98,59 @@ class Setting:
 
 
 #: Least and most of the numbers; finer steps than the engine takes are refused by it.
-_RANGES: MappingProxyType[str, tuple[float, float]] = MappingProxyType(
-    {
-        "tolerance": (0.0, 1e6),
-        "lists": (0.05, 8.0),
-        "preview": (0.02, 1.0),
-        "view_cone": (0.0, 90.0),
-        "sample_distance": (1e-3, 100.0),
-    }
-)
+_RANGES: Mapping[str, tuple[float, float]] = {
+    "tolerance": (0.0, 1e6),
+    "lists": (0.05, 8.0),
+    "preview": (0.02, 1.0),
+    "view_cone": (0.0, 90.0),
+    "sample_distance": (1e-3, 100.0),
+}
 
 #: Values of each axis in the default sweep, beside the default; none of an axis that is swept only
 #: when it is asked for, see :data:`ON_REQUEST`.
-AXES: MappingProxyType[str, tuple[Any, ...]] = MappingProxyType(
-    {
-        "max_supersegments": (5, 10, 15, 30, 40),
-        "tolerance": (0.01, 0.1),
-        "lists": (0.5, 1.5, 2.0),
-        "precision": ("16-byte", "8-byte"),
-        "skip_empty": (False,),
-        "preview": (0.7, 0.5, 0.35),
-        "criterion": ("homogeneity", "length", "transmittance", "optical-depth"),
-        "view_cone": (0.0, 30.0, 90.0),
-        "sample_distance": (0.25, 1.0),
-    }
-)
+AXES: Mapping[str, tuple[Any, ...]] = {
+    "max_supersegments": (5, 10, 15, 30, 40),
+    "tolerance": (0.01, 0.1),
+    "lists": (0.5, 1.5, 2.0),
+    "precision": ("16-byte", "8-byte"),
+    "skip_empty": (False,),
+    "preview": (0.7, 0.5, 0.35),
+    "criterion": ("homogeneity", "length", "transmittance", "optical-depth"),
+    "view_cone": (0.0, 30.0, 90.0),
+    "sample_distance": (0.25, 1.0),
+}
 
 #: Axes that are swept by default; the others have a right value for each scene, or compare methods.
 DEFAULT_AXES = tuple(AXES)[:6]
 ON_REQUEST = tuple(AXES)[6:]
 
 #: The same where there is little time.
-QUICK_AXES: MappingProxyType[str, tuple[Any, ...]] = MappingProxyType(
-    {
-        "max_supersegments": (5, 10, 40),
-        "lists": (0.5, 2.0),
-        "precision": ("8-byte",),
-        "skip_empty": (False,),
-        "preview": (0.5,),
-    }
-)
+QUICK_AXES: Mapping[str, tuple[Any, ...]] = {
+    "max_supersegments": (5, 10, 40),
+    "lists": (0.5, 2.0),
+    "precision": ("8-byte",),
+    "skip_empty": (False,),
+    "preview": (0.5,),
+}
 
 #: Knobs that are worth turning together: bytes spent on more lists or on longer ones, saved by
 #: packing and spent again, and time saved twice.
-PAIRS: tuple[MappingProxyType[str, Any], ...] = tuple(
-    MappingProxyType(pair)
-    for pair in (
-        {"max_supersegments": 40, "lists": 0.5},
-        {"max_supersegments": 10, "lists": 1.5},
-        {"max_supersegments": 10, "lists": 2.0},
-        {"max_supersegments": 5, "lists": 2.0},
-        {"tolerance": 0.01, "lists": 2.0},
-        {"max_supersegments": 5, "precision": "8-byte"},
-        {"max_supersegments": 10, "precision": "8-byte"},
-        {"max_supersegments": 40, "precision": "8-byte"},
-        {"lists": 0.5, "precision": "8-byte"},
-        {"lists": 1.5, "precision": "8-byte"},
-        {"lists": 2.0, "precision": "8-byte"},
-        {"max_supersegments": 10, "lists": 2.0, "precision": "8-byte"},
-        {"precision": "8-byte", "preview": 0.7},
-        {"lists": 0.5, "preview": 0.5},
-        {"max_supersegments": 10, "preview": 0.5},
-    )
+PAIRS: tuple[Mapping[str, Any], ...] = (
+    {"max_supersegments": 40, "lists": 0.5},
+    {"max_supersegments": 10, "lists": 1.5},
+    {"max_supersegments": 10, "lists": 2.0},
+    {"max_supersegments": 5, "lists": 2.0},
+    {"tolerance": 0.01, "lists": 2.0},
+    {"max_supersegments": 5, "precision": "8-byte"},
+    {"max_supersegments": 10, "precision": "8-byte"},
+    {"max_supersegments": 40, "precision": "8-byte"},
+    {"lists": 0.5, "precision": "8-byte"},
+    {"lists": 1.5, "precision": "8-byte"},
+    {"lists": 2.0, "precision": "8-byte"},
+    {"max_supersegments": 10, "lists": 2.0, "precision": "8-byte"},
+    {"precision": "8-byte", "preview": 0.7},
+    {"lists": 0.5, "preview": 0.5},
+    {"max_supersegments": 10, "preview": 0.5},
 )
 
 
