@@ -41,6 +41,8 @@ class GrowingLists(ABC):
     has launched the march of the next, and waits for nothing else.
     """
 
+    _places: DeviceBuffer  # offsets on the device
+
     def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int):
         self._runtime = runtime
         self._size = size
@@ -50,7 +52,7 @@ class GrowingLists(ABC):
         self._offsets[0] = 0
         self._made = 0  # lists, those of the last slice included
         self._known = 0  # supersegments of all lists whose sum is known here
-        self._summing: Callable[[], None] | None = None  # waits for the sum of the last slice
+        self._summing: Callable[[], int] | None = None  # waits for the sum with the last slice
         self._arrays = {name: GrowingArray(item) for name, item in _LIST_ARRAYS.items()}
         self._kernels = [
             runtime.kernel("generation/offsets.cl", name)
@@ -79,44 +81,41 @@ class GrowingLists(ABC):
         self.wait()
         blocks = blocks_to_sum(n)
         shared = (np.uint32(n), lengths, LocalMemory(8 * GROUP), self._sums)
-        made, offsets = self._offsets_of_slice()
-        places = (np.uint32(made), offsets)
-        for kernel, arguments in zip(self._kernels, (shared, shared + places), strict=True):
-            self._runtime.launch(kernel, blocks * GROUP, GROUP, *arguments)
+        made = np.uint32(self._first_place())
+        for kernel, places in zip(self._kernels, ((), (made, self._places)), strict=True):
+            self._runtime.launch(kernel, blocks * GROUP, GROUP, *shared, *places)
         self._summing = self._sum_later(n)
         self._made += n
         held, targets = self._room_for(n)
-        return offsets, np.uint32(made), np.uint64(held), *targets
+        return self._places, made, np.uint64(held), *targets
 
     def wait(self) -> None:
         """Wait until the lengths of the last slice are summed up."""
         if self._summing is None:
             return
-        self._summing()
+        begin, self._known = self._known, self._summing()
         self._summing = None
-        begin, self._known = self._known, self._sum()
         require_room(self._known, self._size)
         self._learned(begin)
 
-    @abstractmethod
     def finished(self) -> list[NDArray[Any]]:
         """Return offsets, fronts, backs, colours and optical depths."""
+        self.wait()
+        self._collect_all()
+        arrays = [array.finished(self._known) for array in self._arrays.values()]
+        return [self._offsets, *arrays]
 
     @abstractmethod
     def _buffers(self) -> Iterator[DeviceBuffer]:
         """All buffers, to be released."""
 
     @abstractmethod
-    def _offsets_of_slice(self) -> tuple[int, DeviceBuffer]:
-        """Return where in a buffer of offsets that of the next slice is, and the buffer."""
+    def _first_place(self) -> int:
+        """Return where in the buffer of offsets that of the next slice is."""
 
     @abstractmethod
-    def _sum_later(self, n: int) -> Callable[[], None]:
-        """Let the host have the sum of the n lists that follow those made."""
-
-    @abstractmethod
-    def _sum(self) -> int:
-        """Return the supersegments of all lists, whose sum has come to the host."""
+    def _sum_later(self, n: int) -> Callable[[], int]:
+        """Return what waits for the supersegments of the lists made and of the n behind them."""
 
     @abstractmethod
     def _learned(self, begin: int) -> None:
@@ -125,6 +124,10 @@ class GrowingLists(ABC):
     @abstractmethod
     def _room_for(self, n: int) -> tuple[int, list[DeviceBuffer]]:
         """Return the supersegments before those that the buffers for n lists hold, and these."""
+
+    @abstractmethod
+    def _collect_all(self) -> None:
+        """Bring what the device still has to the arrays."""
 
 
 class _ListsInPlace(GrowingLists):
@@ -138,7 +141,6 @@ class _ListsInPlace(GrowingLists):
         super().__init__(runtime, size, limit, slice_lists)
         self._begin = self._end = 0  # supersegments that the buffers hold
         self._targets: list[tuple[DeviceBuffer, NDArray[Any]]] = []  # and what they are to fill
-        self._last = np.zeros(1, np.uint64)
         with kept_together() as keep:
             keep(self._sums)
             self._places = keep(runtime.target(self._offsets, "list offsets"))
@@ -153,14 +155,18 @@ class _ListsInPlace(GrowingLists):
         yield from (target for target, _part in self._targets)
         yield from (self._sums, self._places)
 
-    def _offsets_of_slice(self) -> tuple[int, DeviceBuffer]:
-        return self._made, self._places
+    def _first_place(self) -> int:
+        return self._made
 
-    def _sum_later(self, n: int) -> Callable[[], None]:
-        return self._runtime.download_later(self._places, self._last, first=self._made + n)
+    def _sum_later(self, n: int) -> Callable[[], int]:
+        last = np.zeros(1, np.uint64)
+        wait = self._runtime.download_later(self._places, last, first=self._made + n)
 
-    def _sum(self) -> int:
-        return int(self._last[0])
+        def summed() -> int:
+            wait()
+            return int(last[0])
+
+        return summed
 
     def _learned(self, begin: int) -> None:
         if self._known > self._end:
@@ -198,12 +204,9 @@ class _ListsInPlace(GrowingLists):
             self._targets[-1][0].release()
             self._targets.pop()
 
-    def finished(self) -> list[NDArray[Any]]:
-        self.wait()
+    def _collect_all(self) -> None:
         self._collect(self._known)
         self._runtime.download(self._places, self._offsets)
-        arrays = [array.finished(self._known) for array in self._arrays.values()]
-        return [self._offsets, *arrays]
 
 
 class _CopiedLists(GrowingLists):
@@ -222,24 +225,24 @@ class _CopiedLists(GrowingLists):
                 keep(runtime.buffer((slice_lists * limit, *item), name=name))
                 for name, item in _LIST_ARRAYS.items()
             ]
-        self._first = 0  # list of the last slice
         self._copies: list[Callable[[], None]] = []
 
     def _buffers(self) -> Iterator[DeviceBuffer]:
         yield from (*self._targets, self._sums, self._places)
 
-    def _offsets_of_slice(self) -> tuple[int, DeviceBuffer]:
-        return 0, self._places
+    def _first_place(self) -> int:
+        return 0
 
-    def _sum_later(self, n: int) -> Callable[[], None]:
-        self._first = self._made
-        ends = self._offsets[self._made + 1 : self._made + n + 1]
-        return self._runtime.download_later(self._places, ends, first=1)
+    def _sum_later(self, n: int) -> Callable[[], int]:
+        before, ends = np.split(self._offsets[self._made : self._made + n + 1], [1])
+        wait = self._runtime.download_later(self._places, ends, first=1)
 
-    def _sum(self) -> int:
-        ends = self._offsets[self._first + 1 : self._made + 1]
-        np.add(ends, self._offsets[self._first], out=ends)
-        return int(ends[-1])
+        def summed() -> int:
+            wait()
+            np.add(ends, before, out=ends)
+            return int(ends[-1])
+
+        return summed
 
     def _learned(self, begin: int) -> None:
         if any(self._known > array.room for array in self._arrays.values()):
@@ -254,11 +257,8 @@ class _CopiedLists(GrowingLists):
     def _room_for(self, n: int) -> tuple[int, list[DeviceBuffer]]:
         return 0, self._targets
 
-    def finished(self) -> list[NDArray[Any]]:
-        self.wait()
+    def _collect_all(self) -> None:
         self._runtime.finish()
-        arrays = [array.finished(self._known) for array in self._arrays.values()]
-        return [self._offsets, *arrays]
 
 
 def growing_lists(
