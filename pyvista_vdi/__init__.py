@@ -10,30 +10,15 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from pyvista_vdi import _moved
+from pyvista_vdi import _moved, errors
 from pyvista_vdi._version import __version__
 from pyvista_vdi.model import providers
 
 if TYPE_CHECKING:
-    from pyvista_vdi import errors, examples
+    from pyvista_vdi import examples
     from pyvista_vdi.api import estimate, generate, pick, read, render, render_depth, render_volume
     from pyvista_vdi.device import describe_devices, list_devices
-    from pyvista_vdi.errors import (
-        Cancelled,
-        DeviceError,
-        DeviceMemoryError,
-        InvalidArgumentError,
-        InvalidCameraError,
-        InvalidVDIError,
-        InvalidVolumeError,
-        KernelBuildError,
-        MissingDependencyError,
-        NoDeviceError,
-        UnsupportedError,
-        VDIError,
-        VDIFileError,
-        VDIWarning,
-    )
+    from pyvista_vdi.errors import *
     from pyvista_vdi.generation.estimate import Estimate
     from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
     from pyvista_vdi.model.camera import Camera
@@ -45,23 +30,6 @@ if TYPE_CHECKING:
     from pyvista_vdi.model.volume import Volume
     from pyvista_vdi.raycasting.picking import Pick
     from pyvista_vdi.vtk_pipeline import VDIActor, VDIMapper, VDISource
-
-_ERRORS = (
-    "Cancelled",
-    "DeviceError",
-    "DeviceMemoryError",
-    "InvalidArgumentError",
-    "InvalidCameraError",
-    "InvalidVDIError",
-    "InvalidVolumeError",
-    "KernelBuildError",
-    "MissingDependencyError",
-    "NoDeviceError",
-    "UnsupportedError",
-    "VDIError",
-    "VDIFileError",
-    "VDIWarning",
-)
 
 #: Where each public name lives; loaded when it is first used (PEP 562).
 _HOMES = {
@@ -89,7 +57,7 @@ _HOMES = {
     "render": "api",
     "render_depth": "api",
     "render_volume": "api",
-    **dict.fromkeys(_ERRORS, "errors"),
+    **dict.fromkeys(errors.__all__, "errors"),
 }
 
 __all__ = ["__version__", "errors", "examples", *sorted(_HOMES)]
@@ -109,8 +77,8 @@ providers.provide(
 
 
 def __getattr__(name: str) -> Any:
-    if name in ("errors", "examples"):
-        return importlib.import_module(f".{name}", __name__)
+    if name == "examples":
+        return importlib.import_module(".examples", __name__)
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)

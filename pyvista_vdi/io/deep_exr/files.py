@@ -65,14 +65,12 @@ def write(
     level: int = 1,
     exact: bool = True,
 ) -> Path:
-    """Write a VDI as an OpenEXR deep scan line image.
+    """Write a VDI as an OpenEXR deep scan line image: see :func:`pyvista_vdi.io.write`.
 
     Parameters
     ----------
-    vdi : VDI
-        What to write.
-    path : path-like
-        The target; its name ends in ``.exr``.
+    vdi, path
+        As there; the name ends in ``.exr``.
     compression : {"zips", "none"}
         ``"zips"`` is zlib, one scan line at a time.
     level : int
@@ -81,20 +79,6 @@ def write(
         Also write the channel ``tau`` and the corrections with which the file reads back to the
         last bit. Without them it has the standard channels alone, and optical depths above about
         ten come back rounded (see ``docs/files.md``).
-
-    Returns
-    -------
-    pathlib.Path
-        The file, links followed.
-
-    Raises
-    ------
-    VDIFileError
-        If the target cannot be written, or the metadata hold what JSON cannot.
-
-    See Also
-    --------
-    pyvista_vdi.io.write : checks the options first.
     """
     offset = _depth_offset(vdi)
     names = [*_STANDARD, *(("tau", *_COLOR_BITS) if exact else ())]
@@ -119,7 +103,7 @@ def read(
     camera: Any = None,
     thickness: float | None = None,
 ) -> VDI:
-    """Read a VDI from an OpenEXR deep image.
+    """Read a VDI from an OpenEXR deep image: see :func:`pyvista_vdi.read`.
 
     Parameters
     ----------
@@ -129,21 +113,6 @@ def read(
         The view that the image shows, where the file does not say it, or instead of what it says.
     thickness : float, optional
         World units: given to samples that have none, such as those of surfaces.
-
-    Returns
-    -------
-    VDI
-        The same to the last bit if :func:`write` wrote the file and nobody changed it; otherwise
-        with the losses that ``docs/files.md`` states.
-
-    Raises
-    ------
-    VDIFileError
-        If the file is absent, truncated, damaged, not a deep image, or says too little; the
-        message says which.
-    MissingDependencyError
-        If it is stored in tiles or several parts, or compressed by a method that only the
-        ``OpenEXR`` package reads, which is not installed.
 
     Warns
     -----

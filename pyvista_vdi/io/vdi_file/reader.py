@@ -118,46 +118,13 @@ class FileInfo:
 
 
 def read(path: str | os.PathLike[str]) -> VDI:
-    """Read a VDI from a file.
-
-    Parameters
-    ----------
-    path : path-like
-        A .vdi file.
-
-    Returns
-    -------
-    VDI
-        The same to the last bit as was written.
-
-    Raises
-    ------
-    VDIFileError
-        If the file is absent, foreign, of a newer version, truncated or damaged; the message
-        says which and what can be done.
-    """
+    """Read a VDI from a .vdi file: see :func:`pyvista_vdi.io.read`."""
     with _OpenFile(path) as file:
         return file.vdi()
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:
-    """Read what a file says about itself; the arrays are not touched.
-
-    Parameters
-    ----------
-    path : path-like
-        A .vdi file.
-
-    Returns
-    -------
-    FileInfo
-        View, size, metadata.
-
-    Raises
-    ------
-    VDIFileError
-        As for :func:`read`, except that damaged arrays are not noticed.
-    """
+    """Read what a .vdi file says about itself: see :func:`pyvista_vdi.io.read_info`."""
     with _OpenFile(path) as file:
         return file.info
 

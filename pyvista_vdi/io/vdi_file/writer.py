@@ -38,17 +38,12 @@ def write(
     level: int | None = None,
     precision: str | None = None,
 ) -> Path:
-    """Write a VDI to a file, exactly or packed.
-
-    The file appears whole or not at all: it is written under a temporary name in the same folder
-    and moved into place, and what was there before stays until then.
+    """Write a VDI to a file, exactly or packed: see :func:`pyvista_vdi.io.write`.
 
     Parameters
     ----------
-    vdi : VDI
-        What to write.
-    path : path-like
-        The target; its name ends in ``.vdi``.
+    vdi, path
+        As there; the name ends in ``.vdi``.
     compression : {"lz4", "zstd", "none"}
         ``"lz4"`` is the fastest to write and to read, ``"zstd"`` makes files a few percent
         smaller, ``"none"`` leaves plain little-endian arrays.
@@ -58,20 +53,6 @@ def write(
     precision : {"exact", "16-byte", "8-byte"}, optional
         Bytes of a supersegment before they are compressed, as for
         :meth:`pyvista_vdi.VDI.with_precision`; the VDI's own by default.
-
-    Returns
-    -------
-    pathlib.Path
-        The file, links followed.
-
-    Raises
-    ------
-    VDIFileError
-        If the target cannot be written, or the metadata hold what JSON cannot.
-
-    See Also
-    --------
-    pyvista_vdi.io.write : checks the options first.
     """
     vdi = vdi if precision is None else vdi.with_precision(precision)
     counts = _smallest(np.diff(vdi.offsets))

@@ -30,28 +30,9 @@ _MAX_RATIO = 1 << 13
 def write(
     vdi: VDI, path: str | os.PathLike[str], *, compression: str = "lz4", level: int = 1
 ) -> Path:
-    """Write a VDI's canonical form to a ``.vti`` file, exactly.
+    """Write a VDI's canonical form to a ``.vti`` file, exactly: see :func:`pyvista_vdi.io.write`.
 
-    Parameters
-    ----------
-    vdi : VDI
-        What to write.
-    path : path-like
-        The target; its name ends in ``.vti``. It appears whole or not at all.
-    compression : {"lz4", "zlib", "lzma", "none"}
-        VTK's compressor.
-    level : int
-        Its effort, 1 to 9.
-
-    Returns
-    -------
-    pathlib.Path
-        The file, links followed.
-
-    Raises
-    ------
-    VDIFileError
-        If the target cannot be written, or the metadata hold what JSON cannot.
+    ``compression`` is VTK's compressor, lz4, zlib, lzma or none, and ``level`` its effort, 1 to 9.
     """
     try:
         image = vdi_to_image(vdi)
