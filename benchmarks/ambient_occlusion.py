@@ -22,6 +22,7 @@ from common import (  # beside this file
 from tqdm import tqdm
 
 from pyvista_vdi import AmbientOcclusion
+from pyvista_vdi.api import render, render_volume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.report import write_text
@@ -32,12 +33,10 @@ from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.reference import ambient_transmittance
 from pyvista_vdi.reference.occlusion import _trilinear as trilinear
 from pyvista_vdi.reference.rays import pixel_ray
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.render import raycast_volume
 
 VOLUMES = ("brain", "rayleigh_taylor")
 ANGLES = (0.0, 5.0, 30.0)
@@ -158,10 +157,14 @@ def ssim(
     found = []
     for angle in ANGLES:
         view = vdi.camera.azimuth(angle)
-        picture = raycast_volume(
-            volume, view, vdi.window_size, classified, ambient_occlusion=occlusion
+        picture = render_volume(
+            volume,
+            view,
+            vdi.window_size,
+            transfer_function=classified,
+            ambient_occlusion=occlusion,
         )
-        found.append(compare_images(render_vdi(vdi, view), picture).ssim)
+        found.append(compare_images(render(vdi, view), picture).ssim)
     return found
 
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device.ray_forms import depth_range
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.occupancy import SLABS, TILE
-from pyvista_vdi.raycasting.raycast import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.reference.raycast import centre_ray_scale, near_limit
 
 Array = NDArray[np.float64]

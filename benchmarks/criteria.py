@@ -25,14 +25,13 @@ from common import (  # beside this file
 )
 from tqdm import tqdm
 
+from pyvista_vdi.api import render, render_volume
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.report import describe_system, write_text
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.volume.render import raycast_volume
 
 ANGLES = (0.0, 5.0, 15.0, 30.0, 60.0, 90.0)
 BUDGETS = (15, 30)
@@ -107,11 +106,11 @@ class Case:
         self._size = tuple(options.size)
         self._device = options.device
         self._references = [
-            raycast_volume(
+            render_volume(
                 self._volume,
                 self._view.azimuth(a),
                 self._size,
-                self._classified,
+                transfer_function=self._classified,
                 device=self._device,
             )
             for a in ANGLES
@@ -148,7 +147,7 @@ class Case:
     def _row(self, way: str, budget: int, criterion: str, vdi: VDI, given: VDI) -> dict[str, Any]:
         found = [
             compare_images(
-                render_vdi(vdi, self._view.azimuth(angle), self._size, device=self._device), image
+                render(vdi, self._view.azimuth(angle), self._size, device=self._device), image
             )
             for angle, image in zip(ANGLES, self._references, strict=True)
         ]

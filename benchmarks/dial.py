@@ -32,6 +32,7 @@ from standard_table import SOFT_ONLY
 from tqdm import tqdm
 
 from pyvista_vdi import examples
+from pyvista_vdi.api import render, render_volume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.report import write_text
@@ -54,8 +55,7 @@ from pyvista_vdi.quality.dial import (
     predictions,
 )
 from pyvista_vdi.quality.probe import Scene, turned
-from pyvista_vdi.raycasting.raycast import prepared_vdi, render_vdi
-from pyvista_vdi.volume.render import raycast_volume
+from pyvista_vdi.raycasting.prepared import prepared_vdi
 
 #: Timed frames of each rung, in turns; and of how many rungs: the larger VDIs take too long.
 FRAMES, TIMED_RUNGS = 6, 8
@@ -153,7 +153,7 @@ def truth(
     """Yield what each rung gives."""
     view = turned(camera, volume.bounds, TARGET_ANGLE)
     runtime = get_runtime(options.device)
-    picture = raycast_volume(volume, view, options.size, table, device=runtime)
+    picture = render_volume(volume, view, options.size, transfer_function=table, device=runtime)
     for setting in LADDER:
         vdi = generate_vdi(
             volume,
@@ -164,7 +164,7 @@ def truth(
             precision=setting.precision,
             device=runtime,
         )
-        seen = render_vdi(vdi, view, options.size, device=runtime)
+        seen = render(vdi, view, options.size, device=runtime)
         yield {
             "lists": setting.lists,
             "max_supersegments": setting.max_supersegments,
@@ -195,7 +195,7 @@ def frames(
     for _ in range(FRAMES):
         for of_one, vdi in zip(seconds, vdis, strict=True):
             start = time.process_time()
-            render_vdi(vdi, view, options.size, device=options.device)
+            render(vdi, view, options.size, device=options.device)
             of_one.append(time.process_time() - start)
     rough, *others = (statistics.median(of_one) for of_one in seconds)
     return [other / rough for other in others]

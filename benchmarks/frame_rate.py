@@ -28,12 +28,12 @@ from common import (  # beside this file
 from tqdm import tqdm
 
 from pyvista_vdi import examples
+from pyvista_vdi.api import render
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.report import describe_system
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.frame_rate import FLOOR, RECENT_FRAMES, FrameRateController
-from pyvista_vdi.raycasting.raycast import render_vdi
 
 #: Frames between those whose time at the floor and in full quality is measured beforehand.
 STRIDE = 6
@@ -181,7 +181,7 @@ class Drawing:
         """Draw a view; return its pixels and what they took, seconds."""
         width, height = self._reduced(samples)
         start = time.perf_counter()
-        render_vdi(self._vdi, self._cameras[number], (width, height), device=self._device)
+        render(self._vdi, self._cameras[number], (width, height), device=self._device)
         return width * height, time.perf_counter() - start
 
     def _reduced(self, samples: int) -> tuple[int, int]:

@@ -38,12 +38,12 @@ from common import (  # beside this file
 )
 from tqdm import tqdm
 
+from pyvista_vdi.api import render_volume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.compare.bounds import FRAME_RATIO_ANGLE
 from pyvista_vdi.measure.report import describe_system, write_text
 from pyvista_vdi.measure.vtk_baselines import MAPPERS, VTKBaseline, add_volume_property
-from pyvista_vdi.volume.render import raycast_volume
 
 #: Ratios: title, what is divided, and by which candidate or by the fastest of which.
 RATIOS: dict[str, tuple[str, str, tuple[str, ...]]] = {
@@ -105,8 +105,9 @@ def measured(subject: Subject, options: argparse.Namespace) -> dict[str, Any]:
     voxel = min(volume.spacing)
     runtime = get_runtime(options.device)
     march = partial(
-        raycast_volume,
-        *(volume, view, options.size, table),
+        render_volume,
+        *(volume, view, options.size),
+        transfer_function=table,
         sample_distance=voxel / 2,
         early_termination=False,
         device=runtime,
@@ -119,8 +120,9 @@ def measured(subject: Subject, options: argparse.Namespace) -> dict[str, Any]:
         device=runtime,
     )
     frame = partial(
-        raycast_volume,
-        *(volume, turned, options.size, table),
+        render_volume,
+        *(volume, turned, options.size),
+        transfer_function=table,
         sample_distance=voxel,
         device=runtime,
     )

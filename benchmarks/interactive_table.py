@@ -40,9 +40,10 @@ from pyvista_vdi.measure.paper import find_dataset
 from pyvista_vdi.measure.paper.datasets import label_of, require_allocation
 from pyvista_vdi.measure.report import describe_system, system_line, table, write_text
 from pyvista_vdi.measure.session import CANDIDATES, Bench, VDIRenderer
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.standard_cases import ANGLES, filling_camera
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import raycast_medium
 
@@ -212,7 +213,11 @@ def _generation(
         ]
 
     medium = DeviceVolume(runtime, volume, function, step)
-    raycast = partial(raycast_medium, runtime, medium, view, early_termination=False)
+
+    def raycast(size: tuple[int, int]) -> object:
+        options = RenderOptions(transmittance_cutoff=0)
+        return raycast_medium(medium, FrameRequest(view, size, options))
+
     generate(_WARM_UP_SIZE)
     raycast(_WARM_UP_SIZE)
     steps = {"generation": partial(generate, size), "render_volume": partial(raycast, size)}

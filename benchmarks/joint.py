@@ -25,9 +25,8 @@ from common import (  # beside this file
 )
 from numpy.typing import NDArray
 
+from pyvista_vdi.api import render
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.multi_vdi import render_vdis
-from pyvista_vdi.raycasting.raycast import render_vdi
 
 #: Azimuths from the first VDI's generating view, degrees.
 ANGLES = (0.0, 5.0, 30.0, 90.0)
@@ -48,12 +47,12 @@ def main() -> None:
         moved = camera.replace(model_transform=place)
 
         def single(camera=camera, moved=moved):  # type: ignore[no-untyped-def]
-            render_vdi(first, camera, options.size, device=options.device)
-            render_vdi(second, moved, options.size, device=options.device)
+            render(first, camera, options.size, device=options.device)
+            render(second, moved, options.size, device=options.device)
 
         def joint(camera=camera):  # type: ignore[no-untyped-def]
             transforms = [np.eye(4), place]
-            render_vdis(
+            render(
                 [first, second],
                 camera,
                 options.size,

@@ -28,13 +28,13 @@ from common import (  # beside this file
 )
 
 from pyvista_vdi import Volume, examples
+from pyvista_vdi.api import render
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.report import table
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
-from pyvista_vdi.raycasting.raycast import render_vdi
 
 VOLUMES = ("visible_female_head", "heptane", "rayleigh_taylor")
 
@@ -103,7 +103,7 @@ def drawn(
     )
     generating = resident("VmHWM") - before
     forget_peak()
-    render_vdi(vdi, view.azimuth(5), device=runtime)
+    render(vdi, view.azimuth(5), device=runtime)
     return {
         "vdi": vdi.nbytes,
         "generate": generating,

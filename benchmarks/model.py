@@ -47,11 +47,12 @@ from pyvista_vdi.measure.paper import find_dataset
 from pyvista_vdi.measure.report import describe_system, system_line, table, write_text
 from pyvista_vdi.measure.session import VDIRenderer
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.standard_cases import ANGLES, filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import raycast_medium
 
@@ -548,7 +549,7 @@ def measured(name: str, options: argparse.Namespace, rates: Rates) -> dict[str, 
         "seconds": taken[""],
     }
     medium = DeviceVolume(runtime, volume, function, voxel)
-    taken = _kernels_and_rest(watch, lambda: raycast_medium(runtime, medium, view, size))
+    taken = _kernels_and_rest(watch, lambda: raycast_medium(medium, FrameRequest(view, size)))
     stages["render_volume"] = {**model.volume_frame(view, voxel), "seconds": taken["kernels"]}
 
     taken = _kernels_and_rest(watch, lambda: PreparedVDI(runtime, vdi))

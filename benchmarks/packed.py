@@ -30,8 +30,10 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.measure.report import describe_system, system_line, write_text
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.packing import PRECISIONS
+from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI
+from pyvista_vdi.raycasting.raycast import draw as draw_frame
 
 #: Degrees about the centre, from V_O.
 ANGLES = (0, 5, 30)
@@ -97,7 +99,8 @@ def measured(vdi: VDI, options: argparse.Namespace) -> dict[str, Any]:
         for angle in ANGLES:
             camera = vdi.camera.azimuth(angle)
             ways = {
-                name: partial(form.render, camera, size, image) for name, form in prepared.items()
+                name: partial(draw_frame, form, FrameRequest(camera, size), image)
+                for name, form in prepared.items()
             }
             pictures = {}
             for name, draw in ways.items():

@@ -21,13 +21,12 @@ from common import (  # beside this file
 )
 from tqdm import tqdm
 
+from pyvista_vdi.api import render, render_volume
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.report import write_text
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.volume.render import raycast_volume
 
 #: What is changed; the first row is the default. ``lists`` is the VDI's window over the frame's.
 VARIANTS: tuple[dict[str, float], ...] = (
@@ -72,16 +71,16 @@ def measured(name: str, options: argparse.Namespace) -> Any:
     """Yield a row for each variant."""
     volume, classified, view = subject_of(name, options)
     references = {
-        angle: raycast_volume(volume, view.azimuth(angle), options.size, classified)
+        angle: render_volume(
+            volume, view.azimuth(angle), options.size, transfer_function=classified
+        )
         for angle in ANGLES
     }
     for variant in VARIANTS:
         vdi = generated(volume, view, options.size, classified, **variant)
         occupied = int(np.count_nonzero(np.diff(vdi.offsets)))
         found = {
-            angle: compare_images(
-                render_vdi(vdi, view.azimuth(angle), options.size), references[angle]
-            )
+            angle: compare_images(render(vdi, view.azimuth(angle), options.size), references[angle])
             for angle in ANGLES
         }
         yield {

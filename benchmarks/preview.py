@@ -28,15 +28,17 @@ from common import (  # beside this file
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from pyvista_vdi.api import render_volume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.report import describe_system, write_text
 from pyvista_vdi.measure.session import enlarged
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.raycast import prepared_vdi
-from pyvista_vdi.volume.render import raycast_volume
+from pyvista_vdi.raycasting.prepared import prepared_vdi
+from pyvista_vdi.raycasting.raycast import draw
 
 #: Speeds, as multiples of the full frame's, at which the ways are compared.
 SPEEDS = (2.0, 3.0, 4.0)
@@ -120,7 +122,9 @@ def measured(name: str, options: argparse.Namespace) -> list[dict[str, Any]]:
             begin = time.perf_counter()
             way()
             taken.append(time.perf_counter() - begin)
-    reference = raycast_volume(volume, camera, options.size, table, device=options.device)
+    reference = render_volume(
+        volume, camera, options.size, transfer_function=table, device=options.device
+    )
     full = statistics.median(times[0])
     return [
         {
@@ -161,7 +165,8 @@ class Drawing:
         width, height = size or self._size
         prepared = prepared_vdi(self._runtime, vdi)
         with self._runtime.buffer((height, width, 4), name="image") as image:
-            prepared.render(self._camera, (width, height), image, preview_samples=samples)
+            options = RenderOptions(preview_samples=samples)
+            draw(prepared, FrameRequest(self._camera, (width, height), options), image)
             return self._runtime.download(image)
 
     def whole(self, image: Image) -> Image:

@@ -22,8 +22,10 @@ from pathlib import Path
 WORKER = """
 import hashlib, sys, time
 import pyvista_vdi
+from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.raycasting.raycast import draw
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 runtime = get_runtime(sys.argv[1] or None)
 size = None
@@ -41,7 +43,7 @@ for line in sys.stdin:
         continue
     camera = vdi.camera.azimuth(float(rest))
     began = time.process_time()
-    prepared.render(camera, size, image)
+    draw(prepared, FrameRequest(camera, size), image)
     took = time.process_time() - began
     bits = ""
     if order == "bits":

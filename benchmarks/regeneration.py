@@ -30,10 +30,12 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.report import describe_system
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import BackgroundGeneration
-from pyvista_vdi.raycasting.raycast import prepared_vdi
+from pyvista_vdi.raycasting.prepared import prepared_vdi
+from pyvista_vdi.raycasting.raycast import draw
 
 VOLUMES = ("aneurism", "brain", "heptane", "rayleigh_taylor")
 
@@ -171,7 +173,8 @@ class Bench:
         """Draw a frame, and return its seconds, from its request to the picture on the host."""
         start = time.perf_counter()
         with self._runtime.foreground():
-            prepared_vdi(self._runtime, self._vdi).render(self._camera, self._size, self._image)
+            prepared = prepared_vdi(self._runtime, self._vdi)
+            draw(prepared, FrameRequest(self._camera, self._size), self._image)
             self._runtime.download(self._image)
         return time.perf_counter() - start
 

@@ -42,10 +42,11 @@ from pyvista_vdi.measure.paper import find_dataset
 from pyvista_vdi.measure.paper.procedural import PROCEDURAL
 from pyvista_vdi.measure.report import describe_system, system_line, table, write_text
 from pyvista_vdi.measure.session import VDIRenderer
+from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import raycast_medium
 
@@ -187,7 +188,7 @@ class Bench:
         medium = DeviceVolume(self._runtime, volume, function, voxel)
         steps: dict[str, Callable[[], object]] = {
             "VDI frame": partial(self._draw(case, generate).image, camera),
-            "render_volume": partial(raycast_medium, self._runtime, medium, view, case.size),
+            "render_volume": partial(raycast_medium, medium, FrameRequest(view, case.size)),
             "generation": generate,
         }
         return {name: steps[name] for name in quantities}

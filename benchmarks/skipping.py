@@ -26,9 +26,10 @@ from tqdm import tqdm
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.measure.report import describe_system, system_line, write_text
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.occupancy import OccupancyGrid
-from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 #: Azimuths from V_O, degrees.
 ANGLES = (0.0, 5.0, 30.0, 60.0, 90.0, 180.0)
@@ -135,7 +136,8 @@ class Drawing:
         with self._runtime.buffer((height, width, 4), name="image") as image:
 
             def draw(skip: bool) -> None:
-                self._prepared.render(camera, self._size, image, skip_empty=skip)
+                options = RenderOptions(skip_empty=skip)
+                draw(self._prepared, FrameRequest(camera, self._size, options), image)
 
             def bits(skip: bool) -> NDArray[np.uint32]:
                 draw(skip)

@@ -34,6 +34,7 @@ from common import (  # beside this file
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from pyvista_vdi.api import render, render_volume
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.report import write_text
 from pyvista_vdi.model.camera import Camera
@@ -43,8 +44,6 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.view_error import TILE_SIZE, TILES, ViewErrorEstimator
-from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.volume.render import raycast_volume
 
 VOLUMES = ("aneurism", "bonsai", "brain", "heptane", "rayleigh_taylor", "tooth")
 LOOKS = ("soft", "steep")
@@ -155,8 +154,8 @@ def found(
     """Compare the whole pictures, and estimate the same from tiles."""
     size, device = options.size, options.device
     frame, reference = (
-        lambda: render_vdi(vdi, camera, size, device=device),
-        lambda: raycast_volume(volume, camera, size, classified, device=device),
+        lambda: render(vdi, camera, size, device=device),
+        lambda: render_volume(volume, camera, size, transfer_function=classified, device=device),
     )
     picture = frame()
     estimates = {

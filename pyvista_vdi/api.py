@@ -17,12 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, InvalidVolumeError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import DEFAULTS, IN_PLACE, Classification
-from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.options import GenerationOptions, MediumOptions
 from pyvista_vdi.model.providers import provider
+from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, warn_missed
-from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY
+from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
 
 if TYPE_CHECKING:
     from pyvista_vdi.generation.estimate import Estimate
@@ -287,36 +288,32 @@ def render(
                 "transmittance_cutoff is for a single VDI: leave it out for several"
             )
         from pyvista_vdi.raycasting.multi_vdi import render_vdis
+        from pyvista_vdi.raycasting.placed import common_window_size, placed_vdis
 
-        return render_vdis(
+        placed = placed_vdis(
             [as_vdi(one) for one in vdi] if isinstance(vdi, list | tuple) else [as_vdi(vdi)],
             view,
-            window_size,
             model_transforms=model_transforms,
-            opaque_depth=opaque_depth,
             clipping_planes=clipping_planes,
             cropping=cropping,
             opacity_multiplier=opacity_multiplier,
             skip_empty=skip_empty,
-            device=device,
         )
+        size = common_window_size(placed) if window_size is None else window_size
+        frame = _frame(None, view, size, RenderOptions(), opaque_depth, device)
+        return render_vdis(placed, frame)
     vdi = as_vdi(vdi)
-    from pyvista_vdi.raycasting.raycast import TRANSMITTANCE_CUTOFF, render_vdi
+    from pyvista_vdi.raycasting.raycast import render_vdi
 
-    cutoff = TRANSMITTANCE_CUTOFF if transmittance_cutoff is None else transmittance_cutoff
-    return render_vdi(
-        vdi,
-        view,
-        window_size,
-        opaque_depth=opaque_depth,
-        clipping_planes=clipping_planes,
-        cropping=cropping,
-        opacity_multiplier=opacity_multiplier,
-        skip_empty=skip_empty,
-        preview_samples=preview_samples,
-        transmittance_cutoff=cutoff,
-        device=device,
+    options = RenderOptions(
+        clipping_planes,
+        cropping,
+        opacity_multiplier,
+        skip_empty,
+        preview_samples,
+        TRANSMITTANCE_CUTOFF if transmittance_cutoff is None else transmittance_cutoff,
     )
+    return render_vdi(vdi, _frame(vdi, view, window_size, options, opaque_depth, device))
 
 
 def render_depth(
@@ -361,19 +358,9 @@ def render_depth(
     vdi = as_vdi(vdi)
     from pyvista_vdi.raycasting.raycast import render_first_hits
 
-    return render_first_hits(
-        vdi,
-        view,
-        window_size,
-        opacity_threshold=opacity_threshold,
-        accumulated=accumulated,
-        opaque_depth=opaque_depth,
-        clipping_planes=clipping_planes,
-        cropping=cropping,
-        opacity_multiplier=opacity_multiplier,
-        skip_empty=skip_empty,
-        device=device,
-    )
+    options = RenderOptions(clipping_planes, cropping, opacity_multiplier, skip_empty)
+    frame = _frame(vdi, view, window_size, options, opaque_depth, device)
+    return render_first_hits(vdi, frame, FirstHit.of(opacity_threshold, accumulated))
 
 
 def pick(
@@ -434,18 +421,9 @@ def pick(
     vdi = as_vdi(vdi)
     from pyvista_vdi.raycasting.picking import pick_vdi
 
-    return pick_vdi(
-        vdi,
-        view,
-        pixel,
-        window_size,
-        opacity_threshold=opacity_threshold,
-        accumulated=accumulated,
-        opaque_depth=opaque_depth,
-        clipping_planes=clipping_planes,
-        cropping=cropping,
-        opacity_multiplier=opacity_multiplier,
-    )
+    options = RenderOptions(clipping_planes, cropping, opacity_multiplier)
+    frame = _frame(vdi, view, window_size, options, opaque_depth)
+    return pick_vdi(vdi, frame, pixel, FirstHit.of(opacity_threshold, accumulated))
 
 
 @_classified
@@ -519,22 +497,20 @@ def render_volume(
     volume = as_volume(volume, looks.scalars, looks.preference)
     from pyvista_vdi.volume.render import raycast_volume
 
+    cutoff = TRANSMITTANCE_CUTOFF if early_termination else 0.0
+    options = RenderOptions(
+        clipping_planes, cropping, opacity_multiplier, skip_empty, transmittance_cutoff=cutoff
+    )
     return raycast_volume(
         volume,
-        view,
-        window_size,
         looks.transfer_function(volume),
-        sample_distance=sample_distance,
-        opaque_depth=opaque_depth,
-        clipping_planes=clipping_planes,
-        cropping=cropping,
-        opacity_multiplier=opacity_multiplier,
-        early_termination=early_termination,
-        skip_empty=skip_empty,
-        lights=lights,
-        ambient_occlusion=ambient_occlusion,
-        memory_limit=memory_limit,
-        device=device,
+        _frame(None, view, window_size, options, opaque_depth, device),
+        MediumOptions(
+            sample_distance=sample_distance,
+            lights=lights,
+            ambient_occlusion=ambient_occlusion,
+            memory_limit=memory_limit,  # type: ignore[arg-type]  # a text becomes bytes
+        ),
     )
 
 
@@ -702,6 +678,19 @@ def as_vdi(vdi: Any) -> VDI:
     raise InvalidVDIError(
         f"expected a VDI or its VTK form (a vtkImageData); got {_described(vdi)}{hint}"
     )
+
+
+def _frame(
+    vdi: VDI | None,
+    camera: Camera,
+    window_size: Sequence[int] | None,
+    options: RenderOptions,
+    opaque_depth: ArrayLike | None,
+    device: Any = None,
+) -> FrameRequest:
+    """Return the request of a frame, by default of a VDI's own size."""
+    size: Any = window_size if vdi is None or window_size is not None else vdi.window_size
+    return FrameRequest(camera, size, options, opaque_depth, device)
 
 
 def _keywords(function: Callable[..., Any]) -> tuple[str, ...]:

@@ -177,38 +177,11 @@ def box_planes(rays: PixelRays, bounds: Sequence[float]) -> list[Floats]:
     return forms
 
 
-def user_planes(camera: Camera, rays: PixelRays, planes: ArrayLike | None) -> list[Floats]:
-    """Return the forms of clipping planes given in world coordinates.
-
-    Parameters
-    ----------
-    camera : Camera
-        Its ``model_transform`` carries them into the model frame.
-    rays : PixelRays
-        Rays in the model frame.
-    planes : array_like of float, shape (k, 6), optional
-        Origin and normal of each; the side that the normal points to is kept.
-
-    Returns
-    -------
-    list of numpy.ndarray
-        One form each.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If the shape is another, a value is not finite or a normal is zero.
-    """
-    if planes is None:
+def user_planes(camera: Camera, rays: PixelRays, planes: Sequence[Sequence[float]]) -> list[Floats]:
+    """Return the forms of clipping planes of the world: :attr:`RenderOptions.clipping_planes`."""
+    if len(planes) == 0:
         return []
-    wanted = "clipping_planes must be (k, 6) finite numbers, origin and normal of each plane"
-    table = _numbers(planes, wanted)
-    if table.size == 0:
-        return []
-    if table.ndim != 2 or table.shape[1] != 6 or not np.isfinite(table).all():
-        raise InvalidArgumentError(f"{wanted}; got shape {table.shape}")
-    if not table[:, 3:].any(axis=1).all():
-        raise InvalidArgumentError("a clipping plane's normal is zero: give its direction")
+    table = np.array(planes)
     # Unit normals, scaled first: a form of one that float32 cannot hold would clip nothing
     normals = table[:, 3:] / np.abs(table[:, 3:]).max(axis=1, keepdims=True)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -425,7 +398,10 @@ def checked_opaque_depth(
     wanted = f"opaque_depth must have shape (height, width) = {window_size[::-1]}"
     depth = opaque_depth
     if not (isinstance(depth, np.ndarray) and depth.dtype in (np.float32, np.float64)):
-        depth = _numbers(opaque_depth, wanted)
+        try:
+            depth = np.asarray(opaque_depth, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise InvalidArgumentError(f"{wanted}; got {opaque_depth!r}") from error
     if depth.shape != window_size[::-1]:
         raise InvalidArgumentError(f"{wanted}; got {depth.shape}")
     ends = aligned_empty(depth.shape, np.float32)
@@ -434,11 +410,3 @@ def checked_opaque_depth(
     if np.isnan(ends.min()):
         raise InvalidArgumentError("opaque_depth holds NaN: use inf where nothing is opaque")
     return ends
-
-
-def _numbers(values: ArrayLike, wanted: str) -> Floats:
-    """Return values as float64; what is ragged or no number is refused with what is wanted."""
-    try:
-        return np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidArgumentError(f"{wanted}; got {values!r}") from error

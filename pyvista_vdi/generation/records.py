@@ -67,7 +67,7 @@ class Records:
     ) -> None:
         check_list_space(camera, medium.volume.bounds)
         self.runtime, self.size, self.slices = runtime, size, slices
-        rays = medium.forms(camera, size, None)
+        rays = medium.forms(camera, size)
         self.planes, self.depth_origin = rays.planes, rays.rays.reference_depth
         self.of_medium, self.of_rays = {**medium.defines, **rays.defines}, rays.defines
         # Differences stay below 1e18, whose square float32 still holds

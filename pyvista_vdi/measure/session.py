@@ -21,10 +21,12 @@ from pyvista_vdi.measure.clock import Step, Times, take_turns
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI
+from pyvista_vdi.raycasting.raycast import draw
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import raycast_medium
 
@@ -203,7 +205,7 @@ class Bench:
 
     def image(self, camera: Camera) -> Image:
         """Draw at the accurate step, premultiplied RGBA (H, W, 4)."""
-        return raycast_medium(self._runtime, self._accurate, camera, self._size)
+        return raycast_medium(self._accurate, FrameRequest(camera, self._size))
 
     def reference(self, camera: Camera, angle: float) -> tuple[Image, dict[str, float] | None]:
         """Return our picture of a view, and how near VTK's is; both are kept for other VDIs.
@@ -234,7 +236,7 @@ class Bench:
     def frames(self, camera: Camera) -> dict[str, Step]:
         """Return what draws a frame, by candidate; ours ends with the picture on the host."""
         steps: dict[str, Step] = {
-            name: partial(raycast_medium, self._runtime, medium, camera, self._size)
+            name: partial(raycast_medium, medium, FrameRequest(camera, self._size))
             for name, medium in self._timed.items()
         }
         for name, baseline in self._baselines.items():
@@ -286,15 +288,10 @@ class VDIRenderer:
         preview_samples: int | None = None,
     ) -> Image:
         """Draw a frame; premultiplied RGBA (H, W, 4) on the host."""
+        options = RenderOptions(skip_empty=skip_empty, preview_samples=preview_samples)
         width, height = size or self._size
         with self._runtime.result((height, width, 4), name="image") as image:
-            self._prepared.render(
-                camera,
-                (width, height),
-                image,
-                skip_empty=skip_empty,
-                preview_samples=preview_samples,
-            )
+            draw(self._prepared, FrameRequest(camera, (width, height), options), image)
             return self._runtime.download(image)
 
     def frames(self, camera: Camera) -> dict[str, Step]:

@@ -10,6 +10,7 @@ from typing import Any
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -102,7 +103,8 @@ class BackgroundGeneration:
             vdi = generate_by_dial(
                 *arguments, metadata=metadata, device=runtime, progress=report, **changes
             )
-            render_vdi(vdi, vdi.camera, (_TRIAL_SIZE, _TRIAL_SIZE), device=runtime)
+            trial = FrameRequest(vdi.camera, (_TRIAL_SIZE, _TRIAL_SIZE), device=runtime)
+            render_vdi(vdi, trial)
             return vdi
 
         self._worker.put(Job(make, self._device, key))

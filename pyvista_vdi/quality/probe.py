@@ -20,6 +20,7 @@ from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.metrics import SSIM_WINDOW
 from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -257,13 +258,9 @@ class Scene:
         covered = all(((corners - side[:3]) @ side[3:]).min() >= 0 for side in sides)
         if covered and self._transfer_function.shading is None:
             return 0.0
+        shown = RenderOptions(clipping_planes=None if covered else sides)
         pictures = [
-            estimator.volume_tile(
-                lens,
-                tiles.size,
-                clipping_planes=None if covered else sides,
-                lit_from=self._camera,
-            )
+            estimator.volume_tile(lens, tiles.size, shown, lit_from=self._camera)
             for lens in self._lenses(tiles)
         ]
         return _loss(tiles, pictures, truth)
@@ -297,7 +294,7 @@ class Scene:
         window = setting.window_size(self._size)
         lenses = self._lenses(tiles)
         if whole is not None:
-            return [render_vdi(whole, at, tiles.size, device=self._runtime) for at in lenses]
+            return [render_vdi(whole, self._frame(lens, tiles.size)) for lens in lenses]
         met = [
             lists_met(lens, tiles.size, self._volume.bounds, self._camera, window)
             for lens in lenses
@@ -313,15 +310,18 @@ class Scene:
                 continue
             corner, size = part
             vdi = self._generated(self._camera.tile(window, corner, size), size, setting)
-            pictures.append(render_vdi(vdi, lens, tiles.size, device=self._runtime))
+            pictures.append(render_vdi(vdi, self._frame(lens, tiles.size)))
         return pictures
+
+    def _frame(self, camera: Camera, size: tuple[int, int]) -> FrameRequest:
+        return FrameRequest(camera, size, device=self._runtime)
 
     def _frame_seconds(self, vdi: VDI) -> float:
         """Return the shortest time of a few full frames, seconds."""
         seconds = []
         for _ in range(_FRAMES):
             start = time.perf_counter()
-            render_vdi(vdi, self._view, self._size, device=self._runtime)
+            render_vdi(vdi, self._frame(self._view, self._size))
             seconds.append(time.perf_counter() - start)
         return max(min(seconds), 1e-9)
 

@@ -21,9 +21,9 @@ from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float
-from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
 from pyvista_vdi.model.metrics import SSIM_WINDOW, over_background
 from pyvista_vdi.model.options import MediumOptions
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -282,11 +282,7 @@ class ViewErrorEstimator:
             size,
             _of_window("picture", picture, (*size[::-1], 4)),
             _of_window("opaque_depth", opaque_depth, size[::-1]),
-            {
-                "clipping_planes": clipping_planes,
-                "cropping": Cropping.from_any(cropping),
-                "opacity_multiplier": checked_opacity_multiplier(opacity_multiplier),
-            },
+            RenderOptions(clipping_planes, cropping, opacity_multiplier),
             background,
             pause,
         )
@@ -316,17 +312,21 @@ class ViewErrorEstimator:
         TileSample or None
             ``None`` where the volume is not in view.
         """
-        scene = _Scene(self, vdi, camera, window_size, None, None, {}, (0.0, 0.0, 0.0), None)
+        shown = RenderOptions()
+        scene = _Scene(self, vdi, camera, window_size, None, None, shown, (0.0, 0.0, 0.0), None)
         return self._sample(scene, vdi, camera, window_size)
 
     def volume_tile(
-        self, lens: Camera, tile_size: tuple[int, int], **options: Any
+        self,
+        lens: Camera,
+        tile_size: tuple[int, int],
+        shown: RenderOptions | None = None,
+        *,
+        lit_from: Camera | None = None,
     ) -> NDArray[np.float32]:
-        """Return the volume's picture through the lens of a tile.
-
-        The options are those of :func:`~pyvista_vdi.volume.render.raycast_medium`.
-        """
-        return raycast_medium(self._runtime, self._medium, lens, tile_size, **options)
+        """Return the volume's picture through the lens of a tile, lit as seen from a view."""
+        frame = FrameRequest(lens, tile_size, shown or RenderOptions())
+        return raycast_medium(self._medium, frame, lit_from=lit_from)
 
     def _sample(
         self, scene: _Scene, vdi: VDI, camera: Camera, size: tuple[int, int]
@@ -351,7 +351,7 @@ class _Scene:
         size: tuple[int, int],
         picture: NDArray[Any] | None,
         opaque_depth: NDArray[Any] | None,
-        shown: dict[str, Any],
+        shown: RenderOptions,
         background: Sequence[float],
         pause: Pause | None,
     ) -> None:
@@ -402,28 +402,14 @@ class _Scene:
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """The pixels ``part`` of the window, seen through ``lens``, by VDI and volume."""
         depth = None if self._opaque_depth is None else self._opaque_depth[part]
+        request = FrameRequest(lens, size, self._shown, depth, self._runtime)
         if self._picture is not None:
             of_vdi = self._picture[part]
         else:
             self._wait()
-            of_vdi = render_vdi(
-                self._vdi,
-                lens,
-                size,
-                opaque_depth=depth,
-                device=self._runtime,
-                **self._shown,
-            )
+            of_vdi = render_vdi(self._vdi, request)
         self._wait()
-        of_volume = raycast_medium(
-            self._runtime,
-            self._medium,
-            lens,
-            size,
-            opaque_depth=depth,
-            **self._shown,
-        )
-        return of_vdi, of_volume
+        return of_vdi, raycast_medium(self._medium, request)
 
     def _wait(self) -> None:
         if self._pause is not None and self._pause() is False:

@@ -9,34 +9,28 @@ be met, each is drawn as it would be by itself.
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import math
 import weakref
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Runtime, get_runtime
+from pyvista_vdi.device import DeviceBuffer, Kernel, Runtime, get_runtime
 from pyvista_vdi.device.constants import CELL, CELL_ITEMS
 from pyvista_vdi.device.ray_forms import cells_of_points
 from pyvista_vdi.device.work_order import GROUP, Rectangle
-from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
 from pyvista_vdi.model.float32_limits import compensation
+from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.packets import LANES
-from pyvista_vdi.raycasting.raycast import (
-    TRANSMITTANCE_CUTOFF,
-    ListView,
-    PreparedVDI,
-    SegmentsKernel,
-    prepared_vdi,
-    render_vdi,
-)
+from pyvista_vdi.raycasting.placed import PlacedVDI, canonical_order
+from pyvista_vdi.raycasting.prepared import Defines, prepared_vdi
+from pyvista_vdi.raycasting.raycast import enqueue, render_vdi
+from pyvista_vdi.raycasting.scene import OnDevice, Scene
+from pyvista_vdi.raycasting.strategies import strategy_for
 
 #: Bytes of a segment: those of ``opencl/raycasting/segments.cl``.
 _SEGMENT_BYTES = 24
@@ -55,36 +49,10 @@ _FIRST_SLOTS = 64
 _SPARE_SLOTS = 1.1
 
 _slots: weakref.WeakKeyDictionary[VDI, int] = weakref.WeakKeyDictionary()
-_digests: weakref.WeakKeyDictionary[VDI, bytes] = weakref.WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
-class PlacedVDI:
-    """A VDI and where it is in a scene.
-
-    Attributes
-    ----------
-    vdi : VDI
-        The medium.
-    camera : Camera
-        The new view; its ``model_transform`` says where this VDI's model frame is.
-    clipping_planes : array_like of float, shape (k, 6), optional
-        That cut this VDI: origin and normal of each, world coordinates.
-    cropping : Cropping, optional
-        Regions of its model frame that are drawn.
-    opacity_multiplier : float
-        Factor of its extinction.
-    """
-
-    vdi: VDI
-    camera: Camera
-    clipping_planes: ArrayLike | None = None
-    cropping: Cropping | None = None
-    opacity_multiplier: float = 1.0
-
-
-@dataclass(frozen=True)
-class JointImage:
+class OwnedImage:
     """The picture of several VDIs.
 
     Attributes
@@ -100,178 +68,69 @@ class JointImage:
     owner: NDArray[np.int16]
 
 
-def render_vdis(
-    vdis: Sequence[VDI],
-    camera: Camera,
-    window_size: Sequence[int] | None = None,
-    *,
-    model_transforms: Sequence[ArrayLike] | None = None,
-    opaque_depth: ArrayLike | None = None,
-    clipping_planes: Any = None,
-    cropping: Sequence[Any] | None = None,
-    opacity_multiplier: float | Sequence[float] = 1.0,
-    skip_empty: bool = True,
-    device: Any = None,
-) -> NDArray[np.float32]:
-    """Raycast several VDIs together.
+def render_vdis(placed: Sequence[PlacedVDI], request: FrameRequest) -> NDArray[np.float32]:
+    """Raycast VDIs together: premultiplied RGBA, float32 (height, width, 4), top row first.
 
-    Parameters
-    ----------
-    vdis : sequence of VDI
-        In any order: the picture is the same to the last bit.
-    camera : Camera
-        The new view V_N.
-    window_size : (int, int), optional
-        Width and height in pixels; by default that of the VDIs, if all have the same.
-    model_transforms : sequence of array_like of float, shape (4, 4), optional
-        Where each VDI's model frame is; by default the camera's ``model_transform`` for all.
-    opaque_depth
-        As for :func:`pyvista_vdi.raycasting.raycast.render_vdi`; for all of them.
-    clipping_planes : optional
-        Shape (k, 6), for all of them; or one such array, or ``None``, for each.
-    cropping : sequence, optional
-        What :meth:`pyvista_vdi.Cropping.from_any` takes, or ``None``, for each.
-    opacity_multiplier : float or sequence of float
-        Factor of the extinction, 0 or above: for all of them, or one for each.
-    skip_empty : bool
-        Pass by what is empty. The picture is the same to the last bit.
-    device : optional
-        See :func:`pyvista_vdi.list_devices`.
-
-    Returns
-    -------
-    numpy.ndarray
-        Premultiplied RGBA, float32 (height, width, 4), top row first.
+    Camera and options are those of each VDI; ``request`` has the rest.
     """
-    vdis = list(vdis)
-    for vdi in vdis:
-        if not isinstance(vdi, VDI):
-            raise InvalidArgumentError(f"expected VDIs, got {type(vdi).__name__} among them")
-    if not vdis:
-        raise InvalidArgumentError("there is no VDI to render: the sequence is empty")
-    camera = Camera.from_any(camera)
-    size = _window_size(vdis, window_size)
-    cameras = _cameras(camera, model_transforms, len(vdis))
-    planes = _planes_of_each(clipping_planes, len(vdis))
-    croppings = _croppings(cropping, len(vdis))
-    multipliers = _multipliers(opacity_multiplier, len(vdis))
-    if len(vdis) == 1:
-        return render_vdi(
-            vdis[0],
-            cameras[0],
-            size,
-            opaque_depth=opaque_depth,
-            clipping_planes=planes[0],
-            cropping=croppings[0],
-            opacity_multiplier=multipliers[0],
-            skip_empty=skip_empty,
-            device=device,
-        )
-    each = zip(vdis, cameras, planes, croppings, multipliers, strict=True)
-    placed = [PlacedVDI(*one) for one in each]
-    return joint_image(
-        placed, size, opaque_depth=opaque_depth, skip_empty=skip_empty, device=device
-    ).image
+    if len(placed) == 1:
+        (one,) = placed
+        return render_vdi(one.vdi, request.replace(camera=one.camera, options=one.options))
+    return owned_image(placed, request).image
 
 
-def joint_image(
-    placed: Sequence[PlacedVDI],
-    size: tuple[int, int],
-    *,
-    opaque_depth: ArrayLike | None = None,
-    margin: float = 0.0,
-    skip_empty: bool = True,
-    device: Any = None,
-) -> JointImage:
+def owned_image(
+    placed: Sequence[PlacedVDI], request: FrameRequest, *, margin: float = 0.0
+) -> OwnedImage:
     """Raycast VDIs together, and say to which each pixel belongs.
 
     Parameters
     ----------
     placed : sequence of PlacedVDI
         All seen by the same eye: their cameras differ in ``model_transform`` only.
-    size : (int, int)
-        Width and height of the image in pixels.
-    opaque_depth : array_like of float, shape (H, W), optional
-        View depth at which each ray ends, world units, top row first.
+    request : FrameRequest
+        The frame; its camera and options are not used.
     margin : float
         A pixel belongs to the first VDI that it meets and whose bounds it meets this many pixels
         farther to all four corners, too; or else to the first that it meets.
-    skip_empty : bool
-        Pass by what is empty.
-    device : optional
-        See :func:`pyvista_vdi.list_devices`.
 
     Returns
     -------
-    JointImage
+    OwnedImage
         The same picture, to the last bit, in whatever order the VDIs are given.
     """
-    runtime = get_runtime(device)
-    streams = [
-        _Stream.of(prepared_vdi(runtime, one.vdi), one, size, opaque_depth, skip_empty)
+    runtime = get_runtime(request.device)
+    segments = 2 if _in_rows(runtime) else 1
+    scenes = [
+        Scene.of(
+            prepared_vdi(runtime, one.vdi),
+            request.replace(camera=one.camera, options=_merged(one.options)),
+            segments=segments,
+        )
         for one in placed
     ]
-    order = _canonical_order(placed, [stream.view.reference_depth for stream in streams])
-    width, height = size
-    cells = _Cells.of(streams, size)
+    order = canonical_order(placed, [scene.reference_depth for scene in scenes])
+    width, height = request.size
+    cells = _Cells.of(scenes, request.size)
     with contextlib.ExitStack() as stack:
-        on_device = [stack.enter_context(stream.on(runtime)) for stream in streams]
+        on_device = [stack.enter_context(scene.on_device()) for scene in scenes]
         image = stack.enter_context(runtime.result((height, width, 4), name="image"))
         owner = stack.enter_context(runtime.result((height, width), np.int16, "owners"))
-        _draw_alone(runtime, streams, on_device, cells, image, owner)
+        _draw_alone(runtime, scenes, on_device, cells, image, owner)
         if len(cells.shared):
-            frame = _JointFrame(runtime, streams, on_device, order, margin)
-            needed = frame.draw(cells.shared, _slots_for(placed), image, owner)
+            merged = _MergedCells(runtime, scenes, on_device, order, margin)
+            slots = max(_slots.get(one.vdi, _FIRST_SLOTS) for one in placed)
+            needed = merged.draw(cells.shared, slots, image, owner)
             for one in placed:
                 _slots[one.vdi] = math.ceil(_SPARE_SLOTS * max(needed, 1))
-        result = JointImage(runtime.download(image), runtime.download(owner))
+        result = OwnedImage(runtime.download(image), runtime.download(owner))
         runtime.finish()  # arrays on the device may be host memory in use
         return result
 
 
-class _OnDevice(NamedTuple):
-    """A frame's arrays of a VDI."""
-
-    forms: DeviceBuffer
-    ends: DeviceBuffer
-
-
-@dataclass(frozen=True)
-class _Stream:
-    """A VDI on the device, as seen in the frame."""
-
-    prepared: PreparedVDI
-    placed: PlacedVDI
-    view: ListView
-    skip_empty: bool
-
-    @classmethod
-    def of(
-        cls,
-        prepared: PreparedVDI,
-        placed: PlacedVDI,
-        size: tuple[int, int],
-        opaque_depth: ArrayLike | None,
-        skip_empty: bool,
-    ) -> _Stream:
-        view = prepared.view(
-            placed.camera,
-            size,
-            opaque_depth,
-            placed.clipping_planes,
-            placed.cropping,
-            placed.opacity_multiplier,
-        )
-        return cls(prepared, placed, view, skip_empty)
-
-    @contextlib.contextmanager
-    def on(self, runtime: Runtime) -> Iterator[_OnDevice]:
-        """Have the frame's arrays on the device."""
-        with (
-            runtime.upload(self.view.forms, "rays") as forms,
-            runtime.upload(self.view.ends, "opaque depth") as ends,
-        ):
-            yield _OnDevice(forms, ends)
+def _merged(options: RenderOptions) -> RenderOptions:
+    """Return the options of a VDI that is merged with others: all end at the same transmittance."""
+    return options.replace(transmittance_cutoff=TRANSMITTANCE_CUTOFF, preview_samples=None)
 
 
 @dataclass(frozen=True)
@@ -295,14 +154,10 @@ class _Cells:
     shared: NDArray[np.int32]
 
     @classmethod
-    def of(cls, streams: Sequence[_Stream], size: tuple[int, int]) -> _Cells:
+    def of(cls, scenes: Sequence[Scene], size: tuple[int, int]) -> _Cells:
         # Whether or not rays pass by what is empty: the picture is the same
-        met = np.array(
-            [
-                cells_of_points(stream.placed.camera, size, stream.prepared.occupancy.corners)
-                for stream in streams
-            ]
-        )
+        corners = [(scene.camera, size, scene.prepared.occupancy.corners) for scene in scenes]
+        met = np.array([cells_of_points(*points) for points in corners])
         count = met.sum(axis=0)
         alone = np.choose(
             np.minimum(count, 2), [np.full_like(count, cls.NOBODY), met.argmax(axis=0), cls.SHARED]
@@ -325,14 +180,14 @@ class _Cells:
 
 def _draw_alone(
     runtime: Runtime,
-    streams: Sequence[_Stream],
-    on_device: Sequence[_OnDevice],
+    scenes: Sequence[Scene],
+    on_device: Sequence[OnDevice],
     cells: _Cells,
     image: DeviceBuffer,
     owner: DeviceBuffer,
 ) -> None:
     """Draw the cells in which no two VDIs are met, as each would be by itself."""
-    width, height = size = streams[0].view.size
+    width, height = size = scenes[0].size
     wide = cells.alone.shape[1]
     group = (_CELLS_OF_GROUP, 1)
     items = (-(-wide // _CELLS_OF_GROUP) * _CELLS_OF_GROUP, height)
@@ -342,7 +197,7 @@ def _draw_alone(
         alone = stack.enter_context(runtime.upload(cells.alone, "cells"))
         window = (np.int32(wide), np.int32(width), np.int32(height))
         picture, ends = image, None  # others are drawn over the first one's picture
-        for number, (stream, arrays) in enumerate(zip(streams, on_device, strict=True)):
+        for number, (scene, (forms, opaque)) in enumerate(zip(scenes, on_device, strict=True)):
             part = cells.part(number, size)
             if not part.pixels:
                 continue
@@ -351,19 +206,10 @@ def _draw_alone(
                 ends = stack.enter_context(runtime.result((height, width), name="ends of rays"))
             elif picture is image:
                 picture = stack.enter_context(runtime.result(image.shape, name="one's picture"))
-            has_ends = np.int32(stream.view.has_ends)
-            runtime.launch(
-                ends_kernel, items, group, alone, vdi, *window, arrays.ends, has_ends, ends
-            )
-            stream.prepared.render_part(
-                stream.placed.camera,
-                stream.view,
-                arrays.forms,
-                ends,
-                picture,
-                part,
-                skip_empty=stream.skip_empty,
-            )
+            has_ends = np.int32(scene.ends is not None)
+            runtime.launch(ends_kernel, items, group, alone, vdi, *window, opaque, has_ends, ends)
+            scene = replace(scene, segments=0, only=part)
+            enqueue(scene, scene.walk_arguments(forms, ends, has_ends=True), picture)
             runtime.launch(take, items, group, alone, vdi, *window, picture, image, owner)
         if (cells.alone == cells.NOBODY).any():
             nobody = np.int32(cells.NOBODY)
@@ -371,60 +217,51 @@ def _draw_alone(
         runtime.finish()  # the buffers above may be host memory in use
 
 
-class _JointFrame:
-    """What a frame's cells are drawn with in which several VDIs are met.
+class _Walk(NamedTuple):
+    """A kernel that writes a VDI's segments, and what does not change per band."""
 
-    Parameters
-    ----------
-    runtime : Runtime
-        The device.
-    streams : sequence of _Stream
-        The VDIs, in the order in which owners are numbered.
-    on_device : sequence of _OnDevice
-        Their arrays.
-    order : sequence of int
-        In which their streams of segments are written, and sums are formed.
-    margin : float
-        See :func:`joint_image`.
+    kernel: Kernel
+    rays: int  # that a work-item follows
+    arguments: tuple[Any, ...]
+    depth_shift: np.float32
+
+
+class _MergedCells:
+    """Draws a frame's cells in which several VDIs are met.
+
+    ``order`` is that in which the scenes' streams of segments are written, and sums are formed;
+    ``margin`` is :func:`owned_image`'s.
     """
 
     def __init__(
         self,
         runtime: Runtime,
-        streams: Sequence[_Stream],
-        on_device: Sequence[_OnDevice],
+        scenes: Sequence[Scene],
+        on_device: Sequence[OnDevice],
         order: Sequence[int],
         margin: float,
     ) -> None:
         self._runtime = runtime
-        self._size = streams[0].view.size
+        self._size = scenes[0].size
         self._streams_of = np.argsort(order).astype(np.int32)
         self._margin = np.float32(margin)
-        nearest = min(stream.view.reference_depth for stream in streams)
+        nearest = min(scene.reference_depth for scene in scenes)
         self._in_rows = _in_rows(runtime)
-        self._walks = [
-            _Walk(
-                streams[i].prepared.segments_kernel(
-                    streams[i].view, skip_empty=streams[i].skip_empty, in_rows=self._in_rows
-                ),
-                streams[i].prepared.walk_arguments(
-                    streams[i].view, *on_device[i], -math.log(TRANSMITTANCE_CUTOFF)
-                ),
-                np.float32(streams[i].view.reference_depth - nearest),
-            )
-            for i in order
-        ]
-        media = sum(stream.prepared.media for stream in streams)
-        defines: dict[str, str | int | None] = {
-            "STREAMS": len(streams),
-            "SEGMENTS": 2 if self._in_rows else 1,
-            **compensation(media),
+        self._walks = []
+        for scene, (forms, ends) in ((scenes[i], on_device[i]) for i in order):
+            strategy = strategy_for(scene)
+            walk = scene.walk_arguments(forms, ends, has_ends=scene.ends is not None)
+            shift = np.float32(scene.reference_depth - nearest)
+            self._walks.append(_Walk(strategy.build(scene), strategy.rays, walk, shift))
+        defines: Defines = {
+            "STREAMS": len(scenes),
+            "SEGMENTS": scenes[0].segments,
+            **compensation(sum(scene.prepared.media for scene in scenes)),
         }
-        if self._in_rows and defines.get("COMPENSATED") != 2:
-            merge = runtime.kernel("multi_vdi/merge_blocks.cl", "merge_blocks", defines)
-            self._merge = SegmentsKernel(merge, LANES)
-        else:
-            self._merge = SegmentsKernel(runtime.kernel("multi_vdi/merge.cl", "merge", defines), 1)
+        in_blocks = self._in_rows and defines.get("COMPENSATED") != 2
+        file, name = ("merge_blocks.cl", "merge_blocks") if in_blocks else ("merge.cl", "merge")
+        self._merge = runtime.kernel(f"multi_vdi/{file}", name, defines)
+        self._merged_rays = LANES if in_blocks else 1
 
     def draw(
         self, cells: NDArray[np.int32], slots: int, image: DeviceBuffer, owner: DeviceBuffer
@@ -464,9 +301,9 @@ class _JointFrame:
                 items = min(most, len(cells) - first) * CELL_ITEMS
                 for number, walk in enumerate(self._walks):
                     runtime.launch(
-                        walk.kernel.kernel,
-                        items // walk.kernel.rays,
-                        GROUP // walk.kernel.rays,
+                        walk.kernel,
+                        items // walk.rays,
+                        GROUP // walk.rays,
                         *walk.arguments,
                         of_cells,
                         np.int32(first),
@@ -481,9 +318,9 @@ class _JointFrame:
                         dark,
                     )
                 runtime.launch(
-                    self._merge.kernel,
-                    items // self._merge.rays,
-                    GROUP // self._merge.rays,
+                    self._merge,
+                    items // self._merged_rays,
+                    GROUP // self._merged_rays,
                     segments,
                     np.int32(slots),
                     ends,
@@ -502,119 +339,6 @@ class _JointFrame:
             return runtime.download(needed)
 
 
-@dataclass(frozen=True)
-class _Walk:
-    """A kernel that writes a VDI's segments, and the arguments that do not change per band."""
-
-    kernel: SegmentsKernel
-    arguments: tuple[Any, ...]
-    depth_shift: np.float32
-
-
 def _in_rows(runtime: Runtime) -> bool:
     """Return whether segments lie ray by ray, for kernels in vectors (raycasting/segments.cl)."""
     return runtime.is_cpu
-
-
-def _slots_for(placed: Sequence[PlacedVDI]) -> int:
-    return max(_slots.get(one.vdi, _FIRST_SLOTS) for one in placed)
-
-
-def _canonical_order(placed: Sequence[PlacedVDI], depths: Sequence[float]) -> list[int]:
-    """Return the indices of VDIs in an order that does not depend on the one they are given in.
-
-    Sums of floats depend on it where there are more than two, and so does where light is known to
-    have ended: that of ``depths``, so that those behind end where those before are opaque.
-    """
-    tied = len(set(depths)) < len(depths)
-    keys = [_key(one) if tied else () for one in placed]
-    return sorted(range(len(placed)), key=lambda i: (depths[i], keys[i]))
-
-
-def _key(placed: PlacedVDI) -> tuple[bytes, ...]:
-    planes = placed.clipping_planes
-    table = b"" if planes is None else np.asarray(planes, dtype=np.float64).tobytes()
-    looks = repr((placed.cropping, placed.opacity_multiplier)).encode()
-    return _digest(placed.vdi), placed.camera.model_transform.tobytes(), table, looks
-
-
-def _digest(vdi: VDI) -> bytes:
-    """Return a digest of all that a VDI's picture depends on; computed once."""
-    known = _digests.get(vdi)
-    if known is None:
-        digest = hashlib.blake2b(digest_size=16)
-        scalars = (vdi.camera, vdi.window_size, vdi.bounds, vdi.depth_origin)
-        digest.update(repr(scalars).encode())
-        digest.update(vdi.camera.model_transform.tobytes())
-        for array in (vdi.offsets, vdi.front, vdi.back, vdi.color, vdi.optical_depth):
-            digest.update(array.data)
-        known = _digests[vdi] = digest.digest()
-    return known
-
-
-def _window_size(vdis: list[VDI], window_size: Sequence[int] | None) -> tuple[int, int]:
-    if window_size is not None:
-        return check_window_size(window_size)
-    sizes = {vdi.window_size for vdi in vdis}
-    if len(sizes) > 1:
-        raise InvalidArgumentError(
-            f"the VDIs have different window sizes, {sorted(sizes)}: say which the image is to "
-            "have (window_size=)"
-        )
-    return vdis[0].window_size
-
-
-def _cameras(camera: Camera, transforms: Sequence[ArrayLike] | None, count: int) -> list[Camera]:
-    if transforms is None:
-        return [camera] * count
-    transforms = list(transforms)
-    if len(transforms) != count:
-        raise InvalidArgumentError(
-            f"model_transforms must have one matrix for each of the {count} VDIs; "
-            f"got {len(transforms)}"
-        )
-    return [camera.replace(model_transform=matrix) for matrix in transforms]
-
-
-def _croppings(croppings: Sequence[Any] | None, count: int) -> list[Cropping | None]:
-    if croppings is None:
-        return [None] * count
-    if not isinstance(croppings, list | tuple) or len(croppings) != count:
-        raise InvalidArgumentError(
-            f"cropping must be a list with an entry for each of the {count} VDIs, None where "
-            f"nothing is cropped; got {croppings!r}"
-        )
-    return [Cropping.from_any(one) for one in croppings]
-
-
-def _multipliers(multiplier: float | Sequence[float], count: int) -> list[float]:
-    if not isinstance(multiplier, list | tuple):
-        return [checked_opacity_multiplier(multiplier)] * count
-    if len(multiplier) != count:
-        raise InvalidArgumentError(
-            f"opacity_multiplier must be a number, or one for each of the {count} VDIs; "
-            f"got {multiplier!r}"
-        )
-    return [checked_opacity_multiplier(one) for one in multiplier]
-
-
-def _planes_of_each(planes: Any, count: int) -> list[ArrayLike | None]:
-    """Return each VDI's clipping planes: the same for all, or one entry for each."""
-    if planes is None:
-        return [None] * count
-    try:
-        shape = np.shape(np.asarray(planes, dtype=np.float64))
-    except (TypeError, ValueError):  # None among them, or different numbers of planes
-        shape = ()
-    if len(shape) == 2:
-        return [planes] * count
-    try:
-        each = list(planes)
-    except TypeError:
-        each = []
-    if len(each) != count:
-        raise InvalidArgumentError(
-            "clipping_planes must be (k, 6), or have such an array or None for each of the "
-            f"{count} VDIs; got {planes!r}"
-        )
-    return each

@@ -2,13 +2,11 @@
 
 Rays of one plane through the eyes of V_O and V_N cross the same lists, if not at the same depth. On
 a CPU a packet of such rays loads each list once. That pays where rays cross many lists. Where they
-do not, a CPU follows them one by one, in blocks. At V_O each ray goes through a list of its own,
-and a packet's lists lie side by side.
+do not, a CPU follows them one by one, in blocks.
 """
 
 from __future__ import annotations
 
-import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -21,19 +19,9 @@ from pyvista_vdi.model.vdi import VDI
 
 #: Rays of a packet, side by side: that of ``raycasting/packet.cl``.
 LANES = 16
-#: Width and height, in pixels, of a packet that is drawn from the pixels' own lists, if these lie
-#: in tiles and if they do not: those of ``raycasting/aligned_view.cl``.
-OWN_LISTS = {True: (8, 2), False: (16, 1)}
-#: Lists that a ray may be away from the centre of its own, of the half that it has.
-_FARTHEST_FROM_CENTRE = 0.125
-#: Pixels that list (0, 0) may be away from the window's first one.
-_FARTHEST_ORIGIN = 2**24
 #: Packets of a strip that begin before the window, or behind it: the steepest line that a packet
 #: follows (``STEEPEST`` of ``raycasting/packet.cl``, 1.5) rises by less over its length.
 MARGIN = 24
-#: Of a frame's forms: (u, v, depth, denominator), and how many come before the planes to clip to;
-#: those of ``lib/list_space.cl``.
-COORDINATE_FORMS, PLANE_FORMS = 4, 7
 #: Lists that a ray crosses before its light ends, over those that lie between a packet's first and
 #: last ray, from which packets are faster: what they have in common (docs/decisions/packets.md).
 LEAST_IN_COMMON = 4.5
@@ -125,80 +113,6 @@ def packets_of(
         np.array([first, strips, across[0] - MARGIN, 0], np.int32),
         strips * numbers,
     )
-
-
-class OwnLists(NamedTuple):
-    """How a frame is drawn in which each ray stays in a list of its own.
-
-    Attributes
-    ----------
-    origin : numpy.ndarray
-        The pixel of list (0, 0), which may lie beside V_N's window, int32 (2,).
-    items : int
-        Work-items, in whole groups: packets.
-    """
-
-    origin: NDArray[np.int32]
-    items: int
-
-
-def own_lists_of(
-    size: tuple[int, int],
-    window: tuple[int, int],
-    coordinates: NDArray[np.float64],
-    depths: tuple[float, float],
-    *,
-    parallel: bool,
-    in_tiles: bool,
-) -> OwnLists | None:
-    """Return how each pixel is drawn from a list of its own; None if a ray is in another one, too.
-
-    Parameters
-    ----------
-    size, window : (int, int)
-        Width and height of V_N's window, and of V_O's, in pixels.
-    coordinates : numpy.ndarray
-        Forms of the homogeneous list coordinates (u, v, depth, denominator), float64 (4, 6).
-    depths : (float, float)
-        The least and the largest t at which a ray may meet something.
-    parallel : bool
-        Whether V_O is a parallel projection.
-    in_tiles : bool
-        Whether lists lie in tiles (raycasting/supersegments.cl).
-    """
-    u_form, v_form, z_form, w_form = coordinates.tolist()
-    first: list[int] = []
-    # The corners, edges and middle speak for all: places depend on the pixel by a homography
-    for x, y in itertools.product(*((0, pixels // 2, pixels - 1) for pixels in size)):
-        a, b = x + 0.5 - size[0] / 2, y + 0.5 - size[1] / 2
-        for t in depths:
-            w = _value(w_form, a, b, t)
-            if not (w > 0 and _slope(z_form if parallel else w_form, a, b) > 0):
-                return None
-            origin = (
-                x + 0.5 - (_value(u_form, a, b, t) / w + window[0] / 2),
-                y + 0.5 - (_value(v_form, a, b, t) / w + window[1] / 2),
-            )
-            if not first:
-                if not max(map(abs, origin)) < _FARTHEST_ORIGIN:
-                    return None
-                first = [round(at) for at in origin]
-            away = (abs(at - whole) for at, whole in zip(origin, first, strict=True))
-            if not max(away) <= _FARTHEST_FROM_CENTRE:
-                return None
-    ways = zip(size, first, OWN_LISTS[in_tiles], strict=True)
-    wide, high = (-(-(edge - at - -at // step * step) // step) for edge, at, step in ways)
-    return OwnLists(np.array(first, np.int32), -(-wide * high // LANES) * LANES)
-
-
-def _slope(form: list[float], a: float, b: float) -> float:
-    """Return the slope of a form along the ray at pixel offsets (a, b)."""
-    return form[3] + a * form[4] + b * form[5]
-
-
-def _value(form: list[float], a: float, b: float, t: float) -> float:
-    """Return the value of a form on that ray at t."""
-    return form[0] + a * form[1] + b * form[2] + t * _slope(form, a, b)
 
 
 def epipole_of(generating: Camera, view: Camera, size: tuple[int, int]) -> NDArray[np.float64]:

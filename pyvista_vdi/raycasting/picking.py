@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.compositing import opacity
-from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
+from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -108,10 +109,7 @@ class FirstHit(NamedTuple):
 
 def checked_opacity(opacity_threshold: float) -> float:
     """Return an opacity threshold as a float, at least 0 and less than 1."""
-    try:
-        threshold = float(opacity_threshold)
-    except (TypeError, ValueError):
-        threshold = math.nan
+    threshold = as_float(opacity_threshold)
     if not 0 <= threshold < 1:
         raise InvalidArgumentError(
             "opacity_threshold must be at least 0 and less than 1, which no medium reaches; "
@@ -120,56 +118,33 @@ def checked_opacity(opacity_threshold: float) -> float:
     return threshold
 
 
-def pick_vdi(
-    vdi: VDI,
-    camera: Camera,
-    pixel: Sequence[float],
-    window_size: Sequence[int] | None = None,
-    *,
-    opacity_threshold: float = DEFAULT_OPACITY,
-    accumulated: bool = True,
-    opaque_depth: float | None = None,
-    clipping_planes: ArrayLike | None = None,
-    cropping: Any = None,
-    opacity_multiplier: float = 1.0,
-) -> Pick | None:
-    """Return the first supersegment on a pixel's ray that reaches an opacity.
+def pick_vdi(vdi: VDI, request: FrameRequest, pixel: Sequence[float], hit: FirstHit) -> Pick | None:
+    """Return the first supersegment on a pixel's ray that is hit; ``None`` where none is.
 
     Parameters
     ----------
     vdi : VDI
         What to look at.
-    camera : Camera
-        The view; its ``model_transform`` says where the VDI's model frame is.
+    request : FrameRequest
+        The frame that the pixel is of; its ``opaque_depth`` is that of this ray, a number.
     pixel : (float, float)
         x and y in pixels; whole numbers are pixels' centres, y = 0 is the bottom row.
-    window_size : (int, int), optional
-        Width and height in pixels; by default the VDI's own.
-    opacity_threshold, accumulated
-        What counts as a hit: see :func:`pyvista_vdi.pick`.
-    opaque_depth : float, optional
-        View depth at which the ray ends, world units.
-    clipping_planes, cropping, opacity_multiplier
-        As for :func:`pyvista_vdi.render`.
-
-    Returns
-    -------
-    Pick or None
-        ``None`` where nothing is hit.
+    hit : FirstHit
+        What counts as a hit.
     """
     if not isinstance(vdi, VDI):
         raise InvalidArgumentError(f"expected a VDI, got {type(vdi).__name__}")
-    camera = Camera.from_any(camera)
-    size = check_window_size(vdi.window_size if window_size is None else window_size)
-    wanted = FirstHit.of(opacity_threshold, accumulated)
-    ray = _Ray.of_pixel(vdi, camera, _checked_pixel(pixel, size), size)
-    span = ray.span(vdi, camera, opaque_depth, clipping_planes)
+    camera, options = request.camera, request.options
+    ray = _Ray.of_pixel(vdi, camera, _checked_pixel(pixel, request.size), request.size)
+    span = ray.span(vdi, request)
     if span is None:
         return None
-    cropping = Cropping.from_any(cropping)
-    kept = np.array([span]) if cropping is None else ray.parts(cropping, *span)
-    met = _media_along(vdi, ray, *span, kept, checked_opacity_multiplier(opacity_multiplier))
-    k = wanted.first(met.optical_depth)
+    cropping = options.cropping
+    kept = np.array([span])
+    if cropping is not None:
+        kept = cropping.parts_of_ray(ray.origin, ray.direction, *span)
+    met = _media_along(vdi, ray, *span, kept, options.opacity_multiplier)
+    k = hit.first(met.optical_depth)
     if k is None:
         return None
     row, column = divmod(int(met.list[k]), vdi.window_size[0])
@@ -177,7 +152,7 @@ def pick_vdi(
     at_model = np.append(ray.origin + met.enters[k] * ray.direction, 1.0)
     return Pick(
         position=_triple((camera.model_transform @ at_model)[:3]),
-        depth=float(met.enters[k] + ray.reference_depth),
+        depth=float(met.enters[k] + ray.window.reference_depth),
         list=(column, row),
         index=supersegment - vdi.list_at(column, row).start,
         supersegment=supersegment,
@@ -219,22 +194,12 @@ class _Ray:
             to_viewport @ np.append(direction, 0.0),
         )
 
-    @property
-    def reference_depth(self) -> float:
-        """View depth of t = 0, world units."""
-        return self.window.reference_depth
-
-    def span(
-        self,
-        vdi: VDI,
-        camera: Camera,
-        opaque_depth: float | None,
-        clipping_planes: ArrayLike | None,
-    ) -> tuple[float, float] | None:
+    def span(self, vdi: VDI, request: FrameRequest) -> tuple[float, float] | None:
         """Return first and last t where there may be a medium; ``None`` where there is none."""
         forms = rays.box_planes(self.window, vdi.bounds)
-        forms += rays.eye_plane(camera, self.window)
-        forms += rays.user_planes(camera, self.window, clipping_planes)
+        forms += rays.eye_plane(request.camera, self.window)
+        planes = request.options.clipping_planes
+        forms += rays.user_planes(request.camera, self.window, planes)
         table = np.asarray(forms)
         (u, v, depth, d), (du, dv, ddepth, dd) = self.at, self.slope
         value = [*(table[:, :3] @ self.pixel), d + u, d - u, d + v, d - v]
@@ -242,14 +207,10 @@ class _Ray:
         if not vdi.camera.parallel_projection:
             value.append(depth - rays.nearest_depth(vdi.camera, vdi.bounds))
             slope.append(ddepth)
-        if opaque_depth is not None:
-            value.append(_checked_depth(opaque_depth) - self.reference_depth)
+        if request.opaque_depth is not None:
+            value.append(_checked_depth(request.opaque_depth) - self.window.reference_depth)
             slope.append(-1.0)
         return _where_positive(np.array(value), np.array(slope))
-
-    def parts(self, cropping: Cropping, first: float, last: float) -> Floats:
-        """Return first and last t of each part that cropping keeps, (k, 2)."""
-        return cropping.parts_of_ray(self.origin, self.direction, first, last)
 
 
 class _Media(NamedTuple):
@@ -354,11 +315,8 @@ def _checked_pixel(pixel: Sequence[float], size: tuple[int, int]) -> tuple[float
     return x, y
 
 
-def _checked_depth(depth: float) -> float:
-    try:
-        number = float(depth)
-    except (TypeError, ValueError):
-        number = math.nan
+def _checked_depth(depth: Any) -> float:
+    number = as_float(depth)
     if math.isnan(number):
         raise InvalidArgumentError(
             f"opaque_depth must be a view depth in world units, or inf; got {depth!r}"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, padded
 from pyvista_vdi.device import ray_forms as rays
@@ -21,6 +21,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.float32_limits import MOST_STEPS, compensation, entries, held_unit_distance
 from pyvista_vdi.model.lighting import Lights
+from pyvista_vdi.model.render_options import Planes
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.bricks import (
@@ -169,7 +170,7 @@ class DeviceVolume:
             self.defines["NEAREST"] = 1
             if native and (ends := integer_ends(runtime, volume, ranges)):
                 self._look_up_by_scalar(runtime, *ends)
-        self._runtime = runtime
+        self.runtime = runtime
         self._shading = transfer_function.shading
         self._lights = Lights() if lights is None else lights
         self._lit: tuple[Camera, DeviceBuffer] | None = None
@@ -247,7 +248,7 @@ class DeviceVolume:
         self, room: Room, scale: Scale | None, transfer_function: TransferFunction
     ) -> DeviceBricks:
         """Return room for bricks of the volume, none of which is there yet."""
-        runtime = self._runtime
+        runtime = self.runtime
         volume = self.volume
         gradients = (
             transfer_function.shading is not None
@@ -302,13 +303,13 @@ class DeviceVolume:
         radius, directions = occlusion.radius_in(self.volume), occlusion.directions
         key = (opacity, radius, directions, self.sample_distance)
         uploads = uploads_of(self.volume)
-        with self._runtime.holding(uploads.lock):
-            kept = uploads.occlusions.get(self._runtime)
+        with self.runtime.holding(uploads.lock):
+            kept = uploads.occlusions.get(self.runtime)
             if kept is None or kept[0] != key:
-                uploads.occlusions.pop(self._runtime, None)  # its memory goes first
+                uploads.occlusions.pop(self.runtime, None)  # its memory goes first
                 kept = None
                 ambient = ambient_transmittances(
-                    self._runtime,
+                    self.runtime,
                     grid,
                     (*self._classified(self._visible), *self._gradient),
                     self._classified(self._visible)[-2:],
@@ -316,7 +317,7 @@ class DeviceVolume:
                     self.sample_distance,
                     self.unit_distance,
                 )
-                uploads.occlusions[self._runtime] = kept = (key, ambient)
+                uploads.occlusions[self.runtime] = kept = (key, ambient)
         to_nodes = [*(1 / edge for edge in grid.cell), occlusion.strength]
         return (
             kept[1],
@@ -330,7 +331,7 @@ class DeviceVolume:
             return ()
         if self._lit is None or self._lit[0] != camera:
             table = lighting_table(self.volume, camera, self._shading, self._lights)
-            self._lit = (camera, self._runtime.upload(table, "lights"))
+            self._lit = (camera, self.runtime.upload(table, "lights"))
         return (self._lit[1],)
 
     def _visibility(
@@ -384,7 +385,7 @@ class DeviceVolume:
         return reaches
 
     def forms(
-        self, camera: Camera, window_size: Sequence[int], clipping_planes: ArrayLike | None
+        self, camera: Camera, window_size: Sequence[int], clipping_planes: Planes = ()
     ) -> MarchForms:
         """Return what the kernels march along in a view."""
         pixel_rays = rays.pixel_rays(camera, window_size, self.volume.bounds)

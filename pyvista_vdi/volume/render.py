@@ -7,17 +7,14 @@ from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from pyvista_vdi.device import Runtime, get_runtime
+from pyvista_vdi.device import get_runtime
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.work_order import GROUP, block_items
-from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
-from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import memory_limit_bytes
-from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
-from pyvista_vdi.model.lighting import Lights
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.options import MediumOptions
+from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.bricks import SAMPLE_BYTES, Room, StepSampler
@@ -35,110 +32,33 @@ _PIXEL_BYTES = 16 + 4
 
 def raycast_volume(
     volume: Volume,
-    camera: Camera,
-    window_size: Sequence[int],
     transfer_function: TransferFunction,
-    *,
-    sample_distance: float | None = None,
-    opaque_depth: ArrayLike | None = None,
-    clipping_planes: ArrayLike | None = None,
-    cropping: Any = None,
-    opacity_multiplier: float = 1.0,
-    early_termination: bool = True,
-    skip_empty: bool = True,
-    lights: Any = None,
-    ambient_occlusion: Any = None,
-    memory_limit: Any = None,
-    device: Any = None,
+    request: FrameRequest,
+    sampling: MediumOptions | None = None,
 ) -> NDArray[np.float32]:
-    """Render a classified volume directly.
+    """Render a classified volume directly: premultiplied RGBA, float32 (H, W, 4), top row first.
 
     Samples at the midpoints of equal steps, composited front to back by the same kernel code that
     generates VDIs.
-
-    Parameters
-    ----------
-    volume : Volume
-        The scalars.
-    camera : Camera
-        The view.
-    window_size : (int, int)
-        Width and height in pixels.
-    transfer_function : TransferFunction
-        Scalar to colour and opacity.
-    sample_distance : float, optional
-        Length of a step, model units; half the smallest spacing by default.
-    opaque_depth : array_like of float, shape (height, width), optional
-        View depth at which each ray ends, world units, top row first; inf where nothing is opaque.
-    clipping_planes : array_like of float, shape (k, 6), optional
-        Origin and normal of each plane, world coordinates; the normal's side is kept.
-    cropping : Cropping or what makes one, optional
-        Which regions of the model frame are drawn: see :meth:`pyvista_vdi.Cropping.from_any`.
-    opacity_multiplier : float
-        Factor of the optical depth of every step, 0 or above.
-    early_termination : bool
-        End a ray where less than :data:`~pyvista_vdi.raycasting.raycast.TRANSMITTANCE_CUTOFF` is
-        left.
-    skip_empty : bool
-        Pass by blocks that are transparent; the picture is the same to the last bit.
-    lights : optional
-        What a shaded volume is lit by; see :meth:`pyvista_vdi.Lights.from_any`.
-    ambient_occlusion : optional
-        Darken what is hidden from the light around it, see
-        :meth:`pyvista_vdi.AmbientOcclusion.from_any`.
-    memory_limit : int, float or str, optional
-        Most bytes to take on the device, see
-        :func:`~pyvista_vdi.generation.generate.generate_vdi`.
-    device : optional
-        See :func:`pyvista_vdi.list_devices`.
-
-    Returns
-    -------
-    numpy.ndarray
-        Premultiplied RGBA, float32 (height, width, 4), top row first.
     """
-    camera = Camera.from_any(camera)
-    size = check_window_size(window_size)
-    memory = memory_limit_bytes(memory_limit)
-    occlusion = AmbientOcclusion.from_any(ambient_occlusion)
-    grid = 0 if occlusion is None else OcclusionGrid.of(volume, occlusion).nbytes
-    runtime = get_runtime(device)
+    sampling = sampling or MediumOptions()
+    room = picture_room(request.size, sampling.memory_limit, sampling.occlusion_bytes(volume))
     medium = DeviceVolume(
-        runtime,
+        get_runtime(request.device),
         volume,
         transfer_function,
-        sample_distance,
-        skip_empty=skip_empty,
-        lights=Lights.from_any(lights),
-        ambient_occlusion=occlusion,
-        room=picture_room(size, memory, grid),
+        sampling.sample_distance,
+        skip_empty=request.options.skip_empty,
+        lights=sampling.lights,
+        ambient_occlusion=sampling.ambient_occlusion,
+        room=room,
     )
     with medium.giving_bricks_back():
-        return raycast_medium(
-            runtime,
-            medium,
-            camera,
-            size,
-            opaque_depth=opaque_depth,
-            clipping_planes=clipping_planes,
-            cropping=Cropping.from_any(cropping),
-            opacity_multiplier=checked_opacity_multiplier(opacity_multiplier),
-            early_termination=early_termination,
-        )
+        return raycast_medium(medium, request)
 
 
 def picture_room(size: tuple[int, int], memory_limit: int | None, occlusion: int = 0) -> Room:
-    """Return the room for a volume beside an image and the grid of an occlusion.
-
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height of the image in pixels.
-    memory_limit : int or None
-        Most bytes in all.
-    occlusion : int
-        Bytes of the occlusion's grid.
-    """
+    """Return the room for a volume beside an image and so many bytes of an occlusion's grid."""
     width, height = size
     items = block_items(width, _rows_of_part(size, memory_limit))
     working = width * height * _PIXEL_BYTES + items * _STATE_BYTES + occlusion
@@ -157,34 +77,27 @@ def _rows_of_part(size: tuple[int, int], memory_limit: int | None) -> int:
 
 
 def raycast_medium(
-    runtime: Runtime,
-    medium: DeviceVolume,
-    camera: Camera,
-    size: tuple[int, int],
-    *,
-    opaque_depth: ArrayLike | None = None,
-    clipping_planes: ArrayLike | None = None,
-    cropping: Cropping | None = None,
-    opacity_multiplier: float = 1.0,
-    early_termination: bool = True,
-    lit_from: Camera | None = None,
+    medium: DeviceVolume, request: FrameRequest, *, lit_from: Camera | None = None
 ) -> NDArray[np.float32]:
     """Render a volume that is on the device already; see :func:`raycast_volume`.
 
-    ``lit_from`` is the view that decides the light of a shaded volume in place of ``camera``.
+    ``lit_from`` is the view that decides the light of a shaded volume in place of the request's.
+    A cutoff of 0 ends no ray.
     """
-    width, height = size
-    march = medium.forms(camera, size, clipping_planes)
-    ends = rays.checked_opaque_depth(opaque_depth, size, march.rays)
-    cropped = rays.cropped(march.rays, cropping, medium.volume.bounds)
+    runtime, camera, options = medium.runtime, request.camera, request.options
+    width, height = size = request.size
+    march = medium.forms(camera, size, options.clipping_planes)
+    ends = rays.checked_opaque_depth(request.opaque_depth, size, march.rays)
+    cropped = rays.cropped(march.rays, options.cropping, medium.volume.bounds)
     planes = march.planes + len(cropped.planes)
     forms = march.packed(*cropped.planes, *cropped.forms)
     defines = {**medium.defines, **march.defines, **cropped.defines}
     multiplier: tuple[np.float32, ...] = ()
-    if opacity_multiplier != 1.0:
+    if options.opacity_multiplier != 1.0:
         defines["OPACITY_MULTIPLIER"] = 1
-        multiplier = (np.float32(opacity_multiplier),)
+        multiplier = (np.float32(options.opacity_multiplier),)
     kernel = runtime.kernel("volume/render_volume.cl", "render_volume", defines)
+    medium_arguments = medium.medium_arguments(lit_from or camera)
     with ExitStack() as stack:
         keep = stack.enter_context
         form_buffer = keep(runtime.upload(forms, "rays"))
@@ -203,14 +116,14 @@ def raycast_medium(
                 kernel,
                 items,
                 GROUP,
-                *medium.medium_arguments(lit_from or camera),
+                *medium_arguments,
                 *sampled,
                 *begin,
                 np.int32(width),
                 np.int32(height),
                 depth,
                 np.int32(ends is not None),
-                np.float32(TRANSMITTANCE_CUTOFF if early_termination else -1.0),
+                np.float32(options.transmittance_cutoff or -1.0),
                 *cropped.arguments,
                 *multiplier,
                 *part,
@@ -228,7 +141,7 @@ def raycast_medium(
                 StepSampler(
                     runtime,
                     medium.bricks,
-                    medium.medium_arguments(lit_from or camera),
+                    medium_arguments,
                     defines,
                     begin,
                     size,

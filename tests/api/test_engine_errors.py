@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drawing import raycast_volume, render_vdi
 
 from pyvista_vdi import VDI, Camera, TransferFunction, Volume
 from pyvista_vdi.errors import (
@@ -19,8 +20,6 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.generation import slices
 from pyvista_vdi.generation.estimate import estimate
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (12, 9)
 CAMERA = Camera((3.5, 3.5, 30), (3.5, 3.5, 3.5), (0, 1, 0))
@@ -197,7 +196,7 @@ def test_other_types(make, draw, change, message):
 
 def test_other_types_of_vdi_and_camera(runtime, make, view):
     with pytest.raises(InvalidArgumentError, match="expected a VDI, got str"):
-        render_vdi("knee.vdi", CAMERA, device=runtime)
+        render_vdi("knee.vdi", CAMERA, WINDOW, device=runtime)
     for function in (make, view):
         with pytest.raises(InvalidCameraError):
             function(camera=(0, 0, 1))

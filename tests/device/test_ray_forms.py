@@ -11,6 +11,7 @@ from strategies import camera_around, random_bounds, random_transform, world_cor
 from pyvista_vdi import Camera
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
+from pyvista_vdi.model.render_options import RenderOptions
 
 EPS64 = np.finfo(np.float64).eps
 SEEDS = range(12)
@@ -252,7 +253,7 @@ def test_no_planes():
     camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
     made = rays.pixel_rays(camera, WINDOW, (-1, 1, -1, 1, -1, 1))
     for none in (None, [], np.empty((0, 6))):
-        assert rays.user_planes(camera, made, none) == []
+        assert rays.user_planes(camera, made, RenderOptions(none).clipping_planes) == []
 
 
 @pytest.mark.parametrize(
@@ -270,10 +271,8 @@ def test_no_planes():
     ],
 )
 def test_bad_planes_are_refused(planes, message):
-    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
-    made = rays.pixel_rays(camera, WINDOW, (-1, 1, -1, 1, -1, 1))
     with pytest.raises(InvalidArgumentError, match=message):
-        rays.user_planes(camera, made, planes)
+        RenderOptions(planes)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import strategies
+from drawing import render_vdi
 from extreme_scenes import BOUND, TURNS, field_volume, transfer, turned, view
 from oracle import explain, total
 
@@ -19,7 +20,6 @@ from pyvista_vdi.generation import march, records, slices
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting import occupancy, raycast
-from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.volume import render as raycast_volume
 
 pytestmark = pytest.mark.extremes

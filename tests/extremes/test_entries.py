@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import strategies
+from drawing import raycast_volume, render_vdi
 from extreme_scenes import (
     BOUND,
     WINDOW,
@@ -26,10 +27,9 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.cropping import PRESETS
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.raycast import PreparedVDI, render_vdi
+from pyvista_vdi.raycasting.prepared import PreparedVDI
 from pyvista_vdi.reference.rays import pixel_ray
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.render import raycast_volume
 
 pytestmark = pytest.mark.extremes
 
@@ -38,7 +38,7 @@ SHINY = Shading(0.2, 0.6, 0.5, 30.0)
 
 def is_far(runtime, volume, camera, window=WINDOW):
     medium = DeviceVolume(runtime, volume, transfer())
-    return "FAR_ENTRIES" in medium.forms(camera, window, None).defines
+    return "FAR_ENTRIES" in medium.forms(camera, window).defines
 
 
 def plate(thinness):
@@ -77,7 +77,7 @@ def test_what_is_not_very_thin_is_computed_in_float32_alone(runtime, dimensions)
     for azimuth in range(0, 91, 15):
         for options in ({}, {"distance": 1.3}, {"parallel": True}):
             camera = view(volume, azimuth, 35, **options)
-            assert not DeviceVolume.forms(_Bare(volume), camera, (640, 480), None).defines
+            assert not DeviceVolume.forms(_Bare(volume), camera, (640, 480)).defines
 
 
 class _Bare:
@@ -217,7 +217,7 @@ def test_any_vdi_may_be_drawn_by_depths_relative_to_the_ray(
     rng = np.random.default_rng([4, 901])
     vdi = strategies.random_vdi(rng, max_window=(9, 7)).with_precision(precision)
     camera, size = strategies.random_view(rng, vdi, kind)
-    monkeypatch.setattr("pyvista_vdi.raycasting.raycast.lists_are_far", lambda *_: True)
+    monkeypatch.setattr("pyvista_vdi.raycasting.prepared.lists_are_far", lambda *_: True)
     assert "FAR_ENTRIES" in PreparedVDI(runtime, vdi).defines
     image = render_vdi(vdi, camera, size, device=runtime)
     result = explain(vdi, camera, size, image, name=kind)

@@ -6,12 +6,12 @@ import itertools
 
 import numpy as np
 import pytest
+from drawing import raycast_volume
 from extreme_scenes import BOUND, FIELD, check_scene, field_volume, transfer, turned, view
 
 from pyvista_vdi import Light, Lights, Shading, reference
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.volume.render import raycast_volume
 
 pytestmark = pytest.mark.extremes
 

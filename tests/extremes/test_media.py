@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from drawing import raycast_volume, render_vdi, render_vdis
 from extreme_scenes import (
     BOUND,
     FIELD,
@@ -27,9 +28,6 @@ from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.float32_limits import MANY_MEDIA, MOST_STEPS, VERY_MANY_MEDIA
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.multi_vdi import render_vdis
-from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.volume.render import raycast_volume
 
 pytestmark = pytest.mark.extremes
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drawing import render_vdi
 from extreme_scenes import WINDOW, check_views, field_volume, slabs_vdi, transfer, turned, view
 
 from pyvista_vdi import reference
@@ -11,7 +12,6 @@ from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.raycast import render_vdi
 
 pytestmark = pytest.mark.extremes
 

@@ -202,9 +202,9 @@ def test_both_depth_coordinates_at_the_border_of_their_choice(runtime, worst, di
 
 def test_both_depth_coordinates_within_the_bound_on_the_same_vdi(runtime, worst, monkeypatch):
     """At a ratio of 2 either will do: forced, they agree with the oracle, too."""
-    from pyvista_vdi.raycasting import raycast
+    from pyvista_vdi.raycasting import prepared
 
     for long_lens in (1.5, 2.5):
-        monkeypatch.setattr(raycast, "_LONG_LENS", long_lens)
+        monkeypatch.setattr(prepared, "_LONG_LENS", long_lens)
         for distance in (2.9, 3.0, 3.1):
             test_both_depth_coordinates_at_the_border_of_their_choice(runtime, worst, distance)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drawing import raycast_volume, render_vdi
 from extreme_scenes import (
     BOUND,
     FIELD,
@@ -25,10 +26,8 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import scalars_suit_float32
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.light_tables import GRADIENT_SHARE
-from pyvista_vdi.volume.render import raycast_volume
 
 pytestmark = pytest.mark.extremes
 

@@ -6,13 +6,12 @@ import itertools
 
 import numpy as np
 import pytest
+from drawing import raycast_volume, render_vdi
 from extreme_scenes import BOUND, WINDOW, check_scene, field_volume, transfer, turned, view
 
 from pyvista_vdi import reference
 from pyvista_vdi.errors import InvalidCameraError
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.volume.render import raycast_volume
 
 pytestmark = pytest.mark.extremes
 

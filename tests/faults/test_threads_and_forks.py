@@ -11,13 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawing import raycast_volume, render_vdi
 from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume, state_of
 from strategies import random_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.volume.render import raycast_volume
 
 #: Seconds after which a process counts as one that hangs.
 PATIENCE = 100
@@ -148,7 +147,7 @@ import pyvista_vdi as pvdi
 from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
 from pyvista_vdi.device import aligned_empty, get_runtime, list_devices
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.raycasting.raycast import render_vdi
+from drawing import render_vdi
 
 runtime = get_runtime(sys.argv[1])
 volume = fresh_volume()

@@ -10,6 +10,7 @@ import itertools
 import numpy as np
 import pytest
 import strategies
+from drawing import raycast_volume, render_vdi
 
 from pyvista_vdi import reference
 from pyvista_vdi.generation.generate import generate_vdi
@@ -18,8 +19,6 @@ from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (12, 9)
 OPACITY = 0.35

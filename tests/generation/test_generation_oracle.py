@@ -14,6 +14,7 @@ import itertools
 import numpy as np
 import pytest
 import strategies
+from drawing import raycast_volume, render_vdi
 from sampling_uncertainty import uncertainties
 
 from pyvista_vdi import reference
@@ -23,11 +24,9 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
-from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.reference.generate import near_depth
 from pyvista_vdi.reference.ranges import ROUNDOFF
 from pyvista_vdi.reference.raycast import NEAR_LIMIT
-from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (14, 10)
 

@@ -7,6 +7,7 @@ import functools
 import numpy as np
 import pytest
 import strategies
+from drawing import render_first_hits, render_vdi
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import explain, total
@@ -16,7 +17,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.packing import DEPTH_CODES, Packed8, Packed16, gaps_and_thicknesses, packed_8
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.raycast import PreparedVDI, render_first_hits, render_vdi
+from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 PACKED = ("16-byte", "8-byte")
 BOUNDS = (-1, 1, -1, 1, -1, 1)

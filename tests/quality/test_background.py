@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawing import raycast_volume, render_vdi
 from fresh_python import run_python
 
 from pyvista_vdi import Camera, TransferFunction, Volume
@@ -22,9 +23,9 @@ from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.quality import background
 from pyvista_vdi.quality.background import BackgroundGeneration
 from pyvista_vdi.quality.probe import generate_by_dial
-from pyvista_vdi.raycasting.raycast import prepared_vdi, render_vdi
+from pyvista_vdi.raycasting import raycast
+from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.volume import upload as voxels
-from pyvista_vdi.volume.render import raycast_volume
 
 #: Seconds after which a test that waits for the thread gives up: it would wait for ever.
 PATIENCE = 120
@@ -279,7 +280,7 @@ def test_what_is_finished_too_late_is_dropped(runtime, monkeypatch):
     finished, replaced, calls = threading.Event(), threading.Event(), []
 
     def render_and_wait(*arguments, **options):
-        render_vdi(*arguments, **options)
+        raycast.render_vdi(*arguments, **options)
         if not finished.is_set():
             finished.set()
             replaced.wait(PATIENCE)

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from drawing import raycast_volume, render_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Camera, TransferFunction, Volume
@@ -33,8 +34,7 @@ from pyvista_vdi.quality.dial import (
     predictions,
 )
 from pyvista_vdi.quality.probe import Scene, lists_met, turned, viewport_planes
-from pyvista_vdi.raycasting.raycast import prepared_vdi, render_vdi
-from pyvista_vdi.volume.render import raycast_volume
+from pyvista_vdi.raycasting.prepared import prepared_vdi
 
 WINDOW = (160, 120)
 

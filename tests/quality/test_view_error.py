@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from drawing import raycast_volume, render_vdi
 
 from pyvista_vdi import VDI, Camera, TransferFunction, Volume
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
@@ -26,8 +27,6 @@ from pyvista_vdi.quality.view_error import (
     angle_from_generating_view,
     magnification,
 )
-from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.volume.render import raycast_volume
 
 #: Frames; a hundred cells of the default tiles' 14 pixels, of which the bounds take about 60.
 WINDOW = (160, 120)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import strategies
+from drawing import draw, render_vdi
 from oracle import explain
 
 from pyvista_vdi.device import Runtime
@@ -18,7 +19,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import FirstHit
-from pyvista_vdi.raycasting.raycast import PreparedVDI, render_vdi
+from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 #: Most that a channel of these random VDIs may differ from rays that are followed one by one, whose
 #: lengths have more roundings. Measured: 2e-6.
@@ -76,7 +77,7 @@ def test_which_frames_are_drawn_from_own_lists(runtime, monkeypatch):
         prepared = PreparedVDI(runtime, vdi.with_precision(precision))
         names.clear()
         with runtime.buffer((size[1], size[0], 4), name="image") as image:
-            prepared.render(camera, size, image, **options)
+            draw(prepared, camera, size, image, **options)
         return names[-1]
 
     own, others = ("raycast_own_lists", "raycast_blocks") if runtime.is_cpu else ("raycast",) * 2
@@ -288,12 +289,12 @@ def test_offsets_of_64_bits(runtime, precision):
     prepared = PreparedVDI(runtime, vdi)
     images = []
     for long_offsets in (False, True):
-        prepared._long_offsets = long_offsets
+        prepared.long_offsets = long_offsets
         if long_offsets and precision == "8-byte":  # whose headers are offsets
-            headers = runtime.download(prepared._headers).astype(np.int64)
-            prepared._headers = runtime.upload(headers, "list headers")
+            headers = runtime.download(prepared.headers).astype(np.int64)
+            prepared.headers = runtime.upload(headers, "list headers")
         with runtime.buffer((9, 21, 4), name="image") as image:
-            prepared.render(vdi.camera, vdi.window_size, image)
+            draw(prepared, vdi.camera, vdi.window_size, image)
             images.append(runtime.download(image).copy())
     assert images[0].any()
     np.testing.assert_array_equal(*images)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import strategies
+from drawing import pick_vdi, raycast_volume, render_first_hits, render_vdi
 from oracle import explain, total
 
 from pyvista_vdi.device import ray_forms as rays
@@ -17,11 +18,8 @@ from pyvista_vdi.model.cropping import PRESETS, Cropping
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
-from pyvista_vdi.raycasting.picking import pick_vdi
-from pyvista_vdi.raycasting.raycast import render_first_hits, render_vdi
 from pyvista_vdi.reference.raycast import kept_parts
 from pyvista_vdi.reference.rays import clip, inside_box, pixel_ray
-from pyvista_vdi.volume.render import raycast_volume
 
 
 def planes_in(rng, bounds):

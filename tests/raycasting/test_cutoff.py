@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import strategies
+from drawing import render_vdi
 from oracle import TOLERANCE
 
 import pyvista_vdi
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.raycasting.raycast import TRANSMITTANCE_CUTOFF, render_vdi
+from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 
 
 def seen_from_beside(seed):

@@ -14,6 +14,7 @@ import itertools
 import numpy as np
 import pytest
 import strategies
+from drawing import owned_image, render_vdi, render_vdis
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import reference
@@ -23,8 +24,8 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting import multi_vdi as joint
-from pyvista_vdi.raycasting.multi_vdi import PlacedVDI, joint_image, render_vdis
-from pyvista_vdi.raycasting.raycast import prepared_vdi, render_vdi
+from pyvista_vdi.raycasting.placed import PlacedVDI
+from pyvista_vdi.raycasting.prepared import prepared_vdi
 
 #: Largest difference per channel from the oracle; see above.
 TOLERANCE = 4e-5
@@ -327,16 +328,16 @@ def test_owners_are_the_first_that_surely_cover(runtime):
     size = (16, 16)  # an eighth of a unit per pixel
     left = PlacedVDI(slab(-1.0, 0.07), camera)  # ends within a pixel, behind its centre
     right = PlacedVDI(slab(-0.5, 1.0), camera)
-    first = joint_image([left, right], size, margin=9 / 16, device=runtime)
+    first = owned_image([left, right], size, margin=9 / 16, device=runtime)
     assert (first.owner[1:-1, 1:8] == 0).all()
     assert (first.owner[1:-1, 8:-1] == 1).all()  # met by both in column 8, surely by the right one
-    other = joint_image([right, left], size, margin=9 / 16, device=runtime)
+    other = owned_image([right, left], size, margin=9 / 16, device=runtime)
     assert (other.owner[1:-1, 1:4] == 1).all()
     assert (other.owner[1:-1, 5:-1] == 0).all()
     assert np.array_equal(first.image, other.image)
     # Without margin the first that is met; where there is but one, it is that one's
-    assert (joint_image([left, right], size, device=runtime).owner[:, 8] == 0).all()
-    assert (joint_image([left, left], size, device=runtime).owner[:, 9:] == -1).all()
+    assert (owned_image([left, right], size, device=runtime).owner[:, 8] == 0).all()
+    assert (owned_image([left, left], size, device=runtime).owner[:, 9:] == -1).all()
     assert (first.owner[:, 0] == 0).all()
 
 
@@ -369,7 +370,7 @@ def test_where_no_two_are_met_each_is_drawn_as_by_itself(runtime, dealt, precisi
         "of",
         classmethod(lambda cls, *args: found.append(of_cells(cls, *args)) or found[-1]),
     )
-    drawn = joint_image(placed, size, opaque_depth=depth, margin=0.5, device=runtime)
+    drawn = owned_image(placed, size, opaque_depth=depth, margin=0.5, device=runtime)
     alone = np.repeat(np.repeat(found[0].alone, 16, axis=0), 16, axis=1)[: size[1], : size[0]][::-1]
     assert set(np.unique(alone)) == {-2, -1, 0, 1, 2}
     met = 0
@@ -386,11 +387,11 @@ def test_where_no_two_are_met_each_is_drawn_as_by_itself(runtime, dealt, precisi
     assert (drawn.owner[alone == -2] == -1).all()
     # What several are met in is drawn as if several were met everywhere, and so is the rest
     monkeypatch.setattr(joint, "cells_of_points", lambda *_: np.ones_like(found[0].alone, bool))
-    whole = joint_image(placed, size, opaque_depth=depth, margin=0.5, device=runtime)
+    whole = owned_image(placed, size, opaque_depth=depth, margin=0.5, device=runtime)
     np.testing.assert_array_equal(whole.image[alone == -1], drawn.image[alone == -1])
     assert np.abs(whole.image - drawn.image).max() <= SAME
     np.testing.assert_array_equal(whole.owner, drawn.owner)
-    turned = joint_image(placed[::-1], size, opaque_depth=depth, margin=0.5, device=runtime)
+    turned = owned_image(placed[::-1], size, opaque_depth=depth, margin=0.5, device=runtime)
     np.testing.assert_array_equal(turned.image, whole.image)
 
 
@@ -430,4 +431,4 @@ def test_what_cannot_be_drawn_is_refused(default_runtime):
     with pytest.raises(InvalidArgumentError, match="preview_samples is for a single VDI"):
         pvdi.render([one, one], camera, preview_samples=9)
     with pytest.raises(InvalidArgumentError, match="expected VDIs, got str"):
-        render_vdis([one, "x"], camera)
+        render_vdis([one, "x"], camera, (1, 1))

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 import strategies
+from drawing import draw
 
 from pyvista_vdi import read
 from pyvista_vdi.device import ray_forms as rays
@@ -14,7 +15,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting import occupancy
 from pyvista_vdi.raycasting.occupancy import SLABS, TILE
-from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 #: Seeds of random VDIs per kind.
 N_CASES = 6
@@ -310,7 +311,7 @@ def test_nothing_is_seen_beside_the_occupied_cells(runtime, kind):
         images = []
         for skip_empty in (False, True):
             with runtime.buffer((size[1], size[0], 4)) as image:
-                prepared.render(camera, size, image, skip_empty=skip_empty)
+                draw(prepared, camera, size, image, skip_empty=skip_empty)
                 images.append(runtime.download(image))
         assert np.array_equal(*images)
         part = rays.pixels_of_points(camera, size, prepared.occupancy.corners)
@@ -329,7 +330,7 @@ def test_rays_beside_the_occupied_cells_are_not_cast(runtime, monkeypatch):
 
     def drawn(**options):
         with runtime.buffer((*wide, 4)) as image:
-            prepared.render(CAMERA, wide, image, **options)
+            draw(prepared, CAMERA, wide, image, **options)
             return (runtime.download(image)[..., 3] > 0).mean()
 
     everything = drawn()
@@ -378,7 +379,7 @@ def test_skipping_is_left_out_where_it_does_not_pay(runtime, monkeypatch):
 
     def drawn(skip_empty):
         with runtime.buffer((20, 20, 4)) as image:
-            prepared.render(camera, (20, 20), image, skip_empty=skip_empty)
+            draw(prepared, camera, (20, 20), image, skip_empty=skip_empty)
             return bool(runtime.download(image).any())
 
     monkeypatch.setattr(occupancy, "_WORTHWHILE", 2.0)

@@ -8,7 +8,7 @@ import pytest
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.occupancy import SLABS, TILE
-from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 FILE = "occupancy_functions.cl"
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drawing import render_vdi
 
 from pyvista_vdi import VDI, Camera
 from pyvista_vdi.device import aligned_empty
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.raycasting.raycast import render_vdi
 
 CAMERA = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))
 

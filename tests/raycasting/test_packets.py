@@ -9,14 +9,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import strategies
+from drawing import draw, frame
 
 from pyvista_vdi.device import ray_forms as rays
-from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting import packets
-from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI
+from pyvista_vdi.raycasting.scene import Scene
+from pyvista_vdi.raycasting.strategies import strategy_for
 
 BOUNDS = (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
 CAMERA = Camera((0, 0, 6), (0, 0, 0), (0, 1, 0), view_angle=30)
@@ -40,28 +42,27 @@ def slab_vdi(camera=CAMERA, window=(480, 360), optical_depth=0.1):
     )
 
 
+def scene_of(runtime, vdi, camera, size, **options):
+    """A frame whose rays are cast through all of the window."""
+    request = frame(vdi, camera, size, skip_empty=False, **options)
+    return Scene.of(PreparedVDI(runtime, vdi), request)
+
+
 def dealt(runtime, vdi, camera, size=SIZE):
     """The packets of a frame, None if its rays are followed one by one."""
-    prepared = PreparedVDI(runtime, vdi)
-    view = prepared.view(camera, size, None, None)
-    whole = Rectangle(0, size[0], 0, size[1])
-    return prepared._packets(camera, view, whole, prepared.defines)
+    return scene_of(runtime, vdi, camera, size).packets
 
 
 def kernel_of(runtime, vdi, camera, size=SIZE, **options):
     """The name of the kernel that draws a frame."""
-    prepared = PreparedVDI(runtime, vdi)
-    view = prepared.view(camera, size, None, None, **options)
-    with runtime.buffer((size[1], size[0], 4), name="image") as image:
-        launch = prepared._raycast(camera, view, image, first_hit=None, skip_empty=False)
-    return launch.kernel.name
+    return strategy_for(scene_of(runtime, vdi, camera, size, **options)).kernel
 
 
 def drawn(runtime, prepared, camera, size, unwritten=np.nan):
     """A frame, `unwritten` where nothing was."""
     with runtime.buffer((size[1], size[0], 4), name="image") as image:
         runtime.fill(image, np.float32(unwritten))
-        prepared.render(camera, size, image, skip_empty=False)  # which fills the rest by itself
+        draw(prepared, camera, size, image, skip_empty=False)  # which fills the rest by itself
         return runtime.download(image).copy()
 
 

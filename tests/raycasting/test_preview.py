@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import strategies
+from drawing import render_vdi
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.render_options import MAX_PREVIEW_SAMPLES
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.raycast import MAX_PREVIEW_SAMPLES, render_vdi
 
 BOUNDS = (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
 COLOR = np.array([0.8, 0.5, 0.2])

@@ -12,11 +12,11 @@ import functools
 import numpy as np
 import pytest
 import strategies
+from drawing import render_vdi
 from oracle import explain, total
 
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.raycast import render_vdi
 
 #: Share of pixels that may differ by more from the unmoved ray, over all views together.
 MAX_SHARE = 0.02

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import strategies
+from drawing import render_vdi
 from real_data import require_data
 
 from pyvista_vdi import examples, generate
@@ -26,7 +27,7 @@ from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting import occupancy
 from pyvista_vdi.raycasting.occupancy import SLABS, TILE
-from pyvista_vdi.raycasting.raycast import prepared_vdi, render_vdi
+from pyvista_vdi.raycasting.prepared import prepared_vdi
 
 #: Lists of the sparse VDIs: many tiles, those of the last column cut off. The middle is a corner of
 #: lists, and lies on a border between two rows of tiles.

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 import strategies
+from drawing import raycast_volume, render_vdi
 from oracle import explain
 from sampling_uncertainty import uncertainties
 
@@ -20,8 +21,6 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.volume.render import raycast_volume
 
 #: Odd, so that what is thinner than a pixel and lies in the middle is seen.
 WINDOW = (9, 7)

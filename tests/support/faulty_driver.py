@@ -6,12 +6,12 @@ import gc
 from dataclasses import dataclass
 
 import numpy as np
+from drawing import raycast_volume, render_vdi
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import DeviceBuffer, devices
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.raycasting.raycast import prepared_vdi, render_vdi
-from pyvista_vdi.volume.render import raycast_volume
+from pyvista_vdi.raycasting.prepared import prepared_vdi
 
 #: The driver's functions that the runtime calls, by what they are for.
 ALLOCATIONS = ("Buffer",)

@@ -20,7 +20,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
 from pyvista_vdi.raycasting import multi_vdi as joint
 from pyvista_vdi.raycasting import packets
-from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.raycasting.scene import Scene
 
 #: Views of a VDI that :func:`random_view` draws; the hard ones by name.
 VIEWS = (
@@ -185,8 +185,7 @@ def deal_rays(patch, dealt):
     for name in ("LEAST_IN_COMMON", "LEAST_IN_COMMON_WITHOUT_BLOCKS", "LEAST_PIXELS"):
         patch.setattr(packets, name, least)
     if dealt == "one by one":
-        patch.setattr(PreparedVDI, "_in_blocks", lambda self, defines: False)
-        patch.setattr(PreparedVDI, "_own_lists", lambda *_: None)
+        patch.setattr(Scene, "in_vectors", False)
         patch.setattr(joint, "_in_rows", lambda runtime: False)
 
 

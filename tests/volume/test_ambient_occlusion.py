@@ -7,6 +7,7 @@ import hashlib
 import numpy as np
 import pytest
 import strategies
+from drawing import raycast_volume, render_vdi
 
 from pyvista_vdi import (
     AmbientOcclusion,
@@ -20,12 +21,10 @@ from pyvista_vdi.device import Runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
-from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.reference.generate import node_occlusion
 from pyvista_vdi.reference.occlusion import _trilinear as trilinear
 from pyvista_vdi.volume import classified_volume as device_volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (7, 6)
 

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 import strategies
+from drawing import raycast_volume
 
 from pyvista_vdi import Camera, Light, TransferFunction, Volume
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
@@ -18,7 +19,6 @@ from pyvista_vdi.model.lighting import Shading
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.volume import bricks
 from pyvista_vdi.volume.bricks import BrickLayout, DeviceBricks, fitting_layout, in_parts
-from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (20, 13)
 #: Little enough that the volumes below do not fit, enough for the rays of that window.

@@ -9,6 +9,7 @@ import re
 import numpy as np
 import pytest
 import strategies
+from drawing import raycast_volume, render_vdi
 
 from pyvista_vdi import (
     AmbientOcclusion,
@@ -22,10 +23,8 @@ from pyvista_vdi import (
 from pyvista_vdi.device import sources
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.reference.generate import medium_at
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (7, 6)
 

@@ -26,7 +26,7 @@ def random_volume(rng):
 
 
 def marched(
-    call, runtime, volume, camera, window, transfer, step, *, t_end=np.inf, planes=None, group=1
+    call, runtime, volume, camera, window, transfer, step, *, t_end=np.inf, planes=(), group=1
 ):
     """Whole marches of every pixel of a small window, and the rays that they belong to."""
     medium = DeviceVolume(runtime, volume, transfer, step)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import strategies
+from drawing import raycast_volume, render_vdi
 
 from pyvista_vdi import InvalidVolumeError, Shading, TransferFunction, Volume, reference
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.volume.render import raycast_volume
 
 WINDOW = (7, 6)
 

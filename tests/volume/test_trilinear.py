@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import strategies
+from drawing import raycast_volume
 
 from pyvista_vdi import reference
 from pyvista_vdi.model.camera import Camera
@@ -12,7 +13,6 @@ from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.reference.generate import classify, medium_at
-from pyvista_vdi.volume.render import raycast_volume
 
 SHAPE = (5, 6, 7)  # z, y, x
 TOP = np.prod(np.array(SHAPE) - 1.0)

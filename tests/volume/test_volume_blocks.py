@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drawing import raycast_volume
 from scipy.ndimage import distance_transform_cdt
 from strategies import camera_around
 
 from pyvista_vdi import TransferFunction, Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.render import raycast_volume
 
 MOST = 16
 

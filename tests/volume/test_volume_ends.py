@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drawing import raycast_volume
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.generation import generate as generation
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.volume.render import raycast_volume
 
 SIZE = 9.0  # model units along each edge
 OPACITY = 0.3

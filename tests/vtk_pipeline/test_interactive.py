@@ -444,9 +444,9 @@ def test_samples_follow_the_time_that_frames_take(plotter, monkeypatch):
     clock = Clock()
     render_vdi = painter_module.render_vdi
 
-    def timed(vdi, camera, size, **keywords):
-        clock.now += 1e-6 * size[0] * size[1]
-        return render_vdi(vdi, camera, size, **keywords)
+    def timed(vdi, request):
+        clock.now += 1e-6 * request.size[0] * request.size[1]
+        return render_vdi(vdi, request)
 
     monkeypatch.setattr(painter_module, "render_vdi", timed)
     for module in (interaction, painter_module, regeneration):

@@ -32,13 +32,13 @@ BALLS = (("viridis", (0.0, 0.0, 0.0)), ("hot", (0.9, 0.4, 0.2)), ("bone", (0.2, 
 def raycasts(monkeypatch):
     """The number of VDIs in each joint picture that is raycast."""
     counts = []
-    joint_image = overlap.joint_image
+    owned_image = overlap.owned_image
 
     def counting(placed, *args, **kwargs):
         counts.append(len(placed))
-        return joint_image(placed, *args, **kwargs)
+        return owned_image(placed, *args, **kwargs)
 
-    monkeypatch.setattr(overlap, "joint_image", counting)
+    monkeypatch.setattr(overlap, "owned_image", counting)
     return counts
 
 

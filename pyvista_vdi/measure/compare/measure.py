@@ -33,6 +33,8 @@ from pyvista_vdi.measure.session import (
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.metrics import Comparison, compare_images
+from pyvista_vdi.model.options import MediumOptions
+from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
 from pyvista_vdi.model.standard_cases import ANGLES, WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -298,7 +300,7 @@ class _Bench:
             self._done()
         images["raycaster"] = self._raycast(camera, size, self.step)
         self._done()
-        images["vdi"] = render_vdi(vdi, camera, size, device=self._device)
+        images["vdi"] = render_vdi(vdi, FrameRequest(camera, size, device=self._device))
         self._done()
         seen(images["raycaster"], angle, _TRANSPARENT)
         return images
@@ -309,7 +311,7 @@ class _Bench:
             return {}
         camera, size = self.view.azimuth(angle), self._settings.window_size
         frames: dict[str, Step] = {
-            "vdi": lambda: render_vdi(vdi, camera, size, device=self._device),
+            "vdi": lambda: render_vdi(vdi, FrameRequest(camera, size, device=self._device)),
             "raycaster": lambda: self._raycast(camera, size, self.voxel),
         }
         for name, baseline in self._baselines.items():
@@ -332,16 +334,12 @@ class _Bench:
     def _raycast(
         self, camera: Camera, size: tuple[int, int], step: float, *, early_termination: bool = True
     ) -> Image:
-        return raycast_volume(
-            self._volume,
-            camera,
-            size,
-            self._table,
-            sample_distance=step,
-            early_termination=early_termination,
-            skip_empty=False,  # the plain baseline that the paper compares with
-            device=self._device,
-        )
+        cutoff = TRANSMITTANCE_CUTOFF if early_termination else 0.0
+        # Without skipping: the plain baseline that the paper compares with
+        options = RenderOptions(skip_empty=False, transmittance_cutoff=cutoff)
+        frame = FrameRequest(camera, size, options, device=self._device)
+        sampling = MediumOptions(sample_distance=step)
+        return raycast_volume(self._volume, self._table, frame, sampling)
 
     def _case(self) -> dict[str, Any]:
         volume, settings = self._volume, self._settings

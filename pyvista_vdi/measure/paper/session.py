@@ -32,7 +32,7 @@ from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.raycast import PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 
 def run(plan: Plan, results: Results, device: Any = None, progress: Progress | None = None) -> None:

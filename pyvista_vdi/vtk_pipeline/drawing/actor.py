@@ -7,9 +7,9 @@ from typing import Any
 from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
-from pyvista_vdi.raycasting.raycast import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.shader import show_image
 from pyvista_vdi.vtk_pipeline.filters.view import as_array

@@ -14,9 +14,9 @@ from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.cropping import checked_opacity_multiplier
+from pyvista_vdi.model.render_options import checked_transmittance_cutoff
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import checked_opacity
-from pyvista_vdi.raycasting.raycast import check_transmittance_cutoff
 from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
@@ -147,7 +147,7 @@ class VDIMapperMethods:
         InvalidArgumentError
             If it is not from 0 to below 1.
         """
-        least = check_transmittance_cutoff(cutoff)
+        least = checked_transmittance_cutoff(cutoff)
         if least != self.painter.transmittance_cutoff:
             self.painter.transmittance_cutoff = least
             self.Modified()

@@ -17,7 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.raycasting.multi_vdi import JointImage, PlacedVDI, joint_image
+from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.raycasting.multi_vdi import OwnedImage, owned_image
+from pyvista_vdi.raycasting.placed import PlacedVDI
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
 from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, Image, Matrix, Recent, same_depth
 
@@ -37,7 +39,7 @@ _numbers = itertools.count(-1, -1)
 class _Picture:
     """A joint picture, and the image that each actor shows of it."""
 
-    joint: JointImage
+    joint: OwnedImage
     depth: Image | None
     parts: dict[int, Image] = field(default_factory=dict)
     numbers: dict[int, int] = field(default_factory=dict)
@@ -125,25 +127,15 @@ def _key(*frames: Frame) -> Any:
     return tuple((id(f.painter), weakref.ref(f.vdi), f.key) for f in frames if f.vdi is not None)
 
 
-def _raycast(frames: Sequence[Frame]) -> JointImage:
+def _raycast(frames: Sequence[Frame]) -> OwnedImage:
     before = time.perf_counter()
     # One device draws them all, and the same in whatever order they were added
     devices = {repr(frame.painter.device): frame.painter.device for frame in frames}
-    joint = joint_image(
-        [
-            PlacedVDI(
-                frame.vdi,  # type: ignore[arg-type]
-                frame.camera,
-                frame.options.clipping_planes,
-                frame.options.cropping,
-                frame.options.opacity_multiplier,
-            )
-            for frame in frames
-        ],
-        frames[0].size,
-        opaque_depth=frames[0].depth,
+    device, first = devices[min(devices)], frames[0]
+    joint = owned_image(
+        [PlacedVDI(frame.vdi, frame.camera, frame.options) for frame in frames if frame.vdi],
+        FrameRequest(first.camera, first.size, opaque_depth=first.depth, device=device),
         margin=_MARGIN,
-        device=devices[min(devices)],
     )
     seconds = time.perf_counter() - before
     for frame in frames:  # as if each had drawn its own

@@ -16,7 +16,7 @@ from vtkmodules.vtkRenderingCore import vtkVolume
 from pyvista_vdi.device import Runtime, aligned_empty, get_runtime
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
+from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.raycasting.raycast import render_vdi
@@ -326,18 +326,11 @@ class Painter:
         pixels = self._pixels(frame.size)
         width, height = frame.size
         assert frame.vdi is not None
-        image = render_vdi(
-            frame.vdi,
-            frame.camera,
-            frame.size,
-            opaque_depth=frame.depth,
-            clipping_planes=frame.options.clipping_planes or None,
-            cropping=frame.options.cropping,
-            opacity_multiplier=frame.options.opacity_multiplier,
-            transmittance_cutoff=frame.options.transmittance_cutoff,
-            device=self.device,
-            out=pixels[: height * width * 4].reshape(height, width, 4),
+        out = pixels[: height * width * 4].reshape(height, width, 4)
+        request = FrameRequest(
+            frame.camera, frame.size, frame.options, frame.depth, self.device, out
         )
+        image = render_vdi(frame.vdi, request)
         frame.clock.drawn(frame.size, frame.full_size, time.perf_counter() - before)
         self._raycasts += 1
         drawn = Drawn(image, frame.full_size, frame.depth, self._raycasts, pixels=pixels)

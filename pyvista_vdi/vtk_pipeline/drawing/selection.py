@@ -17,7 +17,8 @@ from vtkmodules.vtkCommonCore import vtkInformation
 from vtkmodules.vtkCommonDataModel import vtkDataObject
 from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLActor
 
-from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, Pick, pick_vdi
+from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit, Pick, pick_vdi
 from pyvista_vdi.raycasting.raycast import render_first_hits
 from pyvista_vdi.vtk_pipeline.drawing.frame import Area, Frame, Image
 from pyvista_vdi.vtk_pipeline.drawing.shader import show_first_hits, show_image
@@ -111,14 +112,9 @@ class Selection:
         assert seen.vdi is not None
         hit = pick_vdi(
             seen.vdi,
-            seen.camera,
+            FrameRequest(seen.camera, seen.size, seen.options),
             (int(x) - left, int(y) - bottom),
-            seen.size,
-            opacity_threshold=self.opacity,
-            accumulated=self.accumulated,
-            clipping_planes=seen.options.clipping_planes or None,
-            cropping=seen.options.cropping,
-            opacity_multiplier=seen.options.opacity_multiplier,
+            FirstHit.of(self.opacity, self.accumulated),
         )
         if hit is None:  # at the threshold, by rounding
             return None
@@ -136,17 +132,10 @@ class Selection:
             seen.origin[1] + seen.size[1] - (bottom + height),  # from the top
         )
         assert seen.vdi is not None
-        depth = render_first_hits(
-            seen.vdi,
-            seen.camera.tile(seen.size, corner, (width, height)),
-            (width, height),
-            opacity_threshold=self.opacity,
-            accumulated=self.accumulated,
-            clipping_planes=seen.options.clipping_planes or None,
-            cropping=seen.options.cropping,
-            opacity_multiplier=seen.options.opacity_multiplier,
-            device=device,
-        )
+        camera = seen.camera.tile(seen.size, corner, (width, height))
+        request = FrameRequest(camera, (width, height), seen.options, device=device)
+        hit = FirstHit.of(self.opacity, self.accumulated)
+        depth = render_first_hits(seen.vdi, request, hit)
         return seen.window_depth(depth[::-1])
 
 

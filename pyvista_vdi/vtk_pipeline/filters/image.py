@@ -12,6 +12,7 @@ from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
 from pyvista_vdi.io import to_bytes
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce, ask_for_all
@@ -146,7 +147,8 @@ class VDIToImage(Algorithm):
         view = vdi.camera if self._camera is None else self._camera
         view = view.azimuth(self._azimuth) if self._azimuth else view
         view = view.elevation(self._elevation) if self._elevation else view
-        pixels = render_vdi(vdi, view, self._window_size, device=self._device)
+        size = self._window_size or vdi.window_size
+        pixels = render_vdi(vdi, FrameRequest(view, size, device=self._device))
         vtkImageData.GetData(outputs, 0).ShallowCopy(rgba_to_image(pixels))
 
     def _read(self, image: vtkImageData) -> VDI:

@@ -1,0 +1,316 @@
+"""A VDI on a device, in the form that the raycaster reads: uploaded once, kept while it lives."""
+
+from __future__ import annotations
+
+import functools
+import threading
+import weakref
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.device import DeviceBuffer, Runtime, aligned_empty, kept_together
+from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.device.work_order import GROUP
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.float32_limits import lists_are_far
+from pyvista_vdi.model.packing import Packed8, Packed16
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.occupancy import OccupancyGrid
+from pyvista_vdi.raycasting.packets import share_lit
+
+#: ``-D`` names of a kernel, and their values.
+Defines: TypeAlias = dict[str, str | int | None]
+
+#: Far depth over near depth up to which a lens counts as long, and depth is kept relative.
+_LONG_LENS = 2.0
+#: Lists along each edge of a tile, in which supersegments lie together; those of 8 bytes lie list
+#: by list: that of ``raycasting/supersegments.cl``.
+_LIST_TILE = 2
+#: Bits of a tile's header that say where it begins: that of ``raycasting/supersegments.cl``.
+_FIRST_BITS = 36
+#: Pairs of words before the supersegments of an 8-byte list: that of
+#: ``raycasting/supersegments.cl``.
+_LIST_HEADER = 2
+
+_Keep: TypeAlias = Callable[[DeviceBuffer], DeviceBuffer]
+
+_prepared: weakref.WeakKeyDictionary[VDI, dict[Runtime, _Preparation]] = weakref.WeakKeyDictionary()
+_lock = threading.Lock()
+
+
+class _Preparation:
+    """The place of a prepared VDI: whoever comes first makes it, others wait for that one only."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.prepared: PreparedVDI | None = None
+
+
+def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
+    """Return the VDI on the device, made once and kept as long as the VDI lives."""
+    with _lock:
+        place = _prepared.setdefault(vdi, {}).setdefault(runtime, _Preparation())
+    with runtime.holding(place.lock):
+        if place.prepared is None:
+            place.prepared = PreparedVDI(runtime, vdi)
+        return place.prepared
+
+
+class PreparedVDI:
+    """A VDI on a device, in the form that the raycaster reads.
+
+    Parameters
+    ----------
+    runtime : Runtime
+        The device.
+    vdi : VDI
+        Not kept: the buffers are enough.
+
+    Attributes
+    ----------
+    window, bounds, depth_origin, camera
+        The VDI's.
+    nearest : float
+        Least view depth that is in front of V_O's eye, world units.
+    parallel : bool
+        Whether V_O is a parallel projection.
+    shifted : bool
+        Whether the depth coordinate is that of a long lens.
+    packed : int
+        Bytes of a packed supersegment; 0 where they are exact.
+    double_float : int
+        Not 0 where float32 has too few digits for rays: where the lists lie at the far end of the
+        bounds' depths 1, at the near one 2.
+    list_rows : numpy.ndarray
+        See :meth:`list_space`.
+    lit : float
+        How far light gets, see :func:`share_lit`.
+    media : int
+        About how many supersegments a ray may meet.
+    occupancy : OccupancyGrid
+        Where there is nothing to see.
+    headers : DeviceBuffer
+        Where each tile of lists begins, or each list of 8 bytes.
+    lists : tuple of DeviceBuffer
+        The supersegments.
+    long_offsets : bool
+        Whether the headers take 64 bits where they need not.
+    """
+
+    def __init__(self, runtime: Runtime, vdi: VDI) -> None:
+        self.runtime = runtime
+        self.window = vdi.window_size
+        self.bounds = vdi.bounds
+        self.depth_origin = vdi.depth_origin
+        self.camera = vdi.camera
+        self.parallel = vdi.camera.parallel_projection
+        near, far = depths = rays.depth_range(vdi.camera, vdi.bounds)
+        rays.check_list_space(vdi.camera, vdi.bounds)
+        self.nearest = rays.nearest_depth(vdi.camera, vdi.bounds)
+        self.lit = share_lit(vdi, near, far)
+        # An origin much closer than the data costs the coordinate the digits that it is to save
+        closest = min(near, self.depth_origin)
+        self.shifted = not self.parallel and 0 < far <= _LONG_LENS * closest
+        # A ray that steps from list to list meets about as many as it crosses borders
+        self.media = sum(vdi.window_size) + int(vdi.counts.max(initial=0))
+        self.double_float = self._double_float(vdi, depths)
+        self.list_rows = self.list_space(vdi.camera)
+        self.packed = {Packed16: 16, Packed8: 8}.get(type(vdi.packing), 0)
+        self._upload(vdi)
+
+    def _double_float(self, vdi: VDI, depths: tuple[float, float]) -> int:
+        """Return ``double_float``: lists may be thin for where they lie in the bounds' depths."""
+        offsets, occupied = vdi.offsets.view(np.int64), np.flatnonzero(vdi.counts)
+        first, last = offsets[occupied], offsets[occupied + 1] - 1
+        near, far = (depth - self.depth_origin for depth in depths)
+        front, back = (
+            np.clip(face.astype(np.float64), near, far)
+            for face in (vdi.front[first], vdi.back[last])
+        )
+        rounded = np.maximum(np.abs(front), np.abs(back))
+        if not (self.parallel or self.shifted):
+            rounded = back + self.depth_origin
+        thickness = (back - front).max(initial=0.0)
+        if not lists_are_far(rounded.max(initial=0.0), thickness, far - near):
+            return 0
+        return 2 if back.max() - near < far - front.min() else 1
+
+    @property
+    def list_bytes(self) -> int:
+        """Bytes of the lists on the device: headers and supersegments."""
+        return sum(buffer.nbytes for buffer in (self.headers, *self.lists))
+
+    @property
+    def defines(self) -> dict[str, str | int | None]:
+        """``-D`` names that fix the kernels' shape for this VDI."""
+        defines: dict[str, str | int | None] = {"OFFSET_T": "long" if self.long_offsets else "int"}
+        if self.parallel:
+            defines["PARALLEL"] = 1
+        if self.shifted:
+            defines["SHIFTED"] = 1
+        if self.packed:
+            defines["PACKED"] = self.packed
+        if self.double_float:
+            defines["FAR_ENTRIES"] = self.double_float
+        return defines
+
+    def list_space(self, camera: Camera) -> NDArray[np.float64]:
+        """Model frame to homogeneous list coordinates, float64 (4, 4).
+
+        Rows give u and v in pixels from the window's centre, the depth coordinate, and the
+        denominator that all three are divided by (1 in parallel projection).
+        """
+        viewport = camera.viewport_matrix(self.window) @ camera.model_to_view
+        half = np.asarray(self.window, dtype=np.float64) / 2
+        u, v, depth, denominator = viewport
+        if self.parallel or self.shifted or self.double_float:
+            coordinate = depth.copy()
+            coordinate[3] -= self.depth_origin
+        else:
+            coordinate = np.array([0.0, 0.0, 0.0, -1.0])  # -1 / Z
+        return np.stack([half[0] * u, half[1] * v, coordinate, denominator])
+
+    def _upload(self, vdi: VDI) -> None:
+        """Bring the lists to the device, exact or packed, and build the occupancy grid."""
+        runtime = self.runtime
+        if self.packed == 8:
+            lengths = vdi.counts + _LIST_HEADER * (vdi.counts > 0)
+        else:
+            lengths = _longest(vdi.counts) * _LIST_TILE**2
+        begins = np.zeros(lengths.size + 1, np.int64)
+        np.cumsum(lengths, out=begins[1:])
+        # Kernels count words of 8 bytes, of which an entry takes up to two, by signed numbers
+        self.long_offsets = 2 * int(begins[-1]) >= 2**31
+        offset_type = np.int64 if self.long_offsets else np.int32
+        if self.packed == 8:
+            headers: NDArray[Any] = begins.astype(offset_type)
+        else:
+            longest = lengths.reshape(-1) // _LIST_TILE**2
+            headers = (begins[:-1] | longest << _FIRST_BITS).view(np.uint64)
+        with (
+            kept_together() as keep,
+            runtime.upload(vdi.front, "front depths") as front,
+            runtime.upload(vdi.back, "back depths") as back,
+            runtime.upload(vdi.offsets.astype(offset_type), "list offsets") as starts,
+        ):
+            self.occupancy = OccupancyGrid(
+                runtime,
+                vdi,
+                starts,
+                front,
+                back,
+                nearest=self.nearest,
+                shifted=self.shifted,
+                long_offsets=self.long_offsets,
+            )
+            keep(self.occupancy.counts), keep(self.occupancy.masks)
+            self.headers = keep(runtime.upload(headers, "list headers"))
+            if isinstance(vdi.packing, Packed8):
+                self.lists = self._packed_lists(vdi, vdi.packing, keep)
+            else:
+                self.lists = self._prepared_lists(vdi, int(begins[-1]), starts, front, back, keep)
+            runtime.finish()  # the buffers above may be host memory in use
+
+    def _prepared_lists(
+        self,
+        vdi: VDI,
+        entries: int,
+        starts: DeviceBuffer,
+        front: DeviceBuffer,
+        back: DeviceBuffer,
+        keep: _Keep,
+    ) -> tuple[DeviceBuffer, ...]:
+        """Return the supersegments with depth coordinates and extinctions, 24 or 16 bytes each.
+
+        They lie by tiles of lists, in so many ``entries``; ``starts`` are the lists' in the VDI's
+        arrays.
+        """
+        runtime = self.runtime
+        wide, high = vdi.window_size
+        packed = isinstance(vdi.packing, Packed16)
+        colors = vdi.packing.color if isinstance(vdi.packing, Packed16) else vdi.color
+        lists: tuple[DeviceBuffer, ...]
+        # On a CPU device memory of our own, which systems give in large pages: a driver's comes in
+        # pages of 4 KiB, each of which the kernel is interrupted for where it first writes
+        if packed:
+            lists = (keep(runtime.result((entries, 4), np.uint32, "supersegments", lasting=True)),)
+        else:
+            lists = (
+                keep(runtime.result((entries, 2), name="supersegment faces", lasting=True)),
+                keep(runtime.result((entries, 4), name="supersegment media", lasting=True)),
+            )
+        # Direction of a centre ray per unit of view depth, in the model frame
+        centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
+        with (
+            runtime.upload(colors, "supersegment colours") as color,
+            runtime.upload(vdi.optical_depth, "optical depths") as optical_depth,
+            runtime.upload(centre.astype(np.float32), "centre rays") as directions,
+        ):
+            runtime.launch(
+                runtime.kernel("raycasting/prepare.cl", "prepare_lists", self.defines),
+                -(-wide * high // GROUP) * GROUP,
+                GROUP,
+                starts,
+                self.headers,
+                front,
+                back,
+                color,
+                optical_depth,
+                np.float32(self.depth_origin),
+                np.float32(self.nearest),
+                np.int32(wide),
+                np.int32(high),
+                directions,
+                *lists,
+            )
+            runtime.finish()  # the buffers above may be host memory in use
+        return (*lists, keep(self._constants(1.0))) if packed else lists
+
+    def _packed_lists(
+        self,
+        vdi: VDI,
+        packing: Packed8,
+        keep: _Keep,
+    ) -> tuple[DeviceBuffer, ...]:
+        """Return lists of 8-byte supersegments that begin with their scales."""
+        runtime = self.runtime
+        counts = vdi.counts.reshape(-1)
+        occupied = np.flatnonzero(counts)
+        headers = np.zeros(len(counts) + 1, np.uint64)
+        headers[1:] = np.cumsum(counts > 0) * _LIST_HEADER
+        first = (vdi.offsets + headers)[:-1][occupied].astype(np.int64)
+        words = aligned_empty((vdi.n_supersegments + len(occupied) * _LIST_HEADER, 2), np.uint32)
+        words[first, 0] = packing.origins[occupied].view(np.uint32)
+        words[first, 1] = packing.strides[occupied]
+        words[first + 1, 0] = self._per_code(vdi, packing, occupied).view(np.uint32)
+        words[first + 1, 1] = 0
+        behind = np.ones(len(words), bool)
+        behind[first] = behind[first + 1] = False
+        words[behind] = packing.words
+        return (keep(runtime.upload(words, "supersegments")), keep(self._constants(packing.step)))
+
+    def _per_code(
+        self, vdi: VDI, packing: Packed8, lists: NDArray[np.int64]
+    ) -> NDArray[np.float32]:
+        """Return 1 over the model length of a code of depth along each list's centre ray."""
+        wide, high = vdi.window_size
+        centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
+        a, b = lists % wide + 0.5 - wide / 2, lists // wide + 0.5 - high / 2
+        direction = centre[0] + a[:, np.newaxis] * centre[1] + b[:, np.newaxis] * centre[2]
+        lengths = np.linalg.norm(direction, axis=1) * packing.strides[lists] * packing.step
+        return (1 / lengths).astype(np.float32)
+
+    def _constants(self, step: float) -> DeviceBuffer:
+        constants = np.array([step, self.nearest - self.depth_origin], np.float32)
+        return self.runtime.upload(constants, "constants of depths")
+
+
+def _longest(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the length of the longest list of each tile; ``counts`` are (height, width)."""
+    height, width = counts.shape
+    longest = np.pad(counts, ((0, -height % _LIST_TILE), (0, -width % _LIST_TILE)))
+    longest = functools.reduce(np.maximum, (longest[n::_LIST_TILE] for n in range(_LIST_TILE)))
+    return functools.reduce(np.maximum, (longest[:, n::_LIST_TILE] for n in range(_LIST_TILE)))

@@ -1,0 +1,261 @@
+"""A VDI in a frame: the rays in its list space, as strategies and kernels take them."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.device import DeviceBuffer
+from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.device.work_order import Rectangle
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.float32_limits import compensation
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
+from pyvista_vdi.raycasting.aligned_view import AlignedView, aligned_view
+from pyvista_vdi.raycasting.packets import Packets, epipole_of, packets_of
+from pyvista_vdi.raycasting.picking import FirstHit
+from pyvista_vdi.raycasting.prepared import Defines, PreparedVDI
+
+#: Of a frame's forms: (u, v, depth, denominator), and how many come before the planes to clip to;
+#: those of ``lib/list_space.cl``.
+_COORDINATE_FORMS, _PLANE_FORMS = 4, 7
+#: Share of a window above which rays are cast through all of it: clearing it first costs as much.
+_MOST_DRAWN = 0.9
+
+#: A frame's forms and the ends of its rays, on the device.
+OnDevice: TypeAlias = tuple[DeviceBuffer, DeviceBuffer]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A VDI on a device, and the frame that is asked of it.
+
+    Attributes
+    ----------
+    prepared : PreparedVDI
+        The VDI.
+    request : FrameRequest
+        The view, its size and how it looks.
+    forms : numpy.ndarray
+        List coordinates, model direction and the planes to clip to, float32 (n, 6), or (n, 12) as
+        double-floats.
+    planes : int
+        How many of the forms are planes; the first six are the bounds.
+    ends : numpy.ndarray or None
+        t at which each ray ends, float32 (H, W), top row first; None if nothing opaque ends them.
+    reference_depth : float
+        View depth of t = 0, world units.
+    cropped : CroppedRays
+        How kernels crop.
+    hit : FirstHit or None
+        What counts as a hit, where t of each ray's first one is asked for and no picture.
+    segments : int
+        Not 0 where segments are asked for: 1 ray by ray, 2 in rows (``raycasting/segments.cl``).
+    only : Rectangle or None
+        The part of the window in which rays are cast, and nothing is written beside it; None where
+        the VDI decides that.
+    """
+
+    prepared: PreparedVDI
+    request: FrameRequest
+    forms: NDArray[np.float32]
+    planes: int
+    ends: NDArray[np.float32] | None
+    reference_depth: float
+    cropped: rays.CroppedRays
+    hit: FirstHit | None = None
+    segments: int = 0
+    only: Rectangle | None = None
+
+    @classmethod
+    def of(
+        cls,
+        prepared: PreparedVDI,
+        request: FrameRequest,
+        hit: FirstHit | None = None,
+        segments: int = 0,
+    ) -> Scene:
+        """Make the rays of a frame."""
+        camera, size, options = request.camera, request.size, request.options
+        pixel_rays = rays.pixel_rays(camera, size, prepared.bounds)
+        coordinates = [pixel_rays.form(row[:3], row[3]) for row in prepared.list_rows]
+        # Lengths are all that this is for, and a length times m absorbs as m times the extinction
+        direction = rays.direction_forms(pixel_rays, size, options.opacity_multiplier)
+        cropped = rays.cropped(pixel_rays, options.cropping, prepared.bounds)
+        planes = [
+            *rays.box_planes(pixel_rays, prepared.bounds),
+            *_viewport_planes(prepared, coordinates),
+            *rays.eye_plane(camera, pixel_rays),
+            *rays.user_planes(camera, pixel_rays, options.clipping_planes),
+            *cropped.planes,
+        ]
+        pack = rays.packed_pairs if prepared.double_float else rays.packed
+        return cls(
+            prepared,
+            request,
+            pack([*coordinates, *direction, *planes, *cropped.forms]),
+            len(planes),
+            rays.checked_opaque_depth(request.opaque_depth, size, pixel_rays),
+            pixel_rays.reference_depth,
+            cropped,
+            hit,
+            segments,
+        )
+
+    @property
+    def camera(self) -> Camera:
+        """The new view V_N."""
+        return self.request.camera
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the picture in pixels."""
+        return self.request.size
+
+    @property
+    def options(self) -> RenderOptions:
+        """How the picture is to look."""
+        return self.request.options
+
+    # -- what strategies ask ---------------------------------------------------------------------
+
+    @cached_property
+    def defines(self) -> Defines:
+        """``-D`` names that every kernel which draws the scene has."""
+        defines = {**self.prepared.defines, **self.cropped.defines}
+        if self.segments:
+            defines["SEGMENTS"] = self.segments
+        elif self.hit is not None:
+            defines["FIRST_HIT"] = 1
+        else:
+            defines.update(compensation(self.options.preview_samples or self.prepared.media))
+        return defines
+
+    @property
+    def skipping(self) -> Defines:
+        """``-D`` names of kernels that pass by what is empty: none where that does not pay."""
+        skips = self.options.skip_empty and self.prepared.occupancy.worthwhile
+        return {"SKIP_EMPTY": 1} if skips else {}
+
+    @property
+    def in_regions(self) -> bool:
+        """Whether it takes the regions of cropping to say what is drawn."""
+        return bool(self.cropped.forms)
+
+    @cached_property
+    def in_vectors(self) -> bool:
+        """Whether there are kernels that follow the scene's rays in vectors."""
+        prepared = self.prepared
+        plain = not prepared.double_float and self.defines.get("COMPENSATED") != 2
+        return prepared.runtime.is_cpu and plain
+
+    @property
+    def in_blocks(self) -> bool:
+        """Whether there is one that follows them in blocks of pixels."""
+        return self.in_vectors and not self.prepared.packed and not self.prepared.long_offsets
+
+    @cached_property
+    def one_list(self) -> bool:
+        """Whether the view is V_O's, exactly: each of its rays stays in one list."""
+        prepared = self.prepared
+        return np.array_equal(prepared.list_space(self.camera), prepared.list_rows)
+
+    @cached_property
+    def part(self) -> Rectangle:
+        """The part of the window in which rays are cast: nothing is met beside it."""
+        if self.only is not None:
+            return self.only
+        whole = Rectangle(0, self.size[0], 0, self.size[1])
+        if not self.options.skip_empty:
+            return whole
+        part = rays.pixels_of_points(self.camera, self.size, self.prepared.occupancy.corners)
+        return whole if part.pixels > _MOST_DRAWN * whole.pixels else part
+
+    @cached_property
+    def aligned(self) -> AlignedView | None:
+        """How each pixel is drawn from a list of its own; None if it cannot be."""
+        prepared, camera = self.prepared, self.camera
+        near, far = rays.depth_range(camera, prepared.bounds)
+        if not camera.parallel_projection:
+            near = max(near, rays.nearest_depth(camera, prepared.bounds))
+        return aligned_view(
+            self.size,
+            prepared.window,
+            self.forms[:_COORDINATE_FORMS].astype(np.float64),
+            (near - self.reference_depth, far - self.reference_depth),
+            parallel=prepared.parallel,
+            in_tiles=prepared.packed != 8,
+        )
+
+    @cached_property
+    def packets(self) -> Packets | None:
+        """How the rays are dealt to packets; None if each had better be followed by itself."""
+        forms = self.forms.astype(np.float64)
+        return packets_of(
+            self.size,
+            self.part,
+            forms[:_COORDINATE_FORMS],
+            forms[_PLANE_FORMS : _PLANE_FORMS + self.planes],
+            epipole_of(self.prepared.camera, self.camera, self.size),
+            self.prepared.lit,
+            or_blocks=self.in_blocks,
+        )
+
+    # -- what kernels take -----------------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def on_device(self) -> Iterator[OnDevice]:
+        """Have the forms and the ends of rays on the device."""
+        runtime = self.prepared.runtime
+        ends = np.zeros(1, np.float32) if self.ends is None else self.ends
+        with (
+            runtime.upload(self.forms, "rays") as forms,
+            runtime.upload(ends, "opaque depth") as depth,
+        ):
+            yield forms, depth
+
+    def walk_arguments(
+        self, forms: DeviceBuffer, ends: DeviceBuffer, *, has_ends: bool
+    ) -> tuple[Any, ...]:
+        """Return the arguments that every kernel which walks through the lists begins with."""
+        prepared, cutoff = self.prepared, self.options.transmittance_cutoff
+        return (
+            prepared.headers,
+            *prepared.lists,
+            np.int32(prepared.window[0]),
+            np.int32(prepared.window[1]),
+            np.float32(prepared.depth_origin),
+            forms,
+            np.int32(self.planes),
+            np.int32(self.size[0]),
+            np.int32(self.size[1]),
+            ends,
+            np.int32(has_ends),
+            np.float32(-math.log(cutoff) if self.segments else cutoff),
+            prepared.occupancy.masks,
+            np.float32(prepared.occupancy.first_depth),
+            np.float32(prepared.occupancy.slabs_per_depth),
+            *self.cropped.arguments,
+        )
+
+
+def _viewport_planes(
+    prepared: PreparedVDI, coordinates: list[NDArray[np.float64]]
+) -> list[NDArray[np.float64]]:
+    """Return forms that keep what is in V_O's viewport and in front of its eye."""
+    u, v, _, denominator = coordinates
+    wide, high = prepared.window[0] / 2, prepared.window[1] / 2
+    sides = [u, -u, v, -v]
+    forms = [s + e * denominator for s, e in zip(sides, (wide, wide, high, high), strict=True)]
+    if not prepared.parallel:
+        front = denominator.copy()
+        front[0] -= prepared.nearest
+        forms.append(front)
+    return forms

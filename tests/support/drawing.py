@@ -1,0 +1,66 @@
+"""The engine's pictures, depths and picks, with options by name as for the public functions."""
+
+from __future__ import annotations
+
+from pyvista_vdi.model.options import MediumOptions
+from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
+from pyvista_vdi.raycasting import multi_vdi, picking, placed, raycast
+from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
+from pyvista_vdi.volume import render
+
+#: What frames take beside options.
+_OF_FRAMES = ("opaque_depth", "device", "out")
+
+
+def frame(vdi, camera, size=None, **options):
+    """The request of a frame, by default of the VDI's own size."""
+    others = {name: options.pop(name) for name in _OF_FRAMES if name in options}
+    size = vdi.window_size if size is None else size
+    return FrameRequest(camera, size, RenderOptions(**options), **others)
+
+
+def render_vdi(vdi, camera, size=None, **options):
+    """The picture of a VDI."""
+    return raycast.render_vdi(vdi, frame(vdi, camera, size, **options))
+
+
+def render_first_hits(
+    vdi, camera, size=None, *, opacity_threshold=DEFAULT_OPACITY, accumulated=True, **options
+):
+    """The depths of first hits."""
+    hit = FirstHit.of(opacity_threshold, accumulated)
+    return raycast.render_first_hits(vdi, frame(vdi, camera, size, **options), hit)
+
+
+def pick_vdi(
+    vdi, camera, pixel, size=None, *, opacity_threshold=DEFAULT_OPACITY, accumulated=True, **options
+):
+    """What a pixel shows."""
+    hit = FirstHit.of(opacity_threshold, accumulated)
+    return picking.pick_vdi(vdi, frame(vdi, camera, size, **options), pixel, hit)
+
+
+def draw(prepared, camera, size, image, *, first_hit=None, **options):
+    """Draw a frame of a prepared VDI into an image on the device."""
+    raycast.draw(prepared, frame(None, camera, size, **options), image, first_hit)
+
+
+def render_vdis(vdis, camera, size, *, opaque_depth=None, device=None, **options):
+    """The picture of several VDIs."""
+    request = FrameRequest(camera, size, opaque_depth=opaque_depth, device=device)
+    return multi_vdi.render_vdis(placed.placed_vdis(vdis, camera, **options), request)
+
+
+def owned_image(members, size, *, margin=0.0, opaque_depth=None, device=None):
+    """The picture of several placed VDIs, and to which each pixel belongs."""
+    request = FrameRequest(members[0].camera, size, opaque_depth=opaque_depth, device=device)
+    return multi_vdi.owned_image(members, request, margin=margin)
+
+
+def raycast_volume(volume, camera, size, transfer_function, *, early_termination=True, **options):
+    """The picture of a volume."""
+    names = MediumOptions.__dataclass_fields__
+    sampling = {name: options.pop(name) for name in names if name in options}
+    cutoff = TRANSMITTANCE_CUTOFF if early_termination else 0.0
+    request = frame(None, camera, size, transmittance_cutoff=cutoff, **options)
+    return render.raycast_volume(volume, transfer_function, request, MediumOptions(**sampling))
