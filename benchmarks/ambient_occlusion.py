@@ -25,7 +25,7 @@ from pyvista_vdi import AmbientOcclusion
 from pyvista_vdi.api import render, render_volume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.report import write_text
+from pyvista_vdi.measure.report import table, write_text
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
@@ -66,7 +66,7 @@ def main() -> int:
     width, height = options.size
     target = options.out / f"ambient_occlusion_{width}x{height}.json"
     save(results, target)
-    write_text(target.with_suffix(".md"), "\n".join([*table(results), ""]))
+    write_text(target.with_suffix(".md"), "\n".join([*described(results), ""]))
     return 0
 
 
@@ -168,24 +168,20 @@ def ssim(
     return found
 
 
-def table(results: dict[str, Any]) -> list[str]:
+def described(results: dict[str, Any]) -> list[str]:
     """Return the rows as Markdown."""
     width, height = results["window_size"]
-    lines = [
-        f"{width} x {height}, linear, N_S 20, the default occlusion, {results['device']}.",
-        LEGEND,
-        "",
-        "| volume | look | A | rms | mean | anew | kept | SSIM 0° | 5° | 30° |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-    ]
+    head = f"{width} x {height}, linear, N_S 20, the default occlusion, {results['device']}."
+    heads = ["volume", "look", "A", "rms", "mean", "anew", "kept", "SSIM 0°", "5°", "30°"]
+    rows = []
     for row in results["rows"]:
         cells = [row["volume"], row["transfer_function"]]
         cells += [f"{row['open']:.3f}", f"{row['rms']:.3f}", f"{row['mean']:+.3f}"]
         cells += [f"{row['anew_ratio']:.2f}", f"{row['kept_ratio']:.2f}"]
         pairs = zip(row["ssim"], row["plain_ssim"], strict=True)
         cells += [f"{with_it:.4f} ({without:.4f})" for with_it, without in pairs]
-        lines.append("| " + " | ".join(cells) + " |")
-    return lines
+        rows.append(cells)
+    return [head, LEGEND, "", *table(heads, rows)]
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ from pyvista_vdi import examples
 from pyvista_vdi.api import render, render_volume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.report import write_text
+from pyvista_vdi.measure.report import table, write_text
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.metrics import compare_images
@@ -218,7 +218,7 @@ def tables(cases: dict[str, Case], size: tuple[int, int]) -> list[str]:
         "each. Error: predicted less true SSIM, so that positive ones are too hopeful. What is",
         "calibrated is fitted to the other volumes.",
         "",
-        *_table(
+        *table(
             ("predictions of", "n", "mean", "90 %", "most hopeful", "least", "bias"),
             [
                 ("all rungs", *_summary(errors)),
@@ -238,7 +238,7 @@ def tables(cases: dict[str, Case], size: tuple[int, int]) -> list[str]:
         "",
         "**The worst predictions**",
         "",
-        *_table(
+        *table(
             ("case", "lists", "N_S", "true", "predicted", "error"),
             [
                 (
@@ -255,7 +255,7 @@ def tables(cases: dict[str, Case], size: tuple[int, int]) -> list[str]:
         "",
         "**What a quality gives**: the true SSIM of the rung that is chosen",
         "",
-        *_table(
+        *table(
             ("quality", "asked", "cases", "true: mean", "least", "short of it by most", "reached"),
             [_of_quality(name, goal, rows) for name, goal in QUALITIES.items() if goal is not None],
         ),
@@ -263,7 +263,7 @@ def tables(cases: dict[str, Case], size: tuple[int, int]) -> list[str]:
         "**Bytes and frames**, predicted over true. A frame's time is over one of the rough VDI,",
         f"in the process's CPU time, for {len(_timed(cases, size))} rungs of some cases.",
         "",
-        *_table(
+        *table(
             ("of", "median", "5 %", "95 %"),
             [
                 ("bytes on the device", *_spread([row["bytes"] for row in rows])),
@@ -407,11 +407,6 @@ def _fitted(cases: dict[str, Case], size: tuple[int, int]) -> list[str]:
         f"Fitted to all volumes: EXPONENT ({a:.2f}, {b:.2f}), FRAME_COST ({c:.2f}, {d:.2f});",
         f"in use: {EXPONENT} and {FRAME_COST}.",
     ]
-
-
-def _table(heads: tuple[str, ...], rows: list[tuple[Any, ...]]) -> list[str]:
-    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
-    return lines + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ from tqdm import tqdm
 from pyvista_vdi import examples
 from pyvista_vdi.api import render
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.report import describe_system
+from pyvista_vdi.measure.report import describe_system, new_figure, save_figure
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.frame_rate import FLOOR, RECENT_FRAMES, FrameRateController
@@ -234,14 +234,10 @@ def turns(samples: Iterable[float]) -> int:
 
 def write_plot(results: dict[str, Any], target: Path) -> None:
     """Plot times with the target's band above, pixels and angle below."""
-    import matplotlib as mpl
-
-    mpl.use("agg")
-    import matplotlib.pyplot as plt
-
     frames, limits = results["frames"], results["limits"]
     period, threshold = 1e3 / results["target_fps"], results["threshold"]
-    times, pixels = plt.subplots(2, 1, figsize=(9, 6), sharex=True)[1]
+    figure = new_figure((9, 6))
+    times, pixels = figure.subplots(2, 1, sharex=True)
     times.axhspan(
         period / (1 + threshold), period / (1 - threshold), color="C2", alpha=0.25, label="target"
     )
@@ -258,10 +254,8 @@ def write_plot(results: dict[str, Any], target: Path) -> None:
     angle = pixels.twinx()
     angle.plot([frame["azimuth"] for frame in frames], color="C1", linewidth=1)
     angle.set_ylabel("azimuth from V_O, degrees", color="C1")
-    figure = times.figure
     figure.tight_layout()
-    figure.savefig(target, dpi=90)
-    plt.close(figure)
+    save_figure(figure, target, 90)
 
 
 if __name__ == "__main__":

@@ -41,6 +41,7 @@ from tqdm import tqdm
 from pyvista_vdi.api import render_volume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.clock import take_turns
 from pyvista_vdi.measure.compare.bounds import FRAME_RATIO_ANGLE
 from pyvista_vdi.measure.report import describe_system, write_text
 from pyvista_vdi.measure.vtk_baselines import MAPPERS, VTKBaseline, add_volume_property
@@ -138,21 +139,13 @@ def measured(subject: Subject, options: argparse.Namespace) -> dict[str, Any]:
             peer = VTKBaseline(volume, prop, options.size, mapper, voxel)
             stack.callback(peer.close)
             candidates[mapper] = partial(peer.render, turned)
-        seconds = in_turns(candidates, options.repeats)
+        clocks = {"wall": time.perf_counter, "cpu": time.process_time}
+        taken = take_turns(candidates, options.repeats, clocks=clocks)
+    seconds: Seconds = {
+        name: [{"wall": w, "cpu": c} for w, c in zip(t["wall"], t["cpu"], strict=True)]
+        for name, t in taken.items()
+    }
     return {"seconds": seconds, "ratios": {name: ratio(seconds, name) for name in RATIOS}}
-
-
-def in_turns(candidates: dict[str, Callable[[], object]], repeats: int) -> Seconds:
-    """Time candidates in turns, after one turn that is not counted."""
-    taken: Seconds = {name: [] for name in candidates}
-    for turn in range(repeats + 1):
-        for name, candidate in candidates.items():
-            wall, cpu = time.perf_counter(), time.process_time()
-            candidate()
-            if turn:
-                spent = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
-                taken[name].append(spent)
-    return taken
 
 
 def ratio(seconds: Seconds, name: str) -> dict[str, float]:

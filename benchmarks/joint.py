@@ -11,9 +11,6 @@ wall clock) are printed as ratios. See README.md in this folder.
 from __future__ import annotations
 
 import argparse
-import statistics
-import time
-from collections.abc import Callable
 
 import numpy as np
 from common import (  # beside this file
@@ -21,6 +18,7 @@ from common import (  # beside this file
     add_size,
     add_vdi_cache,
     new_parser,
+    timed,
     vdi_of,
 )
 from numpy.typing import NDArray
@@ -60,23 +58,15 @@ def main() -> None:
                 device=options.device,
             )
 
-        (cpu, wall), (joint_cpu, joint_wall) = times([single, joint], options.repeats)
-        print(f"| {angle:g} | {joint_cpu / cpu:.2f} | {joint_wall / wall:.2f} | {1e3 * cpu:.0f} |")
-
-
-def times(candidates: list[Callable[[], None]], repeats: int) -> list[tuple[float, float]]:
-    """Return the median CPU and wall time of each, taken in turns after one that is not counted."""
-    taken: list[list[tuple[float, float]]] = [[] for _ in candidates]
-    for repeat in range(repeats + 1):
-        for candidate, runs in zip(candidates, taken, strict=True):
-            cpu, wall = time.process_time(), time.perf_counter()
-            candidate()
-            if repeat:
-                runs.append((time.process_time() - cpu, time.perf_counter() - wall))
-    return [
-        (statistics.median(c for c, _ in runs), statistics.median(w for _, w in runs))
-        for runs in taken
-    ]
+        for way in (single, joint):  # not counted
+            way()
+        times = timed({"single": single, "joint": joint}, options.repeats)
+        cpu, wall = (
+            [times[way][clock]["median"] for way in ("single", "joint")]
+            for clock in ("cpu", "wall")
+        )
+        ratios = f"{cpu[1] / cpu[0]:.2f} | {wall[1] / wall[0]:.2f}"
+        print(f"| {angle:g} | {ratios} | {1e3 * cpu[0]:.0f} |")
 
 
 def beside(first: VDI, second: VDI) -> NDArray[np.float64]:

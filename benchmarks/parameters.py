@@ -23,7 +23,7 @@ from tqdm import tqdm
 
 from pyvista_vdi.api import render, render_volume
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.report import write_text
+from pyvista_vdi.measure.report import table, write_text
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -63,7 +63,7 @@ def main() -> int:
         "rows": rows,
     }
     save(results, target)
-    write_text(target.with_suffix(".md"), "\n".join([*table(results), ""]))
+    write_text(target.with_suffix(".md"), "\n".join([*described(results), ""]))
     return 0
 
 
@@ -107,7 +107,7 @@ def generated(
     return generate_vdi(volume, view, window, classified, **arguments)
 
 
-def table(results: dict[str, Any]) -> list[str]:
+def described(results: dict[str, Any]) -> list[str]:
     """Return the rows as Markdown."""
     width, height = results["window_size"]
     looks = f"transfer function {results['transfer_function']}, `{results['interpolation']}`"
@@ -115,15 +115,15 @@ def table(results: dict[str, Any]) -> list[str]:
         f"{width} x {height}, {looks}; default: 20 supersegments, tolerance 0, view cone 60,",
         "one list per pixel of the frame.",
         "",
-        "| volume | changed | per list | MiB | SSIM 5° | 30° | 60° | brightness 5° | 30° | 60° |",
-        "|---|---|---|---|---|---|---|---|---|---|",
     ]
+    heads = ("volume", "changed", "per list", "MiB", "SSIM 5°", "30°", "60°", "brightness 5°")
+    rows = []
     for row in results["rows"]:
         changed = ", ".join(f"{k} = {v:g}" for k, v in row["variant"].items()) or "nothing"
         cells = [row["volume"], changed, f"{row['per_list']:.1f}", f"{row['bytes'] / 2**20:.1f}"]
         cells += [f"{value:.4f}" for value in (*row["ssim"], *row["brightness"])]
-        lines.append("| " + " | ".join(cells) + " |")
-    return lines
+        rows.append(cells)
+    return [*lines, *table((*heads, "30°", "60°"), rows)]
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ from tqdm import tqdm
 from pyvista_vdi.api import render_volume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.report import describe_system, write_text
+from pyvista_vdi.measure.report import describe_system, new_figure, save_figure, write_text
 from pyvista_vdi.measure.session import enlarged
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
@@ -264,15 +264,9 @@ def report(results: dict[str, Any]) -> str:
 
 def write_plot(results: dict[str, Any], target: Path) -> None:
     """Plot SSIM over speed, a panel per volume."""
-    import matplotlib as mpl
-
-    mpl.use("agg")
-    import matplotlib.pyplot as plt
-
     volumes = list(dict.fromkeys(row["volume"] for row in results["rows"]))
-    figure, axes = plt.subplots(
-        1, len(volumes), figsize=(3.2 * len(volumes), 3.4), sharey=True, squeeze=False
-    )
+    figure = new_figure((3.2 * len(volumes), 3.4))
+    axes = figure.subplots(1, len(volumes), sharey=True, squeeze=False)
     for panel, volume in zip(axes[0], volumes, strict=True):
         rows = [row for row in results["rows"] if row["volume"] == volume]
         for way in dict.fromkeys(row["way"] for row in rows[1:]):
@@ -287,7 +281,7 @@ def write_plot(results: dict[str, Any], target: Path) -> None:
     axes[0][0].set_ylabel("SSIM to the full frame")
     axes[0][-1].legend(fontsize="small")
     figure.tight_layout()
-    figure.savefig(target, dpi=110)
+    save_figure(figure, target)
 
 
 if __name__ == "__main__":

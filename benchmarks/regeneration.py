@@ -28,7 +28,7 @@ from tqdm import tqdm
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.report import describe_system
+from pyvista_vdi.measure.report import describe_system, new_figure, save_figure
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -278,14 +278,9 @@ def report(results: dict[str, Any]) -> None:
 
 def write_plot(results: dict[str, Any], target: Path) -> None:
     """Plot the frames of each volume's last round, over the undisturbed median."""
-    import matplotlib as mpl
-
-    mpl.use("agg")
-    import matplotlib.pyplot as plt
-
     volumes = results["volumes"]
-    size = (9, 1 + 1.6 * len(volumes))
-    figure, axes = plt.subplots(len(volumes), 1, figsize=size, squeeze=False)
+    figure = new_figure((9, 1 + 1.6 * len(volumes)))
+    axes = figure.subplots(len(volumes), 1, squeeze=False)
     for axis, (name, volume) in zip(axes[:, 0], volumes.items(), strict=True):
         last = volume["rounds"][-1]
         undisturbed = statistics.median(last["before"])
@@ -297,8 +292,7 @@ def write_plot(results: dict[str, Any], target: Path) -> None:
         axis.set(ylabel=f"{name}\nframe / undisturbed", ylim=(0, None))
     axes[-1, 0].set_xlabel("seconds since the generation began; red: the new VDI's first frame")
     figure.tight_layout()
-    figure.savefig(target, dpi=90)
-    plt.close(figure)
+    save_figure(figure, target, 90)
 
 
 if __name__ == "__main__":

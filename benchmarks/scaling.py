@@ -36,11 +36,17 @@ from tqdm import tqdm
 
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.io import whole_file
 from pyvista_vdi.measure.clock import take_turns
 from pyvista_vdi.measure.paper import find_dataset
 from pyvista_vdi.measure.paper.procedural import PROCEDURAL
-from pyvista_vdi.measure.report import describe_system, system_line, table, write_text
+from pyvista_vdi.measure.report import (
+    describe_system,
+    new_figure,
+    save_figure,
+    system_line,
+    table,
+    write_text,
+)
 from pyvista_vdi.measure.session import VDIRenderer
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -493,12 +499,8 @@ def _exponent(fit: Fit | None) -> str:
 
 def write_plot(results: Mapping[str, Any], target: Path) -> None:
     """Write a panel per axis, cost by what is changed, both logarithmic, with the fits."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     names = [name for name in AXES if name in results["axes"]]
-    figure = Figure(figsize=(3.4 * len(names), 3.6), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure((3.4 * len(names), 3.6), layout="constrained")
     panels = figure.subplots(1, len(names), squeeze=False)[0]
     for panel, name in zip(panels, names, strict=True):
         axis, rows = AXES[name], results["axes"][name]
@@ -523,8 +525,7 @@ def write_plot(results: Mapping[str, Any], target: Path) -> None:
         if found:
             panel.legend(fontsize="small")
     panels[0].set_ylabel("ms")
-    with whole_file(target) as stream:
-        figure.savefig(stream, dpi=110, format="png")
+    save_figure(figure, target)
 
 
 def _short(value: float) -> str:

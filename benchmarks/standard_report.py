@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.measure.compare.bounds import CONVERGED_STEPS, SSIM_FROM_NEW_VIEWS
+from pyvista_vdi.measure.report import new_figure, save_figure
 
 Results = dict[str, Any]
 
@@ -55,18 +56,12 @@ def write_tables(results: Results, target: Path) -> None:
 
 def write_plot(results: Results, target: Path) -> None:
     """Plot 1 - SSIM of the VDI from new views, a row per angle and a column per interpolation."""
-    import matplotlib as mpl
-
-    mpl.use("agg")
-    import matplotlib.pyplot as plt
-
     columns = {i: _cases(results, "accuracy", i) for i in ("nearest", "linear")}
     columns = {name: cases for name, cases in columns.items() if cases}
     if not columns:
         return
-    figure, axes = plt.subplots(
-        2, len(columns), figsize=(5.5 * len(columns), 7), sharey=True, squeeze=False
-    )
+    figure = new_figure((5.5 * len(columns), 7))
+    axes = figure.subplots(2, len(columns), sharey=True, squeeze=False)
     for column, (interpolation, cases) in enumerate(columns.items()):
         names = sorted({entry["case"]["volume"] for entry in cases})
         for row, angle in enumerate((5.0, 30.0)):
@@ -76,8 +71,7 @@ def write_plot(results: Results, target: Path) -> None:
     for row in axes:
         row[0].set_ylabel("1 - SSIM")
     figure.tight_layout()
-    figure.savefig(target, dpi=90)
-    plt.close(figure)
+    save_figure(figure, target, 90)
 
 
 def _plot_panel(axes: Any, cases: list[Any], names: list[str], angle: float) -> None:

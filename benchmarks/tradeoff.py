@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from pyvista_vdi.cli import main as command
-from pyvista_vdi.io import whole_file
+from pyvista_vdi.measure.report import across, table, write_text
 from pyvista_vdi.measure.tradeoff import Point, Tradeoff
 from pyvista_vdi.measure.tradeoff.findings import faster_vtk
 
@@ -73,8 +73,7 @@ def main() -> int:
         ("tradeoff_settings", beside_the_default(swept)),
         ("tradeoff_angles", by_angle(angles)),
     ):
-        with whole_file(options.out / f"{stem}.md") as stream:
-            stream.write(("\n".join(lines) + "\n").encode())
+        write_text(options.out / f"{stem}.md", "\n".join(lines) + "\n")
     return failed
 
 
@@ -87,29 +86,29 @@ def beside_the_default(found: dict[str, Tradeoff]) -> Iterator[str]:
     angles = first.data["plan"]["angles"]
     yield f"Each cell: {names}. SSIM: the change in thousandths; the others: over the default's."
     yield ""
-    titles = [f"SSIM {angle:g}°" for angle in angles]
-    yield _row("setting", *titles, "frame", "bytes on the device", "in the file", "generation")
-    yield "|" + "---|" * (5 + len(angles))
+    kinds = {
+        "frame": "frame",
+        "memory": "bytes on the device",
+        "file": "in the file",
+        "generation": "generation",
+    }
+    rows = []
     for name in (one.name for one in first.points if one.name != "default"):
         pairs = [
             (one.point(name), one.point("default"))
             for one in found.values()
             if name in {point.name for point in one.points}
         ]
-        yield _row(
-            name,
-            *(
-                ", ".join(
-                    f"{round(1e3 * (a.ssims[angle] - b.ssims[angle]), 1) + 0.0:+.1f}"
-                    for a, b in pairs
-                )
-                for angle in angles
-            ),
-            *(
-                ", ".join(_ratio(a, b, kind) for a, b in pairs)
-                for kind in ("frame", "memory", "file", "generation")
-            ),
+        changes = (
+            ", ".join(
+                f"{round(1e3 * (a.ssims[angle] - b.ssims[angle]), 1) + 0.0:+.1f}" for a, b in pairs
+            )
+            for angle in angles
         )
+        costs = (", ".join(_ratio(a, b, kind) for a, b in pairs) for kind in kinds)
+        rows.append([name, *changes, *costs])
+    titles = [f"SSIM {angle:g}°" for angle in angles]
+    yield from table(("setting", *titles, *kinds.values()), rows)
 
 
 def by_angle(found: dict[str, Tradeoff]) -> Iterator[str]:
@@ -117,33 +116,28 @@ def by_angle(found: dict[str, Tradeoff]) -> Iterator[str]:
     if not found:
         return
     angles = next(iter(found.values())).data["plan"]["angles"]
+    degrees = [f"{angle:g}°" for angle in angles]
     for title, with_vtk in (("`render_volume`", False), ("the faster of VTK's mappers", True)):
         yield f"**Frames of the default VDI over {title}**"
         yield ""
-        yield _row("volume", "size", *(f"{angle:g}°" for angle in angles))
-        yield "|" + "---|" * (2 + len(angles))
+        rows = []
         for name, one in found.items():
             others = faster_vtk(one.data) if with_vtk else dict.fromkeys(angles, 1.0)
             frames = one.point("default").frames
-            size = " x ".join(str(n) for n in one.data["plan"]["volume"]["dimensions"])
-            yield _row(name, size, *(f"{frames[a] / others[a]:.2f}" for a in angles))
+            size = across(one.data["plan"]["volume"]["dimensions"], " x ")
+            rows.append([name, size, *(f"{frames[a] / others[a]:.2f}" for a in angles)])
+        yield from table(("volume", "size", *degrees), rows)
         yield ""
     yield "**SSIM of the default VDI to `render_volume`**"
     yield ""
-    yield _row("volume", *(f"{angle:g}°" for angle in angles))
-    yield "|" + "---|" * (1 + len(angles))
-    for name, one in found.items():
-        ssims = one.point("default").ssims
-        yield _row(name, *(f"{ssims[angle]:.4f}" for angle in angles))
+    ssims = {name: one.point("default").ssims for name, one in found.items()}
+    rows = [[name, *(f"{of_one[a]:.4f}" for a in angles)] for name, of_one in ssims.items()]
+    yield from table(("volume", *degrees), rows)
 
 
 def _ratio(one: Point, default: Point, kind: str) -> str:
     a, b = one.cost(kind), default.cost(kind)
     return "-" if a is None or b is None else f"{a / b:.2f}"
-
-
-def _row(*cells: str) -> str:
-    return "| " + " | ".join(cells) + " |"
 
 
 if __name__ == "__main__":

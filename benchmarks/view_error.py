@@ -36,7 +36,7 @@ from tqdm import tqdm
 
 from pyvista_vdi.api import render, render_volume
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.report import write_text
+from pyvista_vdi.measure.report import new_figure, save_figure, table, write_text
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -305,12 +305,13 @@ def decisions(rows: list[dict[str, Any]]) -> Iterator[str]:
     predictions = {name: 1 - predicted(rows, features) for name, features in PREDICTORS.items()}
     tiles = variant_name(DEFAULT)
     predictions[f"{tiles} tiles"] = np.array([row["estimates"][tiles][0] for row in rows])
-    yield "| SSIM at least | truly below | " + " | ".join(predictions) + " |"
-    yield "|---" * (2 + len(predictions)) + "|"
+    rows_below = []
     for bound in BOUNDS:
         wrong = [np.mean((guess < bound) != (true < bound)) for guess in predictions.values()]
-        cells = [f"{bound:g}", f"{np.mean(true < bound):.0%}", *(f"{w:.0%}" for w in wrong)]
-        yield "| " + " | ".join(cells) + " |"
+        rows_below.append(
+            [f"{bound:g}", f"{np.mean(true < bound):.0%}", *(f"{w:.0%}" for w in wrong)]
+        )
+    yield from table(("SSIM at least", "truly below", *predictions), rows_below)
 
 
 def row_of(name: str, errors: NDArray[Any], losses: NDArray[Any], held: Any) -> str:
@@ -335,12 +336,8 @@ def variant_name(variant: tuple[int, int]) -> str:
 
 def plot(rows: list[dict[str, Any]], target: Path) -> None:
     """Plot estimated over true 1 - SSIM: from tiles, and from the angle."""
-    import matplotlib as mpl
-
-    mpl.use("agg")
-    import matplotlib.pyplot as plt
-
-    figure, panels = plt.subplots(1, 2, figsize=(9, 4.4), sharex=True, sharey=True)
+    figure = new_figure((9, 4.4))
+    panels = figure.subplots(1, 2, sharex=True, sharey=True)
     some = telling(rows, "turned") + telling(rows, "moved")
     losses = np.array([1 - row["ssim"] for row in some])
     tiles = np.array([1 - row["estimates"][variant_name(DEFAULT)][0] for row in some])
@@ -360,8 +357,7 @@ def plot(rows: list[dict[str, Any]], target: Path) -> None:
     panels[0].set_ylabel("predicted 1 - SSIM")
     panels[0].legend(fontsize=8)
     figure.tight_layout()
-    figure.savefig(target, dpi=80)
-    plt.close(figure)
+    save_figure(figure, target, 80)
 
 
 if __name__ == "__main__":

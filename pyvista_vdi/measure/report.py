@@ -65,13 +65,13 @@ def section(title: str, *paragraphs: str) -> Iterator[str]:
         yield from (text, "")
 
 
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
     """Return the lines of a Markdown table."""
     return [_row(heads), "|" + "---|" * len(heads), *map(_row, rows)]
 
 
-def _row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+def _row(cells: Sequence[object]) -> str:
+    return f"| {' | '.join(map(str, cells))} |"
 
 
 def number(value: float | None, form: str) -> str:
@@ -122,10 +122,10 @@ def new_figure(size: tuple[float, float], **options: Any) -> Figure:
     return figure
 
 
-def save_figure(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path, dpi: int = 110) -> None:
     """Write a figure as PNG; the file appears whole or not at all."""
     with whole_file(path) as stream:
-        figure.savefig(stream, dpi=110, format="png")
+        figure.savefig(stream, dpi=dpi, format="png")
 
 
 def write_text(path: Path, text: str) -> None:
