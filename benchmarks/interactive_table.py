@@ -212,7 +212,7 @@ def _generation(
             )
         ]
 
-    medium = DeviceVolume(runtime, volume, function, step)
+    medium = DeviceVolume(runtime, volume, function, sample_distance=step)
 
     def raycast(size: tuple[int, int]) -> object:
         options = RenderOptions(transmittance_cutoff=0)

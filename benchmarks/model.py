@@ -548,7 +548,7 @@ def measured(name: str, options: argparse.Namespace, rates: Rates) -> dict[str, 
         **model.floor(hosted_work(vdi, runtime)),
         "seconds": taken[""],
     }
-    medium = DeviceVolume(runtime, volume, function, voxel)
+    medium = DeviceVolume(runtime, volume, function, sample_distance=voxel)
     taken = _kernels_and_rest(watch, lambda: raycast_medium(medium, FrameRequest(view, size)))
     stages["render_volume"] = {**model.volume_frame(view, voxel), "seconds": taken["kernels"]}
 

@@ -191,7 +191,7 @@ class Bench:
             device=self._runtime,
         )
         camera = view.azimuth(case.angle)
-        medium = DeviceVolume(self._runtime, volume, function, voxel)
+        medium = DeviceVolume(self._runtime, volume, function, sample_distance=voxel)
         steps: dict[str, Callable[[], object]] = {
             "VDI frame": partial(self._draw(case, generate).image, camera),
             "render_volume": partial(raycast_medium, medium, FrameRequest(view, case.size)),

@@ -86,15 +86,7 @@ def generate_vdi(
     require_room(0, size)
     runtime = get_runtime(device)
     slices = Slices(size, options)
-    medium = DeviceVolume(
-        runtime,
-        volume,
-        transfer_function,
-        options.sample_distance,
-        lights=options.lights,
-        ambient_occlusion=options.ambient_occlusion,
-        room=slices.room(volume),
-    )
+    medium = DeviceVolume(runtime, volume, transfer_function, options, room=slices.room(volume))
     with (
         medium.giving_bricks_back(),
         Records(runtime, medium, camera, size, slices, options) as records,

@@ -154,10 +154,12 @@ class Bench:
         self._runtime, self._volume, self._table, self._size = runtime, volume, table, size
         self.voxel = min(volume.spacing)
         self.step = self.voxel / 2
-        self._accurate = DeviceVolume(runtime, volume, table, self.step)
+        self._accurate = DeviceVolume(runtime, volume, table, sample_distance=self.step)
         self._timed = {
-            "volume": DeviceVolume(runtime, volume, table, self.voxel, skip_empty=False),
-            "volume_skipping": DeviceVolume(runtime, volume, table, self.voxel),
+            "volume": DeviceVolume(
+                runtime, volume, table, sample_distance=self.voxel, skip_empty=False
+            ),
+            "volume_skipping": DeviceVolume(runtime, volume, table, sample_distance=self.voxel),
         }
         self._references: dict[float, tuple[Image, dict[str, float] | None]] = {}
         self._baselines: dict[str, Any] = {}

@@ -8,6 +8,8 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -184,57 +186,56 @@ def _measurement(scene: Scene) -> Measurement:
     return measured
 
 
+@dataclass(frozen=True, eq=False)
 class Scene:
     """One volume, look, generating view, window and device, and the view that is judged."""
 
-    def __init__(
-        self,
-        volume: Volume,
-        camera: Camera,
-        window_size: tuple[int, int],
-        transfer_function: TransferFunction,
-        angle: float,
-        device: Any,
-        options: GenerationOptions,
-        progress: Progress | None = None,
-    ) -> None:
-        self._volume = volume
-        self._camera = camera
-        self._size = window_size
-        self._transfer_function = transfer_function
-        self._angle = angle
-        self._view = turned(camera, volume.bounds, angle)
-        self._runtime: Runtime = get_runtime(device)
-        self._options = options
-        self._progress = progress
+    volume: Volume
+    camera: Camera
+    window_size: tuple[int, int]
+    transfer_function: TransferFunction
+    angle: float
+    device: Any
+    options: GenerationOptions
+    progress: Progress | None = None
+
+    @cached_property
+    def view(self) -> Camera:
+        """The view that is judged."""
+        return turned(self.camera, self.volume.bounds, self.angle)
+
+    @cached_property
+    def runtime(self) -> Runtime:
+        """The device."""
+        return get_runtime(self.device)
 
     @property
     def key(self) -> Any:
         """Equal where a measurement would be equal, but for times."""
-        volume = self._volume
+        volume = self.volume
         return (
             hashlib.blake2b(np.ascontiguousarray(volume.array).data, digest_size=16).digest(),
             (volume.array.shape, volume.array.dtype.str),
             (volume.spacing, volume.origin, np.asarray(volume.direction).tobytes()),
-            (self._camera, self._size, self._transfer_function, self._angle),
-            self._options,
-            self._runtime.info.index,
+            (self.camera, self.window_size, self.transfer_function, self.angle),
+            self.options,
+            self.runtime.info.index,
         )
 
     def measure(self) -> Measurement:
         """Measure losses, lengths of lists and the time of a frame."""
         self._go_on()
         estimator = ViewErrorEstimator(
-            self._volume,
-            self._transfer_function,
-            self._options,
+            self.volume,
+            self.transfer_function,
+            self.options,
             tiles=TILES,
             tile_size=TILE_SIZE,
-            device=self._runtime,
+            device=self.runtime,
         )
         rough = self._whole(ROUGH)
         counts = np.bincount(rough.counts.reshape(-1), minlength=2)
-        tiles = estimator.sample(rough, self._view, self._size)
+        tiles = estimator.sample(rough, self.view, self.window_size)
         seconds = self._frame_seconds(rough)
         if tiles is None:
             return Measurement(0.0, 0.0, 0.0, counts, seconds)
@@ -252,52 +253,51 @@ class Scene:
         self, estimator: ViewErrorEstimator, tiles: TileSample, truth: list[NDArray[np.float32]]
     ) -> float:
         """Return the loss of the volume itself where V_O covers it, lit as V_O has it."""
-        sides = viewport_planes(self._camera, self._size)
-        world = self._camera.model_transform
-        corners = rays.corners(self._volume.bounds) @ world[:3, :3].T + world[:3, 3]
+        sides = viewport_planes(self.camera, self.window_size)
+        world = self.camera.model_transform
+        corners = rays.corners(self.volume.bounds) @ world[:3, :3].T + world[:3, 3]
         covered = all(((corners - side[:3]) @ side[3:]).min() >= 0 for side in sides)
-        if covered and self._transfer_function.shading is None:
+        if covered and self.transfer_function.shading is None:
             return 0.0
         shown = RenderOptions(clipping_planes=None if covered else sides)
         pictures = [
-            estimator.volume_tile(lens, tiles.size, shown, lit_from=self._camera)
+            estimator.volume_tile(lens, tiles.size, shown, lit_from=self.camera)
             for lens in self._lenses(tiles)
         ]
         return _loss(tiles, pictures, truth)
 
     def _go_on(self) -> None:
-        if self._progress is not None and self._progress(0.0) is False:
+        if self.progress is not None and self.progress(0.0) is False:
             raise Cancelled("choosing the settings of a VDI was cancelled")
 
     def _lenses(self, tiles: TileSample) -> list[Camera]:
         """Return the view that each tile has."""
         corners = tiles.corners.tolist()
-        return [self._view.tile(self._size, corner, tiles.size) for corner in corners]
+        return [self.view.tile(self.window_size, corner, tiles.size) for corner in corners]
 
     def _whole(self, setting: Setting) -> VDI:
-        return self._generated(self._camera, setting.window_size(self._size), setting)
+        return self._generated(self.camera, setting.window_size(self.window_size), setting)
 
     def _generated(self, camera: Camera, size: tuple[int, int], setting: Setting) -> VDI:
         return generate_vdi(
-            self._volume,
+            self.volume,
             camera,
             size,
-            self._transfer_function,
-            setting.applied_to(self._options),
-            device=self._runtime,
+            self.transfer_function,
+            setting.applied_to(self.options),
+            device=self.runtime,
         )
 
     def _pictures(
         self, tiles: TileSample, setting: Setting, whole: VDI | None
     ) -> list[NDArray[np.float32]]:
         """Return the tiles' pictures, by the whole VDI if there is one, or else as is cheaper."""
-        window = setting.window_size(self._size)
+        window = setting.window_size(self.window_size)
         lenses = self._lenses(tiles)
         if whole is not None:
             return [render_vdi(whole, self._frame(lens, tiles.size)) for lens in lenses]
         met = [
-            lists_met(lens, tiles.size, self._volume.bounds, self._camera, window)
-            for lens in lenses
+            lists_met(lens, tiles.size, self.volume.bounds, self.camera, window) for lens in lenses
         ]
         parts = [math.prod(part[1]) + _PART_OVERHEAD for part in met if part is not None]
         # Where the parts together cost more than the whole, the whole is made
@@ -309,19 +309,19 @@ class Scene:
                 pictures.append(np.zeros((*tiles.size[::-1], 4), np.float32))
                 continue
             corner, size = part
-            vdi = self._generated(self._camera.tile(window, corner, size), size, setting)
+            vdi = self._generated(self.camera.tile(window, corner, size), size, setting)
             pictures.append(render_vdi(vdi, self._frame(lens, tiles.size)))
         return pictures
 
     def _frame(self, camera: Camera, size: tuple[int, int]) -> FrameRequest:
-        return FrameRequest(camera, size, device=self._runtime)
+        return FrameRequest(camera, size, device=self.runtime)
 
     def _frame_seconds(self, vdi: VDI) -> float:
         """Return the shortest time of a few full frames, seconds."""
         seconds = []
         for _ in range(_FRAMES):
             start = time.perf_counter()
-            render_vdi(vdi, self._frame(self._view, self._size))
+            render_vdi(vdi, self._frame(self.view, self.window_size))
             seconds.append(time.perf_counter() - start)
         return max(min(seconds), 1e-9)
 

@@ -212,15 +212,8 @@ class ViewErrorEstimator:
         self._edge = _whole("tile_size", tile_size, SSIM_WINDOW) - 2 * REACH
         self._runtime = get_runtime(device)
         edge = max(int(tile_size), math.isqrt(2 * _COARSE_LAUNCH))  # of what is rendered at a time
-        self._medium = DeviceVolume(
-            self._runtime,
-            volume,
-            transfer_function,
-            options.sample_distance,
-            lights=options.lights,
-            ambient_occlusion=options.ambient_occlusion,
-            room=picture_room((edge, edge), options.memory_limit),
-        )
+        room = picture_room((edge, edge), options.memory_limit)
+        self._medium = DeviceVolume(self._runtime, volume, transfer_function, options, room=room)
 
     def estimate(
         self,
@@ -275,21 +268,15 @@ class ViewErrorEstimator:
         """
         camera = Camera.from_any(camera)
         size = check_window_size(vdi.window_size if window_size is None else window_size)
-        scene = _Scene(
-            self,
-            vdi,
-            camera,
-            size,
-            _of_window("picture", picture, (*size[::-1], 4)),
-            _of_window("opaque_depth", opaque_depth, size[::-1]),
-            RenderOptions(clipping_planes, cropping, opacity_multiplier),
-            background,
-            pause,
-        )
+        shown = RenderOptions(clipping_planes, cropping, opacity_multiplier)
+        depth = _of_window("opaque_depth", opaque_depth, size[::-1])
+        request = FrameRequest(camera, size, shown, depth, self._runtime)
+        picture = _of_window("picture", picture, (*size[::-1], 4))
+        scene = _Scene(self._medium, vdi, request, picture, background, pause)
         where = (angle_from_generating_view(vdi, camera), magnification(vdi, camera, size))
         if min(size) < SSIM_WINDOW:
             return ViewError(math.nan, math.nan, *where, 0)
-        tiles = self._sample(scene, vdi, camera, size)
+        tiles = self._sample(scene)
         if tiles is None:
             return ViewError(1.0, 0.0, *where, 0)
         ssim = scene.tiles_ssim(tiles.corners, tiles.size)
@@ -312,9 +299,8 @@ class ViewErrorEstimator:
         TileSample or None
             ``None`` where the volume is not in view.
         """
-        shown = RenderOptions()
-        scene = _Scene(self, vdi, camera, window_size, None, None, shown, (0.0, 0.0, 0.0), None)
-        return self._sample(scene, vdi, camera, window_size)
+        request = FrameRequest(camera, window_size, device=self._runtime)
+        return self._sample(_Scene(self._medium, vdi, request))
 
     def volume_tile(
         self,
@@ -328,10 +314,9 @@ class ViewErrorEstimator:
         frame = FrameRequest(lens, tile_size, shown or RenderOptions())
         return raycast_medium(self._medium, frame, lit_from=lit_from)
 
-    def _sample(
-        self, scene: _Scene, vdi: VDI, camera: Camera, size: tuple[int, int]
-    ) -> TileSample | None:
-        region = seen_region(camera, size, (vdi.bounds, self._medium.volume.bounds))
+    def _sample(self, scene: _Scene) -> TileSample | None:
+        camera, size = scene.request.camera, scene.request.size
+        region = seen_region(camera, size, (scene.vdi.bounds, self._medium.volume.bounds))
         if region is None:
             return None
         cells = Cells(region, size, self._edge)
@@ -340,31 +325,16 @@ class ViewErrorEstimator:
         return cells.sample(guess, self._tiles)
 
 
+@dataclass(frozen=True, eq=False)
 class _Scene:
     """One view of both, of which parts are rendered."""
 
-    def __init__(
-        self,
-        estimator: ViewErrorEstimator,
-        vdi: VDI,
-        camera: Camera,
-        size: tuple[int, int],
-        picture: NDArray[Any] | None,
-        opaque_depth: NDArray[Any] | None,
-        shown: RenderOptions,
-        background: Sequence[float],
-        pause: Pause | None,
-    ) -> None:
-        self._runtime = estimator._runtime
-        self._medium = estimator._medium
-        self._vdi = vdi
-        self._camera = camera
-        self._size = size
-        self._picture = picture
-        self._opaque_depth = opaque_depth
-        self._shown = shown  # what both pictures leave out, or show otherwise
-        self._background = background
-        self._pause = pause
+    medium: DeviceVolume
+    vdi: VDI
+    request: FrameRequest  # of the whole view
+    picture: NDArray[Any] | None = None
+    background: Sequence[float] = (0.0, 0.0, 0.0)
+    pause: Pause | None = None
 
     def coarse(self, region: Region) -> tuple[Floats, Floats]:
         """Return coarse pictures of a region by VDI and volume, float64 (rows, columns, 3)."""
@@ -373,17 +343,22 @@ class _Scene:
         # The last may lie beyond the window, which has no depth and no picture there
         across, down = (
             np.minimum(first + COARSE * np.arange(n) + COARSE // 2, edge - 1)
-            for first, n, edge in zip(region.first, (columns, rows), self._size, strict=True)
+            for first, n, edge in zip(region.first, (columns, rows), self.request.size, strict=True)
         )
         bands = []
         band = max(1, _COARSE_LAUNCH // columns)
         for row in range(0, rows, band):
             n = min(band, rows - row)
             corner = (left, top + row * COARSE)
-            lens = self._camera.tile(self._size, corner, (columns * COARSE, n * COARSE))
+            lens = self.request.camera.tile(
+                self.request.size, corner, (columns * COARSE, n * COARSE)
+            )
             part = np.ix_(down[row : row + n], across)
             bands.append(self._both(lens, (columns, n), part))
-        old, new = (self._blended(np.concatenate(b)) for b in zip(*bands, strict=True))
+        old, new = (
+            over_background(np.concatenate(band), self.background)
+            for band in zip(*bands, strict=True)
+        )
         return old, new
 
     def tiles_ssim(self, corners: NDArray[np.int64], tile_size: tuple[int, int]) -> Floats:
@@ -391,32 +366,31 @@ class _Scene:
         width, height = tile_size
         pairs = []
         for column, row in corners.tolist():
-            lens = self._camera.tile(self._size, (column, row), tile_size)
+            lens = self.request.camera.tile(self.request.size, (column, row), tile_size)
             part = np.s_[row : row + height, column : column + width]
             pairs.append(self._both(lens, tile_size, part))
         old, new = zip(*pairs, strict=True)
-        return tiles_ssim(old, new, self._background)
+        return tiles_ssim(old, new, self.background)
 
     def _both(
         self, lens: Camera, size: tuple[int, int], part: Any
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """The pixels ``part`` of the window, seen through ``lens``, by VDI and volume."""
-        depth = None if self._opaque_depth is None else self._opaque_depth[part]
-        request = FrameRequest(lens, size, self._shown, depth, self._runtime)
-        if self._picture is not None:
-            of_vdi = self._picture[part]
+        depth: Any = self.request.opaque_depth
+        request = self.request.replace(
+            camera=lens, size=size, opaque_depth=None if depth is None else depth[part]
+        )
+        if self.picture is not None:
+            of_vdi = self.picture[part]
         else:
             self._wait()
-            of_vdi = render_vdi(self._vdi, request)
+            of_vdi = render_vdi(self.vdi, request)
         self._wait()
-        return of_vdi, raycast_medium(self._medium, request)
+        return of_vdi, raycast_medium(self.medium, request)
 
     def _wait(self) -> None:
-        if self._pause is not None and self._pause() is False:
+        if self.pause is not None and self.pause() is False:
             raise Cancelled("the estimate of a view's error was cancelled")
-
-    def _blended(self, picture: NDArray[np.float32]) -> Floats:
-        return over_background(picture, self._background)
 
 
 def _towards_eye(camera: Camera, bounds: Sequence[float]) -> Floats:

@@ -20,7 +20,7 @@ from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.float32_limits import MOST_STEPS, compensation, entries, held_unit_distance
-from pyvista_vdi.model.lighting import Lights
+from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import Planes
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
@@ -97,17 +97,15 @@ class DeviceVolume:
         Uploaded once per device and kept as long as the object lives.
     transfer_function : TransferFunction
         Its table is uploaded each time: a few kilobytes.
-    sample_distance : float, optional
-        Length of a step, model units; half the smallest spacing by default.
+    options : MediumOptions, optional
+        How it is sampled; ambient occlusion is computed once for a classification.
     skip_empty : bool
         Pass by blocks that the transfer function makes transparent; the samples stay the same.
-    lights : Lights, optional
-        What a shaded volume is lit by; one headlight by default.
-    ambient_occlusion : AmbientOcclusion, optional
-        Darkens samples by what stands around them; computed once for a classification.
     room : Room, optional
         Memory that there is; a volume for which it is too little is held brick by brick. Without
         it a volume is held in one piece or refused.
+    **changes
+        Options by name, in place of those in ``options``.
 
     Attributes
     ----------
@@ -128,13 +126,13 @@ class DeviceVolume:
         runtime: Runtime,
         volume: Volume,
         transfer_function: TransferFunction,
-        sample_distance: float | None = None,
+        options: MediumOptions | None = None,
         *,
         skip_empty: bool = True,
-        lights: Lights | None = None,
-        ambient_occlusion: AmbientOcclusion | None = None,
         room: Room | None = None,
+        **changes: Any,
     ) -> None:
+        options = MediumOptions.of(options, changes)
         if not isinstance(volume, Volume):
             raise InvalidArgumentError(f"expected a Volume, got {type(volume).__name__}")
         if not isinstance(transfer_function, TransferFunction):
@@ -142,7 +140,7 @@ class DeviceVolume:
                 f"expected a TransferFunction, got {type(transfer_function).__name__}"
             )
         self.volume = volume
-        self.sample_distance = checked_sample_distance(volume, sample_distance)
+        self.sample_distance = checked_sample_distance(volume, options.sample_distance)
         self.unit_distance = held_unit_distance(
             transfer_function.unit_distance or volume.default_unit_distance, self.sample_distance
         )
@@ -172,16 +170,15 @@ class DeviceVolume:
                 self._look_up_by_scalar(runtime, *ends)
         self.runtime = runtime
         self._shading = transfer_function.shading
-        self._lights = Lights() if lights is None else lights
+        self._lights = options.lights
         self._lit: tuple[Camera, DeviceBuffer] | None = None
         self._gradient: tuple[DeviceBuffer, ...] = ()
         shading = shading_defines(transfer_function, self._lights)
         if transfer_function.gradient_opacities is not None:
             gradient = gradient_table(volume, transfer_function, scale.unit if scale else 1.0)
             self._gradient = (runtime.upload(gradient, "gradient opacity"),)
-        self.ambient_occlusion = ambient_occlusion
         self._occlusion: tuple[Any, ...] = ()
-        if ambient_occlusion is not None:
+        if options.ambient_occlusion is not None:
             if not whole:
                 raise DeviceMemoryError(
                     f"ambient occlusion needs the volume {volume.name!r} in one piece, "
@@ -190,7 +187,7 @@ class DeviceVolume:
                 )
             unlit = {k: v for k, v in shading.items() if k == "GRADIENT_OPACITY"}
             self._occlusion = self._occluded(
-                ambient_occlusion, transfer_function, {**self.defines, **unlit}
+                options.ambient_occlusion, transfer_function, {**self.defines, **unlit}
             )
             shading["OCCLUSION"] = 1
         self.defines.update(shading)

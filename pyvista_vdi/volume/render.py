@@ -47,10 +47,8 @@ def raycast_volume(
         get_runtime(request.device),
         volume,
         transfer_function,
-        sampling.sample_distance,
+        sampling,
         skip_empty=request.options.skip_empty,
-        lights=sampling.lights,
-        ambient_occlusion=sampling.ambient_occlusion,
         room=room,
     )
     with medium.giving_bricks_back():

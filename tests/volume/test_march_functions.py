@@ -29,8 +29,8 @@ def marched(
     call, runtime, volume, camera, window, transfer, step, *, t_end=np.inf, planes=(), group=1
 ):
     """Whole marches of every pixel of a small window, and the rays that they belong to."""
-    medium = DeviceVolume(runtime, volume, transfer, step)
-    march = medium.forms(camera, window, planes)
+    medium = DeviceVolume(runtime, volume, transfer, sample_distance=step)
+    march = medium.forms(camera, window, planes or ())
     rays = march.rays
     x, y = (i.ravel() for i in np.meshgrid(np.arange(window[0]), np.arange(window[1])))
     offsets = np.column_stack([x + 0.5 - window[0] / 2, y + 0.5 - window[1] / 2])
