@@ -49,12 +49,17 @@ class VDIActorMethods:
         mapper = self.GetMapper()
         return None if mapper is None else mapper.GetVDI()
 
+    def _mapper_for(self: Any, what: str) -> Any:
+        """Return the mapper; without one, say what there cannot be."""
+        mapper = self.GetMapper()
+        if mapper is None:
+            raise InvalidArgumentError(f"this actor has no mapper{what}")
+        return mapper
+
     @property
     def status(self: Any) -> VDIStatus:
         """How the VDI was drawn in the last frame, and what goes on behind it."""
-        mapper = self.GetMapper()
-        if mapper is None:
-            raise InvalidArgumentError("this actor has no mapper, so there is no status of it")
+        mapper = self._mapper_for(", so there is no status of it")
         return mapper.painter.status()  # type: ignore[no-any-return]
 
     @property
@@ -65,10 +70,7 @@ class VDIActorMethods:
 
     @opacity_multiplier.setter
     def opacity_multiplier(self: Any, multiplier: float) -> None:
-        mapper = self.GetMapper()
-        if mapper is None:
-            raise InvalidArgumentError("this actor has no mapper whose opacity could be set")
-        mapper.SetOpacityMultiplier(multiplier)
+        self._mapper_for(" whose opacity could be set").SetOpacityMultiplier(multiplier)
 
     @property
     def transmittance_cutoff(self: Any) -> float:
@@ -78,10 +80,7 @@ class VDIActorMethods:
 
     @transmittance_cutoff.setter
     def transmittance_cutoff(self: Any, cutoff: float) -> None:
-        mapper = self.GetMapper()
-        if mapper is None:
-            raise InvalidArgumentError("this actor has no mapper whose rays could be ended")
-        mapper.SetTransmittanceCutoff(cutoff)
+        self._mapper_for(" whose rays could be ended").SetTransmittanceCutoff(cutoff)
 
     def show_status(self: Any, renderer: Any = None, corner: str = "upper left") -> Any:
         """Show :attr:`status` as a text in a corner, written anew in each frame.

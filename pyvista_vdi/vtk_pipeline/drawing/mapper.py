@@ -8,6 +8,7 @@ and the fragment shader that ``VDIActor`` installs looks it up.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NoReturn
 
 from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
@@ -18,9 +19,10 @@ from pyvista_vdi.model.render_options import checked_transmittance_cutoff
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import checked_opacity
 from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
+from pyvista_vdi.vtk_pipeline.filters.algorithm import DEVICE, accessors
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
-from pyvista_vdi.vtk_pipeline.interaction.regeneration import Policy, checked_bound, checked_policy
+from pyvista_vdi.vtk_pipeline.interaction.regeneration import checked_bound, checked_policy
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import checked_rate
 
 #: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.
@@ -97,64 +99,47 @@ class VDIMapperMethods:
         source = self.painter.input
         return source.source if isinstance(source, SourceInput) else None
 
-    def SetDevice(self, device: Any) -> None:
-        """Choose the OpenCL device that raycasts; ``None`` is the default one."""
-        self.painter.device = device
+    SetDevice, GetDevice = accessors("Device", "painter.device", "device", *DEVICE, modifies=False)
 
-    def GetDevice(self) -> Any:
-        """Return the device as it was set."""
-        return self.painter.device
-
-    def SetAutomaticView(self, automatic: bool) -> None:
-        """Give a source without camera the view of the first frame (on by default)."""
-        self.painter.upkeep.automatic_view = bool(automatic)
-
-    def GetAutomaticView(self) -> bool:
-        """Whether a source without camera gets the view of the first frame."""
-        return self.painter.upkeep.automatic_view
+    SetAutomaticView, GetAutomaticView = accessors(
+        "AutomaticView",
+        "painter.upkeep.automatic_view",
+        "automatic",
+        "Give a source without camera the view of the first frame (on by default).",
+        "Whether a source without camera gets the view of the first frame.",
+        bool,
+        modifies=False,
+    )
 
     # -- how it is drawn -------------------------------------------------------------------------
 
-    def SetOpacityMultiplier(self: Any, multiplier: float) -> None:
+    SetOpacityMultiplier, GetOpacityMultiplier = accessors(
+        "OpacityMultiplier",
+        "painter.opacity_multiplier",
+        "multiplier",
         """Multiply the extinction of everything that is drawn; 1 by default.
 
         It acts on the next frame, without another VDI: 2 is twice as dense, 0 transparent. For
         what is not opaque it is the same as dividing the volume property's scalar opacity unit
-        distance by it; changing that itself makes the VDI anew.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is no finite number, or below 0.
-        """
-        factor = checked_opacity_multiplier(multiplier)
-        if factor != self.painter.opacity_multiplier:
-            self.painter.opacity_multiplier = factor
-            self.Modified()
-
-    def GetOpacityMultiplier(self) -> float:
-        """Return the factor of the extinction."""
-        return self.painter.opacity_multiplier
-
-    def SetTransmittanceCutoff(self: Any, cutoff: float) -> None:
+        distance by it; changing that itself makes the VDI anew. ``InvalidArgumentError`` is raised
+        if it is no finite number, or below 0.
+        """,
+        "Return the factor of the extinction.",
+        checked_opacity_multiplier,
+    )
+    SetTransmittanceCutoff, GetTransmittanceCutoff = accessors(
+        "TransmittanceCutoff",
+        "painter.transmittance_cutoff",
+        "cutoff",
         """End rays where less light than this is left; 10^-6 by default.
 
         No channel of the picture loses more than that. VTK's own volume mappers stop at about
         1/255. VDIs that overlap are merged to the default, whatever is set here.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is not from 0 to below 1.
-        """
-        least = checked_transmittance_cutoff(cutoff)
-        if least != self.painter.transmittance_cutoff:
-            self.painter.transmittance_cutoff = least
-            self.Modified()
-
-    def GetTransmittanceCutoff(self) -> float:
-        """Return the light below which rays end."""
-        return self.painter.transmittance_cutoff
+        ``InvalidArgumentError`` is raised if it is not from 0 to below 1.
+        """,
+        "Return the light below which rays end.",
+        checked_transmittance_cutoff,
+    )
 
     # -- while a hand moves ----------------------------------------------------------------------
 
@@ -183,32 +168,36 @@ class VDIMapperMethods:
         """Draw every frame in full."""
         self.SetAutoAdjustSampleDistances(False)
 
-    def SetInteractiveUpdateRate(self, rate: float) -> None:
+    SetInteractiveUpdateRate, GetInteractiveUpdateRate = accessors(
+        "InteractiveUpdateRate",
+        "painter.interaction.update_rate",
+        "rate",
         """Set the window's desired update rate from which on a frame is interactive, 1/s.
 
         1 by default, as in ``vtkSmartVolumeMapper``.
-        """
-        self.painter.interaction.update_rate = checked_rate("the interactive update rate", rate)
-
-    def GetInteractiveUpdateRate(self) -> float:
-        """Return the desired update rate from which on a frame is interactive, 1/s."""
-        return self.painter.interaction.update_rate
-
-    def SetTargetFrameRate(self, rate: float | None) -> None:
+        """,
+        "Return the desired update rate from which on a frame is interactive, 1/s.",
+        partial(checked_rate, "the interactive update rate"),
+        modifies=False,
+    )
+    SetTargetFrameRate, GetTargetFrameRate = accessors(
+        "TargetFrameRate",
+        "painter.interaction.target",
+        "rate",
         """Set the frames per second that previews keep.
 
         ``None``, the default, means the window's desired update rate, which the interactor gives
         (``SetDesiredUpdateRate``: 15 in VTK, 30 in PyVista); 0 means that no rate is to be kept,
         so that every frame is full. Several VDIs in a window keep the highest of their targets.
-        """
-        target = None if rate is None else checked_rate("the target frame rate", rate)
-        self.painter.interaction.target = target
-
-    def GetTargetFrameRate(self) -> float | None:
-        """Return the frames per second that previews keep, as it was set."""
-        return self.painter.interaction.target
-
-    def SetRegenerate(self, policy: Policy) -> None:
+        """,
+        "Return the frames per second that previews keep, as it was set.",
+        lambda rate: None if rate is None else checked_rate("the target frame rate", rate),
+        modifies=False,
+    )
+    SetRegenerate, GetRegenerate = accessors(
+        "Regenerate",
+        "painter.upkeep.regeneration.policy",
+        "policy",
         """Choose what decides that a view needs a VDI of its own.
 
         Parameters
@@ -223,57 +212,61 @@ class VDIMapperMethods:
         ------
         InvalidArgumentError
             If it is something else.
-        """
-        self.painter.upkeep.regeneration.policy = checked_policy(policy)
-
-    def GetRegenerate(self) -> Policy:
-        """Return what decides that a view needs a VDI of its own."""
-        return self.painter.upkeep.regeneration.policy
-
-    def SetRegenerateBelow(self, ssim: float) -> None:
+        """,
+        "Return what decides that a view needs a VDI of its own.",
+        checked_policy,
+        modifies=False,
+    )
+    SetRegenerateBelow, GetRegenerateBelow = accessors(
+        "RegenerateBelow",
+        "painter.upkeep.regeneration.bound",
+        "ssim",
         """Set the estimated SSIM below which ``"auto"`` regenerates a view at rest.
 
         While the view moves, twice the error (1 - SSIM) is borne.
-        """
-        self.painter.upkeep.regeneration.bound = checked_bound(ssim)
-
-    def GetRegenerateBelow(self) -> float:
-        """Return the estimated SSIM below which ``"auto"`` regenerates."""
-        return self.painter.upkeep.regeneration.bound
-
-    def SetInteractiveOffScreen(self, on: bool) -> None:
+        """,
+        'Return the estimated SSIM below which ``"auto"`` regenerates.',
+        checked_bound,
+        modifies=False,
+    )
+    SetInteractiveOffScreen, GetInteractiveOffScreen = accessors(
+        "InteractiveOffScreen",
+        "painter.interaction.off_screen",
+        "on",
         """Treat off-screen windows as if somebody watched them (off by default).
 
         For server-side rendering, where the window is off-screen and the person in a browser:
         previews are drawn, and VDIs are made in the background.
-        """
-        self.painter.interaction.off_screen = bool(on)
-
-    def GetInteractiveOffScreen(self) -> bool:
-        """Whether off-screen windows are treated as if somebody watched them."""
-        return self.painter.interaction.off_screen
+        """,
+        "Whether off-screen windows are treated as if somebody watched them.",
+        bool,
+        modifies=False,
+    )
 
     # -- picking ---------------------------------------------------------------------------------
 
-    def SetPickingOpacity(self, opacity: float) -> None:
+    SetPickingOpacity, GetPickingOpacity = accessors(
+        "PickingOpacity",
+        "painter.selection.opacity",
+        "opacity",
         """Set the opacity that a ray must reach in the VDI to pick it.
 
         At least 0 and less than 1; 0.05 by default, as in VTK's pickers for volumes. What is
         compared says ``SetPickingAccumulated``; see :func:`pyvista_vdi.pick`.
-        """
-        self.painter.selection.opacity = checked_opacity(opacity)
-
-    def GetPickingOpacity(self) -> float:
-        """Return the opacity that a ray must reach in the VDI to pick it."""
-        return self.painter.selection.opacity
-
-    def SetPickingAccumulated(self, accumulated: bool) -> None:
-        """Compare the opacity from the ray's beginning (the default), or each supersegment's."""
-        self.painter.selection.accumulated = bool(accumulated)
-
-    def GetPickingAccumulated(self) -> bool:
-        """Whether the opacity from the ray's beginning is compared."""
-        return self.painter.selection.accumulated
+        """,
+        "Return the opacity that a ray must reach in the VDI to pick it.",
+        checked_opacity,
+        modifies=False,
+    )
+    SetPickingAccumulated, GetPickingAccumulated = accessors(
+        "PickingAccumulated",
+        "painter.selection.accumulated",
+        "accumulated",
+        "Compare the opacity from the ray's beginning (the default), or each supersegment's.",
+        "Whether the opacity from the ray's beginning is compared.",
+        bool,
+        modifies=False,
+    )
 
     def _set_input(self: Any, source: Input | None) -> None:
         self.painter.set_input(source)
@@ -287,28 +280,14 @@ class VDIMapperMethods:
             _refuse_blending()
 
     def SetBlendModeToMaximumIntensity(self) -> NoReturn:
-        """Refuse."""
+        """Refuse, as all that follow."""
         _refuse_blending()
 
-    def SetBlendModeToMinimumIntensity(self) -> NoReturn:
-        """Refuse."""
-        _refuse_blending()
-
-    def SetBlendModeToAverageIntensity(self) -> NoReturn:
-        """Refuse."""
-        _refuse_blending()
-
-    def SetBlendModeToAdditive(self) -> NoReturn:
-        """Refuse."""
-        _refuse_blending()
-
-    def SetBlendModeToIsoSurface(self) -> NoReturn:
-        """Refuse."""
-        _refuse_blending()
-
-    def SetBlendModeToSlice(self) -> NoReturn:
-        """Refuse."""
-        _refuse_blending()
+    SetBlendModeToMinimumIntensity = SetBlendModeToMaximumIntensity
+    SetBlendModeToAverageIntensity = SetBlendModeToMaximumIntensity
+    SetBlendModeToAdditive = SetBlendModeToMaximumIntensity
+    SetBlendModeToIsoSurface = SetBlendModeToMaximumIntensity
+    SetBlendModeToSlice = SetBlendModeToMaximumIntensity
 
     def SetGlobalIlluminationReach(self, reach: float) -> None:
         """Refuse VTK's shadows along light rays; 0 is accepted."""

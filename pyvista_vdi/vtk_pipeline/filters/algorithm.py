@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from inspect import Parameter, Signature
+from operator import attrgetter
 from typing import Any
 
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
@@ -10,6 +13,12 @@ from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
 from pyvista_vdi.errors import Cancelled
+
+#: Docstrings of ``SetDevice`` and ``GetDevice``.
+DEVICE = (
+    "Choose the OpenCL device; ``None`` is the default one.",
+    "Return the device as it was set.",
+)
 
 
 class Algorithm(VTKPythonAlgorithmBase):
@@ -72,6 +81,60 @@ class Algorithm(VTKPythonAlgorithmBase):
         if getattr(self, attribute) != value:
             setattr(self, attribute, value)
             self.Modified()
+
+
+def accessors(
+    name: str,
+    attribute: str,
+    argument: str,
+    sets: str,
+    gets: str,
+    check: Callable[[Any], Any] = lambda value: value,
+    *,
+    modifies: bool = True,
+) -> tuple[Any, Any]:
+    """Return VTK's pair of methods of a setting, ``Set<name>(<argument>)`` and ``Get<name>()``.
+
+    ``attribute`` says where its value is, with dots; ``check`` returns the value that is kept, or
+    raises. Another value calls ``Modified()``, if ``modifies``. ``sets`` and ``gets`` are the
+    methods' docstrings.
+    """
+    path, _, last = attribute.rpartition(".")
+    owner = attrgetter(path) if path else lambda self: self
+
+    def set_value(self: Any, value: Any) -> None:
+        value = check(value)
+        if getattr(owner(self), last) != value:
+            setattr(owner(self), last, value)
+            if modifies:
+                self.Modified()
+
+    return pair(name, argument, (set_value, sets), (attrgetter(attribute), gets))
+
+
+def pair(
+    name: str,
+    argument: str,
+    setter: tuple[Callable[[Any, Any], None], str],
+    getter: tuple[Callable[[Any], Any], str],
+) -> tuple[Any, Any]:
+    """Return two functions, each given with its docstring, as methods of these names."""
+
+    def set_it(self: Any, value: Any) -> None:
+        setter[0](self, value)
+
+    def get_it(self: Any) -> Any:
+        return getter[0](self)
+
+    for method, verb, arguments, doc in (
+        (set_it, "Set", ("self", argument), setter[1]),
+        (get_it, "Get", ("self",), getter[1]),
+    ):
+        method.__name__ = method.__qualname__ = verb + name
+        method.__doc__ = doc
+        parameters = [Parameter(each, Parameter.POSITIONAL_OR_KEYWORD) for each in arguments]
+        method.__signature__ = Signature(parameters)  # type: ignore[union-attr]
+    return set_it, get_it
 
 
 def whole_extent(information: Any) -> tuple[int, ...] | None:

@@ -23,18 +23,11 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 
-__all__ = [
-    "is_vdi_image",
-    "require_image",
-    "require_image_port",
-    "scalars_of",
-    "transfer_function_from_property",
-    "vdi_from_image",
-    "vdi_to_image",
-    "volume_from_vtk",
-]
+# The documented name of it is here
+from pyvista_vdi.vtk_pipeline.filters.properties import (
+    transfer_function_from_property as transfer_function_from_property,
+)
 
 #: Point scalars of the canonical form: how many supersegments each pixel's list has.
 COUNT = "count"
@@ -62,15 +55,7 @@ _REMEDIES = {
 
 
 def require_image(data: Any) -> vtkImageData:
-    """Return ``data`` if it is a uniform grid.
-
-    Raises
-    ------
-    UnsupportedError
-        If it is another VTK data set; the message says how to make a uniform grid of it.
-    InvalidVolumeError
-        If it is no data set at all.
-    """
+    """Return ``data`` if it is a uniform grid, and say how to make one of anything else."""
     if isinstance(data, vtkImageData):
         return data
     if not hasattr(data, "GetClassName"):
@@ -83,10 +68,7 @@ def require_image(data: Any) -> vtkImageData:
 def require_image_port(port: Any) -> None:
     """Refuse an output port that is known to give something other than a uniform grid.
 
-    Raises
-    ------
-    UnsupportedError
-        As :func:`require_image`. A port that promises no more than a ``vtkDataSet``, say, passes.
+    A port that promises no more than a ``vtkDataSet``, say, passes.
     """
     information = port.GetProducer().GetOutputPortInformation(port.GetIndex())
     name = str(information.Get(vtkDataObject.DATA_TYPE_NAME()))
@@ -97,7 +79,6 @@ def require_image_port(port: Any) -> None:
 
 
 def _refusal(kind: type) -> UnsupportedError:
-    """Return what is to be said of data that are no uniform grid."""
     named = f"a {kind.__name__} is not a uniform grid"
     for name, remedy in _REMEDIES.items():
         if issubclass(kind, getattr(vtkCommonDataModel, name)):
@@ -137,10 +118,18 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
     array = scalars_of(image, scalars, preference)
     rgba = array.GetNumberOfComponents() == 4 and array.GetDataType() == VTK_UNSIGNED_CHAR
     if array.GetNumberOfComponents() != 1 and not rgba:
-        raise UnsupportedError(_several_components(array))
+        n = array.GetNumberOfComponents()
+        raise UnsupportedError(
+            f"the scalars {array.GetName()!r} have 4 components, but are not RGBA of type unsigned "
+            "char: convert them, or pass one scalar per point"
+            if n == 4
+            else f"the scalars {array.GetName()!r} have {n} components: a VDI is made from one "
+            "scalar per point; pass one component, or the vectors' length"
+        )
     dimensions = image.GetDimensions()
     name = array.GetName() or "values"
-    if not _is_point_array(image, array):
+    points = image.GetPointData()
+    if not any(points.GetArray(i) is array for i in range(points.GetNumberOfArrays())):
         if min(dimensions) < 2:
             raise InvalidVolumeError(
                 f"the volume has only one plane of points: its dimensions are {dimensions}, and "
@@ -152,7 +141,7 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
     image.TransformIndexToPhysicalPoint(extent[0], extent[2], extent[4], first)
     direction = image.GetDirectionMatrix()
     return Volume(
-        _as_numpy(array).reshape((*dimensions[::-1], 4) if rgba else dimensions[::-1]),
+        as_numpy(array).reshape((*dimensions[::-1], 4) if rgba else dimensions[::-1]),
         image.GetSpacing(),
         first,
         [[direction.GetElement(i, j) for j in range(3)] for i in range(3)],
@@ -206,24 +195,6 @@ def _array_names(attributes: dict[str, Any]) -> list[str]:
     return names
 
 
-def _is_point_array(image: vtkImageData, array: vtkDataArray) -> bool:
-    data = image.GetPointData()
-    return any(data.GetArray(i) is array for i in range(data.GetNumberOfArrays()))
-
-
-def _several_components(array: vtkDataArray) -> str:
-    n = array.GetNumberOfComponents()
-    if n == 4:
-        return (
-            f"the scalars {array.GetName()!r} have 4 components, but are not RGBA of type unsigned "
-            "char: convert them, or pass one scalar per point"
-        )
-    return (
-        f"the scalars {array.GetName()!r} have {n} components: a VDI is made from one scalar per "
-        "point; pass one component, or the vectors' length"
-    )
-
-
 def _at_points(image: vtkImageData, array: vtkDataArray) -> vtkDataArray:
     """Average cell values at the points, by the filter that ``add_volume`` uses."""
     cells = vtkImageData()
@@ -235,7 +206,8 @@ def _at_points(image: vtkImageData, array: vtkDataArray) -> vtkDataArray:
     return to_points.GetOutput().GetPointData().GetScalars()
 
 
-def _as_numpy(array: vtkDataArray) -> NDArray[Any]:
+def as_numpy(array: vtkDataArray) -> NDArray[Any]:
+    """Return the values of VTK's array, sharing its memory where it has one."""
     try:
         return vtk_to_numpy(array)  # type: ignore[no-any-return]
     except (AttributeError, TypeError, ValueError):
@@ -269,22 +241,16 @@ def vdi_to_image(vdi: VDI) -> vtkImageData:
     image = vtkImageData()
     image.SetDimensions(width, height, 1)
     counts = np.diff(vdi.offsets).astype(np.uint32)
-    image.GetPointData().SetScalars(_to_vtk(COUNT, counts))
+    image.GetPointData().SetScalars(to_vtk(COUNT, counts))
     field = image.GetFieldData()
     for name in _RAGGED:
-        field.AddArray(_to_vtk(name, getattr(vdi, name)))
+        field.AddArray(to_vtk(name, getattr(vdi, name)))
     field.AddArray(description_of(DESCRIPTION, vdi))
     return image
 
 
 def description_of(name: str, vdi: VDI) -> vtkStringArray:
-    """Return everything of a VDI that is not an array, as a field string of JSON.
-
-    Raises
-    ------
-    InvalidVDIError
-        If the metadata hold what JSON cannot.
-    """
+    """Return everything of a VDI that is not an array, as a field string of JSON."""
     about = {
         "form_version": FORM_VERSION,
         "camera": vdi.camera.to_dict(),
@@ -312,11 +278,16 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"a value of type {type(value).__name__} is not JSON")
 
 
+def has_description(data: Any, name: str) -> bool:
+    """Whether a VTK object is an image with a field string of this name."""
+    return isinstance(data, vtkImageData) and isinstance(
+        data.GetFieldData().GetAbstractArray(name), vtkStringArray
+    )
+
+
 def is_vdi_image(data: Any) -> bool:
     """Whether a VTK object is a VDI in its canonical form."""
-    return isinstance(data, vtkImageData) and isinstance(
-        data.GetFieldData().GetAbstractArray(DESCRIPTION), vtkStringArray
-    )
+    return has_description(data, DESCRIPTION)
 
 
 def vdi_from_image(image: Any) -> VDI:
@@ -345,21 +316,13 @@ def vdi_from_image(image: Any) -> VDI:
         )
     field = image.GetFieldData()
     about = view_from_description(image, DESCRIPTION)
-    counts = _counts(image)
-    offsets = np.zeros(len(counts) + 1, dtype=np.uint64)
-    np.cumsum(counts, dtype=np.uint64, out=offsets[1:])
+    offsets = offsets_of(_counts(image))
     arrays: dict[str, Any] = {name: _ragged(field, name, int(offsets[-1])) for name in _RAGGED}
     return VDI(window_size=image.GetDimensions()[:2], offsets=offsets, **arrays, **about)
 
 
 def view_from_description(image: vtkImageData, name: str) -> dict[str, Any]:
-    """Return what :func:`description_of` wrote: arguments of :class:`VDI`.
-
-    Raises
-    ------
-    InvalidVDIError
-        If it is damaged, or of a newer version.
-    """
+    """Return what :func:`description_of` wrote: arguments of :class:`VDI`."""
     try:
         about = json.loads(image.GetFieldData().GetAbstractArray(name).GetValue(0))
         version = int(about["form_version"])
@@ -378,13 +341,20 @@ def view_from_description(image: vtkImageData, name: str) -> dict[str, Any]:
     )
 
 
+def offsets_of(counts: NDArray[Any]) -> NDArray[np.uint64]:
+    """Return where each list begins, and where the last one ends."""
+    offsets = np.zeros(len(counts) + 1, dtype=np.uint64)
+    np.cumsum(counts, dtype=np.uint64, out=offsets[1:])
+    return offsets
+
+
 def _counts(image: vtkImageData) -> NDArray[Any]:
     """Return the supersegments of each list, checked; nothing is allocated for a window alone."""
     array = image.GetPointData().GetArray(COUNT)
     if array is None:
         raise InvalidVDIError(f"the VDI's image lacks its point array {COUNT!r}")
     width, height, depth = image.GetDimensions()
-    counts = _as_numpy(array)
+    counts = as_numpy(array)
     if depth != 1 or counts.shape != (width * height,):
         raise InvalidVDIError(
             f"the VDI's image has {width} x {height} x {depth} points, and {COUNT!r} is of shape "
@@ -404,10 +374,11 @@ def _ragged(field: Any, name: str, n: int) -> NDArray[Any]:
         if n == 0:  # VTK's XML files drop arrays without values
             return np.zeros((0, 3) if _RAGGED[name] == 3 else 0, dtype=np.float32)
         raise InvalidVDIError(f"the VDI's image lacks its field array {name!r}")
-    return _as_numpy(array)
+    return as_numpy(array)
 
 
-def _to_vtk(name: str, array: NDArray[Any]) -> vtkDataArray:
+def to_vtk(name: str, array: NDArray[Any]) -> vtkDataArray:
+    """Return a named array of VTK's that shares the memory."""
     # VTK's arrays hold memory through the buffer protocol; this view drops NumPy's read-only flag
     if not array.flags.writeable and array.size:
         array = np.frombuffer(memoryview(array.data).cast("B"), dtype=array.dtype).reshape(

@@ -11,8 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkStringArray
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
@@ -21,9 +19,13 @@ from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, ask_for_all
+from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, accessors, whole_extent
 from pyvista_vdi.vtk_pipeline.filters.convert import (
+    as_numpy,
     description_of,
+    has_description,
+    offsets_of,
+    to_vtk,
     vdi_from_image,
     view_from_description,
 )
@@ -93,33 +95,28 @@ def vdi_to_dense_image(
         f"the dense form of {width} x {height} lists of {longest} supersegments",
         "keep the canonical form (vdi_to_image), or generate fewer lists or shorter ones",
     )
-    # Point z W H + list: lists are points of one slice, bottom row first
-    lists = np.repeat(np.arange(width * height, dtype=np.int64), counts)
-    rank = np.arange(vdi.n_supersegments, dtype=np.int64) - vdi.offsets.astype(np.int64)[lists]
-    places = rank * (width * height) + lists
+    places = _places(vdi.offsets, counts)
     image = vtkImageData()
     image.SetDimensions(width, height, longest)
     data = image.GetPointData()
     color = np.zeros((n, 3), np.float32) if exact else np.zeros((n, 4), np.uint8)
     color[places] = vdi.color if exact else _rgba_bytes(vdi)
-    data.SetScalars(_array(_COLOR, color))
+    data.SetScalars(to_vtk(_COLOR, color))
     depth = np.zeros((n, 2), np.float32)
     depth[places, 0], depth[places, 1] = vdi.front, vdi.back
-    data.AddArray(_array(_DEPTH, depth))
+    data.AddArray(to_vtk(_DEPTH, depth))
     optical_depth = np.zeros(n, np.float32)
     optical_depth[places] = vdi.optical_depth
-    data.AddArray(_array(_OPTICAL_DEPTH, optical_depth))
+    data.AddArray(to_vtk(_OPTICAL_DEPTH, optical_depth))
     field = image.GetFieldData()
-    field.AddArray(_array(COUNT, counts.astype(np.uint32)))
+    field.AddArray(to_vtk(COUNT, counts.astype(np.uint32)))
     field.AddArray(description_of(DESCRIPTION, vdi))
     return image
 
 
 def is_dense_image(data: Any) -> bool:
     """Whether a VTK object is a VDI in its dense form."""
-    return isinstance(data, vtkImageData) and isinstance(
-        data.GetFieldData().GetAbstractArray(DESCRIPTION), vtkStringArray
-    )
+    return has_description(data, DESCRIPTION)
 
 
 def vdi_from_dense_image(image: Any) -> VDI:
@@ -161,11 +158,8 @@ def vdi_from_dense_image(image: Any) -> VDI:
     color = _numbers(points, _COLOR, (n, 3 if exact else 4))
     depth = _numbers(points, _DEPTH, (n, 2))
     optical_depth = _numbers(points, _OPTICAL_DEPTH, (n,))
-    offsets = np.zeros(n_lists + 1, dtype=np.uint64)
-    np.cumsum(counts, out=offsets[1:], dtype=np.uint64)
-    lists = np.repeat(np.arange(n_lists, dtype=np.int64), counts)
-    rank = np.arange(len(lists), dtype=np.int64) - offsets.astype(np.int64)[lists]
-    places = rank * n_lists + lists
+    offsets = offsets_of(counts)
+    places = _places(offsets, counts)
     straight = color[places]
     if not exact:
         straight = straight[:, :3].astype(np.float32) / np.float32(255)
@@ -178,6 +172,14 @@ def vdi_from_dense_image(image: Any) -> VDI:
         optical_depth=optical_depth[places],
         **about,
     )
+
+
+def _checked_limit(limit: Any) -> int | None:
+    if limit is not None and not (isinstance(limit, int) and limit >= 1):
+        raise InvalidArgumentError(
+            f"max_supersegments must be a whole number from 1 on; got {limit!r}"
+        )
+    return limit
 
 
 class VDIToDenseImage(Algorithm):
@@ -195,13 +197,14 @@ class VDIToDenseImage(Algorithm):
         self._exact = False
         self._max_supersegments: int | None = None
 
-    def SetExact(self, exact: bool) -> None:
-        """Choose whether colours stay float32; off by default."""
-        self._change("_exact", bool(exact))
-
-    def GetExact(self) -> bool:
-        """Whether colours stay float32."""
-        return self._exact
+    SetExact, GetExact = accessors(
+        "Exact",
+        "_exact",
+        "exact",
+        "Choose whether colours stay float32; off by default.",
+        "Whether colours stay float32.",
+        bool,
+    )
 
     def ExactOn(self) -> None:
         """Keep colours as they are."""
@@ -211,31 +214,22 @@ class VDIToDenseImage(Algorithm):
         """Round colours to bytes."""
         self.SetExact(False)
 
-    def SetMaxSupersegments(self, limit: int | None) -> None:
-        """Set the points along z; ``None``, the default, is the longest list."""
-        if limit is not None and not (isinstance(limit, int) and limit >= 1):
-            raise InvalidArgumentError(
-                f"max_supersegments must be a whole number from 1 on; got {limit!r}"
-            )
-        self._change("_max_supersegments", limit)
-
-    def GetMaxSupersegments(self) -> int | None:
-        """Return the points along z."""
-        return self._max_supersegments
+    SetMaxSupersegments, GetMaxSupersegments = accessors(
+        "MaxSupersegments",
+        "_max_supersegments",
+        "limit",
+        "Set the points along z; ``None``, the default, is the longest list.",
+        "Return the points along z.",
+        _checked_limit,
+    )
 
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the lists; how long the longest is, only the data tell."""
-        information = inputs[0].GetInformationObject(0)
-        executive = vtkStreamingDemandDrivenPipeline
-        if information is not None and information.Has(executive.WHOLE_EXTENT()):
-            x0, x1, y0, y1, *_ = information.Get(executive.WHOLE_EXTENT())
-            whole = (x0, x1, y0, y1, 0, (self._max_supersegments or 1) - 1)
-            outputs.GetInformationObject(0).Set(executive.WHOLE_EXTENT(), whole, 6)
-        return 1
-
-    def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Ask for all lists, whatever part of the image is wanted."""
-        ask_for_all(inputs)
+        extent = whole_extent(inputs[0].GetInformationObject(0))
+        if extent is not None:
+            whole = (*extent[:4], 0, (self._max_supersegments or 1) - 1)
+            key = vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
+            outputs.GetInformationObject(0).Set(key, whole, 6)
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
@@ -252,19 +246,18 @@ def _rgba_bytes(vdi: VDI) -> NDArray[np.uint8]:
     return np.rint(rgba * np.float32(255)).astype(np.uint8)
 
 
-def _array(name: str, values: NDArray[Any]) -> Any:
-    array = numpy_to_vtk(values)
-    array.SetName(name)
-    return array
+def _places(offsets: NDArray[np.uint64], counts: NDArray[Any]) -> NDArray[np.int64]:
+    """Return the point of each supersegment: z W H + list; lists are points of one slice."""
+    n_lists = len(counts)
+    lists = np.repeat(np.arange(n_lists, dtype=np.int64), counts)
+    rank = np.arange(len(lists), dtype=np.int64) - offsets.astype(np.int64)[lists]
+    return rank * n_lists + lists
 
 
 def _numbers(data: Any, name: str, shape: tuple[int, ...]) -> NDArray[Any]:
     array = data.GetArray(name)
-    values = np.zeros(0) if array is None else vtk_to_numpy(array)
+    values = np.zeros(0) if array is None else as_numpy(array)
     if values.shape != shape:
         found = "there is none" if array is None else f"its shape is {values.shape}"
         raise InvalidVDIError(f"the dense form needs an array {name!r} of shape {shape}; {found}")
     return values
-
-
-__all__ = ["VDIToDenseImage", "is_dense_image", "vdi_from_dense_image", "vdi_to_dense_image"]

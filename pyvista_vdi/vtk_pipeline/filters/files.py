@@ -9,8 +9,12 @@ from vtkmodules.vtkCommonDataModel import vtkImageData
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.io import checked_target, read, read_info
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce, ask_for_all
+from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, accessors, announce
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image
+
+
+def _as_path(path: str | os.PathLike[str] | None) -> str | None:
+    return os.fspath(path) if path else None
 
 
 class VDIReader(Algorithm):
@@ -29,13 +33,9 @@ class VDIReader(Algorithm):
         super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkImageData")
         self._path: str | None = None
 
-    def SetFileName(self, path: str | os.PathLike[str] | None) -> None:
-        """Set the file."""
-        self._change("_path", os.fspath(path) if path else None)
-
-    def GetFileName(self) -> str | None:
-        """Return the file."""
-        return self._path
+    SetFileName, GetFileName = accessors(
+        "FileName", "_path", "path", "Set the file.", "Return the file.", _as_path
+    )
 
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the output's extent: one point per list; reads the file's description only."""
@@ -66,13 +66,14 @@ class VDIWriter(Algorithm):
         """Set the VDI's canonical VTK form."""
         self.SetInputDataObject(image)
 
-    def SetFileName(self, path: str | os.PathLike[str] | None) -> None:
-        """Set the file; its name ends in ``.vdi`` or ``.exr``."""
-        self._change("_path", os.fspath(path) if path else None)
-
-    def GetFileName(self) -> str | None:
-        """Return the file."""
-        return self._path
+    SetFileName, GetFileName = accessors(
+        "FileName",
+        "_path",
+        "path",
+        "Set the file; its name ends in ``.vdi`` or ``.exr``.",
+        "Return the file.",
+        _as_path,
+    )
 
     def Write(self) -> None:
         """Write the file.
@@ -88,11 +89,6 @@ class VDIWriter(Algorithm):
         """
         self.Modified()
         self.Update()
-
-    def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Ask for the whole VDI."""
-        ask_for_all(inputs)
-        return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
         if self._path is None:

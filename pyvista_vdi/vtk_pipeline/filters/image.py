@@ -6,17 +6,21 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonDataModel import vtkImageData
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
 from pyvista_vdi.io import to_bytes
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce, ask_for_all
-from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
+from pyvista_vdi.vtk_pipeline.filters.algorithm import (
+    DEVICE,
+    Algorithm,
+    accessors,
+    announce,
+    whole_extent,
+)
+from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, to_vtk, vdi_from_image
 
 #: Point scalars of the picture: straight RGBA, uint8.
 STRAIGHT = "RGBA"
@@ -52,8 +56,6 @@ class VDIToImage(Algorithm):
         self._vdi: VDI | None = None
         self._vdi_of: tuple[Any, int] | None = None
 
-    # -- settings --------------------------------------------------------------------------------
-
     def SetCamera(self, camera: Any, model_transform: ArrayLike | None = None) -> None:
         """Set the new view V_N.
 
@@ -76,21 +78,23 @@ class VDIToImage(Algorithm):
         """Return the view before it is turned, or ``None`` for the generating view."""
         return self._camera
 
-    def SetAzimuth(self, degrees: float) -> None:
-        """Turn the view about its up direction through the focal point, as VTK's ``Azimuth``."""
-        self._change("_azimuth", float(degrees))
-
-    def GetAzimuth(self) -> float:
-        """Return by how much the view is turned, degrees."""
-        return self._azimuth
-
-    def SetElevation(self, degrees: float) -> None:
-        """Lift the view through the focal point, after turning it, as VTK's ``Elevation``."""
-        self._change("_elevation", float(degrees))
-
-    def GetElevation(self) -> float:
-        """Return by how much the view is lifted, degrees."""
-        return self._elevation
+    SetAzimuth, GetAzimuth = accessors(
+        "Azimuth",
+        "_azimuth",
+        "degrees",
+        "Turn the view about its up direction through the focal point, as VTK's ``Azimuth``.",
+        "Return by how much the view is turned, degrees.",
+        float,
+    )
+    SetElevation, GetElevation = accessors(
+        "Elevation",
+        "_elevation",
+        "degrees",
+        "Lift the view through the focal point, after turning it, as VTK's ``Elevation``.",
+        "Return by how much the view is lifted, degrees.",
+        float,
+    )
+    SetDevice, GetDevice = accessors("Device", "_device", "device", *DEVICE)
 
     def SetWindowSize(self, *size: Any) -> None:
         """Set the picture's width and height in pixels; ``None``, the default, is the VDI's own."""
@@ -100,16 +104,6 @@ class VDIToImage(Algorithm):
     def GetWindowSize(self) -> tuple[int, int] | None:
         """Return the picture's width and height in pixels, or ``None`` for the VDI's own."""
         return self._window_size
-
-    def SetDevice(self, device: Any) -> None:
-        """Choose the OpenCL device; ``None`` is the default one."""
-        self._change("_device", device)
-
-    def GetDevice(self) -> Any:
-        """Return the device as it was set."""
-        return self._device
-
-    # -- results ---------------------------------------------------------------------------------
 
     def GetImage(self) -> vtkImageData:
         """Return the picture, brought up to date.
@@ -122,25 +116,14 @@ class VDIToImage(Algorithm):
         self.Update()
         return self.GetOutputDataObject(0)
 
-    # -- the pipeline's requests -----------------------------------------------------------------
-
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the output's extent: one point per pixel."""
         size = self._window_size
-        information = inputs[0].GetInformationObject(0)
-        executive = vtkStreamingDemandDrivenPipeline
-        if size is None and information.Has(executive.WHOLE_EXTENT()):
-            whole = information.Get(executive.WHOLE_EXTENT())
+        whole = whole_extent(inputs[0].GetInformationObject(0))
+        if size is None and whole is not None:
             size = whole[1] - whole[0] + 1, whole[3] - whole[2] + 1
         announce(outputs, size or (1, 1))
         return 1
-
-    def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Ask for the whole VDI, whatever part of the picture is wanted."""
-        ask_for_all(inputs)
-        return 1
-
-    # -- how -------------------------------------------------------------------------------------
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
         vdi = self._read(vtkImageData.GetData(inputs[0], 0))
@@ -161,25 +144,12 @@ class VDIToImage(Algorithm):
 
 
 def rgba_to_image(pixels: NDArray[np.float32]) -> vtkImageData:
-    """Return a rendered picture as VTK data.
-
-    Parameters
-    ----------
-    pixels : numpy.ndarray
-        Premultiplied RGBA, float32 (H, W, 4), top row first.
-
-    Returns
-    -------
-    vtkImageData
-        As :class:`VDIToImage` puts it out.
-    """
+    """Return a rendered picture, (H, W, 4), as :class:`VDIToImage` puts it out."""
     height, width = pixels.shape[:2]
     image = vtkImageData()
     image.SetDimensions(width, height, 1)
     bottom_first = np.ascontiguousarray(pixels[::-1])
     for name, values in ((STRAIGHT, to_bytes(bottom_first)), (PREMULTIPLIED, bottom_first)):
-        array = numpy_to_vtk(values.reshape(-1, 4))
-        array.SetName(name)
-        image.GetPointData().AddArray(array)
+        image.GetPointData().AddArray(to_vtk(name, values.reshape(-1, 4)))
     image.GetPointData().SetActiveScalars(STRAIGHT)
     return image

@@ -83,11 +83,11 @@ class SourceInput(Input):
         return self.source.GetCurrentVDI()
 
     def bounds(self) -> tuple[float, ...] | None:
-        """Return the volume's bounds."""
+        """Return the bounds: the volume's, or those of the updated image."""
         return self.source.GetInputBounds()
 
     def stamp(self) -> Any:
-        """Return the newest time stamp of the source, its input and its property."""
+        """Return the newest time stamp of all that it depends on."""
         if self.source.GetNumberOfInputConnections(0) > 0:
             self.source.GetInputAlgorithm(0, 0).Update()
         self.source.CheckLights()
@@ -119,40 +119,31 @@ class ImageInput(Input):
         self._read_at: int | None = None
 
     def vdi(self) -> VDI | None:
-        """Return the VDI in the image, read again only if the image has changed."""
-        image = self._updated()
+        """Return the VDI, brought up to date."""
+        if self._port is not None:
+            self._producer.Update(self._port.GetIndex())
+            self._image = self._producer.GetOutputDataObject(self._port.GetIndex())
+        image = self._image
         if self._vdi is None or self._read_at != image.GetMTime():
             self._vdi = vdi_from_image(image)
             self._read_at = image.GetMTime()
         return self._vdi
 
     def bounds(self) -> tuple[float, ...] | None:
-        """Return the VDI's bounds; this updates the pipeline."""
+        """Return the bounds: the volume's, or those of the updated image."""
         vdi = self.vdi()
         return None if vdi is None else vdi.bounds
 
     def stamp(self) -> Any:
-        """Return the image's time stamp."""
+        """Return the newest time stamp of all that it depends on."""
         if self._port is not None:
             self._producer.UpdateInformation()
             return self._producer.GetMTime()
         return self._image.GetMTime()
 
-    def _updated(self) -> Any:
-        if self._port is not None:
-            self._producer.Update(self._port.GetIndex())
-            self._image = self._producer.GetOutputDataObject(self._port.GetIndex())
-        return self._image
-
 
 def input_of(data: Any) -> Input:
-    """Return what to draw for a VDI, its canonical image, or a :class:`VDISource`.
-
-    Raises
-    ------
-    InvalidVDIError
-        If it is none of these; for a volume the message says what to do.
-    """
+    """Return what to draw for a VDI, its canonical image, or a :class:`VDISource`."""
     if isinstance(data, VDI):
         return Input(data)
     if isinstance(data, VDISource):

@@ -73,6 +73,10 @@ def transfer_function_from_property(
         raise InvalidArgumentError(
             f"the volume property's {missing} function has no points: add some (AddPoint)"
         )
+    shading = None
+    if prop.GetShade():
+        reflected = (prop.GetAmbient(), prop.GetDiffuse(), prop.GetSpecular())
+        shading = Shading(*reflected, prop.GetSpecularPower())
     colors, opacities, scalar_range = _tabulate(color, opacity, n_entries)
     return TransferFunction(
         np.clip(colors, 0, 1),
@@ -80,7 +84,7 @@ def transfer_function_from_property(
         scalar_range,
         unit_distance=prop.GetScalarOpacityUnitDistance(RGBA_OPACITY if rgba else 0),
         interpolation=_INTERPOLATION[prop.GetInterpolationType()],
-        shading=_shading(prop),
+        shading=shading,
         **_gradient_opacity(prop),
     )
 
@@ -114,31 +118,17 @@ def _refuse_unsupported(prop: vtkVolumeProperty, rgba: bool) -> None:
         )
 
 
-def _has_gradient_opacity(prop: vtkVolumeProperty) -> bool:
-    if prop.GetDisableGradientOpacity() or not prop.HasGradientOpacity():
-        return False
-    return any(node[1] != 1.0 for node in _nodes(prop.GetGradientOpacity()))
-
-
-def _shading(prop: vtkVolumeProperty) -> Shading | None:
-    if not prop.GetShade():
-        return None
-    return Shading(
-        prop.GetAmbient(), prop.GetDiffuse(), prop.GetSpecular(), prop.GetSpecularPower()
-    )
-
-
 def _gradient_opacity(prop: vtkVolumeProperty) -> dict[str, Any]:
-    if not _has_gradient_opacity(prop):
+    if prop.GetDisableGradientOpacity() or not prop.HasGradientOpacity():
         return {}
     function = prop.GetGradientOpacity()
-    low, high = 0.0, max(float(_nodes(function)[:, 0].max()), float(np.finfo(np.float32).tiny))
+    nodes = _nodes(function)
+    if (nodes[:, 1] == 1.0).all():
+        return {}
+    low, high = 0.0, max(float(nodes[:, 0].max()), float(np.finfo(np.float32).tiny))
     grid = np.linspace(low, high, GRADIENT_ENTRIES)
     opacities = np.array([function.GetValue(x) for x in grid])
-    return {
-        "gradient_opacities": np.clip(opacities, 0, 1),
-        "gradient_range": (low, high),
-    }
+    return {"gradient_opacities": np.clip(opacities, 0, 1), "gradient_range": (low, high)}
 
 
 # -- tables ----------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from inspect import Parameter, Signature
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm
+from pyvista_vdi.vtk_pipeline.filters.algorithm import DEVICE, Algorithm, accessors, pair
 from pyvista_vdi.vtk_pipeline.filters.convert import require_image, require_image_port
 from pyvista_vdi.vtk_pipeline.filters.properties import (
     color_function,
@@ -33,28 +33,21 @@ Progress = Callable[[float], object]
 
 
 def _option(name: str, argument: str, meaning: str, more: str = "") -> tuple[Any, Any]:
-    """Return the setter and the getter of one of the :class:`GenerationOptions`.
+    """Return the setter and the getter of one of the :class:`GenerationOptions`, which check."""
 
-    The setter's ``argument`` is checked by the options.
-    """
+    def set_option(self: Any, value: Any) -> None:
+        self.SetOptions(replace(self.GetOptions(), **{name: value}))
 
-    def set_option(self: SourceSettings, value: Any) -> None:
-        self.SetOptions(replace(self._options, **{name: value}))
-
-    def get_option(self: SourceSettings) -> Any:
-        return getattr(self._options, name)
-
+    sets = f"Set {meaning}.\n\n{more}As ``{name}`` of :func:`pyvista_vdi.generate`."
+    gets = f"Return {meaning}."
     as_vtk = "".join(word.capitalize() for word in name.split("_"))
-    kind = Parameter.POSITIONAL_OR_KEYWORD
-    for function, verb, names in (
-        (set_option, "Set", ["self", argument]),
-        (get_option, "Get", ["self"]),
-    ):
-        function.__name__, function.__qualname__ = verb + as_vtk, f"VDISource.{verb}{as_vtk}"
-        function.__signature__ = Signature([Parameter(each, kind) for each in names])  # type: ignore[union-attr]
-    set_option.__doc__ = f"Set {meaning}.\n\n{more}As ``{name}`` of :func:`pyvista_vdi.generate`."
-    get_option.__doc__ = f"Return {meaning}."
-    return set_option, get_option
+    return pair(as_vtk, argument, (set_option, sets), (attrgetter(f"_options.{name}"), gets))
+
+
+def _checked_coverage(coverage: Any) -> str:
+    if coverage not in COVERAGES:
+        raise InvalidArgumentError(f"coverage must be 'bounds' or 'view'; got {coverage!r}")
+    return str(coverage)
 
 
 class SourceSettings(Algorithm):
@@ -187,7 +180,10 @@ class SourceSettings(Algorithm):
         """Return the screen's width and height in pixels."""
         return self._window_size
 
-    def SetCoverage(self, coverage: str) -> None:
+    SetCoverage, GetCoverage = accessors(
+        "Coverage",
+        "_coverage",
+        "coverage",
         """Choose what the VDI's window covers.
 
         Parameters
@@ -196,14 +192,10 @@ class SourceSettings(Algorithm):
             ``"view"``: the window as it is. ``"bounds"``: the smallest rectangle of the screen's
             pixel grid that contains the whole volume; where the eye is inside the volume's
             bounds, or they reach behind it, a ``VDIWarning`` is given and the window is used.
-        """
-        if coverage not in COVERAGES:
-            raise InvalidArgumentError(f"coverage must be 'bounds' or 'view'; got {coverage!r}")
-        self._change("_coverage", coverage)
-
-    def GetCoverage(self) -> str:
-        """Return what the VDI's window covers."""
-        return self._coverage
+        """,
+        "Return what the VDI's window covers.",
+        _checked_coverage,
+    )
 
     def SetVolumeProperty(self, prop: vtkVolumeProperty | None) -> None:
         """Set the volume property; later changes to it make the VDI out of date.
@@ -332,13 +324,7 @@ class SourceSettings(Algorithm):
         """Return what the VDI is to reach; ``None`` where nothing is to be chosen."""
         return self._dial
 
-    def SetDevice(self, device: Any) -> None:
-        """Choose the OpenCL device; ``None`` is the default one."""
-        self._change("_device", device)
-
-    def GetDevice(self) -> Any:
-        """Return the device as it was set."""
-        return self._device
+    SetDevice, GetDevice = accessors("Device", "_device", "device", *DEVICE)
 
     def SetProgressCallback(self, progress: Progress | None) -> None:
         """Set a callable that gets the fraction done; if it returns ``False`` the work stops.

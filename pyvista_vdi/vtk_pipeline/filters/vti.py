@@ -57,13 +57,7 @@ def write(
 
 
 def read(path: str | os.PathLike[str]) -> VDI:
-    """Read a VDI from a ``.vti`` file that holds its canonical or its dense form.
-
-    Raises
-    ------
-    VDIFileError
-        If the file is absent, damaged, or holds an image that is no VDI.
-    """
+    """Read a VDI from a ``.vti`` file that holds its canonical or its dense form."""
     image = _image(path)
     try:
         return vdi_from_dense_image(image) if is_dense_image(image) else vdi_from_image(image)
