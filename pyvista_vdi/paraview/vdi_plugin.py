@@ -195,6 +195,16 @@ _SOURCE_XML = """
 """
 
 
+def _of_looks(setter: str) -> Any:
+    """Return a method that sets what a setter of the source's volume property sets."""
+
+    def set_it(self: Any, value: Any) -> None:
+        getattr(self._looks, setter)(value)
+        self.Modified()
+
+    return set_it
+
+
 class _Looking(VTKPythonAlgorithmBase):
     """The properties of a view: an algorithm with ``SetCamera`` gets them as a camera."""
 
@@ -324,29 +334,12 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
         """Set the scalar opacity unit distance; 0 is the default one."""
         self._put("_unit_distance", distance or None)
 
-    def SetInterpolation(self, which: int) -> None:
-        """Choose nearest (0) or linear (1) interpolation."""
-        self._on_looks("SetInterpolationType", which)
-
-    def SetShade(self, shade: int) -> None:
-        """Choose whether the volume is lit."""
-        self._on_looks("SetShade", shade)
-
-    def SetAmbient(self, share: float) -> None:
-        """Set the ambient coefficient."""
-        self._on_looks("SetAmbient", share)
-
-    def SetDiffuse(self, share: float) -> None:
-        """Set the diffuse coefficient."""
-        self._on_looks("SetDiffuse", share)
-
-    def SetSpecular(self, share: float) -> None:
-        """Set the specular coefficient."""
-        self._on_looks("SetSpecular", share)
-
-    def SetSpecularPower(self, power: float) -> None:
-        """Set the specular power."""
-        self._on_looks("SetSpecularPower", power)
+    SetInterpolation = _of_looks("SetInterpolationType")
+    SetShade = _of_looks("SetShade")
+    SetAmbient = _of_looks("SetAmbient")
+    SetDiffuse = _of_looks("SetDiffuse")
+    SetSpecular = _of_looks("SetSpecular")
+    SetSpecularPower = _of_looks("SetSpecularPower")
 
     def SetOcclusion(self, occluded: int) -> None:
         """Choose whether what is hidden from the light around it is darkened."""
@@ -431,10 +424,6 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
             distance = volume.default_unit_distance
         prop.SetScalarOpacityUnitDistance(distance)
         self.SetVolumeProperty(prop)
-
-    def _on_looks(self, setter: str, value: Any) -> None:
-        getattr(self._looks, setter)(value)
-        self.Modified()
 
     def _follow(self, role: str, function: Any) -> None:
         """Be out of date whenever a transfer function changes."""

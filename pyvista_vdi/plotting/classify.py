@@ -34,38 +34,8 @@ _MAX_COLORS = 4096
 class Looks:
     """``add_volume``'s arguments that say what a scalar looks like, with its names and defaults.
 
-    What cannot be used is refused where it is used.
-
-    Parameters
-    ----------
-    clim : float or (float, float), optional
-        Range; one number means from minus to plus it; all finite values by default.
-    n_colors : int
-        Number of entries.
-    opacity : str or float or array_like
-        A name, one number 0 to 1, an array of other length than ``n_colors`` (0 to 1,
-        interpolated) or of that length (taken as it is, 0 to 255).
-    cmap : str, list, matplotlib colour map or pyvista.LookupTable, optional
-        A lookup table is used as it is, with its own range and opacities; what else makes a table
-        then has no effect.
-    flip_scalars : bool
-        Reverse the colour map.
-    log_scale : bool
-        Map values to colours by their logarithm.
-    categories : bool or int
-        Take as many colours as there are different values, or this many.
-    annotations : dict, optional
-        Labels on the scalar bar, by value.
-    theme : pyvista.plotting.themes.Theme, optional
-        Whose default colour map is used; the global one by default.
-    opacity_unit_distance : float, optional
-        Model units; ``None`` leaves it to the volume.
-    interpolation : {"nearest", "linear"}
-        How samples are taken between the volume's points.
-    shade : bool
-        Whether samples reflect light.
-    ambient, diffuse, specular, specular_power
-        How a shaded volume does: see :class:`~pyvista_vdi.Shading`.
+    :meth:`AddVDI.__call__` says what each means. What cannot be used is refused where it is used.
+    ``theme`` is PyVista's, whose default colour map is used, the global one by default.
     """
 
     clim: float | ArrayLike | None = None
@@ -92,13 +62,7 @@ class Looks:
         return replace(self, opacity="linear")
 
     def lookup_table(self, scalars: NDArray[Any]) -> pv.LookupTable:
-        """Return the lookup table that ``Plotter.add_volume`` would build for some values.
-
-        Raises
-        ------
-        InvalidArgumentError, InvalidVolumeError, MissingDependencyError
-            See :func:`transfer_function_from_arguments`.
-        """
+        """Return the lookup table that ``Plotter.add_volume`` would build for some values."""
         if isinstance(self.cmap, pv.LookupTable):
             return self.cmap
         low, high = _scalar_range(scalars, self.clim)
@@ -166,29 +130,9 @@ def transfer_function_from_arguments(
 ) -> TransferFunction:
     """Return the transfer function that ``Plotter.add_volume`` would draw with.
 
-    Parameters
-    ----------
-    scalars : numpy.ndarray
-        The volume's values, of any shape; for the default ``clim``.
-    rgba : bool
-        Whether they are RGBA.
-    **arguments
-        Those of :class:`Looks`.
-
-    Returns
-    -------
-    TransferFunction
-        ``n_colors`` entries. PyVista stores opacities as bytes and cuts them at 0.998; so does
-        this.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If a name is unknown or a value out of range.
-    InvalidVolumeError
-        If every value is NaN and ``clim`` is not given.
-    MissingDependencyError
-        If the colour map is of a package that is not installed.
+    ``scalars`` are the volume's values, of any shape, ``rgba`` says whether they are RGBA, and the
+    arguments are those of :class:`Looks`. The table has ``n_colors`` entries. PyVista stores
+    opacities as bytes and cuts them at 0.998; so does this. What cannot be used is refused by name.
     """
     looks = Looks(**arguments)
     if rgba:

@@ -13,20 +13,9 @@ if TYPE_CHECKING:
 
 
 def to_image_data(volume: Volume, name: str | None = None) -> pv.ImageData:
-    """Return a volume as PyVista's uniform grid.
+    """Return a volume as PyVista's uniform grid, with its values as the active point array.
 
-    Parameters
-    ----------
-    volume : Volume
-        Scalars indexed [z, y, x] with spacing, origin and direction in the model frame.
-    name : str, optional
-        Name of the point array, which becomes the active one; the volume's own by default.
-
-    Returns
-    -------
-    pyvista.ImageData
-        The same grid: dimensions (nx, ny, nz), point data of the volume's type. It may share
-        memory with ``volume.array``.
+    ``name`` is the array's, the volume's own by default. It may share memory with the volume.
     """
     import pyvista as pv
 

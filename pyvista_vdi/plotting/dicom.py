@@ -34,47 +34,21 @@ _UNCOMPRESSED = ("1.2.840.10008.1.2", "1.2.840.10008.1.2.1")
 
 @dataclass(frozen=True)
 class Slice:
-    """One slice of a scan; lengths are millimetres, ``None`` where the file does not say.
-
-    Attributes
-    ----------
-    path : pathlib.Path
-        Its file.
-    series, description : str
-        Identifier and name of the series that it belongs to.
-    transfer_syntax : str
-        Identifier of how the file is encoded.
-    position : numpy.ndarray or None
-        Centre of its first pixel, float64 (3,), in the patient's frame: to the left, to the back,
-        to the head.
-    orientation : numpy.ndarray or None
-        Directions in which columns and rows are counted, float64 (2, 3).
-    thickness : float or None
-        Of what the slice shows.
-    spacing : numpy.ndarray or None
-        Between the centres of rows and of columns, in this order, float64 (2,).
-    """
+    """One slice of a scan; lengths are millimetres, ``None`` where the file does not say."""
 
     path: Path
-    series: str
+    series: str  # identifier of the series that it belongs to, and the series' name
     description: str
-    transfer_syntax: str
+    transfer_syntax: str  # identifier of how the file is encoded
+    # Centre of its first pixel, (3,), in the patient's frame: to the left, to the back, to the head
     position: NDArray[np.float64] | None
-    orientation: NDArray[np.float64] | None
+    orientation: NDArray[np.float64] | None  # directions of columns and rows, (2, 3)
     thickness: float | None
-    spacing: NDArray[np.float64] | None
+    spacing: NDArray[np.float64] | None  # between rows and between columns
 
 
 def slices_of(folder: Path) -> list[Slice]:
-    """Return the slices in a folder, which must be those of one series.
-
-    Raises
-    ------
-    InvalidVolumeError
-        If there are none, or several series.
-    UnsupportedError
-        If their pixels are compressed.
-    """
+    """Return the slices in a folder, which must be those of one series, not compressed."""
     files = sorted(path for path in folder.iterdir() if path.is_file())
     found = [each for each in (read_slice(path) for path in files) if each is not None]
     if not found:

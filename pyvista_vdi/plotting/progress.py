@@ -13,15 +13,7 @@ PATIENCE = 1.0
 
 
 class DelayedBar:
-    """Progress on stderr, shown from one second of work on.
-
-    Parameters
-    ----------
-    always : bool
-        Also where stderr is not a terminal.
-    label : str
-        What is being done.
-    """
+    """Progress on stderr from one second of work on; ``always``: also where it is no terminal."""
 
     def __init__(self, *, always: bool = False, label: str = "generating a VDI") -> None:
         self._label = label
@@ -60,11 +52,8 @@ def progress_callback(
 ) -> Callable[[float], object] | None:
     """Return what to call with the fraction done.
 
-    Parameters
-    ----------
-    progress_bar : bool or callable, optional
-        ``None``: a bar on a terminal if the work takes over a second; ``True``: also elsewhere;
-        ``False``: none; a callable: that.
+    ``None``: a bar on a terminal if the work takes over a second; ``True``: also elsewhere;
+    ``False``: none; a callable: that.
     """
     if callable(progress_bar):
         return progress_bar

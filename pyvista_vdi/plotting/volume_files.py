@@ -39,32 +39,11 @@ _EVEN = 0.01
 def read_volume(path: str | os.PathLike[str]) -> pv.ImageData:
     """Read a volume by PyVista's readers, with the orientation that its file states.
 
-    Parameters
-    ----------
-    path : path-like
-        A file in any format of ``pyvista.read`` that holds a uniform grid (MetaImage, NIfTI, .vti,
-        .vtk, TIFF, ...), or a folder of DICOM slices.
-
-    Returns
-    -------
-    pyvista.ImageData
-        The grid with its arrays, in the file's own coordinates: those of NIfTI grow to the right,
-        the front and the head, those of DICOM and of most MetaImages to the left, the back and
-        the head; millimetres.
-
-    Raises
-    ------
-    InvalidVolumeError
-        If the file is absent, of an unknown format or cannot be read, or a folder holds no DICOM
-        slices or those of several series.
-    UnsupportedError
-        If it holds another kind of data set, several time points, or pixels that VTK does not
-        decode; the message says what to do.
-
-    Warns
-    -----
-    VDIWarning
-        If slices do not say where they lie, or not at equal distances.
+    A file in any format of ``pyvista.read`` that holds a uniform grid (MetaImage, NIfTI, .vti,
+    .vtk, TIFF, ...), or a folder of DICOM slices, gives the grid in the file's own coordinates:
+    those of NIfTI grow to the right, the front and the head, those of DICOM and of most MetaImages
+    to the left, the back and the head; millimetres. What cannot be read is refused with a remedy,
+    and slices that do not say where they lie, or not at equal distances, bring a ``VDIWarning``.
     """
     file = Path(path)
     if not os.path.exists(file):  # noqa: PTH110 - pathlib's raises for a name that is too long

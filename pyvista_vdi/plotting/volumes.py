@@ -17,28 +17,12 @@ _UNNAMED = "Data"
 
 
 def as_image(volume: Any, scalars: Any, resolution: Any) -> tuple[Any, str | None]:
-    """Return a uniform grid and the name of its scalars.
+    """Return a uniform grid and the name of its scalars, ``None`` for the active ones.
 
-    Parameters
-    ----------
-    volume : pyvista.ImageData or vtkImageData or numpy.ndarray or Volume
-        The user's own grid is returned where that is possible, so that changes to it are seen.
-    scalars : str or numpy.ndarray, optional
-        Name, or values per point or cell; these go into a shallow copy.
-    resolution : (float, float, float), optional
-        Spacing of a NumPy array.
-
-    Returns
-    -------
-    image : vtkImageData
-        The grid.
-    name : str or None
-        The array; ``None`` for the active scalars.
-
-    Raises
-    ------
-    InvalidVolumeError, InvalidArgumentError, UnsupportedError
-        If it cannot be used; for other grids the message says what to do.
+    ``volume`` is a grid, a NumPy array with the spacing ``resolution``, or a Volume; the user's own
+    grid is returned where that is possible, so that changes to it are seen. ``scalars`` is a name,
+    or values per point or cell, which go into a shallow copy. Other grids are refused with a
+    remedy.
     """
     if isinstance(volume, np.ndarray):
         image = _from_array(volume, resolution)

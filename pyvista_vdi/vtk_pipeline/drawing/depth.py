@@ -23,24 +23,12 @@ _PLAIN_MAPPERS = ("vtkDataSetMapper", "vtkPolyDataMapper", "vtkOpenGLPolyDataMap
 
 @dataclass
 class _Reading:
-    """What was read of a renderer's depth buffer.
+    """What was read of a renderer's depth buffer."""
 
-    Attributes
-    ----------
-    view : tuple
-        Viewport, matrices and area that it belongs to.
-    state : tuple or None
-        All that it depends on; ``None`` if that is not known.
-    z : numpy.ndarray
-        Window depth in the area, float32 (h, w), bottom row first.
-    depth : numpy.ndarray or None
-        The result.
-    """
-
-    view: Any
-    state: Any
-    z: Image
-    depth: Image | None
+    view: Any  # viewport, matrices and area that it belongs to
+    state: Any  # all that it depends on; None if that is not known
+    z: Image  # window depth in the area, (h, w), bottom row first
+    depth: Image | None  # the result
 
 
 class OpaqueDepths:
@@ -50,17 +38,12 @@ class OpaqueDepths:
         self._known: Recent[_Reading] = Recent()
 
     def read(self, frames: Sequence[Frame]) -> Image | None:
-        """Return where rays end in the frame that is being drawn, of these VDIs.
+        """Return where rays end in the frame that is being drawn; ``None`` if none ends early.
 
-        Nothing is read where nothing opaque is before the VDIs, outside the VDIs' rectangles on
-        the screen, outside what can hide them where that is known, and if all that it depends on
-        is as it was.
-
-        Returns
-        -------
-        numpy.ndarray or None
-            View depth, float32 (H, W), top row first, world units; inf where nothing is. The same
-            object as long as it has not changed. ``None`` if no ray ends early.
+        View depth, float32 (H, W), top row first, world units; inf where nothing is; the same
+        object as long as it has not changed. Nothing is read where nothing opaque is before the
+        VDIs, outside the VDIs' rectangles on the screen, outside what can hide them where that is
+        known, and if all that it depends on is as it was.
         """
         frame = frames[0]
         renderer = frame.renderer  # it has drawn what is opaque

@@ -287,28 +287,15 @@ class Frame:
 class Drawn:
     """An image that was raycast, kept without what VTK has.
 
-    Attributes
-    ----------
-    image : numpy.ndarray
-        Premultiplied RGBA, float32 (H, W, 4), top row first.
-    full_size : (int, int) or None
-        Width and height of the viewport in pixels; ``None`` for the empty image before the first.
-    depth : numpy.ndarray or None
-        Where its rays ended.
-    number : int or None
-        By which an upload is known.
-    joint : bool
-        Whether it is a part of a picture that other actors show the rest of.
-    pixels : numpy.ndarray or None
-        The memory that the image begins, 1D: another image may be raycast into it when this one is
-        kept no longer.
+    ``pixels`` is the memory that it begins, 1D: another image may be raycast into it when this one
+    is kept no longer.
     """
 
-    image: Image
-    full_size: tuple[int, int] | None = None
-    depth: Image | None = None
-    number: int | None = None
-    joint: bool = False
+    image: Image  # premultiplied RGBA, (H, W, 4), top row first
+    full_size: tuple[int, int] | None = None  # the viewport's; None before the first image
+    depth: Image | None = None  # where its rays ended
+    number: int | None = None  # by which an upload is known
+    joint: bool = False  # a part of a picture that other actors show the rest of
     pixels: Image | None = None
 
     @property
@@ -408,26 +395,13 @@ def view_of(
 
     Whatever VTK put into the matrix (one eye of a stereo pair, a tile of a screenshot, a window
     centre, an off-axis or explicit projection) is in what is drawn, so the frame's view is taken
-    from the matrix and not from the camera's settings.
+    from the matrix, ``composite``, world to normalised device coordinates, and not from the
+    camera's settings. In parallel projection it does not tell where depth begins: the camera's
+    ``eye`` and ``forward`` direction do. ``aspect`` is that of the viewport in pixels.
 
-    Parameters
-    ----------
-    composite : numpy.ndarray
-        World to normalised device coordinates, (4, 4).
-    aspect : float
-        Width over height of the viewport in pixels.
-    eye, forward : numpy.ndarray
-        The camera's position and direction; used in parallel projection, where the matrix does
-        not tell where depth begins.
-
-    Returns
-    -------
-    to_view : numpy.ndarray
-        World to view coordinates (x right, y up, z backward), (4, 4): rotation and translation,
-        with whatever scale or shear is left in it.
-    lens : dict
-        ``view_angle`` and ``window_center``, or ``parallel_projection`` and ``parallel_scale``,
-        for a :class:`Camera` at the origin that looks along -z.
+    Returns world to view coordinates (x right, y up, z backward), (4, 4), rotation and translation
+    with whatever scale or shear is left in it, and the lens of a :class:`Camera` at the origin that
+    looks along -z.
     """
     across, up, denominator = composite[0], composite[1], composite[3]
     scale = np.linalg.norm(denominator[:3])

@@ -70,13 +70,8 @@ class Overlaps:
     def part(self, own: Frame, others: Callable[[Frame], Sequence[Frame]]) -> Drawn | None:
         """Return what an actor shows of the joint picture; ``None`` if it overlaps no other.
 
-        Parameters
-        ----------
-        own : Frame
-            The actor's VDI.
-        others : callable
-            Gives all VDIs that the renderer shows, ``own`` among them, in its order; given
-            ``own``. Called once for all of them, as long as each is drawn once.
+        ``others`` gives all VDIs that the renderer shows, ``own`` among them, in its order. It is
+        called once for all of them, as long as each is drawn once.
         """
         # Where the frame's VDIs have been looked at already; once each, for a frame may have passes
         place = ("overlaps", own.renderer.GetAddressAsString(""))

@@ -224,13 +224,7 @@ class Painter:
         return None
 
     def raise_trouble(self) -> None:
-        """Raise, once, what a frame could not be drawn for: nothing passes through VTK's renderer.
-
-        Raises
-        ------
-        KeyboardInterrupt, Exception
-            The first such error since the last call.
-        """
+        """Raise, once, what a frame could not be drawn for: VTK's renderer lets nothing through."""
         trouble, self._trouble = self._trouble, None
         if trouble is not None:
             raise trouble

@@ -62,13 +62,7 @@ class Selection:
             keys.Remove(vtkOpenGLActor.GLDepthMaskOverride())
 
     def show(self, renderer: Any, seen: Frame | None, device: Any) -> None:
-        """Raycast and bind the hits in the selector's area; none if nothing is seen.
-
-        Raises
-        ------
-        DeviceError
-            If OpenCL or OpenGL fails; nothing can be picked then.
-        """
+        """Raycast and bind the hits in the selector's area; none if nothing is seen."""
         window, selector = renderer.GetRenderWindow(), renderer.GetSelector()
         if self._picking:
             self._seen = seen

@@ -76,12 +76,7 @@ def place_image(actor: Any, origin: tuple[int, int], size: tuple[int, int]) -> N
 def show_first_hits(actor: Any, selection_pass: int) -> None:
     """Have it draw first hits, at their depth, in place of the image.
 
-    Parameters
-    ----------
-    actor : vtkVolume
-        The VDI's.
-    selection_pass : int
-        What ``vtkHardwareSelector::GetCurrentPass`` says.
+    ``selection_pass`` is what ``vtkHardwareSelector::GetCurrentPass`` says.
     """
     cells = (vtkHardwareSelector.CELL_ID_LOW24, vtkHardwareSelector.CELL_ID_HIGH24)
     which = _CELL if selection_pass in cells else _PROP

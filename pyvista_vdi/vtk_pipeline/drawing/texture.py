@@ -25,23 +25,12 @@ class ImageTexture:
     def show(
         self, window: Any, image: NDArray[np.float32], number: int | None, *, smooth: bool
     ) -> None:
-        """Bind an image for the shader.
+        """Bind an image for the shader, in the window's context, which is current.
 
-        Parameters
-        ----------
-        window : vtkRenderWindow
-            Its context is current.
-        image : numpy.ndarray
-            RGBA, float32 (H, W, 4), its rows in the order that the shader takes them in.
-        number : int, optional
-            The same as last time if the image is; it is not uploaded again then.
-        smooth : bool
-            Interpolate linearly between texels: a full frame's texels are the pixels.
-
-        Raises
-        ------
-        DeviceError
-            If OpenGL binds it where the shader does not look.
+        ``image`` is RGBA, float32 (H, W, 4), its rows in the order that the shader takes them in.
+        Where ``number`` is that of last time it is not uploaded again. With ``smooth`` texels are
+        interpolated linearly: a full frame's texels are the pixels. DeviceError is raised if OpenGL
+        binds it where the shader does not look.
         """
         if self._texture is None:
             self._texture = vtkTextureObject()

@@ -23,17 +23,9 @@ _VIEW_CONE = 60.0
 class Upkeep:
     """Keeps the input of a mapper up to date.
 
-    Where somebody watches the window, a change or a new view is made a VDI of in the background
-    and swapped between two frames; elsewhere a frame waits for the VDI that belongs to it.
-
-    Parameters
-    ----------
-    interaction : Interaction
-        Says where somebody watches.
-    warnings : Warnings
-        For what goes wrong.
-    texts : CornerTexts
-        They may have to be drawn again though nothing else has changed.
+    Where somebody watches the window, which ``interaction`` says, a change or a new view is made a
+    VDI of in the background and swapped between two frames; elsewhere a frame waits for the VDI
+    that belongs to it. ``texts`` may have to be drawn again though nothing else has changed.
     """
 
     def __init__(self, interaction: Interaction, warnings: Warnings, texts: CornerTexts) -> None:

@@ -49,39 +49,17 @@ _NO_INPUT = "VDISource has no input: call SetInputDataObject(volume)"
 
 @dataclass(frozen=True)
 class Request:
-    """Everything that decides a VDI, read from the pipeline at one moment.
-
-    Attributes
-    ----------
-    volume : Volume
-        The scalars.
-    transfer_function : TransferFunction
-        Their colours and opacities.
-    screen : View
-        The view on the screen.
-    generating : (Camera, (int, int))
-        The generating view V_O and its window, after coverage.
-    options : GenerationOptions
-        How it is made.
-    dial : Dial or None
-        What chooses some of the options.
-    device
-        Where.
-    metadata : dict
-        What is added to the VDI's.
-    content : tuple
-        Equal where what is generated from is equal, the view apart.
-    """
+    """Everything that decides a VDI, read from the pipeline at one moment."""
 
     volume: Volume
     transfer_function: TransferFunction
     screen: View
-    generating: tuple[Camera, tuple[int, int]]
+    generating: tuple[Camera, tuple[int, int]]  # V_O and its window, after coverage
     options: GenerationOptions
     dial: Dial | None
     device: Any
-    metadata: dict[str, Any]
-    content: Any = field(repr=False)
+    metadata: dict[str, Any]  # what is added to the VDI's
+    content: Any = field(repr=False)  # equal where what is generated from is, the view apart
 
     @property
     def key(self) -> Any:
@@ -171,12 +149,8 @@ class VDISource(SourceSettings):
     def MakeRequest(self, view: View | None = None) -> Request:
         """Return what the next VDI would be made of, from another view if one is given.
 
-        This brings the pipeline before the source up to date, and generates nothing.
-
-        Raises
-        ------
-        VDIError
-            What :meth:`GetVDI` would raise before it generates.
+        This brings the pipeline before the source up to date, and generates nothing; it raises what
+        :meth:`GetVDI` would raise before it generates.
         """
         data = self._input()
         return self._make_request(

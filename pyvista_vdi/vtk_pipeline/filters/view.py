@@ -29,13 +29,7 @@ class View:
 
     @classmethod
     def of(cls, renderer: Any, model_transform: NDArray[np.float64]) -> View:
-        """Return what a renderer shows an actor from.
-
-        Raises
-        ------
-        UnsupportedError
-            If its camera has what the optical model has no place for.
-        """
+        """Return what a renderer shows an actor from; UnsupportedError where no VDI can be."""
         camera = Camera.from_any(renderer.GetActiveCamera(), model_transform=model_transform)
         width, height = renderer.GetSize()
         return cls(camera, (max(1, width), max(1, height)))

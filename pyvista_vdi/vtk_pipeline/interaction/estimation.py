@@ -63,13 +63,7 @@ class Estimation:
         self._worker.put(Job(judge, request.device))
 
     def take(self) -> Estimate | None:
-        """Return the estimate that was finished, once.
-
-        Raises
-        ------
-        VDIError, Exception
-            What made it fail, once.
-        """
+        """Return the estimate that was finished, or raise what made it fail, once."""
         return self._worker.take()  # type: ignore[no-any-return]
 
     def cancel(self) -> None:

@@ -44,13 +44,7 @@ _OUT_OF_DATE = 0.7
 
 
 def checked_policy(policy: Any) -> Policy:
-    """Return ``"auto"``, ``"never"`` or a callable.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If it is something else.
-    """
+    """Return ``"auto"``, ``"never"`` or a callable; refuse anything else."""
     if policy in ("auto", "never") or callable(policy):
         return policy  # type: ignore[no-any-return]
     raise InvalidArgumentError(
@@ -136,26 +130,11 @@ class Regeneration:
     ) -> None:
         """Look at the frame's view and at what the VDI was made of, and begin what is needed.
 
-        Parameters
-        ----------
-        source : VDISource
-            It has made a VDI.
-        stamp : object
-            Changes whenever the source may have to make another.
-        view : View
-            What the frame shows.
-        moving : bool
-            Whether the window is interactive.
-        ask : callable
-            Gives the status for a policy that is a callable.
-        options : RenderOptions
-            How it is drawn (clipping planes in world coordinates), for the estimate. A change
-            needs no new VDI, and by itself no new estimate: that is of the view.
-
-        Raises
-        ------
-        VDIError
-            If what has changed cannot be made a VDI of; it is said once.
+        ``source`` has made a VDI, and ``stamp`` changes whenever it may have to make another.
+        ``ask`` gives the status for a policy that is a callable. ``options`` say how the VDI is
+        drawn (clipping planes in world coordinates), for the estimate: a change of them needs no
+        new VDI, and by itself no new estimate, which is of the view. VDIError is raised, once, if
+        what has changed cannot be made a VDI of.
         """
         self._notice(source, view, moving)
         self._options = options
@@ -200,13 +179,7 @@ class Regeneration:
     # -- between frames --------------------------------------------------------------------------
 
     def collect(self) -> bool:
-        """Take what the workers have finished; whether a VDI has been swapped.
-
-        Raises
-        ------
-        VDIError, Exception
-            What made a worker fail, once.
-        """
+        """Take what the workers have finished, or raise why not; whether a VDI was swapped."""
         source = None if self._source is None else self._source()
         if source is None:
             self.cancel()

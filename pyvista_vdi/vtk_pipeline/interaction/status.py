@@ -111,13 +111,7 @@ class CornerTexts:
         self._progress: float | None = None
 
     def add(self, renderer: Any, corner: str) -> vtkCornerAnnotation:
-        """Add one to a corner of a renderer.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If there is no such corner.
-        """
+        """Add one to a corner of a renderer."""
         if corner not in CORNERS:
             raise InvalidArgumentError(f"corner must be one of {tuple(CORNERS)}; got {corner!r}")
         annotation = vtkCornerAnnotation()

@@ -38,24 +38,11 @@ def checked_rate(name: str, value: Any, *, least: str = "0 or above") -> float:
 
 @dataclass
 class Interaction:
-    """What a mapper allows while a hand moves; VTK's names are in the mapper.
-
-    Attributes
-    ----------
-    adjust : bool
-        Draw previews at all (``SetAutoAdjustSampleDistances``).
-    update_rate : float
-        A frame is interactive if its window's desired update rate is at least this, 1/s
-        (``SetInteractiveUpdateRate``, default 1 as in ``vtkSmartVolumeMapper``).
-    target : float or None
-        Frames per second to be kept; ``None``: the window's desired update rate.
-    off_screen : bool
-        Treat off-screen windows as if somebody watched them.
-    """
+    """What a mapper allows while a hand moves; VTK's names, and the meaning, are in the mapper."""
 
     adjust: bool = True
-    update_rate: float = 1.0
-    target: float | None = None
+    update_rate: float = 1.0  # 1/s, as in vtkSmartVolumeMapper
+    target: float | None = None  # frames per second; None: the window's desired update rate
     off_screen: bool = False
 
     def watched(self, window: Any) -> bool:
@@ -79,31 +66,15 @@ class Interaction:
 
 @dataclass
 class _Frame:
-    """What the VDIs of one frame have taken together.
+    """What the VDIs of one frame have taken together."""
 
-    Attributes
-    ----------
-    share : float or None
-        Of its pixels that each is drawn with; ``None`` before one has asked.
-    interactive : bool
-        Whether one may be a preview.
-    preview : bool
-        Whether one is.
-    target : float
-        The highest rate that one wants to keep, 1/s.
-    pixels, full_pixels : int
-        That were raycast, and those of full images.
-    work : float
-        Seconds that this took.
-    """
-
-    share: float | None = None
-    interactive: bool = False
-    preview: bool = False
-    target: float = 0.0
-    pixels: int = 0
-    full_pixels: int = 0
-    work: float = 0.0
+    share: float | None = None  # of its pixels that each is drawn with; None before one has asked
+    interactive: bool = False  # whether one may be a preview
+    preview: bool = False  # whether one is
+    target: float = 0.0  # the highest rate that one wants to keep, 1/s
+    pixels: int = 0  # that were raycast
+    full_pixels: int = 0  # those of full images
+    work: float = 0.0  # seconds that this took
 
 
 class WindowClock:
@@ -204,16 +175,8 @@ class WindowClock:
     def share(self, renderer: Any, interaction: Interaction, pixels: int, floor: float) -> float:
         """Return the share of its pixels, 0 to 1, that a VDI is drawn with in this frame.
 
-        Parameters
-        ----------
-        renderer : vtkRenderer
-            Where it is drawn.
-        interaction : Interaction
-            What its mapper allows.
-        pixels : int
-            Of the full image.
-        floor : float
-            Least share.
+        ``interaction`` is what its mapper allows, ``pixels`` those of the full image, and ``floor``
+        the least share.
         """
         window = self._window.Get()
         if not interaction.wants_preview(window):
