@@ -52,7 +52,6 @@ MODULES = {
 NAMES = {
     "generation": {
         "Estimate": "generation.estimate",
-        "estimate": "generation.estimate",
         "generate_vdi": "generation.generate",
     },
     "volume": {"Volume": "model.volume"},

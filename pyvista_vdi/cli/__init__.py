@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from types import FrameType
+from typing import Any
 
 from pyvista_vdi.cli.parser import UsageError, parse
 from pyvista_vdi.cli.text import printable
@@ -39,7 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = parse(sys.argv[1:] if arguments is None else list(arguments))
         if options is None:  # --help and --version have said what there is to say
             return 0
-        return int(options.run(options))
+        with _no_interrupt_lost():
+            return int(options.run(options))
     except UsageError as error:
         return _complain(str(error), _MISUSED)
     except VDIError as error:
@@ -58,6 +62,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Whoever reads our output has seen enough; what Python would flush at exit goes nowhere
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+
+
+@contextlib.contextmanager
+def _no_interrupt_lost() -> Iterator[None]:
+    """Raise a Ctrl-C again that came where nothing can be raised, so that Python would print it.
+
+    Such places are destructors and the callbacks of weak references, of which every import has one.
+    """
+    before = sys.unraisablehook
+
+    def unraisable(found: Any) -> None:
+        if issubclass(found.exc_type, KeyboardInterrupt):
+            sys.setprofile(raise_again)
+        else:
+            before(found)
+
+    def raise_again(frame: FrameType, event: str, argument: object) -> None:
+        """Called by Python when the code that was interrupted next calls or returns."""
+        if frame.f_code is not unraisable.__code__:
+            sys.setprofile(None)
+            raise KeyboardInterrupt
+
+    sys.unraisablehook = unraisable
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 def _complain(message: str, status: int) -> int:

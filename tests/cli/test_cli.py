@@ -8,11 +8,11 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fresh_python import PATIENCE
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
@@ -552,9 +552,8 @@ def test_ctrl_c_while_generating(folder, default_runtime, tmp_path):
     )
     try:
         assert process.stdout.readline() == "writing\n"
-        time.sleep(0.1)
         process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=PATIENCE)
     finally:
         process.kill()
     assert process.returncode == 130

@@ -15,7 +15,7 @@ from pyvista_vdi.device.scheduling import Turns
 from pyvista_vdi.errors import Cancelled
 
 #: Seconds after which a test that waits for another thread gives up: it would wait for ever.
-PATIENCE = 60
+PATIENCE = 600
 
 
 class InThread(threading.Thread):

@@ -110,7 +110,7 @@ def test_across_processes_and_thread_counts(runtime, threads):
         env=environment,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=600,
         check=False,
     )
     assert run.returncode == 0, run.stderr

@@ -5,16 +5,16 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
 import sys
-import time
+import weakref
 
 import numpy as np
 import pytest
 from faulty_driver import ALLOCATIONS, LAUNCHES, state_of
+from fresh_python import run_python
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import cli, io
+from pyvista_vdi import cli
 from pyvista_vdi.model.standard_cases import filling_camera
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
@@ -136,7 +136,7 @@ def test_ctrl_c_in_the_middle_of_a_verb(verb, here, capsys, monkeypatch):
     def interrupted(*_, **__):
         called.append(1)
         signal.raise_signal(signal.SIGINT)
-        time.sleep(60)
+        pytest.fail("the interrupt was lost")
 
     monkeypatch.setattr(function, interrupted)
     status = cli.main([*arguments])
@@ -145,44 +145,109 @@ def test_ctrl_c_in_the_middle_of_a_verb(verb, here, capsys, monkeypatch):
     assert files_in(here) == before
 
 
-@pytest.mark.parametrize("delay", [0.05, 0.3, pytest.param(0.6, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("verb", ["generate", "render", "devices", "info", "convert"])
-def test_ctrl_c_to_a_process_at_any_time(verb, delay, here):
-    """While it looks for drivers, compiles, works: it ends, and leaves nothing."""
+#: Runs a command several times, each in a fork of one Python, and interrupts each before another
+#: of its imports. Prints for each: the status, what it said, the files then; and its imports.
+AT_IMPORTS = """
+import json, os, signal, sys, tempfile
+from pyvista_vdi.cli import main
+# A shell's background jobs ignore SIGINT, and what they start does: not this one
+signal.signal(signal.SIGINT, signal.default_int_handler)
+moments, *arguments = sys.argv[1:]
+for moment in json.loads(moments):
+    with tempfile.TemporaryFile("w+") as said:
+        child = os.fork()
+        if child:
+            status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+            said.seek(0)
+            print(json.dumps([status, said.read(), sorted(os.listdir())]))
+            continue
+        os.dup2(said.fileno(), 1)
+        os.dup2(said.fileno(), 2)
+        left = [moment]
+        def heard(event, _):
+            if event == "import":
+                left[0] -= 1
+                if left[0] == -1:
+                    signal.raise_signal(signal.SIGINT)
+        sys.addaudithook(heard)
+        sys.exit(main(arguments))
+"""
+
+
+@pytest.mark.parametrize(
+    ("verb", "moments"),
+    [
+        ("generate", [0, 90, 180, 260]),
+        ("render", [10, 70, 200]),
+        ("devices", [0, 50, 100]),
+        ("info", [0, 30, 45]),
+        ("convert", [20, 110, 170]),
+    ],
+)
+def test_ctrl_c_while_a_verb_imports(verb, moments, here):
+    """Before the first module, among the libraries, at the last: one line, and nothing is left."""
     arguments = ON_A_DEVICE.get(verb) or ON_THE_HOST[verb][0]
     before = files_in(here)
-    # A shell's background jobs ignore SIGINT, and what they start does: not this one
-    code = (
-        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "from pyvista_vdi.cli import main\n"
-        "print(1, flush=True)\n"
-        "sys.exit(main(sys.argv[1:]))\n"
-    )
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        process.stdout.readline()
-        time.sleep(delay)
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=60)
-    finally:
-        process.kill()
-        process.communicate()
-    made = sorted(set(files_in(here)) - set(before))
-    # Done before the signal came, or killed by it while Python was shutting down
-    if process.returncode in (0, -signal.SIGINT):
-        assert "Traceback" not in err
-        assert len(made) <= 1
-        for name in made:
-            if name.endswith((".vdi", ".exr")):
-                io.read(here / name)
-            (here / name).unlink()
-    else:
-        assert process.returncode == 130, err
-        assert made == []
+    done = run_python(AT_IMPORTS, json.dumps(moments), *arguments)
+    assert done.returncode == 0, done.stderr
+    outcomes = [json.loads(line) for line in done.stdout.splitlines()]
+    assert len(outcomes) == len(moments)
+    for moment, (status, said, files) in zip(moments, outcomes, strict=True):
+        assert (status, files) == (130, before), (moment, said)
         # Behind it, libraries that were half imported may complain at exit
-        assert SENTENCE in err.splitlines()
+        assert SENTENCE in said.splitlines(), moment
+        assert "KeyboardInterrupt" not in said, moment
+
+
+class Interrupted:
+    """Ctrl-C comes in its destructor, from where Python lets no error through."""
+
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+
+class Referred:
+    """Ctrl-C comes in a callback of a weak reference to it, as there are in every import."""
+
+    def __init__(self):
+        self.reference = weakref.ref(self, lambda _: signal.raise_signal(signal.SIGINT))
+        KEPT.append(self.reference)
+
+
+KEPT: list[object] = []
+
+
+@pytest.mark.parametrize("thing", [Interrupted, Referred])
+def test_ctrl_c_where_python_can_raise_nothing(thing, here, capsys, monkeypatch):
+    arguments, function = ON_THE_HOST["info"]
+    went_on = []
+
+    def interrupted(*_, **__):
+        made = thing()
+        del made
+        went_on.append(len(went_on))
+        pytest.fail("the interrupt was lost")
+
+    monkeypatch.setattr(function, interrupted)
+    status = cli.main([*arguments])
+    check_interrupted(capsys, status)
+    assert went_on == []
+
+
+def test_other_errors_that_python_cannot_raise_are_printed(here, capsys, monkeypatch):
+    arguments, _ = ON_THE_HOST["info"]
+    heard = []
+    monkeypatch.setattr(sys, "unraisablehook", heard.append)
+
+    class Failing:
+        def __del__(self):
+            raise ValueError("in a destructor")
+
+    def failing(options):
+        Failing()
+        return 0
+
+    monkeypatch.setattr("pyvista_vdi.cli.files.info", failing)
+    assert cli.main([*arguments]) == 0
+    assert [str(found.exc_value) for found in heard] == ["in a destructor"]
+    assert sys.unraisablehook == heard.append

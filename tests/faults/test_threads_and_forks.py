@@ -19,7 +19,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.generation.generate import generate_vdi
 
 #: Seconds after which a process counts as one that hangs.
-PATIENCE = 100
+PATIENCE = 600
 
 
 def finished(code, *arguments):
@@ -183,7 +183,7 @@ fork = multiprocessing.get_context("fork")
 for _ in range(2):
     process = fork.Process(target=child)
     process.start()
-    process.join(60)
+    process.join(600)
     assert process.exitcode == 0, process.exitcode
 number = os.fork()
 if number == 0:
@@ -209,8 +209,8 @@ fork = multiprocessing.get_context("fork")
 queue = fork.Queue()
 process = fork.Process(target=child, args=(queue,))
 process.start()
-made = queue.get(timeout=60)
-process.join(60)
+made = queue.get(timeout=600)
+process.join(600)
 assert process.exitcode == 0
 assert made.n_supersegments > 0
 print("well")

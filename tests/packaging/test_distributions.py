@@ -20,6 +20,13 @@ import pytest
 #: Files of the repository that a source distribution has no use for.
 NOT_IN_SDIST = {".gitattributes"}
 
+#: Bytes of the largest file that is tracked, volumes that are shipped apart, and of the sdist.
+LARGEST_FILE, LARGEST_SDIST = 5_000_000, 14_000_000
+
+#: What editors, tools and broken-off runs leave behind; and the folders in which tools keep things.
+TEMPORARY = {".tmp", ".orig", ".rej", ".swp", ".log", ".pyc", ".bak"}
+CACHES = {".cache", "__pycache__", ".hypothesis", ".mypy_cache", ".pytest_cache", ".ruff_cache"}
+
 
 def _find_checkout():
     named = os.environ.get("PYVISTA_VDI_CHECKOUT")
@@ -49,6 +56,26 @@ def source(tmp_path_factory):
         (copy / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(checkout / name, copy / name)
     return copy, names
+
+
+def test_no_large_file_is_tracked(source):
+    copy, names = source
+    sizes = {name: (copy / name).stat().st_size for name in names}
+    large = {
+        name: size
+        for name, size in sizes.items()
+        if size > LARGEST_FILE and not name.startswith("pyvista_vdi/data/")
+    }
+    assert not large, "write such files where .gitignore names them"
+
+
+def test_nothing_temporary_is_tracked(source):
+    paths = [PurePosixPath(name) for name in source[1]]
+    assert not [
+        str(path)
+        for path in paths
+        if path.suffix in TEMPORARY or path.name.endswith("~") or CACHES & set(path.parts)
+    ]
 
 
 def _build(source, kind, target):
@@ -139,6 +166,7 @@ def test_wheel_metadata_and_entry_points(wheel, wheel_names):
 
 def test_sdist_holds_the_repository(source, tmp_path):
     archive = _build(source[0], "sdist", tmp_path)
+    assert archive.stat().st_size <= LARGEST_SDIST
     with tarfile.open(archive) as tar:
         found = {name.partition("/")[2] for name in tar.getnames() if tar.getmember(name).isfile()}
     generated = {"PKG-INFO", "setup.cfg"}

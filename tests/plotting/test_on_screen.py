@@ -38,7 +38,7 @@ def test_on_screen(display, case):
         env={**environment, "DISPLAY": display},
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=600,
         check=False,
     )
     assert done.stdout.strip() == "all well", done.stdout + done.stderr

@@ -28,7 +28,7 @@ from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.volume import upload as voxels
 
 #: Seconds after which a test that waits for the thread gives up: it would wait for ever.
-PATIENCE = 120
+PATIENCE = 600
 
 WINDOW = (45, 34)
 THREAD_NAME = "pyvista-vdi generation"
@@ -317,12 +317,15 @@ def test_cancelling_drops_what_was_not_taken(runtime, generator):
     assert runtime.allocated == before
 
 
-def test_closing_in_the_middle(runtime, gate):
+def test_closing_in_the_middle(runtime, gate, monkeypatch):
     generator = BackgroundGeneration(runtime)
     start(generator)
     gate.wait()
-    threading.Timer(0.05, gate.open).start()
+    join = generator._worker.join
+    # Its thread goes on only when nothing is left but to wait for it
+    monkeypatch.setattr(generator._worker, "join", lambda: (gate.open(), join()))
     generator.close()
+    assert len(gate.cancelled) == 1
     assert not threads()
     generator.close()
     with pytest.raises(RuntimeError, match="closed"):

@@ -20,7 +20,7 @@ from vtkmodules.vtkCommonCore import VTK_INT
 
 from pyvista_vdi.quality.frame_rate import FrameRateController
 
-LONG = 60.0
+LONG = 250.0
 
 
 class Hand:

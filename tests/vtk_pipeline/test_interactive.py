@@ -40,7 +40,7 @@ pytestmark = pytest.mark.gl
 #: Odd, so that no smaller image divides it.
 WINDOW = (241, 203)
 #: Seconds after which something that should have happened has not.
-LONG = 60.0
+LONG = 600.0
 MOVING, STILL = 30.0, 0.0001
 
 
