@@ -11,16 +11,40 @@ from vtkmodules.vtkRenderingOpenGL2 import vtkTextureObject
 
 from pyvista_vdi.errors import DeviceError
 
-#: Window depth of nothing: 1 is the far plane.
-_FAR = np.ones(1, dtype=np.float32)
 
-
-class ImageTexture:
-    """Made with the first image, and again in another window."""
+class _Texture:
+    """A texture that is made when it is first shown, and filled again in another window."""
 
     def __init__(self) -> None:
         self._texture: Any = None
-        self._uploaded: int | None = None
+
+    def _in_context(self, window: Any) -> bool:
+        """Have the texture in a window's context, which is current; whether it is filled there."""
+        if self._texture is None:
+            self._texture = vtkTextureObject()
+            self._texture.SetWrapS(vtkTextureObject.ClampToEdge)
+            self._texture.SetWrapT(vtkTextureObject.ClampToEdge)
+        if self._texture.GetContext() is not window:
+            self._texture.SetContext(window)
+            return False
+        return bool(self._texture.GetHandle() != 0)
+
+    def let_go(self) -> None:
+        """Give the texture unit back."""
+        if self._texture is not None:
+            self._texture.Deactivate()
+
+    def release(self) -> None:
+        """Free it, for the next frame to fill it anew; a mapper may keep the object."""
+        window = None if self._texture is None else self._texture.GetContext()
+        if window is not None:
+            self._texture.ReleaseGraphicsResources(window)
+
+
+class ImageTexture(_Texture):
+    """The image that the shader of an actor looks up."""
+
+    _uploaded: int | None = None
 
     def show(
         self, window: Any, image: NDArray[np.float32], number: int | None, *, smooth: bool
@@ -32,18 +56,12 @@ class ImageTexture:
         interpolated linearly: a full frame's texels are the pixels. DeviceError is raised if OpenGL
         binds it where the shader does not look.
         """
-        if self._texture is None:
-            self._texture = vtkTextureObject()
-            self._texture.SetWrapS(vtkTextureObject.ClampToEdge)
-            self._texture.SetWrapT(vtkTextureObject.ClampToEdge)
+        filled = self._in_context(window)
         texture = self._texture
-        if texture.GetContext() is not window:
-            texture.SetContext(window)
-            self._uploaded = None
         kind = vtkTextureObject.Linear if smooth else vtkTextureObject.Nearest
         texture.SetMinificationFilter(kind)
         texture.SetMagnificationFilter(kind)
-        if number is None or number != self._uploaded or texture.GetHandle() == 0:
+        if not filled or number is None or number != self._uploaded:
             height, width = image.shape[:2]
             texture.Create2DFromRaw(width, height, 4, VTK_FLOAT, image)
             self._uploaded = number
@@ -57,49 +75,23 @@ class ImageTexture:
                 "a texture active"
             )
 
-    def let_go(self) -> None:
-        """Give the texture unit back."""
-        if self._texture is not None:
-            self._texture.Deactivate()
-
     def release(self) -> None:
-        """Free the texture."""
-        if self._texture is not None:
-            window = self._texture.GetContext()
-            if window is not None:
-                self._texture.ReleaseGraphicsResources(window)
+        """Free the texture and its object."""
+        super().release()
         self._texture = self._uploaded = None
 
 
-class NoDepth:
+class NoDepth(_Texture):
     """A depth texture of one texel, in place of the copy of the depth buffer that VTK would make.
 
     VTK's volume mapper copies the whole depth buffer in each frame, for the ray caster that our
     shader replaces: under MSAA that takes longer than to draw the image.
     """
 
-    def __init__(self) -> None:
-        self._texture: Any = None
-
     def show(self, window: Any, mapper: Any) -> None:
         """Give it to a mapper for the frame that begins; the image's texture is active already."""
-        if self._texture is None:
-            self._texture = vtkTextureObject()
-        texture = self._texture
-        if texture.GetContext() is not window:
-            texture.SetContext(window)
-        if texture.GetHandle() == 0:
-            texture.CreateDepthFromRaw(1, 1, vtkTextureObject.Float32, VTK_FLOAT, _FAR)
-        mapper.SetSharedDepthTexture(texture)
-        texture.Activate()
-
-    def let_go(self) -> None:
-        """Give the texture unit back."""
-        if self._texture is not None:
-            self._texture.Deactivate()
-
-    def release(self) -> None:
-        """Free it. The mapper keeps the object, which the next frame fills anew."""
-        window = None if self._texture is None else self._texture.GetContext()
-        if window is not None:
-            self._texture.ReleaseGraphicsResources(window)
+        if not self._in_context(window):
+            far = np.ones(1, dtype=np.float32)  # window depth of nothing
+            self._texture.CreateDepthFromRaw(1, 1, vtkTextureObject.Float32, VTK_FLOAT, far)
+        mapper.SetSharedDepthTexture(self._texture)
+        self._texture.Activate()

@@ -36,7 +36,7 @@ class Upkeep:
         self._warnings = warnings
         self._texts = texts
         self._ticker = Ticker(self._tick)
-        self._clock: weakref.ref[WindowClock] | None = None
+        self._clock: Callable[[], WindowClock | None] = lambda: None  # a weak reference
         self._looked_at = (0, 0)
         self._failed_at: Any = None
         self._said_far = False
@@ -173,7 +173,7 @@ class Upkeep:
 
     def _tick(self) -> None:
         """Look, from the event loop, at what goes on, and have shown what is new."""
-        clock = None if self._clock is None else self._clock()
+        clock = self._clock()
         if clock is None or clock.drawing:
             return
         swapped = self.collect()

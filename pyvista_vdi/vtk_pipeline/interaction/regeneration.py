@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any, Literal, TypeAlias
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import BackgroundGeneration
@@ -55,10 +56,7 @@ def checked_policy(policy: Any) -> Policy:
 
 def checked_bound(ssim: Any) -> float:
     """Return an SSIM between 0 and 1."""
-    try:
-        bound = float(ssim)
-    except (TypeError, ValueError):
-        bound = math.nan
+    bound = as_float(ssim)
     if isinstance(ssim, bool) or not 0 <= bound <= 1:
         raise InvalidArgumentError(
             f"regenerate_below must be an SSIM between 0 and 1; got {ssim!r}"
@@ -90,7 +88,7 @@ class Regeneration:
         self._for_view = False
         self._estimation = Estimation()
         self._estimate: Estimate | None = None
-        self._source: weakref.ref[VDISource] | None = None
+        self._source: Callable[[], VDISource | None] = lambda: None  # a weak reference
         self._stamp: Any = None
         self._failed_at: Any = None
         self._view: View | None = None
@@ -150,7 +148,7 @@ class Regeneration:
 
     def _notice(self, source: VDISource, view: View, moving: bool) -> None:
         now = time.perf_counter()
-        if self._source is None or self._source() is not source:
+        if self._source() is not source:
             self.cancel()
             self._source = weakref.ref(source)
             self._stamp = self._estimate = self._view = None
@@ -180,7 +178,7 @@ class Regeneration:
 
     def collect(self) -> bool:
         """Take what the workers have finished, or raise why not; whether a VDI was swapped."""
-        source = None if self._source is None else self._source()
+        source = self._source()
         if source is None:
             self.cancel()
             return False
@@ -237,7 +235,7 @@ class Regeneration:
 
     def _apart(self, other: View) -> float:
         """Distance of the view from another one."""
-        source = None if self._source is None else self._source()
+        source = self._source()
         bounds = None if source is None else source.GetInputBounds()
         if self._view is None or bounds is None:
             return math.inf
@@ -265,7 +263,7 @@ class Regeneration:
 
     def _drop_if_outdated(self) -> None:
         """Give up a VDI that is made for a view which the hand has left behind."""
-        source = None if self._source is None else self._source()
+        source = self._source()
         made = None if source is None else source.GetCurrentRequest()
         if self._target is None or made is None or not self._for_view:
             return
@@ -291,4 +289,5 @@ class Regeneration:
             self._background.close()
             self._background = None
         self._estimation.close()
-        self._estimate = self._source = self._stamp = self._view = None
+        self._estimate = self._stamp = self._view = None
+        self._source = lambda: None

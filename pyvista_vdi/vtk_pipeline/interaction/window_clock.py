@@ -13,6 +13,7 @@ from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLGL2PSHelper
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.quality.frame_rate import FrameRateController
 
 T = TypeVar("T")
@@ -23,15 +24,12 @@ _KNOWN_CAMERAS = 16
 _clocks: weakref.WeakValueDictionary[str, WindowClock] = weakref.WeakValueDictionary()
 
 
-def checked_rate(name: str, value: Any, *, least: str = "0 or above") -> float:
+def checked_rate(name: str, value: Any) -> float:
     """Return a rate in frames per second; 0 or above, finite."""
-    try:
-        rate = float(value)
-    except (TypeError, ValueError):
-        rate = math.nan
-    if isinstance(value, bool) or not (math.isfinite(rate) and rate >= 0):
+    rate = as_float(value)
+    if isinstance(value, bool) or not 0 <= rate < math.inf:
         raise InvalidArgumentError(
-            f"{name} must be a number of frames per second, {least}; got {value!r}"
+            f"{name} must be a number of frames per second, 0 or above; got {value!r}"
         )
     return rate
 
