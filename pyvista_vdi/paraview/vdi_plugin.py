@@ -2,12 +2,14 @@
 
 ParaView loads this file by its path (``pyvista-vdi paraview`` prints it): Tools > Manage
 Plugins, ``paraview.simple.LoadPlugin`` or ``PV_PLUGIN_PATH``. Nothing else imports it. It declares
-ParaView's properties over VTK algorithms that know nothing of ParaView.
+ParaView's properties over VTK algorithms that know nothing of ParaView. It is one file, however
+long: ParaView knows a plugin by one path.
 """
 
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -38,18 +40,25 @@ paraview_plugin_version = __version__
 #: Value of the property View that means the camera properties.
 _CAMERA = 1
 
-#: The camera properties, of our filters and of ParaView's render views alike.
-_CAMERA_PROPERTIES = (
-    "CameraPosition",
-    "CameraFocalPoint",
-    "CameraViewUp",
-    "CameraViewAngle",
-    "CameraParallelProjection",
-    "CameraParallelScale",
-)
+#: Camera properties of our filters and of ParaView's render views alike: kind, default, domain.
+_CAMERA_PROPERTIES = {
+    "CameraPosition": ("Double", "0 0 1", ""),
+    "CameraFocalPoint": ("Double", "0 0 0", ""),
+    "CameraViewUp": ("Double", "0 1 0", ""),
+    "CameraViewAngle": ("Double", "30", ""),
+    "CameraParallelProjection": ("Int", "0", '<BooleanDomain name="bool" />'),
+    "CameraParallelScale": ("Double", "1", ""),
+}
 
 _WITH_CAMERA = """<Hints><PropertyWidgetDecorator type="GenericDecorator" mode="visibility"
                          property="View" value="1" /></Hints>"""
+
+_CAMERA_XML = "".join(
+    f"""
+<{kind}VectorProperty name="{name}" command="Set{name}" number_of_elements="{len(default.split())}"
+                      default_values="{default}">{domain}{_WITH_CAMERA}</{kind}VectorProperty>"""
+    for name, (kind, default, domain) in _CAMERA_PROPERTIES.items()
+)
 
 #: What decides a view: our two filters have it in common. {default} is what View = 0 means, {size}
 #: the default window.
@@ -65,22 +74,7 @@ _VIEW_XML = f"""
   </EnumerationDomain>
   <Documentation>Where the eye is before it is turned.</Documentation>
 </IntVectorProperty>
-<DoubleVectorProperty name="CameraPosition" command="SetCameraPosition" number_of_elements="3"
-                      default_values="0 0 1">{_WITH_CAMERA}</DoubleVectorProperty>
-<DoubleVectorProperty name="CameraFocalPoint" command="SetCameraFocalPoint" number_of_elements="3"
-                      default_values="0 0 0">{_WITH_CAMERA}</DoubleVectorProperty>
-<DoubleVectorProperty name="CameraViewUp" command="SetCameraViewUp" number_of_elements="3"
-                      default_values="0 1 0">{_WITH_CAMERA}</DoubleVectorProperty>
-<DoubleVectorProperty name="CameraViewAngle" command="SetCameraViewAngle" number_of_elements="1"
-                      default_values="30">{_WITH_CAMERA}</DoubleVectorProperty>
-<IntVectorProperty name="CameraParallelProjection" command="SetCameraParallelProjection"
-                   number_of_elements="1" default_values="0">
-  <BooleanDomain name="bool" />{_WITH_CAMERA}
-</IntVectorProperty>
-<DoubleVectorProperty name="CameraParallelScale" command="SetCameraParallelScale"
-                      number_of_elements="1" default_values="1">
-  {_WITH_CAMERA}
-</DoubleVectorProperty>
+{_CAMERA_XML}
 <DoubleVectorProperty name="Azimuth" command="SetAzimuth" number_of_elements="1"
                       default_values="0">
   <DoubleRangeDomain name="range" min="-180" max="180" />
@@ -107,7 +101,14 @@ _DEVICE_XML = """
 </StringVectorProperty>
 """
 
-_SOURCE_XML = """
+_REFLECTION_XML = "".join(
+    f"""
+<DoubleVectorProperty name="{name}" command="Set{name}" number_of_elements="1"
+                      default_values="{default}" panel_visibility="advanced" />"""
+    for name, default in (("Ambient", 0), ("Diffuse", 1), ("Specular", 0), ("SpecularPower", 1))
+)
+
+_SOURCE_XML = f"""
 <StringVectorProperty name="Scalars" command="SetArray" number_of_elements="5"
                       element_types="0 0 0 0 2" animateable="0">
   <ArrayListDomain name="array_list" attribute_type="Scalars">
@@ -146,14 +147,7 @@ _SOURCE_XML = """
   <BooleanDomain name="bool" />
   <Documentation>Light the volume by one headlight at the generating view.</Documentation>
 </IntVectorProperty>
-<DoubleVectorProperty name="Ambient" command="SetAmbient" number_of_elements="1"
-                      default_values="0" panel_visibility="advanced" />
-<DoubleVectorProperty name="Diffuse" command="SetDiffuse" number_of_elements="1"
-                      default_values="1" panel_visibility="advanced" />
-<DoubleVectorProperty name="Specular" command="SetSpecular" number_of_elements="1"
-                      default_values="0" panel_visibility="advanced" />
-<DoubleVectorProperty name="SpecularPower" command="SetSpecularPower" number_of_elements="1"
-                      default_values="1" panel_visibility="advanced" />
+{_REFLECTION_XML}
 <IntVectorProperty name="AmbientOcclusion" command="SetOcclusion" number_of_elements="1"
                    default_values="0">
   <BooleanDomain name="bool" />
@@ -195,6 +189,15 @@ _SOURCE_XML = """
 """
 
 
+def _of_lens(name: str, kind: Callable[[Any], Any] = lambda value: value) -> Any:
+    """Return a method that sets one of the camera's arguments, a number or three."""
+
+    def set_it(self: Any, *value: Any) -> None:
+        self._put("_lens", {**self._lens, name: value if len(value) > 1 else kind(value[0])})
+
+    return set_it
+
+
 def _of_looks(setter: str) -> Any:
     """Return a method that sets what a setter of the source's volume property sets."""
 
@@ -221,29 +224,12 @@ class _Looking(VTKPythonAlgorithmBase):
         """Choose between the default view and the camera properties."""
         self._put("_camera_chosen", which == _CAMERA)
 
-    def SetCameraPosition(self, *place: float) -> None:
-        """Set the eye."""
-        self._look(position=place)
-
-    def SetCameraFocalPoint(self, *place: float) -> None:
-        """Set the point looked at."""
-        self._look(focal_point=place)
-
-    def SetCameraViewUp(self, *direction: float) -> None:
-        """Set the direction that is up."""
-        self._look(view_up=direction)
-
-    def SetCameraViewAngle(self, degrees: float) -> None:
-        """Set the vertical opening angle."""
-        self._look(view_angle=degrees)
-
-    def SetCameraParallelProjection(self, parallel: int) -> None:
-        """Choose between perspective and parallel projection."""
-        self._look(parallel_projection=bool(parallel))
-
-    def SetCameraParallelScale(self, scale: float) -> None:
-        """Set half the viewport's height in parallel projection."""
-        self._look(parallel_scale=scale)
+    SetCameraPosition = _of_lens("position")
+    SetCameraFocalPoint = _of_lens("focal_point")
+    SetCameraViewUp = _of_lens("view_up")
+    SetCameraViewAngle = _of_lens("view_angle")
+    SetCameraParallelProjection = _of_lens("parallel_projection", bool)
+    SetCameraParallelScale = _of_lens("parallel_scale")
 
     def SetSize(self, width: int, height: int) -> None:
         """Set the window; 0 is the default one."""
@@ -270,9 +256,6 @@ class _Looking(VTKPythonAlgorithmBase):
         client.set("Azimuth", [0.0])
         client.set("Elevation", [0.0])
         client.proxy.UpdateVTKObjects()
-
-    def _look(self, **part: Any) -> None:
-        self._put("_lens", {**self._lens, **part})
 
     def _given_camera(self) -> Any:
         # Made as late as this: set one at a time, the properties may pass through no camera at all
