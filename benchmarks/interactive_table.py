@@ -43,7 +43,7 @@ from pyvista_vdi.measure.session import CANDIDATES, Bench, VDIRenderer
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.standard_cases import ANGLES, filling_camera
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.prepared import PreparedVDI
+from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import raycast_medium
 
@@ -158,8 +158,8 @@ def measured(
             "generation": seconds,
             "angles": [],
         }
-        prepared = PreparedVDI(runtime, vdi)
-        draw = VDIRenderer(runtime, prepared, tuple(options.size))
+        prepared = prepared_vdi(runtime, vdi)
+        draw = VDIRenderer(runtime, vdi, tuple(options.size))
         for angle in ANGLES:
             done(f"{name}: {angle:g} degrees")
             camera = view.azimuth(angle)

@@ -52,7 +52,7 @@ from pyvista_vdi.model.standard_cases import ANGLES, filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.prepared import PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI, prepared_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import raycast_medium
 
@@ -557,8 +557,8 @@ def measured(name: str, options: argparse.Namespace, rates: Rates) -> dict[str, 
         **model.floor(preparation_work(vdi)),
         "seconds": sum(taken.values()),
     }
-    prepared = PreparedVDI(runtime, vdi)
-    draw = VDIRenderer(runtime, prepared, size)
+    prepared = prepared_vdi(runtime, vdi)
+    draw = VDIRenderer(runtime, vdi, size)
     for angle in options.angles:
         camera = view.azimuth(angle)
         taken = _kernels_and_rest(watch, lambda camera=camera: draw.image(camera))

@@ -52,7 +52,6 @@ from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.prepared import PreparedVDI
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import raycast_medium
 
@@ -169,7 +168,7 @@ class Bench:
     def __init__(self, runtime: Runtime, interpolation: str) -> None:
         self._runtime, self._interpolation = runtime, interpolation
         self._volumes: dict[str, tuple[Volume, Any]] = {}
-        self._vdi: tuple[Any, VDI, PreparedVDI] | None = None
+        self._vdi: tuple[Any, VDI] | None = None
 
     def steps(self, case: Case, quantities: Sequence[str]) -> dict[str, Callable[[], object]]:
         """Return what is timed of a case, by quantity."""
@@ -203,8 +202,8 @@ class Bench:
         made_for = (case.volume, case.size, case.limit)
         if self._vdi is None or self._vdi[0] != made_for:
             vdi = generate()
-            self._vdi = made_for, vdi, PreparedVDI(self._runtime, vdi)
-        return VDIRenderer(self._runtime, self._vdi[2], case.size)
+            self._vdi = made_for, vdi
+        return VDIRenderer(self._runtime, self._vdi[1], case.size)
 
 
 def measured_axis(

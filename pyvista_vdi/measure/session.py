@@ -25,8 +25,7 @@ from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.prepared import PreparedVDI
-from pyvista_vdi.raycasting.raycast import draw
+from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import raycast_medium
 
@@ -278,23 +277,14 @@ class Bench:
 class VDIRenderer:
     """One VDI on the device, drawn without and with skipping of empty space."""
 
-    def __init__(self, runtime: Runtime, prepared: PreparedVDI, size: tuple[int, int]) -> None:
-        self._runtime, self._prepared, self._size = runtime, prepared, size
+    def __init__(self, runtime: Runtime, vdi: VDI, size: tuple[int, int]) -> None:
+        self._runtime, self._vdi, self._size = runtime, vdi, size
 
-    def image(
-        self,
-        camera: Camera,
-        size: tuple[int, int] | None = None,
-        *,
-        skip_empty: bool = True,
-        preview_samples: int | None = None,
-    ) -> Image:
+    def image(self, camera: Camera, size: tuple[int, int] | None = None, **options: Any) -> Image:
         """Draw a frame; premultiplied RGBA (H, W, 4) on the host."""
-        options = RenderOptions(skip_empty=skip_empty, preview_samples=preview_samples)
-        width, height = size or self._size
-        with self._runtime.result((height, width, 4), name="image") as image:
-            draw(self._prepared, FrameRequest(camera, (width, height), options), image)
-            return self._runtime.download(image)
+        looks = RenderOptions(**options)
+        frame = FrameRequest(camera, size or self._size, looks, device=self._runtime)
+        return render_vdi(self._vdi, frame)
 
     def frames(self, camera: Camera) -> dict[str, Step]:
         """Return what draws a frame, by candidate."""

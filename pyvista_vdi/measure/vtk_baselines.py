@@ -47,13 +47,15 @@ class VTKBaseline:
         if mapper not in MAPPERS:
             raise InvalidArgumentError(f"mapper must be one of {MAPPERS}; got {mapper!r}")
         core = _vtk("vtkRenderingCore")
+        from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
+
         self.name = mapper
         self._window = _off_screen_window(check_window_size(window_size))
         self._renderer = core.vtkRenderer()
         self._renderer.SetBackground(0, 0, 0)
         self._window.AddRenderer(self._renderer)
         self._mapper = _make_mapper(mapper)
-        self._mapper.SetInputData(image_from_volume(volume))
+        self._mapper.SetInputData(volume_to_image(volume))
         self.set_sample_distance(sample_distance)
         self._volume = core.vtkVolume()
         self._volume.SetMapper(self._mapper)
@@ -135,22 +137,6 @@ def _vtk(module: str) -> Any:
         return import_module(f"vtkmodules.{module}")
     except ImportError as error:
         raise explain_import_error(error) from error
-
-
-def image_from_volume(volume: Volume) -> Any:
-    """Return a volume as a ``vtkImageData`` that shares its memory."""
-    image = _vtk("vtkCommonDataModel").vtkImageData()
-    image.SetDimensions(volume.dimensions)
-    image.SetSpacing(volume.spacing)
-    image.SetOrigin(volume.origin)
-    image.SetDirectionMatrix(volume.direction.ravel().tolist())
-    # x runs fastest in VTK's point order, as it does in a C-ordered [z, y, x] array
-    scalars = _vtk("util.numpy_support").numpy_to_vtk(
-        volume.array.reshape((-1, 4) if volume.rgba else -1)
-    )
-    scalars.SetName(volume.name)
-    image.GetPointData().SetScalars(scalars)
-    return image
 
 
 def property_from_transfer_function(volume: Volume, table: TransferFunction) -> Any:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
     import pyvista as pv
 
@@ -19,14 +17,7 @@ def to_image_data(volume: Volume, name: str | None = None) -> pv.ImageData:
     """
     import pyvista as pv
 
-    grid = pv.ImageData(
-        dimensions=volume.dimensions,
-        spacing=volume.spacing,
-        origin=volume.origin,
-        direction_matrix=np.array(volume.direction),
-    )
-    # x runs fastest in VTK's point order, as it does in a C-ordered [z, y, x] array
-    name = volume.name if name is None else name
-    grid.point_data[name] = volume.array.reshape((-1, 4) if volume.rgba else -1)
-    grid.set_active_scalars(name)
+    from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
+
+    grid: pv.ImageData = pv.wrap(volume_to_image(volume, name))
     return grid

@@ -7,11 +7,11 @@ supersegments in 1280 x 720; at other sizes it promises nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from pyvista_vdi.measure.compare.measure import AngleResult, Report
+from pyvista_vdi.measure.compare.measure import Report
 from pyvista_vdi.model.metrics import Comparison
 
 #: From V_O at the VDI's own size, against our volume raycaster at the same step.
@@ -109,11 +109,22 @@ def judge_vdi(report: Report, volume: str, transfer_function: str) -> list[Check
     list of Check
         The bounds that apply to what was measured; other angles have none.
     """
-    return [
-        check
-        for result in report.angles
-        for check in _vdi_checks(result, volume, transfer_function)
-    ]
+    checks = []
+    for result in report.angles:
+        found, at = result.vdi_to_raycaster, f"{result.angle:g} degrees"
+        if result.angle == 0:
+            worst = WORST_PIXEL_AT_GENERATING_VIEW
+            checks.append(Check("SSIM at V_O", found.ssim, ">=", SSIM_AT_GENERATING_VIEW))
+            checks.append(Check("worst pixel at V_O", found.worst_pixel, "<=", worst))
+            continue
+        bound = SSIM_FROM_NEW_VIEWS.get((result.angle, transfer_function))
+        if volume in BINARY_SOLID:
+            bound = SSIM_OF_BINARY_SOLID.get(result.angle)
+        if bound is not None:
+            away = abs(found.mean_brightness_ratio - 1)
+            checks.append(Check(f"SSIM at {at}", found.ssim, ">=", bound))
+            checks.append(Check(f"brightness error at {at}", away, "<=", BRIGHTNESS_TOLERANCE))
+    return checks
 
 
 def judge_vtk(report: Report, transfer_function: str) -> list[Check]:
@@ -127,7 +138,21 @@ def judge_vtk(report: Report, transfer_function: str) -> list[Check]:
     list of Check
         The bounds that apply; none where VTK took no part.
     """
-    return [c for result in report.angles for c in _vtk_checks(result, transfer_function)]
+    checks = []
+    for result in report.angles:
+        ours, theirs = result.raycaster_to_gpu, result.fixed_point_to_gpu
+        if ours is None or theirs is None:
+            continue
+        at = f"to VTK at {result.angle:g} degrees"
+        if transfer_function == "soft":
+            checks.append(Check(f"SSIM {at}", ours.ssim, ">=", SSIM_TO_VTK))
+            checks.append(Check(f"PSNR {at}", ours.psnr, ">=", PSNR_TO_VTK))
+            continue
+        limit = FACTOR_OF_VTK * (1 - theirs.ssim)
+        checks.append(Check(f"1 - SSIM {at}", 1 - ours.ssim, "<=", limit))
+        limit = FACTOR_OF_VTK * _root_mean_square(theirs)
+        checks.append(Check(f"RMS {at}", _root_mean_square(ours), "<=", limit))
+    return checks
 
 
 def judge_times(report: Report, volume: str) -> list[Check]:
@@ -149,36 +174,6 @@ def judge_times(report: Report, volume: str) -> list[Check]:
         if result.angle == FRAME_RATIO_ANGLE and result.ratio_to_vtk is not None:
             checks.append(Check("frame / VTK at 5 degrees", result.ratio_to_vtk, "<", FRAME_RATIO))
     return checks
-
-
-def _vdi_checks(result: AngleResult, volume: str, transfer_function: str) -> Iterator[Check]:
-    found, at = result.vdi_to_raycaster, f"{result.angle:g} degrees"
-    if result.angle == 0:
-        yield Check("SSIM at V_O", found.ssim, ">=", SSIM_AT_GENERATING_VIEW)
-        yield Check("worst pixel at V_O", found.worst_pixel, "<=", WORST_PIXEL_AT_GENERATING_VIEW)
-        return
-    bound = SSIM_FROM_NEW_VIEWS.get((result.angle, transfer_function))
-    if volume in BINARY_SOLID:
-        bound = SSIM_OF_BINARY_SOLID.get(result.angle)
-    if bound is not None:
-        yield Check(f"SSIM at {at}", found.ssim, ">=", bound)
-        away = abs(found.mean_brightness_ratio - 1)
-        yield Check(f"brightness error at {at}", away, "<=", BRIGHTNESS_TOLERANCE)
-
-
-def _vtk_checks(result: AngleResult, transfer_function: str) -> Iterator[Check]:
-    ours, theirs = result.raycaster_to_gpu, result.fixed_point_to_gpu
-    if ours is None or theirs is None:
-        return
-    at = f"to VTK at {result.angle:g} degrees"
-    if transfer_function == "soft":
-        yield Check(f"SSIM {at}", ours.ssim, ">=", SSIM_TO_VTK)
-        yield Check(f"PSNR {at}", ours.psnr, ">=", PSNR_TO_VTK)
-        return
-    limit = FACTOR_OF_VTK * (1 - theirs.ssim)
-    yield Check(f"1 - SSIM {at}", 1 - ours.ssim, "<=", limit)
-    limit = FACTOR_OF_VTK * _root_mean_square(theirs)
-    yield Check(f"RMS {at}", _root_mean_square(ours), "<=", limit)
 
 
 def _root_mean_square(found: Comparison) -> float:

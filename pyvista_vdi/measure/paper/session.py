@@ -32,7 +32,6 @@ from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 
 def run(plan: Plan, results: Results, device: Any = None, progress: Progress | None = None) -> None:
@@ -165,7 +164,7 @@ class _Run:
         cell = self._results.new_cell(name, size, limit)
         if cell["vdi"] is None:
             cell["vdi"] = {"generation_seconds": seconds, **sizes_of(vdi)}
-        draw = VDIRenderer(self._runtime, PreparedVDI(self._runtime, vdi), size)
+        draw = VDIRenderer(self._runtime, vdi, size)
         there = {row["angle"] for row in cell["angles"]}
         for angle in self._plan.angles:
             if angle in there:
@@ -212,7 +211,7 @@ class _Run:
             bench = Bench(self._runtime, volume, table, size, vtk=False)
             view = filling_camera(volume.bounds, size)
             vdi, _ = self._generated(bench, view, size, limit)
-            draw = VDIRenderer(self._runtime, PreparedVDI(self._runtime, vdi), size)
+            draw = VDIRenderer(self._runtime, vdi, size)
             camera = view.azimuth(angle)
             reference = bench.image(camera)
             frames = draw.frames(camera)

@@ -38,7 +38,7 @@ from pyvista_vdi.model.metrics import SSIM_WINDOW
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.prepared import PreparedVDI
+from pyvista_vdi.raycasting.prepared import prepared_vdi
 
 #: What frames are ratios to, by the keys of the results: what ``render_volume`` does by default.
 _BASELINE = "volume_skipping"
@@ -298,15 +298,14 @@ class _Run:
         renderers: dict[str, VDIRenderer] = {}
         for precision in precisions:
             vdi = forms[precision]
-            prepared = PreparedVDI(self._runtime, vdi)
             found = sizes_of(vdi)
             sizes[precision] = {
                 "window_size": list(vdi.window_size),
                 **{n: found[n] for n in ("supersegments", "mean_length", "longest_list")},
                 "bytes_file": found["bytes_saved"],
-                "bytes_memory": prepared.list_bytes,
+                "bytes_memory": prepared_vdi(self._runtime, vdi).list_bytes,
             }
-            renderers[precision] = VDIRenderer(self._runtime, prepared, self._plan.window_size)
+            renderers[precision] = VDIRenderer(self._runtime, vdi, self._plan.window_size)
         points = [
             _point(
                 setting,

@@ -120,6 +120,16 @@ AXES: Mapping[str, tuple[Any, ...]] = {
     "sample_distance": (0.25, 1.0),
 }
 
+#: How values of an axis are spelled; those of the others speak for themselves.
+_FORMS: Mapping[str, str] = {
+    "max_supersegments": "N_S {:g}",
+    "tolerance": "tolerance {:g}",
+    "lists": "lists x{:g}",
+    "preview": "preview x{:g}",
+    "view_cone": "view cone {:g}",
+    "sample_distance": "steps {:g}",
+}
+
 #: Axes that are swept by default; the others have a right value for each scene, or compare methods.
 DEFAULT_AXES = tuple(AXES)[:6]
 ON_REQUEST = tuple(AXES)[6:]
@@ -225,16 +235,6 @@ def _chosen(axes: Mapping[str, Sequence[Any]] | Sequence[str]) -> dict[str, tupl
 
 def _spelled(name: str, value: Any) -> str:
     """Return a value as tables and plots have it."""
-    if name in ("precision", "criterion"):
-        return str(value)
     if name == "skip_empty":
         return "skipping" if value else "no skipping"
-    form = {
-        "max_supersegments": "N_S {:g}",
-        "tolerance": "tolerance {:g}",
-        "lists": "lists x{:g}",
-        "preview": "preview x{:g}",
-        "view_cone": "view cone {:g}",
-        "sample_distance": "steps {:g}",
-    }
-    return form[name].format(value)
+    return _FORMS.get(name, "{}").format(value)

@@ -217,6 +217,19 @@ def as_numpy(array: vtkDataArray) -> NDArray[Any]:
         return vtk_to_numpy(plain)  # type: ignore[no-any-return]
 
 
+def volume_to_image(volume: Volume, name: str | None = None) -> vtkImageData:
+    """Return a volume as a grid that shares its memory; its scalars are the active ones."""
+    image = vtkImageData()
+    image.SetDimensions(volume.dimensions)
+    image.SetSpacing(volume.spacing)
+    image.SetOrigin(volume.origin)
+    image.SetDirectionMatrix(volume.direction.ravel().tolist())
+    # x runs fastest in VTK's point order, as it does in a C-ordered [z, y, x] array
+    flat = volume.array.reshape((-1, 4) if volume.rgba else -1)
+    image.GetPointData().SetScalars(_to_vtk(volume.name if name is None else name, flat))
+    return image
+
+
 # -- VDIs ------------------------------------------------------------------------------------------
 
 
