@@ -1,7 +1,8 @@
 """The public functions: a thin façade over the engine that takes VTK's and PyVista's objects too.
 
 Converters are imported only where an argument needs them: for a :class:`Volume`, a
-:class:`Camera` and a :class:`TransferFunction` neither VTK nor PyVista is loaded.
+:class:`Camera` and a :class:`TransferFunction` neither VTK nor PyVista is loaded. More than half of
+these lines document arguments: ``help(pyvista_vdi.generate)`` is complete by itself.
 """
 
 from __future__ import annotations
@@ -14,14 +15,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, InvalidVolumeError
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import DEFAULTS, IN_PLACE, Classification
+from pyvista_vdi.model.inputs import as_vdi, as_volume
 from pyvista_vdi.model.options import GenerationOptions, MediumOptions
-from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, warn_missed
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
 
@@ -174,7 +174,7 @@ def generate(
     >>> camera = filling_camera(volume.bounds, (640, 360))
     >>> vdi = pvdi.generate(volume, camera, (640, 360), cmap="bone")  # doctest: +SKIP
     """
-    looks = Classification(classification, "generate", _keywords(generate))
+    looks = _looks(generate, classification)
     view = Camera.from_any(camera)
     dial = Dial.of(quality, target_ssim, target_fps, max_bytes, target_angle)
     options = GenerationOptions(
@@ -492,7 +492,7 @@ def render_volume(
     NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
         If there is no device, or it fails.
     """
-    looks = Classification(classification, "render_volume", _keywords(render_volume))
+    looks = _looks(render_volume, classification)
     view = Camera.from_any(camera)
     volume = as_volume(volume, looks.scalars, looks.preference)
     from pyvista_vdi.volume.render import raycast_volume
@@ -592,7 +592,7 @@ def estimate(
     InvalidVolumeError, InvalidArgumentError
         If an argument cannot be used.
     """
-    looks = Classification(classification, "estimate", _keywords(estimate))
+    looks = _looks(estimate, classification)
     volume = as_volume(volume, looks.scalars, looks.preference)
     from pyvista_vdi.generation.estimate import estimate as estimate_bytes
 
@@ -604,79 +604,6 @@ def estimate(
         ambient_occlusion=ambient_occlusion,
         memory_limit=memory_limit,
         transfer_function=looks.transfer_function(volume),
-    )
-
-
-def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Volume:
-    """Return what a user calls a volume as a :class:`Volume`.
-
-    Parameters
-    ----------
-    volume : Volume or vtkImageData or pyvista.ImageData
-        VTK is imported only for its own objects.
-    scalars : str or array_like, optional
-        Name of the array, or values per point; the active array by default.
-    preference : {"point", "cell"}
-        Which array where both kinds have one of that name.
-
-    Raises
-    ------
-    InvalidVolumeError
-        If it is none of these, or has no such scalars.
-    """
-    if isinstance(volume, Volume):
-        return _with_scalars(volume, scalars)
-    if hasattr(volume, "GetClassName"):
-        from_vtk = provider("volume_from_vtk")
-        if scalars is not None and not isinstance(scalars, str):
-            volume, scalars = provider("image_with_scalars")(volume, scalars, None)
-        return from_vtk(  # type: ignore[no-any-return]
-            volume, scalars=scalars, preference=preference
-        )
-    if isinstance(volume, np.ndarray):
-        raise InvalidVolumeError(
-            f"got a NumPy array of shape {volume.shape}, which has no spacing: "
-            "wrap it as pyvista_vdi.Volume(array, spacing), indexed [z, y, x]"
-        )
-    raise InvalidVolumeError(
-        f"expected a pyvista.ImageData, a vtkImageData or a pyvista_vdi.Volume; "
-        f"got {_described(volume)}"
-    )
-
-
-def _with_scalars(volume: Volume, scalars: Any) -> Volume:
-    if scalars is None or isinstance(scalars, str):
-        if scalars not in (None, volume.name):
-            raise InvalidVolumeError(
-                f"the volume has no array {scalars!r}: its only one is {volume.name!r}"
-            )
-        return volume
-    values = np.asarray(scalars)
-    rgba = values.ndim > 1 and values.shape[-1] == 4 and values.dtype == np.uint8
-    points = volume.scalars.size
-    if values.size != points * (4 if rgba else 1):
-        raise InvalidVolumeError(
-            f"scalars must have one value per point, {points}; got {values.size}"
-        )
-    shaped = values.reshape(volume.scalars.shape + (4,) * rgba)
-    return Volume(shaped, volume.spacing, volume.origin, volume.direction, name="scalars")
-
-
-def as_vdi(vdi: Any) -> VDI:
-    """Return a VDI, or its VTK form, as a :class:`VDI`.
-
-    Raises
-    ------
-    InvalidVDIError
-        If it is neither.
-    """
-    if isinstance(vdi, VDI):
-        return vdi
-    if hasattr(vdi, "GetClassName"):
-        return provider("vdi_from_image")(vdi)  # type: ignore[no-any-return]
-    hint = ": read it by pyvista_vdi.read(path)" if isinstance(vdi, str | os.PathLike) else ""
-    raise InvalidVDIError(
-        f"expected a VDI or its VTK form (a vtkImageData); got {_described(vdi)}{hint}"
     )
 
 
@@ -693,14 +620,6 @@ def _frame(
     return FrameRequest(camera, size, options, opaque_depth, device)
 
 
-def _keywords(function: Callable[..., Any]) -> tuple[str, ...]:
-    """Return all keyword names of a function."""
-    return tuple(inspect.signature(function).parameters)
-
-
-def _described(thing: object) -> str:
-    return (
-        f"the path {os.fspath(thing)!r}"
-        if isinstance(thing, str | os.PathLike)
-        else (f"{type(thing).__name__}")
-    )
+def _looks(function: Callable[..., Any], given: dict[str, Any]) -> Classification:
+    """Return the classification arguments of a call, checked."""
+    return Classification(given, function.__name__, tuple(inspect.signature(function).parameters))

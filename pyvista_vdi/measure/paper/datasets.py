@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi import examples
-from pyvista_vdi.api import as_volume
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.measure.paper.procedural import PROCEDURAL, Procedural, Progress, make
 from pyvista_vdi.measure.paper.published import paper_tables
 from pyvista_vdi.measure.volumes import look, read_file
 from pyvista_vdi.model.host_memory import require_free_memory
+from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 

@@ -12,7 +12,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi.api import as_volume
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.measure.clock import Step, take_turns
@@ -34,6 +33,7 @@ from pyvista_vdi.measure.tradeoff.results import Tradeoff, TradeoffFile
 from pyvista_vdi.measure.tradeoff.settings import Setting, sweep
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.classification import IN_PLACE, Classification
+from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.metrics import SSIM_WINDOW
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
-from pyvista_vdi.api import as_vdi
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.host_memory import require_host_memory
+from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, accessors, whole_extent
 from pyvista_vdi.vtk_pipeline.filters.convert import (

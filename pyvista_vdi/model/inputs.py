@@ -1,0 +1,92 @@
+"""What a user calls a volume or a VDI, VTK's objects and PyVista's among it, as ours."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+from pyvista_vdi.errors import InvalidVDIError, InvalidVolumeError
+from pyvista_vdi.model.providers import provider
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+
+
+def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Volume:
+    """Return what a user calls a volume as a :class:`Volume`.
+
+    Parameters
+    ----------
+    volume : Volume or vtkImageData or pyvista.ImageData
+        VTK is imported only for its own objects.
+    scalars : str or array_like, optional
+        Name of the array, or values per point; the active array by default.
+    preference : {"point", "cell"}
+        Which array where both kinds have one of that name.
+
+    Raises
+    ------
+    InvalidVolumeError
+        If it is none of these, or has no such scalars.
+    """
+    if isinstance(volume, Volume):
+        return _with_scalars(volume, scalars)
+    if hasattr(volume, "GetClassName"):
+        from_vtk = provider("volume_from_vtk")
+        if scalars is not None and not isinstance(scalars, str):
+            volume, scalars = provider("image_with_scalars")(volume, scalars, None)
+        return from_vtk(  # type: ignore[no-any-return]
+            volume, scalars=scalars, preference=preference
+        )
+    if isinstance(volume, np.ndarray):
+        raise InvalidVolumeError(
+            f"got a NumPy array of shape {volume.shape}, which has no spacing: "
+            "wrap it as pyvista_vdi.Volume(array, spacing), indexed [z, y, x]"
+        )
+    raise InvalidVolumeError(
+        f"expected a pyvista.ImageData, a vtkImageData or a pyvista_vdi.Volume; "
+        f"got {_described(volume)}"
+    )
+
+
+def _with_scalars(volume: Volume, scalars: Any) -> Volume:
+    if scalars is None or isinstance(scalars, str):
+        if scalars not in (None, volume.name):
+            raise InvalidVolumeError(
+                f"the volume has no array {scalars!r}: its only one is {volume.name!r}"
+            )
+        return volume
+    values = np.asarray(scalars)
+    rgba = values.ndim > 1 and values.shape[-1] == 4 and values.dtype == np.uint8
+    points = volume.scalars.size
+    if values.size != points * (4 if rgba else 1):
+        raise InvalidVolumeError(
+            f"scalars must have one value per point, {points}; got {values.size}"
+        )
+    shaped = values.reshape(volume.scalars.shape + (4,) * rgba)
+    return Volume(shaped, volume.spacing, volume.origin, volume.direction, name="scalars")
+
+
+def as_vdi(vdi: Any) -> VDI:
+    """Return a VDI, or its VTK form, as a :class:`VDI`.
+
+    Raises
+    ------
+    InvalidVDIError
+        If it is neither.
+    """
+    if isinstance(vdi, VDI):
+        return vdi
+    if hasattr(vdi, "GetClassName"):
+        return provider("vdi_from_image")(vdi)  # type: ignore[no-any-return]
+    hint = ": read it by pyvista_vdi.read(path)" if isinstance(vdi, str | os.PathLike) else ""
+    raise InvalidVDIError(
+        f"expected a VDI or its VTK form (a vtkImageData); got {_described(vdi)}{hint}"
+    )
+
+
+def _described(thing: object) -> str:
+    if isinstance(thing, str | os.PathLike):
+        return f"the path {os.fspath(thing)!r}"
+    return type(thing).__name__
