@@ -82,8 +82,7 @@ def depth_range(camera: Camera, bounds: Sequence[float]) -> tuple[float, float]:
 def nearest_depth(camera: Camera, bounds: Sequence[float]) -> float:
     """Return the view depth before which nothing is looked up in perspective, world units.
 
-    :data:`NEAREST_DEPTH` times the diagonal of the bounds, carried into the world by the model
-    transform's largest stretch.
+    :data:`NEAREST_DEPTH` diagonals of the bounds, by the model transform's largest stretch.
     """
     diagonal = float(np.linalg.norm(np.subtract(bounds[1::2], bounds[::2])))
     return NEAREST_DEPTH * diagonal * float(np.linalg.norm(camera.model_transform[:3, :3], 2))
@@ -99,12 +98,9 @@ def reference_depth(camera: Camera, bounds: Sequence[float]) -> float:
 
 
 def check_list_space(camera: Camera, bounds: Sequence[float]) -> None:
-    """Refuse a generating view whose lists float32 cannot express.
+    """Refuse a generating view whose lists float32 cannot express (docs/numerics.md).
 
-    Raises
-    ------
-    InvalidCameraError
-        If lengths times reciprocal depths leave the range of float32 (docs/numerics.md).
+    Lengths times reciprocal depths leave its range then.
     """
     near, far = (1.0, 1.0) if camera.parallel_projection else depth_range(camera, bounds)
     near = max(near, 0.0 if camera.parallel_projection else nearest_depth(camera, bounds))
@@ -121,22 +117,7 @@ def check_list_space(camera: Camera, bounds: Sequence[float]) -> None:
 
 
 def pixel_rays(camera: Camera, window_size: Sequence[int], bounds: Sequence[float]) -> PixelRays:
-    """Return the rays of a camera's window, formed about the near depth of ``bounds``.
-
-    Parameters
-    ----------
-    camera : Camera
-        Its ``model_transform`` says where the model is.
-    window_size : (int, int)
-        Width and height in pixels.
-    bounds : sequence of float, shape (6,)
-        Of the data, model frame.
-
-    Returns
-    -------
-    PixelRays
-        In the model frame.
-    """
+    """Return the rays of a camera's window in the model frame, about the bounds' near depth."""
     width, height = check_window_size(window_size)
     depth = reference_depth(camera, bounds)
     origin, direction = camera.ray_coefficients((width, height))
@@ -258,13 +239,7 @@ def direction_forms(
 
 
 def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
-    """Return forms as the kernels read them, float32 (n, 6).
-
-    Raises
-    ------
-    InvalidCameraError
-        If one is not finite in float32: the camera or the data are beyond what it can hold.
-    """
+    """Return forms as the kernels read them, float32 (n, 6); refuse what float32 cannot hold."""
     with np.errstate(over="ignore"):
         table = np.asarray(forms, dtype=np.float32)
     if not np.isfinite(table).all():
@@ -287,19 +262,10 @@ def largest_value(
     bounds: Sequence[float],
     forms: Sequence[Floats],
 ) -> float:
-    """Return the largest magnitude of forms, or of a part of one, on rays that meet the bounds.
+    """Return the largest magnitude of :func:`pixel_rays`' forms on rays that meet the bounds.
 
-    Parameters
-    ----------
-    camera, window_size, bounds
-        As for :func:`pixel_rays`, whose forms they are.
-    forms : sequence of numpy.ndarray
-        float64 (6,) each.
-
-    Returns
-    -------
-    float
-        Over the depths of the bounds; infinite where nothing of them is in the window.
+    Over the depths of the bounds; of each form's first number, too. Infinite where nothing of them
+    is in the window.
     """
     width, height = window_size
     near, far = depth_range(camera, bounds)
@@ -336,10 +302,7 @@ def pixels_of_points(camera: Camera, window_size: tuple[int, int], points: Float
 
 
 def _pixels_at(camera: Camera, window_size: tuple[int, int], points: Floats) -> Floats | None:
-    """Return where model points are seen, in pixels, float64 (2, n).
-
-    None if one of them is not in front of the eye.
-    """
+    """Return where model points are seen, pixels (2, n); None if one is not in front of the eye."""
     matrix = camera.viewport_matrix(window_size) @ camera.model_to_view
     x, y, _, d = matrix[:, :3] @ points.T + matrix[:, 3:]
     if not d.min() > NEAREST_DEPTH * np.abs(d).max():
@@ -354,18 +317,8 @@ def cells_of_points(
 ) -> NDArray[np.bool_]:
     """Return which cells of a window the convex hull of model points may lie in.
 
-    Parameters
-    ----------
-    camera, window_size, points
-        As for :func:`pixels_of_points`.
-
-    Returns
-    -------
-    numpy.ndarray
-        bool (high, wide), bottom row first, of squares of
-        :data:`~pyvista_vdi.device.work_order.CELL` pixels.
-        All of them, if a point is not in front of the eye; those that two pixels more reach into
-        otherwise.
+    bool (high, wide), bottom row first: those that two pixels more than the hull reach into, or
+    all of them, if a point is not in front of the eye.
     """
     wide, high = (-(-edge // CELL) for edge in window_size)
     if not len(points):
@@ -386,13 +339,7 @@ def cells_of_points(
 def checked_opaque_depth(
     opaque_depth: ArrayLike | None, window_size: tuple[int, int], rays: PixelRays
 ) -> NDArray[np.float32] | None:
-    """Return where each pixel's ray ends, as t: float32 (H, W), top row first; page-aligned.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If the shape is not (H, W) or a depth is NaN.
-    """
+    """Return where each pixel's ray ends, as t: float32 (H, W), top row first; page-aligned."""
     if opaque_depth is None:
         return None
     wanted = f"opaque_depth must have shape (height, width) = {window_size[::-1]}"

@@ -23,18 +23,10 @@ _FARTHEST_ORIGIN = 2**24
 
 
 class AlignedView(NamedTuple):
-    """How a frame is drawn in which each ray stays in a list of its own.
+    """How a frame is drawn in which each ray stays in a list of its own."""
 
-    Attributes
-    ----------
-    origin : numpy.ndarray
-        The pixel of list (0, 0), which may lie beside V_N's window, int32 (2,).
-    items : int
-        Work-items, in whole groups: packets.
-    """
-
-    origin: NDArray[np.int32]
-    items: int
+    origin: NDArray[np.int32]  # the pixel of list (0, 0), which may lie beside V_N's window
+    items: int  # packets, in whole groups
 
 
 def aligned_view(
@@ -48,18 +40,8 @@ def aligned_view(
 ) -> AlignedView | None:
     """Return how each pixel is drawn from a list of its own; None if a ray is in another one, too.
 
-    Parameters
-    ----------
-    size, window : (int, int)
-        Width and height of V_N's window, and of V_O's, in pixels.
-    coordinates : numpy.ndarray
-        Forms of the homogeneous list coordinates (u, v, depth, denominator), float64 (4, 6).
-    depths : (float, float)
-        The least and the largest t at which a ray may meet something.
-    parallel : bool
-        Whether V_O is a parallel projection.
-    in_tiles : bool
-        Whether lists lie in tiles (raycasting/supersegments.cl).
+    ``window`` is V_O's in pixels, ``coordinates`` are the forms of (u, v, depth, denominator),
+    float64 (4, 6), and ``depths`` the least and the largest t at which a ray may meet something.
     """
     u_form, v_form, z_form, w_form = coordinates.tolist()
     first: list[int] = []

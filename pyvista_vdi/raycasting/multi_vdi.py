@@ -135,22 +135,15 @@ def _merged(options: RenderOptions) -> RenderOptions:
 
 @dataclass(frozen=True)
 class _Cells:
-    """The cells of a window, by which VDIs may be met in them.
-
-    Attributes
-    ----------
-    alone : numpy.ndarray
-        int16 (high, wide), bottom row first: the VDI that is the only one, or ``SHARED`` or
-        ``NOBODY``.
-    shared : numpy.ndarray
-        Column and row of each in which several may be met, int32 (n, 2), row by row.
-    """
+    """The cells of a window, by which VDIs may be met in them."""
 
     SHARED: ClassVar[int] = -1
     #: That of ``opencl/multi_vdi/cells.cl``.
     NOBODY: ClassVar[int] = -2
 
+    #: (high, wide), bottom row first: the VDI that is the only one, or ``SHARED`` or ``NOBODY``.
     alone: NDArray[np.int16]
+    #: Column and row of each in which several may be met, (n, 2), row by row.
     shared: NDArray[np.int32]
 
     @classmethod
@@ -266,10 +259,7 @@ class _MergedCells:
     def draw(
         self, cells: NDArray[np.int32], slots: int, image: DeviceBuffer, owner: DeviceBuffer
     ) -> int:
-        """Draw cells, and return how many slots their rays have needed at most.
-
-        Those with rays that have more segments than there are ``slots`` are drawn again.
-        """
+        """Draw cells, again where ``slots`` are too few, and return how many rays needed."""
         needed = self._pass(cells, slots, image, owner)
         most = int(needed.max())
         if most > slots:

@@ -38,25 +38,12 @@ _PROBES = 7
 
 
 class Packets(NamedTuple):
-    """How a frame's rays are dealt to packets.
+    """How a frame's rays are dealt to packets."""
 
-    Attributes
-    ----------
-    defines : dict
-        ``-D`` names of the kernel, for the directions.
-    epipole : numpy.ndarray
-        As the kernel takes it, float32 (4,).
-    part : numpy.ndarray
-        First strip, how many there are, number of each strip's first packet; int32 (4,), the
-        last one unused.
-    items : int
-        Work-items: packets.
-    """
-
-    defines: dict[str, str | int | None]
-    epipole: NDArray[np.float32]
-    part: NDArray[np.int32]
-    items: int
+    defines: dict[str, str | int | None]  # for the directions
+    epipole: NDArray[np.float32]  # as the kernel takes it, (4,)
+    part: NDArray[np.int32]  # first strip, strips, number of each one's first packet, unused
+    items: int  # packets
 
 
 def packets_of(
@@ -69,23 +56,11 @@ def packets_of(
     *,
     or_blocks: bool,
 ) -> Packets | None:
-    """Return the packets of a frame, or None if its rays had better be followed one by one.
+    """Return the packets of a part of a frame; None if rays had better be followed one by one.
 
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height of V_N's window in pixels.
-    part : Rectangle
-        Where rays are cast.
-    coordinates, planes : numpy.ndarray
-        Forms of the homogeneous list coordinates (u, v, depth, denominator), float64 (4, 6), and of
-        the planes that rays are clipped to, float64 (n, 6).
-    epipole : numpy.ndarray
-        Where V_N sees V_O's eye, see :func:`epipole_of`.
-    lit : float
-        How far light gets, see :func:`share_lit`.
-    or_blocks : bool
-        Whether rays that are followed one by one are so in blocks.
+    ``coordinates`` are the forms of (u, v, depth, denominator), float64 (4, 6), ``planes`` those
+    that rays are clipped to, float64 (n, 6). ``epipole`` is :func:`epipole_of`'s, and ``lit``
+    :func:`share_lit`'s. Rays one by one are followed in blocks, or not.
     """
     if min(part.x1 - part.x0, part.y1 - part.y0) < LEAST_PIXELS:
         return None

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.checks import as_float
+from pyvista_vdi.model.checks import as_float, as_range
 from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
@@ -76,28 +76,14 @@ class Pick:
 
 
 class FirstHit(NamedTuple):
-    """What counts as a hit: some optical depth, and at least this much.
-
-    Attributes
-    ----------
-    optical_depth : float
-        tau >= 0.
-    accumulated : bool
-        Whether what the ray has met before counts, too.
-    """
+    """What counts as a hit: some optical depth, and at least this much."""
 
     optical_depth: float
-    accumulated: bool
+    accumulated: bool  # whether what the ray has met before counts, too
 
     @classmethod
     def of(cls, opacity_threshold: float, accumulated: bool) -> FirstHit:
-        """Return it for an opacity.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If the opacity is not a number of at least 0 and less than 1.
-        """
+        """Return it for an opacity, which is checked."""
         return cls(-math.log1p(-checked_opacity(opacity_threshold)), bool(accumulated))
 
     def first(self, optical_depths: Floats) -> int | None:
@@ -119,18 +105,9 @@ def checked_opacity(opacity_threshold: float) -> float:
 
 
 def pick_vdi(vdi: VDI, request: FrameRequest, pixel: Sequence[float], hit: FirstHit) -> Pick | None:
-    """Return the first supersegment on a pixel's ray that is hit; ``None`` where none is.
+    """Return the first supersegment on a pixel's ray that is hit: see :func:`pyvista_vdi.pick`.
 
-    Parameters
-    ----------
-    vdi : VDI
-        What to look at.
-    request : FrameRequest
-        The frame that the pixel is of; its ``opaque_depth`` is that of this ray, a number.
-    pixel : (float, float)
-        x and y in pixels; whole numbers are pixels' centres, y = 0 is the bottom row.
-    hit : FirstHit
-        What counts as a hit.
+    The request's ``opaque_depth`` is that of this ray, a number.
     """
     if not isinstance(vdi, VDI):
         raise InvalidArgumentError(f"expected a VDI, got {type(vdi).__name__}")
@@ -208,7 +185,13 @@ class _Ray:
             value.append(depth - rays.nearest_depth(vdi.camera, vdi.bounds))
             slope.append(ddepth)
         if request.opaque_depth is not None:
-            value.append(_checked_depth(request.opaque_depth) - self.window.reference_depth)
+            end = as_float(request.opaque_depth)
+            if math.isnan(end):
+                raise InvalidArgumentError(
+                    "opaque_depth must be a view depth in world units, or inf; "
+                    f"got {request.opaque_depth!r}"
+                )
+            value.append(end - self.window.reference_depth)
             slope.append(-1.0)
         return _where_positive(np.array(value), np.array(slope))
 
@@ -303,25 +286,13 @@ def _where_positive(value: Floats, slope: Floats) -> tuple[float, float] | None:
 
 
 def _checked_pixel(pixel: Sequence[float], size: tuple[int, int]) -> tuple[float, float]:
-    try:
-        x, y = (float(c) for c in pixel)
-    except (TypeError, ValueError):
-        x = y = math.nan
+    x, y = as_range(pixel)
     if not (-0.5 <= x < size[0] - 0.5 and -0.5 <= y < size[1] - 0.5):
         raise InvalidArgumentError(
             f"pixel must be (x, y) inside the window of {size[0]} x {size[1]}, y = 0 at the "
             f"bottom; got {pixel!r}"
         )
     return x, y
-
-
-def _checked_depth(depth: Any) -> float:
-    number = as_float(depth)
-    if math.isnan(number):
-        raise InvalidArgumentError(
-            f"opaque_depth must be a view depth in world units, or inf; got {depth!r}"
-        )
-    return number
 
 
 def _triple(values: ArrayLike) -> tuple[float, float, float]:

@@ -89,7 +89,6 @@ def enqueue(scene: Scene, walk: tuple[Any, ...], image: DeviceBuffer) -> None:
     """
     runtime = scene.prepared.runtime
     strategy = strategy_for(scene)
-    assert strategy.launch is not None
     pixels = scene.size[0] * scene.size[1]
     if not strategy.whole and scene.only is None and scene.part.pixels < pixels:
         defines = {} if scene.hit is None else {"FIRST_HIT": 1}

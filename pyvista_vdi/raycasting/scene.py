@@ -41,8 +41,8 @@ class Scene:
     ----------
     prepared : PreparedVDI
         The VDI.
-    request : FrameRequest
-        The view, its size and how it looks.
+    camera, size, options
+        Of the request.
     forms : numpy.ndarray
         List coordinates, model direction and the planes to clip to, float32 (n, 6), or (n, 12) as
         double-floats.
@@ -64,7 +64,9 @@ class Scene:
     """
 
     prepared: PreparedVDI
-    request: FrameRequest
+    camera: Camera
+    size: tuple[int, int]
+    options: RenderOptions
     forms: NDArray[np.float32]
     planes: int
     ends: NDArray[np.float32] | None
@@ -99,7 +101,9 @@ class Scene:
         pack = rays.packed_pairs if prepared.double_float else rays.packed
         return cls(
             prepared,
-            request,
+            camera,
+            size,
+            options,
             pack([*coordinates, *direction, *planes, *cropped.forms]),
             len(planes),
             rays.checked_opaque_depth(request.opaque_depth, size, pixel_rays),
@@ -108,21 +112,6 @@ class Scene:
             hit,
             segments,
         )
-
-    @property
-    def camera(self) -> Camera:
-        """The new view V_N."""
-        return self.request.camera
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height of the picture in pixels."""
-        return self.request.size
-
-    @property
-    def options(self) -> RenderOptions:
-        """How the picture is to look."""
-        return self.request.options
 
     # -- what strategies ask ---------------------------------------------------------------------
 
@@ -152,20 +141,25 @@ class Scene:
     @cached_property
     def in_vectors(self) -> bool:
         """Whether there are kernels that follow the scene's rays in vectors."""
-        prepared = self.prepared
-        plain = not prepared.double_float and self.defines.get("COMPENSATED") != 2
-        return prepared.runtime.is_cpu and plain
+        exact = not self.prepared.double_float and self.defines.get("COMPENSATED") != 2
+        return self.prepared.runtime.is_cpu and exact
 
     @property
     def in_blocks(self) -> bool:
         """Whether there is one that follows them in blocks of pixels."""
         return self.in_vectors and not self.prepared.packed and not self.prepared.long_offsets
 
+    @property
+    def plain(self) -> bool:
+        """Whether there are those that follow them together otherwise."""
+        return self.in_vectors and not self.in_regions
+
     @cached_property
     def one_list(self) -> bool:
-        """Whether the view is V_O's, exactly: each of its rays stays in one list."""
+        """Whether a picture's view is V_O's, exactly: each of its rays stays in one list."""
         prepared = self.prepared
-        return np.array_equal(prepared.list_space(self.camera), prepared.list_rows)
+        same = np.array_equal(prepared.list_space(self.camera), prepared.list_rows)
+        return same and not self.segments
 
     @cached_property
     def part(self) -> Rectangle:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,11 +36,10 @@ class Strategy:
         A file of ``opencl/`` and the kernel in it.
     supports : callable
         Whether it draws a scene that no row above does.
+    launch : callable
+        Its launch; segments are asked for band by band in place of it (``multi_vdi.py``).
     defines : callable
         ``-D`` names beside those of :attr:`Scene.defines`.
-    launch : callable or None
-        Its :class:`Launch`; None where segments are asked for, band by band
-        (``raycasting/multi_vdi.py``).
     rays : int
         Rays that a work-item follows.
     whole : bool
@@ -51,8 +50,8 @@ class Strategy:
     file: str
     kernel: str
     supports: Callable[[Scene], bool]
-    defines: Callable[[Scene], Defines]
-    launch: Callable[[Scene], Launch] | None = None
+    launch: Callable[[Scene], Launch]
+    defines: Callable[[Scene], Defines] = lambda scene: scene.skipping
     rays: int = 1
     whole: bool = False
 
@@ -64,8 +63,7 @@ class Strategy:
 
 def _preview(scene: Scene) -> Launch:
     samples = np.int32(scene.options.preview_samples or 0)
-    items = block_items(*scene.size)
-    return Launch(items, GROUP, (scene.prepared.occupancy.counts, samples))
+    return Launch(block_items(*scene.size), GROUP, (scene.prepared.occupancy.counts, samples))
 
 
 def _aligned(scene: Scene) -> Launch:
@@ -87,20 +85,31 @@ def _columns(scene: Scene, rays: int = 1) -> Launch:
     """Return the launch of strips of the part to be drawn, column by column."""
     columns = part_columns(scene.part)
     items = COLUMN_ITEMS * int(columns[2]) * int(columns[3])
-    return Launch(items // rays, COLUMN_ITEMS // rays, (columns,))
-
-
-def _ray_by_ray(scene: Scene) -> Launch:
-    launch = _columns(scene)
-    if scene.hit is None:
-        return launch
-    hit = (np.float32(scene.hit.optical_depth), np.int32(scene.hit.accumulated))
-    return launch._replace(arguments=(*launch.arguments, *hit))
+    hit = scene.hit
+    hits = () if hit is None else (np.float32(hit.optical_depth), np.int32(hit.accumulated))
+    return Launch(items // rays, COLUMN_ITEMS // rays, (columns, *hits))
 
 
 def _ray_by_ray_defines(scene: Scene) -> Defines:
-    return {**scene.skipping, **({"ONE_LIST": 1} if scene.one_list else {})}
+    return {**scene.skipping, "ONE_LIST": 1} if scene.one_list else scene.skipping
 
+
+_BLOCKS = Strategy(
+    "blocks",
+    "raycasting/blocks.cl",
+    "raycast_blocks",
+    supports=lambda scene: scene.in_blocks,
+    launch=lambda scene: _columns(scene, LANES),
+    rays=LANES,
+)
+_RAY_BY_RAY = Strategy(
+    "ray by ray",
+    "raycasting/raycast.cl",
+    "raycast",
+    supports=lambda scene: True,
+    launch=_columns,
+    defines=_ray_by_ray_defines,
+)
 
 STRATEGIES = (
     Strategy(
@@ -108,80 +117,42 @@ STRATEGIES = (
         "raycasting/preview.cl",
         "preview",
         supports=lambda scene: scene.options.preview_samples is not None,
-        defines=lambda scene: {},
         launch=_preview,
+        defines=lambda scene: {},
         whole=True,
     ),
-    Strategy(
-        "segments in blocks",
-        "raycasting/blocks.cl",
-        "raycast_blocks",
+    replace(
+        _BLOCKS,
+        name="segments in blocks",
         supports=lambda scene: scene.segments == 2 and scene.in_blocks,
-        defines=lambda scene: scene.skipping,
-        rays=LANES,
     ),
-    Strategy(
-        "segments ray by ray",
-        "raycasting/raycast.cl",
-        "raycast",
-        supports=lambda scene: scene.segments > 0,
-        defines=lambda scene: scene.skipping,
-    ),
-    Strategy(
-        "first hits",
-        "raycasting/raycast.cl",
-        "raycast",
-        supports=lambda scene: scene.hit is not None,
-        defines=_ray_by_ray_defines,
-        launch=_ray_by_ray,
-    ),
+    replace(_RAY_BY_RAY, name="segments ray by ray", supports=lambda scene: scene.segments > 0),
+    replace(_RAY_BY_RAY, name="first hits", supports=lambda scene: scene.hit is not None),
     Strategy(
         "aligned view",
         "raycasting/aligned_view.cl",
         "raycast_own_lists",
-        supports=lambda scene: (
-            scene.in_vectors and not scene.in_regions and scene.aligned is not None
-        ),
-        defines=lambda scene: {},
+        supports=lambda scene: scene.plain and scene.aligned is not None,
         launch=_aligned,
+        defines=lambda scene: {},
         whole=True,
     ),
     # V_O's rays have a loop of their own where they are followed one by one; regions have blocks
-    Strategy(
-        "one list",
-        "raycasting/raycast.cl",
-        "raycast",
+    replace(
+        _RAY_BY_RAY,
+        name="one list",
         supports=lambda scene: scene.one_list and not (scene.in_regions and scene.in_blocks),
-        defines=_ray_by_ray_defines,
-        launch=_ray_by_ray,
     ),
     Strategy(
         "packets",
         "raycasting/packets.cl",
         "raycast_packets",
-        supports=lambda scene: (
-            scene.in_vectors and not scene.in_regions and scene.packets is not None
-        ),
-        defines=_packet_defines,
+        supports=lambda scene: scene.plain and scene.packets is not None,
         launch=_packets,
+        defines=_packet_defines,
     ),
-    Strategy(
-        "blocks",
-        "raycasting/blocks.cl",
-        "raycast_blocks",
-        supports=lambda scene: scene.in_blocks,
-        defines=lambda scene: scene.skipping,
-        launch=lambda scene: _columns(scene, LANES),
-        rays=LANES,
-    ),
-    Strategy(
-        "ray by ray",
-        "raycasting/raycast.cl",
-        "raycast",
-        supports=lambda scene: True,
-        defines=_ray_by_ray_defines,
-        launch=_ray_by_ray,
-    ),
+    _BLOCKS,
+    _RAY_BY_RAY,
 )
 
 
