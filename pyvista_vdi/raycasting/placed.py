@@ -61,10 +61,22 @@ def placed_vdis(
             raise InvalidArgumentError(f"expected VDIs, got {type(vdi).__name__} among them")
     if not vdis:
         raise InvalidArgumentError("there is no VDI to render: the sequence is empty")
-    cameras = _cameras(camera, model_transforms, count)
+    cameras = [camera] * count
+    if model_transforms is not None:
+        matrices = list(model_transforms)
+        wanted = "model_transforms must have one matrix for each of the {} VDIs"
+        matrices = _each(matrices, count, wanted, got=len(matrices))
+        cameras = [camera.replace(model_transform=matrix) for matrix in matrices]
+    croppings: Sequence[Any] = [None] * count
+    if cropping is not None:
+        wanted = "cropping must be a list with an entry for each of the {} VDIs, None where "
+        wanted += "nothing is cropped"
+        croppings = _each(cropping, count, wanted, got=cropping)
+    multipliers: Sequence[Any] = [opacity_multiplier] * count
+    if isinstance(opacity_multiplier, list | tuple):
+        wanted = "opacity_multiplier must be a number, or one for each of the {} VDIs"
+        multipliers = _each(opacity_multiplier, count, wanted, got=opacity_multiplier)
     planes = _planes_of_each(clipping_planes, count)
-    croppings = _croppings(cropping, count)
-    multipliers = _multipliers(opacity_multiplier, count)
     each = zip(planes, croppings, multipliers, strict=True)
     options = [RenderOptions(*one, skip_empty=skip_empty) for one in each]
     return [PlacedVDI(*one) for one in zip(vdis, cameras, options, strict=True)]
@@ -113,38 +125,11 @@ def common_window_size(placed: Sequence[PlacedVDI]) -> tuple[int, int]:
     return sizes.pop()
 
 
-def _cameras(camera: Camera, transforms: Sequence[ArrayLike] | None, count: int) -> list[Camera]:
-    if transforms is None:
-        return [camera] * count
-    transforms = list(transforms)
-    if len(transforms) != count:
-        raise InvalidArgumentError(
-            f"model_transforms must have one matrix for each of the {count} VDIs; "
-            f"got {len(transforms)}"
-        )
-    return [camera.replace(model_transform=matrix) for matrix in transforms]
-
-
-def _croppings(croppings: Sequence[Any] | None, count: int) -> Sequence[Any]:
-    if croppings is None:
-        return [None] * count
-    if not isinstance(croppings, list | tuple) or len(croppings) != count:
-        raise InvalidArgumentError(
-            f"cropping must be a list with an entry for each of the {count} VDIs, None where "
-            f"nothing is cropped; got {croppings!r}"
-        )
-    return croppings
-
-
-def _multipliers(multiplier: float | Sequence[float], count: int) -> Sequence[float]:
-    if not isinstance(multiplier, list | tuple):
-        return [multiplier] * count  # type: ignore[list-item]
-    if len(multiplier) != count:
-        raise InvalidArgumentError(
-            f"opacity_multiplier must be a number, or one for each of the {count} VDIs; "
-            f"got {multiplier!r}"
-        )
-    return multiplier
+def _each(values: Any, count: int, wanted: str, *, got: object) -> list[Any]:
+    """Return a list or a tuple with one value for each VDI; anything else is refused."""
+    if not isinstance(values, list | tuple) or len(values) != count:
+        raise InvalidArgumentError(f"{wanted.format(count)}; got {got!r}")
+    return list(values)
 
 
 def _planes_of_each(planes: Any, count: int) -> list[ArrayLike | None]:
@@ -157,13 +142,5 @@ def _planes_of_each(planes: Any, count: int) -> list[ArrayLike | None]:
         shape = ()
     if len(shape) == 2:
         return [planes] * count
-    try:
-        each = list(planes)
-    except TypeError:
-        each = []
-    if len(each) != count:
-        raise InvalidArgumentError(
-            "clipping_planes must be (k, 6), or have such an array or None for each of the "
-            f"{count} VDIs; got {planes!r}"
-        )
-    return each
+    wanted = "clipping_planes must be (k, 6), or have such an array or None for each of the {} VDIs"
+    return _each(list(planes) if np.iterable(planes) else [], count, wanted, got=planes)

@@ -226,7 +226,7 @@ def volume_to_image(volume: Volume, name: str | None = None) -> vtkImageData:
     image.SetDirectionMatrix(volume.direction.ravel().tolist())
     # x runs fastest in VTK's point order, as it does in a C-ordered [z, y, x] array
     flat = volume.array.reshape((-1, 4) if volume.rgba else -1)
-    image.GetPointData().SetScalars(_to_vtk(volume.name if name is None else name, flat))
+    image.GetPointData().SetScalars(to_vtk(volume.name if name is None else name, flat))
     return image
 
 
