@@ -22,6 +22,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
+from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -150,7 +151,8 @@ class Bench:
         size: tuple[int, int],
         vtk: bool,
     ) -> None:
-        self._runtime, self._volume, self._table, self._size = runtime, volume, table, size
+        self._runtime, self._volume, self._table, self.size = runtime, volume, table, size
+        self.view = filling_camera(volume.bounds, size)
         self.voxel = min(volume.spacing)
         self.step = self.voxel / 2
         self._accurate = DeviceVolume(runtime, volume, table, sample_distance=self.step)
@@ -206,7 +208,7 @@ class Bench:
 
     def image(self, camera: Camera) -> Image:
         """Draw at the accurate step, premultiplied RGBA (H, W, 4)."""
-        return raycast_medium(self._accurate, FrameRequest(camera, self._size))
+        return raycast_medium(self._accurate, FrameRequest(camera, self.size))
 
     def reference(self, camera: Camera, angle: float) -> tuple[Image, dict[str, float] | None]:
         """Return our picture of a view, and how near VTK's is; both are kept for other VDIs.
@@ -237,7 +239,7 @@ class Bench:
     def frames(self, camera: Camera) -> dict[str, Step]:
         """Return what draws a frame, by candidate; ours ends with the picture on the host."""
         steps: dict[str, Step] = {
-            name: partial(raycast_medium, medium, FrameRequest(camera, self._size))
+            name: partial(raycast_medium, medium, FrameRequest(camera, self.size))
             for name, medium in self._timed.items()
         }
         for name, baseline in self._baselines.items():
@@ -266,7 +268,7 @@ class Bench:
                         "take a smaller one, or a machine with more memory",
                     )
                 prop = property_from_transfer_function(volume, table)
-                baseline = VTKBaseline(volume, prop, self._size, mapper, self.voxel)
+                baseline = VTKBaseline(volume, prop, self.size, mapper, self.voxel)
             except VDIError as error:
                 self.left_out[f"vtk_{mapper}"] = str(error)
                 continue

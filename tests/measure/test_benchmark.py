@@ -161,10 +161,10 @@ def test_an_interrupted_run_can_be_gone_on_with(default_runtime, tmp_path, monke
     run = (*TINY_RUN, "--angles", "0,5,30", "--no-vtk", "--tables", "1", "--out", out)
     whole = session._Run._row
 
-    def interrupted(self, camera, angle, *others):
+    def interrupted(self, angle, *others):
         if angle == 30:
             raise KeyboardInterrupt
-        return whole(self, camera, angle, *others)
+        return whole(self, angle, *others)
 
     monkeypatch.setattr(session._Run, "_row", interrupted)
     assert benchmark(*run) == 130

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import time
+from contextlib import closing
 from typing import Any
 
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.measure.clock import Times, take_turns
-from pyvista_vdi.measure.paper.datasets import (
-    Dataset,
-    find_dataset,
-    label_of,
-    require_allocation,
-)
+from pyvista_vdi.measure.paper.datasets import Dataset, find_dataset, label_of, require_allocation
 from pyvista_vdi.measure.paper.plan import Plan
 from pyvista_vdi.measure.paper.preview import measure_preview
 from pyvista_vdi.measure.paper.results import Results
@@ -27,8 +23,6 @@ from pyvista_vdi.measure.session import (
     refusal,
     sizes_of,
 )
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -102,10 +96,8 @@ class _Run:
         except (VDIError, MemoryError) as error:
             self._refuse(name, self._cells(name), error)
             return
-        self._results.data["datasets"][name] = {
-            **dataset.describe(volume),
-            "load_seconds": seconds,
-        }
+        described = {**dataset.describe(volume), "load_seconds": seconds}
+        self._results.data["datasets"][name] = described
         table = dataset.transfer_function(volume, self._plan.interpolation)
         for size in dict.fromkeys(size for size, _ in self._cells(name)):
             self._window(name, volume, table, size)
@@ -141,56 +133,50 @@ class _Run:
         except (VDIError, MemoryError) as error:
             self._refuse(name, [(size, limit) for limit in limits], error)
             return
-        try:
-            view = filling_camera(volume.bounds, size)
+        with closing(bench):
             if bench.opengl is not None:
                 self._results.data["system"]["opengl"] = bench.opengl
             for limit in limits:
                 try:
-                    self._cell(name, view, size, limit, bench)
+                    self._cell(name, limit, bench)
                 except (VDIError, MemoryError) as error:
                     self._refuse(name, [(size, limit)], error)
-        finally:
-            bench.close()
 
     # -- a VDI -------------------------------------------------------------------------------------
 
-    def _cell(
-        self, name: str, view: Camera, size: tuple[int, int], limit: int, bench: Bench
-    ) -> None:
-        doing = f"{name}, {across(size)}, N_S {limit}"
+    def _cell(self, name: str, limit: int, bench: Bench) -> None:
+        doing = f"{name}, {across(bench.size)}, N_S {limit}"
         self._step(f"{doing}: generating")
-        vdi, seconds = self._generated(bench, view, size, limit)
-        cell = self._results.new_cell(name, size, limit)
+        vdi, seconds = self._generated(bench, limit)
+        cell = self._results.new_cell(name, bench.size, limit)
         if cell["vdi"] is None:
             cell["vdi"] = {"generation_seconds": seconds, **sizes_of(vdi)}
-        draw = VDIRenderer(self._runtime, vdi, size)
+        draw = VDIRenderer(self._runtime, vdi, bench.size)
         there = {row["angle"] for row in cell["angles"]}
         for angle in self._plan.angles:
             if angle in there:
                 continue
             self._step(f"{doing}: {angle:g} degrees")
-            cell["angles"].append(self._row(view.azimuth(angle), angle, draw, bench))
+            cell["angles"].append(self._row(angle, draw, bench))
             cell["angles"].sort(key=lambda row: row["angle"])
             cell["left_out"] = dict(bench.left_out)
             self._results.save()
             self._step(doing, finished=1)
 
-    def _generated(
-        self, bench: Bench, view: Camera, size: tuple[int, int], limit: int
-    ) -> tuple[VDI, Times]:
+    def _generated(self, bench: Bench, limit: int) -> tuple[VDI, Times]:
         """Generate the VDI as often as is timed."""
         made, seconds = bench.generate(
-            view,
-            size,
+            bench.view,
+            bench.size,
             self._plan.generations,
             max_supersegments=limit,
             sample_distance=bench.step,
         )
         return made["exact"], seconds["generate"]
 
-    def _row(self, camera: Camera, angle: float, draw: VDIRenderer, bench: Bench) -> dict[str, Any]:
+    def _row(self, angle: float, draw: VDIRenderer, bench: Bench) -> dict[str, Any]:
         """Compare the pictures of one view, and time everybody's frames."""
+        camera = bench.view.azimuth(angle)
         reference, vtk_accuracy = bench.reference(camera, angle)
         frames = {**draw.frames(camera), **bench.frames(camera)}
         return {
@@ -209,17 +195,14 @@ class _Run:
         entry = self._preview_entry(None)
         try:
             bench = Bench(self._runtime, volume, table, size, vtk=False)
-            view = filling_camera(volume.bounds, size)
-            vdi, _ = self._generated(bench, view, size, limit)
+            vdi, _ = self._generated(bench, limit)
             draw = VDIRenderer(self._runtime, vdi, size)
-            camera = view.azimuth(angle)
+            camera = bench.view.azimuth(angle)
             reference = bench.image(camera)
             frames = draw.frames(camera)
             full = take_turns(frames, self._plan.repeats, runtime=self._runtime)["vdi_skipping"]
-            entry["full"] = {
-                "seconds": full,
-                "to_volume": accuracy(draw.image(camera), reference),
-            }
+            to_volume = accuracy(draw.image(camera), reference)
+            entry["full"] = {"seconds": full, "to_volume": to_volume}
             entry["rows"] = measure_preview(draw, camera, size, full, reference)
         except (VDIError, MemoryError) as error:
             entry["refused"] = refusal(error)

@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
@@ -244,7 +245,7 @@ class _Run:
     def everything(self) -> None:
         """Measure what is missing."""
         data = self._results.data
-        try:
+        with closing(self._bench):
             if self._bench.opengl is not None:
                 data["system"]["opengl"] = self._bench.opengl
             if not data["baselines"]:
@@ -260,8 +261,6 @@ class _Run:
                 order = {setting.name: i for i, setting in enumerate(self._plan.settings)}
                 data["points"].sort(key=lambda point: order[point["name"]])
                 self._results.save()
-        finally:
-            self._bench.close()
 
     # -- what all is compared with -----------------------------------------------------------------
 
