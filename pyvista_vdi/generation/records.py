@@ -37,23 +37,10 @@ class Step:
 class Records:
     """A ray per list, and the runs of like samples that are recorded along each of a slice's rays.
 
-    Attributes
-    ----------
-    runtime, size, slices
-        The device, width and height of the window in lists, and how they are cut into slices.
-    forms, planes
-        The rays as the kernels take them, and how many of the forms are planes.
-    march : tuple
-        Arguments ``forms`` to ``unit_distance`` of the kernels that march.
-    of_medium, of_rays : dict
-        What kernels are compiled with that march, and those that take rays alone.
-    weights : tuple
-        Arguments ``reference_length`` and ``hidden_weight`` of the kernels that merge.
-    finest : float32
-        Merge error that is accepted on every ray.
-    runs, errors, thresholds, counts : DeviceBuffer
-        The recorded runs, their merge errors, and each ray's accepted merge error and number of
-        runs.
+    ``of_medium`` and ``of_rays`` are what kernels that march, and those that take rays alone, are
+    compiled with; ``march`` their arguments ``forms`` to ``unit_distance``, ``weights`` those of a
+    merge error. ``runs`` come with their merge ``errors``, and with the number (``counts``) and the
+    accepted merge error (``thresholds``) of each ray: ``finest`` until its record has been full.
     """
 
     def __init__(

@@ -133,7 +133,10 @@ class GenerationOptions(MediumOptions):
 
     def __post_init__(self) -> None:
         self._put("max_supersegments", check_max_supersegments(self.max_supersegments))
-        check_criterion(self.criterion)
+        if self.criterion not in CRITERIA:
+            raise InvalidArgumentError(
+                f"criterion must be one of {', '.join(CRITERIA)}; got {self.criterion!r}"
+            )
         check_precision(self.precision)
         difference, angle = as_float(self.tolerance), as_float(self.view_cone)
         if not (np.isfinite(difference) and difference >= 0):
@@ -164,12 +167,3 @@ def check_max_supersegments(max_supersegments: int) -> int:
             f"got {max_supersegments!r}"
         )
     return limit
-
-
-def check_criterion(criterion: str) -> str:
-    """Return ``criterion`` if it is one of :data:`CRITERIA`."""
-    if criterion not in CRITERIA:
-        raise InvalidArgumentError(
-            f"criterion must be one of {', '.join(CRITERIA)}; got {criterion!r}"
-        )
-    return criterion

@@ -38,8 +38,8 @@ from pyvista_vdi.quality.dial import (
     predictions,
     refuse_settings,
 )
-from pyvista_vdi.quality.tiles import TileSample, tiles_ssim
-from pyvista_vdi.quality.view_error import ViewErrorEstimator
+from pyvista_vdi.quality.tiles import TileSample, tiles_ssim, window_pixels
+from pyvista_vdi.quality.view_error import ViewErrorEstimator, world_centre
 from pyvista_vdi.raycasting.raycast import render_vdi
 
 #: Tiles that are measured, and their edge in pixels: benchmarks/dial.py.
@@ -80,19 +80,10 @@ def generate_by_dial(
     """
     options = GenerationOptions.of(options, changes)
     if dial is not None:
-        choice = choose(
-            volume,
-            camera,
-            window_size,
-            transfer_function,
-            dial,
-            options,
-            device=device,
-            progress=progress,
-        )
+        scene = (volume, camera, window_size, transfer_function)
+        choice = choose(*scene, dial, options, device=device, progress=progress)
         window_size = choice.prediction.window_size
-        setting = choice.prediction.setting
-        options = setting.applied_to(options)
+        options = choice.prediction.setting.applied_to(options)
         metadata = {**(metadata or {}), "dial": choice.to_dict()}
     return generate_vdi(
         volume,
@@ -351,9 +342,7 @@ def turned(camera: Camera, bounds: Sequence[float], degrees: float) -> Camera:
 
     The view of :meth:`Camera.azimuth` where the camera looks at that centre.
     """
-    matrix = camera.model_transform
-    low, high = np.asarray(bounds)[::2], np.asarray(bounds)[1::2]
-    centre = matrix[:3, :3] @ ((low + high) / 2) + matrix[:3, 3]
+    centre = world_centre(camera, bounds)
     axis = np.asarray(camera.view_up) / np.linalg.norm(camera.view_up)
     cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
 
@@ -401,9 +390,7 @@ def lists_met(
     points = np.column_stack([ends, np.ones(len(ends))]) @ camera.model_to_view.T
     if not camera.parallel_projection and points[:, 2].min() <= 0:
         return (0, 0), window  # they pass V_O's eye
-    viewport = points @ camera.viewport_matrix(window).T
-    u, v = viewport[:, :2].T / viewport[:, 3]
-    place = (np.stack([u, -v], axis=1) + 1) / 2 * window
+    place = window_pixels(points, camera, window)
     # One more on each side, for the ends' rounding
     first = np.clip(np.floor(place.min(axis=0)) - 1, 0, window).astype(int)
     last = np.clip(np.ceil(place.max(axis=0)) + 1, 0, window).astype(int)

@@ -169,9 +169,7 @@ def seen_region(
     edges = np.asarray(size)
     first, last = np.zeros(2), edges.astype(np.float64)
     if camera.parallel_projection or depth.min() > rays.NEAREST_DEPTH * depth.max():
-        viewport = points @ camera.viewport_matrix(size).T
-        u, v = viewport[:, :2].T / viewport[:, 3]
-        pixels = (np.stack([u, -v], axis=1) + 1) / 2 * edges
+        pixels = window_pixels(points, camera, size)
         first, last = np.floor(pixels.min(axis=0)), np.ceil(pixels.max(axis=0))
     low = np.clip(first - REACH, REACH, edges - REACH).astype(int)
     high = np.clip(last + REACH, REACH, edges - REACH).astype(int)
@@ -180,6 +178,13 @@ def seen_region(
     width, height = (high - low).tolist()
     left, top = low.tolist()
     return Region((left, top), (width, height))
+
+
+def window_pixels(points: Floats, camera: Camera, size: tuple[int, int]) -> Floats:
+    """Return where homogeneous points in view space lie in a window: pixels from the top left."""
+    viewport = points @ camera.viewport_matrix(size).T
+    u, v = viewport[:, :2].T / viewport[:, 3]
+    return np.asarray((np.stack([u, -v], axis=1) + 1) / 2 * size)
 
 
 def _cell_starts(first: int, extent: int, edge: int, end: int) -> NDArray[np.int64]:

@@ -393,15 +393,22 @@ class _Scene:
             raise Cancelled("the estimate of a view's error was cancelled")
 
 
-def _towards_eye(camera: Camera, bounds: Sequence[float]) -> Floats:
-    """Direction in which the eye stands, seen from the centre of the bounds; model frame."""
+def world_centre(camera: Camera, bounds: Sequence[float]) -> Floats:
+    """Return the centre of bounds in the model frame, world coordinates."""
     matrix = camera.model_transform
     low, high = np.asarray(bounds)[::2], np.asarray(bounds)[1::2]
-    centre = matrix[:3, :3] @ ((low + high) / 2) + matrix[:3, 3]
-    direction = np.linalg.solve(matrix[:3, :3], np.asarray(camera.position) - centre)
-    at_centre = np.linalg.norm(direction) <= _AT_CENTRE * np.linalg.norm(high - low)
-    if camera.parallel_projection or at_centre:
-        direction = np.linalg.solve(matrix[:3, :3], -camera.axes[2])
+    return np.asarray(matrix[:3, :3] @ ((low + high) / 2) + matrix[:3, 3])
+
+
+def _towards_eye(camera: Camera, bounds: Sequence[float]) -> Floats:
+    """Direction in which the eye stands, seen from the centre of the bounds; model frame."""
+    to_world = camera.model_transform[:3, :3]
+    direction = np.linalg.solve(
+        to_world, np.asarray(camera.position) - world_centre(camera, bounds)
+    )
+    diagonal = np.linalg.norm(np.diff(np.reshape(bounds, (3, 2))))
+    if camera.parallel_projection or np.linalg.norm(direction) <= _AT_CENTRE * diagonal:
+        direction = np.linalg.solve(to_world, -camera.axes[2])
     return np.asarray(direction)
 
 
