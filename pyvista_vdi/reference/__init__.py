@@ -16,7 +16,7 @@ from pyvista_vdi.reference.generate import (
     samples,
     volume_image,
 )
-from pyvista_vdi.reference.joint import render_joint, render_joint_range
+from pyvista_vdi.reference.multi_vdi import render_joint, render_joint_range
 from pyvista_vdi.reference.ranges import render_range
 from pyvista_vdi.reference.raycast import render, render_pixels
 

@@ -23,7 +23,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting import multi_vdi as joint
+from pyvista_vdi.raycasting import multi_vdi
 from pyvista_vdi.raycasting.placed import PlacedVDI
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 
@@ -229,12 +229,12 @@ def test_bands_and_room_for_segments_change_no_bit(runtime, monkeypatch):
     vdis, cameras, _ = scene(np.random.default_rng(12), "near", 3)
     size = (61, 37)
     image = draw(runtime, vdis, cameras, size)
-    monkeypatch.setattr(joint, "_FIRST_SLOTS", 1)
+    monkeypatch.setattr(multi_vdi, "_FIRST_SLOTS", 1)
     for room in ("_POOL_BYTES", "_POOL_BYTES_CPU"):
-        monkeypatch.setattr(joint, room, 1)  # a cell in a band
-    joint._slots.clear()
+        monkeypatch.setattr(multi_vdi, room, 1)  # a cell in a band
+    multi_vdi._slots.clear()
     assert np.array_equal(image, draw(runtime, vdis, cameras, size))
-    assert joint._slots[vdis[0]] > 1
+    assert multi_vdi._slots[vdis[0]] > 1
     assert np.array_equal(image, draw(runtime, vdis, cameras, size))
 
 
@@ -364,9 +364,9 @@ def test_where_no_two_are_met_each_is_drawn_as_by_itself(runtime, dealt, precisi
     depth = np.full(size[::-1], np.inf, np.float32)
     depth[60:110] = 8.5
     found = []
-    of_cells = joint._Cells.of.__func__
+    of_cells = multi_vdi._Cells.of.__func__
     monkeypatch.setattr(
-        joint._Cells,
+        multi_vdi._Cells,
         "of",
         classmethod(lambda cls, *args: found.append(of_cells(cls, *args)) or found[-1]),
     )
@@ -386,7 +386,7 @@ def test_where_no_two_are_met_each_is_drawn_as_by_itself(runtime, dealt, precisi
     assert not drawn.image[alone == -2].any()
     assert (drawn.owner[alone == -2] == -1).all()
     # What several are met in is drawn as if several were met everywhere, and so is the rest
-    monkeypatch.setattr(joint, "cells_of_points", lambda *_: np.ones_like(found[0].alone, bool))
+    monkeypatch.setattr(multi_vdi, "cells_of_points", lambda *_: np.ones_like(found[0].alone, bool))
     whole = owned_image(placed, size, opaque_depth=depth, margin=0.5, device=runtime)
     np.testing.assert_array_equal(whole.image[alone == -1], drawn.image[alone == -1])
     assert np.abs(whole.image - drawn.image).max() <= SAME

@@ -18,8 +18,7 @@ from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
-from pyvista_vdi.raycasting import multi_vdi as joint
-from pyvista_vdi.raycasting import packets
+from pyvista_vdi.raycasting import multi_vdi, packets
 from pyvista_vdi.raycasting.scene import Scene
 
 #: Views of a VDI that :func:`random_view` draws; the hard ones by name.
@@ -186,7 +185,7 @@ def deal_rays(patch, dealt):
         patch.setattr(packets, name, least)
     if dealt == "one by one":
         patch.setattr(Scene, "in_vectors", False)
-        patch.setattr(joint, "_in_rows", lambda runtime: False)
+        patch.setattr(multi_vdi, "_in_rows", lambda runtime: False)
 
 
 # -- VDIs ------------------------------------------------------------------------------------------

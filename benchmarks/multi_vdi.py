@@ -1,7 +1,7 @@
 """What a joint frame of two VDIs costs, over the two frames by themselves.
 
-    python benchmarks/joint.py
-    python benchmarks/joint.py --volumes brain heptane --vdi-cache FOLDER
+    python benchmarks/multi_vdi.py
+    python benchmarks/multi_vdi.py --volumes brain heptane --vdi-cache FOLDER
 
 The second volume is scaled to the size of the first and put beside its centre, so that they share
 about a third of their bounds. Candidates take turns; medians of the process's CPU time (and of the
