@@ -10,31 +10,7 @@ from importlib import import_module
 from typing import Any, NoReturn
 
 from pyvista_vdi._version import __version__
-from pyvista_vdi.cli.options import (
-    VDI_FILE,
-    add_angles,
-    add_camera,
-    add_classification,
-    add_device,
-    add_dial,
-    add_file,
-    add_format,
-    add_limits,
-    add_longest,
-    add_no_vtk,
-    add_occlusion,
-    add_output,
-    add_repeats,
-    add_size,
-    add_step,
-    add_volume,
-    option,
-    parse_color,
-    parse_count,
-    parse_rate,
-    parse_size,
-    switch,
-)
+from pyvista_vdi.cli import declare
 from pyvista_vdi.model.standard_cases import ANGLES, ELEVATION, WINDOW_SIZE
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
@@ -146,40 +122,42 @@ def _make_parser() -> tuple[_Parser, dict[str, _Parser]]:
 
 
 def _add_devices(parser: argparse.ArgumentParser) -> None:
-    switch(parser, "--json", "print JSON")
+    declare.switch(parser, "--json", "print JSON")
 
 
 def _add_info(parser: argparse.ArgumentParser) -> None:
-    add_file(parser)
-    switch(parser, "--json", "print JSON, with all metadata")
+    declare.vdi_file(parser)
+    declare.switch(parser, "--json", "print JSON, with all metadata")
 
 
 def _add_generate(parser: argparse.ArgumentParser) -> None:
-    add_volume(parser)
-    add_output(parser)
-    add_size(parser, WINDOW_SIZE)
-    add_camera(parser, f"the view that the volume fills, {ELEVATION:g} degrees above its middle")
-    add_classification(parser)
-    add_occlusion(parser)
-    add_limits(parser)
-    add_dial(parser)
-    add_format(parser)
-    add_device(parser)
+    declare.volume(parser)
+    declare.output(parser)
+    declare.size(parser, WINDOW_SIZE)
+    declare.camera(
+        parser, f"the view that the volume fills, {ELEVATION:g} degrees above its middle"
+    )
+    declare.classification(parser)
+    declare.occlusion(parser)
+    declare.limits(parser)
+    declare.dial(parser)
+    declare.file_format(parser)
+    declare.device(parser)
 
 
 def _add_convert(parser: argparse.ArgumentParser) -> None:
-    add_file(parser)
-    add_output(parser)
-    add_format(parser)
+    declare.vdi_file(parser)
+    declare.output(parser)
+    declare.file_format(parser)
     group = parser.add_argument_group("deep images of other programs")
     view = "the view that the image shows, where it does not say it: Camera.to_dict() as JSON"
-    option(group, "--camera-json", view, "FILE")
+    declare.option(group, "--camera-json", view, "FILE")
     thickness = "world units, given to samples that have none (surfaces)"
-    option(group, "--thickness", thickness, "LENGTH", float)
+    declare.option(group, "--thickness", thickness, "LENGTH", float)
 
 
 def _add_paraview(parser: argparse.ArgumentParser) -> None:
-    switch(
+    declare.switch(
         parser,
         "--environment",
         "print, for a shell's eval, the variables that make ParaView find this package and "
@@ -188,25 +166,25 @@ def _add_paraview(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_render(parser: argparse.ArgumentParser) -> None:
-    option(
+    declare.option(
         parser,
         "files",
-        f"{VDI_FILE}; several are merged by depth, each where it was generated, and the "
+        f"{declare.VDI_FILE}; several are merged by depth, each where it was generated, and the "
         "view and the size are those of the first unless they are given",
         "FILE",
         nargs="+",
     )
-    add_output(parser, ".png to write")
-    add_size(parser, None)
-    option(
+    declare.output(parser, ".png to write")
+    declare.size(parser, None)
+    declare.option(
         parser,
         "--background",
         "blend over this: a name, #rrggbb or R,G,B from 0 to 1; otherwise the picture is "
         "transparent where the volume is",
         "COLOR",
-        parse_color,
+        declare.parse_color,
     )
-    option(
+    declare.option(
         parser,
         "--transmittance-cutoff",
         "end rays where less than this is left, 0 to below 1 (0.000001): what a channel may "
@@ -214,18 +192,18 @@ def _add_render(parser: argparse.ArgumentParser) -> None:
         "LIGHT",
         float,
     )
-    add_camera(parser, "the VDI's generating view")
-    add_device(parser)
+    declare.camera(parser, "the VDI's generating view")
+    declare.device(parser)
 
 
 def _add_view(parser: argparse.ArgumentParser) -> None:
-    add_file(parser)
-    add_size(parser, None)
-    option(parser, "--screenshot", "write this .png, open no window", "FILE")
+    declare.vdi_file(parser)
+    declare.size(parser, None)
+    declare.option(parser, "--screenshot", "write this .png, open no window", "FILE")
     group = parser.add_argument_group("while the view moves")
     rate = "frames per second to keep, by fewer pixels; 0: every frame is full (default: 30)"
-    option(group, "--target-fps", rate, "RATE", parse_rate, default=30.0)
-    option(
+    declare.option(group, "--target-fps", rate, "RATE", declare.parse_rate, default=30.0)
+    declare.option(
         group,
         "--regenerate",
         "auto (default): say once that the view is beyond what the VDI was made to serve (a "
@@ -233,7 +211,7 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
         choices=("auto", "never"),
         default="auto",
     )
-    switch(
+    declare.switch(
         group,
         "--status",
         "show in a corner how it is drawn: pixels, frames per second, angle from the "
@@ -242,20 +220,22 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_compare(parser: argparse.ArgumentParser) -> None:
-    add_volume(parser)
-    option(parser, "--out", "where the files go", "FOLDER", default=".")
-    add_size(parser, WINDOW_SIZE)
-    add_angles(parser, f"degrees from V_O (default: {','.join(f'{a:g}' for a in ANGLES)})", ANGLES)
-    add_repeats(parser, "timed frames of each kind (default: 3)", 3, metavar=None)
-    add_no_vtk(parser)
-    add_classification(parser, tables=False)
-    add_longest(parser)
-    add_step(parser)
-    add_device(parser)
+    declare.volume(parser)
+    declare.option(parser, "--out", "where the files go", "FOLDER", default=".")
+    declare.size(parser, WINDOW_SIZE)
+    declare.angles(
+        parser, f"degrees from V_O (default: {','.join(f'{a:g}' for a in ANGLES)})", ANGLES
+    )
+    declare.repeats(parser, "timed frames of each kind (default: 3)", 3, metavar=None)
+    declare.no_vtk(parser)
+    declare.classification(parser, tables=False)
+    declare.longest(parser)
+    declare.step(parser)
+    declare.device(parser)
 
 
 def _add_benchmark(parser: argparse.ArgumentParser) -> None:
-    option(
+    declare.option(
         parser,
         "--profile",
         "quick (default): small volumes, minutes; full: the paper's sizes and all volumes at "
@@ -263,18 +243,18 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
         choices=("quick", "full"),
         default="quick",
     )
-    option(
+    declare.option(
         parser,
         "--out",
         ".json to write; a table (.md) and a plot (.png) go beside it (default: benchmark.json)",
         "FILE",
         default="benchmark.json",
     )
-    switch(parser, "--resume", "go on with FILE where it was left")
+    declare.switch(parser, "--resume", "go on with FILE where it was left")
     changed = "measure nothing: say what changed between two files beyond noise"
-    option(parser, "--compare", changed, ("A", "B"), nargs=2)
+    declare.option(parser, "--compare", changed, ("A", "B"), nargs=2)
     group = parser.add_argument_group("what is measured", "In place of the profile's.")
-    option(
+    declare.option(
         group,
         "--datasets",
         "volumes known by name, and kingsnake_like, beechnut_like, richtmyer_meshkov_like: "
@@ -282,7 +262,7 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
         "NAME",
         nargs="+",
     )
-    option(
+    declare.option(
         group,
         "--volume",
         "a file, may be repeated; a NAME of kingsnake, beechnut or richtmyer_meshkov says "
@@ -290,34 +270,34 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
         "[NAME=]FILE",
         action="append",
     )
-    option(group, "--sizes", "windows, pixels", "WxH", parse_size, nargs="+")
-    option(group, "--max-supersegments", None, "N", parse_count, nargs="+")
-    add_angles(group, "degrees from V_O")
-    add_repeats(group, "timed frames of each kind and view (5)")
-    option(group, "--interpolation", "(nearest)", choices=("nearest", "linear"))
-    option(group, "--seed", "of the made volumes (1)", "N", parse_count)
+    declare.option(group, "--sizes", "windows, pixels", "WxH", declare.parse_size, nargs="+")
+    declare.option(group, "--max-supersegments", None, "N", declare.parse_count, nargs="+")
+    declare.angles(group, "degrees from V_O")
+    declare.repeats(group, "timed frames of each kind and view (5)")
+    declare.option(group, "--interpolation", "(nearest)", choices=("nearest", "linear"))
+    declare.option(group, "--seed", "of the made volumes (1)", "N", declare.parse_count)
     tables = "which of the paper's tables (both)"
-    option(group, "--tables", tables, kind=int, nargs="+", choices=(1, 2))
-    add_no_vtk(parser)
-    add_device(parser)
+    declare.option(group, "--tables", tables, kind=int, nargs="+", choices=(1, 2))
+    declare.no_vtk(parser)
+    declare.device(parser)
 
 
 def _add_tradeoff(parser: argparse.ArgumentParser) -> None:
-    add_volume(parser)
+    declare.volume(parser)
     results = "where tradeoff-NAME.json (every figure), .md (tables) and .png (plot) go"
-    option(parser, "--out", results, "FOLDER", default=".")
-    option(parser, "--name", "in place of the volume's own, for several runs of one")
-    switch(parser, "--resume", "go on with what is there")
-    switch(parser, "--quick", "fewer settings and angles in a smaller window")
+    declare.option(parser, "--out", results, "FOLDER", default=".")
+    declare.option(parser, "--name", "in place of the volume's own, for several runs of one")
+    declare.switch(parser, "--resume", "go on with what is there")
+    declare.switch(parser, "--quick", "fewer settings and angles in a smaller window")
     parser.add_argument(
         "--size",
         "--window-size",
-        type=parse_size,
+        type=declare.parse_size,
         metavar="WxH",
         help="of all frames, pixels (default: 640x360; with --quick 320x180)",
     )
-    add_angles(parser, "degrees from V_O (default: 5,30,60; with --quick 5,30)")
-    option(
+    declare.angles(parser, "degrees from V_O (default: 5,30,60; with --quick 5,30)")
+    declare.option(
         parser,
         "--sweep",
         "which settings, with values other than the usual ones: max-supersegments, "
@@ -327,14 +307,14 @@ def _add_tradeoff(parser: argparse.ArgumentParser) -> None:
         nargs="+",
     )
     among = parser.add_mutually_exclusive_group()
-    switch(among, "--alone", "change one setting at a time, and no two together")
-    switch(among, "--product", "measure every combination")
-    add_repeats(parser, "timed frames (default: 5)", 5)
+    declare.switch(among, "--alone", "change one setting at a time, and no two together")
+    declare.switch(among, "--product", "measure every combination")
+    declare.repeats(parser, "timed frames (default: 5)", 5)
     generations = "timed generations of each VDI (default: 5)"
-    option(parser, "--generations", generations, "N", parse_count, default=5)
-    add_no_vtk(parser)
-    add_classification(parser)
-    add_device(parser)
+    declare.option(parser, "--generations", generations, "N", declare.parse_count, default=5)
+    declare.no_vtk(parser)
+    declare.classification(parser)
+    declare.device(parser)
 
 
 _VERBS: dict[str, tuple[str, str, str, Any]] = {

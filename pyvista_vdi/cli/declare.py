@@ -1,4 +1,4 @@
-"""Options that several verbs have, and their types."""
+"""Declares options to a parser: those that several verbs have, any other, and their types."""
 
 from __future__ import annotations
 
@@ -113,17 +113,17 @@ def switch(options: Options, name: str, text: str | None = None, **more: Any) ->
     options.add_argument(name, help=text, action="store_true", **more)
 
 
-def add_file(options: Options) -> None:
+def vdi_file(options: Options) -> None:
     """Add the VDI to read."""
     option(options, "file", VDI_FILE, "FILE")
 
 
-def add_output(options: Options, text: str = ".vdi, .exr or .vti to write") -> None:
+def output(options: Options, text: str = ".vdi, .exr or .vti to write") -> None:
     """Add the file to write."""
     options.add_argument("-o", "--output", metavar="FILE", required=True, help=text)
 
 
-def add_volume(options: Options) -> None:
+def volume(options: Options) -> None:
     """Add the volume: a file's name, or one that is known."""
     source = options.add_mutually_exclusive_group(required=True)
     option(
@@ -137,31 +137,31 @@ def add_volume(options: Options) -> None:
     option(source, "--example", "a volume known by name, e.g. brain", "NAME")
 
 
-def add_size(options: Options, default: tuple[int, int] | None) -> None:
+def size(options: Options, default: tuple[int, int] | None) -> None:
     """Add the window's size, pixels; the VDI's own without a default."""
     shown = "the VDI's" if default is None else f"{default[0]}x{default[1]}"
     text = f"window size in pixels (default: {shown})"
     option(options, "--size", text, "WxH", parse_size, default=default)
 
 
-def add_angles(options: Options, text: str, default: tuple[float, ...] | None = None) -> None:
+def angles(options: Options, text: str, default: tuple[float, ...] | None = None) -> None:
     """Add the new views."""
     option(options, "--angles", text, "A,B,...", parse_numbers, default=default)
 
 
-def add_repeats(
+def repeats(
     options: Options, text: str, default: int | None = None, metavar: str | None = "N"
 ) -> None:
     """Add how often frames are timed."""
     option(options, "--repeats", text, metavar, parse_count, default=default)
 
 
-def add_no_vtk(options: Options) -> None:
+def no_vtk(options: Options) -> None:
     """Add the way to do without VTK."""
     switch(options, "--no-vtk", "leave out VTK's mappers")
 
 
-def add_camera(parser: argparse.ArgumentParser, default: str) -> None:
+def camera(parser: argparse.ArgumentParser, default: str) -> None:
     """Add the view; ``default`` says in words what it is without these options."""
     group = parser.add_argument_group("camera", f"By default {default}.")
     for name, text in (
@@ -178,7 +178,7 @@ def add_camera(parser: argparse.ArgumentParser, default: str) -> None:
     option(group, "--elevation", "lift by", "DEGREES", float, default=0.0)
 
 
-def add_classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> None:
+def classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> None:
     """Add how the volume looks; ``tables``: also its transfer function as a file."""
     group = parser.add_argument_group(
         "classification", "Names, defaults and meaning are those of PyVista's add_volume."
@@ -203,7 +203,7 @@ def add_classification(parser: argparse.ArgumentParser, *, tables: bool = True) 
         option(group, "--transfer-function", text, "FILE")
 
 
-def add_occlusion(parser: argparse.ArgumentParser) -> None:
+def occlusion(parser: argparse.ArgumentParser) -> None:
     """Add ambient occlusion."""
     group = parser.add_argument_group("ambient occlusion", "Either option below turns it on, too.")
     switch(group, "--ambient-occlusion", "darken what is hidden from the light around it")
@@ -213,20 +213,20 @@ def add_occlusion(parser: argparse.ArgumentParser) -> None:
     option(group, "--occlusion-strength", strength, "S", float)
 
 
-def add_longest(options: Options, text: str | None = None) -> None:
+def longest(options: Options, text: str | None = None) -> None:
     """Add how long lists may be."""
     option(options, "--max-supersegments", text, "N", int, default=20)
 
 
-def add_step(options: Options, text: str | None = None) -> None:
+def step(options: Options, text: str | None = None) -> None:
     """Add how finely the volume is sampled."""
     option(options, "--sample-distance", text, "LENGTH", float)
 
 
-def add_limits(parser: argparse.ArgumentParser) -> None:
+def limits(parser: argparse.ArgumentParser) -> None:
     """Add how much a VDI may hold, and how finely the volume is sampled."""
     group = parser.add_argument_group("limits")
-    add_longest(group, "longest list (default: 20)")
+    longest(group, "longest list (default: 20)")
     option(
         group,
         "--criterion",
@@ -235,7 +235,7 @@ def add_limits(parser: argparse.ArgumentParser) -> None:
         "NAME",
         default="least-error",
     )
-    add_step(group, "step along the ray, model units (default: half the smallest spacing)")
+    step(group, "step along the ray, model units (default: half the smallest spacing)")
     option(group, "--tolerance", "error traded for length", kind=float, default=0.0)
     cone = "half angle of the cone of new views to serve (default: 60)"
     option(group, "--view-cone", cone, "DEGREES", float, default=60.0)
@@ -249,7 +249,7 @@ def add_limits(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_dial(parser: argparse.ArgumentParser) -> None:
+def dial(parser: argparse.ArgumentParser) -> None:
     """Add goals, from which the limits are chosen."""
     group = parser.add_argument_group(
         "dial",
@@ -270,7 +270,7 @@ def add_dial(parser: argparse.ArgumentParser) -> None:
     option(group, "--target-angle", turn, "DEGREES", float, default=TARGET_ANGLE)
 
 
-def add_format(parser: argparse.ArgumentParser) -> None:
+def file_format(parser: argparse.ArgumentParser) -> None:
     """Add how a VDI is written."""
     group = parser.add_argument_group("file")
     option(
@@ -293,6 +293,6 @@ def add_format(parser: argparse.ArgumentParser) -> None:
     switch(group, "--standard-channels", standard)
 
 
-def add_device(options: Options) -> None:
+def device(options: Options) -> None:
     """Add the OpenCL device."""
     option(options, "--device", "OpenCL device, see pyvista-vdi devices", "NAME")
