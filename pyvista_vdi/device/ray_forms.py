@@ -250,7 +250,7 @@ def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
     return table
 
 
-def packed_pairs(forms: Sequence[Floats]) -> NDArray[np.float32]:
+def packed_double_float(forms: Sequence[Floats]) -> NDArray[np.float32]:
     """Return forms with what float32 rounds off them, float32 (n, 12): see ``lib/rays.cl``."""
     table = packed(forms)
     return np.hstack([table, np.subtract(forms, table, dtype=np.float64).astype(np.float32)])

@@ -35,45 +35,25 @@ OnDevice: TypeAlias = tuple[DeviceBuffer, DeviceBuffer]
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A VDI on a device, and the frame that is asked of it.
-
-    Attributes
-    ----------
-    prepared : PreparedVDI
-        The VDI.
-    camera, size, options
-        Of the request.
-    forms : numpy.ndarray
-        List coordinates, model direction and the planes to clip to, float32 (n, 6), or (n, 12) as
-        double-floats.
-    planes : int
-        How many of the forms are planes; the first six are the bounds.
-    ends : numpy.ndarray or None
-        t at which each ray ends, float32 (H, W), top row first; None if nothing opaque ends them.
-    reference_depth : float
-        View depth of t = 0, world units.
-    cropped : CroppedRays
-        How kernels crop.
-    hit : FirstHit or None
-        What counts as a hit, where t of each ray's first one is asked for and no picture.
-    segments : int
-        Not 0 where segments are asked for: 1 ray by ray, 2 in rows (``raycasting/segments.cl``).
-    only : Rectangle or None
-        The part of the window in which rays are cast, and nothing is written beside it; None where
-        the VDI decides that.
-    """
+    """A VDI on a device, and the frame that is asked of it."""
 
     prepared: PreparedVDI
     camera: Camera
     size: tuple[int, int]
     options: RenderOptions
+    #: List coordinates, model direction and the planes to clip to, (n, 6), or (n, 12) as
+    #: double-floats; how many of them are planes, of which the first six are the bounds.
     forms: NDArray[np.float32]
     planes: int
+    #: t at which each ray ends, (H, W), top row first; None if nothing opaque ends them.
     ends: NDArray[np.float32] | None
-    reference_depth: float
+    reference_depth: float  # view depth of t = 0, world units
     cropped: rays.CroppedRays
+    #: What counts as a hit, where t of each ray's first one is asked for and no picture.
     hit: FirstHit | None = None
+    #: Not 0 where segments are asked for: 1 ray by ray, 2 in rows (raycasting/segments.cl).
     segments: int = 0
+    #: The part in which rays are cast, and nothing is written beside it; None: the VDI decides.
     only: Rectangle | None = None
 
     @classmethod
@@ -98,7 +78,7 @@ class Scene:
             *rays.user_planes(camera, pixel_rays, options.clipping_planes),
             *cropped.planes,
         ]
-        pack = rays.packed_pairs if prepared.double_float else rays.packed
+        pack = rays.packed_double_float if prepared.double_float else rays.packed
         return cls(
             prepared,
             camera,

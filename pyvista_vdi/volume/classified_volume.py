@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, padded
 from pyvista_vdi.device import ray_forms as rays
-from pyvista_vdi.device.ray_forms import Floats, PixelRays, packed, packed_pairs
+from pyvista_vdi.device.ray_forms import Floats, PixelRays, packed, packed_double_float
 from pyvista_vdi.device.work_order import GROUP
 from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
@@ -82,7 +82,7 @@ class MarchForms:
 
     def packed(self, *more: Floats) -> NDArray[np.float32]:
         """Return the forms, and more of the same rays, as the kernels read them."""
-        pack = packed_pairs if self.defines else packed
+        pack = packed_double_float if self.defines else packed
         return pack([*self.forms, *more])
 
 
