@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from paraview.util.vtkAlgorithm import smdomain, smhint, smproperty, smproxy
-from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
-from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkWeakReference
+from vtkmodules.vtkCommonCore import vtkOutputWindow
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
 from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
 
@@ -31,6 +30,7 @@ except ImportError as error:
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
+from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, watch
 from pyvista_vdi.vtk_pipeline.filters.convert import scalars_of, volume_from_vtk
 
 #: What ParaView's plugin manager shows.
@@ -193,7 +193,7 @@ def _of_lens(name: str, kind: Callable[[Any], Any] = lambda value: value) -> Any
     """Return a method that sets one of the camera's arguments, a number or three."""
 
     def set_it(self: Any, *value: Any) -> None:
-        self._put("_lens", {**self._lens, name: value if len(value) > 1 else kind(value[0])})
+        self._change("_lens", {**self._lens, name: value if len(value) > 1 else kind(value[0])})
 
     return set_it
 
@@ -208,7 +208,7 @@ def _of_looks(setter: str) -> Any:
     return set_it
 
 
-class _Looking(VTKPythonAlgorithmBase):
+class _Looking(Algorithm):
     """The properties of a view: an algorithm with ``SetCamera`` gets them as a camera."""
 
     def __init__(self) -> None:
@@ -222,7 +222,7 @@ class _Looking(VTKPythonAlgorithmBase):
 
     def SetView(self, which: int) -> None:
         """Choose between the default view and the camera properties."""
-        self._put("_camera_chosen", which == _CAMERA)
+        self._change("_camera_chosen", which == _CAMERA)
 
     SetCameraPosition = _of_lens("position")
     SetCameraFocalPoint = _of_lens("focal_point")
@@ -261,11 +261,6 @@ class _Looking(VTKPythonAlgorithmBase):
         # Made as late as this: set one at a time, the properties may pass through no camera at all
         return Camera(**self._lens) if self._camera_chosen else None
 
-    def _put(self, attribute: str, value: Any) -> None:
-        if getattr(self, attribute) != value:
-            setattr(self, attribute, value)
-            self.Modified()
-
 
 @smproxy.filter(name="VDISource", label="VDI Source", support_reload=False)
 @smhint.xml('<ShowInMenu category="VDI" />')
@@ -294,11 +289,11 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
 
     def SetAzimuth(self, degrees: float) -> None:
         """Turn the generating view."""
-        self._put("_azimuth", degrees)
+        self._change("_azimuth", degrees)
 
     def SetElevation(self, degrees: float) -> None:
         """Lift the generating view."""
-        self._put("_elevation", degrees)
+        self._change("_elevation", degrees)
 
     def SetArray(self, index: int, port: int, connection: int, kind: int, name: str) -> None:
         """Choose the array, as ``SetInputArrayToProcess``: kind 0 is at points, 1 at cells."""
@@ -315,7 +310,7 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
 
     def SetUnitDistance(self, distance: float) -> None:
         """Set the scalar opacity unit distance; 0 is the default one."""
-        self._put("_unit_distance", distance or None)
+        self._change("_unit_distance", distance or None)
 
     SetInterpolation = _of_looks("SetInterpolationType")
     SetShade = _of_looks("SetShade")
@@ -370,16 +365,10 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
             self._set_view()
         return int(super().RequestInformation(request, inputs, outputs))
 
-    def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Generate."""
-        try:
-            self._set_view()
-            self._set_looks(vtkImageData.GetData(inputs[0], 0))
-        except VDIError as error:
-            _say(self, error)
-            vtkImageData.GetData(outputs, 0).Initialize()
-            return 1
-        return int(super().RequestData(request, inputs, outputs))
+    def _execute(self, inputs: Any, outputs: Any) -> None:
+        self._set_view()
+        self._set_looks(vtkImageData.GetData(inputs[0], 0))
+        super()._execute(inputs, outputs)
 
     def _set_view(self) -> None:
         view, bounds, size = self._given_camera(), self.GetInputBounds(), self.GetWindowSize()
@@ -414,15 +403,8 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
         if before is not None:
             before.RemoveObserver(self._observers.pop(role))
         if function is not None:
-            weak = vtkWeakReference()  # the function must not keep this algorithm alive
-            weak.Set(self)
-
-            def changed(caller: Any, event: str) -> None:
-                if weak.Get() is not None:
-                    weak.Get().Modified()
-
             self._functions[role] = function
-            self._observers[role] = function.AddObserver("ModifiedEvent", changed)
+            self._observers[role] = watch(function, self, Algorithm.Modified)
         self.Modified()
 
 
@@ -437,15 +419,9 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
 class VDIToImage(_Looking, vtk_pipeline.VDIToImage):
     """A picture of a VDI: :class:`pyvista_vdi.vtk_pipeline.VDIToImage`."""
 
-    def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Raycast."""
-        try:
-            self.SetCamera(self._given_camera())
-        except VDIError as error:
-            _say(self, error)
-            vtkImageData.GetData(outputs, 0).Initialize()
-            return 1
-        return int(super().RequestData(request, inputs, outputs))
+    def _execute(self, inputs: Any, outputs: Any) -> None:
+        self.SetCamera(self._given_camera())
+        super()._execute(inputs, outputs)
 
 
 @smproxy.reader(

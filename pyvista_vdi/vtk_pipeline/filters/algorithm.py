@@ -8,7 +8,7 @@ from operator import attrgetter
 from typing import Any
 
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
-from vtkmodules.vtkCommonCore import vtkOutputWindow
+from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkWeakReference
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
@@ -135,6 +135,22 @@ def pair(
         parameters = [Parameter(each, Parameter.POSITIONAL_OR_KEYWORD) for each in arguments]
         method.__signature__ = Signature(parameters)  # type: ignore[union-attr]
     return set_it, get_it
+
+
+def watch(thing: Any, algorithm: Any, changed: Callable[[Any], None]) -> int:
+    """Call ``changed(algorithm)`` when a VTK object is modified, which does not keep the algorithm.
+
+    Returns the observer's tag.
+    """
+    weak = vtkWeakReference()
+    weak.Set(algorithm)
+
+    def modified(*_: Any) -> None:
+        found = weak.Get()
+        if found is not None:
+            changed(found)
+
+    return int(thing.AddObserver("ModifiedEvent", modified))
 
 
 def whole_extent(information: Any) -> tuple[int, ...] | None:

@@ -18,7 +18,7 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial
-from pyvista_vdi.vtk_pipeline.filters.algorithm import DEVICE, Algorithm, accessors, pair
+from pyvista_vdi.vtk_pipeline.filters.algorithm import DEVICE, Algorithm, accessors, pair, watch
 from pyvista_vdi.vtk_pipeline.filters.convert import require_image, require_image_port
 from pyvista_vdi.vtk_pipeline.filters.properties import (
     color_function,
@@ -349,19 +349,13 @@ class SourceSettings(Algorithm):
         prop = self._property
         if prop is None:
             return
-        weak = vtkWeakReference()  # the property must not keep this algorithm alive
-        weak.Set(self)
-
-        def changed(caller: Any, event: str) -> None:
-            source = weak.Get()
-            if source is None:
-                return
-            if caller is source._property:
-                source._observe_property()  # its functions may be others now
-            source.Modified()
-
         functions = [color_function(prop), prop.GetScalarOpacity()]
         if prop.HasGradientOpacity():
             functions.append(prop.GetStoredGradientOpacity())
-        for watched in (prop, *functions):
-            self._observed.append((watched, watched.AddObserver("ModifiedEvent", changed)))
+
+        def changed(source: SourceSettings) -> None:
+            source._observe_property()  # its functions may be others now
+            source.Modified()
+
+        self._observed = [(prop, watch(prop, self, changed))]
+        self._observed += [(each, watch(each, self, Algorithm.Modified)) for each in functions]
