@@ -190,17 +190,8 @@ if len(platforms) < wanted:
 PYTHON
 }
 
-# Options of pytest-xdist. A test that uses a device computes on all cores, but most of the time goes
-# into compiling kernels and into the references in Python, which take one core each. The tests of a
-# file stay together: a process makes that file's fixtures and kernels once.
-in_parallel() {
-    local cores
-    cores=$(nproc)
-    printf -- '-n %d --dist loadfile' "${CI_PYTEST_WORKERS:-$((cores < 4 ? cores : 4))}"
-}
-
-# run_tests [more arguments of pytest]; the fixtures of tests/conftest.py run every test that needs
-# a device on each of them
+# run_tests [more arguments of pytest]: by as many processes as pyproject.toml says, on the devices
+# that PYVISTA_VDI_TEST_DEVICES names
 run_tests() {
     copy_tests
     cd "$work/tests-only"
@@ -208,6 +199,18 @@ run_tests() {
     "$work/venv/bin/python" -m pytest -p no:cacheprovider "$@" || result=$?
     # 5: no test was selected, which is fine for a marker that no test carries yet
     ((result == 0 || (result == 5 && $# > 0)))
+}
+
+# What runs on a device, on the implementation that the README's test command has not used.
+run_tests_on_second_implementation() {
+    export PYVISTA_VDI_TEST_DEVICES=${PYVISTA_VDI_SECOND_IMPLEMENTATION:-portable computing language}
+    run_tests -m "device and not slow and not paraview"
+}
+
+# Those that are slow, on every implementation.
+run_slow_tests() {
+    export PYVISTA_VDI_TEST_DEVICES=all
+    run_tests -m "slow and not paraview"
 }
 
 # Each target guided by coverage, where atheris has a wheel for this Python.
@@ -218,7 +221,7 @@ run_fuzzing() {
     fi
     copy_tests
     cd "$work/tests-only"
-    "$work/venv/bin/python" tests/fuzz/run.py --seconds "${CI_FUZZ_SECONDS:-120}"
+    "$work/venv/bin/python" tests/fuzz/run.py --seconds "${CI_FUZZ_SECONDS:-30}"
 }
 
 # The plugin in a real ParaView; tools/ installs one where there is none.
@@ -227,7 +230,7 @@ run_paraview_tests() {
     env -u PYTHON bash "$work/source/tools/install_paraview.sh" \
         "$work/paraview" "$(compgen -G "$work/dist/*.whl")"
     export PYVISTA_VDI_PARAVIEW=$work/paraview PYVISTA_VDI_REQUIRE_PARAVIEW=1
-    run_tests -m paraview
+    run_tests -m paraview -n 0 # one ParaView at a time
 }
 
 check_lint() {
@@ -275,7 +278,7 @@ run_readme_commands() {
     rm -rf .venv
     cat "$work/test-command"
     # To the letter and in full: tests that find the installed package elsewhere may not in a checkout
-    PYTEST_ADDOPTS=$(in_parallel) bash -euo pipefail "$work/test-command"
+    bash -euo pipefail "$work/test-command"
 }
 
 copy_checkout_to_clone() {
@@ -314,7 +317,5 @@ run_oldest_tests() {
     cd "$work/tests-only"
     # Old releases warn about what newer ones of their own dependencies deprecate: warnings are
     # errors only with the current versions.
-    local options
-    read -ra options <<<"$(in_parallel)"
-    "$work/oldest/bin/python" -m pytest -p no:cacheprovider "${options[@]}" -W default
+    "$work/oldest/bin/python" -m pytest -p no:cacheprovider -W default
 }

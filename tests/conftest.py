@@ -16,10 +16,12 @@ HYPOTHESIS_PROFILE
 from __future__ import annotations
 
 import functools
+import inspect
 import os
 import re
 import signal
 import sysconfig
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -94,12 +96,71 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     )
 
 
+#: Files, by rooms, that take long together: ``-m fast`` runs one case of each of their tests.
+#: `tools/README.md` says which mutants of the kernels that lets live.
+LENGTHY = {
+    "api": "api engine_errors",
+    "cli": "cli",
+    "extremes": "entries lighting media vdis views volumes worlds",
+    "faults": "device_faults",
+    "generation": "criterion_functions generation_oracle march_blocks run_functions",
+    "io": "deep_exr packed_files vdi_files",
+    "measure": "benchmark_model",
+    "model": "packing",
+    "plotting": "add_vdi dial scenes shown volume_files",
+    "quality": "dial view_error",
+    "raycasting": "aligned_view cropping multi_vdi_oracle occupancy packets picking_oracle preview "
+    "raycast_oracle skipping",
+    "reference": "reference",
+    "volume": "ambient_occlusion bricks lighting",
+    "vtk_pipeline": "interactive overlap picking pipeline source vtk_files",
+}
+
+#: And those of which it runs none.
+LENGTHIEST = {
+    "extremes": "determinism",
+    "faults": "disk_faults interrupts threads_and_forks",
+    "fuzz": "fuzz",
+    "measure": "benchmark compare lighting_against_vtk real_volumes tradeoff",
+    "packaging": "distributions documentation",
+    "plotting": "example_scripts on_screen",
+    "quality": "background",
+}
+
+#: Names in a function that starts a process.
+STARTERS = frozenset({"subprocess", "multiprocessing", "run_python", "fork"})
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what runs on each device to test, for a run on another OpenCL implementation."""
+    """Mark what runs on each device to test, and what is fast."""
+    seen = set()
     for item in items:
         if "runtime" in getattr(item, "fixturenames", ()):
             item.add_marker("device")
+        if any(map(item.get_closest_marker, ("slow", "paraview"))):
+            continue
+        room, name = item.path.parent.name, item.path.stem.removeprefix("test_")
+        another_case = item.function in seen and name in LENGTHY.get(room, "").split()
+        seen.add(item.function)
+        left_out = another_case or name in LENGTHIEST.get(room, "").split()
+        if not left_out and not starts_a_process(item.function):
+            item.add_marker("fast")
+
+
+@functools.cache
+def starts_a_process(function: Callable[..., object]) -> bool:
+    """Whether a test, or a function of its module that it calls, names what starts processes."""
+    code = inspect.unwrap(function).__code__
+    names = {*code.co_names}
+    for inner in filter(inspect.iscode, code.co_consts):
+        names.update(inner.co_names)
+    called = (function.__globals__.get(name) for name in names - {code.co_name})
+    return bool(names & STARTERS) or any(
+        starts_a_process(each)
+        for each in called
+        if inspect.isfunction(each) and each.__module__ == function.__module__
+    )
 
 
 def no_device(reason: str) -> None:
