@@ -16,15 +16,28 @@ from extreme_scenes import BOUND, TURNS, field_volume, transfer, turned, view
 from oracle import explain, total
 
 from pyvista_vdi.device import get_runtime, list_devices
-from pyvista_vdi.generation import march, records, slices
+from pyvista_vdi.generation import slices
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting import occupancy, raycast
 from pyvista_vdi.volume import render as raycast_volume
 
 pytestmark = pytest.mark.extremes
 
 SIZE = (45, 37)
+
+#: Modules that launch kernels by groups of :data:`pyvista_vdi.device.work_order.GROUP`.
+LAUNCHING = (
+    "device.work_order",
+    "generation.march",
+    "generation.records",
+    "raycasting.occupancy",
+    "raycasting.prepared",
+    "raycasting.strategies",
+    "volume.classified_volume",
+    "volume.render",
+    "volume.upload",
+)
 
 
 def volume():
@@ -43,7 +56,8 @@ def digest(runtime):
     vdi = generate_vdi(scene, camera, SIZE, function, max_supersegments=5, device=runtime)
     for name in ("offsets", "front", "back", "color", "optical_depth"):
         state.update(getattr(vdi, name).tobytes())
-    state.update(raycast_volume.raycast_volume(scene, camera, SIZE, function, device=runtime))
+    frame = FrameRequest(camera, SIZE, device=runtime)
+    state.update(raycast_volume.raycast_volume(scene, function, frame))
     # Without what was prepared before: made anew each time
     vdi = VDI(
         camera, SIZE, vdi.offsets, vdi.front, vdi.back, vdi.color, vdi.optical_depth, vdi.bounds,
@@ -62,9 +76,7 @@ def test_across_runs(runtime):
 @pytest.mark.parametrize("group", [16, 128])
 def test_across_work_group_sizes(runtime, monkeypatch, group):
     expected = digest(runtime)
-    for module in (march, records, raycast, raycast_volume, occupancy):
-        monkeypatch.setattr(module, "GROUP", group)
-    for module in ("device.work_order", "volume.classified_volume", "volume.upload"):
+    for module in LAUNCHING:
         monkeypatch.setattr(f"pyvista_vdi.{module}.GROUP", group)
     assert digest(runtime) == expected
 
