@@ -7,6 +7,8 @@ Map of the files
 ----------------
 Shared functions:
 
+``lib/lanes.cl``, ``lib/transpose.cl``
+    One text for one ray and for sixteen in vectors (``-D LANES``).
 ``lib/rays.cl``
     Affine forms along the ray of a pixel, clipping to planes, pixels in blocks of 4 x 4.
 ``lib/double_float.cl``
@@ -43,8 +45,8 @@ Shared functions:
     Tiles and slabs of the occupancy grid.
 ``raycasting/packet.cl``, ``raycasting/packet_light.cl``, ``raycasting/slabs_ahead.cl``
     Sixteen rays in vectors: where they are, what they see, and which slabs are ahead of them.
-``lib/transpose.cl``, ``raycasting/packet_cropping.cl``
-    Vectors of theirs transposed, and the parts of them that cropping keeps.
+``raycasting/packet_cropping.cl``
+    The parts of them that cropping keeps.
 ``raycasting/segments.cl``, ``raycasting/segment_rows.cl``
     What rays cross of several VDIs, as segments in a pool; sixteen of them at a time.
 
@@ -52,13 +54,11 @@ Entry points:
 
 ``lib/probe.cl``
     ``probe``: the kernel that a device must run correctly before it is used.
-``generation/generate.cl``, with ``generation/runs.cl``
-    ``march_lists``, ``shorten_lists``, ``pack_lists``: volume to lists of supersegments; with
-    ``generation/criteria.cl`` also ``cut_lists``, where another criterion than least error is
-    asked for.
-``generation/march_blocks.cl``, ``generation/shorten_blocks.cl``, with ``generation/run_blocks.cl``
-    ``march_blocks``, ``shorten_blocks``: ``march_lists`` and ``shorten_lists`` on a CPU, in vectors
-    that are written out.
+``generation/march_lists.cl``, ``generation/shorten_lists.cl``, ``generation/pack_lists.cl``
+    ``march_lists``, ``shorten_lists``, ``pack_lists``: volume to lists of supersegments, by the
+    runs of ``generation/runs.cl``.
+``generation/criteria.cl``
+    ``cut_lists``, where another criterion than least error is asked for.
 ``generation/offsets.cl``
     ``sum_lengths``, ``list_offsets``: where each list begins in a VDI's arrays.
 ``volume/bricks.cl``

@@ -7,7 +7,8 @@
 //                                   the least that keeps the budget (Frey et al. 2013)
 //
 // Without it nothing is compiled. All work on the recorded runs: the volume is not marched again, and no run is dropped.
-#include "generation/runs.cl"
+#include "lib/opacity.cl"
+#include "generation/shorten_lists.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 #ifdef CRITERION
@@ -29,16 +30,16 @@ inline int merge_alike(__global float *record, int count, float threshold, float
 {
     const float most = threshold * threshold;
     int kept = 0;
-    float8 run = load_run(record, 0);
+    Run run = load_run(record, 0);
     float4 feature = run_feature(run, per_reference);
     for (int k = 1; k < count; ++k) {
-        const float8 next = load_run(record, k);
+        const Run next = load_run(record, k);
         const float4 next_feature = run_feature(next, per_reference);
         bool alike = true;
         float4 mean = feature;
         if (next.FRONT > run.BACK) {
             alike = !(dot(feature, feature) > most);
-            float8 widened = run;
+            Run widened = run;
             widened.BACK = next.FRONT;
             mean = run_feature(widened, per_reference);
         }
@@ -87,7 +88,7 @@ inline int cut_to_limit(__global float *record, int count, int limit, float per_
 
 // What is shared out equally, between the first face and a run's front (x) and back (y). `before`: the same at the back of
 // the run before; `first`: where the record begins.
-inline float2 measured(float8 run, float before, float first)
+inline float2 measured(Run run, float before, float first)
 {
 #if CRITERION == EQUAL_LENGTH
     return (float2)(run.FRONT, run.BACK) - first;
@@ -99,7 +100,7 @@ inline float2 measured(float8 run, float before, float first)
 }
 
 // Where in a run, 0 to 1, so much of the measure has been passed since its front.
-inline float place_in_run(float8 run, float amount)
+inline float place_in_run(Run run, float amount)
 {
 #if CRITERION == EQUAL_LENGTH
     return amount / (run.BACK - run.FRONT);
@@ -111,9 +112,9 @@ inline float place_in_run(float8 run, float amount)
 }
 
 // The part of a homogeneous medium from `front` to `back`, of optical depth `tau`, behind transmittance `transmittance`.
-inline float8 part_of_run(float8 run, float front, float back, float tau, float transmittance)
+inline Run part_of_run(Run run, float front, float back, float tau, float transmittance)
 {
-    float8 part;
+    Run part;
     part.FRONT = front;
     part.BACK = back;
     part.TAU = tau;
@@ -135,9 +136,9 @@ inline int cut_to_limit(__global float *record, int count, int limit, float per_
     at = (float2)(0.0f);
     int made = 0, cut = 1; // the cut that comes next, of limit - 1
     bool begun = false;
-    float8 run = (float8)(0.0f);
+    Run run = (Run)(0.0f);
     for (int k = 0; k < count; ++k) {
-        float8 rest = load_run(record, k);
+        Run rest = load_run(record, k);
         at = measured(rest, at.y, first);
         for (bool left = true; left;) {
             bool ends = false;
@@ -149,14 +150,14 @@ inline int cut_to_limit(__global float *record, int count, int limit, float per_
                 store_run(record, count + made++, run);
                 begun = false;
             }
-            float8 part = rest;
+            Run part = rest;
             left = false;
             if (cut < limit && (float)cut * share < at.y) {
                 // What is too thin to be cut is not
                 const float place = place_in_run(rest, (float)cut * share - at.x);
                 const float depth = rest.FRONT + place * (rest.BACK - rest.FRONT);
-                const float8 near = part_of_run(rest, rest.FRONT, depth, rest.TAU * place, rest.TRANSMITTANCE);
-                const float8 far = part_of_run(rest, depth, rest.BACK, rest.TAU - near.TAU,
+                const Run near = part_of_run(rest, rest.FRONT, depth, rest.TAU * place, rest.TRANSMITTANCE);
+                const Run far = part_of_run(rest, depth, rest.BACK, rest.TAU - near.TAU,
                                                rest.TRANSMITTANCE - rest.TRANSMITTANCE * near.OPACITY);
                 if (near.FRONT < near.BACK && far.FRONT < far.BACK && near.OPACITY > 0.0f && far.OPACITY > 0.0f) {
                     part = near;
@@ -176,4 +177,31 @@ inline int cut_to_limit(__global float *record, int count, int limit, float per_
 }
 
 #endif
+
+// Bring records to at most `limit` runs by another criterion than least error, and merge neighbours as while marching: what
+// is homogeneous needs no cut. Records have room for `limit` more runs.
+__kernel void cut_lists(
+    int limit,
+    int width, int height,
+    int first_row, int rows,
+    __global const float *forms,
+    int capacity,
+    float reference_length,
+    float hidden_weight,
+    float threshold,               // merge errors up to this are accepted
+    __global float *records,
+    __global uint *counts)
+{
+    const uint item = (uint)get_global_id(0);
+    const Rays rays = rays_of_block(item, width, height, first_row, rows);
+    const Int list = rays.y * width + rays.x;
+    const int count = load_counts(counts, list, rays.present);
+    if (count == 0)
+        return;
+    const float per_reference = march_speed(forms, rays.a, rays.b) / reference_length;
+    __global float *record = records + record_start(item, capacity);
+    const Places start = {0};
+    const int cut = cut_to_limit(record, count, limit, per_reference);
+    counts[list] = (uint)merge_within(record, &start, cut, threshold, 1, per_reference, hidden_weight);
+}
 #endif

@@ -22,19 +22,19 @@ inline float4 classify(float scalar, __global const float4 *table, int entries, 
 }
 
 // Optical depth of one opacity unit distance of opacity a: -log1p(-a), INFINITY where it is opaque.
-inline float unit_optical_depth(float opacity)
+inline Real unit_optical_depth(Real opacity)
 {
-    return opacity < 1.0f ? -log1p(-opacity) : INFINITY;
+    return SELECT((Real)(INFINITY), -log1p(-opacity), opacity < 1.0f);
 }
 
 // Optical depth of a step of `units` opacity unit distances, of which one has the optical depth `of_unit`.
-inline float scaled_to_step(float of_unit, float units)
+inline Real scaled_to_step(Real of_unit, Real units)
 {
-    return of_unit < INFINITY ? of_unit * units : fmax(OPAQUE_OPTICAL_DEPTH, units);
+    return SELECT(fmax(units, OPAQUE_OPTICAL_DEPTH), of_unit * units, of_unit < INFINITY);
 }
 
 // Optical depth of a step of `units` opacity unit distances through opacity a.
-inline float step_optical_depth(float opacity, float units)
+inline Real step_optical_depth(Real opacity, Real units)
 {
     return scaled_to_step(unit_optical_depth(opacity), units);
 }

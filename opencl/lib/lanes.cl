@@ -95,8 +95,13 @@ typedef Int Ints;
 #define NUMBERS LANE_NUMBERS
 #endif
 
-// A number of each lane that is read one by one, as volatile: from memory, as to take each out of a register costs two operations
-// more.
+// A number of each lane that is read one by one: of a vector as a Place, from memory, as to take each out of a register costs
+// two operations more.
+#if LANES == 1
+typedef const int Place;
+#else
+typedef const volatile int Place;
+#endif
 typedef union {
     Int all;
     int each[LANES];

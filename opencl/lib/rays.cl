@@ -11,6 +11,7 @@
 // -D FAR_ENTRIES   rays may enter the data so far from there that it is not enough for the positions of samples: six more
 //                  floats of each form are what float32 has rounded off the first six (docs/numerics.md)
 #include "lib/double_float.cl"
+#include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 #ifdef FAR_ENTRIES
@@ -34,25 +35,29 @@ inline float form_slope(__global const float *form, float a, float b)
     return FORM_SLOPE(float, form, a, b);
 }
 
-// Model-frame direction of a ray that is marched, per unit of t. `forms`: 3 index positions, then 3 model directions.
-inline float3 model_direction(__global const float *forms, float a, float b)
+// Model units per unit of t along a ray that is marched. `forms`: 3 index positions, then 3 model directions. By length() of
+// each lane, which drivers compute in ways of their own.
+inline Real march_speed(__global const float *forms, Real a, Real b)
 {
-    return (float3)(form_slope(forms + 3 * FORM_SIZE, a, b), form_slope(forms + 4 * FORM_SIZE, a, b),
-                    form_slope(forms + 5 * FORM_SIZE, a, b));
+    const Real x = FORM_SLOPE(Real, forms + 3 * FORM_SIZE, a, b);
+    const Real y = FORM_SLOPE(Real, forms + 4 * FORM_SIZE, a, b);
+    const Real z = FORM_SLOPE(Real, forms + 5 * FORM_SIZE, a, b);
+    const float *of_x = (const float *)&x, *of_y = (const float *)&y, *of_z = (const float *)&z;
+#define LENGTH(n) length((float3)(of_x[n], of_y[n], of_z[n]))
+    return OF_LANES(Real, LENGTH);
+#undef LENGTH
 }
 
 // Clip [*t0, *t1] to where each of `count` forms is >= 0. Returns whether anything is left.
-inline bool clip_to_planes(__global const float *planes, int count, float a, float b, float *t0, float *t1)
+inline Int clip_to_planes(__global const float *planes, int count, Real a, Real b, Real *t0, Real *t1)
 {
     for (int k = 0; k < count; ++k) {
-        const float value = form_value(planes + k * FORM_SIZE, a, b);
-        const float slope = form_slope(planes + k * FORM_SIZE, a, b);
-        if (slope > 0.0f)
-            *t0 = fmax(*t0, -value / slope);
-        else if (slope < 0.0f)
-            *t1 = fmin(*t1, -value / slope);
-        else if (value < 0.0f)  // parallel to the plane and outside it
-            *t1 = -INFINITY;
+        const Real value = FORM_VALUE(Real, planes + k * FORM_SIZE, a, b);
+        const Real slope = FORM_SLOPE(Real, planes + k * FORM_SIZE, a, b);
+        const Real t = -value / slope;
+        *t0 = SELECT(*t0, fmax(*t0, t), slope > 0.0f);
+        *t1 = SELECT(*t1, fmin(*t1, t), slope < 0.0f);
+        *t1 = SELECT(*t1, (Real)(-INFINITY), slope == 0.0f && value < 0.0f); // parallel to the plane and outside it
     }
     return *t0 < *t1;
 }
@@ -108,7 +113,26 @@ inline int2 block_pixel(uint item, int width)
     return (int2)((int)((block % columns) << 2 | (item & 3)), (int)((block / columns) << 2 | (item >> 2 & 3)));
 }
 
-// The same for part of a window, in strips STRIP blocks high, each from left to right, so that one work-item's lists are still
+// The rays of a work-item through some rows of a window, from `first` on: one, or those of a block.
+typedef struct {
+    Int x, y;    // pixels, of the rows
+    Int present; // those in the window
+    Real a, b;   // pixel offsets
+} Rays;
+
+inline Rays rays_of_block(uint first, int width, int height, int first_row, int rows)
+{
+    const int2 corner = block_pixel(first, width);
+    Rays rays;
+    rays.x = corner.x + (LANE_NUMBERS & 3);
+    rays.y = corner.y + (LANE_NUMBERS >> 2);
+    rays.present = (rays.x < width) & (rays.y < rows);
+    rays.a = TO_REAL(rays.x) + 0.5f - 0.5f * (float)width;
+    rays.b = TO_REAL(first_row + rays.y) + 0.5f - 0.5f * (float)height;
+    return rays;
+}
+
+// Pixel of a work-item for part of a window, in strips STRIP blocks high, each from left to right, so that one work-item's lists are still
 // cached when those above and below come to them: whole columns of strips, a work-group each. `part` is its first column and
 // strip, in columns and strips of the window, how many columns it has in each strip, and how many strips.
 inline int2 part_pixel(int group, int item, int4 part)

@@ -5,8 +5,6 @@
 #include "raycasting/packet.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-DEFINE_OPACITY_OF(opacities_of, 16)
-
 typedef struct {
     Reals red, green, blue;
     Reals transmittance;

@@ -29,7 +29,7 @@ inline bool any_visible(__global const uchar *visible, int4 blocks, float3 low, 
 __kernel void step_opacities(
     __global const VOXEL_T *voxels,
     int4 size,                     // points along x, y, z
-    __global const float4 *table,  // see generation/generate.cl
+    __global const float4 *table,  // see generation/march_lists.cl
     int entries,
     float low, float per_scalar,
     __global const uchar *visible,

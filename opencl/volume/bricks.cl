@@ -12,7 +12,7 @@
 // its last cell, and for gradients a margin of one before and three behind (a position that 1 is added to may round up to
 // the cell after the next).
 //
-// Work-items are pixels in rows first_row .. first_row + rows - 1, in blocks of 4 x 4, as in generation/generate.cl.
+// Work-items are pixels in rows first_row .. first_row + rows - 1, in blocks of 4 x 4, as in generation/march_lists.cl.
 #include "volume/march.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -74,7 +74,7 @@ inline Stretch next_stretch(const Walk *walk, const Medium *medium, __global con
 
 // Which bricks the steps of a chunk lie in, but for those that are transparent: their samples are set to nothing here.
 __kernel void want_bricks(
-    __global const VOXEL_T *voxels, // see generation/generate.cl
+    __global const VOXEL_T *voxels, // see generation/march_lists.cl
     int4 size,
     __global const float4 *table,
     int entries,

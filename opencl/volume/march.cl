@@ -6,7 +6,9 @@
 // -D BY_SCALAR     with NEAREST and voxels of integers: the table holds the medium of each scalar from `low` on, of which no
 //                  voxel is outside (volume/scalar_media.cl); otherwise it is classified at each sample
 // -D FAR_ENTRIES   see lib/rays.cl: t counts from where the ray enters
+// -D LANES         see lib/lanes.cl; 16 with BY_SCALAR and INDEX_T of uint, and without FAR_ENTRIES, SAMPLED and what is below
 #include "lib/rays.cl"
+#include "lib/transpose.cl"
 #include "lib/classification.cl"
 #include "volume/sampling.cl"
 #include "volume/shading.cl"
@@ -19,127 +21,153 @@ typedef struct {
     __global const float4 *table; // transfer function, or the media of scalars
     int entries;
     float low, per_scalar;        // scalar to table position
-    __global const uchar *reaches; // of the blocks, see volume/volume_blocks.cl
+    __global const uchar *distances; // of the blocks from visible ones, see volume/volume_blocks.cl
     int4 blocks;                  // along x, y, z
     SHADING_FIELDS
 } Medium;
 
 typedef struct {
-    float3 start, slope; // position in index space at t = 0 and per unit of t
-    float3 inverse;      // 1 / slope
-    float t0, t1;        // where the ray is inside everything it is clipped to
-    float step;          // t of one full step
-    float per_step;      // 1 / step
-    float units;         // opacity unit distances per unit of t
-    int steps;
+    Real3 start, slope; // position in index space at t = 0 and per unit of t
+    Real3 inverse;      // 1 / slope
+    Real t0, t1;        // where the ray is inside everything it is clipped to
+    Real step;          // t of one full step
+    Real per_step;      // 1 / step
+    Real units;         // opacity unit distances per unit of t
+    Int steps;          // 0 where a ray misses
 #ifdef FAR_ENTRIES
-    float2 entry;        // t of the rays' forms where t is 0 here
+    float2 entry;       // t of the rays' forms where t is 0 here
 #endif
 } March;
 
 // Value of a form where t of the march is 0.
-inline float march_value(const March *march, __global const float *form, float a, float b)
+inline Real march_value(const March *march, __global const float *form, Real a, Real b)
 {
 #ifdef FAR_ENTRIES
     return form_at(form, a, b, march->entry).x;
 #else
-    return form_value(form, a, b);
+    return FORM_VALUE(Real, form, a, b);
 #endif
 }
 
 // Set up the march of pixel offsets (a, b). `forms`: 3 index positions, 3 model directions, then `planes` to clip to.
-// `sample_distance` and `unit_distance` in model units. Returns false where the ray misses.
-inline bool begin_march(March *march, __global const float *forms, int planes, float a, float b,
-                        float sample_distance, float unit_distance, float t_end)
+// `sample_distance` and `unit_distance` in model units. Returns whether it meets anything.
+inline Int begin_march(March *march, __global const float *forms, int planes, Real a, Real b, float sample_distance,
+                       float unit_distance, Real t_end)
 {
 #ifdef FAR_ENTRIES
     march->t0 = 0.0f;
-    if (!clip_from_entry(forms + 6 * FORM_SIZE, planes, a, b, t_end, &march->entry, &march->t1))
-        return false;
+    const Int meets = clip_from_entry(forms + 6 * FORM_SIZE, planes, a, b, t_end, &march->entry, &march->t1);
 #else
     march->t0 = -INFINITY;
     march->t1 = t_end;
-    if (!clip_to_planes(forms + 6 * FORM_SIZE, planes, a, b, &march->t0, &march->t1))
-        return false;
+    const Int meets = clip_to_planes(forms + 6 * FORM_SIZE, planes, a, b, &march->t0, &march->t1);
 #endif
-    march->start = (float3)(march_value(march, forms, a, b), march_value(march, forms + FORM_SIZE, a, b),
-                            march_value(march, forms + 2 * FORM_SIZE, a, b));
-    march->slope = (float3)(form_slope(forms, a, b), form_slope(forms + FORM_SIZE, a, b),
-                            form_slope(forms + 2 * FORM_SIZE, a, b));
-    const float speed = length(model_direction(forms, a, b)); // model units per unit of t
-    march->inverse = 1.0f / march->slope;
+    if (!ANY(meets))
+        return meets;
+    march->start = REAL3(march_value(march, forms, a, b), march_value(march, forms + FORM_SIZE, a, b),
+                         march_value(march, forms + 2 * FORM_SIZE, a, b));
+    march->slope = REAL3(FORM_SLOPE(Real, forms, a, b), FORM_SLOPE(Real, forms + FORM_SIZE, a, b),
+                         FORM_SLOPE(Real, forms + 2 * FORM_SIZE, a, b));
+    march->inverse = REAL3(1.0f / march->slope.x, 1.0f / march->slope.y, 1.0f / march->slope.z);
+    const Real speed = march_speed(forms, a, b);
     march->step = sample_distance / speed;
     march->per_step = 1.0f / march->step;
     march->units = speed / unit_distance;
-    march->steps = (int)ceil((march->t1 - march->t0) / march->step);
-    return true;
+    march->steps = SELECT((Int)(0), TO_INT(ceil((march->t1 - march->t0) / march->step)), meets);
+    return meets;
 }
 
-inline float step_face(const March *march, int k)
+inline Real step_face(const March *march, Int k)
 {
-    return fmin(fma((float)k, march->step, march->t0), march->t1);
+    return fmin(fma(TO_REAL(k), march->step, march->t0), march->t1);
 }
 
 // Where a ray leaves a slab between two index positions of one axis, in t: past the face ahead, or never.
-inline float leaves_slab(float lower, float upper, float start, float slope, float inverse)
+inline Real leaves_slab(Real lower, Real upper, Real start, Real slope, Real inverse)
 {
-    return slope != 0.0f ? ((slope > 0.0f ? upper : lower) - start) * inverse : INFINITY;
+    return SELECT((Real)(INFINITY), (SELECT(lower, upper, slope > 0.0f) - start) * inverse, slope != 0.0f);
 }
 
 // The first step from which on midpoints may lie outside a box that the ray is in. Here and below axes are scalars: compilers
 // that put work-items into the lanes of a vector take a float3 apart and put it together again around each conversion.
-inline int first_step_outside(const March *march, float lower_x, float lower_y, float lower_z, float upper_x, float upper_y,
-                              float upper_z)
+inline Int first_step_outside(const March *march, Real lower_x, Real lower_y, Real lower_z, Real upper_x, Real upper_y,
+                              Real upper_z)
 {
-    const float leaves =
-        fmin(leaves_slab(lower_x, upper_x, march->start.x, march->slope.x, march->inverse.x),
-             fmin(leaves_slab(lower_y, upper_y, march->start.y, march->slope.y, march->inverse.y),
-                  leaves_slab(lower_z, upper_z, march->start.z, march->slope.z, march->inverse.z)));
+    const Real leaves = fmin(leaves_slab(lower_x, upper_x, march->start.x, march->slope.x, march->inverse.x),
+                             fmin(leaves_slab(lower_y, upper_y, march->start.y, march->slope.y, march->inverse.y),
+                                  leaves_slab(lower_z, upper_z, march->start.z, march->slope.z, march->inverse.z)));
     // Steps with their midpoint before that, less a hundredth of a step for the rounding of positions
-    return (int)fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f) + 1;
+    return TO_INT(fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f)) + 1;
 }
 
 // Block of an index position on one axis.
-inline int block_of(float position, int blocks)
+inline Int block_of(Real position, int blocks)
 {
-    return clamp((int)position >> BLOCK_SHIFT, 0, blocks - 1);
+    return clamp(TO_INT(position) >> BLOCK_SHIFT, 0, blocks - 1);
 }
 
-// Steps from step k on whose midpoints lie in transparent blocks around the first one's, in whole groups of `group` steps, so
-// that the others are grouped as if none had been passed by; 0 where there is something to look at. Skipping decides what is
-// looked at and changes no sample. -D SKIP_EMPTY, or every step is looked at.
-inline int empty_steps(const March *march, const Medium *medium, int k, int end, int group)
+// Steps from step k on, which lies between two faces, whose midpoints lie in transparent blocks around the first one's, in
+// whole groups of `group` steps, so that the others are grouped as if none had been passed by; 0 where there is something to
+// look at, or a ray is not chosen. Skipping decides what is looked at and changes no sample. -D SKIP_EMPTY, or every step is
+// looked at.
+inline Int empty_steps(const March *march, const Medium *medium, Int chosen, Int k, Int end, Int group, Real front, Real back)
 {
 #ifdef SKIP_EMPTY
-    const float t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
-    const int i = block_of(fma(t, march->slope.x, march->start.x), medium->blocks.x);
-    const int j = block_of(fma(t, march->slope.y, march->start.y), medium->blocks.y);
-    const int l = block_of(fma(t, march->slope.z, march->start.z), medium->blocks.z);
-    const int reach = medium->reaches[((size_t)l * medium->blocks.y + j) * medium->blocks.x + i];
-    if (reach == 0)
+#if LANES == 1
+    if (!chosen)
         return 0;
-    const int before = reach - 1;
-    const int outside = first_step_outside(
-        march, (float)((i - before) << BLOCK_SHIFT), (float)((j - before) << BLOCK_SHIFT),
-        (float)((l - before) << BLOCK_SHIFT), (float)((i + reach) << BLOCK_SHIFT), (float)((j + reach) << BLOCK_SHIFT),
-        (float)((l + reach) << BLOCK_SHIFT));
-    const int steps = max(min(outside, end) - k, 0);
+#endif
+    const Real t = 0.5f * (front + back);
+    const Int i = block_of(fma(t, march->slope.x, march->start.x), medium->blocks.x);
+    const Int j = block_of(fma(t, march->slope.y, march->start.y), medium->blocks.y);
+    const Int l = block_of(fma(t, march->slope.z, march->start.z), medium->blocks.z);
+    const Places places = {(l * medium->blocks.y + j) * medium->blocks.x + i};
+    Place *at = places.each;
+#define BLOCK_DISTANCE(n) medium->distances[at[n]]
+    const Int distance = OF_LANES(Int, BLOCK_DISTANCE);
+#undef BLOCK_DISTANCE
+    const Int empty = chosen & (distance != 0);
+    if (!ANY(empty))
+        return (Int)(0);
+    const Int before = distance - 1;
+    const Int outside = first_step_outside(
+        march, TO_REAL((i - before) << BLOCK_SHIFT), TO_REAL((j - before) << BLOCK_SHIFT),
+        TO_REAL((l - before) << BLOCK_SHIFT), TO_REAL((i + distance) << BLOCK_SHIFT),
+        TO_REAL((j + distance) << BLOCK_SHIFT), TO_REAL((l + distance) << BLOCK_SHIFT));
+    const Int steps = max(min(outside, end) - k, 0);
     // A division of whole numbers would be done lane by lane; half a step off, rounding crosses none below 2^23
-    return group * (int)(((float)steps + 0.5f) / (float)group);
+    return SELECT((Int)(0), group * TO_INT((TO_REAL(steps) + 0.5f) / TO_REAL(group)), empty);
 #else
-    return 0;
+    return (Int)(0);
 #endif
 }
 
+#ifdef BY_SCALAR
+// Colour and optical depth of one opacity unit distance, of an entry of the table.
+inline Real4 entry_of(__global const float4 *table, Uint entry)
+{
+#if LANES == 1
+    // Two loads where a vector's lanes load from different places, and not four
+    __global const ulong *halves = (__global const ulong *)(table + entry);
+    return (float4)(as_float2(halves[0]), as_float2(halves[1]));
+#else
+    const Places places = {AS_INT(entry)};
+    Place *at = places.each;
+#define ENTRY(n) (*((__global const volatile float4 *)table + at[n]))
+#define ENTRIES(n) (Real)(ENTRY(n), ENTRY((n) + 4), ENTRY((n) + 8), ENTRY((n) + 12))
+    return transpose(REAL4(ENTRIES(0), ENTRIES(1), ENTRIES(2), ENTRIES(3)));
+#undef ENTRY
+#undef ENTRIES
+#endif
+}
+#endif
+
 // Colour (rgb) and optical depth (w) of a step of `units` opacity unit distances around index position (x, y, z).
-inline float4 medium_at(const Medium *medium, float x, float y, float z, float units)
+inline Real4 medium_at(const Medium *medium, Real x, Real y, Real z, Real units)
 {
 #ifdef BY_SCALAR
-    const int scalar = (int)nearest_component(medium->voxels, medium->size, x, y, z, SCALAR);
-    const uint entry = min((uint)(scalar - (int)medium->low), (uint)(medium->entries - 1));
-    // Two loads where a vector's lanes load from different places, and not four
-    __global const ulong *halves = (__global const ulong *)(medium->table + entry);
-    float4 sample = (float4)(as_float2(halves[0]), as_float2(halves[1]));
+    const Int scalar = TO_INT(nearest_component(medium->voxels, medium->size, x, y, z, SCALAR));
+    Real4 sample = entry_of(medium->table, min(AS_UINT(scalar - (int)medium->low), (uint)(medium->entries - 1)));
     sample.w = scaled_to_step(sample.w, units);
 #else
     const float scalar = sample_volume(medium->voxels, medium->size, x, y, z);
@@ -170,12 +198,12 @@ inline float4 medium_at(const Medium *medium, float x, float y, float z, float u
 }
 
 // Colour (rgb) and optical depth (w) of step k, between two faces.
-inline float4 step_medium(const March *march, const Medium *medium, int k, float front, float back)
+inline Real4 step_medium(const March *march, const Medium *medium, Int k, Real front, Real back)
 {
 #ifdef SAMPLED
     return medium->samples[(k - medium->first_sample) * SAMPLE_LANES];
 #else
-    const float t = 0.5f * (front + back);
+    const Real t = 0.5f * (front + back);
     return medium_at(medium, fma(t, march->slope.x, march->start.x), fma(t, march->slope.y, march->start.y),
                      fma(t, march->slope.z, march->start.z), (back - front) * march->units);
 #endif

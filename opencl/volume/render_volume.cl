@@ -107,13 +107,13 @@ __kernel void render_volume(
         const int end = march.steps - first_step > steps ? first_step + steps : march.steps;
         float front = step_face(&march, k);
         while (k < end && transmittance > transmittance_cutoff) {
-            const int empty = empty_steps(&march, &medium, k, end, 1);
+            const float back = step_face(&march, k + 1);
+            const int empty = empty_steps(&march, &medium, 1, k, end, 1, front, back);
             k += empty;
             if (empty > 0) {
                 front = step_face(&march, k);
                 continue;
             }
-            const float back = step_face(&march, k + 1);
             float4 step = step_medium(&march, &medium, k, front, back);
 #ifdef CROPPED
             step.w *= kept_share(&kept, front, back);

@@ -7,6 +7,7 @@
 // -D BRICK_POINTS  `voxels` is a brick of the grid with so many points along each edge, see volume/bricks.cl
 //
 // Positions are in index space: point (i, j, k) lies at (i, j, k); x is fastest in memory.
+#include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 #ifdef BRICK_POINTS
@@ -18,7 +19,7 @@
 #else
 #define POINTS_X(size) (size).x
 #define POINTS_Y(size) (size).y
-#define FIRST_POINT(size) 0
+#define FIRST_POINT(size) (INDEX_T)0
 #endif
 
 #ifdef RGBA
@@ -29,19 +30,42 @@
 #define SCALAR (COMPONENTS - 1) // which of them classification sees
 
 #ifdef NEAREST
-// A component of the point nearest to a position.
+// Address of the point nearest to a position.
+#if LANES == 1
+typedef INDEX_T Index;
+#define TO_INDEX(x) ((INDEX_T)(x))
+#else
+typedef Uint Index; // INDEX_T is uint
+#define TO_INDEX(x) AS_UINT(x)
+#endif
+inline Index nearest_point(int4 size, Real x, Real y, Real z)
+{
+    // What is below 0 is clamped, so that TO_INT rounds down
+    const Int i = clamp(TO_INT(x + 0.5f), 0, size.x - 1);
+    const Int j = clamp(TO_INT(y + 0.5f), 0, size.y - 1);
+    const Int k = clamp(TO_INT(z + 0.5f), 0, size.z - 1);
+    return (TO_INDEX(k) * (INDEX_T)POINTS_Y(size) + TO_INDEX(j)) * (INDEX_T)POINTS_X(size) + TO_INDEX(i) - FIRST_POINT(size);
+}
+
+// A component of that point; of a vector of points that have one component, of integers.
+#if LANES == 1
 inline VOXEL_T nearest_component(__global const VOXEL_T *voxels, int4 size, float x, float y, float z, int component)
 {
-    // What is below 0 is clamped, so that (int) rounds down
-    const int i = clamp((int)(x + 0.5f), 0, size.x - 1);
-    const int j = clamp((int)(y + 0.5f), 0, size.y - 1);
-    const int k = clamp((int)(z + 0.5f), 0, size.z - 1);
-    const INDEX_T voxel = ((INDEX_T)k * (INDEX_T)POINTS_Y(size) + (INDEX_T)j) * (INDEX_T)POINTS_X(size) + (INDEX_T)i -
-                          FIRST_POINT(size);
-    return voxels[voxel * COMPONENTS + component];
+    return voxels[nearest_point(size, x, y, z) * COMPONENTS + component];
+}
+#else
+inline Int nearest_component(__global const VOXEL_T *voxels, int4 size, Real x, Real y, Real z, int component)
+{
+    const Places places = {AS_INT(nearest_point(size, x, y, z))};
+    const volatile uint *at = (const volatile uint *)places.each;
+#define VOXEL(n) voxels[at[n]]
+    return OF_LANES(Int, VOXEL);
+#undef VOXEL
 }
 #endif
+#endif
 
+#if LANES == 1
 inline float sample_component(__global const VOXEL_T *voxels, int4 size, float x, float y, float z, int component)
 {
 #ifdef NEAREST
@@ -79,4 +103,5 @@ inline float3 sample_color(__global const VOXEL_T *voxels, int4 size, float x, f
                     sample_component(voxels, size, x, y, z, 2)) /
            255.0f;
 }
+#endif
 #endif

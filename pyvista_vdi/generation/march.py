@@ -16,7 +16,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.volume.bricks import StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 
-#: ``-D`` names that ``generation/march_blocks.cl`` knows; ``COMPENSATED=1`` changes no march.
+#: ``-D`` names of marches that follow rays in blocks; ``COMPENSATED=1`` changes no march.
 _IN_BLOCKS = {"VOXEL_T", "INDEX_T", "NEAREST", "BY_SCALAR", "SKIP_EMPTY", "BLOCK_SHIFT"}
 #: Steps of a ray before the first look at the length of its record: few, so that rays which cannot
 #: keep every detail learn it soon.
@@ -44,7 +44,7 @@ class March:
         # hair more, so that half a voxel divides a voxel twice whatever the rounding
         voxel = min(medium.volume.spacing) / medium.sample_distance * (1 + 1e-9)
         self._grain = np.int32(max(1, min(voxel, CHUNK_STEPS)))
-        self._step = _step_for(records)
+        self._step = _step_for(records, "march_lists")
         with ExitStack() as stack:
             self._sampler = None
             if medium.bricks is not None:
@@ -103,13 +103,13 @@ class March:
         """Return the steps of the longest ray of each slice: chunks behind them have nothing."""
         records = self._records
         runtime, (width, height) = records.runtime, records.size
-        kernel = runtime.kernel("generation/generate.cl", "longest_marches", records.of_medium)
+        step = _step_for(records, "longest_marches")
         with runtime.buffer((len(records.slices),), np.int32, "longest rays") as longest:
             runtime.fill(longest, np.int32(0))
             runtime.launch(
-                kernel,
-                block_items(width, height),
-                GROUP,
+                step.kernel,
+                block_items(width, height) // step.rays,
+                GROUP // step.rays,
                 *records.march,
                 *(np.int32(n) for n in (width, height, records.slices.rows)),
                 longest,
@@ -117,11 +117,11 @@ class March:
             return runtime.download(longest)
 
 
-def _step_for(records: Records) -> Step:
-    """Return the kernel that marches: one that follows blocks of rays, where there is one."""
-    kernel, defines = records.runtime.kernel, records.of_medium
+def _step_for(records: Records, name: str) -> Step:
+    """Return a kernel that marches, one that follows blocks of rays where they can be."""
+    defines, path = records.of_medium, "generation/march_lists.cl"
     known = {k: v for k, v in defines.items() if (k, v) != ("COMPENSATED", 1)}
     by_scalar = "BY_SCALAR" in known and known["INDEX_T"] == "uint"
     if records.runtime.is_cpu and by_scalar and known.keys() <= _IN_BLOCKS:
-        return Step.in_blocks(kernel("generation/march_blocks.cl", "march_blocks", known))
-    return Step(kernel("generation/generate.cl", "march_lists", defines))
+        return Step.of(records.runtime, path, name, known, in_blocks=True)
+    return Step.of(records.runtime, path, name, defines)

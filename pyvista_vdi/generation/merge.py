@@ -24,16 +24,15 @@ class Merge:
     def __init__(self, records: Records, options: GenerationOptions) -> None:
         self._records = records
         self._limit = options.max_supersegments
-        kernel, defines = records.runtime.kernel, records.of_medium
-        if records.runtime.is_cpu:
-            path, name = "generation/shorten_blocks.cl", "shorten_blocks"
-            self._shorten_step = Step.in_blocks(kernel(path, name, records.of_rays))
-        else:
-            self._shorten_step = Step(kernel("generation/generate.cl", "shorten_lists", defines))
+        runtime, defines = records.runtime, records.of_rays
+        path = "generation/shorten_lists.cl"
+        self._shorten_step = Step.of(
+            runtime, path, "shorten_lists", defines, in_blocks=runtime.is_cpu
+        )
         self._cut = None
         if options.criterion in _CUTS:
             defines = {**defines, "CRITERION": _CUTS[options.criterion]}
-            self._cut = Step(kernel("generation/generate.cl", "cut_lists", defines))
+            self._cut = Step.of(runtime, "generation/criteria.cl", "cut_lists", defines)
 
     def make_room(self, part: Slice, chunk: Chunk) -> None:
         """Merge what is least unlike in records without room for another chunk.

@@ -17,8 +17,8 @@ class Pack:
     def __init__(self, records: Records, lists: GrowingLists) -> None:
         self._records = records
         self._lists = lists
-        kernel = records.runtime.kernel("generation/generate.cl", "pack_lists", records.of_medium)
-        self._step = Step(kernel)
+        path = "generation/pack_lists.cl"
+        self._step = Step.of(records.runtime, path, "pack_lists", records.of_rays)
 
     def append(self, part: Slice) -> None:
         """Write the slice's lists behind those made before; what is launched next need not wait."""

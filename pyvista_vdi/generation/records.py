@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from pyvista_vdi.device import Kernel, Runtime
 from pyvista_vdi.device.constants import RUN_WORDS
+from pyvista_vdi.device.programs import Define
 from pyvista_vdi.device.ray_forms import check_list_space
 from pyvista_vdi.device.work_order import BLOCK_RAYS, GROUP, block_items
 from pyvista_vdi.generation.slices import Slice, Slices
@@ -29,9 +31,18 @@ class Step:
     rays: int = 1
 
     @classmethod
-    def in_blocks(cls, kernel: Kernel) -> Step:
-        """Return the step of a kernel whose work-items follow blocks of rays."""
-        return cls(kernel, BLOCK_RAYS)
+    def of(
+        cls,
+        runtime: Runtime,
+        path: str,
+        name: str,
+        defines: Mapping[str, Define],
+        *,
+        in_blocks: bool = False,
+    ) -> Step:
+        """Return the step of a kernel, whose work-items follow blocks of rays if ``in_blocks``."""
+        rays = BLOCK_RAYS if in_blocks else 1
+        return cls(runtime.kernel(path, name, {**defines, "LANES": rays}), rays)
 
 
 class Records:

@@ -158,7 +158,7 @@ def test_a_frame_and_background_work_go_on_after_a_loss(runtime, driver):
 @pytest.mark.parametrize(
     ("operation", "broken"),
     [
-        *((0, name) for name in ("volume/volume_blocks.cl", "generation/generate.cl")),
+        *((0, name) for name in ("volume/volume_blocks.cl", "generation/march_lists.cl")),
         *(
             (2, name)
             for name in (

@@ -9,7 +9,7 @@ __kernel void cut(int count, int limit, int capacity, float per_reference, __glo
     const int i = get_global_id(0);
     if (i >= count)
         return;
-    __global float *record = records + record_start((uint)i, capacity, RUN_WORDS);
+    __global float *record = records + record_start((uint)i, capacity);
     for (int k = 0; k < lengths[i]; ++k)
         store_run(record, k, runs[(size_t)i * capacity + k]);
     lengths[i] = cut_to_limit(record, lengths[i], limit, per_reference);

@@ -1,5 +1,5 @@
 // Entry points to opencl/generation/runs.cl, one work-item per case or record.
-#include "generation/runs.cl"
+#include "generation/shorten_lists.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 __kernel void merged(int count, __global const float8 *a, __global const float8 *b, __global float8 *results)
@@ -21,7 +21,7 @@ __kernel void merge_errors(int count, __global const float8 *a, __global const f
 {
     const int i = get_global_id(0);
     if (i < count)
-        results[i] = merge_error(a[i], run_feature(a[i], per_reference), b[i], run_feature(b[i], per_reference),
+        results[i] = merge_error(1, a[i], run_feature(a[i], per_reference), b[i], run_feature(b[i], per_reference),
                                  per_reference, hidden_weight);
 }
 
@@ -31,7 +31,7 @@ __kernel void stored(int count, __global const float8 *runs, int capacity, __glo
     const int i = get_global_id(0);
     if (i >= count)
         return;
-    __global float *record = records + record_start((uint)i, capacity, RUN_WORDS);
+    __global float *record = records + record_start((uint)i, capacity);
     for (int k = 0; k < capacity; ++k)
         store_run(record, k, runs[(size_t)i * capacity + k]);
     for (int k = 0; k < capacity; ++k)
@@ -50,18 +50,19 @@ __kernel void shortened(int count, int way, int limit, int capacity, float per_r
     const int i = get_global_id(0);
     if (i >= count)
         return;
-    __global float *record = records + record_start((uint)i, capacity, RUN_WORDS);
+    __global float *record = records + record_start((uint)i, capacity);
     __global float *errors = all_errors + errors_start((uint)i, capacity);
+    const Places start = {0};
     int n = lengths[i];
     for (int k = 0; k < n; ++k)
         store_run(record, k, runs[(size_t)i * capacity + k]);
     float threshold = thresholds[i];
     if (way == WITHIN)
-        n = merge_within(record, 0, n, threshold, per_reference, hidden_weight);
+        n = merge_within(record, &start, n, threshold, 1, per_reference, hidden_weight);
     else if (way == ROOM)
-        n = make_room(record, errors, n, limit, &threshold, per_reference, hidden_weight);
+        n = make_room(record, &start, errors, n, limit, &threshold, per_reference, hidden_weight);
     else
-        n = merge_to_limit(record, errors, n, limit, per_reference, hidden_weight);
+        n = merge_to_limit(record, &start, errors, n, limit, per_reference, hidden_weight);
     thresholds[i] = threshold;
     lengths[i] = n;
     for (int k = 0; k < n; ++k)

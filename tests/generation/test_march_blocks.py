@@ -1,7 +1,6 @@
 """A CPU device marches nearest samples of integers in blocks of rays: the VDI is the same.
 
-``generation/march_blocks.cl`` against ``march_lists`` of ``generation/generate.cl``, to the last
-bit.
+``generation/march_lists.cl`` of 16 lanes against one, to the last bit.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ import pytest
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import Runtime
+from pyvista_vdi.device.work_order import BLOCK_RAYS, GROUP
 from pyvista_vdi.generation import march, slices
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -53,16 +53,16 @@ VIEWS = {
 
 @pytest.fixture
 def ways(monkeypatch, runtime):
-    """Make a VDI with each kernel that marches; how often each was launched."""
+    """Make a VDI with each form of the march; how often each was launched, by its groups."""
     if not runtime.is_cpu:
         pytest.skip("only CPU devices march in blocks")
-    launches = {"march_blocks": 0, "march_lists": 0}
+    launches = {GROUP: 0, GROUP // BLOCK_RAYS: 0}
     launch = Runtime.launch
 
-    def counted(self, kernel, *arguments, **options):
-        if kernel.name in launches:
-            launches[kernel.name] += 1
-        launch(self, kernel, *arguments, **options)
+    def counted(self, kernel, size, group, *arguments, **options):
+        if kernel.name == "march_lists":
+            launches[group] += 1
+        launch(self, kernel, size, group, *arguments, **options)
 
     monkeypatch.setattr(Runtime, "launch", counted)
 
@@ -81,7 +81,7 @@ def check(ways, volume, camera, **options):
     both, launches = ways
     found, expected = both(volume, camera, **options)
     assert found.equals(expected)
-    assert launches["march_blocks"] == launches["march_lists"] > 0
+    assert launches[GROUP] == launches[GROUP // BLOCK_RAYS] > 0
     return found
 
 

@@ -1,4 +1,4 @@
-"""opencl/generation/shorten_blocks.cl does what shorten_lists of generation/generate.cl does."""
+"""opencl/generation/shorten_lists.cl does the same for a block of rays as for each of them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from recorded_runs import EXTREMES, as_runs, random_records
 
 from pyvista_vdi.device.work_order import GROUP, block_items
 
-MEDIUM = {"VOXEL_T": "uchar", "INDEX_T": "int", "NEAREST": None, "BLOCK_SHIFT": 3}
 LANES = 16
 WINDOW = (13, 23)  # blocks of rays reach beyond it
 FIRST_ROW, ROWS = 6, 14
@@ -20,7 +19,7 @@ def forms():
     return rng.normal(size=(6, 6)).astype(np.float32)
 
 
-def shortened(runtime, kernel, records, limit, exactly, *, hidden_weight=0.25, reference=0.7):
+def shortened(runtime, lanes, records, limit, exactly, *, hidden_weight=0.25, reference=0.7):
     """Counts, thresholds and records after one launch, by work-item; counts by list."""
     width, height = WINDOW
     items = block_items(width, ROWS)
@@ -41,8 +40,7 @@ def shortened(runtime, kernel, records, limit, exactly, *, hidden_weight=0.25, r
         counts[y[at], x[at]] = len(record)
     thresholds = np.full(items, 1e-6, np.float32)
     thresholds[::3] = 1e-2
-    path, name, lanes = kernel
-    function = runtime.kernel(path, name, MEDIUM if lanes == 1 else {})
+    function = runtime.kernel("generation/shorten_lists.cl", "shorten_lists", {"LANES": lanes})
     with (
         runtime.upload(forms()) as rays,
         runtime.buffer(thresholds.shape) as of_items,
@@ -65,15 +63,11 @@ def shortened(runtime, kernel, records, limit, exactly, *, hidden_weight=0.25, r
         return after, runtime.download(of_items)[inside], np.concatenate(kept)
 
 
-RAY_BY_RAY = ("generation/generate.cl", "shorten_lists", 1)
-IN_BLOCKS = ("generation/shorten_blocks.cl", "shorten_blocks", LANES)
-
-
 def check_the_same(runtime, records, limit, exactly, **options):
     if not runtime.is_cpu:
         pytest.skip("only CPU devices shorten records in blocks")
-    expected = shortened(runtime, RAY_BY_RAY, records, limit, exactly, **options)
-    found = shortened(runtime, IN_BLOCKS, records, limit, exactly, **options)
+    expected = shortened(runtime, 1, records, limit, exactly, **options)
+    found = shortened(runtime, LANES, records, limit, exactly, **options)
     for name, a, b in zip(("counts", "thresholds", "records"), expected, found, strict=True):
         np.testing.assert_array_equal(a.view(np.uint32), b.view(np.uint32), name)
     assert expected[0].max() <= limit

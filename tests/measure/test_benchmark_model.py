@@ -347,8 +347,8 @@ def test_the_work_of_a_frame_at_the_generating_view_is_one_list_a_ray(scene):
 
 def test_stages_are_known_by_their_kernels_names():
     kernels = {
-        "march": ("longest_marches", "march_lists", "march_blocks"),
-        "shorten": ("shorten_lists", "shorten_blocks"),
+        "march": ("longest_marches", "march_lists"),
+        "shorten": ("shorten_lists",),
         "pack": ("sum_lengths", "list_offsets", "pack_lists"),
     }
     for stage, names in kernels.items():

@@ -26,7 +26,7 @@ __kernel void marches(int count, __global const VOXEL_T *voxels, int4 size, __gl
         const int at = i * capacity + k;
         faces[at] = step_face(&march, k);
         media[at] = step_medium(&march, &medium, k, step_face(&march, k), step_face(&march, k + 1));
-        empty[at] = empty_steps(&march, &medium, k, march.steps, group);
+        empty[at] = empty_steps(&march, &medium, 1, k, march.steps, group, step_face(&march, k), step_face(&march, k + 1));
     }
     faces[i * capacity + min(march.steps, capacity - 1)] = step_face(&march, march.steps);
 }

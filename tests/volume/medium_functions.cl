@@ -2,6 +2,7 @@
 #include "lib/classification.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
+#if LANES == 1
 __kernel void classified(int count, __global const float *scalars, __global const float4 *table, int entries, float low,
                          float per_scalar, __global float4 *results)
 {
@@ -17,20 +18,12 @@ __kernel void step_optical_depths(int count, __global const float *opacities, __
     if (i < count)
         results[i] = step_optical_depth(opacities[i], units[i]);
 }
+#endif
 
+// LANES of them for each work-item
 __kernel void opacities(int count, __global const float *optical_depths, __global float *results)
 {
     const int i = get_global_id(0);
     if (i < count)
-        results[i] = opacity_of(optical_depths[i]);
-}
-
-DEFINE_OPACITY_OF(opacities_of, 16)
-
-// 16 of them for each work-item
-__kernel void opacities_in_vectors(int count, __global const float *optical_depths, __global float *results)
-{
-    const int i = get_global_id(0);
-    if (i < count)
-        vstore16(opacities_of(vload16(i, optical_depths)), i, results);
+        STORE_LANES(opacity_of(LOAD_LANES(i, optical_depths)), i, results);
 }

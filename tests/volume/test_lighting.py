@@ -238,7 +238,7 @@ def compiled(runtime, path, function, lights=None, **options):
     return preprocessed(sources.expand(path), medium.defines)
 
 
-@pytest.mark.parametrize("path", ["generation/generate.cl", "volume/render_volume.cl"])
+@pytest.mark.parametrize("path", ["generation/march_lists.cl", "volume/render_volume.cl"])
 def test_kernels_compile_only_what_is_used(default_runtime, path):
     code = {
         "plain": compiled(default_runtime, path, lambda v: looks(v, shaded=False)),

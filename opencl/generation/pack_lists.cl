@@ -1,0 +1,60 @@
+// Records to the VDI's arrays.
+//
+// -D FAR_ENTRIES: see lib/rays.cl
+#include "lib/rays.cl"
+#include "generation/runs.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+// Records of a slice of rays to the VDI's arrays.
+__kernel void pack_lists(
+    __global const float *records,
+    int capacity,
+    int width, int rows,            // of the slice
+    __global const ulong *offsets,  // where each list begins, and the last one ends
+    uint made,                      // lists before the slice's
+    ulong held,                     // supersegments before those that the arrays hold
+    __global float *fronts,         // view depth less the depth origin, world units
+    __global float *backs,
+    __global float *colors,         // straight RGB, 3 per supersegment
+    __global float *optical_depths
+#ifdef FAR_ENTRIES
+    , __global const float *forms,
+    int planes,
+    int height, int first_row
+#endif
+)
+{
+    const uint item = (uint)get_global_id(0);
+    const int2 pixel = block_pixel(item, width);
+    if (pixel.x >= width || pixel.y >= rows)
+        return;
+    __global const float *record = records + record_start(item, capacity);
+    const size_t list = made + (size_t)pixel.y * width + pixel.x;
+    const ulong begin = offsets[list] - held;
+    const int count = (int)(offsets[list + 1] - offsets[list]);
+#ifdef FAR_ENTRIES
+    const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
+    const float b = (float)(first_row + pixel.y) + 0.5f - 0.5f * (float)height;
+    float2 entry = (float2)(0.0f);
+    float length = 0.0f;
+    clip_from_entry(forms + 6 * FORM_SIZE, planes, a, b, INFINITY, &entry, &length);
+    const float2 exit = pair_sum(entry, (float2)(length, 0.0f));
+    // Faces as they are stored lie in the volume, or its bounds would cut off what rounding has put outside
+    float least = entry.y > 0.0f ? nextafter(entry.x, INFINITY) : entry.x;
+    const float most = exit.y < 0.0f ? nextafter(exit.x, -INFINITY) : exit.x;
+#endif
+    for (int k = 0; k < count; ++k) {
+        Run run = load_run(record, k);
+#ifdef FAR_ENTRIES
+        // Rounding must neither leave a supersegment without thickness nor let two overlap
+        run.FRONT = fmax(pair_sum(entry, (float2)(run.FRONT, 0.0f)).x, least);
+        run.BACK = fmin(pair_sum(entry, (float2)(run.BACK, 0.0f)).x, most);
+        run.BACK = fmax(run.BACK, nextafter(run.FRONT, INFINITY));
+        least = run.BACK;
+#endif
+        fronts[begin + k] = run.FRONT;
+        backs[begin + k] = run.BACK;
+        optical_depths[begin + k] = run.TAU;
+        vstore3(clamp(run.COLOR / run.OPACITY, 0.0f, 1.0f), begin + k, colors);
+    }
+}
