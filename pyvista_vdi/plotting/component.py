@@ -427,9 +427,9 @@ _DEFAULTS = {
 def _changed(given: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
     """Return the arguments that differ from their defaults."""
     return {
-        name: value
-        for name, value in given.items()
-        if name in defaults and not _is_default(value, defaults[name])
+        name: given[name]
+        for name, default in defaults.items()
+        if name in given and not _is_default(given[name], default)
     }
 
 
