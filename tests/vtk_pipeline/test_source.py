@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import inspect
 
 import numpy as np
 import pytest
@@ -26,11 +27,13 @@ from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLImageDataWriter
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import (
     Cancelled,
+    InvalidArgumentError,
     InvalidCameraError,
     InvalidVDIError,
     InvalidVolumeError,
     UnsupportedError,
 )
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
 
 pytestmark = pytest.mark.gl
@@ -578,3 +581,32 @@ def test_progress_begins_rises_and_ends():
     assert callbacks == sorted(callbacks)
     assert fractions[-1] == callbacks[-1] == 1.0
     assert len(set(fractions)) >= 2
+
+
+def test_options_are_set_one_by_one_or_all_at_once():
+    source = ready_source()
+    before = source.GetMTime()
+    source.SetOptions(GenerationOptions(tolerance=0.25, memory_limit="1 GiB"))
+    assert source.GetMTime() > before
+    assert (source.GetTolerance(), source.GetMemoryLimit()) == (0.25, 2**30)
+    source.SetViewCone(degrees=30)
+    assert source.GetOptions() == GenerationOptions(
+        tolerance=0.25, memory_limit=2**30, view_cone=30
+    )
+    before = source.GetMTime()
+    source.SetViewCone(30.0)
+    assert source.GetMTime() == before
+    for wrong in (lambda: source.SetViewCone(91), lambda: source.SetSampleDistance(0.0)):
+        with pytest.raises(InvalidArgumentError, match=r"got (91|0\.0)"):
+            wrong()
+
+
+def test_methods_from_a_table_say_what_they_do():
+    for method, name, arguments, doc in (
+        (pvdi.VDISource.SetViewCone, "SetViewCone", ["self", "degrees"], "Set the half angle"),
+        (pvdi.VDISource.GetCoverage, "GetCoverage", ["self"], "Return what the VDI's window"),
+        (pvdi.VDIMapper.SetRegenerateBelow, "SetRegenerateBelow", ["self", "ssim"], "Set the est"),
+    ):
+        assert method.__name__ == name
+        assert list(inspect.signature(method).parameters) == arguments
+        assert method.__doc__.startswith(doc)

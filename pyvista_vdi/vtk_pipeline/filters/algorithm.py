@@ -119,21 +119,19 @@ def pair(
     getter: tuple[Callable[[Any], Any], str],
 ) -> tuple[Any, Any]:
     """Return two functions, each given with its docstring, as methods of these names."""
+    kind = Parameter.POSITIONAL_OR_KEYWORD
+    signature = Signature([Parameter("self", kind), Parameter(argument, kind)])
 
-    def set_it(self: Any, value: Any) -> None:
-        setter[0](self, value)
+    def set_it(*args: Any, **named: Any) -> None:
+        setter[0](*signature.bind(*args, **named).args)
 
     def get_it(self: Any) -> Any:
         return getter[0](self)
 
-    for method, verb, arguments, doc in (
-        (set_it, "Set", ("self", argument), setter[1]),
-        (get_it, "Get", ("self",), getter[1]),
-    ):
+    for method, verb, doc in ((set_it, "Set", setter[1]), (get_it, "Get", getter[1])):
         method.__name__ = method.__qualname__ = verb + name
         method.__doc__ = doc
-        parameters = [Parameter(each, Parameter.POSITIONAL_OR_KEYWORD) for each in arguments]
-        method.__signature__ = Signature(parameters)  # type: ignore[union-attr]
+    set_it.__signature__ = signature  # type: ignore[attr-defined]
     return set_it, get_it
 
 
