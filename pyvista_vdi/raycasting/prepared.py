@@ -60,45 +60,15 @@ def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
 
 
 class PreparedVDI:
-    """A VDI on a device, in the form that the raycaster reads.
+    """A VDI on a device, in the form that the raycaster reads; the VDI itself is not kept."""
 
-    Parameters
-    ----------
-    runtime : Runtime
-        The device.
-    vdi : VDI
-        Not kept: the buffers are enough.
-
-    Attributes
-    ----------
-    window, bounds, depth_origin, camera
-        The VDI's.
-    nearest : float
-        Least view depth that is in front of V_O's eye, world units.
-    parallel : bool
-        Whether V_O is a parallel projection.
-    shifted : bool
-        Whether the depth coordinate is that of a long lens.
-    packed : int
-        Bytes of a packed supersegment; 0 where they are exact.
-    double_float : int
-        Not 0 where float32 has too few digits for rays: where the lists lie at the far end of the
-        bounds' depths 1, at the near one 2.
-    list_rows : numpy.ndarray
-        See :meth:`list_space`.
-    lit : float
-        How far light gets, see :func:`share_lit`.
-    media : int
-        About how many supersegments a ray may meet.
-    occupancy : OccupancyGrid
-        Where there is nothing to see.
-    headers : DeviceBuffer
-        Where each tile of lists begins, or each list of 8 bytes.
-    lists : tuple of DeviceBuffer
-        The supersegments.
-    long_offsets : bool
-        Whether the headers take 64 bits where they need not.
-    """
+    #: Where there is nothing to see.
+    occupancy: OccupancyGrid
+    #: Where lists begin, by their bundles or, of 8-byte supersegments, each; the supersegments.
+    headers: DeviceBuffer
+    lists: tuple[DeviceBuffer, ...]
+    #: Whether offsets take 64 bits.
+    long_offsets: bool
 
     def __init__(self, runtime: Runtime, vdi: VDI) -> None:
         self.runtime = runtime
@@ -109,15 +79,20 @@ class PreparedVDI:
         self.parallel = vdi.camera.parallel_projection
         near, far = depths = rays.depth_range(vdi.camera, vdi.bounds)
         rays.check_list_space(vdi.camera, vdi.bounds)
+        #: Least view depth that is in front of V_O's eye, world units.
         self.nearest = rays.nearest_depth(vdi.camera, vdi.bounds)
         self.lit = share_lit(vdi, near, far)
         # An origin much closer than the data costs the coordinate the digits that it is to save
         closest = min(near, self.depth_origin)
+        #: Whether the depth coordinate is that of a long lens.
         self.shifted = not self.parallel and 0 < far <= _LONG_LENS * closest
-        # A ray that steps from list to list meets about as many as it crosses borders
+        #: About how many supersegments a ray may meet: it crosses a border from list to list.
         self.media = sum(vdi.window_size) + int(vdi.counts.max(initial=0))
+        #: Whether float32 has too few digits for rays, whose forms are double-floats then: 1 where
+        #: the lists lie at the far end of the bounds' depths, 2 at the near one.
         self.double_float = self._double_float(vdi, depths)
         self.list_rows = self.list_space(vdi.camera)
+        #: Bytes of a packed supersegment; 0 where they are exact.
         self.packed = {Packed16: 16, Packed8: 8}.get(type(vdi.packing), 0)
         self._upload(vdi)
 
