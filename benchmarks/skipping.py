@@ -30,6 +30,7 @@ from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.occupancy import OccupancyGrid
 from pyvista_vdi.raycasting.prepared import PreparedVDI
+from pyvista_vdi.raycasting.raycast import draw
 
 #: Azimuths from V_O, degrees.
 ANGLES = (0.0, 5.0, 30.0, 60.0, 90.0, 180.0)
@@ -135,16 +136,16 @@ class Drawing:
         width, height = self._size
         with self._runtime.buffer((height, width, 4), name="image") as image:
 
-            def draw(skip: bool) -> None:
+            def frame(skip: bool) -> None:
                 options = RenderOptions(skip_empty=skip)
                 draw(self._prepared, FrameRequest(camera, self._size, options), image)
 
             def bits(skip: bool) -> NDArray[np.uint32]:
-                draw(skip)
+                frame(skip)
                 return self._runtime.download(image).view(np.uint32)
 
             identical = np.array_equal(bits(False), bits(True))  # builds the kernels, too
-            times = timed({"plain": lambda: draw(False), "skipping": lambda: draw(True)}, repeats)
+            times = timed({"plain": lambda: frame(False), "skipping": lambda: frame(True)}, repeats)
         return {
             "identical": identical,
             **times,
