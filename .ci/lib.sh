@@ -204,7 +204,7 @@ run_tests() {
 # What runs on a device, on the implementation that the README's test command has not used.
 run_tests_on_second_implementation() {
     export PYVISTA_VDI_TEST_DEVICES=${PYVISTA_VDI_SECOND_IMPLEMENTATION:-portable computing language}
-    run_tests -m "device and not slow and not paraview"
+    run_tests -m device
 }
 
 # Those that are slow, on every implementation.

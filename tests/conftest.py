@@ -136,10 +136,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what runs on each device to test, and what is fast."""
     seen = set()
     for item in items:
-        if "runtime" in getattr(item, "fixturenames", ()):
-            item.add_marker("device")
         if any(map(item.get_closest_marker, ("slow", "paraview"))):
             continue
+        if "runtime" in getattr(item, "fixturenames", ()):
+            item.add_marker("device")
         room, name = item.path.parent.name, item.path.stem.removeprefix("test_")
         another_case = item.function in seen and name in LENGTHY.get(room, "").split()
         seen.add(item.function)
