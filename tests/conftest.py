@@ -107,13 +107,13 @@ LENGTHY = {
     "io": "deep_exr packed_files vdi_files",
     "measure": "benchmark_model",
     "model": "packing",
-    "plotting": "add_vdi dial scenes shown volume_files",
-    "quality": "dial view_error",
+    "plotting": "add_vdi dial shown volume_files",
+    "quality": "view_error",
     "raycasting": "aligned_view cropping multi_vdi_oracle occupancy packets picking_oracle preview "
     "raycast_oracle skipping",
     "reference": "reference",
     "volume": "ambient_occlusion bricks lighting",
-    "vtk_pipeline": "interactive overlap picking pipeline source vtk_files",
+    "vtk_pipeline": "overlap picking pipeline source vtk_files",
 }
 
 #: And those of which it runs none.
@@ -123,8 +123,9 @@ LENGTHIEST = {
     "fuzz": "fuzz",
     "measure": "benchmark compare lighting_against_vtk real_volumes tradeoff",
     "packaging": "distributions documentation",
-    "plotting": "example_scripts on_screen",
-    "quality": "background",
+    "plotting": "example_scripts on_screen scenes",
+    "quality": "background dial",
+    "vtk_pipeline": "interactive long_load",
 }
 
 #: Names in a function that starts a process.
