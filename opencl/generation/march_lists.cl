@@ -33,14 +33,7 @@ inline void store_last_run(__global float *records, Int starts, Int count, Run r
 __attribute__((vec_type_hint(float16)))
 #endif
 __kernel void march_lists(
-    __global const VOXEL_T *voxels,
-    int4 size,                       // points along x, y, z
-    __global const float4 *table,    // transfer function, `entries` (R, G, B, opacity)
-    int entries,
-    float low, float per_scalar,     // scalar to table position
-    __global const uchar *distances, // of the blocks, see volume/volume_blocks.cl
-    int4 blocks,                     // along x, y, z
-    SHADING_PARAMETERS               // see volume/shading.cl
+    MEDIUM_PARAMETERS
     __global const float *forms,     // see begin_march
     int planes,
     float sample_distance,           // model units
@@ -64,7 +57,7 @@ __kernel void march_lists(
     March march;
     if (!ANY(begin_march(&march, forms, planes, rays.a, rays.b, sample_distance, unit_distance, INFINITY)))
         return;
-    const Medium medium = {voxels, size, table, entries, low, per_scalar, distances, blocks SHADING_ARGUMENTS};
+    const Medium medium = MEDIUM;
     const Int begun = rays.present & (march.steps > first_step);
     if (!ANY(begun))
         return;

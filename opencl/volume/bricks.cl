@@ -74,14 +74,7 @@ inline Stretch next_stretch(const Walk *walk, const Medium *medium, __global con
 
 // Which bricks the steps of a chunk lie in, but for those that are transparent: their samples are set to nothing here.
 __kernel void want_bricks(
-    __global const VOXEL_T *voxels, // see generation/march_lists.cl
-    int4 size,
-    __global const float4 *table,
-    int entries,
-    float low, float per_scalar,
-    __global const uchar *reaches,
-    int4 blocks,
-    SHADING_PARAMETERS
+    MEDIUM_PARAMETERS
     __global const float *forms,
     int planes,
     float sample_distance, float unit_distance,
@@ -100,7 +93,7 @@ __kernel void want_bricks(
     if (pixel.x >= width || pixel.y >= rows)
         return;
     pixel.y += first_row;
-    const Medium medium = {voxels, size, table, entries, low, per_scalar, reaches, blocks SHADING_ARGUMENTS};
+    const Medium medium = MEDIUM;
     Walk walk;
     if (!begin_walk(&walk, forms, planes, sample_distance, unit_distance, pixel, width, height, opaque_depth,
                     has_opaque_depth, first_step, steps))
@@ -119,14 +112,7 @@ __kernel void want_bricks(
 
 // Sample the steps of a chunk that lie in bricks which are on the device.
 __kernel void sample_steps(
-    __global const VOXEL_T *voxels, // slots of BRICK_POINTS cubed points, each with a brick or not
-    int4 size,
-    __global const float4 *table,
-    int entries,
-    float low, float per_scalar,
-    __global const uchar *reaches,
-    int4 blocks,
-    SHADING_PARAMETERS
+    MEDIUM_PARAMETERS              // `voxels`: slots of BRICK_POINTS cubed points, each with a brick or not
     __global const float *forms,
     int planes,
     float sample_distance, float unit_distance,
@@ -145,7 +131,7 @@ __kernel void sample_steps(
     if (pixel.x >= width || pixel.y >= rows)
         return;
     pixel.y += first_row;
-    Medium medium = {voxels, size, table, entries, low, per_scalar, reaches, blocks SHADING_ARGUMENTS};
+    Medium medium = MEDIUM;
     Walk walk;
     if (!begin_walk(&walk, forms, planes, sample_distance, unit_distance, pixel, width, height, opaque_depth,
                     has_opaque_depth, first_step, steps))

@@ -26,6 +26,12 @@ typedef struct {
     SHADING_FIELDS
 } Medium;
 
+// What each kernel that marches takes first, and the medium that it makes of it
+#define MEDIUM_PARAMETERS                                                                                                 \
+    __global const VOXEL_T *voxels, int4 size, __global const float4 *table, int entries, float low, float per_scalar,    \
+        __global const uchar *distances, int4 blocks, SHADING_PARAMETERS
+#define MEDIUM {voxels, size, table, entries, low, per_scalar, distances, blocks SHADING_ARGUMENTS}
+
 typedef struct {
     Real3 start, slope; // position in index space at t = 0 and per unit of t
     Real3 inverse;      // 1 / slope

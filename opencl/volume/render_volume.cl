@@ -52,14 +52,7 @@ inline float kept_share(const Kept *kept, float front, float back)
 #endif
 
 __kernel void render_volume(
-    __global const VOXEL_T *voxels,
-    int4 size,
-    __global const float4 *table,
-    int entries,
-    float low, float per_scalar,
-    __global const uchar *reaches, // of the blocks, see volume/volume_blocks.cl
-    int4 blocks,                   // along x, y, z
-    SHADING_PARAMETERS             // see volume/shading.cl
+    MEDIUM_PARAMETERS
     __global const float *forms,          // see begin_march
     int planes,
     float sample_distance,                // model units
@@ -99,7 +92,7 @@ __kernel void render_volume(
 #endif
     March march;
     if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, t_end)) {
-        const Medium medium = {voxels, size, table, entries, low, per_scalar, reaches, blocks SHADING_ARGUMENTS};
+        const Medium medium = MEDIUM;
 #ifdef CROPPED
         const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, a, b, regions);
 #endif

@@ -32,22 +32,22 @@ __kernel void block_ranges(__global const VOXEL_T *voxels, int4 size, int4 block
     ranges[item] = (float2)(least, largest);
 }
 
-// The reach of a block: how far it is to one that may be visible, in blocks along the axis on which that is most; 0 where it is
-// one itself, `most` where there is none nearer. One axis at a time: `along` blocks are on it, their numbers `apart`.
-__kernel void block_reaches(
-    __global const uchar *before, uint blocks, uint apart, int along, int most, __global uchar *reaches)
+// The distance field of blocks: how far each is from one that may be visible, in blocks along the axis on which that is most; 0
+// where it is one itself, `most` where there is none nearer. One axis at a time: `along` blocks are on it, their numbers `apart`.
+__kernel void block_distances(
+    __global const uchar *before, uint blocks, uint apart, int along, int most, __global uchar *distances)
 {
     const uint item = (uint)get_global_id(0);
     if (item >= blocks)
         return;
     const int place = (int)(item / apart % (uint)along);
-    int reach = before[item];
-    for (int d = 1; d < reach; ++d) {
+    int distance = before[item];
+    for (int d = 1; d < distance; ++d) {
         const int low = place >= d ? before[item - (uint)d * apart] : most;
         const int high = place + d < along ? before[item + (uint)d * apart] : most;
-        reach = min(reach, max(d, min(low, high)));
+        distance = min(distance, max(d, min(low, high)));
     }
-    reaches[item] = (uchar)reach;
+    distances[item] = (uchar)distance;
 }
 
 // Whether anything in a block may be visible. visible_before[e]: how many of the table's entries 0 to e - 1 are not

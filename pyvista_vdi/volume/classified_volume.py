@@ -158,12 +158,12 @@ class DeviceVolume:
         self._entries = len(table)
         self._per_scalar = _per_scalar(self._entries, span)
         self._table = runtime.upload(np.ascontiguousarray(table), "transfer function")
-        self._visible = self._reaches = self._visibility(runtime, ranges, transfer_function)
+        self._visible = self._distances = self._visibility(runtime, ranges, transfer_function)
         if skip_empty:
             seen = runtime.download(self._visible)
             if 1.0 - float(np.mean(seen)) >= _WORTH_SKIPPING:
                 self.defines["SKIP_EMPTY"] = 1
-                self._reaches = self._reaches_of(runtime, seen)
+                self._distances = self._distances_of(runtime, seen)
         if transfer_function.interpolation == "nearest":
             self.defines["NEAREST"] = 1
             if native and (ends := integer_ends(runtime, volume, ranges)):
@@ -235,7 +235,7 @@ class DeviceVolume:
         ``camera`` is the view: lights may move with it.
         """
         return (
-            *self._classified(self._reaches),
+            *self._classified(self._distances),
             *self._lighting(camera),
             *self._gradient,
             *self._occlusion,
@@ -356,16 +356,16 @@ class DeviceVolume:
             runtime.finish()  # the table above may be host memory in use
         return visible
 
-    def _reaches_of(self, runtime: Runtime, seen: NDArray[np.uint8]) -> DeviceBuffer:
+    def _distances_of(self, runtime: Runtime, seen: NDArray[np.uint8]) -> DeviceBuffer:
         """Return how far each block is from one that may be visible, uint8 on the device."""
         n = np.uint32(seen.size)
-        kernel = runtime.kernel("volume/volume_blocks.cl", "block_reaches", self.defines)
+        kernel = runtime.kernel("volume/volume_blocks.cl", "block_distances", self.defines)
         far = np.where(seen > 0, 0, _FARTHEST).astype(np.uint8)
-        reaches = runtime.upload(far, "empty blocks")
+        distances = runtime.upload(far, "empty blocks")
         apart = 1
         for along in blocks_over(self.volume):
-            with reaches as before:
-                reaches = runtime.buffer((seen.size,), np.uint8, "reaches of empty blocks")
+            with distances as before:
+                distances = runtime.buffer((seen.size,), np.uint8, "distances of blocks")
                 runtime.launch(
                     kernel,
                     padded(seen.size, GROUP),
@@ -375,11 +375,11 @@ class DeviceVolume:
                     np.uint32(apart),
                     np.int32(along),
                     np.int32(_FARTHEST),
-                    reaches,
+                    distances,
                 )
                 runtime.finish()  # what was read is released
             apart *= along
-        return reaches
+        return distances
 
     def forms(
         self, camera: Camera, window_size: Sequence[int], clipping_planes: Planes = ()

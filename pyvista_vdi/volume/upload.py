@@ -32,7 +32,7 @@ _BLOCK_SHIFT = 3
 #: many such parts there must be room for.
 _PART_BYTES, _PARTS = 64 * 2**20, 4
 #: Bytes on the device of what is known of a block: its scalar range, whether it is visible, and its
-#: reach, which is made from another one.
+#: distance from such a block, which is made from another one.
 BLOCK_BYTES = 11
 #: Bytes that are kept for tables: transfer functions, lights, rays. They may be a tenth of it.
 TABLE_BYTES = 2**20

@@ -6,8 +6,7 @@
 
 // Of each ray its interval and step, its number of steps (-1 where it misses), every face, every step's medium, and how
 // many steps could be passed by there.
-__kernel void marches(int count, __global const VOXEL_T *voxels, int4 size, __global const float4 *table, int entries,
-                      float low, float per_scalar, __global const uchar *reaches, int4 blocks,
+__kernel void marches(int count, MEDIUM_PARAMETERS
                       __global const float *forms, int planes, __global const float2 *offsets, float sample_distance,
                       float unit_distance, float t_end, int group, int capacity, __global float4 *intervals,
                       __global int *steps, __global float *faces, __global float4 *media, __global int *empty)
@@ -19,7 +18,7 @@ __kernel void marches(int count, __global const VOXEL_T *voxels, int4 size, __gl
     steps[i] = -1;
     if (!begin_march(&march, forms, planes, offsets[i].x, offsets[i].y, sample_distance, unit_distance, t_end))
         return;
-    const Medium medium = {voxels, size, table, entries, low, per_scalar, reaches, blocks};
+    const Medium medium = MEDIUM;
     steps[i] = march.steps;
     intervals[i] = (float4)(march.t0, march.t1, march.step, march.units);
     for (int k = 0; k < min(march.steps, capacity - 1); ++k) {
