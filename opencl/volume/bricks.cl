@@ -22,14 +22,24 @@ typedef struct {
     int k, end;
 } Walk;
 
-inline bool begin_walk(Walk *walk, __global const float *forms, int planes, float sample_distance, float unit_distance,
-                       int2 pixel, int width, int height, __global const float *opaque_depth, int has_opaque_depth,
-                       int first_step, int steps)
+// What both kernels take of the rays, and the walk of a work-item; false where it has no steps
+#define WALK_PARAMETERS                                                                                                   \
+    __global const float *forms, int planes, float sample_distance, float unit_distance, int width, int height,           \
+        int first_row, int rows, int first_step, int steps, /* of this chunk */                                           \
+        __global const float *opaque_depth, /* where each ray ends in t, top row first */                                 \
+        int has_opaque_depth
+#define WALK_ARGUMENTS                                                                                                    \
+    forms, planes, sample_distance, unit_distance, width, height, first_row, rows, first_step, steps, opaque_depth,       \
+        has_opaque_depth
+
+inline bool begin_walk(Walk *walk, uint item, WALK_PARAMETERS)
 {
-    const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
-    const float b = (float)pixel.y + 0.5f - 0.5f * (float)height;
-    const float t_end = has_opaque_depth ? opaque_depth[(size_t)(height - 1 - pixel.y) * width + pixel.x] : INFINITY;
-    if (!begin_march(&walk->march, forms, planes, a, b, sample_distance, unit_distance, t_end))
+    const Rays rays = rays_of_block(item, width, height, first_row, rows);
+    if (!rays.present)
+        return false;
+    const size_t place = (size_t)(height - 1 - (first_row + rays.y)) * width + rays.x;
+    const float t_end = has_opaque_depth ? opaque_depth[place] : INFINITY;
+    if (!begin_march(&walk->march, forms, planes, rays.a, rays.b, sample_distance, unit_distance, t_end))
         return false;
     walk->k = first_step;
     walk->end = min(first_step + steps, walk->march.steps);
@@ -75,28 +85,16 @@ inline Stretch next_stretch(const Walk *walk, const Medium *medium, __global con
 // Which bricks the steps of a chunk lie in, but for those that are transparent: their samples are set to nothing here.
 __kernel void want_bricks(
     MEDIUM_PARAMETERS
-    __global const float *forms,
-    int planes,
-    float sample_distance, float unit_distance,
-    int width, int height,
-    int first_row, int rows,
-    int first_step, int steps,
-    __global const float *opaque_depth, // where each ray ends in t, top row first
-    int has_opaque_depth,
+    WALK_PARAMETERS,
     __global const uchar *seen,    // whether a block holds anything that is not transparent
     int4 bricks,                   // along x, y, z
     __global uint *wanted,         // per brick; set to 1
     __global float4 *samples)      // see volume/samples.cl; room for `steps` of each ray
 {
     const uint item = (uint)get_global_id(0);
-    int2 pixel = block_pixel(item, width);
-    if (pixel.x >= width || pixel.y >= rows)
-        return;
-    pixel.y += first_row;
     const Medium medium = MEDIUM;
     Walk walk;
-    if (!begin_walk(&walk, forms, planes, sample_distance, unit_distance, pixel, width, height, opaque_depth,
-                    has_opaque_depth, first_step, steps))
+    if (!begin_walk(&walk, item, WALK_ARGUMENTS))
         return;
     __global float4 *sample = samples + samples_start(item, steps);
     while (walk.k < walk.end) {
@@ -113,28 +111,16 @@ __kernel void want_bricks(
 // Sample the steps of a chunk that lie in bricks which are on the device.
 __kernel void sample_steps(
     MEDIUM_PARAMETERS              // `voxels`: slots of BRICK_POINTS cubed points, each with a brick or not
-    __global const float *forms,
-    int planes,
-    float sample_distance, float unit_distance,
-    int width, int height,
-    int first_row, int rows,
-    int first_step, int steps,
-    __global const float *opaque_depth,
-    int has_opaque_depth,
+    WALK_PARAMETERS,
     __global const uchar *seen,
     int4 bricks,
     __global const int *slots,     // of each brick; negative where its steps are not to be sampled now
     __global float4 *samples)
 {
     const uint item = (uint)get_global_id(0);
-    int2 pixel = block_pixel(item, width);
-    if (pixel.x >= width || pixel.y >= rows)
-        return;
-    pixel.y += first_row;
     Medium medium = MEDIUM;
     Walk walk;
-    if (!begin_walk(&walk, forms, planes, sample_distance, unit_distance, pixel, width, height, opaque_depth,
-                    has_opaque_depth, first_step, steps))
+    if (!begin_walk(&walk, item, WALK_ARGUMENTS))
         return;
     __global float4 *sample = samples + samples_start(item, steps);
     while (walk.k < walk.end) {
