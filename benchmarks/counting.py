@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi.device.constants import SLABS, STACK
 from pyvista_vdi.device.ray_forms import depth_range
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.occupancy import SLABS, TILE
 from pyvista_vdi.reference.raycast import centre_ray_scale, near_limit
 
 Array = NDArray[np.float64]
@@ -130,7 +130,7 @@ class CountedVDI:
         self.per_length = vdi.optical_depth / np.maximum((self.back - self.front) * scale, 1e-300)
         self.sums = np.zeros(len(owner) + 1)
         np.cumsum(self.per_length * (self.back - self.front), out=self.sums[1:])
-        self.tiles_wide = -(-vdi.window_size[0] // TILE)
+        self.tiles_wide = -(-vdi.window_size[0] // STACK)
         #: Occupied cells before each slab of each tile of the occupancy grid, (tiles, slabs + 1)
         self.occupied_before = self._occupied_before(owner)
 
@@ -146,8 +146,8 @@ class CountedVDI:
 
     def _occupied_before(self, owner: Integers) -> Integers:
         width, height = self.vdi.window_size
-        tiles = self.tiles_wide * -(-height // TILE)
-        tile = owner // width // TILE * self.tiles_wide + owner % width // TILE
+        tiles = self.tiles_wide * -(-height // STACK)
+        tile = owner // width // STACK * self.tiles_wide + owner % width // STACK
         first, last = self.slab_of(self.front), self.slab_of(self.back)
         edges = np.zeros((tiles, SLABS + 1), np.int64)
         np.add.at(edges, (tile, first), 1)
@@ -255,7 +255,7 @@ def walk(
         first = np.searchsorted(counted.back_key, list_ + counted.share_of_depth(low), "right")
         last = np.searchsorted(counted.front_key, list_ + counted.share_of_depth(high), "left")
         first, last = np.clip(first, begin, end), np.clip(last, begin, end)
-        tile = j[r] // TILE * counted.tiles_wide + i[r] // TILE
+        tile = j[r] // STACK * counted.tiles_wide + i[r] // STACK
 
         found["lists"][r] += 1
         found["filled"][r] += end > begin

@@ -105,7 +105,7 @@ OF_LIST = Operations(12)
 #: Clip to two faces, length, opacity, over.
 OF_SUPERSEGMENT = Operations(16, 1, 1)
 #: A tile's border and slab ahead.
-OF_TILE = Operations(16, 1)
+OF_STACK = Operations(16, 1)
 #: Clipping to seven planes, positions and steps.
 OF_MARCHED_RAY = Operations(80, 14)
 #: Faces of a step, position, place of the nearest voxel.
@@ -262,7 +262,7 @@ def raycast_work(walked: Walk, size: tuple[int, int], n_bytes: float, *, skips: 
         operations=OF_LIST_RAY.times(rays)
         + OF_LIST.times(visits)
         + OF_SUPERSEGMENT.times(met)
-        + OF_TILE.times(tiles),
+        + OF_STACK.times(tiles),
         launches=1,
     )
 

@@ -33,22 +33,22 @@ Shared functions:
     V_O's list space: coordinates of a ray in it, and its depth coordinate.
 ``lib/cropping.cl``
     The parts of a ray that cropping keeps.
-``raycasting/list_ray.cl``
-    The ray of a pixel in list space, clipped; model lengths along it.
+``lib/lanes.cl``, ``lib/transpose.cl``
+    One text for one ray and for sixteen in vectors, and their numbers transposed.
+``raycasting/list_rays.cl``, ``raycasting/pixels.cl``
+    Rays in list space, clipped; model lengths along them; their pixels.
+``raycasting/stepping.cl``
+    How rays step from list to list, and pass by what is empty.
 ``raycasting/lists.cl``
     Which supersegment of a list a ray meets first (paper, Algorithm 1).
 ``lib/compositing.cl``
     Compositing front to back, with or without carrying what is rounded off.
 ``raycasting/supersegments.cl``
     How a list's supersegments are read: as they were made, or packed.
-``raycasting/tiles.cl``
-    Tiles and slabs of the occupancy grid.
-``raycasting/packet.cl``, ``raycasting/packet_light.cl``, ``raycasting/slabs_ahead.cl``
-    Sixteen rays in vectors: where they are, what they see, and which slabs are ahead of them.
-``raycasting/packet_cropping.cl``
-    The parts of them that cropping keeps.
-``raycasting/segments.cl``, ``raycasting/segment_rows.cl``
-    What rays cross of several VDIs, as segments in a pool; sixteen of them at a time.
+``raycasting/stacks.cl``
+    Stacks of cells of the occupancy grid, and which slab of one is ahead.
+``raycasting/segments.cl``
+    What rays cross of several VDIs, as segments in a pool.
 
 Entry points:
 
@@ -67,12 +67,13 @@ Entry points:
     ``prepare_lists``: a VDI's arrays to what the raycaster reads.
 ``raycasting/raycast.cl``
     ``raycast``: VDI to image from any view (paper, section 3), to the depth of the first hit, or to
-    what is merged with other VDIs; ``clear_image``: nothing where no rays are cast.
-``raycasting/blocks.cl``, ``raycasting/packets.cl``
-    ``raycast_blocks``, ``raycast_packets``: VDI to image on a CPU, in vectors that are written out:
-    of 4 x 4 pixels near V_O, along epipolar lines far from it.
-``multi_vdi/merge.cl``, ``multi_vdi/merge_blocks.cl``
-    ``merge``, ``merge_blocks``: what rays cross of several VDIs, to one image; on a CPU in vectors.
+    what is merged with other VDIs; ``raycast_blocks``: the same on a CPU, for blocks of 4 x 4 rays.
+``raycasting/packets.cl``
+    ``raycast_packets``: VDI to image on a CPU, for rays along epipolar lines, far from V_O.
+``raycasting/clear.cl``
+    ``clear_image``: nothing where no rays are cast.
+``multi_vdi/merge.cl``
+    ``merge``, ``merge_blocks``: what rays cross of several VDIs, to one image.
 ``multi_vdi/cells.cl``
     ``alone_ends``, ``take_cells``: where only one of several VDIs is met.
 ``raycasting/preview.cl``

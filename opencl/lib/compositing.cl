@@ -4,38 +4,71 @@
 //                 "Accumulated rounding"):
 //                     1  opacity is summed up from 0, so that what is nearly transparent keeps its digits
 //                     2  and every sum carries what it rounds off (Kahan)
+#include "lib/lanes.cl"
+#include "lib/opacity.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Composite straight `color` behind what has been seen; `weight` is its opacity times the transmittance before it. `rest` is
-// what the form needs besides: 0 at first.
-inline void composite_over(float3 *seen, float *transmittance, float4 *rest, float weight, float3 color)
+typedef struct {
+    Real4 sums;         // premultiplied red, green and blue; transmittance
+    Real4 compensation; // if COMPENSATED: w is the opacity, or each is what the sum was rounded up by
+} Seen;
+
+inline Seen nothing_seen()
+{
+    Seen seen;
+    seen.sums.x = seen.sums.y = seen.sums.z = 0.0f;
+    seen.sums.w = 1.0f;
+    seen.compensation.x = seen.compensation.y = seen.compensation.z = seen.compensation.w = 0.0f;
+    return seen;
+}
+
+#if defined(COMPENSATED) && COMPENSATED == 2
+#define ADD_TO_SUM(component, summand)                                                                        \
+    {                                                                                                         \
+        const Real sum = seen->sums.component;                                                                \
+        const Real term = (summand) - seen->compensation.component;                                           \
+        seen->sums.component = sum + term;                                                                    \
+        seen->compensation.component = (seen->sums.component - sum) - term;                                   \
+    }
+#else
+#define ADD_TO_SUM(component, summand) seen->sums.component += (summand);
+#endif
+
+// Composite straight `color` (xyz) behind what has been seen; `weight` is its opacity times the transmittance before it.
+inline void composite_over(Seen *seen, Real weight, Real4 color)
+{
+    ADD_TO_SUM(x, weight * color.x)
+    ADD_TO_SUM(y, weight * color.y)
+    ADD_TO_SUM(z, weight * color.z)
+#if defined(COMPENSATED) && COMPENSATED == 1
+    seen->compensation.w += weight;
+    seen->sums.w = 1.0f - seen->compensation.w;
+#else
+    ADD_TO_SUM(w, -weight)
+#endif
+}
+
+// Composite a medium of straight colour for the rays that are chosen.
+inline void composite_medium(Seen *seen, Real optical_depth, Real4 color, Int chosen)
+{
+    composite_over(seen, SELECT((Real)(0.0f), seen->sums.w * opacity_of(optical_depth), chosen), color);
+}
+
+inline Real alpha_seen(const Seen *seen)
 {
 #if !defined(COMPENSATED)
-    *seen += weight * color;
-    *transmittance -= weight;
+    return 1.0f - seen->sums.w;
 #elif COMPENSATED == 1
-    *seen += weight * color;
-    rest->w += weight; // opacity
-    *transmittance = 1.0f - rest->w;
+    return fmin(seen->compensation.w, 1.0f);
 #else
-    // The sums are seen - rest.xyz and transmittance - rest.w
-    const float4 sum = (float4)(*seen, *transmittance);
-    const float4 term = (float4)(weight * color, -weight) - *rest;
-    const float4 next = sum + term;
-    *rest = (next - sum) - term;
-    *seen = next.xyz;
-    *transmittance = next.w;
+    return (1.0f - seen->sums.w) + seen->compensation.w;
 #endif
 }
 
 // Premultiplied RGBA of what was composited.
-inline float4 composited(float3 seen, float transmittance, float4 rest)
+inline Real4 composited(const Seen *seen)
 {
-#if !defined(COMPENSATED)
-    return (float4)(seen, 1.0f - transmittance);
-#elif COMPENSATED == 1
-    return (float4)(seen, fmin(rest.w, 1.0f));
-#else
-    return (float4)(seen, (1.0f - transmittance) + rest.w);
-#endif
+    Real4 rgba = seen->sums;
+    rgba.w = alpha_seen(seen);
+    return rgba;
 }

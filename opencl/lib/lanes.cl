@@ -27,9 +27,11 @@ typedef float4 Real4;
 #define COUNT(condition) (condition) // 1 where it holds, or 0
 #define TO_REAL(x) ((float)(x))    // the value
 #define TO_INT(x) ((int)(x))
+#define TO_UCHAR(x) ((uchar)(x))
 #define AS_REAL(x) as_float(x)     // the bits
 #define AS_INT(x) as_int(x)
 #define AS_UINT(x) as_uint(x)
+#define KERNEL_OF_LANES __kernel
 #define LANE_NUMBERS 0
 #define OF_LANES(TYPE, OF_LANE) (TYPE)(OF_LANE(0)) // TYPE: Real, Int or Uint; OF_LANE(n): lane n's, a macro
 #define LOAD_LANES(k, from) ((from)[k]) // the k-th row of LANES numbers
@@ -63,9 +65,11 @@ typedef struct {
 #define COUNT(condition) (-(condition))
 #define TO_REAL(x) convert_float16(x)
 #define TO_INT(x) convert_int16(x)
+#define TO_UCHAR(x) convert_uchar16(x)
 #define AS_REAL(x) as_float16(x)
 #define AS_INT(x) as_int16(x)
 #define AS_UINT(x) as_uint16(x)
+#define KERNEL_OF_LANES __attribute__((vec_type_hint(float16))) __kernel
 #define LANE_NUMBERS (Int)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 #define OF_LANES(TYPE, OF_LANE)                                                                                       \
     (TYPE)(OF_LANE(0), OF_LANE(1), OF_LANE(2), OF_LANE(3), OF_LANE(4), OF_LANE(5), OF_LANE(6), OF_LANE(7), OF_LANE(8), \
@@ -106,3 +110,7 @@ typedef union {
     Int all;
     int each[LANES];
 } Places;
+
+// The lower and the higher of two numbers that are never NaN: one instruction each
+#define LOWER_OF(x, y) SELECT(y, x, (x) < (y))
+#define HIGHER_OF(x, y) SELECT(y, x, (x) > (y))

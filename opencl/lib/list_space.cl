@@ -19,7 +19,6 @@
 #define DEPTH_FORM 2
 #define DENOMINATOR_FORM 3
 #define MODEL_FORM 4
-#define PLANE_FORMS 7
 
 #ifdef FAR_ENTRIES
 typedef struct {
@@ -27,11 +26,12 @@ typedef struct {
     float reciprocal; // 1 / Z_deep
     float depth_origin;
 } Depths;
-#define DEPTHS ray.depths // of a kernel whose ray is `ray`
+#define DEPTHS_OF(rays) (rays)->depths
 #else
 typedef float Depths; // the depth origin
-#define DEPTHS depth_origin
+#define DEPTHS_OF(rays) depth_origin
 #endif
+#define DEPTHS DEPTHS_OF(rays) // where `rays` are followed
 
 #ifdef FAR_ENTRIES
 inline float depth_coordinate(float offset, Depths depths)
@@ -78,33 +78,49 @@ inline float reciprocal_depth(float z, Depths depths)
 #endif
 
 #ifndef FAR_ENTRIES
-// Homogeneous list coordinates at t, divided out: (u, v, depth coordinate).
-inline float3 list_point(__global const float *forms, float a, float b, float t)
+inline Real list_form(__global const float *form, Real a, Real b, Real t)
 {
-    const float u = fma(t, form_slope(forms + U_FORM * FORM_SIZE, a, b), form_value(forms + U_FORM * FORM_SIZE, a, b));
-    const float v = fma(t, form_slope(forms + V_FORM * FORM_SIZE, a, b), form_value(forms + V_FORM * FORM_SIZE, a, b));
-    const float z = fma(t, form_slope(forms + DEPTH_FORM * FORM_SIZE, a, b),
-                        form_value(forms + DEPTH_FORM * FORM_SIZE, a, b));
+    return fma(t, FORM_SLOPE(Real, form, a, b), FORM_VALUE(Real, form, a, b));
+}
+
+// Depth coordinate at t.
+inline Real list_depth(__global const float *forms, Real a, Real b, Real t)
+{
+    const Real depth = list_form(forms + DEPTH_FORM * FORM_SIZE, a, b, t);
 #ifdef PARALLEL
-    return (float3)(u, v, z);
+    return depth;
 #else
-    const float d = fma(t, form_slope(forms + DENOMINATOR_FORM * FORM_SIZE, a, b),
-                        form_value(forms + DENOMINATOR_FORM * FORM_SIZE, a, b));
-    return (float3)(u, v, z) / d;
+    return depth / list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
 #endif
+}
+
+// (u, v, depth coordinate) at t.
+inline Real3 list_point(__global const float *forms, Real a, Real b, Real t)
+{
+    Real3 point;
+    point.x = list_form(forms + U_FORM * FORM_SIZE, a, b, t);
+    point.y = list_form(forms + V_FORM * FORM_SIZE, a, b, t);
+    point.z = list_depth(forms, a, b, t);
+#ifndef PARALLEL
+    const Real denominator = list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
+    point.x /= denominator;
+    point.y /= denominator;
+#endif
+    return point;
 }
 #endif
 
-// Model length per unit of t along the ray. The slopes of its forms are about 1, and in units of the value of the first: no
-// square is lost, and `length`, which guards against that by doubles or by divisions, is not needed. TYPE: of a and b.
-#define MODEL_SPEED(TYPE, forms, a, b)                                                    \
-    ((forms)[MODEL_FORM * FORM_SIZE] *                                                    \
-     sqrt(SQUARED_SLOPE(TYPE, (forms) + MODEL_FORM * FORM_SIZE, a, b) +                   \
-          SQUARED_SLOPE(TYPE, (forms) + (MODEL_FORM + 1) * FORM_SIZE, a, b) +             \
-          SQUARED_SLOPE(TYPE, (forms) + (MODEL_FORM + 2) * FORM_SIZE, a, b)))
-#define SQUARED_SLOPE(TYPE, form, a, b) (FORM_SLOPE(TYPE, form, a, b) * FORM_SLOPE(TYPE, form, a, b))
-
-inline float model_speed(__global const float *forms, float a, float b)
+inline Real squared_slope(__global const float *form, Real a, Real b)
 {
-    return MODEL_SPEED(float, forms, a, b);
+    const Real slope = FORM_SLOPE(Real, form, a, b);
+    return slope * slope;
+}
+
+// Model length per unit of t along the ray. The slopes of its forms are about 1, and in units of the value of the first: no
+// square is lost, and `length`, which guards against that by doubles or by divisions, is not needed.
+inline Real model_speed(__global const float *forms, Real a, Real b)
+{
+    __global const float *form = forms + MODEL_FORM * FORM_SIZE;
+    return form[0] * sqrt(squared_slope(form, a, b) + squared_slope(form + FORM_SIZE, a, b) +
+                          squared_slope(form + 2 * FORM_SIZE, a, b));
 }

@@ -2,18 +2,50 @@
 //
 // Every VDI is piecewise constant along a ray, so all of them together are: where several segments cover a piece of the ray,
 // their extinctions add and the colour is the mean by extinction (docs/conventions.md, "Several VDIs"). Streams are walked
-// together from boundary to boundary. The sums are formed in the order of the streams.
+// together from boundary to boundary: in each turn every ray composites one piece, and comes to the next segment of those
+// streams whose segment ends there. The sums are formed in the order of the streams.
 //
+// -D LANES        1: a work-item has a ray; 16: a block of 4 x 4, if SEGMENTS is 2
 // -D STREAMS      how many VDIs
 // -D SEGMENTS     see raycasting/segments.cl
 // -D COMPENSATED  see lib/compositing.cl
 #include "lib/rays.cl"
-#include "lib/classification.cl"
 #include "lib/compositing.cl"
+#include "raycasting/pixels.cl"
 #include "raycasting/segments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-__kernel void merge(
+// The rays' streams of one VDI: slots of the segments that are not behind what has been composited, and of those behind the last
+// ones. At the end of a stream a segment begins at infinity.
+typedef struct {
+    Int slots, ends;
+    Segments at;
+} Stream;
+
+// Load the segments of the rays that are chosen.
+inline void come_to_segments(Stream *stream, __global const float *rows, int capacity, Int chosen)
+{
+    const Int left = chosen && stream->slots < stream->ends;
+#if LANES == 1
+    if (left)
+        stream->at = load_segments(rows, stream->slots, capacity);
+    else if (chosen)
+        stream->at.from = stream->at.to = INFINITY;
+#else
+    const Segments next = load_segments(rows, select((Int)(0), stream->slots, left), capacity);
+    stream->at.from = select(stream->at.from, select((Real)(INFINITY), next.from, left), chosen);
+    stream->at.to = select(stream->at.to, select((Real)(INFINITY), next.to, left), chosen);
+    stream->at.optical_depth = select(stream->at.optical_depth, next.optical_depth, left);
+    stream->at.color.x = select(stream->at.color.x, next.color.x, left);
+    stream->at.color.y = select(stream->at.color.y, next.color.y, left);
+    stream->at.color.z = select(stream->at.color.z, next.color.z, left);
+#endif
+}
+
+#if LANES > 1
+#define merge merge_blocks
+#endif
+KERNEL_OF_LANES void merge(
     __global const float *pool,         // see raycasting/segments.cl
     int capacity,                       // slots of a ray
     __global const int *ends,           // (streams, rays)
@@ -28,83 +60,100 @@ __kernel void merge(
     __global float4 *image,             // premultiplied RGBA, top row first
     __global short *owner)              // the VDI to which each pixel belongs, top row first; -1: to none
 {
-    const int ray = (int)get_global_id(0);
-    const int2 pixel = cell_pixel(cells + first_cell, ray);
-    if (pixel.x >= width || pixel.y >= height)
+    const int first_ray = (int)get_global_id(0) * LANES;
+    const int2 corner = cell_pixel(cells + first_cell, first_ray);
+    const Int x = corner.x + (LANE_NUMBERS & (BLOCK - 1));
+    const Int y = corner.y + (LANE_NUMBERS / BLOCK);
+    const Int in_window = x < width && y < height;
+    if (!ANY(in_window))
         return;
-    const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
-    const int used = ends[(STREAMS - 1) * rays + ray];
-    __global int *const needed_here = needed + first_cell + ray / CELL_ITEMS;
-    if (used > *needed_here) // an old value is only lower, and does no harm
-        atomic_max(needed_here, used);
-    if (used > capacity)
+    const Pixels pixels = pixels_at(x, y, in_window, width, height);
+    const Int used = SELECT((Int)(0), LOAD_LANES(0, ends + (STREAMS - 1) * rays + first_ray), in_window);
+    const int most = largest_lane(used);
+    __global int *const needed_here = needed + first_cell + first_ray / CELL_ITEMS;
+    if (most > *needed_here) // an old value is only lower, and does no harm
+        atomic_max(needed_here, most);
+    if (most > capacity)
         return;
 
     // A pixel belongs to the first VDI that surely covers it, or else to the first that it meets
-    int owned_by = -1;
-    int grade = 0;
+    Int owned_by = -1;
+    Int grades = 0;
     for (int vdi = 0; vdi < STREAMS; ++vdi) {
-        const int meets = contributes[streams_of[vdi] * rays + ray];
-        owned_by = meets > grade ? vdi : owned_by;
-        grade = max(meets, grade);
+        const Int meets = TO_INT(LOAD_LANES(0, contributes + streams_of[vdi] * rays + first_ray));
+        owned_by = SELECT(owned_by, (Int)(vdi), meets > grades);
+        grades = max(meets, grades);
     }
-    owner[place] = (short)owned_by;
+    int owners[LANES];
+    STORE_LANES(owned_by, 0, owners);
+    for (int k = 0; k < LANES; ++k) {
+        if (pixels.wanted[k])
+            owner[pixels.places[k]] = (short)owners[k];
+    }
 
-    // The segment of each stream that is not behind `reached`; at the end of a stream it begins at infinity
-    int slot[STREAMS];
-    float from[STREAMS];
-    float to[STREAMS];
+    __global const float *const rows = POOL_OF(pool, first_ray, capacity);
+    Stream streams[STREAMS];
+    Int first = 0;
     for (int j = 0; j < STREAMS; ++j) {
-        slot[j] = j > 0 ? ends[(j - 1) * rays + ray] : 0;
-        const bool left = slot[j] < ends[j * rays + ray];
-        from[j] = left ? SEGMENT(pool, ray, slot[j], capacity, SEGMENT_FROM) : INFINITY;
-        to[j] = left ? SEGMENT(pool, ray, slot[j], capacity, SEGMENT_TO) : INFINITY;
+        streams[j].slots = first;
+        first = streams[j].ends = SELECT((Int)(0), LOAD_LANES(0, ends + j * rays + first_ray), in_window);
+        streams[j].at.optical_depth = streams[j].at.color.x = streams[j].at.color.y = streams[j].at.color.z = 0.0f;
+        streams[j].at.from = streams[j].at.to = INFINITY;
+        come_to_segments(&streams[j], rows, capacity, in_window);
     }
-    float3 color = (float3)(0.0f);
-    float transmittance = 1.0f;
-    float4 rest = (float4)(0.0f);
-    float reached = -INFINITY;
-    while (transmittance >= transmittance_cutoff) {
+    Seen seen = nothing_seen();
+    Real reached = -INFINITY;
+    while (true) {
         // The next piece that no segment begins or ends in
-        float begin = INFINITY;
+        Real begin = INFINITY;
         for (int j = 0; j < STREAMS; ++j)
-            begin = fmin(begin, fmax(from[j], reached));
-        if (begin == INFINITY)
+            begin = LOWER_OF(begin, HIGHER_OF(streams[j].at.from, reached));
+        const Int goes = begin < INFINITY && !(seen.sums.w < transmittance_cutoff);
+        if (!ANY(goes))
             break;
-        float end = INFINITY;
+        Real end = INFINITY;
         for (int j = 0; j < STREAMS; ++j)
-            end = fmin(end, from[j] <= begin ? to[j] : from[j]);
+            end = LOWER_OF(end, SELECT(streams[j].at.from, streams[j].at.to, streams[j].at.from <= begin));
 
         // Its medium
-        float optical_depth = 0.0f;
-        float3 weighted = (float3)(0.0f);
-        float3 single = (float3)(0.0f);
-        int covering = 0;
+        Real optical_depth = 0.0f, red = 0.0f, green = 0.0f, blue = 0.0f; // colour times optical depth
+        Real4 color;                                                       // of the last one
+        color.x = color.y = color.z = color.w = 0.0f;
+        Int covering = 0;
         for (int j = 0; j < STREAMS; ++j) {
-            if (from[j] > begin)
-                continue;
-            const bool ends_here = to[j] <= end;
+            const Segments at = streams[j].at;
+            const Int covers = goes && at.from <= begin;
+            const Int ends_here = covers && at.to <= end;
             // A segment that nothing cuts keeps its optical depth, however short it is in t
-            const float share = ends_here && from[j] >= begin ? 1.0f : (end - begin) / (to[j] - from[j]);
-            const float part = SEGMENT(pool, ray, slot[j], capacity, SEGMENT_OPTICAL_DEPTH) * share;
-            single = (float3)(SEGMENT(pool, ray, slot[j], capacity, SEGMENT_COLOR),
-                              SEGMENT(pool, ray, slot[j], capacity, SEGMENT_COLOR + 1),
-                              SEGMENT(pool, ray, slot[j], capacity, SEGMENT_COLOR + 2));
-            weighted += part * single;
+            const Real share = SELECT((end - begin) / (at.to - at.from), (Real)(1.0f), ends_here && at.from >= begin);
+            const Real part = SELECT((Real)(0.0f), at.optical_depth * share, covers);
+            red += part * at.color.x;
+            green += part * at.color.y;
+            blue += part * at.color.z;
             optical_depth += part;
-            ++covering;
-            if (ends_here) {
-                ++slot[j];
-                const bool left = slot[j] < ends[j * rays + ray];
-                from[j] = left ? SEGMENT(pool, ray, slot[j], capacity, SEGMENT_FROM) : INFINITY;
-                to[j] = left ? SEGMENT(pool, ray, slot[j], capacity, SEGMENT_TO) : INFINITY;
+            color.x = SELECT(color.x, at.color.x, covers);
+            color.y = SELECT(color.y, at.color.y, covers);
+            color.z = SELECT(color.z, at.color.z, covers);
+            covering += COUNT(covers);
+            if (ANY(ends_here)) {
+                streams[j].slots += COUNT(ends_here);
+                come_to_segments(&streams[j], rows, capacity, ends_here);
             }
         }
-        if (optical_depth > 0.0f) {
-            const float weight = transmittance * opacity_of(optical_depth); // over, front to back
-            composite_over(&color, &transmittance, &rest, weight, covering == 1 ? single : weighted / optical_depth);
-        }
-        reached = end;
+        const Int several = covering > 1;
+#if LANES == 1
+#define MEAN(sum) ((sum) / optical_depth)
+        const Int meets = optical_depth > 0.0f;
+#else // one division, not three
+        const Real per_depth = 1.0f / optical_depth;
+#define MEAN(sum) ((sum) * per_depth)
+        const Int meets = goes && optical_depth >= FLT_MIN; // of less, the reciprocal is not finite
+#endif
+        color.x = SELECT(color.x, MEAN(red), several);
+        color.y = SELECT(color.y, MEAN(green), several);
+        color.z = SELECT(color.z, MEAN(blue), several);
+        composite_medium(&seen, optical_depth, color, meets);
+        reached = SELECT(reached, end, goes);
     }
-    image[place] = composited(color, transmittance, rest);
+    write_pixels(image, &pixels, composited(&seen));
 }

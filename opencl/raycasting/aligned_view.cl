@@ -1,37 +1,38 @@
 // VDI to image at V_O, where the pixels of the picture are those of the VDI's window, or some of them, or more: what
 // raycasting/raycast.cl does, where the ray of each pixel goes through a list of its own from front to back, and through no other.
 //
-// A work-item draws a packet (raycasting/packet.cl) of LANES pixels: those of PACKET_TILES tiles of lists side by side. What
+// A work-item draws a packet of LANES pixels: those of PACKET_BUNDLES bundles of lists side by side. What
 // these hold lies in one piece of memory (raycasting/supersegments.cl), and one packet's behind the other's; so it is loaded in
-// whole vectors, and nothing is gathered or searched for. (Lists of 8-byte supersegments do not lie in tiles: here, four side
+// whole vectors, and nothing is gathered or searched for. (Lists of 8-byte supersegments do not lie in bundles: here, four side
 // by side are called one, and their words are loaded one by one.) Only depth matters: a supersegment is clipped to the ray
 // in the depth coordinate, and a length is a difference of it over the reciprocal depths at both ends.
 //
 // -D OFFSET_T, PARALLEL, SHIFTED, PACKED, COMPENSATED (1)    as in raycasting/raycast.cl
 #define LANES 16
-#include "raycasting/packet_light.cl"
+#include "lib/compositing.cl"
 #include "lib/transpose.cl"
+#include "raycasting/list_rays.cl"
+#include "raycasting/pixels.cl"
 #include "raycasting/supersegments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Lane p * PACKET_TILES + n has place p in the n-th tile: vectors of tiles become vectors of lanes within each 128 bits
-#define PACKET_TILES 4
+// Lane p * PACKET_BUNDLES + n has place p in the n-th bundle: vectors of bundles become vectors of lanes within each 128 bits
+#define PACKET_BUNDLES 4
 #if defined(PACKED) && PACKED == 8
-#define TILE_WIDE 4
-#define TILE_HIGH 1
-#define LANE_X (Ints)(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15)
-#define LANE_Y (Ints)(0)
+#define BUNDLE_WIDE 4
+#define BUNDLE_HIGH 1
+#define LANE_X (Int)(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15)
+#define LANE_Y (Int)(0)
 #else
-#define TILE_WIDE LIST_TILE
-#define TILE_HIGH LIST_TILE
-#define LANE_X (Ints)(0, 2, 4, 6, 1, 3, 5, 7, 0, 2, 4, 6, 1, 3, 5, 7)
-#define LANE_Y (Ints)(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1)
+#define BUNDLE_WIDE BUNDLE
+#define BUNDLE_HIGH BUNDLE
+#define LANE_X (Int)(0, 2, 4, 6, 1, 3, 5, 7, 0, 2, 4, 6, 1, 3, 5, 7)
+#define LANE_Y (Int)(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1)
 #endif
-#define LISTS_OF_TILE (TILE_WIDE * TILE_HIGH)
-#define PACKET_WIDE (PACKET_TILES * TILE_WIDE) // pixels; TILE_HIGH high. Those of pyvista_vdi/packets.py.
+#define PACKET_WIDE (LANES / BUNDLE_HIGH) // pixels
 // The same of one lane, from the packet's first pixel
-#define X_OF(lane) ((lane) % PACKET_TILES * TILE_WIDE + (lane) / PACKET_TILES % TILE_WIDE)
-#define Y_OF(lane) ((lane) / PACKET_TILES / TILE_WIDE)
+#define X_OF(lane) ((lane) % PACKET_BUNDLES * BUNDLE_WIDE + (lane) / PACKET_BUNDLES % BUNDLE_WIDE)
+#define Y_OF(lane) ((lane) / PACKET_BUNDLES / BUNDLE_WIDE)
 
 // The form of V_O's depth, or of that less a number
 #ifdef PARALLEL
@@ -48,15 +49,11 @@
 #endif
 
 typedef struct {
-    Reals front, back; // depth coordinates
+    Real front, back; // depth coordinates
 #ifdef PACKED
-    uint16 words[2]; // as loaded with them: 16 bytes: extinction, colour; 8 bytes: all
+    Uint words[2]; // as loaded with them: 16 bytes: extinction, colour; 8 bytes: all
 #endif
 } Faces;
-
-typedef struct {
-    Reals red, green, blue, extinction;
-} Media;
 
 // Bring lines of the cache close.
 inline void fetch_lines(__global const ulong *words, OFFSET_T first, OFFSET_T end)
@@ -68,15 +65,13 @@ inline void fetch_lines(__global const ulong *words, OFFSET_T first, OFFSET_T en
 #if defined(PACKED) && PACKED == 8
 // The lists of a packet, lane by lane.
 typedef struct {
-    Ints counts; // supersegments; 0 beside the window
-    int longest; // the most of them
-    Ints first;  // behind `begin`; of a list that has none, another one's, if there is one
+    List list;     // of each, behind `begin`; one that has none has another one's entry, if there is one; 0 beside the window
+    int longest;   // the most supersegments
     OFFSET_T begin;
-    Ints origin, stride; // see raycasting/supersegments.cl
-    Reals per_code;
 } Lists;
 
-inline Lists lists_at(__global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int i, int j, int lists_wide, int lists_high)
+inline Lists lists_at(__global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int i, int j, int lists_wide, int lists_high,
+                      float depth_origin)
 {
     Lists lists;
     lists.longest = 0;
@@ -105,11 +100,14 @@ inline Lists lists_at(__global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS
         strides[lane] = as_int(scale[0].y);
         per_codes[lane] = as_float(scale[1].x);
     }
-    lists.counts = vload16(0, counts);
-    lists.first = vload16(0, firsts);
-    lists.origin = vload16(0, origins);
-    lists.stride = vload16(0, strides);
-    lists.per_code = vload16(0, per_codes);
+    lists.list.count = vload16(0, counts);
+    lists.list.first = vload16(0, firsts);
+    lists.list.origin = vload16(0, origins);
+    lists.list.stride = vload16(0, strides);
+    lists.list.per_code = vload16(0, per_codes);
+    lists.list.step = constants[0];
+    lists.list.nearest = constants[1];
+    lists.list.depths = depth_origin;
     return lists;
 }
 
@@ -117,90 +115,72 @@ inline Lists lists_at(__global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS
 inline void fetch(SUPERSEGMENTS_PARAMETERS const Lists *lists, int depth)
 {
     int firsts[LANES], ends[LANES];
-    vstore16(lists->first, 0, firsts);
-    vstore16(lists->first + min(lists->counts, depth), 0, ends);
+    vstore16(lists->list.first, 0, firsts);
+    vstore16(lists->list.first + min(lists->list.count, depth), 0, ends);
     for (int lane = 0; lane < LANES; ++lane)
         fetch_lines((__global const ulong *)words, lists->begin + firsts[lane], lists->begin + ends[lane]);
 }
 
-// As depth_of_code.
-inline Reals depths_of_codes(const Lists *lists, uint16 codes, float step, float nearest, float depth_origin)
-{
-    const Reals offsets = convert_float16(lists->origin + as_int16(codes) * lists->stride) * step;
-#ifdef PARALLEL
-    return offsets;
-#else
-    return depth_coordinate(fmax(offsets, nearest), depth_origin);
-#endif
-}
-
-inline Faces faces_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, float depth_origin)
+inline Faces faces_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k)
 {
     int places[LANES];
-    vstore16(lists->first + select((Ints)(0), (Ints)(k), k < lists->counts), 0, places);
+    vstore16(entry_of(&lists->list, select((Int)(0), (Int)(k), k < lists->list.count)), 0, places);
     __global const ulong *const from = (__global const ulong *)words + lists->begin;
-    const uint16 low_lanes = as_uint16((ulong8)(from[places[0]], from[places[1]], from[places[2]], from[places[3]],
+    const Uint low_lanes = as_uint16((ulong8)(from[places[0]], from[places[1]], from[places[2]], from[places[3]],
                                                 from[places[4]], from[places[5]], from[places[6]], from[places[7]]));
-    const uint16 high_lanes = as_uint16((ulong8)(from[places[8]], from[places[9]], from[places[10]], from[places[11]],
+    const Uint high_lanes = as_uint16((ulong8)(from[places[8]], from[places[9]], from[places[10]], from[places[11]],
                                                  from[places[12]], from[places[13]], from[places[14]], from[places[15]]));
     Faces at;
     at.words[0] = (uint16)(low_lanes.even, high_lanes.even);
     at.words[1] = (uint16)(low_lanes.odd, high_lanes.odd);
-    at.front = depths_of_codes(lists, at.words[0] & DEPTH_CODES, constants[0], constants[1], depth_origin);
-    at.back = depths_of_codes(lists, at.words[0] >> 14 & DEPTH_CODES, constants[0], constants[1], depth_origin);
+    at.front = FRONT_OF_WORD(&lists->list, at.words[0]);
+    at.back = BACK_OF_WORD(&lists->list, at.words[0]);
     return at;
 }
 
-// As medium_of.
-inline Media media_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, Faces at)
+inline Real4 media_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, Faces at)
 {
-    const uint16 tau = at.words[0] >> 28 | (at.words[1] & 255) << 4;
-    const uint16 thickness = (at.words[0] >> 14 & DEPTH_CODES) - (at.words[0] & DEPTH_CODES);
-    const Reals optical_depth = select((Reals)(0.0f), as_float16((tau + TAU_BASE - 1) << 16), tau > 0);
-    const Media media = {convert_float16(at.words[1] >> 8 & 255) * (1.0f / 255.0f),
-                         convert_float16(at.words[1] >> 16 & 255) * (1.0f / 255.0f),
-                         convert_float16(at.words[1] >> 24) * (1.0f / 255.0f),
-                         fmin(optical_depth * lists->per_code / convert_float16(thickness), FLT_MAX)};
-    return media;
+    return medium_of(&lists->list, at.words[0], at.words[1]);
 }
 
 #else
-// The lists of a packet, tile by tile.
+// The lists of a packet, bundle by bundle.
 typedef struct {
-    Ints counts;                  // entries of each lane's list; 0 beside the window
-    int longest;                  // the most of them
-    int tile_counts[PACKET_TILES];
-    OFFSET_T first[PACKET_TILES]; // entry; of a tile that has none, another one's, if there is one
+    List list;                      // of each lane only the count, of entries; 0 beside the window
+    int longest;                    // the most of them
+    int counts[PACKET_BUNDLES];
+    OFFSET_T first[PACKET_BUNDLES]; // entry; of a bundle that has none, another one's, if there is one
 } Lists;
 
-inline Lists lists_at(__global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int i, int j, int lists_wide, int lists_high)
+inline Lists lists_at(__global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int i, int j, int lists_wide, int lists_high,
+                      float depth_origin)
 {
     Lists lists;
     lists.longest = 0;
     if (i < 0 || j < 0 || j >= lists_high)
         return lists;
     OFFSET_T any_first = 0;
-    for (int n = 0; n < PACKET_TILES; ++n) {
-        const int column = i + n * LIST_TILE;
-        const ulong header = column < lists_wide ? headers[tile_of_list(column, j, lists_wide)] : 0;
-        lists.first[n] = (OFFSET_T)(header & ((1UL << FIRST_BITS) - 1));
-        lists.tile_counts[n] = (int)(header >> FIRST_BITS);
-        lists.longest = max(lists.longest, lists.tile_counts[n]);
-        any_first = lists.tile_counts[n] > 0 ? lists.first[n] : any_first;
+    for (int n = 0; n < PACKET_BUNDLES; ++n) {
+        const int column = i + n * BUNDLE;
+        const ulong header = column < lists_wide ? headers[BUNDLE_OF_LIST(column, j, lists_wide)] : 0;
+        lists.first[n] = first_of_header(header);
+        lists.counts[n] = count_of_header(header);
+        lists.longest = max(lists.longest, lists.counts[n]);
+        any_first = lists.counts[n] > 0 ? lists.first[n] : any_first;
     }
-    for (int n = 0; n < PACKET_TILES; ++n)
-        lists.first[n] = lists.tile_counts[n] > 0 ? lists.first[n] : any_first;
-    const int4 counts = vload4(0, lists.tile_counts);
-    lists.counts = (Ints)(counts, counts, counts, counts);
+    for (int n = 0; n < PACKET_BUNDLES; ++n)
+        lists.first[n] = lists.counts[n] > 0 ? lists.first[n] : any_first;
+    const int4 counts = vload4(0, lists.counts);
+    lists.list.count = (Int)(counts, counts, counts, counts);
     return lists;
 }
 
 // The first `depth` supersegments of all lists.
 inline void fetch(SUPERSEGMENTS_PARAMETERS const Lists *lists, int depth)
 {
-    for (int n = 0; n < PACKET_TILES; ++n) {
+    for (int n = 0; n < PACKET_BUNDLES; ++n) {
         const OFFSET_T first = lists->first[n];
-        const OFFSET_T end = first + min(depth, lists->tile_counts[n]) * LISTS_PER_TILE;
+        const OFFSET_T end = first + min(depth, lists->counts[n]) * LISTS_PER_BUNDLE;
 #ifdef PACKED
         fetch_lines(supersegments, 2 * first, 2 * end);
 #else
@@ -210,64 +190,57 @@ inline void fetch(SUPERSEGMENTS_PARAMETERS const Lists *lists, int depth)
     }
 }
 
-// Entry of the k-th supersegment of a tile's first list; of any, if the tile has no more.
+// Entry of the k-th supersegment of a bundle's first list; of any, if the bundle has no more.
 inline OFFSET_T entry_at(const Lists *lists, int n, int k)
 {
-    return lists->first[n] + (k < lists->tile_counts[n] ? k * LISTS_PER_TILE : 0);
+    return lists->first[n] + (k < lists->counts[n] ? k * LISTS_PER_BUNDLE : 0);
 }
 
 // `words` of 8 bytes, two of which an entry takes.
 inline Quads quads_at(__global const ulong *words, const Lists *lists, int k)
 {
-    Quads of_tiles;
-    for (int n = 0; n < PACKET_TILES; ++n)
-        of_tiles.of[n] = vload16(0, (__global const float *)(words + 2 * entry_at(lists, n, k)));
-    return transposed(of_tiles);
+    Quads of_bundles;
+    for (int n = 0; n < PACKET_BUNDLES; ++n)
+        of_bundles.of[n] = vload16(0, (__global const float *)(words + 2 * entry_at(lists, n, k)));
+    return transposed(of_bundles);
 }
 
 #ifdef PACKED
-inline Faces faces_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, float depth_origin)
+inline Faces faces_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k)
 {
     const Quads quads = quads_at(supersegments, lists, k);
     const Faces at = {quads.of[0], quads.of[1], {as_uint16(quads.of[2]), as_uint16(quads.of[3])}};
     return at;
 }
 
-// As medium_of.
-inline Media media_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, Faces at)
+inline Real4 media_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, Faces at)
 {
-    const uint16 color = at.words[1];
-    const Media media = {convert_float16(color & 2047) * (1.0f / 2047.0f),
-                         convert_float16(color >> 11 & 2047) * (1.0f / 2047.0f),
-                         convert_float16(color >> 22) * (1.0f / 1023.0f), as_float16(at.words[0])};
-    return media;
+    return medium_of(at.words[0], at.words[1]);
 }
 #else
-inline float8 faces_of_tile(__global const ulong *faces, const Lists *lists, int n, int k)
+inline float8 faces_of_bundle(__global const ulong *faces, const Lists *lists, int n, int k)
 {
     return vload8(0, (__global const float *)(faces + entry_at(lists, n, k)));
 }
 
-inline Faces faces_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, float depth_origin)
+inline Faces faces_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k)
 {
-    const Reals of_01 = (Reals)(faces_of_tile(faces, lists, 0, k), faces_of_tile(faces, lists, 1, k));
-    const Reals of_23 = (Reals)(faces_of_tile(faces, lists, 2, k), faces_of_tile(faces, lists, 3, k));
-    const Faces at = {((Reals)(of_01.even, of_23.even)).s048c159d26ae37bf, ((Reals)(of_01.odd, of_23.odd)).s048c159d26ae37bf};
+    const Real of_01 = (Real)(faces_of_bundle(faces, lists, 0, k), faces_of_bundle(faces, lists, 1, k));
+    const Real of_23 = (Real)(faces_of_bundle(faces, lists, 2, k), faces_of_bundle(faces, lists, 3, k));
+    const Faces at = {((Real)(of_01.even, of_23.even)).s048c159d26ae37bf, ((Real)(of_01.odd, of_23.odd)).s048c159d26ae37bf};
     return at;
 }
 
-inline Media media_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, Faces at)
+inline Real4 media_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, Faces at)
 {
     const Quads quads = quads_at(media, lists, k);
-    const Media result = {quads.of[0], quads.of[1], quads.of[2], quads.of[3]};
-    return result;
+    return REAL4(quads.of[0], quads.of[1], quads.of[2], quads.of[3]);
 }
 #endif
 #endif
 
-__attribute__((vec_type_hint(float16)))
-__kernel void raycast_own_lists(
-    __global const HEADER_T *headers,   // of the tiles of lists, see raycasting/supersegments.cl
+KERNEL_OF_LANES void raycast_aligned_view(
+    __global const HEADER_T *headers,   // of the bundles of lists, see raycasting/supersegments.cl
     SUPERSEGMENTS_PARAMETERS            // see raycasting/supersegments.cl
     int lists_wide, int lists_high,     // window of V_O
     float depth_origin,                 // world units
@@ -284,23 +257,23 @@ __kernel void raycast_own_lists(
     __global float4 *image)             // premultiplied RGBA, top row first
 {
     // Packets begin at multiples of their size, in lists
-    const int first_i = -origin.x & -PACKET_WIDE, first_j = -origin.y & -TILE_HIGH;
+    const int first_i = -origin.x & -PACKET_WIDE, first_j = -origin.y & -BUNDLE_HIGH;
     const int packets_wide = (width - origin.x - first_i + PACKET_WIDE - 1) / PACKET_WIDE;
     const int packet = (int)get_global_id(0);
     const int i = first_i + packet % packets_wide * PACKET_WIDE;
-    const int j = first_j + packet / packets_wide * TILE_HIGH;
+    const int j = first_j + packet / packets_wide * BUNDLE_HIGH;
     const int x = i + origin.x, y = j + origin.y;
     if (y >= height)
         return;
-    const bool whole = x >= 0 && x + PACKET_WIDE <= width && y >= 0 && y + TILE_HIGH <= height;
+    const bool whole = x >= 0 && x + PACKET_WIDE <= width && y >= 0 && y + BUNDLE_HIGH <= height;
     const long place = (long)(height - 1 - y) * width + x; // of the first pixel; row y + 1 is a width before
 // Whether a pixel of the packet is one of the window's
 #define IS_IN_WINDOW(dx, dy) (x + (dx) >= 0 && x + (dx) < width && y + (dy) >= 0 && y + (dy) < height)
 
     Seen seen = nothing_seen();
-    const Lists lists = lists_at(headers, SUPERSEGMENTS_ARGUMENTS i, j, lists_wide, lists_high);
+    const Lists lists = lists_at(headers, SUPERSEGMENTS_ARGUMENTS i, j, lists_wide, lists_high, depth_origin);
     if (lists.longest > 0) {
-        Reals t_end = INFINITY;
+        Real t_end = INFINITY;
         if (has_opaque_depth) {
             float ends[LANES];
             for (int lane = 0; lane < LANES; ++lane) {
@@ -309,54 +282,54 @@ __kernel void raycast_own_lists(
             }
             t_end = vload16(0, ends);
         }
-        const Reals a = convert_float16(x + LANE_X) + 0.5f - 0.5f * (float)width;
-        const Reals b = convert_float16(y + LANE_Y) + 0.5f - 0.5f * (float)height;
-        const Ints wanted = IS_IN_WINDOW(LANE_X, LANE_Y) && i + LANE_X < lists_wide && j + LANE_Y < lists_high &&
-                            lists.counts > 0;
-        Reals t0, t1;
-        Ints going = clip_packet(forms, planes, a, b, t_end, wanted, &t0, &t1);
-        const Reals begin = list_depths(forms, a, b, t0);
-        const Reals end = list_depths(forms, a, b, t1);
+        const Real a = offsets_from_middle(x + LANE_X, width);
+        const Real b = offsets_from_middle(y + LANE_Y, height);
+        const Int wanted = IS_IN_WINDOW(LANE_X, LANE_Y) && i + LANE_X < lists_wide && j + LANE_Y < lists_high &&
+                            lists.list.count > 0;
+        Real t0 = -INFINITY, t1 = t_end;
+        Int going = clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, planes, a, b, &t0, &t1) && wanted;
+        const Real begin = list_depth(forms, a, b, SELECT((Real)(0.0f), t0, going));
+        const Real end = list_depth(forms, a, b, SELECT((Real)(1.0f), t1, going));
         // Model length per unit of V_O's depth
-        Reals scale = MODEL_SPEED(Reals, forms, a, b) / FORM_SLOPE(Reals, forms + Z_FORM * FORM_SIZE, a, b);
+        Real scale = model_speed(forms, a, b) / FORM_SLOPE(Real, forms + Z_FORM * FORM_SIZE, a, b);
 #ifdef SHIFTED
         scale *= depth_origin;
 #endif
         int k = 0;
         for (; k < lists.longest; ++k) {
-            const Faces at = faces_at(SUPERSEGMENTS_ARGUMENTS &lists, k, depth_origin);
-            going = going && k < lists.counts && at.front < end && !(seen.transmittance < transmittance_cutoff);
-            const Reals from = HIGHER_OF(at.front, begin);
-            const Reals to = LOWER_OF(at.back, end);
-            const Ints meet = going && from < to;
+            const Faces at = faces_at(SUPERSEGMENTS_ARGUMENTS &lists, k);
+            going = going && k < lists.list.count && at.front < end && !(seen.sums.w < transmittance_cutoff);
+            const Real from = HIGHER_OF(at.front, begin);
+            const Real to = LOWER_OF(at.back, end);
+            const Int meet = going && from < to;
             if (!ANY(meet)) {
                 if (!ANY(going))
                     break;
                 continue;
             }
-            const Media medium = media_at(SUPERSEGMENTS_ARGUMENTS &lists, k, at);
+            const Real4 medium = media_at(SUPERSEGMENTS_ARGUMENTS &lists, k, at);
 #ifdef PARALLEL
-            const Reals lengths = scale * (to - from);
+            const Real lengths = scale * (to - from);
 #else
-            const Reals lengths = scale * (to - from) / (NEARNESS(from) * NEARNESS(to));
+            const Real lengths = scale * (to - from) / (NEARNESS(from) * NEARNESS(to));
 #endif
-            composite_medium(&seen, medium.extinction * lengths, medium.red, medium.green, medium.blue, meet);
+            composite_medium(&seen, medium.w * lengths, medium, meet);
         }
         // The next packet, which comes to about the same depth: all at once, as loads in the loop are not
-        const Lists next = lists_at(headers, SUPERSEGMENTS_ARGUMENTS i + PACKET_WIDE, j, lists_wide, lists_high);
+        const Lists next = lists_at(headers, SUPERSEGMENTS_ARGUMENTS i + PACKET_WIDE, j, lists_wide, lists_high, depth_origin);
         fetch(SUPERSEGMENTS_ARGUMENTS &next, k + 1);
         // The others have looked at what is not theirs, or lies beside V_O's window, where there may be anything
-        seen.red = select((Reals)(0.0f), seen.red, wanted);
-        seen.green = select((Reals)(0.0f), seen.green, wanted);
-        seen.blue = select((Reals)(0.0f), seen.blue, wanted);
+        seen.sums.x = select((Real)(0.0f), seen.sums.x, wanted);
+        seen.sums.y = select((Real)(0.0f), seen.sums.y, wanted);
+        seen.sums.z = select((Real)(0.0f), seen.sums.z, wanted);
     }
 
-    const Quads channels = {{seen.red, seen.green, seen.blue, alpha_seen(&seen)}};
-    const Quads pixels = transposed(channels); // of each tile, row by row
-    for (int n = 0; n < PACKET_TILES; ++n) {
-        __global float4 *const target = image + place + n * TILE_WIDE;
+    const Quads channels = {{seen.sums.x, seen.sums.y, seen.sums.z, alpha_seen(&seen)}};
+    const Quads pixels = transposed(channels); // of each bundle, row by row
+    for (int n = 0; n < PACKET_BUNDLES; ++n) {
+        __global float4 *const target = image + place + n * BUNDLE_WIDE;
         if (whole) {
-#if TILE_HIGH == 1
+#if BUNDLE_HIGH == 1
             vstore16(pixels.of[n], 0, (__global float *)target);
 #else
             vstore8(pixels.of[n].lo, 0, (__global float *)target);
@@ -364,11 +337,11 @@ __kernel void raycast_own_lists(
 #endif
             continue;
         }
-        float4 colors[LISTS_OF_TILE];
+        float4 colors[BUNDLE_WIDE * BUNDLE_HIGH];
         vstore16(pixels.of[n], 0, (float *)colors);
-        for (int p = 0; p < LISTS_OF_TILE; ++p) {
-            const int dx = p % TILE_WIDE, dy = p / TILE_WIDE;
-            if (IS_IN_WINDOW(n * TILE_WIDE + dx, dy))
+        for (int p = 0; p < BUNDLE_WIDE * BUNDLE_HIGH; ++p) {
+            const int dx = p % BUNDLE_WIDE, dy = p / BUNDLE_WIDE;
+            if (IS_IN_WINDOW(n * BUNDLE_WIDE + dx, dy))
                 target[dx - dy * width] = colors[p];
         }
     }

@@ -1,8 +1,8 @@
-// The occupancy grid: how many supersegments reach into each cell (paper, section 4), and for each tile of lists the set of
-// its occupied slabs as one 64-bit mask, which answers a ray's whole crossing of the tile with one load.
+// The occupancy grid: how many supersegments reach into each cell (paper, section 4), and for each stack of cells the set of
+// its occupied slabs as one 64-bit mask, which answers a ray's whole crossing of the stack with one load.
 //
 // -D OFFSET_T   type of an offset into the supersegments: uint or ulong
-#include "raycasting/tiles.cl"
+#include "raycasting/stacks.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // One work-item per list. Each supersegment adds 1 where it begins and takes 1 away behind its end, whatever it spans;
@@ -12,18 +12,18 @@ __kernel void count_supersegments(
     __global const float *fronts,     // view depth less depth_origin
     __global const float *backs,
     int width, int height,            // lists
-    int tiles_wide,
+    int stacks_wide,
     float first_depth,                // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,            // per world unit
     float margin,                     // by which supersegments count beyond their faces, world units
-    __global uint *changes)           // of the counts along each tile: tiles_high, tiles_wide, SLABS; all 0
+    __global uint *changes)           // of the counts of each stack: stacks_high, stacks_wide, SLABS; all 0
 {
     const size_t list = get_global_id(0);
     if (list >= (size_t)width * (size_t)height)
         return;
-    const size_t i = (list % (size_t)width) >> TILE_SHIFT;
-    const size_t j = (list / (size_t)width) >> TILE_SHIFT;
-    __global uint *cells = changes + (j * (size_t)tiles_wide + i) * SLABS;
+    const size_t i = (list % (size_t)width) >> STACK_SHIFT;
+    const size_t j = (list / (size_t)width) >> STACK_SHIFT;
+    __global uint *cells = changes + (j * (size_t)stacks_wide + i) * SLABS;
     for (OFFSET_T k = offsets[list]; k < offsets[list + 1]; ++k) {
         const int first = slab_of(fronts[k] - margin, first_depth, slabs_per_depth);
         const int last = slab_of(backs[k] + margin, first_depth, slabs_per_depth);
@@ -33,18 +33,18 @@ __kernel void count_supersegments(
     }
 }
 
-// One work-item per tile: its changes become counts.
-__kernel void occupied_slabs(__global uint *counts, uint tiles, __global ulong *masks)
+// One work-item per stack: its changes become counts.
+__kernel void occupied_slabs(__global uint *counts, uint stacks, __global ulong *masks)
 {
-    const size_t tile = get_global_id(0);
-    if (tile >= tiles)
+    const size_t stack = get_global_id(0);
+    if (stack >= stacks)
         return;
     ulong mask = 0;
     uint count = 0;
     for (int slab = 0; slab < SLABS; ++slab) {
-        count += counts[tile * SLABS + slab];
-        counts[tile * SLABS + slab] = count;
+        count += counts[stack * SLABS + slab];
+        counts[stack * SLABS + slab] = count;
         mask |= (ulong)(count > 0) << slab;
     }
-    masks[tile] = mask;
+    masks[stack] = mask;
 }

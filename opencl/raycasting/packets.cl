@@ -1,4 +1,4 @@
-// VDI to image from a view that is turned far from V_O: what raycasting/raycast.cl does, for packets of rays (raycasting/packet.cl).
+// VDI to image from a view that is turned far from V_O: what raycasting/raycast.cl does, for packets of rays.
 //
 // A packet's rays cross the same lists, if not at the same depth. The work-item sweeps over the lists along one axis of V_O's
 // window, p, from where its first ray begins: in each column of lists, list by list along the other axis, q, all rays that
@@ -10,11 +10,42 @@
 // -D SKIP_EMPTY         as in raycasting/raycast.cl: the picture is the same to the last bit
 // -D OFFSET_T, PARALLEL, SHIFTED, PACKED, COMPENSATED (1)    as there
 #define LANES 16
+#define SHARED_LISTS
 #include "raycasting/lists.cl"
-#include "raycasting/packet_light.cl"
-#include "raycasting/slabs_ahead.cl"
+#include "raycasting/stepping.cl"
+#include "raycasting/pixels.cl"
+#include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
+#define NOWHERE INT_MAX
+
+// The least of those that are chosen, NOWHERE if none is.
+inline int least_of(Int x, Int chosen)
+{
+    return least_lane(select((Int)(NOWHERE), x, chosen));
+}
+
+// A packet's pixels lie along the image of the line that its rays share in V_O's window: an epipolar line. Rays of one plane
+// through both eyes cross the same lists, one after another. `epipole` is where V_N sees V_O's eye: homogeneous pixel offsets
+// along the strips' width, across it, and their denominator. A strip is LANES pixels wide; its packets are numbered by where
+// they meet that of its edges that is farther from the epipole, from before the window on. Lines draw together towards the
+// epipole: a pixel may be in two packets or more, whose numbers follow one another, and is in one at least.
+inline Int across_strip(int first, int number, int along_size, int across_size, float4 epipole)
+{
+    const float first_offset = (float)first + 0.5f - 0.5f * (float)along_size;
+    const float to_first = epipole.x - first_offset * epipole.z;
+    const float to_last = epipole.x - (first_offset + (float)(LANES - 1)) * epipole.z;
+    const bool last_is_farther = fabs(to_last) > fabs(to_first);
+    const float farther = last_is_farther ? to_last : to_first;
+    const float nearer = last_is_farther ? to_first : to_last;
+    float slope = 0.0f;
+    if (farther * nearer > 0.0f && fabs(nearer) > (float)LANES * fabs(epipole.z)) {
+        // By a product: what is rounded must still not grow, or a pixel would be left out
+        const float offset = (float)number + 0.5f - 0.5f * (float)across_size;
+        slope = clamp((epipole.y - offset * epipole.z) * (1.0f / farther), -STEEPEST, STEEPEST);
+    }
+    return number + convert_int16_rte(slope * convert_float16(LANE_NUMBERS - (last_is_farther ? LANES - 1 : 0)));
+}
 
 // Of u's and v's, that of p and that of q; and of p's and q's, those of u and v
 #ifdef SWEEP_V
@@ -25,111 +56,46 @@
 #define SECOND_OF(of_u, of_v) (of_v)
 #endif
 
-// One axis of V_O's window. A place along it is the index of a list times `step`: it grows along the rays.
-typedef struct {
-    Reals start, along, deep;
-    Reals zero, inverse; // of crossings, see there
-    int lists;
-    int step;            // 1 or -1: all lanes that go on together have the same
-    float middle, border; // half of the lists, and from a list's index to its border ahead
-} Axis;
-
-inline Axis axis_of(Reals start, Reals along, Reals deep, int lists)
-{
-    Axis axis;
-    axis.start = start;
-    axis.along = along;
-    axis.deep = deep;
-    // By a component that does not change, borders are crossed at infinity
-    axis.zero = select((Reals)(-INFINITY), deep, along != 0.0f);
-    axis.inverse = select((Reals)(1.0f), 1.0f / along, along != 0.0f);
-    axis.lists = lists;
-    axis.middle = 0.5f * (float)lists;
-    return axis;
-}
-
-inline void take_step(Axis *axis, bool upwards)
-{
-    axis->step = upwards ? 1 : -1;
-    axis->border = (upwards ? 1.0f : 0.0f) - axis->middle;
-}
-
-// Where the rays leave the lists of an index: from the border's number, never accumulated.
-inline Reals crossings(const Axis *axis, Reals index)
-{
-    return ((index + axis->border) - axis->zero) * axis->inverse;
-}
-
-inline Reals crossings_of(const Axis *axis, Ints index)
-{
-    return crossings(axis, convert_float16(index));
-}
-
 // How far the rays have come.
 typedef struct {
-    Ints p, q; // places of their lists; p is NOWHERE if they have ended
-    Reals r;
-    Reals depth; // in their sense, see raycasting/lists.cl
+    Int p, q; // places of their lists; p is NOWHERE if they have ended
+    Real r;
+    Real depth; // in their sense, see raycasting/lists.cl
 } Progress;
 
 #ifdef SKIP_EMPTY
-// The index of the list that stepping from `index` would have reached at r_until; see raycasting/raycast.cl.
-inline Ints index_reached(const Axis *axis, Ints index, int edge, Reals r_until)
+// Pass by what is empty for the lanes that look, which are in column P; a lane that comes to another stack is `fresh` there.
+inline void pass_by(Progress *now, Int *fresh, Int looks, int P, const ListRays *rays, const Axis *p, const Axis *q,
+                    const Sense *sense, const Grid *grid, float depth_origin)
 {
-    Ints reached = convert_int16(floor(fma(r_until, axis->along, axis->deep) + axis->middle));
-    reached = axis->step > 0 ? clamp(reached, index, (Ints)(edge + 1)) : clamp(reached, (Ints)(edge - 1), index);
-    const Ints too_far = reached != index && crossings_of(axis, reached - axis->step) > r_until;
-    const Ints farther = !too_far && crossings_of(axis, reached) <= r_until;
-    reached += select((Ints)(0), (Ints)(axis->step), farther) - select((Ints)(0), (Ints)(axis->step), too_far);
-    return select(index, reached, axis->along != 0.0f);
-}
-
-inline int tile_edge(const Axis *axis, int tile)
-{
-    return axis->step > 0 ? tile << TILE_SHIFT | (TILE - 1) : tile << TILE_SHIFT;
-}
-
-// Pass by what is empty for the lanes that look, which are in column P; a lane that comes to another tile is `fresh` there.
-inline void pass_by(Progress *now, Ints *fresh, Ints looks, int P, const Packet *packet, const Axis *p, const Axis *q,
-                    Reals inverse_depth, float sense, bool away, __global const ulong *masks, int tiles_wide, float first_depth,
-                    float slabs_per_depth, float depth_origin)
-{
-    const int tile_p = P >> TILE_SHIFT;
-    const Reals along_depth = sense * packet->along_z;
-    const Reals deep_depth = sense * packet->deep_z;
+    const int stack_p = P >> STACK_SHIFT;
     while (ANY(looks)) {
-        // Those in one tile; there is seldom a second one
-        const int tile_q = least_of(now->q, looks) * q->step >> TILE_SHIFT;
-        const Ints index_q = now->q * q->step;
-        const Ints here = looks && index_q >> TILE_SHIFT == tile_q;
+        // Those in one stack; there is seldom a second one
+        const int stack_q = least_of(now->q, looks) * q->step >> STACK_SHIFT;
+        const Int index_q = now->q * q->step;
+        const Int here = looks && index_q >> STACK_SHIFT == stack_q;
         looks = looks && !here;
-        const ulong mask = masks[SECOND_OF(tile_p, tile_q) * tiles_wide + FIRST_OF(tile_p, tile_q)];
-        const Reals offsets = depth_offset(sense * now->depth, depth_origin);
-        const Ints slab = convert_int16(clamp((offsets - first_depth) * slabs_per_depth, 0.0f, (float)(SLABS - 1)));
-        Ints nothing;
-        const Ints nearest = nearest_slabs((uint16)((uint)mask), (uint16)((uint)(mask >> HALF_SLABS)), slab, away, &nothing);
-        const Ints passes = here && (nothing || nearest != slab);
+        const ulong mask = grid->masks[SECOND_OF(stack_p, stack_q) * grid->stacks_wide + FIRST_OF(stack_p, stack_q)];
+        Int nearest, nothing;
+        const Int passes = look_ahead(&nearest, &nothing, (Uint)((uint)mask), (Uint)((uint)(mask >> HALF_SLABS)), sense,
+                                      now->depth, here, grid, depth_origin);
         if (!ANY(passes))
             continue;
-        const int edge_p = tile_edge(p, tile_p);
-        const int edge_q = tile_edge(q, tile_q);
-        const Reals faces = first_depth + convert_float16(away ? nearest : nearest + 1) / slabs_per_depth;
-        const Reals r_face = (sense * depth_coordinate(faces, depth_origin) - deep_depth) * inverse_depth;
-        Reals r_until = LOWER_OF(crossings(p, (Reals)(edge_p)), crossings(q, (Reals)(edge_q)));
-        r_until = select(r_until, LOWER_OF(r_until, r_face), !nothing && along_depth != 0.0f);
-        const Ints next_p = index_reached(p, (Ints)(P), edge_p, r_until);
-        const Ints next_q = index_reached(q, index_q, edge_q, r_until);
-        Reals r = now->r;
-        r = select(r, HIGHER_OF(r, crossings_of(p, next_p - p->step)), next_p != P);
-        r = select(r, HIGHER_OF(r, crossings_of(q, next_q - q->step)), next_q != index_q);
-        const Ints moves = passes && (next_p != P || next_q != index_q);
+        const int edge_p = stack_edge(p, stack_p << STACK_SHIFT);
+        const int edge_q = stack_edge(q, stack_q << STACK_SHIFT);
+        const Real r_border = fmin(CROSSINGS(p, (Real)(edge_p)), CROSSINGS(q, (Real)(edge_q)));
+        const Real r_until = empty_until(r_border, nearest, nothing, sense, grid, depth_origin);
+        const Int next_p = index_reached(p, (Int)(P), edge_p, r_until);
+        const Int next_q = index_reached(q, index_q, edge_q, r_until);
+        const Int moves = passes && (next_p != P || next_q != index_q);
+        const Real r = r_entered(q, r_entered(p, now->r, (Int)(P), next_p), index_q, next_q);
         now->r = select(now->r, r, moves);
-        now->depth = select(now->depth, fma(r, along_depth, deep_depth), moves);
-        const Ints ends = r_until >= packet->r_begin + 1.0f || next_p < 0 || next_p >= p->lists || next_q < 0 ||
-                          next_q >= q->lists;
+        now->depth = select(now->depth, depth_at(sense, r), moves);
+        const Int ends = r_until >= rays->r_begin + 1.0f || next_p < 0 || next_p >= p->lists || next_q < 0 ||
+                         next_q >= q->lists;
         now->q = select(now->q, next_q * q->step, passes);
-        now->p = select(now->p, select(next_p * p->step, (Ints)(NOWHERE), ends), passes);
-        const Ints enters = passes && !ends && ((next_p ^ P) | (next_q ^ index_q)) >> TILE_SHIFT != 0;
+        now->p = select(now->p, select(next_p * p->step, (Int)(NOWHERE), ends), passes);
+        const Int enters = passes && !ends && ((next_p ^ P) | (next_q ^ index_q)) >> STACK_SHIFT != 0;
         looks = looks || (enters && next_p == P);
         *fresh = *fresh || (enters && next_p != P);
     }
@@ -139,71 +105,67 @@ inline void pass_by(Progress *now, Ints *fresh, Ints looks, int P, const Packet 
 // The supersegment that each ray has met last and that is not composited yet: that takes as long for one ray as for all, and
 // few of them are in the same supersegment at a time.
 typedef struct {
-    Ints waits; // rays that have one
-    Reals near, far, r, r_next; // its faces in their sense, and from where to where they cross the list
-    Reals red, green, blue, extinction;
+    Int waits; // rays that have one
+    Real near, far, r, r_next; // its faces in their sense, and from where to where they cross the list
+    Real4 medium;
 } Met;
 
 // Composite what waits.
-inline void composite_met(Seen *seen, Met *met, const Packet *packet, Reals along_depth, Reals deep_depth, Reals inverse_depth)
+inline void composite_met(Seen *seen, Met *met, const ListRays *rays, const Sense *sense, float depth_origin)
 {
-    const Reals depth = fma(met->r, along_depth, deep_depth);
-    const Reals next_depth = fma(met->r_next, along_depth, deep_depth);
-    const Reals length_crossed = lengths_between(packet, met->near, met->far, met->r, met->r_next, depth, next_depth,
-                                                 deep_depth, inverse_depth);
-    composite_medium(seen, met->extinction * length_crossed, met->red, met->green, met->blue, met->waits);
+    Real from, to;
+    clip_to_faces(&from, &to, sense, met->near, met->far, met->r, met->r_next, depth_at(sense, met->r),
+                  depth_at(sense, met->r_next));
+    composite_medium(seen, met->medium.w * length_crossed(rays, from, to, depth_origin), met->medium, met->waits);
     met->waits = 0;
 }
 
 // Follow the rays that are `going`, which step the same way, through all lists that they cross.
 __attribute__((always_inline))
-inline void sweep(Seen *seen, const Packet *packet, const Axis *p, const Axis *q, Ints going, Ints first_p, Ints first_q,
+inline void sweep(Seen *seen, const ListRays *rays, const Axis *p, const Axis *q, Int going, Int first_p, Int first_q,
                   bool away, __global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int lists_wide, float depth_origin,
                   float transmittance_cutoff, __global const ulong *masks, float first_depth, float slabs_per_depth)
 {
-    const float sense = away ? 1.0f : -1.0f;
-    const Reals along_depth = sense * packet->along_z;
-    const Reals deep_depth = sense * packet->deep_z;
-    const Reals inverse_depth = select((Reals)(0.0f), 1.0f / along_depth, packet->along_z != 0.0f);
-    const Reals r_end = packet->r_begin + 1.0f;
+    const Sense sense = sense_of(rays, away);
+    const Real r_end = rays->r_begin + 1.0f;
     Met met;
     met.waits = 0;
-    met.near = met.far = met.r = met.r_next = met.red = met.green = met.blue = met.extinction = 0.0f;
+    met.near = met.far = met.r = met.r_next = met.medium.x = met.medium.y = met.medium.z = met.medium.w = 0.0f;
     Progress now;
-    now.p = select((Ints)(NOWHERE), first_p * p->step, going);
+    now.p = select((Int)(NOWHERE), first_p * p->step, going);
     now.q = first_q * q->step;
-    now.r = packet->r_begin;
-    now.depth = sense * packet->start_z;
+    now.r = rays->r_begin;
+    now.depth = sense.sign * rays->start.z;
     int n = 0; // the supersegment that the last list was left at
 #ifdef SKIP_EMPTY
-    Ints fresh = going; // lanes in a tile that they have not looked at
+    const Grid grid = {masks, STACKS_ALONG(lists_wide), first_depth, slabs_per_depth};
+    Int fresh = going; // lanes in a stack that they have not looked at
 #endif
-    for (int place_p = least(now.p); place_p != NOWHERE; place_p = least(now.p)) {
+    for (int place_p = least_lane(now.p); place_p != NOWHERE; place_p = least_lane(now.p)) {
         const int P = place_p * p->step;
-        Ints column = now.p == place_p;
+        Int column = now.p == place_p;
 #ifdef SKIP_EMPTY
-        const Ints looks = column && fresh;
+        const Int looks = column && fresh;
         if (ANY(looks)) {
             fresh = fresh && !looks;
-            pass_by(&now, &fresh, looks, P, packet, p, q, inverse_depth, sense, away, masks,
-                    (lists_wide + TILE - 1) >> TILE_SHIFT, first_depth, slabs_per_depth, depth_origin);
+            pass_by(&now, &fresh, looks, P, rays, p, q, &sense, &grid, depth_origin);
             column = now.p == place_p;
         }
 #endif
-        const Reals r_p = crossings(p, (Reals)(P));
+        const Real r_p = CROSSINGS(p, (Real)(P));
         // By the columns before: where a ray goes does not wait for what it sees in this one
-        const Ints dark = seen->transmittance < transmittance_cutoff;
+        const Int dark = seen->sums.w < transmittance_cutoff;
         if (!ANY(column))
             continue;
         for (int place_q = least_of(now.q, column);; ++place_q) {
-            const Ints here = column && now.q == place_q;
+            const Int here = column && now.q == place_q;
             if (!ANY(here))
                 continue;
             // They cross list (P, Q) from now.r to r_next
             const int Q = place_q * q->step;
-            const Reals r_q = crossings(q, (Reals)(Q));
-            const Reals r_next = HIGHER_OF(now.r, LOWER_OF(r_end, LOWER_OF(r_p, r_q)));
-            const Reals next_depth = fma(r_next, along_depth, deep_depth);
+            const Real r_q = CROSSINGS(q, (Real)(Q));
+            const Real r_next = HIGHER_OF(now.r, LOWER_OF(r_end, LOWER_OF(r_p, r_q)));
+            const Real next_depth = depth_at(&sense, r_next);
 
             const List list = LIST_AT(FIRST_OF(P, Q), SECOND_OF(P, Q));
             n = min(n, list.count);
@@ -211,55 +173,54 @@ inline void sweep(Seen *seen, const Packet *packet, const Axis *p, const Axis *q
                 --n;
             for (int k = n; k < list.count; ++k) {
                 const float near = near_face(list, SUPERSEGMENTS_ARGUMENTS k, away);
-                const Ints come_to = here && near <= next_depth;
+                const Int come_to = here && near <= next_depth;
                 if (!ANY(come_to))
                     break;
                 const float far = far_face(list, SUPERSEGMENTS_ARGUMENTS k, away);
-                const Ints meet = come_to && far > now.depth;
+                const Int meet = come_to && far > now.depth;
                 if (!ANY(meet)) {
                     n = k + 1;
                     continue;
                 }
                 if (ANY(meet && met.waits))
-                    composite_met(seen, &met, packet, along_depth, deep_depth, inverse_depth);
+                    composite_met(seen, &met, rays, &sense, depth_origin);
                 const float4 medium = MEDIUM(list, away ? k : list.count - 1 - k);
-                met.near = select(met.near, (Reals)(near), meet);
-                met.far = select(met.far, (Reals)(far), meet);
+                met.near = select(met.near, (Real)(near), meet);
+                met.far = select(met.far, (Real)(far), meet);
                 met.r = select(met.r, now.r, meet);
                 met.r_next = select(met.r_next, r_next, meet);
-                met.red = select(met.red, (Reals)(medium.x), meet);
-                met.green = select(met.green, (Reals)(medium.y), meet);
-                met.blue = select(met.blue, (Reals)(medium.z), meet);
-                met.extinction = select(met.extinction, (Reals)(medium.w), meet);
+                met.medium.x = select(met.medium.x, (Real)(medium.x), meet);
+                met.medium.y = select(met.medium.y, (Real)(medium.y), meet);
+                met.medium.z = select(met.medium.z, (Real)(medium.z), meet);
+                met.medium.w = select(met.medium.w, (Real)(medium.w), meet);
                 met.waits = met.waits || meet;
             }
-            const Ints steps_p = here && r_p <= r_q;
-            const Ints steps_q = here && !(r_p <= r_q);
-            Ints ends = here && (r_next >= r_end || dark);
-            ends = ends || (P + p->step < 0 || P + p->step >= p->lists ? steps_p : (Ints)(0));
-            ends = ends || (Q + q->step < 0 || Q + q->step >= q->lists ? steps_q : (Ints)(0));
+            const Int steps_p = here && r_p <= r_q;
+            const Int steps_q = here && !(r_p <= r_q);
+            Int ends = here && (r_next >= r_end || dark);
+            ends = ends || (P + p->step < 0 || P + p->step >= p->lists ? steps_p : (Int)(0));
+            ends = ends || (Q + q->step < 0 || Q + q->step >= q->lists ? steps_q : (Int)(0));
             now.r = select(now.r, r_next, here);
             now.depth = select(now.depth, next_depth, here);
-            now.p = select(select(now.p, (Ints)(place_p + 1), steps_p), (Ints)(NOWHERE), ends);
-            now.q = select(now.q, (Ints)(place_q + 1), steps_q);
+            now.p = select(select(now.p, (Int)(place_p + 1), steps_p), (Int)(NOWHERE), ends);
+            now.q = select(now.q, (Int)(place_q + 1), steps_q);
             column = now.p == place_p;
             const bool goes_on = ANY(column); // here, where it is one instruction, as the comparison has just made a mask
 #ifdef SKIP_EMPTY
-            if (((P + p->step) ^ P) >> TILE_SHIFT)
+            if (((P + p->step) ^ P) >> STACK_SHIFT)
                 fresh = fresh || steps_p;
-            if (((Q + q->step) ^ Q) >> TILE_SHIFT)
+            if (((Q + q->step) ^ Q) >> STACK_SHIFT)
                 fresh = fresh || steps_q;
 #endif
             if (!goes_on)
                 break;
         }
     }
-    composite_met(seen, &met, packet, along_depth, deep_depth, inverse_depth);
+    composite_met(seen, &met, rays, &sense, depth_origin);
 }
 
-__attribute__((vec_type_hint(float16)))
-__kernel void raycast_packets(
-    __global const HEADER_T *headers,   // of the tiles of lists, see raycasting/supersegments.cl
+KERNEL_OF_LANES void raycast_packets(
+    __global const HEADER_T *headers,   // of the bundles of lists, see raycasting/supersegments.cl
     SUPERSEGMENTS_PARAMETERS            // see raycasting/supersegments.cl
     int lists_wide, int lists_high,     // window of V_O
     float depth_origin,                 // world units
@@ -269,10 +230,10 @@ __kernel void raycast_packets(
     __global const float *opaque_depth, // t at which each pixel's ray ends, top row first, if has_opaque_depth
     int has_opaque_depth,
     float transmittance_cutoff,         // the ray ends where less than this is left
-    __global const ulong *masks,        // occupied slabs of each tile of lists, if SKIP_EMPTY
+    __global const ulong *masks,        // occupied slabs of each stack, if SKIP_EMPTY
     float first_depth,                  // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth,
-    float4 epipole,                     // see raycasting/packet.cl
+    float4 epipole,                     // see across_strip
     int4 part,                          // of the window: first strip, how many, number of each strip's first packet
     __global float4 *image)             // premultiplied RGBA, top row first
 {
@@ -286,48 +247,46 @@ __kernel void raycast_packets(
     const int block = item / LANES;
     const int first = (part.x + block % part.y) * LANES;
     const int number = part.z + block / part.y * LANES + item % LANES;
-    const Ints along = first + NUMBERS;
-    const Ints across = across_strip(first, number, along_size, across_size, epipole);
+    const Int along = first + LANE_NUMBERS;
+    const Int across = across_strip(first, number, along_size, across_size, epipole);
     // A pixel of two packets is the former's: how it is rounded depends on what the packet's other rays meet
-    const Ints is_own = across != across_strip(first, number - 1, along_size, across_size, epipole);
-    const Ints in_window = is_own && along < along_size && across >= 0 && across < across_size;
+    const Int is_own = across != across_strip(first, number - 1, along_size, across_size, epipole);
+    const Int in_window = is_own && along < along_size && across >= 0 && across < across_size;
     if (!ANY(in_window))
         return;
 #ifdef UPRIGHT
-    const Ints x = across, y = along;
+    const Int x = across, y = along;
 #else
-    const Ints x = along, y = across;
+    const Int x = along, y = across;
 #endif
     const Pixels pixels = pixels_at(x, y, in_window, width, height);
-    const Reals t_end = has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Reals)(INFINITY);
-    const Reals a = convert_float16(x) + 0.5f - 0.5f * (float)width;
-    const Reals b = convert_float16(y) + 0.5f - 0.5f * (float)height;
-    const Packet packet = begin_packet(forms, planes, a, b, t_end, in_window, depth_origin);
+    const Real t_end = has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Real)(INFINITY);
+    const ListRays rays = begin_rays(forms, planes, offsets_from_middle(x, width), offsets_from_middle(y, height), t_end, in_window,
+                                 depth_origin);
 
     Seen seen = nothing_seen();
-    Axis p = axis_of(FIRST_OF(packet.start_u, packet.start_v), FIRST_OF(packet.along_u, packet.along_v),
-                     FIRST_OF(packet.deep_u, packet.deep_v), FIRST_OF(lists_wide, lists_high));
-    Axis q = axis_of(SECOND_OF(packet.start_u, packet.start_v), SECOND_OF(packet.along_u, packet.along_v),
-                     SECOND_OF(packet.deep_u, packet.deep_v), SECOND_OF(lists_wide, lists_high));
-    const Ints first_p = clamp(convert_int16(floor(p.start + p.middle)), 0, p.lists - 1);
-    const Ints first_q = clamp(convert_int16(floor(q.start + q.middle)), 0, q.lists - 1);
+    Axis p = axis_of(FIRST_OF(rays.along.x, rays.along.y), FIRST_OF(rays.deep.x, rays.deep.y), FIRST_OF(lists_wide, lists_high));
+    Axis q = axis_of(SECOND_OF(rays.along.x, rays.along.y), SECOND_OF(rays.deep.x, rays.deep.y),
+                     SECOND_OF(lists_wide, lists_high));
+    const Int first_p = list_index(&p, FIRST_OF(rays.start.x, rays.start.y), 0);
+    const Int first_q = list_index(&q, SECOND_OF(rays.start.x, rays.start.y), 0);
     // Rays that step the same way go on together: nearly always, all
-    const Ints ways = (packet.away & 1) | ((p.along > 0.0f) & 2) | ((q.along > 0.0f) & 4);
-    for (Ints waiting = packet.present; ANY(waiting);) {
+    const Int ways = (rays.away & 1) | ((p.along > 0.0f) & 2) | ((q.along > 0.0f) & 4);
+    for (Int waiting = rays.present; ANY(waiting);) {
         const int way = least_of(ways, waiting);
-        const Ints going = waiting && ways == way;
+        const Int going = waiting && ways == way;
         waiting = waiting && !going;
         const bool away = way & 1;
         take_step(&p, way & 2);
         take_step(&q, way & 4);
         if (away)
-            sweep(&seen, &packet, &p, &q, going, first_p, first_q, true, headers,
+            sweep(&seen, &rays, &p, &q, going, first_p, first_q, true, headers,
                   SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin, transmittance_cutoff, masks, first_depth,
                   slabs_per_depth);
         else
-            sweep(&seen, &packet, &p, &q, going, first_p, first_q, false, headers,
+            sweep(&seen, &rays, &p, &q, going, first_p, first_q, false, headers,
                   SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin, transmittance_cutoff, masks, first_depth,
                   slabs_per_depth);
     }
-    write_pixels(image, &pixels, &seen);
+    write_pixels(image, &pixels, composited(&seen));
 }

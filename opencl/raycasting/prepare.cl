@@ -1,5 +1,5 @@
 // A VDI's arrays to what the raycaster reads: faces in list space and extinction in place of optical depth.
-// The arrays hold offsets, see lib/list_space.cl, whose -D names hold here. They are brought into tiles, see
+// The arrays hold offsets, see lib/list_space.cl, whose -D names hold here. They are brought into bundles, see
 // raycasting/supersegments.cl.
 //
 // -D PACKED=16   both in one array, see raycasting/supersegments.cl; the form of 8 bytes is made by the host
@@ -16,7 +16,7 @@
 // One work-item per list.
 __kernel void prepare_lists(
     __global const OFFSET_T *starts,      // of the lists in the arrays, width * height + 1
-    __global const ulong *headers,        // of the tiles of lists, see raycasting/supersegments.cl
+    __global const ulong *headers,        // of the bundles of lists, see raycasting/supersegments.cl
     __global const float *fronts,         // view depth less depth_origin
     __global const float *backs,
 #ifdef PACKED

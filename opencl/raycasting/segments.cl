@@ -6,11 +6,11 @@
 // -D SEGMENTS  how they lie:
 //                  1  rays in blocks of 16, component by component, so that neighbouring work-items touch neighbouring words
 //                  2  ray by ray, a segment's components together, so that a vector's lanes are loaded and stored in whole
-//                     rows, see raycasting/segment_rows.cl
+//                     rows; a ray then has SPARE_SLOTS
+#include "lib/transpose.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 #define BOX_PLANES 6 // of a VDI's bounds: the first of its planes to clip to
-#define SEGMENT_SIZE 6 // floats
 #define RAY_BLOCK 16
 // More cannot be told from opaque, and a part of it is still a number
 #define MAX_OPTICAL_DEPTH 1e30f
@@ -19,28 +19,93 @@
 // rounded
 #define DARK_FROM(dark, depth_shift) ((dark) - (depth_shift) + 5e-7f * (fabs(dark) + fabs(depth_shift)))
 
-#define SEGMENT_FROM 0
-#define SEGMENT_TO 1
-#define SEGMENT_OPTICAL_DEPTH 2
-#define SEGMENT_COLOR 3
+typedef struct {
+    Real from, to, optical_depth;
+    Real4 color; // straight RGB
+} Segments;
 
-#if SEGMENTS == 2
+// The part of the pool that a work-item's rays have, from its first one on; and where, in it, they keep the segments of their
+// slots.
+#if defined(SEGMENTS) && SEGMENTS == 2
+#define POOL_OF(pool, first_ray, capacity) ((pool) + (size_t)(first_ray) * ((capacity) + SPARE_SLOTS) * SEGMENT_SIZE)
+#define ROWS_OF(slots, capacity) ((LANE_NUMBERS * ((capacity) + SPARE_SLOTS) + (slots)) * SEGMENT_SIZE)
 #define COMPONENTS_APART 1 // floats
-#define SPARE_SLOTS 2      // of each ray: those of pyvista_vdi/joint.py
-
-inline size_t segment_place(int ray, int slot, int capacity)
-{
-    return ((size_t)ray * (capacity + SPARE_SLOTS) + slot) * SEGMENT_SIZE;
-}
 #else
+#define POOL_OF(pool, first_ray, capacity) \
+    ((pool) + (size_t)((first_ray) / RAY_BLOCK) * (capacity) * (SEGMENT_SIZE * RAY_BLOCK) + (first_ray) % RAY_BLOCK)
+#define ROWS_OF(slots, capacity) ((slots) * (SEGMENT_SIZE * RAY_BLOCK))
 #define COMPONENTS_APART RAY_BLOCK
-
-inline size_t segment_place(int ray, int slot, int capacity)
-{
-    return ((size_t)(ray / RAY_BLOCK) * capacity + slot) * (SEGMENT_SIZE * RAY_BLOCK) + ray % RAY_BLOCK;
-}
 #endif
 
-// A component of the segment in a ray's slot.
-#define SEGMENT(pool, ray, slot, capacity, component) \
-    (pool)[segment_place(ray, slot, capacity) + (component) * COMPONENTS_APART]
+#if LANES == 1
+// Store the segment of each ray that is chosen in its slot, if there is room.
+inline void store_segments(__global float *rows, int slot, int capacity, const Segments *segments, int chosen)
+{
+    if (!chosen || slot >= capacity)
+        return;
+    __global float *const to = rows + ROWS_OF(slot, capacity);
+    to[0] = segments->from;
+    to[COMPONENTS_APART] = segments->to;
+    to[2 * COMPONENTS_APART] = segments->optical_depth;
+    to[3 * COMPONENTS_APART] = segments->color.x;
+    to[4 * COMPONENTS_APART] = segments->color.y;
+    to[5 * COMPONENTS_APART] = segments->color.z;
+}
+
+// The segment of each ray in its slot, which is below the capacity.
+inline Segments load_segments(__global const float *rows, int slot, int capacity)
+{
+    __global const float *const at = rows + ROWS_OF(slot, capacity);
+    const Segments segments = {at[0], at[COMPONENTS_APART], at[2 * COMPONENTS_APART],
+                               (float4)(at[3 * COMPONENTS_APART], at[4 * COMPONENTS_APART], at[5 * COMPONENTS_APART], 0.0f)};
+    return segments;
+}
+#else
+#define HALF_ROW 4 // floats; a row's second half reaches into the next slot
+
+// A ray has two slots to spare: what reaches beyond a slot may be stored over, by rays that are not chosen, too, and where there
+// is no room is stored in the first of them.
+inline void store_segments(__global float *rows, Int slots, int capacity, const Segments *segments, Int chosen)
+{
+    const Places in_memory = {ROWS_OF(min(slots, capacity), capacity)};
+    const volatile int *at = in_memory.each;
+    const Quads first = {{segments->from, segments->to, segments->optical_depth, segments->color.x}};
+    const Quads second = {{segments->color.y, segments->color.z, segments->color.y, segments->color.z}};
+    const Quads of_first = transposed(first);
+    const Quads of_second = transposed(second);
+#define STORE_ROWS(n)                                                     \
+    vstore4(of_first.of[n].s0123, 0, rows + at[n]);                       \
+    vstore4(of_second.of[n].s0123, 0, rows + at[n] + HALF_ROW);           \
+    vstore4(of_first.of[n].s4567, 0, rows + at[4 + n]);                   \
+    vstore4(of_second.of[n].s4567, 0, rows + at[4 + n] + HALF_ROW);       \
+    vstore4(of_first.of[n].s89ab, 0, rows + at[8 + n]);                   \
+    vstore4(of_second.of[n].s89ab, 0, rows + at[8 + n] + HALF_ROW);       \
+    vstore4(of_first.of[n].scdef, 0, rows + at[12 + n]);                  \
+    vstore4(of_second.of[n].scdef, 0, rows + at[12 + n] + HALF_ROW)
+    STORE_ROWS(0);
+    STORE_ROWS(1);
+    STORE_ROWS(2);
+    STORE_ROWS(3);
+#undef STORE_ROWS
+}
+
+inline Segments load_segments(__global const float *rows, Int slots, int capacity)
+{
+    const Places in_memory = {ROWS_OF(slots, capacity)};
+    const volatile int *at = in_memory.each;
+#define LOAD_ROWS(n, half)                                                                        \
+    (Real)(vload4(0, rows + at[n] + (half)), vload4(0, rows + at[4 + (n)] + (half)),              \
+           vload4(0, rows + at[8 + (n)] + (half)), vload4(0, rows + at[12 + (n)] + (half)))
+    const Quads first = {{LOAD_ROWS(0, 0), LOAD_ROWS(1, 0), LOAD_ROWS(2, 0), LOAD_ROWS(3, 0)}};
+    const Quads second = {{LOAD_ROWS(0, HALF_ROW), LOAD_ROWS(1, HALF_ROW), LOAD_ROWS(2, HALF_ROW), LOAD_ROWS(3, HALF_ROW)}};
+#undef LOAD_ROWS
+    const Quads of_first = transposed(first);
+    const Quads of_second = transposed(second);
+    Segments segments;
+    segments.from = of_first.of[0];
+    segments.to = of_first.of[1];
+    segments.optical_depth = of_first.of[2];
+    segments.color = REAL4(of_first.of[3], of_second.of[0], of_second.of[1], (Real)(0.0f));
+    return segments;
+}
+#endif

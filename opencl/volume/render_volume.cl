@@ -42,7 +42,7 @@ inline Kept kept_march(const March *march, __global const float *form, float a, 
 inline float kept_share(const Kept *kept, float front, float back)
 {
     float sum = 0.0f;
-    for (int n = 0; n < kept->count; ++n) {
+    for (int n = 0; n < MOST_KEPT; ++n) {
         float from = front, to = back;
         cut_to_part(kept, n, &from, &to);
         sum += fmax(to - from, 0.0f);
@@ -80,14 +80,11 @@ __kernel void render_volume(
     const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
     const float t_end = has_opaque_depth ? opaque_depth[place] : INFINITY;
 
-    float3 color = (float3)(0.0f);
-    float transmittance = 1.0f;
-    float4 rest = (float4)(0.0f);
+    Seen seen = nothing_seen();
 #ifdef SAMPLED
     if (first_step > 0) {
-        color = state[0].xyz;
-        transmittance = state[0].w;
-        rest = state[1];
+        seen.sums = state[0];
+        seen.compensation = state[1];
     }
 #endif
     March march;
@@ -99,7 +96,7 @@ __kernel void render_volume(
         int k = first_step;
         const int end = march.steps - first_step > steps ? first_step + steps : march.steps;
         float front = step_face(&march, k);
-        while (k < end && transmittance > transmittance_cutoff) {
+        while (k < end && seen.sums.w > transmittance_cutoff) {
             const float back = step_face(&march, k + 1);
             const int empty = empty_steps(&march, &medium, 1, k, end, 1, front, back);
             k += empty;
@@ -114,15 +111,14 @@ __kernel void render_volume(
 #ifdef OPACITY_MULTIPLIER
             step.w *= opacity_multiplier;
 #endif
-            const float weight = transmittance * opacity_of(step.w); // over, front to back
-            composite_over(&color, &transmittance, &rest, weight, step.xyz);
+            composite_medium(&seen, step.w, step, true);
             front = back;
             ++k;
         }
     }
 #ifdef SAMPLED
-    state[0] = (float4)(color, transmittance);
-    state[1] = rest;
+    state[0] = seen.sums;
+    state[1] = seen.compensation;
 #endif
-    image[place] = composited(color, transmittance, rest);
+    image[place] = composited(&seen);
 }

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi.device.constants import BUNDLE
 from pyvista_vdi.raycasting.packets import LANES
 
-#: Width and height, in pixels, of a packet, if lists lie in tiles and if they do not: those of
-#: ``raycasting/aligned_view.cl``.
-_PACKET = {True: (8, 2), False: (16, 1)}
+#: Width and height, in pixels, of a packet, if lists lie in bundles and if they do not.
+_PACKET = {True: (LANES // BUNDLE, BUNDLE), False: (LANES, 1)}
 #: Lists that a ray may be away from the centre of its own, of the half that it has.
 _FARTHEST_FROM_CENTRE = 0.125
 #: Pixels that list (0, 0) may be away from the window's first one.
@@ -36,7 +36,7 @@ def aligned_view(
     depths: tuple[float, float],
     *,
     parallel: bool,
-    in_tiles: bool,
+    in_bundles: bool,
 ) -> AlignedView | None:
     """Return how each pixel is drawn from a list of its own; None if a ray is in another one, too.
 
@@ -63,7 +63,7 @@ def aligned_view(
             away = (abs(at - whole) for at, whole in zip(origin, first, strict=True))
             if not max(away) <= _FARTHEST_FROM_CENTRE:
                 return None
-    ways = zip(size, first, _PACKET[in_tiles], strict=True)
+    ways = zip(size, first, _PACKET[in_bundles], strict=True)
     wide, high = (-(-(edge - at - -at // step * step) // step) for edge, at, step in ways)
     return AlignedView(np.array(first, np.int32), -(-wide * high // LANES) * LANES)
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Kernel, Runtime, get_runtime
-from pyvista_vdi.device.constants import CELL, CELL_ITEMS
+from pyvista_vdi.device.constants import CELL, CELL_ITEMS, SEGMENT_SIZE, SPARE_SLOTS
 from pyvista_vdi.device.ray_forms import cells_of_points
 from pyvista_vdi.device.work_order import GROUP, Rectangle
 from pyvista_vdi.model.float32_limits import compensation
@@ -32,11 +32,6 @@ from pyvista_vdi.raycasting.raycast import enqueue, render_vdi
 from pyvista_vdi.raycasting.scene import OnDevice, Scene
 from pyvista_vdi.raycasting.strategies import strategy_for
 
-#: Bytes of a segment: those of ``opencl/raycasting/segments.cl``.
-_SEGMENT_BYTES = 24
-#: Slots that a ray has to spare where segments lie in rows: those of
-#: ``opencl/raycasting/segments.cl``.
-_SPARE_ROWS = 2
 #: Bytes of the pool, unless the segments of a cell need more. A GPU needs more rays at a time; on a
 #: CPU what is below 32 MiB is memory that the process has freed, without page faults (glibc).
 _POOL_BYTES_CPU = 24 * 2**20
@@ -252,9 +247,10 @@ class _MergedCells:
             **compensation(sum(scene.prepared.media for scene in scenes)),
         }
         in_blocks = self._in_rows and defines.get("COMPENSATED") != 2
-        file, name = ("merge_blocks.cl", "merge_blocks") if in_blocks else ("merge.cl", "merge")
-        self._merge = runtime.kernel(f"multi_vdi/{file}", name, defines)
         self._merged_rays = LANES if in_blocks else 1
+        defines["LANES"] = self._merged_rays
+        name = "merge_blocks" if in_blocks else "merge"
+        self._merge = runtime.kernel("multi_vdi/merge.cl", name, defines)
 
     def draw(
         self, cells: NDArray[np.int32], slots: int, image: DeviceBuffer, owner: DeviceBuffer
@@ -274,7 +270,7 @@ class _MergedCells:
         width, height = self._size
         streams = len(self._walks)
         room = _POOL_BYTES_CPU if runtime.is_cpu else _POOL_BYTES
-        ray_bytes = _SEGMENT_BYTES * (slots + (_SPARE_ROWS if self._in_rows else 0))
+        ray_bytes = 4 * SEGMENT_SIZE * (slots + (SPARE_SLOTS if self._in_rows else 0))
         most = min(max(1, room // (CELL_ITEMS * ray_bytes)), len(cells))  # cells of a band
         rays = np.int32(most * CELL_ITEMS)
         with (

@@ -7,14 +7,11 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together
 from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.device.constants import SLABS, STACK
 from pyvista_vdi.device.work_order import GROUP
 from pyvista_vdi.model.vdi import VDI
 
-#: Lists along each edge of a tile, and slabs of depth: those of ``opencl/raycasting/tiles.cl``.
-TILE = 16
-SLABS = 64
-
-#: Squares of tiles along the grid's longer edge: `OccupancyGrid.corners` has a box for each.
+#: Squares of stacks along the grid's longer edge: `OccupancyGrid.corners` has a box for each.
 _SQUARES = 12
 
 #: By how much supersegments count beyond their faces: roundings of 2**-23 of the depths that the
@@ -27,7 +24,7 @@ _WORTHWHILE = 0.8
 
 
 class OccupancyGrid:
-    """How many supersegments reach into each cell: tiles of 16 x 16 lists by 64 slabs of depth.
+    """How many supersegments reach into each cell: stacks of 64 slabs over 16 x 16 lists.
 
     A supersegment that spans several slabs counts in each. The slabs are equal in view depth and
     span the depth range of the VDI's bounds. Built on the device, from the VDI's arrays alone, so
@@ -50,8 +47,8 @@ class OccupancyGrid:
 
     Attributes
     ----------
-    tiles : (int, int)
-        Tiles along the width and the height.
+    stacks : (int, int)
+        Stacks of cells along the width and the height.
     first_depth : float
         Where slab 0 begins: view depth less the VDI's depth origin, world units.
     slabs_per_depth : float
@@ -60,9 +57,9 @@ class OccupancyGrid:
         By which supersegments count beyond their faces, world units: more than the raycaster's
         depths are rounded by.
     counts : DeviceBuffer
-        uint32 (tiles high, tiles wide, slabs).
+        uint32 (stacks high, stacks wide, slabs).
     masks : DeviceBuffer
-        uint64 per tile: bit s is set where slab s is occupied.
+        uint64 per stack: bit s is set where slab s is occupied.
     occupied : float
         Occupied cells over cells within the volume's bounds; above 1 if borders are crossed.
     corners : numpy.ndarray
@@ -83,7 +80,7 @@ class OccupancyGrid:
         long_offsets: bool,
     ) -> None:
         width, height = vdi.window_size
-        wide, high = self.tiles = (-(-width // TILE), -(-height // TILE))
+        wide, high = self.stacks = (-(-width // STACK), -(-height // STACK))
         near, far = rays.depth_range(vdi.camera, vdi.bounds)
         if not vdi.camera.parallel_projection:
             near = max(near, nearest)
@@ -133,8 +130,8 @@ class OccupancyGrid:
 def _corners(vdi: VDI, masks: NDArray[np.uint64], near: float, far: float) -> NDArray[np.float64]:
     """Return corners of boxes in list space that hold the occupied cells, in the model frame.
 
-    A box for each square of tiles. ``near`` and ``far`` are the view depths that slabs divide; what
-    counts in the first or the last of them lies within the bounds, too, where a ray meets it.
+    A box for each square of stacks. ``near`` and ``far`` are the view depths that slabs divide;
+    what counts in the first or the last of them lies within the bounds, too, where a ray meets it.
     """
     half = np.asarray(vdi.window_size) / 2
     pixel_rays = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds)
@@ -151,8 +148,8 @@ def _corners(vdi: VDI, masks: NDArray[np.uint64], near: float, far: float) -> ND
                 continue
             bits = np.unpackbits(part.reshape(-1, 1).view(np.uint8), axis=1, bitorder="little")
             slabs = np.flatnonzero(bits.any(axis=0))
-            a = (column + np.array([i.min(), i.max() + 1])) * TILE + [-1, 1] - half[0]
-            b = (row + np.array([j.min(), j.max() + 1])) * TILE + [-1, 1] - half[1]
+            a = (column + np.array([i.min(), i.max() + 1])) * STACK + [-1, 1] - half[0]
+            b = (row + np.array([j.min(), j.max() + 1])) * STACK + [-1, 1] - half[1]
             depth = np.maximum(near + slab * (slabs[[0, -1]] + [-1, 2]), least)
             at = np.stack(np.meshgrid(1.0, a, b, depth, indexing="ij"), axis=-1).reshape(-1, 4)
             t = at[:, 3:] - pixel_rays.reference_depth
@@ -178,10 +175,10 @@ def _looked_up(vdi: VDI, near: float, far: float, shifted: bool) -> float:
 
 
 def _share_in_bounds(vdi: VDI, near: float, far: float) -> float:
-    """Return the share of all cells that lies within the bounds, by the rays of tile centres."""
+    """Return the share of all cells that lies within the bounds, by the stacks' centre rays."""
     width, height = vdi.window_size
     pixel_rays = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds)
-    a, b = np.meshgrid(_tile_centres(width), _tile_centres(height))
+    a, b = np.meshgrid(_stack_centres(width), _stack_centres(height))
     pixels = np.stack([np.ones_like(a), a, b], axis=-1)
     first = np.full(a.shape, near - pixel_rays.reference_depth)
     last = np.full(a.shape, far - pixel_rays.reference_depth)
@@ -196,7 +193,7 @@ def _share_in_bounds(vdi: VDI, near: float, far: float) -> float:
     return float(np.maximum(last - first, 0).mean() / depth) if depth > 0 else 0.0
 
 
-def _tile_centres(lists: int) -> NDArray[np.float64]:
-    """Return the tiles' centres along an edge of that many lists, pixels from its middle."""
-    starts = np.arange(0, lists, TILE)
-    return (starts + np.minimum(starts + TILE, lists)) / 2 - lists / 2
+def _stack_centres(lists: int) -> NDArray[np.float64]:
+    """Return the stacks' centres along an edge of that many lists, pixels from its middle."""
+    starts = np.arange(0, lists, STACK)
+    return (starts + np.minimum(starts + STACK, lists)) / 2 - lists / 2

@@ -7,21 +7,23 @@ do not, a CPU follows them one by one, in blocks.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi.device.constants import STEEPEST
 from pyvista_vdi.device.ray_forms import inverse_affine
-from pyvista_vdi.device.work_order import Rectangle
+from pyvista_vdi.device.work_order import BLOCK_RAYS, Rectangle
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 
-#: Rays of a packet, side by side: that of ``raycasting/packet.cl``.
-LANES = 16
+#: Rays of a packet, side by side.
+LANES = BLOCK_RAYS
 #: Packets of a strip that begin before the window, or behind it: the steepest line that a packet
-#: follows (``STEEPEST`` of ``raycasting/packet.cl``, 1.5) rises by less over its length.
-MARGIN = 24
+#: follows rises by less over its length.
+MARGIN = math.ceil(STEEPEST * LANES)
 #: Lists that a ray crosses before its light ends, over those that lie between a packet's first and
 #: last ray, from which packets are faster: what they have in common (docs/decisions/packets.md).
 LEAST_IN_COMMON = 4.5

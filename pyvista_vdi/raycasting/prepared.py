@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, aligned_empty, kept_together
 from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.device.constants import BUNDLE, FIRST_BITS, LIST_HEADER
 from pyvista_vdi.device.work_order import GROUP
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import lists_are_far
@@ -26,14 +27,6 @@ Defines: TypeAlias = dict[str, str | int | None]
 
 #: Far depth over near depth up to which a lens counts as long, and depth is kept relative.
 _LONG_LENS = 2.0
-#: Lists along each edge of a tile, in which supersegments lie together; those of 8 bytes lie list
-#: by list: that of ``raycasting/supersegments.cl``.
-_LIST_TILE = 2
-#: Bits of a tile's header that say where it begins: that of ``raycasting/supersegments.cl``.
-_FIRST_BITS = 36
-#: Pairs of words before the supersegments of an 8-byte list: that of
-#: ``raycasting/supersegments.cl``.
-_LIST_HEADER = 2
 
 _Keep: TypeAlias = Callable[[DeviceBuffer], DeviceBuffer]
 
@@ -152,9 +145,9 @@ class PreparedVDI:
         """Bring the lists to the device, exact or packed, and build the occupancy grid."""
         runtime = self.runtime
         if self.packed == 8:
-            lengths = vdi.counts + _LIST_HEADER * (vdi.counts > 0)
+            lengths = vdi.counts + LIST_HEADER * (vdi.counts > 0)
         else:
-            lengths = _longest(vdi.counts) * _LIST_TILE**2
+            lengths = _longest(vdi.counts) * BUNDLE**2
         begins = np.zeros(lengths.size + 1, np.int64)
         np.cumsum(lengths, out=begins[1:])
         # Kernels count words of 8 bytes, of which an entry takes up to two, by signed numbers
@@ -163,8 +156,8 @@ class PreparedVDI:
         if self.packed == 8:
             headers: NDArray[Any] = begins.astype(offset_type)
         else:
-            longest = lengths.reshape(-1) // _LIST_TILE**2
-            headers = (begins[:-1] | longest << _FIRST_BITS).view(np.uint64)
+            longest = lengths.reshape(-1) // BUNDLE**2
+            headers = (begins[:-1] | longest << FIRST_BITS).view(np.uint64)
         with (
             kept_together() as keep,
             runtime.upload(vdi.front, "front depths") as front,
@@ -200,7 +193,7 @@ class PreparedVDI:
     ) -> tuple[DeviceBuffer, ...]:
         """Return the supersegments with depth coordinates and extinctions, 24 or 16 bytes each.
 
-        They lie by tiles of lists, in so many ``entries``; ``starts`` are the lists' in the VDI's
+        They lie by bundles of lists, in so many ``entries``; ``starts`` are the lists' in the VDI's
         arrays.
         """
         runtime = self.runtime
@@ -255,9 +248,9 @@ class PreparedVDI:
         counts = vdi.counts.reshape(-1)
         occupied = np.flatnonzero(counts)
         headers = np.zeros(len(counts) + 1, np.uint64)
-        headers[1:] = np.cumsum(counts > 0) * _LIST_HEADER
+        headers[1:] = np.cumsum(counts > 0) * LIST_HEADER
         first = (vdi.offsets + headers)[:-1][occupied].astype(np.int64)
-        words = aligned_empty((vdi.n_supersegments + len(occupied) * _LIST_HEADER, 2), np.uint32)
+        words = aligned_empty((vdi.n_supersegments + len(occupied) * LIST_HEADER, 2), np.uint32)
         words[first, 0] = packing.origins[occupied].view(np.uint32)
         words[first, 1] = packing.strides[occupied]
         words[first + 1, 0] = self._per_code(vdi, packing, occupied).view(np.uint32)
@@ -284,8 +277,8 @@ class PreparedVDI:
 
 
 def _longest(counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the length of the longest list of each tile; ``counts`` are (height, width)."""
+    """Return the length of the longest list of each bundle; ``counts`` are (height, width)."""
     height, width = counts.shape
-    longest = np.pad(counts, ((0, -height % _LIST_TILE), (0, -width % _LIST_TILE)))
-    longest = functools.reduce(np.maximum, (longest[n::_LIST_TILE] for n in range(_LIST_TILE)))
-    return functools.reduce(np.maximum, (longest[:, n::_LIST_TILE] for n in range(_LIST_TILE)))
+    longest = np.pad(counts, ((0, -height % BUNDLE), (0, -width % BUNDLE)))
+    longest = functools.reduce(np.maximum, (longest[n::BUNDLE] for n in range(BUNDLE)))
+    return functools.reduce(np.maximum, (longest[:, n::BUNDLE] for n in range(BUNDLE)))

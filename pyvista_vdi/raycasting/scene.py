@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer
 from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.device.constants import PLANE_FORMS
 from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import compensation
@@ -23,9 +24,8 @@ from pyvista_vdi.raycasting.packets import Packets, epipole_of, packets_of
 from pyvista_vdi.raycasting.picking import FirstHit
 from pyvista_vdi.raycasting.prepared import Defines, PreparedVDI
 
-#: Of a frame's forms: (u, v, depth, denominator), and how many come before the planes to clip to;
-#: those of ``lib/list_space.cl``.
-_COORDINATE_FORMS, _PLANE_FORMS = 4, 7
+#: How many of a frame's forms are (u, v, depth, denominator).
+_COORDINATE_FORMS = 4
 #: Share of a window above which rays are cast through all of it: clearing it first costs as much.
 _MOST_DRAWN = 0.9
 
@@ -165,7 +165,7 @@ class Scene:
             self.forms[:_COORDINATE_FORMS].astype(np.float64),
             (near - self.reference_depth, far - self.reference_depth),
             parallel=prepared.parallel,
-            in_tiles=prepared.packed != 8,
+            in_bundles=prepared.packed != 8,
         )
 
     @cached_property
@@ -176,7 +176,7 @@ class Scene:
             self.size,
             self.part,
             forms[:_COORDINATE_FORMS],
-            forms[_PLANE_FORMS : _PLANE_FORMS + self.planes],
+            forms[PLANE_FORMS : PLANE_FORMS + self.planes],
             epipole_of(self.prepared.camera, self.camera, self.size),
             self.prepared.lit,
             or_blocks=self.in_blocks,

@@ -96,10 +96,11 @@ def _ray_by_ray_defines(scene: Scene) -> Defines:
 
 _BLOCKS = Strategy(
     "blocks",
-    "raycasting/blocks.cl",
+    "raycasting/raycast.cl",
     "raycast_blocks",
     supports=lambda scene: scene.in_blocks,
     launch=lambda scene: _columns(scene, LANES),
+    defines=lambda scene: {**scene.skipping, "LANES": LANES},
     rays=LANES,
 )
 _RAY_BY_RAY = Strategy(
@@ -131,7 +132,7 @@ STRATEGIES = (
     Strategy(
         "aligned view",
         "raycasting/aligned_view.cl",
-        "raycast_own_lists",
+        "raycast_aligned_view",
         supports=lambda scene: scene.plain and scene.aligned is not None,
         launch=_aligned,
         defines=lambda scene: {},

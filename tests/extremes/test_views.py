@@ -18,9 +18,9 @@ from extreme_scenes import (
     view,
 )
 
+from pyvista_vdi.device.constants import STACK
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.raycasting.occupancy import TILE
 
 pytestmark = pytest.mark.extremes
 
@@ -72,12 +72,12 @@ def along(vdi, first, last):
 def test_rays_along_axes_borders_and_corners(runtime, worst, parallel):
     """Parallel to u, v, both (depth) and neither; along edges of lists and of tiles; corners."""
     camera = view(VOLUME, 0, 0, parallel=parallel)
-    vdi = vdi_from(runtime, camera, (2 * TILE + 8, 2 * TILE))
+    vdi = vdi_from(runtime, camera, (2 * STACK + 8, 2 * STACK))
     wide, high = vdi.window_size
     near, far = 3 * REACH, 5 * REACH  # the view's distance is 4
     middle = (near + far) / 2
     edge_u, edge_v = 2 * (wide // 2 + 3) / wide - 1, 2 * (high // 2 - 2) / high - 1
-    tile_u, tile_v = 2 * TILE / wide - 1, 2 * TILE / high - 1
+    tile_u, tile_v = 2 * STACK / wide - 1, 2 * STACK / high - 1
     inner_u, inner_v = edge_u + 1 / wide, edge_v + 1 / high
     rays = {
         "along u": ((-1, inner_v, middle), (1, inner_v, middle)),
@@ -92,8 +92,8 @@ def test_rays_along_axes_borders_and_corners(runtime, worst, parallel):
         "along a tile's corner": ((tile_u, tile_v, near), (tile_u, tile_v, far)),
         # The window's diagonal of square lists goes through a corner of each
         "through corners": (
-            (tile_u - 2 * TILE / wide, tile_v - 2 * TILE / high, middle),
-            (tile_u + 2 * TILE / wide, tile_v + 2 * TILE / high, middle),
+            (tile_u - 2 * STACK / wide, tile_v - 2 * STACK / high, middle),
+            (tile_u + 2 * STACK / wide, tile_v + 2 * STACK / high, middle),
         ),
         "across u in a plane": ((-1, inner_v, near), (1, inner_v, far)),
         "across v in a plane": ((inner_u, -1, far), (inner_u, 1, near)),

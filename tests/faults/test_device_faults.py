@@ -172,8 +172,6 @@ def test_a_frame_and_background_work_go_on_after_a_loss(runtime, driver):
 )
 def test_a_kernel_that_does_not_compile(runtime, operation, broken, monkeypatch):
     """The message names the file and shows the compiler's log; nothing half made is kept."""
-    if broken == "raycasting/raycast.cl" and runtime.is_cpu:
-        broken = "raycasting/blocks.cl"  # near V_O
     operation = OPERATIONS[operation]
     expected = operation(runtime)
     before = state_of(runtime)

@@ -10,13 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pyvista_vdi.device.constants import STACK
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.compositing import optical_depth_over_length
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.occupancy import TILE
 from pyvista_vdi.reference import build_vdi, render_pixels, samples, volume_image
 from pyvista_vdi.reference.raycast import Lists, crossings, lines_of_pixel
 
@@ -147,12 +147,12 @@ def test_walk_steps_through_as_many_lists_as_it_crosses_borders(scene):
             borders += max(0, int(np.ceil(high)) - int(np.floor(low)) - 1)
         assert walk.lists[k] == borders + 1
         assert walk.occupied[k] <= walk.lists[k]
-        assert walk.tiles[k] <= 1 + sum(-(-n // TILE) for n in SIZE)
+        assert walk.tiles[k] <= 1 + sum(-(-n // STACK) for n in SIZE)
 
 
 def test_walk_counts_as_occupied_every_list_in_which_something_is_met(scene):
     volume, function, view, _ = scene
-    lists = (4 * TILE, 2 * TILE)
+    lists = (4 * STACK, 2 * STACK)
     vdi = build_vdi(volume, view, lists, function, sample_distance=2.0, max_supersegments=3)
     x, y = every_pixel(SIZE)
     rays = counting.Rays.of(view.azimuth(25.0), SIZE, x, y)

@@ -1,13 +1,7 @@
-// Entry points to opencl/raycasting/tiles.cl and to list_space.cl's depth coordinate, one work-item per query.
+// Entry points to opencl/raycasting/stacks.cl and to list_space.cl's depth coordinate, one work-item per query.
 #include "lib/list_space.cl"
-#include "raycasting/tiles.cl"
+#include "raycasting/stacks.cl"
 #pragma OPENCL FP_CONTRACT OFF
-
-__kernel void constants(int count, __global int *results)
-{
-    results[0] = TILE;
-    results[1] = SLABS;
-}
 
 __kernel void slabs(int count, __global const float *offsets, float first_depth, float slabs_per_depth,
                     __global int *results)

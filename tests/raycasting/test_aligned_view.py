@@ -80,7 +80,7 @@ def test_which_frames_are_drawn_from_own_lists(runtime, monkeypatch):
             draw(prepared, camera, size, image, **options)
         return names[-1]
 
-    own, others = ("raycast_own_lists", "raycast_blocks") if runtime.is_cpu else ("raycast",) * 2
+    own, others = ("raycast_aligned_view", "raycast_blocks") if runtime.is_cpu else ("raycast",) * 2
     assert drawn_by() == own
     assert drawn_by(precision="16-byte") == own
     assert drawn_by(precision="8-byte") == own
@@ -191,7 +191,7 @@ def test_a_vdi_of_another_part_of_the_picture(runtime, kind, corner, window, mon
         ends = {"opaque_depth": depth.astype(np.float32)} if case == 1 else {}
         names.clear()
         image, one_by_one = both_ways(runtime, vdi, monkeypatch, view, size, **ends)
-        assert ("raycast_own_lists" in names) == runtime.is_cpu
+        assert ("raycast_aligned_view" in names) == runtime.is_cpu
         result = explain(vdi, view, size, image, name=f"seed {[case, 600, *window]}", **ends)
         assert not result.failures, "\n".join(result.failures)
         np.testing.assert_allclose(image, one_by_one, rtol=0, atol=TOLERANCE)

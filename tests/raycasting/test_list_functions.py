@@ -42,7 +42,9 @@ def linear_scan(faces, depth, away):
 
 def counts(call, lists, queries):
     """``queries``: (list, depth, away, guess)."""
-    stride = int(call(FILE, "lists_per_tile", 1, call.empty(1, dtype=np.int32), OFFSET_T="int")[0])
+    stride = int(
+        call(FILE, "lists_per_bundle", 1, call.empty(1, dtype=np.int32), OFFSET_T="int")[0]
+    )
     faces = np.float32([face for faces in lists for face in faces]).reshape(-1, 2)
     flat = np.full((stride * len(faces) + 1, 2), np.nan, np.float32)  # nothing else is read
     flat[: stride * len(faces) : stride] = faces

@@ -11,10 +11,10 @@ from drawing import draw
 
 from pyvista_vdi import read
 from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.device.constants import SLABS, STACK
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting import occupancy
-from pyvista_vdi.raycasting.occupancy import SLABS, TILE
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 #: Seeds of random VDIs per kind.
@@ -36,9 +36,9 @@ def counted(vdi, first_depth, slabs_per_depth, reach):
     ``first_depth`` in world units less the VDI's depth origin.
     """
     width, height = vdi.window_size
-    tiles = (-(-height // TILE), -(-width // TILE))
+    tiles = (-(-height // STACK), -(-width // STACK))
     lists = np.repeat(np.arange(width * height), np.diff(vdi.offsets).astype(np.int64))
-    tile = lists // width // TILE * tiles[1] + lists % width // TILE
+    tile = lists // width // STACK * tiles[1] + lists % width // STACK
     front, back = vdi.front.astype(np.float64) - reach, vdi.back.astype(np.float64) + reach
     first, last = (
         np.clip(np.floor((face - first_depth) * slabs_per_depth), 0, SLABS - 1).astype(np.int64)
@@ -54,7 +54,7 @@ def counted(vdi, first_depth, slabs_per_depth, reach):
 def check(runtime, vdi):
     """Compare with NumPy's count; return the share of cells on which rounding has no say."""
     grid, counts, occupied = grid_of(runtime, vdi)
-    assert counts.shape == (*grid.tiles[::-1], SLABS)
+    assert counts.shape == (*grid.stacks[::-1], SLABS)
     assert np.array_equal(occupied, counts > 0)
     # The kernel's numbers; its roundings: of a face less the margin, less the first depth (half a
     # unit in the last place of each difference), and of a slab number up to 64. A face is twice as
@@ -152,7 +152,7 @@ def test_windows_that_tiles_do_not_divide(runtime, window):
         depth_origin=near,
     )
     grid, counts, _ = grid_of(runtime, vdi)
-    assert grid.tiles == (math.ceil(window[0] / TILE), math.ceil(window[1] / TILE))
+    assert grid.stacks == (math.ceil(window[0] / STACK), math.ceil(window[1] / STACK))
     assert counts.sum() >= n
     check(runtime, vdi)
 

@@ -1,13 +1,13 @@
-"""opencl/raycasting/tiles.cl, and the depths at which the raycaster looks the grid up."""
+"""opencl/raycasting/stacks.cl, and the depths at which the raycaster looks the grid up."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from pyvista_vdi.device.constants import SLABS
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.occupancy import SLABS, TILE
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 FILE = "occupancy_functions.cl"
@@ -59,11 +59,6 @@ def test_sets_of_slabs(call):
     for slab in slabs.tolist():
         assert int(begin[slab]) == sum(1 << s for s in range(slab, SLABS))
         assert int(end[slab]) == sum(1 << s for s in range(slab + 1))
-
-
-def test_constants_of_python_are_those_of_the_kernels(call):
-    found = call(FILE, "constants", 1, call.empty(2, dtype=np.int32))
-    assert found.tolist() == [TILE, SLABS]
 
 
 @pytest.mark.parametrize("parallel", [False, True])

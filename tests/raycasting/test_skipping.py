@@ -22,11 +22,11 @@ from real_data import require_data
 
 from pyvista_vdi import examples, generate
 from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.device.constants import SLABS, STACK
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting import occupancy
-from pyvista_vdi.raycasting.occupancy import SLABS, TILE
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 
 #: Lists of the sparse VDIs: many tiles, those of the last column cut off. The middle is a corner of
@@ -313,7 +313,7 @@ def along_list_borders(rng, vdi):
 def along_tile_borders(rng, vdi):
     """From a parallel V_O every ray runs along a border between two rows of tiles: pixels are two
     tiles high."""
-    return beside(rng, vdi, (0, 0, 1), (0, 1, 0), (SIZE[0], WINDOW[1] // (2 * TILE)))
+    return beside(rng, vdi, (0, 0, 1), (0, 1, 0), (SIZE[0], WINDOW[1] // (2 * STACK)))
 
 
 def across_corners(rng, vdi):
@@ -489,8 +489,8 @@ def test_rays_through_corners_of_tiles(runtime):
             window_center=(0, 0),
             use_horizontal_view_angle=False,
         )
-        dense = full_vdi(camera, bounds, (6 * TILE, 6 * TILE), 0.0)
-        tile = np.arange(6 * TILE) // TILE
+        dense = full_vdi(camera, bounds, (6 * STACK, 6 * STACK), 0.0)
+        tile = np.arange(6 * STACK) // STACK
         black = ((tile[:, None] + tile) % 2 == 1).ravel()
         dense = changed(dense, optical_depth=np.full_like(dense.optical_depth, 1e7))
         board = with_lists(dense, black)

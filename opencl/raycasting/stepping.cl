@@ -1,0 +1,116 @@
+// How rays step from list to list (Amanatides and Woo), and pass by what the occupancy grid says is empty.
+//
+// -D SHARED_LISTS  all rays of a work-item are in the same list, and step the same way
+#include "raycasting/list_rays.cl"
+#include "raycasting/stacks.cl"
+#pragma OPENCL FP_CONTRACT OFF
+
+#ifdef SHARED_LISTS
+typedef int Steps;
+typedef float Border;
+#else
+typedef Int Steps;
+typedef Real Border;
+#endif
+
+// One axis of V_O's window.
+typedef struct {
+    Real along, deep;
+    Real zero, inverse; // of crossings, see there
+    Steps step;         // 1 or -1
+    Border border;      // from a list's index to its border ahead
+    float middle;       // half of the lists
+    int lists;
+} Axis;
+
+inline Axis axis_of(Real along, Real deep, int lists)
+{
+    Axis axis;
+    axis.along = along;
+    axis.deep = deep;
+    // By a component that does not change, borders are crossed at infinity
+    axis.zero = SELECT((Real)(-INFINITY), deep, along != 0.0f);
+    axis.inverse = SELECT((Real)(1.0f), 1.0f / along, along != 0.0f);
+    axis.middle = 0.5f * (float)lists;
+    axis.lists = lists;
+#ifndef SHARED_LISTS // otherwise see take_step
+    axis.step = SELECT((Int)(-1), (Int)(1), along > 0.0f);
+    axis.border = SELECT((Real)(0.0f), (Real)(1.0f), along > 0.0f) - axis.middle;
+#endif
+    return axis;
+}
+
+#ifdef SHARED_LISTS
+inline void take_step(Axis *axis, bool upwards)
+{
+    axis->step = upwards ? 1 : -1;
+    axis->border = (upwards ? 1.0f : 0.0f) - axis->middle;
+}
+#endif
+
+// Where the rays leave the lists of an index: from the border's number, never accumulated.
+#define CROSSINGS(axis, index) (((index) + (axis)->border - (axis)->zero) * (axis)->inverse)
+
+inline Real crossings(const Axis *axis, Int index)
+{
+    return CROSSINGS(axis, TO_REAL(index));
+}
+
+// The indices of the lists at a coordinate u or v, or the nearest ones.
+inline Int list_index(const Axis *axis, Real coordinate, int shift)
+{
+    return clamp(TO_INT(floor(coordinate + axis->middle)) + shift, 0, axis->lists - 1);
+}
+
+#ifdef SKIP_EMPTY
+// The occupancy grid.
+typedef struct {
+    __global const ulong *masks; // of the stacks
+    int stacks_wide;
+    float first_depth;           // where slab 0 begins, view depth less depth_origin
+    float slabs_per_depth;
+} Grid;
+
+// The last index in a stack, in the rays' sense.
+inline Steps stack_edge(const Axis *axis, Steps index)
+{
+    return SELECT(index & ~(STACK - 1), index | (STACK - 1), axis->step > 0);
+}
+
+// The index of the list that stepping from `index`, but not beyond the edge of a stack, would have reached at r_until, by the
+// crossings of its borders: where r_until lies by its coordinates, one back or one on where rounding has it otherwise.
+inline Int index_reached(const Axis *axis, Int index, Steps edge, Real r_until)
+{
+    const Int behind = (Int)(edge + axis->step);
+    Int reached = TO_INT(floor(fma(r_until, axis->along, axis->deep) + axis->middle));
+    reached = clamp(reached, min(index, behind), max(index, behind));
+    const Int too_far = reached != index && crossings(axis, reached - axis->step) > r_until;
+    const Int farther = !too_far && crossings(axis, reached) <= r_until;
+    reached += SELECT((Int)(0), (Int)(axis->step), farther) - SELECT((Int)(0), (Int)(axis->step), too_far);
+    return SELECT(index, reached, axis->along != 0.0f);
+}
+
+// r where rays come to the list of an index from another one: they do not go back.
+inline Real r_entered(const Axis *axis, Real r, Int from, Int to)
+{
+    return SELECT(r, fmax(r, crossings(axis, to - axis->step)), to != from);
+}
+
+// The nearest occupied slab ahead of rays at a depth, in a stack whose mask has these halves. Returns whether rays that look
+// pass by something empty before it.
+inline Int look_ahead(Int *nearest, Int *nothing, Uint low, Uint high, const Sense *sense, Real depth, Int looks,
+                      const Grid *grid, Depths depths)
+{
+    const Int slab = slab_of(depth_offset(sense->sign * depth, depths), grid->first_depth, grid->slabs_per_depth);
+    *nearest = nearest_slab(low, high, slab, sense->away, nothing);
+    return looks && (*nothing || *nearest != slab);
+}
+
+// Up to here nothing is met: the stack's border at r_border, or the face of the nearest occupied slab.
+inline Real empty_until(Real r_border, Int nearest, Int nothing, const Sense *sense, const Grid *grid, Depths depths)
+{
+    const Real face = grid->first_depth + TO_REAL(sense->away ? nearest : nearest + 1) / grid->slabs_per_depth;
+    const Real r_face = (sense->sign * depth_coordinate(face, depths) - sense->deep) * sense->inverse;
+    return SELECT(r_border, fmin(r_border, r_face), !nothing && sense->along != 0.0f);
+}
+#endif
