@@ -1,4 +1,7 @@
-"""The command line: what each verb does, and that every mistake is one clear line."""
+"""The command line: what each verb does, and that every mistake is one clear line.
+
+All verbs share the folder of inputs and the helpers that run a command, so they stay in one file.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""OpenEXR deep images: ours come back to the last bit, others' within what is stated."""
+"""OpenEXR deep images: ours come back to the last bit, others' within what is stated.
+
+One format, and the images by which each way of writing it is tried: hence more than 500 lines.
+"""
 
 from __future__ import annotations
 

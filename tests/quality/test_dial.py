@@ -1,4 +1,7 @@
-"""One dial: what is chosen at its borders, what is predicted, and what is said of it."""
+"""One dial: what is chosen at its borders, what is predicted, and what is said of it.
+
+Choice, prediction and words are of the same few probes, made once: hence more than 500 lines.
+"""
 
 from __future__ import annotations
 

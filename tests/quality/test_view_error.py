@@ -1,4 +1,7 @@
-"""The estimate of a view's error against the whole pictures' SSIM, and how far a view has moved."""
+"""The estimate of a view's error against the whole pictures' SSIM, and how far a view has moved.
+
+Estimates and whole pictures are of the same views, drawn once: hence more than 500 lines.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Windows that somebody watches: previews while a hand moves, VDIs made behind the frames."""
+"""Windows that somebody watches: previews while a hand moves, VDIs made behind the frames.
+
+Previews, estimates and regeneration act on each other in a watched window; the fixtures that hold
+them up (gate, coarsest, no_estimates) serve all tests: hence more than 500 lines.
+"""
 
 from __future__ import annotations
 

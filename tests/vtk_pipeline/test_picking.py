@@ -1,4 +1,7 @@
-"""Picking in real plotters: what is under the cursor, and where it begins."""
+"""Picking in real plotters: what is under the cursor, and where it begins.
+
+Every test picks in the same scenes, which are drawn once: hence more than 500 lines.
+"""
 
 from __future__ import annotations
 
