@@ -201,10 +201,11 @@ run_tests() {
     ((result == 0 || (result == 5 && $# > 0)))
 }
 
-# What runs on a device, on the implementation that the README's test command has not used.
+# Tests that use a device, chosen by markers, on the implementation that the README's test command
+# has not used.
 run_tests_on_second_implementation() {
     export PYVISTA_VDI_TEST_DEVICES=${PYVISTA_VDI_SECOND_IMPLEMENTATION:-portable computing language}
-    run_tests -m device
+    run_tests -m "$1"
 }
 
 # Those that are slow, on every implementation.
