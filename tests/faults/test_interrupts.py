@@ -149,6 +149,7 @@ def test_ctrl_c_in_the_middle_of_a_verb(verb, here, capsys, monkeypatch):
 #: of its imports. Prints for each: the status, what it said, the files then; and its imports.
 AT_IMPORTS = """
 import json, os, signal, sys, tempfile
+from pathlib import Path
 from pyvista_vdi.cli import main
 # A shell's background jobs ignore SIGINT, and what they start does: not this one
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -159,7 +160,8 @@ for moment in json.loads(moments):
         if child:
             status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
             said.seek(0)
-            print(json.dumps([status, said.read(), sorted(os.listdir())]))
+            files = sorted(str(path) for path in Path().rglob("*") if path.is_file())
+            print(json.dumps([status, said.read(), files]))
             continue
         os.dup2(said.fileno(), 1)
         os.dup2(said.fileno(), 2)
