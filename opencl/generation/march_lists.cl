@@ -3,7 +3,7 @@
 // -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, SKIP_EMPTY, BLOCK_SHIFT: see volume/sampling.cl and volume/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see volume/shading.cl; OCCLUSION: see volume/occlusion.cl
 // -D SAMPLED: see volume/samples.cl
-// -D COMPENSATED: see lib/compositing.cl; FAR_ENTRIES: see lib/rays.cl
+// -D COMPENSATED: see lib/compositing.cl; DOUBLE_FLOAT_RAYS: see lib/rays.cl
 // -D LANES: see volume/march.cl; 16 on CPUs, where a compiler would scatter the words of runs one by one in each turn, and
 //    gather: a run is stored as it lies, by one store
 //
@@ -13,7 +13,7 @@
 // lengths, and generation/pack_lists.cl writes the arrays.
 // The march is one kernel and the merging another because they want different vector code on a CPU.
 //
-// Lengths along a ray are t, the view depth of V_O less the VDI's depth origin, world units; with FAR_ENTRIES, less that of
+// Lengths along a ray are t, the view depth of V_O less the VDI's depth origin, world units; with DOUBLE_FLOAT_RAYS, less that of
 // where the ray enters, until they are packed.
 #include "volume/march.cl"
 #include "generation/runs.cl"

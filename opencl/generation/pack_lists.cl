@@ -1,6 +1,6 @@
 // Records to the VDI's arrays.
 //
-// -D FAR_ENTRIES: see lib/rays.cl
+// -D DOUBLE_FLOAT_RAYS: see lib/rays.cl
 #include "lib/rays.cl"
 #include "generation/runs.cl"
 #pragma OPENCL FP_CONTRACT OFF
@@ -17,7 +17,7 @@ __kernel void pack_lists(
     __global float *backs,
     __global float *colors,         // straight RGB, 3 per supersegment
     __global float *optical_depths
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
     , __global const float *forms,
     int planes,
     int height, int first_row
@@ -32,7 +32,7 @@ __kernel void pack_lists(
     const size_t list = made + (size_t)pixel.y * width + pixel.x;
     const ulong begin = offsets[list] - held;
     const int count = (int)(offsets[list + 1] - offsets[list]);
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
     const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
     const float b = (float)(first_row + pixel.y) + 0.5f - 0.5f * (float)height;
     float2 entry = (float2)(0.0f);
@@ -45,7 +45,7 @@ __kernel void pack_lists(
 #endif
     for (int k = 0; k < count; ++k) {
         Run run = load_run(record, k);
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
         // Rounding must neither leave a supersegment without thickness nor let two overlap
         run.FRONT = fmax(pair_sum(entry, (float2)(run.FRONT, 0.0f)).x, least);
         run.BACK = fmin(pair_sum(entry, (float2)(run.BACK, 0.0f)).x, most);

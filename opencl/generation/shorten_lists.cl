@@ -3,7 +3,7 @@
 //
 // -D LANES  16 on CPUs: ray by ray each merge waits for the divisions of the one before, and for branches that no processor
 //           foresees. The rays of a block of 4 x 4 take the same steps, and what depends on the ray is selected.
-// -D FAR_ENTRIES: see lib/rays.cl
+// -D DOUBLE_FLOAT_RAYS: see lib/rays.cl
 //
 // Functions take the records of a work-item's rays, and where each begins.
 #include "lib/rays.cl"

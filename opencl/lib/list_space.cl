@@ -8,7 +8,7 @@
 //
 // with Z view depth from V_O in world units and Z_ref the VDI's depth origin. An "offset" is Z - Z_ref.
 //
-//     -D FAR_ENTRIES   lists hold so little of the depth that float32 has for all of it, that z is relative to Z_deep, where
+//     -D DOUBLE_FLOAT_RAYS   lists hold so little of the depth that float32 has for all of it, that z is relative to Z_deep, where
 //                      a ray is deepest: 1/Z_deep - 1/Z, or Z - Z_deep if PARALLEL; faces are kept as offsets, DEPTH_FORM
 //                      is that of the offset (docs/numerics.md); 2: relative to where it is least deep
 #include "lib/rays.cl"
@@ -20,7 +20,7 @@
 #define DENOMINATOR_FORM 3
 #define MODEL_FORM 4
 
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
 typedef struct {
     float2 deep;      // the offset of Z_deep, a pair of lib/double_float.cl
     float reciprocal; // 1 / Z_deep
@@ -33,7 +33,7 @@ typedef float Depths; // the depth origin
 #endif
 #define DEPTHS DEPTHS_OF(rays) // where `rays` are followed
 
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
 inline float depth_coordinate(float offset, Depths depths)
 {
     const float beyond = (offset - depths.deep.x) - depths.deep.y;
@@ -77,7 +77,7 @@ inline float reciprocal_depth(float z, Depths depths)
 #endif
 #endif
 
-#ifndef FAR_ENTRIES
+#ifndef DOUBLE_FLOAT_RAYS
 inline Real list_form(__global const float *form, Real a, Real b, Real t)
 {
     return fma(t, FORM_SLOPE(Real, form, a, b), FORM_VALUE(Real, form, a, b));

@@ -8,13 +8,13 @@
 // about a reference depth near the data, so that float32 is enough here however far away the eye or the origin is
 // (docs/conventions.md, "Rays"). y = 0 is the bottom row.
 //
-// -D FAR_ENTRIES   rays may enter the data so far from there that it is not enough for the positions of samples: six more
+// -D DOUBLE_FLOAT_RAYS   rays may enter the data so far from there that it is not enough for the positions of samples: six more
 //                  floats of each form are what float32 has rounded off the first six (docs/numerics.md)
 #include "lib/double_float.cl"
 #include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
 #define FORM_SIZE 12
 #else
 #define FORM_SIZE 6
@@ -62,7 +62,7 @@ inline Int clip_to_planes(__global const float *planes, int count, Real a, Real 
     return *t0 < *t1;
 }
 
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
 // Three coefficients of a form, and their rests, at pixel offsets (a, b), which are exact.
 inline float2 pair_of_form(__global const float *c, float a, float b)
 {

@@ -5,7 +5,7 @@
 //
 // -D CROPPED            see lib/cropping.cl
 // -D SEGMENTS           t of the new view is asked for, too
-// -D FAR_ENTRIES=2      r is 0 at the other end, `deep` is that one and Z_deep is its depth: the lists lie near it
+// -D DOUBLE_FLOAT_RAYS=2      r is 0 at the other end, `deep` is that one and Z_deep is its depth: the lists lie near it
 #include "lib/list_space.cl"
 #include "lib/cropping.cl"
 #pragma OPENCL FP_CONTRACT OFF
@@ -15,7 +15,7 @@ typedef struct {
     Real3 start;       // where they enter it: u, v, depth coordinate
     Real3 deep, along; // u and v that change by less than a normal number do not change: the reciprocal is not finite
     Int away;          // from V_O: depth does not decrease along the ray
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
     Depths depths;
 #endif
     Real r_begin; // 0 or -1; they end at r_begin + 1
@@ -33,13 +33,13 @@ typedef struct {
 #endif
 } ListRays;
 
-#if defined(FAR_ENTRIES) && FAR_ENTRIES == 2
+#if defined(DOUBLE_FLOAT_RAYS) && DOUBLE_FLOAT_RAYS == 2
 #define ENDS_AT_ZERO(away) (!(away)) // whether r is 0 where the ray ends
 #else
 #define ENDS_AT_ZERO(away) (away)
 #endif
 
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
 typedef float2 RayTime; // t
 #define NEAREST_REAL(t) (t).x
 
@@ -103,7 +103,7 @@ inline ListRays begin_rays(__global const float *forms, int planes, CROPPING_PAR
                        float depth_origin)
 {
     ListRays rays;
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
     float2 t0 = (float2)(0.0f);
     float t_length = 1.0f;
     rays.present = wanted && clip_from_entry(forms + PLANE_FORMS * FORM_SIZE, planes, a, b, t_end, &t0, &t_length);

@@ -7,7 +7,7 @@
 #pragma OPENCL FP_CONTRACT OFF
 
 // What is kept of a face
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
 #define FACE_OF(offset) (offset)
 #else
 #define FACE_OF(offset) depth_coordinate(offset, depth_origin)

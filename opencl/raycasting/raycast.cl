@@ -8,10 +8,10 @@
 // -D LANES              1   a work-item follows a ray
 //                       16  it follows a block of 4 x 4: what a compiler makes of the other form for a CPU takes longer, as it
 //                           takes structures apart, keeps masks and registers in memory around branches, and gathers. For
-//                           supersegments that are not packed, OFFSET_T int, neither FAR_ENTRIES, FIRST_HIT nor ONE_LIST
+//                           supersegments that are not packed, OFFSET_T int, neither DOUBLE_FLOAT_RAYS, FIRST_HIT nor ONE_LIST
 // -D OFFSET_T           type of an offset into the supersegments: int or long
 // -D PARALLEL, SHIFTED  the depth coordinate, see lib/list_space.cl
-// -D FAR_ENTRIES        see lib/list_space.cl
+// -D DOUBLE_FLOAT_RAYS        see lib/list_space.cl
 // -D COMPENSATED        see lib/compositing.cl
 // -D PACKED             the form of the supersegments, see raycasting/supersegments.cl
 // -D CROPPED            only some regions are drawn, see lib/cropping.cl

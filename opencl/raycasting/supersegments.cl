@@ -69,7 +69,7 @@ typedef struct {
     ListReal per_code; // 1 over a code's model length
     float step, nearest;
 #endif
-#if defined(FAR_ENTRIES) || (defined(PACKED) && PACKED == 8)
+#if defined(DOUBLE_FLOAT_RAYS) || (defined(PACKED) && PACKED == 8)
     Depths depths;
 #endif
 } List;
@@ -124,7 +124,7 @@ inline List list_at(__global const ulong *headers, int i, int j, int lists_wide)
     return list;
 }
 
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
 // Faces are kept as offsets, and are brought to the depth coordinate of the ray; NO_FACE stays what it is.
 inline List list_on_ray(List list, Depths depths)
 {
@@ -153,7 +153,7 @@ inline float2 face_on_ray(const List *list, float2 offsets)
     __global const ulong *media, /* straight RG, then B and extinction per length */
 #define SUPERSEGMENTS_ARGUMENTS faces, media,
 #define FACE(list, k) face_on_ray(&(list), two_floats(faces[entry_of(&(list), k)]))
-#ifndef FAR_ENTRIES
+#ifndef DOUBLE_FLOAT_RAYS
 #define FRONT(list, k) ((__global const float *)faces)[2 * entry_of(&(list), k)]
 #define BACK(list, k) ((__global const float *)faces)[2 * entry_of(&(list), k) + 1]
 #endif

@@ -5,8 +5,8 @@
 //
 // -D BY_SCALAR     with NEAREST and voxels of integers: the table holds the medium of each scalar from `low` on, of which no
 //                  voxel is outside (volume/scalar_media.cl); otherwise it is classified at each sample
-// -D FAR_ENTRIES   see lib/rays.cl: t counts from where the ray enters
-// -D LANES         see lib/lanes.cl; 16 with BY_SCALAR and INDEX_T of uint, and without FAR_ENTRIES, SAMPLED and what is below
+// -D DOUBLE_FLOAT_RAYS   see lib/rays.cl: t counts from where the ray enters
+// -D LANES         see lib/lanes.cl; 16 with BY_SCALAR and INDEX_T of uint, and without DOUBLE_FLOAT_RAYS, SAMPLED and what is below
 #include "lib/rays.cl"
 #include "lib/transpose.cl"
 #include "lib/classification.cl"
@@ -40,7 +40,7 @@ typedef struct {
     Real per_step;      // 1 / step
     Real units;         // opacity unit distances per unit of t
     Int steps;          // 0 where a ray misses
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
     float2 entry;       // t of the rays' forms where t is 0 here
 #endif
 } March;
@@ -48,7 +48,7 @@ typedef struct {
 // Value of a form where t of the march is 0.
 inline Real march_value(const March *march, __global const float *form, Real a, Real b)
 {
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
     return form_at(form, a, b, march->entry).x;
 #else
     return FORM_VALUE(Real, form, a, b);
@@ -60,7 +60,7 @@ inline Real march_value(const March *march, __global const float *form, Real a, 
 inline Int begin_march(March *march, __global const float *forms, int planes, Real a, Real b, float sample_distance,
                        float unit_distance, Real t_end)
 {
-#ifdef FAR_ENTRIES
+#ifdef DOUBLE_FLOAT_RAYS
     march->t0 = 0.0f;
     const Int meets = clip_from_entry(forms + 6 * FORM_SIZE, planes, a, b, t_end, &march->entry, &march->t1);
 #else

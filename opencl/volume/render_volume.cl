@@ -2,7 +2,7 @@
 //
 // -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, SKIP_EMPTY, BLOCK_SHIFT: see volume/sampling.cl and volume/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see volume/shading.cl; OCCLUSION: see volume/occlusion.cl
-// -D COMPENSATED: see lib/compositing.cl; FAR_ENTRIES: see lib/rays.cl
+// -D COMPENSATED: see lib/compositing.cl; DOUBLE_FLOAT_RAYS: see lib/rays.cl
 // -D CROPPED: see lib/cropping.cl
 // -D OPACITY_MULTIPLIER: optical depths are multiplied
 // -D SAMPLED: see volume/samples.cl; some steps of some rows at a time then, as they are sampled

@@ -71,17 +71,17 @@ def compensation(media: float) -> dict[str, int]:
 
 
 def entries(reach: float, points: int) -> dict[str, str | int | None]:
-    """Return the ``-D FAR_ENTRIES`` of kernels that march, if they need it.
+    """Return the ``-D DOUBLE_FLOAT_RAYS`` of kernels that march, if they need it.
 
     ``reach`` is the largest grid coordinate of a ray between the depths of the volume's bounds, and
     ``points`` the number of grid points along its longest axis.
     """
     farthest = min(max(NEAR_ENTRY, ENTRY_PER_POINT * points), FAR_ENTRY)
-    return {"FAR_ENTRIES": 1} if reach > farthest else {}
+    return {"DOUBLE_FLOAT_RAYS": 1} if reach > farthest else {}
 
 
 def lists_are_far(depth: float, thickness: float, extent: float) -> bool:
-    """Whether depths in lists need be relative to each ray (``-D FAR_ENTRIES``).
+    """Whether depths in lists need be relative to each ray (``-D DOUBLE_FLOAT_RAYS``).
 
     ``depth`` is the largest that is rounded, ``thickness`` that of what the thickest list holds,
     from its first front to its last back, and ``extent`` that of the bounds; world units.

@@ -122,7 +122,7 @@ class PreparedVDI:
         if self.packed:
             defines["PACKED"] = self.packed
         if self.double_float:
-            defines["FAR_ENTRIES"] = self.double_float
+            defines["DOUBLE_FLOAT_RAYS"] = self.double_float
         return defines
 
     def list_space(self, camera: Camera) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 // Entry points to opencl/lib/double_float.cl and to what lib/rays.cl does with it, one work-item per case.
 //
-// -D FAR_ENTRIES
+// -D DOUBLE_FLOAT_RAYS
 #include "lib/rays.cl"
 #pragma OPENCL FP_CONTRACT OFF
 

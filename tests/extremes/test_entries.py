@@ -38,7 +38,7 @@ SHINY = Shading(0.2, 0.6, 0.5, 30.0)
 
 def is_far(runtime, volume, camera, window=WINDOW):
     medium = DeviceVolume(runtime, volume, transfer())
-    return "FAR_ENTRIES" in medium.forms(camera, window).defines
+    return "DOUBLE_FLOAT_RAYS" in medium.forms(camera, window).defines
 
 
 def plate(thinness):
@@ -188,7 +188,7 @@ def thin_slab(thickness, optical_depth=1.0, parallel=False):
 def test_v_o_sees_all_of_a_far_supersegment(runtime, worst, thinness, far, parallel, precision):
     """Both forms of depth, on either side of the border: 128 thicknesses from the near plane."""
     vdi = thin_slab(2 / thinness, parallel=parallel).with_precision(precision)
-    assert ("FAR_ENTRIES" in PreparedVDI(runtime, vdi).defines) is far
+    assert ("DOUBLE_FLOAT_RAYS" in PreparedVDI(runtime, vdi).defines) is far
     alpha = render_vdi(vdi, vdi.camera, (4, 3), device=runtime)[..., 3]
     off = np.abs(alpha - reference.render(vdi, vdi.camera, (4, 3))[..., 3]).max()
     worst("VDI at V_O", off)
@@ -205,7 +205,7 @@ def test_what_depths_cannot_tell_is_left_to_float32(thickness, far):
 def test_lists_far_away_but_not_thin_are_computed_in_float32_alone(runtime):
     volume = field_volume()
     vdi = generate_vdi(volume, view(volume), WINDOW, transfer(), device=runtime)
-    assert "FAR_ENTRIES" not in PreparedVDI(runtime, vdi).defines
+    assert "DOUBLE_FLOAT_RAYS" not in PreparedVDI(runtime, vdi).defines
 
 
 @pytest.mark.parametrize("precision", ["exact", "16-byte", "8-byte"])
@@ -218,7 +218,7 @@ def test_any_vdi_may_be_drawn_by_depths_relative_to_the_ray(
     vdi = strategies.random_vdi(rng, max_window=(9, 7)).with_precision(precision)
     camera, size = strategies.random_view(rng, vdi, kind)
     monkeypatch.setattr("pyvista_vdi.raycasting.prepared.lists_are_far", lambda *_: True)
-    assert "FAR_ENTRIES" in PreparedVDI(runtime, vdi).defines
+    assert "DOUBLE_FLOAT_RAYS" in PreparedVDI(runtime, vdi).defines
     image = render_vdi(vdi, camera, size, device=runtime)
     result = explain(vdi, camera, size, image, name=kind)
     worst("random VDI", result.worst)

@@ -47,7 +47,7 @@ def kernels_used(runtime, monkeypatch):
 
 
 def both_ways(runtime, vdi, monkeypatch, camera=None, size=None, **options):
-    """The picture, by default from V_O: from own lists, and with rays one by one."""
+    """The picture, by default from V_O: from the aligned view, and with rays one by one."""
     camera = vdi.camera if camera is None else camera
     image = render_vdi(vdi, camera, size, device=runtime, **options)
     with monkeypatch.context() as patch:
@@ -68,7 +68,7 @@ def random_ends(rng, vdi, planes):
     }
 
 
-def test_which_frames_are_drawn_from_own_lists(runtime, monkeypatch):
+def test_which_frames_are_drawn_as_the_aligned_view(runtime, monkeypatch):
     vdi = strategies.random_vdi(np.random.default_rng(0), window=(20, 10))
     wide, high = vdi.window_size
     names = kernels_used(runtime, monkeypatch)
