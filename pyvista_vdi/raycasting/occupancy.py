@@ -30,42 +30,14 @@ class OccupancyGrid:
     span the depth range of the VDI's bounds. Built on the device, from the VDI's arrays alone, so
     that a file need not carry it.
 
-    Parameters
-    ----------
-    runtime : Runtime
-        The device.
-    vdi : VDI
-        Not kept.
-    offsets, front, back : DeviceBuffer
-        The VDI's arrays on the device; offsets uint32, or uint64 if ``long_offsets``.
-    nearest : float
-        Least view depth that is in front of V_O's eye, world units.
-    shifted : bool
-        Whether the raycaster's depth coordinate is that of a long lens.
-    long_offsets : bool
-        Type of the offsets.
-
-    Attributes
-    ----------
-    stacks : (int, int)
-        Stacks of cells along the width and the height.
-    first_depth : float
-        Where slab 0 begins: view depth less the VDI's depth origin, world units.
-    slabs_per_depth : float
-        Slabs per world unit.
-    margin : float
-        By which supersegments count beyond their faces, world units: more than the raycaster's
-        depths are rounded by.
-    counts : DeviceBuffer
-        uint32 (stacks high, stacks wide, slabs).
-    masks : DeviceBuffer
-        uint64 per stack: bit s is set where slab s is occupied.
-    occupied : float
-        Occupied cells over cells within the volume's bounds; above 1 if borders are crossed.
-    corners : numpy.ndarray
-        Points of the model frame, float64 (n, 3), whose convex hull holds all occupied cells that
-        rays meet, and a list and a slab around them.
+    ``offsets`` are uint32, or uint64 if ``long_offsets``; ``nearest`` is the least view depth in
+    front of V_O's eye, and ``shifted`` says whether the depth coordinate is that of a long lens.
     """
+
+    #: uint32 (stacks high, stacks wide, slabs); uint64 per stack: bit s is set where slab s is
+    #: occupied.
+    counts: DeviceBuffer
+    masks: DeviceBuffer
 
     def __init__(
         self,
@@ -84,9 +56,12 @@ class OccupancyGrid:
         near, far = rays.depth_range(vdi.camera, vdi.bounds)
         if not vdi.camera.parallel_projection:
             near = max(near, nearest)
+        #: Where slab 0 begins, view depth less the VDI's depth origin; slabs per world unit.
         self.first_depth = near - vdi.depth_origin
         # Bounds without depth, or behind the eye: everything is in slab 0
         self.slabs_per_depth = SLABS / (far - near) if far > near else 1.0
+        #: By which supersegments count beyond their faces, world units: more than the raycaster's
+        #: depths are rounded by.
         self.margin = _ROUNDINGS * 2.0**-23 * _looked_up(vdi, near, far, shifted)
         with kept_together() as keep:
             self.counts = keep(runtime.buffer((high, wide, SLABS), np.uint32, "occupancy counts"))
@@ -117,8 +92,11 @@ class OccupancyGrid:
                 self.masks,
             )
             masks = runtime.download(self.masks)
+        #: Model points, (n, 3), whose convex hull holds all occupied cells that rays meet, and a
+        #: list and a slab around them.
         self.corners = _corners(vdi, masks, near, far)
         cells = _share_in_bounds(vdi, near, far) * masks.size * SLABS
+        #: Occupied cells over cells within the volume's bounds; above 1 if borders are crossed.
         self.occupied = float(np.unpackbits(masks.view(np.uint8)).sum() / max(cells, 1.0))
 
     @property
