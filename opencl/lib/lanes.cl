@@ -92,11 +92,6 @@ inline int largest_lane(Int x)
     const int2 of_eight = max(of_four.lo, of_four.hi);
     return max(of_eight.x, of_eight.y);
 }
-
-// Names that are going: of files that know only vectors
-typedef Real Reals;
-typedef Int Ints;
-#define NUMBERS LANE_NUMBERS
 #endif
 
 // A number of each lane that is read one by one: of a vector as a Place, from memory, as to take each out of a register costs

@@ -24,4 +24,3 @@ inline Real opacity_of(Real tau)
     q = fma(q, r, (Real)(0.5f));
     return fma(left, fma(-(r * r), q, r), 1.0f - left);
 }
-#define opacities_of opacity_of // a name that is going

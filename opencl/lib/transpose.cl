@@ -20,16 +20,4 @@ inline Real4 transpose(Real4 rows)
     return REAL4(FIRST_HALVES(first_01, first_23).JOINED, SECOND_HALVES(first_01, first_23).JOINED,
                  FIRST_HALVES(second_01, second_23).JOINED, SECOND_HALVES(second_01, second_23).JOINED);
 }
-
-// The same, going
-typedef struct {
-    Real of[4];
-} Quads;
-
-inline Quads transposed(Quads x)
-{
-    const Real4 numbers = transpose(REAL4(x.of[0], x.of[1], x.of[2], x.of[3]));
-    const Quads result = {{numbers.x, numbers.y, numbers.z, numbers.w}};
-    return result;
-}
 #endif

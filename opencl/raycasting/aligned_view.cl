@@ -197,19 +197,18 @@ inline OFFSET_T entry_at(const Lists *lists, int n, int k)
 }
 
 // `words` of 8 bytes, two of which an entry takes.
-inline Quads quads_at(__global const ulong *words, const Lists *lists, int k)
+inline Real4 numbers_at(__global const ulong *words, const Lists *lists, int k)
 {
-    Quads of_bundles;
-    for (int n = 0; n < PACKET_BUNDLES; ++n)
-        of_bundles.of[n] = vload16(0, (__global const float *)(words + 2 * entry_at(lists, n, k)));
-    return transposed(of_bundles);
+#define OF_BUNDLE(n) vload16(0, (__global const float *)(words + 2 * entry_at(lists, n, k)))
+    return transpose(REAL4(OF_BUNDLE(0), OF_BUNDLE(1), OF_BUNDLE(2), OF_BUNDLE(3)));
+#undef OF_BUNDLE
 }
 
 #ifdef PACKED
 inline Faces faces_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k)
 {
-    const Quads quads = quads_at(supersegments, lists, k);
-    const Faces at = {quads.of[0], quads.of[1], {as_uint16(quads.of[2]), as_uint16(quads.of[3])}};
+    const Real4 numbers = numbers_at(supersegments, lists, k);
+    const Faces at = {numbers.x, numbers.y, {AS_UINT(numbers.z), AS_UINT(numbers.w)}};
     return at;
 }
 
@@ -233,8 +232,7 @@ inline Faces faces_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k)
 
 inline Real4 media_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, Faces at)
 {
-    const Quads quads = quads_at(media, lists, k);
-    return REAL4(quads.of[0], quads.of[1], quads.of[2], quads.of[3]);
+    return numbers_at(media, lists, k);
 }
 #endif
 #endif
@@ -324,21 +322,21 @@ KERNEL_OF_LANES void raycast_aligned_view(
         seen.sums.z = select((Real)(0.0f), seen.sums.z, wanted);
     }
 
-    const Quads channels = {{seen.sums.x, seen.sums.y, seen.sums.z, alpha_seen(&seen)}};
-    const Quads pixels = transposed(channels); // of each bundle, row by row
+    const Real4 pixels = transpose(composited(&seen)); // of each bundle, row by row
+    const Real of_bundle[PACKET_BUNDLES] = {pixels.x, pixels.y, pixels.z, pixels.w};
     for (int n = 0; n < PACKET_BUNDLES; ++n) {
         __global float4 *const target = image + place + n * BUNDLE_WIDE;
         if (whole) {
 #if BUNDLE_HIGH == 1
-            vstore16(pixels.of[n], 0, (__global float *)target);
+            vstore16(of_bundle[n], 0, (__global float *)target);
 #else
-            vstore8(pixels.of[n].lo, 0, (__global float *)target);
-            vstore8(pixels.of[n].hi, 0, (__global float *)(target - width));
+            vstore8(of_bundle[n].lo, 0, (__global float *)target);
+            vstore8(of_bundle[n].hi, 0, (__global float *)(target - width));
 #endif
             continue;
         }
         float4 colors[BUNDLE_WIDE * BUNDLE_HIGH];
-        vstore16(pixels.of[n], 0, (float *)colors);
+        vstore16(of_bundle[n], 0, (float *)colors);
         for (int p = 0; p < BUNDLE_WIDE * BUNDLE_HIGH; ++p) {
             const int dx = p % BUNDLE_WIDE, dy = p / BUNDLE_WIDE;
             if (IS_IN_WINDOW(n * BUNDLE_WIDE + dx, dy))

@@ -97,11 +97,9 @@ inline Real4 medium_met(const List *list, SUPERSEGMENTS_PARAMETERS Int n, Int as
     const Places in_memory = {entry_met(list, n, asks, away)};
     const volatile int *at = in_memory.each;
     __global const ulong2 *of = (__global const ulong2 *)media;
-    Quads rows;
-    for (int k = 0; k < 4; ++k)
-        rows.of[k] = as_float16((ulong8)(of[at[k]], of[at[k + 4]], of[at[k + 8]], of[at[k + 12]]));
-    rows = transposed(rows);
-    return REAL4(rows.of[0], rows.of[1], rows.of[2], rows.of[3]);
+#define ROW(k) as_float16((ulong8)(of[at[k]], of[at[(k) + 4]], of[at[(k) + 8]], of[at[(k) + 12]]))
+    return transpose(REAL4(ROW(0), ROW(1), ROW(2), ROW(3)));
+#undef ROW
 }
 #endif
 

@@ -69,23 +69,21 @@ inline void store_segments(__global float *rows, Int slots, int capacity, const 
 {
     const Places in_memory = {ROWS_OF(min(slots, capacity), capacity)};
     const volatile int *at = in_memory.each;
-    const Quads first = {{segments->from, segments->to, segments->optical_depth, segments->color.x}};
-    const Quads second = {{segments->color.y, segments->color.z, segments->color.y, segments->color.z}};
-    const Quads of_first = transposed(first);
-    const Quads of_second = transposed(second);
-#define STORE_ROWS(n)                                                     \
-    vstore4(of_first.of[n].s0123, 0, rows + at[n]);                       \
-    vstore4(of_second.of[n].s0123, 0, rows + at[n] + HALF_ROW);           \
-    vstore4(of_first.of[n].s4567, 0, rows + at[4 + n]);                   \
-    vstore4(of_second.of[n].s4567, 0, rows + at[4 + n] + HALF_ROW);       \
-    vstore4(of_first.of[n].s89ab, 0, rows + at[8 + n]);                   \
-    vstore4(of_second.of[n].s89ab, 0, rows + at[8 + n] + HALF_ROW);       \
-    vstore4(of_first.of[n].scdef, 0, rows + at[12 + n]);                  \
-    vstore4(of_second.of[n].scdef, 0, rows + at[12 + n] + HALF_ROW)
-    STORE_ROWS(0);
-    STORE_ROWS(1);
-    STORE_ROWS(2);
-    STORE_ROWS(3);
+    const Real4 first = transpose(REAL4(segments->from, segments->to, segments->optical_depth, segments->color.x));
+    const Real4 second = transpose(REAL4(segments->color.y, segments->color.z, segments->color.y, segments->color.z));
+#define STORE_ROWS(row, n)                                    \
+    vstore4(first.row.s0123, 0, rows + at[n]);                \
+    vstore4(second.row.s0123, 0, rows + at[n] + HALF_ROW);    \
+    vstore4(first.row.s4567, 0, rows + at[4 + n]);            \
+    vstore4(second.row.s4567, 0, rows + at[4 + n] + HALF_ROW); \
+    vstore4(first.row.s89ab, 0, rows + at[8 + n]);            \
+    vstore4(second.row.s89ab, 0, rows + at[8 + n] + HALF_ROW); \
+    vstore4(first.row.scdef, 0, rows + at[12 + n]);           \
+    vstore4(second.row.scdef, 0, rows + at[12 + n] + HALF_ROW)
+    STORE_ROWS(x, 0);
+    STORE_ROWS(y, 1);
+    STORE_ROWS(z, 2);
+    STORE_ROWS(w, 3);
 #undef STORE_ROWS
 }
 
@@ -96,16 +94,15 @@ inline Segments load_segments(__global const float *rows, Int slots, int capacit
 #define LOAD_ROWS(n, half)                                                                        \
     (Real)(vload4(0, rows + at[n] + (half)), vload4(0, rows + at[4 + (n)] + (half)),              \
            vload4(0, rows + at[8 + (n)] + (half)), vload4(0, rows + at[12 + (n)] + (half)))
-    const Quads first = {{LOAD_ROWS(0, 0), LOAD_ROWS(1, 0), LOAD_ROWS(2, 0), LOAD_ROWS(3, 0)}};
-    const Quads second = {{LOAD_ROWS(0, HALF_ROW), LOAD_ROWS(1, HALF_ROW), LOAD_ROWS(2, HALF_ROW), LOAD_ROWS(3, HALF_ROW)}};
+    const Real4 first = transpose(REAL4(LOAD_ROWS(0, 0), LOAD_ROWS(1, 0), LOAD_ROWS(2, 0), LOAD_ROWS(3, 0)));
+    const Real4 second = transpose(REAL4(LOAD_ROWS(0, HALF_ROW), LOAD_ROWS(1, HALF_ROW), LOAD_ROWS(2, HALF_ROW),
+                                         LOAD_ROWS(3, HALF_ROW)));
 #undef LOAD_ROWS
-    const Quads of_first = transposed(first);
-    const Quads of_second = transposed(second);
     Segments segments;
-    segments.from = of_first.of[0];
-    segments.to = of_first.of[1];
-    segments.optical_depth = of_first.of[2];
-    segments.color = REAL4(of_first.of[3], of_second.of[0], of_second.of[1], (Real)(0.0f));
+    segments.from = first.x;
+    segments.to = first.y;
+    segments.optical_depth = first.z;
+    segments.color = REAL4(first.w, second.x, second.y, (Real)(0.0f));
     return segments;
 }
 #endif
