@@ -146,10 +146,10 @@ install() {
     "$folder/bin/python" -m pip install --quiet "pyvista-vdi$extras @ file://$wheel" "$@"
 }
 
-# The tests must see the installed package: they are copied away from it, with pytest's settings.
+# The tests must see the installed package: they are copied away from it, with what they read.
 copy_tests() {
     mkdir -p "$work/tests-only"
-    cp -r "$work/source/tests" "$work/source/examples" "$work/source/pyproject.toml" "$work/tests-only/"
+    cp -r "$work/source/"{tests,examples,docs,benchmarks,pyproject.toml} "$work/tests-only/"
 }
 
 check_installed_copy() {
