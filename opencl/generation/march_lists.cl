@@ -29,10 +29,7 @@ inline void store_last_run(__global float *records, Int starts, Int count, Run r
 // Work-items are the pixels of V_O in rows first_row .. first_row + rows - 1, in blocks of 4 x 4, or the blocks; records are in
 // the order of the work-items, counts and offsets in the order of the lists.
 
-#if LANES > 1
-__attribute__((vec_type_hint(float16)))
-#endif
-__kernel void march_lists(
+KERNEL_OF_LANES void march_lists(
     MEDIUM_PARAMETERS
     __global const float *forms,     // see begin_march
     int planes,

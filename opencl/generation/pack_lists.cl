@@ -38,7 +38,7 @@ __kernel void pack_lists(
     float2 entry = (float2)(0.0f);
     float length = 0.0f;
     clip_from_entry(forms + 6 * FORM_SIZE, planes, a, b, INFINITY, &entry, &length);
-    const float2 exit = pair_sum(entry, (float2)(length, 0.0f));
+    const float2 exit = double_float_sum(entry, (float2)(length, 0.0f));
     // Faces as they are stored lie in the volume, or its bounds would cut off what rounding has put outside
     float least = entry.y > 0.0f ? nextafter(entry.x, INFINITY) : entry.x;
     const float most = exit.y < 0.0f ? nextafter(exit.x, -INFINITY) : exit.x;
@@ -47,8 +47,8 @@ __kernel void pack_lists(
         Run run = load_run(record, k);
 #ifdef DOUBLE_FLOAT_RAYS
         // Rounding must neither leave a supersegment without thickness nor let two overlap
-        run.FRONT = fmax(pair_sum(entry, (float2)(run.FRONT, 0.0f)).x, least);
-        run.BACK = fmin(pair_sum(entry, (float2)(run.BACK, 0.0f)).x, most);
+        run.FRONT = fmax(double_float_sum(entry, (float2)(run.FRONT, 0.0f)).x, least);
+        run.BACK = fmin(double_float_sum(entry, (float2)(run.BACK, 0.0f)).x, most);
         run.BACK = fmax(run.BACK, nextafter(run.FRONT, INFINITY));
         least = run.BACK;
 #endif

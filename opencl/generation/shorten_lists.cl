@@ -265,10 +265,7 @@ inline Int merge_to_limit(__global float *records, const Places *first, __global
 
 // Shorten records of more than `limit` runs: with `exactly`, at least error; otherwise by raising the rays' thresholds. Other
 // arguments as for march_lists.
-#if LANES > 1
-__attribute__((vec_type_hint(float16)))
-#endif
-__kernel void shorten_lists(
+KERNEL_OF_LANES void shorten_lists(
     int limit,
     int exactly,
     int width, int height,

@@ -80,7 +80,7 @@ inline float reciprocal_depth(float z, Depths depths)
 #ifndef DOUBLE_FLOAT_RAYS
 inline Real list_form(__global const float *form, Real a, Real b, Real t)
 {
-    return fma(t, FORM_SLOPE(Real, form, a, b), FORM_VALUE(Real, form, a, b));
+    return fma(t, form_slope(form, a, b), form_value(form, a, b));
 }
 
 // Depth coordinate at t.
@@ -112,7 +112,7 @@ inline Real3 list_point(__global const float *forms, Real a, Real b, Real t)
 
 inline Real squared_slope(__global const float *form, Real a, Real b)
 {
-    const Real slope = FORM_SLOPE(Real, form, a, b);
+    const Real slope = form_slope(form, a, b);
     return slope * slope;
 }
 

@@ -20,28 +20,24 @@
 #define FORM_SIZE 6
 #endif
 
-// Value of a form at t = 0 for pixel offsets (a, b), and its slope along the ray, per unit of t. TYPE: of a and b, float or a
-// vector.
-#define FORM_VALUE(TYPE, form, a, b) fma(b, (TYPE)((form)[2]), fma(a, (TYPE)((form)[1]), (TYPE)((form)[0])))
-#define FORM_SLOPE(TYPE, form, a, b) FORM_VALUE(TYPE, (form) + 3, a, b)
-
-inline float form_value(__global const float *form, float a, float b)
+// Value of a form at t = 0 for pixel offsets (a, b), and its slope along the ray, per unit of t.
+inline Real form_value(__global const float *form, Real a, Real b)
 {
-    return FORM_VALUE(float, form, a, b);
+    return fma(b, (Real)(form[2]), fma(a, (Real)(form[1]), (Real)(form[0])));
 }
 
-inline float form_slope(__global const float *form, float a, float b)
+inline Real form_slope(__global const float *form, Real a, Real b)
 {
-    return FORM_SLOPE(float, form, a, b);
+    return form_value(form + 3, a, b);
 }
 
 // Model units per unit of t along a ray that is marched. `forms`: 3 index positions, then 3 model directions. By length() of
 // each lane, which drivers compute in ways of their own.
 inline Real march_speed(__global const float *forms, Real a, Real b)
 {
-    const Real x = FORM_SLOPE(Real, forms + 3 * FORM_SIZE, a, b);
-    const Real y = FORM_SLOPE(Real, forms + 4 * FORM_SIZE, a, b);
-    const Real z = FORM_SLOPE(Real, forms + 5 * FORM_SIZE, a, b);
+    const Real x = form_slope(forms + 3 * FORM_SIZE, a, b);
+    const Real y = form_slope(forms + 4 * FORM_SIZE, a, b);
+    const Real z = form_slope(forms + 5 * FORM_SIZE, a, b);
     const float *of_x = (const float *)&x, *of_y = (const float *)&y, *of_z = (const float *)&z;
 #define LENGTH(n) length((float3)(of_x[n], of_y[n], of_z[n]))
     return OF_LANES(Real, LENGTH);
@@ -52,8 +48,8 @@ inline Real march_speed(__global const float *forms, Real a, Real b)
 inline Int clip_to_planes(__global const float *planes, int count, Real a, Real b, Real *t0, Real *t1)
 {
     for (int k = 0; k < count; ++k) {
-        const Real value = FORM_VALUE(Real, planes + k * FORM_SIZE, a, b);
-        const Real slope = FORM_SLOPE(Real, planes + k * FORM_SIZE, a, b);
+        const Real value = form_value(planes + k * FORM_SIZE, a, b);
+        const Real slope = form_slope(planes + k * FORM_SIZE, a, b);
         const Real t = -value / slope;
         *t0 = SELECT(*t0, fmax(*t0, t), slope > 0.0f);
         *t1 = SELECT(*t1, fmin(*t1, t), slope < 0.0f);
@@ -64,17 +60,17 @@ inline Int clip_to_planes(__global const float *planes, int count, Real a, Real 
 
 #ifdef DOUBLE_FLOAT_RAYS
 // Three coefficients of a form, and their rests, at pixel offsets (a, b), which are exact.
-inline float2 pair_of_form(__global const float *c, float a, float b)
+inline float2 double_float_of_form(__global const float *c, float a, float b)
 {
-    const float2 of_a = pair_product((float2)(c[1], c[7]), (float2)(a, 0.0f));
-    const float2 of_b = pair_product((float2)(c[2], c[8]), (float2)(b, 0.0f));
-    return pair_sum(pair_sum((float2)(c[0], c[6]), of_a), of_b);
+    const float2 of_a = double_float_product((float2)(c[1], c[7]), (float2)(a, 0.0f));
+    const float2 of_b = double_float_product((float2)(c[2], c[8]), (float2)(b, 0.0f));
+    return double_float_sum(double_float_sum((float2)(c[0], c[6]), of_a), of_b);
 }
 
 // Value of a form at t.
 inline float2 form_at(__global const float *form, float a, float b, float2 t)
 {
-    return pair_sum(pair_of_form(form, a, b), pair_product(t, pair_of_form(form + 3, a, b)));
+    return double_float_sum(double_float_of_form(form, a, b), double_float_product(t, double_float_of_form(form + 3, a, b)));
 }
 
 // clip_to_planes, and what is left as its entry and its length.
@@ -84,23 +80,23 @@ inline bool clip_from_entry(__global const float *planes, int count, float a, fl
     float2 t0 = (float2)(-INFINITY, 0.0f);
     float2 t1 = (float2)(t_end, 0.0f);
     for (int k = 0; k < count; ++k) {
-        const float2 value = pair_of_form(planes + k * FORM_SIZE, a, b);
-        const float2 slope = pair_of_form(planes + k * FORM_SIZE + 3, a, b);
+        const float2 value = double_float_of_form(planes + k * FORM_SIZE, a, b);
+        const float2 slope = double_float_of_form(planes + k * FORM_SIZE + 3, a, b);
         if (slope.x == 0.0f) {
             if (value.x < 0.0f) // parallel to the plane and outside it
                 return false;
             continue;
         }
-        const float2 t = pair_quotient(-value, slope);
+        const float2 t = double_float_quotient(-value, slope);
         if (slope.x > 0.0f)
-            t0 = pair_less(t0, t) ? t : t0;
+            t0 = double_float_less(t0, t) ? t : t0;
         else
-            t1 = pair_less(t, t1) ? t : t1;
+            t1 = double_float_less(t, t1) ? t : t1;
     }
-    if (!pair_less(t0, t1))
+    if (!double_float_less(t0, t1))
         return false;
     *entry = t0;
-    *length = pair_sum(t1, -t0).x;
+    *length = double_float_sum(t1, -t0).x;
     return *length < INFINITY; // not so where every slope has become 0
 }
 #endif
@@ -132,8 +128,8 @@ inline Rays rays_of_block(uint first, int width, int height, int first_row, int 
     return rays;
 }
 
-// Pixel of a work-item for part of a window, in strips STRIP blocks high, each from left to right, so that one work-item's lists are still
-// cached when those above and below come to them: whole columns of strips, a work-group each. `part` is its first column and
+// Pixel of a work-item for part of a window, in strips STRIP blocks high, each from left to right, so that one work-item's lists
+// are still cached when those above and below come to them: whole columns of strips, a work-group each. `part` is its first column and
 // strip, in columns and strips of the window, how many columns it has in each strip, and how many strips.
 inline int2 part_pixel(int group, int item, int4 part)
 {

@@ -289,7 +289,7 @@ KERNEL_OF_LANES void raycast_aligned_view(
         const Real begin = list_depth(forms, a, b, SELECT((Real)(0.0f), t0, going));
         const Real end = list_depth(forms, a, b, SELECT((Real)(1.0f), t1, going));
         // Model length per unit of V_O's depth
-        Real scale = model_speed(forms, a, b) / FORM_SLOPE(Real, forms + Z_FORM * FORM_SIZE, a, b);
+        Real scale = model_speed(forms, a, b) / form_slope(forms + Z_FORM * FORM_SIZE, a, b);
 #ifdef SHIFTED
         scale *= depth_origin;
 #endif

@@ -53,7 +53,7 @@ inline float3 list_point(__global const float *forms, float a, float b, float2 t
 {
     const float u = list_form(forms + U_FORM * FORM_SIZE, a, b, t);
     const float v = list_form(forms + V_FORM * FORM_SIZE, a, b, t);
-    const float beyond = pair_sum(offset, -depths.deep).x;
+    const float beyond = double_float_sum(offset, -depths.deep).x;
 #ifdef PARALLEL
     return (float3)(u, v, beyond);
 #else
@@ -107,10 +107,10 @@ inline ListRays begin_rays(__global const float *forms, int planes, CROPPING_PAR
     float2 t0 = (float2)(0.0f);
     float t_length = 1.0f;
     rays.present = wanted && clip_from_entry(forms + PLANE_FORMS * FORM_SIZE, planes, a, b, t_end, &t0, &t_length);
-    const float2 t1 = pair_sum(t0, (float2)(t_length, 0.0f));
+    const float2 t1 = double_float_sum(t0, (float2)(t_length, 0.0f));
     const float2 offset = form_at(forms + DEPTH_FORM * FORM_SIZE, a, b, t0);
     const float2 end_offset = form_at(forms + DEPTH_FORM * FORM_SIZE, a, b, t1);
-    rays.depths.deep = ENDS_AT_ZERO(!pair_less(end_offset, offset)) ? end_offset : offset;
+    rays.depths.deep = ENDS_AT_ZERO(!double_float_less(end_offset, offset)) ? end_offset : offset;
     rays.depths.reciprocal = 1.0f / (rays.depths.deep.x + depth_origin);
     rays.depths.depth_origin = depth_origin;
     rays.start = list_point(forms, a, b, t0, offset, rays.depths);

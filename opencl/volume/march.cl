@@ -51,7 +51,7 @@ inline Real march_value(const March *march, __global const float *form, Real a, 
 #ifdef DOUBLE_FLOAT_RAYS
     return form_at(form, a, b, march->entry).x;
 #else
-    return FORM_VALUE(Real, form, a, b);
+    return form_value(form, a, b);
 #endif
 }
 
@@ -72,8 +72,8 @@ inline Int begin_march(March *march, __global const float *forms, int planes, Re
         return meets;
     march->start = REAL3(march_value(march, forms, a, b), march_value(march, forms + FORM_SIZE, a, b),
                          march_value(march, forms + 2 * FORM_SIZE, a, b));
-    march->slope = REAL3(FORM_SLOPE(Real, forms, a, b), FORM_SLOPE(Real, forms + FORM_SIZE, a, b),
-                         FORM_SLOPE(Real, forms + 2 * FORM_SIZE, a, b));
+    march->slope = REAL3(form_slope(forms, a, b), form_slope(forms + FORM_SIZE, a, b),
+                         form_slope(forms + 2 * FORM_SIZE, a, b));
     march->inverse = REAL3(1.0f / march->slope.x, 1.0f / march->slope.y, 1.0f / march->slope.z);
     const Real speed = march_speed(forms, a, b);
     march->step = sample_distance / speed;

@@ -10,10 +10,10 @@ __kernel void arithmetic(int count, __global const float2 *a, __global const flo
     const int i = get_global_id(0);
     if (i >= count)
         return;
-    sums[i] = pair_sum(a[i], b[i]);
-    products[i] = pair_product(a[i], b[i]);
-    quotients[i] = pair_quotient(a[i], b[i]);
-    less[i] = pair_less(a[i], b[i]);
+    sums[i] = double_float_sum(a[i], b[i]);
+    products[i] = double_float_product(a[i], b[i]);
+    quotients[i] = double_float_quotient(a[i], b[i]);
+    less[i] = double_float_less(a[i], b[i]);
 }
 
 // Case i is clipped to `planes` forms of its own, and has its first form evaluated where it enters.
