@@ -25,7 +25,7 @@ Shared functions:
     Steps that were sampled before they are composited.
 ``volume/occlusion.cl``
     Ambient occlusion at a sample.
-``volume/empty_blocks.cl``
+``volume/empty_macrocells.cl``
     Size of the blocks by which marches skip what is transparent.
 ``volume/march.cl``
     The steps along a ray of a volume: generation and direct volume rendering share them.
@@ -82,8 +82,8 @@ Entry points:
     ``render_volume``: direct volume rendering, the baseline.
 ``raycasting/occupancy.cl``
     ``count_supersegments``, ``occupied_slabs``: the occupancy grid of a VDI (paper, section 4).
-``volume/volume_blocks.cl``
-    ``block_ranges``, ``block_visibility``: blocks of a volume that are transparent.
+``volume/macrocells.cl``
+    ``macrocell_ranges``, ``macrocell_visibility``: macrocells of a volume that are transparent.
 ``volume/ambient_occlusion.cl``
     ``step_opacities``, ``ambient_transmittances``: ambient occlusion on a coarse grid.
 """

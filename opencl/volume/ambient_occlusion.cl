@@ -1,6 +1,6 @@
 // Ambient occlusion of a classified volume: the mean transmittance around each node of a coarse grid.
 //
-// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, BLOCK_SHIFT: see volume/sampling.cl and volume/march.cl
+// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, MACROCELL_SHIFT: see volume/sampling.cl and volume/march.cl
 // -D GRADIENT_OPACITY: see volume/shading.cl
 //
 // Node (i, j, k) lies at the volume's index position (i, j, k) * cell. step_opacities gives each node the mean opacity, over
@@ -12,16 +12,16 @@
 #include "volume/occlusion.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Whether any block between two index positions may hold something visible.
-inline bool any_visible(__global const uchar *visible, int4 blocks, float3 low, float3 high)
+// Whether any macrocell between two index positions may hold something visible.
+inline bool any_visible(__global const uchar *visible, int4 macrocells, float3 low, float3 high)
 {
-    const int3 last = blocks.xyz - 1;
-    const int3 a = clamp(convert_int3(fmax(low, 0.0f)) >> BLOCK_SHIFT, (int3)(0), last);
-    const int3 b = clamp(convert_int3(fmax(high, 0.0f)) >> BLOCK_SHIFT, (int3)(0), last);
+    const int3 last = macrocells.xyz - 1;
+    const int3 a = clamp(convert_int3(fmax(low, 0.0f)) >> MACROCELL_SHIFT, (int3)(0), last);
+    const int3 b = clamp(convert_int3(fmax(high, 0.0f)) >> MACROCELL_SHIFT, (int3)(0), last);
     for (int z = a.z; z <= b.z; ++z)
         for (int y = a.y; y <= b.y; ++y)
             for (int x = a.x; x <= b.x; ++x)
-                if (visible[((size_t)z * blocks.y + y) * blocks.x + x])
+                if (visible[((size_t)z * macrocells.y + y) * macrocells.x + x])
                     return true;
     return false;
 }
@@ -33,7 +33,7 @@ __kernel void step_opacities(
     int entries,
     float low, float per_scalar,
     __global const uchar *visible,
-    int4 blocks,
+    int4 macrocells,
     SHADING_PARAMETERS
     int4 nodes,                    // along x, y, z
     int4 cell,                     // voxels from node to node
@@ -46,12 +46,12 @@ __kernel void step_opacities(
     const int3 node = (int3)((int)get_global_id(0), (int)get_global_id(1), (int)get_global_id(2));
     if (node.x >= nodes.x)
         return;
-    const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, blocks SHADING_ARGUMENTS};
+    const Medium medium = {voxels, size, table, entries, low, per_scalar, visible, macrocells SHADING_ARGUMENTS};
     const float3 edge = convert_float3(cell.xyz);
     const float3 centre = convert_float3(node * cell.xyz);
     const float3 apart = edge / convert_float3(samples.xyz);
     float sum = 0.0f;
-    if (any_visible(visible, blocks, centre - 0.5f * edge, centre + 0.5f * edge))
+    if (any_visible(visible, macrocells, centre - 0.5f * edge, centre + 0.5f * edge))
         for (int k = 0; k < samples.z; ++k)
             for (int j = 0; j < samples.y; ++j)
                 for (int i = 0; i < samples.x; ++i) {
@@ -70,7 +70,7 @@ __kernel void step_opacities(
 __kernel void ambient_transmittances(
     __global const float *opacities, // padded
     int4 nodes, int4 cell, int4 margin, int4 padded,
-    __global const uchar *visible, int4 blocks,
+    __global const uchar *visible, int4 macrocells,
     __global const int *places,      // of the first of eight opacities around each step's midpoint, from the node's own
     __global const float *shares,    // weights of the second along x, y, z
     int directions, int steps,
@@ -86,7 +86,7 @@ __kernel void ambient_transmittances(
     const float3 edge = convert_float3(cell.xyz);
     float mean = 1.0f;
     // Nobody asks for a node around which nothing is to be seen
-    if (any_visible(visible, blocks, centre - edge, centre + edge)) {
+    if (any_visible(visible, macrocells, centre - edge, centre + edge)) {
         float sum = 0.0f;
         for (int d = 0; d < directions; ++d) {
             float transmittance = 1.0f;

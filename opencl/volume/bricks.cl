@@ -1,6 +1,6 @@
 // A volume that is on the device brick by brick: the steps of rays are sampled before they are composited.
 //
-// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BLOCK_SHIFT: see volume/sampling.cl and volume/march.cl
+// -D VOXEL_T, INDEX_T, RGBA, NEAREST, MACROCELL_SHIFT: see volume/sampling.cl and volume/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see volume/shading.cl
 // -D BRICK_SHIFT   logarithm to base 2 of a brick's cells along each edge
 // -D BRICK_POINTS  points along each edge that a brick in memory holds
@@ -55,7 +55,7 @@ inline int3 cell_of_step(const March *march, const Medium *medium, int k)
     return clamp(convert_int3(position), (int3)(0), medium->size.xyz - 2);
 }
 
-// Steps that follow each other in the same block, and so in the same brick.
+// Steps that follow each other in the same macrocell, and so in the same brick.
 typedef struct {
     int3 cell; // of the first of them
     int end;   // the step behind the last
@@ -68,16 +68,16 @@ inline Stretch next_stretch(const Walk *walk, const Medium *medium, __global con
     const March *march = &walk->march;
     Stretch stretch;
     stretch.cell = cell_of_step(march, medium, walk->k);
-    const int3 block = stretch.cell >> BLOCK_SHIFT;
+    const int3 macrocell = stretch.cell >> MACROCELL_SHIFT;
     const int3 brick = stretch.cell >> BRICK_SHIFT;
     stretch.brick = (brick.z * bricks.y + brick.y) * bricks.x + brick.x;
-    stretch.transparent = !seen[((size_t)block.z * medium->blocks.y + block.y) * medium->blocks.x + block.x];
-    // Positions never turn back: where the last step is in the block as well, all between are
-    const int3 first = block << BLOCK_SHIFT, last = first + BLOCK;
+    stretch.transparent = !seen[((size_t)macrocell.z * medium->macrocells.y + macrocell.y) * medium->macrocells.x + macrocell.x];
+    // Positions never turn back: where the last step is in the macrocell as well, all between are
+    const int3 first = macrocell << MACROCELL_SHIFT, last = first + MACROCELL;
     const int outside = first_step_outside(march, (float)first.x, (float)first.y, (float)first.z, (float)last.x,
                                            (float)last.y, (float)last.z);
     stretch.end = max(min(outside, walk->end), walk->k + 1);
-    if (any((cell_of_step(march, medium, stretch.end - 1) >> BLOCK_SHIFT) != block))
+    if (any((cell_of_step(march, medium, stretch.end - 1) >> MACROCELL_SHIFT) != macrocell))
         stretch.end = walk->k + 1;
     return stretch;
 }
@@ -86,7 +86,7 @@ inline Stretch next_stretch(const Walk *walk, const Medium *medium, __global con
 __kernel void want_bricks(
     MEDIUM_PARAMETERS
     WALK_PARAMETERS,
-    __global const uchar *seen,    // whether a block holds anything that is not transparent
+    __global const uchar *seen,    // whether a macrocell holds anything that is not transparent
     int4 bricks,                   // along x, y, z
     __global uint *wanted,         // per brick; set to 1
     __global float4 *samples)      // see volume/samples.cl; room for `steps` of each ray

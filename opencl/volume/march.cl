@@ -12,7 +12,7 @@
 #include "lib/classification.cl"
 #include "volume/sampling.cl"
 #include "volume/shading.cl"
-#include "volume/empty_blocks.cl"
+#include "volume/empty_macrocells.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 typedef struct {
@@ -21,16 +21,16 @@ typedef struct {
     __global const float4 *table; // transfer function, or the media of scalars
     int entries;
     float low, per_scalar;        // scalar to table position
-    __global const uchar *distances; // of the blocks from visible ones, see volume/volume_blocks.cl
-    int4 blocks;                  // along x, y, z
+    __global const uchar *distances; // of the macrocells from visible ones, see volume/macrocells.cl
+    int4 macrocells;                 // along x, y, z
     SHADING_FIELDS
 } Medium;
 
 // What each kernel that marches takes first, and the medium that it makes of it
 #define MEDIUM_PARAMETERS                                                                                                 \
     __global const VOXEL_T *voxels, int4 size, __global const float4 *table, int entries, float low, float per_scalar,    \
-        __global const uchar *distances, int4 blocks, SHADING_PARAMETERS
-#define MEDIUM {voxels, size, table, entries, low, per_scalar, distances, blocks SHADING_ARGUMENTS}
+        __global const uchar *distances, int4 macrocells, SHADING_PARAMETERS
+#define MEDIUM {voxels, size, table, entries, low, per_scalar, distances, macrocells SHADING_ARGUMENTS}
 
 typedef struct {
     Real3 start, slope; // position in index space at t = 0 and per unit of t
@@ -106,13 +106,13 @@ inline Int first_step_outside(const March *march, Real lower_x, Real lower_y, Re
     return TO_INT(fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f)) + 1;
 }
 
-// Block of an index position on one axis.
-inline Int block_of(Real position, int blocks)
+// Macrocell of an index position on one axis.
+inline Int macrocell_of(Real position, int macrocells)
 {
-    return clamp(TO_INT(position) >> BLOCK_SHIFT, 0, blocks - 1);
+    return clamp(TO_INT(position) >> MACROCELL_SHIFT, 0, macrocells - 1);
 }
 
-// Steps from step k on, which lies between two faces, whose midpoints lie in transparent blocks around the first one's, in
+// Steps from step k on, which lies between two faces, whose midpoints lie in transparent macrocells around the first one's, in
 // whole groups of `group` steps, so that the others are grouped as if none had been passed by; 0 where there is something to
 // look at, or a ray is not chosen. Skipping decides what is looked at and changes no sample. -D SKIP_EMPTY, or every step is
 // looked at.
@@ -124,22 +124,22 @@ inline Int empty_steps(const March *march, const Medium *medium, Int chosen, Int
         return 0;
 #endif
     const Real t = 0.5f * (front + back);
-    const Int i = block_of(fma(t, march->slope.x, march->start.x), medium->blocks.x);
-    const Int j = block_of(fma(t, march->slope.y, march->start.y), medium->blocks.y);
-    const Int l = block_of(fma(t, march->slope.z, march->start.z), medium->blocks.z);
-    const Places places = {(l * medium->blocks.y + j) * medium->blocks.x + i};
+    const Int i = macrocell_of(fma(t, march->slope.x, march->start.x), medium->macrocells.x);
+    const Int j = macrocell_of(fma(t, march->slope.y, march->start.y), medium->macrocells.y);
+    const Int l = macrocell_of(fma(t, march->slope.z, march->start.z), medium->macrocells.z);
+    const Places places = {(l * medium->macrocells.y + j) * medium->macrocells.x + i};
     Place *at = places.each;
-#define BLOCK_DISTANCE(n) medium->distances[at[n]]
-    const Int distance = OF_LANES(Int, BLOCK_DISTANCE);
-#undef BLOCK_DISTANCE
+#define MACROCELL_DISTANCE(n) medium->distances[at[n]]
+    const Int distance = OF_LANES(Int, MACROCELL_DISTANCE);
+#undef MACROCELL_DISTANCE
     const Int empty = chosen & (distance != 0);
     if (!ANY(empty))
         return (Int)(0);
     const Int before = distance - 1;
     const Int outside = first_step_outside(
-        march, TO_REAL((i - before) << BLOCK_SHIFT), TO_REAL((j - before) << BLOCK_SHIFT),
-        TO_REAL((l - before) << BLOCK_SHIFT), TO_REAL((i + distance) << BLOCK_SHIFT),
-        TO_REAL((j + distance) << BLOCK_SHIFT), TO_REAL((l + distance) << BLOCK_SHIFT));
+        march, TO_REAL((i - before) << MACROCELL_SHIFT), TO_REAL((j - before) << MACROCELL_SHIFT),
+        TO_REAL((l - before) << MACROCELL_SHIFT), TO_REAL((i + distance) << MACROCELL_SHIFT),
+        TO_REAL((j + distance) << MACROCELL_SHIFT), TO_REAL((l + distance) << MACROCELL_SHIFT));
     const Int steps = max(min(outside, end) - k, 0);
     // A division of whole numbers would be done lane by lane; half a step off, rounding crosses none below 2^23
     return SELECT((Int)(0), group * TO_INT((TO_REAL(steps) + 0.5f) / TO_REAL(group)), empty);

@@ -13,7 +13,7 @@
 #include "volume/samples.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Of the structure Medium, of the kernels that take one, and of its initialiser: after `blocks` in each
+// Of the structure Medium, of the kernels that take one, and of its initialiser: after `macrocells` in each
 #define SHADING_FIELDS LIGHTING_FIELD GRADIENT_FIELD OCCLUSION_FIELD SAMPLES_FIELD
 #define SHADING_PARAMETERS LIGHTING_PARAMETER GRADIENT_PARAMETER OCCLUSION_PARAMETER SAMPLES_PARAMETER
 #define SHADING_ARGUMENTS LIGHTING_ARGUMENT GRADIENT_ARGUMENT OCCLUSION_ARGUMENT SAMPLES_ARGUMENT

@@ -17,7 +17,7 @@ from pyvista_vdi.volume.bricks import StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 
 #: ``-D`` names of marches that follow rays in blocks; ``COMPENSATED=1`` changes no march.
-_IN_BLOCKS = {"VOXEL_T", "INDEX_T", "NEAREST", "BY_SCALAR", "SKIP_EMPTY", "BLOCK_SHIFT"}
+_IN_BLOCKS = {"VOXEL_T", "INDEX_T", "NEAREST", "BY_SCALAR", "SKIP_EMPTY", "MACROCELL_SHIFT"}
 #: Steps of a ray before the first look at the length of its record: few, so that rays which cannot
 #: keep every detail learn it soon.
 _FIRST_CHUNK_STEPS = 64

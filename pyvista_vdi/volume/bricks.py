@@ -219,7 +219,7 @@ class DeviceBricks:
     memory_limit : int or None
         Most bytes on the device in all, as it was asked for.
     visible : DeviceBuffer
-        Which blocks hold anything that is not transparent; other bricks are never copied.
+        Which macrocells hold anything that is not transparent; other bricks are never copied.
     name : str
         Of the volume, for messages.
 
@@ -407,43 +407,43 @@ class StepSampler:
 
 
 def in_parts(
-    blocks: tuple[int, int, int], block_points: int, point_bytes: int, nbytes: int
+    macrocells: tuple[int, int, int], macrocell_points: int, point_bytes: int, nbytes: int
 ) -> Iterator[tuple[tuple[slice, ...], tuple[slice, ...]]]:
-    """Cut a grid into parts of whole blocks, along z first.
+    """Cut a grid into parts of whole macrocells, along z first.
 
     Parameters
     ----------
-    blocks : (int, int, int)
-        Blocks along x, y and z.
-    block_points : int
-        Points along a block's edge; blocks share the points on their faces.
+    macrocells : (int, int, int)
+        Macrocells along x, y and z.
+    macrocell_points : int
+        Points along a macrocell's edge; macrocells share the points on their faces.
     point_bytes : int
         Bytes of a point.
     nbytes : int
-        Most bytes of a part, if that is enough for a block.
+        Most bytes of a part, if that is enough for a macrocell.
 
     Yields
     ------
     (tuple of slice, tuple of slice)
-        Which blocks, and which points, both (z, y, x).
+        Which macrocells, and which points, both (z, y, x).
     """
-    lengths = list(reversed(blocks))
+    lengths = list(reversed(macrocells))
     for axis in range(3):
-        of_others = math.prod(n * block_points + 1 for k, n in enumerate(lengths) if k != axis)
-        fitting = (nbytes // (of_others * point_bytes) - 1) // block_points
+        of_others = math.prod(n * macrocell_points + 1 for k, n in enumerate(lengths) if k != axis)
+        fitting = (nbytes // (of_others * point_bytes) - 1) // macrocell_points
         lengths[axis] = max(1, min(lengths[axis], fitting))
         if fitting >= 1:
             break
-    starts = (range(0, n, length) for n, length in zip(reversed(blocks), lengths, strict=True))
+    starts = (range(0, n, length) for n, length in zip(reversed(macrocells), lengths, strict=True))
     for first in itertools.product(*starts):
         ends = [
             min(start + length, n)
-            for start, length, n in zip(first, lengths, reversed(blocks), strict=True)
+            for start, length, n in zip(first, lengths, reversed(macrocells), strict=True)
         ]
         yield (
             tuple(slice(start, end) for start, end in zip(first, ends, strict=True)),
             tuple(
-                slice(start * block_points, end * block_points + 1)
+                slice(start * macrocell_points, end * macrocell_points + 1)
                 for start, end in zip(first, ends, strict=True)
             ),
         )

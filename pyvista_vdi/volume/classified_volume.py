@@ -34,14 +34,14 @@ from pyvista_vdi.volume.bricks import (
 from pyvista_vdi.volume.light_tables import gradient_table, lighting_table, shading_defines
 from pyvista_vdi.volume.occlusion_grid import ambient_transmittances
 from pyvista_vdi.volume.upload import (
-    BLOCK_BYTES,
+    MACROCELL_BYTES,
     TABLE_BYTES,
     Scale,
-    blocks_over,
     described,
     device_bytes,
     fits_whole,
     integer_ends,
+    macrocells_over,
     reads_natively,
     scale_of,
     upload_ranges,
@@ -51,9 +51,9 @@ from pyvista_vdi.volume.upload import (
     voxel_reader,
 )
 
-#: Blocks: farther than this no march looks for what is not transparent.
+#: Macrocells: farther than this no march looks for what is not transparent.
 _FARTHEST = 16
-#: Share of transparent blocks from which on looking for them pays. Measured
+#: Share of transparent macrocells from which on looking for them pays. Measured
 #: (docs/decisions/generation.md): where none is, a picture takes 1.2 to 1.35 times as long with the
 #: look as without; from .32 on it takes .4 to .85.
 _WORTH_SKIPPING = 0.15
@@ -100,7 +100,7 @@ class DeviceVolume:
     options : MediumOptions, optional
         How it is sampled; ambient occlusion is computed once for a classification.
     skip_empty : bool
-        Pass by blocks that the transfer function makes transparent; the samples stay the same.
+        Pass by macrocells that the transfer function makes transparent; the samples stay the same.
     room : Room, optional
         Memory that there is; a volume for which it is too little is held brick by brick. Without
         it a volume is held in one piece or refused.
@@ -253,7 +253,7 @@ class DeviceVolume:
         )
         dtype = volume.array.dtype if scale is None else np.dtype(np.float32)
         point_bytes = dtype.itemsize * math.prod(volume.array.shape[3:])
-        others = math.prod(blocks_over(volume)) * BLOCK_BYTES + TABLE_BYTES
+        others = math.prod(macrocells_over(volume)) * MACROCELL_BYTES + TABLE_BYTES
         left = room.for_bricks(runtime, others)
         largest = runtime.info.max_allocation
         found = fitting_layout(volume.dimensions, point_bytes, gradients, left, largest)
@@ -272,8 +272,8 @@ class DeviceVolume:
             volume.name,
         )
 
-    def _classified(self, blocks: DeviceBuffer) -> tuple[Any, ...]:
-        """Arguments ``voxels`` to ``blocks``, of which ``blocks`` says what may be skipped."""
+    def _classified(self, macrocells: DeviceBuffer) -> tuple[Any, ...]:
+        """Arguments ``voxels`` to ``macrocells``; ``macrocells`` says what may be skipped."""
         return (
             self._voxels,
             np.array([*self.volume.dimensions, 0], dtype=np.int32),
@@ -281,8 +281,8 @@ class DeviceVolume:
             np.int32(self._entries),
             np.float32(self._low),
             np.float32(self._per_scalar),
-            blocks,
-            np.array([*blocks_over(self.volume), 0], dtype=np.int32),
+            macrocells,
+            np.array([*macrocells_over(self.volume), 0], dtype=np.int32),
         )
 
     def _occluded(
@@ -334,12 +334,12 @@ class DeviceVolume:
     def _visibility(
         self, runtime: Runtime, ranges: DeviceBuffer, transfer_function: TransferFunction
     ) -> DeviceBuffer:
-        """Return which blocks hold anything that is not transparent, uint8 on the device."""
-        n = int(np.prod(blocks_over(self.volume)))
-        visible = runtime.buffer((n,), np.uint8, "visible blocks")
+        """Return which macrocells hold anything that is not transparent, uint8 on the device."""
+        n = int(np.prod(macrocells_over(self.volume)))
+        visible = runtime.buffer((n,), np.uint8, "visible macrocells")
         before = np.zeros(self._entries + 1, np.uint32)
         np.cumsum(transfer_function.opacities > 0, out=before[1:])
-        kernel = runtime.kernel("volume/volume_blocks.cl", "block_visibility", self.defines)
+        kernel = runtime.kernel("volume/macrocells.cl", "macrocell_visibility", self.defines)
         with runtime.upload(before, "visible entries") as visible_before:
             runtime.launch(
                 kernel,
@@ -357,15 +357,15 @@ class DeviceVolume:
         return visible
 
     def _distances_of(self, runtime: Runtime, seen: NDArray[np.uint8]) -> DeviceBuffer:
-        """Return how far each block is from one that may be visible, uint8 on the device."""
+        """Return how far each macrocell is from one that may be visible, uint8 on the device."""
         n = np.uint32(seen.size)
-        kernel = runtime.kernel("volume/volume_blocks.cl", "block_distances", self.defines)
+        kernel = runtime.kernel("volume/macrocells.cl", "macrocell_distances", self.defines)
         far = np.where(seen > 0, 0, _FARTHEST).astype(np.uint8)
-        distances = runtime.upload(far, "empty blocks")
+        distances = runtime.upload(far, "empty macrocells")
         apart = 1
-        for along in blocks_over(self.volume):
+        for along in macrocells_over(self.volume):
             with distances as before:
-                distances = runtime.buffer((seen.size,), np.uint8, "distances of blocks")
+                distances = runtime.buffer((seen.size,), np.uint8, "distances of macrocells")
                 runtime.launch(
                     kernel,
                     padded(seen.size, GROUP),

@@ -40,7 +40,7 @@ def ambient_transmittances(
     medium : sequence
         Arguments ``voxels`` to ``gradient`` of the kernels that march, without lights.
     visible : tuple
-        Two of them: blocks that are not transparent, and how many there are.
+        Two of them: macrocells that are not transparent, and how many there are.
     defines : dict
         What the kernels are compiled with: of the medium, without lights.
     sample_distance, unit_distance : float

@@ -1,4 +1,4 @@
-"""A volume's voxels on a device, as they are or scaled, and the scalar ranges of its blocks."""
+"""A volume's voxels on a device, as they are or scaled, and the scalar ranges of its macrocells."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _DEVICE_TYPES = {
     "int16": "short",
     "float32": "float",
 }
-#: Logarithm to base 2 of the points along each edge of a block that can be skipped.
-_BLOCK_SHIFT = 3
-#: Most bytes of a volume that are looked through at a time for the ranges of its blocks, and how
-#: many such parts there must be room for.
+#: Logarithm to base 2 of the points along each edge of a macrocell that can be skipped.
+_MACROCELL_SHIFT = 3
+#: Most bytes of a volume that are looked through at a time for the ranges of its macrocells, and
+#: how many such parts there must be room for.
 _PART_BYTES, _PARTS = 64 * 2**20, 4
-#: Bytes on the device of what is known of a block: its scalar range, whether it is visible, and its
-#: distance from such a block, which is made from another one.
-BLOCK_BYTES = 11
+#: Bytes on the device of what is known of a macrocell: its scalar range, whether it is visible,
+#: and its distance from such a macrocell, which is made from another one.
+MACROCELL_BYTES = 11
 #: Bytes that are kept for tables: transfer functions, lights, rays. They may be a tenth of it.
 TABLE_BYTES = 2**20
 #: Scalars of 16 bits that are looked up and not classified at each sample: 64 KiB of media.
@@ -51,7 +51,7 @@ def voxel_defines(volume: Volume, native: bool) -> dict[str, str | int | None]:
     defines: dict[str, str | int | None] = {
         "VOXEL_T": _DEVICE_TYPES[volume.array.dtype.name] if native else "float",
         "INDEX_T": "ulong" if volume.array.size >= 2**32 else "uint",
-        "BLOCK_SHIFT": _BLOCK_SHIFT,
+        "MACROCELL_SHIFT": _MACROCELL_SHIFT,
     }
     if volume.rgba:
         defines["RGBA"] = 1
@@ -112,14 +112,14 @@ def uploads_of(volume: Volume) -> _Uploads:
 class _Uploads:
     """What is on devices of one volume; its lock lets the thread that uploads it be the only one.
 
-    Voxels and the scalar range of each block, by device and scaling; the last classification's
+    Voxels and the scalar range of each macrocell, by device and scaling; the last classification's
     ambient occlusion, by device, with what it was computed from.
     """
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
         self.made: dict[Any, tuple[DeviceBuffer, DeviceBuffer]] = {}
-        #: Scalar range of each block of a volume that no device holds in one piece, by scaling.
+        #: Scalar range of each macrocell of a volume that no device holds in one piece, by scaling.
         self.ranges: dict[Any, NDArray[np.float32]] = {}
         #: Whether float32 cannot hold the voxels' differences; None before anyone has asked.
         self.too_large: bool | None = None
@@ -128,14 +128,14 @@ class _Uploads:
         self.occlusions: dict[Runtime, tuple[Any, DeviceBuffer]] = {}
 
 
-def blocks_over(volume: Volume) -> tuple[int, int, int]:
-    """Blocks along x, y and z that cover the cells of a volume."""
-    return _blocks_of(volume.dimensions)
+def macrocells_over(volume: Volume) -> tuple[int, int, int]:
+    """Macrocells along x, y and z that cover the cells of a volume."""
+    return _macrocells_of(volume.dimensions)
 
 
-def _blocks_of(dimensions: Sequence[int]) -> tuple[int, int, int]:
-    """Blocks along x, y and z that cover the cells of a grid of so many points."""
-    x, y, z = (-(-(points - 1) // 2**_BLOCK_SHIFT) for points in dimensions)
+def _macrocells_of(dimensions: Sequence[int]) -> tuple[int, int, int]:
+    """Macrocells along x, y and z that cover the cells of a grid of so many points."""
+    x, y, z = (-(-(points - 1) // 2**_MACROCELL_SHIFT) for points in dimensions)
     return x, y, z
 
 
@@ -153,18 +153,20 @@ def described(volume: Volume) -> str:
 def fits_whole(runtime: Runtime, volume: Volume, scale: Scale | None, room: Room) -> bool:
     """Whether there is room for a volume in one piece."""
     uploaded = (runtime, scale) in uploads_of(volume).made
-    nbytes, blocks = device_bytes(volume, scale), math.prod(blocks_over(volume))
-    return room.holds(runtime, nbytes, blocks * BLOCK_BYTES + TABLE_BYTES, uploaded=uploaded)
+    nbytes, macrocells = device_bytes(volume, scale), math.prod(macrocells_over(volume))
+    return room.holds(
+        runtime, nbytes, macrocells * MACROCELL_BYTES + TABLE_BYTES, uploaded=uploaded
+    )
 
 
 def volume_bytes(volume: Volume, nbytes: int, room: Room) -> tuple[int, int]:
     """Return what a volume of ``nbytes`` on the device takes there, and its rays' samples, bytes.
 
-    What its blocks and tables take is in it where there is a limit.
+    What its macrocells and tables take is in it where there is a limit.
     """
     if room.limit is None:
         return nbytes, 0
-    others = math.prod(blocks_over(volume)) * BLOCK_BYTES + TABLE_BYTES
+    others = math.prod(macrocells_over(volume)) * MACROCELL_BYTES + TABLE_BYTES
     if nbytes + others + room.working <= room.limit:
         return nbytes + others, 0
     return room.limit - room.working - room.sample_bytes, room.sample_bytes
@@ -181,7 +183,7 @@ def upload_voxels(
     scale: Scale | None,
     defines: dict[str, str | int | None],
 ) -> tuple[DeviceBuffer, DeviceBuffer]:
-    """Return voxels and the scalar range of each block, made once per device and scaling."""
+    """Return voxels and the scalar range of each macrocell, made once per device and scaling."""
     uploads = uploads_of(volume)
     with runtime.holding(uploads.lock):
         made = uploads.made
@@ -193,7 +195,7 @@ def upload_voxels(
             array = volume.array if scale is None else _all_scaled(runtime, volume.array, scale)
             with kept_together() as keep:
                 voxels = keep(runtime.upload(array, f"volume {volume.name!r}"))
-                ranges = keep(_block_ranges(runtime, volume.dimensions, voxels, defines))
+                ranges = keep(_macrocell_ranges(runtime, volume.dimensions, voxels, defines))
                 runtime.finish()  # a thread with another queue may use them next
             made[key] = (voxels, ranges)
         return made[key]
@@ -206,7 +208,7 @@ def upload_ranges(
     defines: dict[str, str | int | None],
     room: Room,
 ) -> DeviceBuffer:
-    """Return the scalar range of each block of a volume that the device holds brick by brick."""
+    """Return the scalar range of each macrocell of a volume that a device holds in bricks."""
     uploads = uploads_of(volume)
     with runtime.holding(uploads.lock):
         for other in [key for key in uploads.made if key[0] is runtime]:
@@ -214,7 +216,7 @@ def upload_ranges(
         if scale not in uploads.ranges:
             _require_a_number(runtime, volume)
             uploads.ranges = {scale: _ranges_in_parts(runtime, volume, scale, defines, room)}
-        return runtime.upload(uploads.ranges[scale], "ranges of blocks")
+        return runtime.upload(uploads.ranges[scale], "ranges of macrocells")
 
 
 def _ranges_in_parts(
@@ -224,40 +226,40 @@ def _ranges_in_parts(
     defines: dict[str, str | int | None],
     room: Room,
 ) -> NDArray[np.float32]:
-    """Return the scalar range of each block, float32 (n, 2), from parts of the volume."""
-    blocks, read = blocks_over(volume), voxel_reader(scale)
-    ranges = aligned_empty((*reversed(blocks), 2), np.float32)
+    """Return the scalar range of each macrocell, float32 (n, 2), from parts of the volume."""
+    macrocells, read = macrocells_over(volume), voxel_reader(scale)
+    ranges = aligned_empty((*reversed(macrocells), 2), np.float32)
     point_bytes = device_bytes(volume, scale) // math.prod(volume.dimensions)
     nbytes = min(_PART_BYTES, room.in_all(runtime) // _PARTS, runtime.info.max_allocation)
-    for place, points in in_parts(blocks, 2**_BLOCK_SHIFT, point_bytes, nbytes):
+    for place, points in in_parts(macrocells, 2**_MACROCELL_SHIFT, point_bytes, nbytes):
         runtime.give_way()
         part = np.ascontiguousarray(read(volume.array[points]))
         nz, ny, nx = part.shape[:3]
         with (
             runtime.upload(part, f"part of volume {volume.name!r}") as voxels,
-            _block_ranges(runtime, (nx, ny, nz), voxels, defines) as found,
+            _macrocell_ranges(runtime, (nx, ny, nz), voxels, defines) as found,
         ):
             ranges[place] = runtime.download(found).reshape(ranges[place].shape)
     return ranges.reshape(-1, 2)
 
 
-def _block_ranges(
+def _macrocell_ranges(
     runtime: Runtime,
     dimensions: Sequence[int],
     voxels: DeviceBuffer,
     defines: dict[str, str | int | None],
 ) -> DeviceBuffer:
-    """Return the scalar range of each block of a grid of so many points along x, y and z."""
-    blocks = _blocks_of(dimensions)
-    n = int(np.prod(blocks))
-    ranges = runtime.buffer((n, 2), name="ranges of blocks")
+    """Return the scalar range of each macrocell of a grid of so many points along x, y and z."""
+    macrocells = _macrocells_of(dimensions)
+    n = int(np.prod(macrocells))
+    ranges = runtime.buffer((n, 2), name="ranges of macrocells")
     runtime.launch(
-        runtime.kernel("volume/volume_blocks.cl", "block_ranges", defines),
+        runtime.kernel("volume/macrocells.cl", "macrocell_ranges", defines),
         padded(n, GROUP),
         GROUP,
         voxels,
         np.array([*dimensions, 0], dtype=np.int32),
-        np.array([*blocks, 0], dtype=np.int32),
+        np.array([*macrocells, 0], dtype=np.int32),
         ranges,
     )
     return ranges
@@ -272,8 +274,8 @@ def integer_ends(runtime: Runtime, volume: Volume, ranges: DeviceBuffer) -> tupl
         return (0, 255) if dtype.kind == "u" else (-128, 127)
     uploads = uploads_of(volume)
     if uploads.ends is None:
-        blocks = runtime.download(ranges)
-        uploads.ends = int(blocks[:, 0].min()), int(blocks[:, 1].max())
+        macrocells = runtime.download(ranges)
+        uploads.ends = int(macrocells[:, 0].min()), int(macrocells[:, 1].max())
     least, largest = uploads.ends
     return uploads.ends if largest - least < _MOST_LOOKED_UP else None
 

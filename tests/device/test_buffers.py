@@ -153,9 +153,9 @@ def test_a_result_that_is_never_read_is_finished_before_its_memory_goes(runtime,
     finished = []
     monkeypatch.setattr(runtime, "_finish", lambda numbers: finished.append(set(numbers)))
     kernel = runtime.kernel(
-        "volume/volume_blocks.cl",
-        "block_distances",
-        {"VOXEL_T": "uchar", "INDEX_T": "uint", "BLOCK_SHIFT": 3},
+        "volume/macrocells.cl",
+        "macrocell_distances",
+        {"VOXEL_T": "uchar", "INDEX_T": "uint", "MACROCELL_SHIFT": 3},
     )
     buffer = runtime.result((64,), np.uint8)
     with runtime.upload(np.ones(64, np.uint8)) as ones:

@@ -24,12 +24,12 @@ from pyvista_vdi.device import devices, programs
 from pyvista_vdi.errors import Cancelled, DeviceError, DeviceMemoryError, KernelBuildError
 
 #: Buffers of a volume and of a VDI that are on the device, and those that are always small.
-VOLUME = {"volume 'values'", "ranges of blocks"}
+VOLUME = {"volume 'values'", "ranges of macrocells"}
 VDI = {
     *("list headers", "supersegment faces", "supersegment media"),
     *("occupancy counts", "occupancy masks"),
 }
-SMALL = {"transfer function", "visible blocks"}
+SMALL = {"transfer function", "visible macrocells"}
 
 every_operation = pytest.mark.parametrize("operation", OPERATIONS, ids=lambda o: o.name)
 
@@ -158,7 +158,7 @@ def test_a_frame_and_background_work_go_on_after_a_loss(runtime, driver):
 @pytest.mark.parametrize(
     ("operation", "broken"),
     [
-        *((0, name) for name in ("volume/volume_blocks.cl", "generation/march_lists.cl")),
+        *((0, name) for name in ("volume/macrocells.cl", "generation/march_lists.cl")),
         *(
             (2, name)
             for name in (

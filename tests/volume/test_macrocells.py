@@ -21,9 +21,9 @@ def test_distances_of_blocks_are_chessboard_distances(runtime, share):
     shape = (23, 9, 40)
     visible = rng.random(shape) < share
     kernel = runtime.kernel(
-        "volume/volume_blocks.cl",
-        "block_distances",
-        {"VOXEL_T": "uchar", "INDEX_T": "uint", "BLOCK_SHIFT": 3},
+        "volume/macrocells.cl",
+        "macrocell_distances",
+        {"VOXEL_T": "uchar", "INDEX_T": "uint", "MACROCELL_SHIFT": 3},
     )
     found = np.where(visible, 0, MOST).astype(np.uint8)
     n, apart = found.size, 1

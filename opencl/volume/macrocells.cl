@@ -1,29 +1,29 @@
-// Blocks of a volume that a transfer function makes transparent, so that marches can skip them.
+// Macrocells of a volume that a transfer function makes transparent, so that marches can skip them.
 //
 // -D VOXEL_T, INDEX_T, RGBA: see volume/sampling.cl
 //
-// Block (i, j, k) covers the index positions from BLOCK i to BLOCK (i + 1) along x, both included, and likewise along y and
+// Macrocell (i, j, k) covers the index positions from MACROCELL i to MACROCELL (i + 1) along x, both included, and likewise along y and
 // z: every point that a sample between them reads, whatever the interpolation.
-#include "volume/empty_blocks.cl"
+#include "volume/empty_macrocells.cl"
 #include "volume/sampling.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Least and largest scalar of each block, NaN left out (it is transparent); (INFINITY, -INFINITY) where all is NaN.
-__kernel void block_ranges(__global const VOXEL_T *voxels, int4 size, int4 blocks, __global float2 *ranges)
+// Least and largest scalar of each macrocell, NaN left out (it is transparent); (INFINITY, -INFINITY) where all is NaN.
+__kernel void macrocell_ranges(__global const VOXEL_T *voxels, int4 size, int4 macrocells, __global float2 *ranges)
 {
     const uint item = (uint)get_global_id(0);
-    if (item >= (uint)blocks.x * (uint)blocks.y * (uint)blocks.z)
+    if (item >= (uint)macrocells.x * (uint)macrocells.y * (uint)macrocells.z)
         return;
-    const int i = (int)(item % (uint)blocks.x) * BLOCK;
-    const int j = (int)(item / (uint)blocks.x % (uint)blocks.y) * BLOCK;
-    const int k = (int)(item / ((uint)blocks.x * (uint)blocks.y)) * BLOCK;
+    const int i = (int)(item % (uint)macrocells.x) * MACROCELL;
+    const int j = (int)(item / (uint)macrocells.x % (uint)macrocells.y) * MACROCELL;
+    const int k = (int)(item / ((uint)macrocells.x * (uint)macrocells.y)) * MACROCELL;
     float least = INFINITY;
     float largest = -INFINITY;
-    for (int z = k; z <= min(k + BLOCK, size.z - 1); ++z)
-        for (int y = j; y <= min(j + BLOCK, size.y - 1); ++y) {
+    for (int z = k; z <= min(k + MACROCELL, size.z - 1); ++z)
+        for (int y = j; y <= min(j + MACROCELL, size.y - 1); ++y) {
             __global const VOXEL_T *row =
                 voxels + ((INDEX_T)z * (INDEX_T)size.y + (INDEX_T)y) * (INDEX_T)size.x * COMPONENTS;
-            for (int x = i; x <= min(i + BLOCK, size.x - 1); ++x) {
+            for (int x = i; x <= min(i + MACROCELL, size.x - 1); ++x) {
                 const float value = (float)row[x * COMPONENTS + SCALAR];
                 least = fmin(least, value);
                 largest = fmax(largest, value);
@@ -32,13 +32,13 @@ __kernel void block_ranges(__global const VOXEL_T *voxels, int4 size, int4 block
     ranges[item] = (float2)(least, largest);
 }
 
-// The distance field of blocks: how far each is from one that may be visible, in blocks along the axis on which that is most; 0
-// where it is one itself, `most` where there is none nearer. One axis at a time: `along` blocks are on it, their numbers `apart`.
-__kernel void block_distances(
-    __global const uchar *before, uint blocks, uint apart, int along, int most, __global uchar *distances)
+// The distance field of macrocells: how far each is from one that may be visible, in macrocells along the axis on which that is most; 0
+// where it is one itself, `most` where there is none nearer. One axis at a time: `along` macrocells are on it, their numbers `apart`.
+__kernel void macrocell_distances(
+    __global const uchar *before, uint macrocells, uint apart, int along, int most, __global uchar *distances)
 {
     const uint item = (uint)get_global_id(0);
-    if (item >= blocks)
+    if (item >= macrocells)
         return;
     const int place = (int)(item / apart % (uint)along);
     int distance = before[item];
@@ -50,14 +50,14 @@ __kernel void block_distances(
     distances[item] = (uchar)distance;
 }
 
-// Whether anything in a block may be visible. visible_before[e]: how many of the table's entries 0 to e - 1 are not
+// Whether anything in a macrocell may be visible. visible_before[e]: how many of the table's entries 0 to e - 1 are not
 // transparent.
-__kernel void block_visibility(
-    __global const float2 *ranges, uint blocks, __global const uint *visible_before, int entries, float low,
+__kernel void macrocell_visibility(
+    __global const float2 *ranges, uint macrocells, __global const uint *visible_before, int entries, float low,
     float per_scalar, __global uchar *visible)
 {
     const uint item = (uint)get_global_id(0);
-    if (item >= blocks)
+    if (item >= macrocells)
         return;
     const float2 range = ranges[item];
     if (range.x > range.y) {
