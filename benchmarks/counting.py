@@ -2,6 +2,8 @@
 
 Two walks, both for many rays at once in NumPy and independent of the kernels: through the lists of
 a VDI, and through a volume step by step. ``model.py`` turns the counts into bytes and operations.
+
+Both walks share their steps, so they stay in one file.
 """
 
 from __future__ import annotations

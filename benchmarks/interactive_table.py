@@ -3,6 +3,8 @@
 Reads ``machine_cpu.json`` or ``machine_gpu.json`` (run ``machine.py`` first), for the reason why a
 reach is missed, and ``scaling.json`` for what a second core brings. Writes ``interactive_WxH.json``
 (all figures) and ``.md`` (the tables). See README.md in this folder.
+
+It measures, compares with what is to be reached and writes, one table from top to bottom.
 """
 
 from __future__ import annotations

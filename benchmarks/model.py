@@ -3,6 +3,8 @@
 Reads ``machine_cpu.json`` or ``machine_gpu.json`` (run ``machine.py`` first), counts what rays meet
 (``counting.py``), and writes ``model_WxH.json`` (all figures) and ``.md`` (the tables). See
 README.md in this folder.
+
+One stage follows the other, each by the counts of the one before: one file.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 Writes ``scaling.json`` (all figures), ``.md`` (fitted exponents) and ``.png`` (plot). See README.md
 in this folder.
+
+Four scalings share volumes, cameras and one fit: one file.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""One device with its context, queues, programs and buffers: what the engine launches through."""
+"""One device with its context, queues, programs and buffers: what the engine launches through.
+
+Launches, copies and turns share one queue and one lock each, so they are methods of one class; half
+of the lines say what each takes and raises.
+"""
 
 from __future__ import annotations
 

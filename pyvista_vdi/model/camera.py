@@ -1,4 +1,7 @@
-"""The camera: the only place that knows world, view and list coordinates (DESIGN section 3)."""
+"""The camera: the only place that knows world, view and list coordinates (DESIGN section 3).
+
+One class, a third of whose lines document public arguments and frames.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""From a volume to samples, to an image and to a plain VDI, in float64 (DESIGN section 3)."""
+"""From a volume to samples, to an image and to a plain VDI, in float64 (DESIGN section 3).
+
+The whole way stands in one file, so that it can be read against the conventions from top to bottom.
+"""
 
 from __future__ import annotations
 

@@ -4,6 +4,10 @@ Written and read here with NumPy and zlib; https://openexr.com/en/latest/OpenEXR
 the source. A file is a header of attributes, a table of where each scan line's chunk begins, and
 the chunks, top line first. A chunk holds how many samples each pixel has, as a running sum along
 the line, and then the samples, channel by channel.
+
+The OpenEXR package is not in the place of this: it makes an array object of each pixel and channel,
+about a hundred bytes each, and takes memory for what a header merely declares. It reads the forms
+that are not read here (``package.py``). Reading and writing share one file, as one layout.
 """
 
 from __future__ import annotations
