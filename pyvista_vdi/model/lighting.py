@@ -59,7 +59,8 @@ class Light:
         the camera, whose eye is (0, 0, 1) and whose focal point is (0, 0, 0) there; a scene
         light's are world coordinates.
     position, focal_point : (float, float, float)
-        Where it is and where it shines to; without meaning for a headlight.
+        Where it is and where it shines to. A headlight's are not its own, since VTK writes the
+        eye of each frame there: they are kept as the defaults.
     ambient, diffuse, specular : (float, float, float)
         Colours, each multiplied by ``intensity``.
     positional : bool
@@ -96,7 +97,10 @@ class Light:
         for name in ("cone_angle", "exponent", "intensity"):
             put(self, name, _number(f"a light's {name}", getattr(self, name)))
         put(self, "positional", bool(self.positional))
-        if self.kind != "headlight" and self.position == self.focal_point:
+        if self.kind == "headlight":  # wherever the eye is, it is the same light
+            put(self, "position", Light.position)
+            put(self, "focal_point", Light.focal_point)
+        if self.position == self.focal_point:
             raise InvalidArgumentError(
                 f"a light at {self.position} has its focal point there: it shines nowhere"
             )

@@ -214,6 +214,32 @@ def test_changed_property_and_data_generate_anew(plotter, calls):
     assert calls["generate"] == 4
 
 
+def test_what_has_changed_is_made_anew_from_the_frame_s_view(plotter, calls):
+    """Off-screen as on it; a view that somebody chose, and ``regenerate="never"``, keep theirs."""
+    volume = soft_ball()
+    actor = plotter.add_vdi(volume, coverage="view", **LOOKS)
+    shown(plotter)
+    plotter.camera_position = ((0, 9, 1), (0, 0, 0), (0, 0, 1))
+    plotter.render()
+    assert calls["generate"] == 1
+    volume["v"][:] = volume["v"] / 2
+    plotter.render()
+    assert calls["generate"] == 2
+    assert actor.vdi.camera.position == (0, 9, 1)
+
+    plotter.camera_position = ((8, 0, 1), (0, 0, 0), (0, 0, 1))
+    actor.mapper.SetRegenerate("never")
+    actor.mapper.lookup_table.cmap = "inferno"
+    plotter.render()
+    assert actor.vdi.camera.position == (0, 9, 1)
+    actor.mapper.SetRegenerate("auto")
+    actor.regenerate(pvdi.Camera((3, 3, 3), (0, 0, 0), (0, 0, 1)))
+    actor.mapper.lookup_table.cmap = "gray"
+    plotter.render()
+    assert actor.vdi.camera.position == (3, 3, 3)
+    assert calls["generate"] == 5
+
+
 def test_regenerate_takes_the_current_view(plotter, calls):
     actor = plotter.add_vdi(soft_ball(), coverage="view", **LOOKS)
     shown(plotter)

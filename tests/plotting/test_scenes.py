@@ -19,6 +19,7 @@ from plugin_scenes import (
 )
 
 from pyvista_vdi.errors import VDIWarning
+from pyvista_vdi.quality.view_error import angle_from_generating_view
 
 pytestmark = pytest.mark.gl
 
@@ -369,6 +370,30 @@ def test_shaded_by_a_lamp_that_was_added_later():
         plotter.add_light(lamp)
 
     assert_as_vtk(scene, lighting="none")
+
+
+@pytest.mark.parametrize("lighting", ["light kit", "three lights", "none"])
+def test_lights_that_move_with_the_camera_make_no_vdi(lighting):
+    """VTK writes the eye of each frame into its headlights: they are the same lights."""
+    plotter = pv.Plotter(window_size=WINDOW, lighting=lighting)
+    actor = add_ours(plotter, soft_ball(), shade=True)
+    plotter.show(auto_close=False)
+    first = actor.vdi
+    for move in (
+        lambda camera: camera.Azimuth(35),
+        lambda camera: camera.Elevation(-20),
+        lambda camera: camera.Zoom(1.5),
+        lambda camera: camera.SetPosition(5, 1, 2),
+    ):
+        move(plotter.camera)
+        plotter.render()
+        assert actor.vdi is first
+    plotter.add_light(pv.Light(position=(4, -3, 2), light_type="scene light"))
+    plotter.camera.Azimuth(15)
+    plotter.render()
+    assert actor.vdi is not first
+    assert angle_from_generating_view(actor.vdi, plotter.camera) < 1e-4  # float32 inverses
+    plotter.close()
 
 
 def test_other_lights_make_another_vdi():

@@ -424,6 +424,19 @@ def test_lights_of_a_renderer():
     assert Lights.from_any(renderer) == Lights(())
 
 
+def test_a_headlight_is_the_same_wherever_the_eye_is():
+    renderer = vtkRenderer()
+    light = vtkLight()
+    light.SetLightTypeToHeadlight()
+    light.SetIntensity(0.25)
+    renderer.AddLight(light)
+    before = Lights.from_any(renderer)
+    renderer.GetActiveCamera().SetPosition(3, -4, 9)
+    renderer.UpdateLightsGeometryToFollowCamera()
+    assert light.GetPosition() == (3, -4, 9)
+    assert Lights.from_any(renderer) == before == Lights((Light(intensity=0.25),))
+
+
 def test_camera_lights_stand_where_vtk_puts_them():
     renderer = vtkRenderer()
     camera = renderer.GetActiveCamera()

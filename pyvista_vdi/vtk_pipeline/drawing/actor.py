@@ -180,15 +180,15 @@ class VDIActorMethods:
             )
         mapper.painter.upkeep.retry()
         matrix = as_array(self.GetMatrix())
-        renderer = mapper.painter.renderer()
+        renderer, shown = mapper.painter.renderer(), mapper.painter.input
         if camera is not None:
             source.SetCamera(camera, matrix)
         elif renderer is not None:
-            source.SetCamera(renderer.GetActiveCamera(), matrix)
+            shown.take_camera(renderer, matrix)
         if window_size is not None:
             source.SetWindowSize(window_size)
         elif renderer is not None and min(renderer.GetSize()) > 0:
-            source.SetWindowSize(renderer.GetSize())
+            shown.take_size(renderer)
         return source.GetVDI()  # type: ignore[no-any-return]
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
+from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
@@ -39,6 +41,7 @@ class Upkeep:
         self._clock: Callable[[], WindowClock | None] = lambda: None  # a weak reference
         self._looked_at = (0, 0)
         self._failed_at: Any = None
+        self._made_at: Any = None
         self._said_far = False
 
     def set_input(self, source: Input | None, changed: Callable[..., Any]) -> None:
@@ -98,8 +101,10 @@ class Upkeep:
                 self._look(source, frame, ask)
             return source.last()
         if one_view and decide and self._asked_for(ask):
-            source.source.SetCamera(frame.view.camera)
-            source.source.SetWindowSize(frame.view.size)
+            source.take_camera(frame.renderer, frame.model_transform)
+            source.take_size(frame.renderer)
+        elif one_view and decide:
+            self._follow_changes(source, frame)
         return self._updated(source)
 
     def tick(self, window: Any) -> None:
@@ -117,7 +122,7 @@ class Upkeep:
         except BaseException:
             self._failed_at = source.stamp()
             raise
-        self._failed_at = None
+        self._failed_at, self._made_at = None, source.stamp()
         return vdi
 
     def _asked_for(self, ask: Callable[[], VDIStatus]) -> bool:
@@ -128,6 +133,14 @@ class Upkeep:
         except Exception as error:
             self._complain(error)
             return False
+
+    def _follow_changes(self, source: SourceInput, frame: Frame) -> None:
+        """Have what has changed made a VDI of from the frame's view, where it may be."""
+        stamp = source.stamp()
+        if stamp in (self._made_at, self._failed_at) or self.regeneration.policy == "never":
+            return
+        with suppress(VDIError):  # which the update raises
+            source.follow_if_changed(frame.renderer, frame.model_transform)
 
     def _look(self, source: SourceInput, frame: Frame, ask: Callable[[], VDIStatus]) -> None:
         moving = self._interaction.moving(frame.renderer.GetRenderWindow())

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVDIError
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
@@ -54,6 +55,8 @@ class SourceInput(Input):
         super().__init__()
         self.source = source
         self._tag: int | None = None
+        self._camera: Camera | None = None  # what frames gave, which nobody has set
+        self._size: tuple[int, int] | None = None
 
     def shared(self) -> Input:
         """Return an input from the same source."""
@@ -99,12 +102,34 @@ class SourceInput(Input):
 
     def set_view_if_missing(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
         """Take the renderer's view."""
-        source = self.source
-        if source.GetCamera() is None:
-            source.SetCamera(renderer.GetActiveCamera(), model_transform)
-        if source.GetWindowSize() is None:
-            width, height = renderer.GetSize()
-            source.SetWindowSize(max(1, width), max(1, height))
+        if self.source.GetCamera() is None:
+            self.take_camera(renderer, model_transform)
+        if self.source.GetWindowSize() is None:
+            self.take_size(renderer)
+
+    def take_camera(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
+        """Have the next VDI made from the renderer's view."""
+        self.source.SetCamera(renderer.GetActiveCamera(), model_transform)
+        self._camera = self.source.GetCamera()
+
+    def take_size(self, renderer: Any) -> None:
+        """Have the next VDI made for the renderer's window."""
+        width, height = renderer.GetSize()
+        self.source.SetWindowSize(max(1, width), max(1, height))
+        self._size = self.source.GetWindowSize()
+
+    def follow_if_changed(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
+        """Take the renderer's view if what the VDI was made of has changed since, the view apart.
+
+        What somebody has set, the camera or the window's size, stays.
+        """
+        made, source = self.source.GetCurrentRequest(), self.source
+        if made is None or self._camera is None or source.GetCamera() is not self._camera:
+            return
+        if source.MakeRequest().content != made.content:
+            self.take_camera(renderer, model_transform)
+            if source.GetWindowSize() == self._size:
+                self.take_size(renderer)
 
 
 class ImageInput(Input):
