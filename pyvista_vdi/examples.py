@@ -151,8 +151,10 @@ def path(name: str) -> Path:
     try:
         example = VOLUMES[name]
     except (KeyError, TypeError):
+        absent = ", ".join(sorted(set(VOLUMES) - set(available())))
+        others = f"; the files of {absent} are not here, see {DATA_VARIABLE}" if absent else ""
         raise InvalidArgumentError(
-            f"no example volume is called {name!r}: choose one of {', '.join(sorted(VOLUMES))}"
+            f"no example volume is called {name!r}: choose one of {', '.join(available())}{others}"
         ) from None
     file = _locate(example)
     if file is not None:

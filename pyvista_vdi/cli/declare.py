@@ -18,6 +18,11 @@ Options = argparse._ActionsContainer
 
 VDI_FILE = "a .vdi file, an .exr deep image, or a VDI as .vti"
 
+VOLUME_FILE = (
+    "a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), .npy, a raw file "
+    "named like x_1024x1024x795_uint8.raw, or a folder of slices (DICOM, TIFF or PNG)"
+)
+
 # -- types of options ------------------------------------------------------------------------------
 
 
@@ -43,7 +48,7 @@ def parse_numbers(text: str) -> tuple[float, ...]:
 
 
 def parse_bytes(text: str) -> int | None:
-    """Return bytes from ``2GiB``."""
+    """Return bytes from ``2GiB``, or from a plain number."""
     try:
         return memory_limit_bytes(text)
     except InvalidArgumentError:
@@ -124,17 +129,35 @@ def output(options: Options, text: str = ".vdi, .exr or .vti to write") -> None:
 
 
 def volume(options: Options) -> None:
-    """Add the volume: a file's name, or one that is known."""
+    """Add the volume: a file's name, or one that is known; and where its voxels lie."""
+    _file_or_example(options, VOLUME_FILE, "VOLUME")
+
+
+def vdi_or_volume(options: Options) -> None:
+    """Add what to show: a VDI or a volume."""
+    _file_or_example(options, f"{VDI_FILE}; or a volume: {VOLUME_FILE}", "FILE")
+
+
+def _file_or_example(options: Options, text: str, metavar: str) -> None:
     source = options.add_mutually_exclusive_group(required=True)
+    option(source, "file", text, metavar, nargs="?")
     option(
         source,
-        "volume",
-        "a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), .npy, "
-        "a raw file named like x_1024x1024x795_uint8.raw, or a folder of DICOM slices",
-        "VOLUME",
-        nargs="?",
+        "--example",
+        "a volume known by name: brain and rayleigh_taylor are shipped, others are read from the "
+        "folder that PYVISTA_VDI_DATA names",
+        "NAME",
     )
-    option(source, "--example", "a volume known by name, e.g. brain", "NAME")
+    xyz = ("X", "Y", "Z")
+    text = "between voxels, in place of what the volume's file says (1 where it says nothing)"
+    option(options, "--spacing", text, xyz, float, nargs=3)
+    option(options, "--origin", "of its first voxel, in the same way", xyz, float, nargs=3)
+
+
+def array(options: Options) -> None:
+    """Add which array of the volume is meant."""
+    option(options, "--scalars", "which array", "NAME")
+    option(options, "--preference", None, choices=("point", "cell"))
 
 
 def size(options: Options, default: tuple[int, int] | None) -> None:
@@ -192,8 +215,7 @@ def classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> N
     switch(group, "--flip-scalars", default=None)
     switch(group, "--log-scale", default=None)
     option(group, "--opacity-unit-distance", None, "LENGTH", float)
-    option(group, "--scalars", "which array", "NAME")
-    option(group, "--preference", None, choices=("point", "cell"))
+    array(group)
     option(group, "--interpolation", None, choices=("nearest", "linear"))
     switch(group, "--shade", "lit by a headlight", default=None)
     for name in ("--ambient", "--diffuse", "--specular", "--specular-power"):
@@ -265,7 +287,8 @@ def dial(parser: argparse.ArgumentParser) -> None:
     )
     option(group, "--target-ssim", "the same by a number", "S", float)
     option(group, "--target-fps", "least full frames per second", "RATE", float)
-    option(group, "--max-bytes", "most bytes on the device; files are smaller", "N", float)
+    most = "most bytes on the device, like 20MB; files are smaller"
+    option(group, "--max-bytes", most, "SIZE", parse_bytes)
     turn = f"turn of the view for which the SSIM is predicted (default: {TARGET_ANGLE:g})"
     option(group, "--target-angle", turn, "DEGREES", float, default=TARGET_ANGLE)
 

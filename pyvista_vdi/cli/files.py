@@ -11,6 +11,7 @@ from pyvista_vdi.cli.text import mebibytes, printable
 
 if TYPE_CHECKING:
     from pyvista_vdi.io import FileInfo
+    from pyvista_vdi.model.volume import Volume
 
 
 def devices(options: argparse.Namespace) -> int:
@@ -26,9 +27,15 @@ def devices(options: argparse.Namespace) -> int:
 
 
 def info(options: argparse.Namespace) -> int:
-    """Print what a file says about itself."""
+    """Print what a file says about itself: a VDI, or a volume."""
+    from pyvista_vdi.cli.inputs import is_volume, read_volume, volume_name
     from pyvista_vdi.io import read_info
 
+    if is_volume(options):
+        rows = _of_volume(read_volume(options))
+        source = options.file or volume_name(options)
+        print(json.dumps(rows, indent=1) if options.json else _volume_text(source, rows))
+        return 0
     about = read_info(options.file)
     state = {**vars(about), "path": str(about.path), "camera": about.camera.to_dict()}
     print(json.dumps(state, indent=1) if options.json else _text(about))
@@ -48,6 +55,40 @@ def convert(options: argparse.Namespace) -> int:
     vdi.save(target, **file_arguments)
     say_vdi(options, vdi)
     return 0
+
+
+def _of_volume(volume: Volume) -> dict[str, Any]:
+    low, high = volume.finite_range()
+    return {
+        "dimensions": volume.dimensions,
+        "scalars": volume.name,
+        "type": f"{volume.array.dtype}{', RGBA' if volume.rgba else ''}",
+        "range": (low, high),
+        "spacing": volume.spacing,
+        "origin": volume.origin,
+        "direction": volume.direction.tolist(),
+        "bounds": volume.bounds,
+        "memory_bytes": volume.array.nbytes,
+    }
+
+
+def _volume_text(source: str, about: dict[str, Any]) -> str:
+    """Return what is known of a volume; lengths are model units, those of its file."""
+    turned = about["direction"] != [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    axes = zip(*about["direction"], strict=True)
+    return _table(
+        {
+            "volume": source,
+            "points": " x ".join(str(n) for n in about["dimensions"]),
+            "scalars": f"{about['scalars']}, {about['type']}, "
+            f"{about['range'][0]:g} to {about['range'][1]:g}",
+            "spacing": _vector(about["spacing"]),
+            "origin": _vector(about["origin"]),
+            **({"axes": ", ".join(_vector(axis) for axis in axes)} if turned else {}),
+            "bounds": _vector(about["bounds"]),
+            "in memory": mebibytes(about["memory_bytes"]),
+        }
+    )
 
 
 def _text(about: FileInfo) -> str:
@@ -72,6 +113,10 @@ def _text(about: FileInfo) -> str:
         "depth origin": f"{about.depth_origin:g}",
         **{name: _short(value) for name, value in about.metadata.items()},
     }
+    return _table(rows)
+
+
+def _table(rows: dict[str, str]) -> str:
     column = max(len(name) for name in rows)
     return "\n".join(printable(f"{name:<{column}}  {value}") for name, value in rows.items())
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pyvista_vdi.cli.text import mebibytes, printable
-from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-from pyvista_vdi.io import check_writable, check_write_options
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
+from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.inputs import as_volume
@@ -32,8 +32,12 @@ _CLASSIFICATION = (
 )
 
 
+#: Options that say how a volume's file is read.
+_OF_A_VOLUME = ("scalars", "preference", "spacing", "origin")
+
+
 def read_volume(options: argparse.Namespace) -> Volume:
-    """Return the volume that VOLUME or ``--example`` names, with the scalars asked for."""
+    """Return the volume that is named, with the scalars, the spacing and the origin asked for."""
     if options.example is not None:
         from pyvista_vdi import examples
 
@@ -41,13 +45,34 @@ def read_volume(options: argparse.Namespace) -> Volume:
     else:
         from pyvista_vdi.measure.volumes import read_file
 
-        volume = read_file(Path(options.volume))
-    return as_volume(volume, options.scalars, options.preference or "point")
+        volume = read_file(Path(options.file))
+    taken = as_volume(volume, options.scalars, options.preference or "point")
+    if options.spacing is None and options.origin is None:
+        return taken
+    return Volume(
+        taken.array,
+        taken.spacing if options.spacing is None else options.spacing,
+        taken.origin if options.origin is None else options.origin,
+        taken.direction,
+        name=taken.name,
+    )
+
+
+def is_volume(options: argparse.Namespace) -> bool:
+    """Whether FILE or ``--example`` names a volume, and no VDI."""
+    if options.example is not None or not is_vdi_file(options.file):
+        return True
+    given = [n for n in _OF_A_VOLUME if getattr(options, n) is not None]
+    if given:
+        raise UnsupportedError(
+            f"{printable(options.file)} is a VDI: --{given[0]} is for volumes, leave it out"
+        )
+    return False
 
 
 def volume_name(options: argparse.Namespace) -> str:
     """Return a short name of the volume, for files and reports."""
-    return options.example or Path(options.volume).resolve().name.split(".")[0]
+    return options.example or Path(options.file).resolve().name.split(".")[0]
 
 
 def classification(options: argparse.Namespace) -> dict[str, Any]:

@@ -16,6 +16,10 @@ from pyvista_vdi.model.standard_cases import ANGLES, ELEVATION, WINDOW_SIZE
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
 
 
+#: So many names are listed where none of them is meant; more are left to ``--help``.
+_LISTED = 16
+
+
 class UsageError(Exception):
     """A mistake in the arguments; the message says which and what is right."""
 
@@ -86,12 +90,19 @@ def _refuse_argument(verb: _Parser, argument: str) -> NoReturn:
 def run_verb(options: argparse.Namespace) -> int:
     """Import the verb's module, which brings what it needs, and run it."""
     verb = import_module(f".{options.module}", __package__)
+    if getattr(options, "device", None) is not None:
+        from pyvista_vdi.device import get_runtime
+
+        get_runtime(options.device)  # a wrong name is said before minutes of reading
     return int(getattr(verb, options.verb)(options))
 
 
 def _suggestion(name: str, known: Sequence[str]) -> str:
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(dict.fromkeys(known))}"
+    if near:
+        return f"did you mean {near[0]!r}?"
+    names = list(dict.fromkeys(known))
+    return f"known are {', '.join(names)}" if len(names) <= _LISTED else "see --help"
 
 
 def _make_parser() -> tuple[_Parser, dict[str, _Parser]]:
@@ -126,7 +137,8 @@ def _add_devices(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_info(parser: argparse.ArgumentParser) -> None:
-    declare.vdi_file(parser)
+    declare.vdi_or_volume(parser)
+    declare.array(parser)
     declare.switch(parser, "--json", "print JSON, with all metadata")
 
 
@@ -197,7 +209,7 @@ def _add_render(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_view(parser: argparse.ArgumentParser) -> None:
-    declare.vdi_file(parser)
+    declare.vdi_or_volume(parser)
     declare.size(parser, None)
     declare.option(parser, "--screenshot", "write this .png, open no window", "FILE")
     group = parser.add_argument_group("while the view moves")
@@ -206,8 +218,8 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
     declare.option(
         group,
         "--regenerate",
-        "auto (default): say once that the view is beyond what the VDI was made to serve (a "
-        "file holds no volume to make another from); never: take it as it is",
+        "auto (default): where the view is beyond what the VDI was made to serve, make another of "
+        "the volume, or say it once of a VDI that was opened without; never: take it as it is",
         choices=("auto", "never"),
         default="auto",
     )
@@ -217,6 +229,8 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
         "show in a corner how it is drawn: pixels, frames per second, angle from the "
         "generating view",
     )
+    declare.classification(parser, tables=False)
+    declare.device(parser)
 
 
 def _add_compare(parser: argparse.ArgumentParser) -> None:
@@ -338,13 +352,13 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "view": (
         "render",
-        "open a window in which a VDI can be turned",
+        "open a window in which a VDI, or a volume by a VDI of it, can be turned",
         "pyvista-vdi view knee.vdi",
         _add_view,
     ),
     "info": (
         "files",
-        "say what a .vdi, .exr or .vti file holds",
+        "say what a file holds: a VDI or a volume",
         "pyvista-vdi info knee.vdi --json",
         _add_info,
     ),

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import argparse
 import warnings
+from typing import Any
 
 import numpy as np
 
 from pyvista_vdi.api import read
 from pyvista_vdi.api import render as render_vdi
-from pyvista_vdi.cli.inputs import camera
+from pyvista_vdi.cli.inputs import camera, classification, is_volume, read_volume
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.io import checked_png_target, to_bytes, write_png
 from pyvista_vdi.measure.vtk_baselines import aim
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.imports import import_pyvista
 
 
@@ -41,34 +45,46 @@ def render(options: argparse.Namespace) -> int:
 
 def view(options: argparse.Namespace) -> int:
     """Open a plotter on a VDI, or write what it shows."""
-    screenshot = None
-    if options.screenshot is not None:
-        screenshot = str(checked_png_target(options.screenshot))
-    vdi = read(options.file)
-    _show(vdi, options, screenshot)
+    screenshot = options.screenshot and str(checked_png_target(options.screenshot))
+    if is_volume(options):
+        looks = classification(options)
+        volume = read_volume(options)
+        size = options.size or WINDOW_SIZE
+        _show(volume, filling_camera(volume.bounds, size), size, looks, options, screenshot)
+    else:
+        vdi = read(options.file)
+        size = options.size or vdi.window_size
+        _show(vdi, vdi.camera, size, classification(options), options, screenshot)
     if screenshot is not None:
         print(f"{printable(options.screenshot)}: written")
     return 0
 
 
-def _show(vdi: VDI, options: argparse.Namespace, screenshot: str | None) -> None:
-    """Open a plotter that shows a VDI from its own view, or write what it shows.
+def _show(
+    shown: VDI | Volume,
+    camera: Camera,
+    size: tuple[int, int],
+    looks: dict[str, Any],
+    options: argparse.Namespace,
+    screenshot: str | None,
+) -> None:
+    """Open a plotter that shows a VDI, or a volume, from a view, or write what it shows.
 
     No file is written where the picture cannot be drawn or is interrupted.
     """
     pv = import_pyvista()
     with pv.vtk_verbosity("off"):
-        plotter = pv.Plotter(
-            off_screen=screenshot is not None, window_size=list(options.size or vdi.window_size)
-        )
+        plotter = pv.Plotter(off_screen=screenshot is not None, window_size=list(size))
     try:
         actor = plotter.add_vdi(
-            vdi,
+            shown,
             target_fps=options.target_fps,
             regenerate=options.regenerate,
             status=options.status,
+            device=options.device,
+            **looks,
         )
-        aim(plotter.camera, vdi.camera)
+        aim(plotter.camera, camera)
         plotter.camera_set = True
         plotter.renderer.reset_camera_clipping_range()
         if screenshot is None:

@@ -26,6 +26,9 @@ REMEDY = (
     "Debian's and Ubuntu's package pocl-opencl-icd, or your GPU's OpenCL driver"
 )
 
+#: Why a device that nobody has tried yet is not used.
+NOT_PROBED = "not probed"
+
 _KIND_RANK = {"GPU": 0, "CPU": 1, "accelerator": 2}
 _INDEX_SELECTOR = re.compile(r"^\s*(\d+)\s*:\s*(\d+)\s*$")
 _PLATFORM_SELECTOR = re.compile(r"^(.+):\s*(\d+)\s*$")
@@ -70,7 +73,7 @@ class DeviceInfo:
     max_allocation: int
     has_fp64: bool
     usable: bool = False
-    reason: str = "not probed"
+    reason: str = NOT_PROBED
     selector: str = ""
     platform_index: int = 0
     device_index: int = 0
@@ -173,7 +176,8 @@ def listing(infos: Sequence[DeviceInfo]) -> str:
         return "no device at all"
     return "; ".join(
         f"{info.full_name} ({info.kind}, selected by {info.selector!r}"
-        + (f", not usable: {info.reason})" if info.reason and not info.usable else ")")
+        + ("" if info.usable or info.reason in ("", NOT_PROBED) else f", not usable: {info.reason}")
+        + ")"
         for info in infos
     )
 

@@ -124,6 +124,31 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
     return exr.read_info(path) if _is_exr(path) else reader.read_info(path)
 
 
+def is_vdi_file(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is to be read as a VDI: by its name, or else by its content.
+
+    Parameters
+    ----------
+    path : path-like
+        A file, or a folder; it need not exist.
+
+    Returns
+    -------
+    bool
+        For ``.vti``, whether the image is a VDI's; for unknown names, whether it begins as ours.
+
+    Raises
+    ------
+    MissingDependencyError
+        If VTK is not installed and the name ends in ``.vti``.
+    """
+    if _is_vti(path):
+        return _vti().holds_vdi(path)  # type: ignore[no-any-return]
+    if Path(path).suffix.lower() in SUFFIXES:
+        return True
+    return Path(path).is_file() and reader.begins_as_vdi(path)
+
+
 def checked_target(path: str | os.PathLike[str]) -> Path:
     """Raise now if a VDI could not be written there later; nothing is left behind.
 

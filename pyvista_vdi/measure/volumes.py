@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError
 from pyvista_vdi.examples import read_nrrd
+from pyvista_vdi.measure import image_stack
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
@@ -53,12 +54,17 @@ def _resampled(nodes: tuple[float, ...]) -> NDArray[np.float64]:
 
 
 def read_file(file: Path) -> Any:
-    """Read a volume of any format that can be read here, or a folder of DICOM slices.
+    """Read a volume of any format that can be read here, or a folder of slices.
 
     Raw files are those of the Open Scientific Visualization Datasets, whose names tell what they
-    hold: ``kingsnake_1024x1024x795_uint8.raw``. NumPy's ``.npy`` holds scalars (nz, ny, nx). These
-    and NRRD become a Volume and need no PyVista; others become a ``pyvista.ImageData``.
+    hold: ``kingsnake_1024x1024x795_uint8.raw``. NumPy's ``.npy`` holds scalars (nz, ny, nx). These,
+    NRRD and folders of TIFF or PNG become a Volume and need no PyVista; others, folders of DICOM
+    among them, become a ``pyvista.ImageData``.
     """
+    if file.is_dir():
+        slices = image_stack.slices_in(file)
+        if slices:
+            return image_stack.read_stack(slices)
     suffix = file.suffix.lower()
     if suffix == ".raw":
         return _read_raw(file)

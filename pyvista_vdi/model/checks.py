@@ -71,7 +71,7 @@ def memory_limit_bytes(memory_limit: Any) -> int | None:
         return None
     unit, number = 1, math.nan
     if isinstance(memory_limit, str):
-        match = re.fullmatch(r"\s*([\d.]+)\s*([a-z]*)\s*", memory_limit.lower())
+        match = re.fullmatch(r"\s*([\d.]+(?:e\+?\d+)?)\s*([a-z]*)\s*", memory_limit.lower())
         if match and match[2] in _UNITS:
             unit, number = _UNITS[match[2]], as_float(match[1])
     elif not isinstance(memory_limit, bool | np.bool_):

@@ -53,8 +53,8 @@ def slices_of(folder: Path) -> list[Slice]:
     found = [each for each in (read_slice(path) for path in files) if each is not None]
     if not found:
         raise InvalidVolumeError(
-            f"the folder {folder} holds no DICOM slices ({len(files)} files, none of them is one): "
-            "give the folder that holds the slices themselves"
+            f"the folder {folder} holds no slices ({len(files)} files, no DICOM, TIFF or PNG among "
+            "them): give the folder that holds the slices themselves"
         )
     series = Counter(each.series for each in found)
     if len(series) > 1:

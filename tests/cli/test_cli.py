@@ -20,6 +20,7 @@ from fresh_python import PATIENCE
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
 from pyvista_vdi.cli import parser
+from pyvista_vdi.measure.volumes import read_file
 from pyvista_vdi.model.standard_cases import filling_camera
 
 VERBS = (
@@ -65,6 +66,7 @@ def folder(tmp_path_factory):
         metadata={"criterion": "none"},
     )
     vdi.save(path / "a.vdi")
+    (path / "no.vdi").write_bytes((path / "v.nrrd").read_bytes())
     return path
 
 
@@ -118,7 +120,7 @@ def test_version(capsys):
     [
         (["generat"], "there is no verb 'generat': did you mean 'generate'?"),
         (["zzz"], "there is no verb 'zzz': known are devices, generate, render, view, info, com"),
-        (["info"], "the following arguments are required: FILE; see pyvista-vdi info --help"),
+        (["info"], "one of the arguments FILE --example is required; see pyvista-vdi info --help"),
         # Not "argument VOLUME: not allowed with argument --example" for the value behind it
         (
             ["generate", "--example", "brain", "--qualty", "high", "-o", "a"],
@@ -133,6 +135,8 @@ def test_version(capsys):
         (["generate", "a", "--example", "b", "-o", "c"], "not allowed with argument"),
         (["generate", "a", "-o", "b", "--size", "12"], "a size is WIDTHxHEIGHT, like 1280x720"),
         (["generate", "a", "-o", "b", "--memory-limit", "2 foo"], "a size such as 2GiB .* '2 foo'"),
+        (["generate", "a", "-o", "b", "--max-bytes", "0"], "a size such as 2GiB or 800MB; got '0'"),
+        (["generate", "a", "-o", "b", "-q"], "no argument '-q': see --help"),
         (["generate", "a", "-o", "b", "--size", "0x3"], "between 1 and 65536 pixels .* got 0 x 3"),
         (["generate", "a", "-o", "b", "--opacity", "0,x"], "numbers with commas .* got '0,x'"),
         (["generate", "a", "-o", "b", "--tf", "hard"], "invalid choice: 'hard'"),
@@ -154,7 +158,11 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
     ("arguments", "message"),
     [
         (["info", "none.vdi"], "none.vdi cannot be read: No such file or directory"),
-        (["info", "v.nrrd"], "is not a VDI file"),
+        (["info", "no.vdi"], "is not a VDI file"),
+        (["info", "a.vdi", "--spacing", "1", "1", "2"], "is a VDI: --spacing is for volumes"),
+        (["view", "a.vdi", "--scalars", "x", "--screenshot", "b.png"], "--scalars is for volumes"),
+        (["view", "a.vdi", "--cmap", "bone", "--screenshot", "b.png"], "cmap cannot be given with"),
+        (["info", "none.nrrd"], "none.nrrd cannot be read"),
         (["render", "a.vdi", "-o", "a.gif"], "the name must end in .png"),
         (["render", "a.vdi", "-o", "no/a.png"], "no does not exist; create it"),
         (["render", "none.vdi", "-o", "a.png"], "none.vdi cannot be read"),
@@ -193,7 +201,6 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
             ["generate", "v.nrrd", "-o", "b.vdi", "--quality", "fast", "--target-ssim", "0.9"],
             "both say how good pictures are to be",
         ),
-        (["generate", "v.nrrd", "-o", "b.vdi", "--max-bytes", "0"], "max_bytes must be .* got 0"),
         (["compare", "v.nrrd", "--out", "v.nrrd"], "the folder v.nrrd cannot be made"),
     ],
 )
@@ -240,6 +247,13 @@ def test_a_device_that_is_absent(folder, capsys, default_runtime):
         capsys, "render", folder / "a.vdi", "-o", folder / "x.png", "--device", "no such"
     )
     assert default_runtime.info.name in message  # it lists what exists
+
+
+def test_a_device_that_is_absent_is_said_before_anything_is_read(capsys, default_runtime):
+    message = complaint(capsys, "generate", "none.nrrd", "-o", "x.vdi", "--device", "no such")
+    assert "there is no such OpenCL device" in message
+    assert default_runtime.info.selector in message
+    assert "not probed" not in message
 
 
 def test_debug_lets_the_traceback_through(monkeypatch):
@@ -304,6 +318,36 @@ def test_info(folder, capsys):
     assert lines["lists"].strip() == "24 x 16"
     assert lines["supersegments"].strip() == "200, 0.52 per list"
     assert lines["criterion"].strip() == '"none"'
+
+
+def test_info_of_a_volume(folder, capsys):
+    arguments = ("info", folder / "v.nrrd", "--spacing", "1", "2", "3", "--origin", "0", "0", "5")
+    status, out, _ = run(capsys, *arguments)
+    assert status == 0
+    lines = {name: text.strip() for name, text in (x.split("  ", 1) for x in out.splitlines())}
+    volume = read_file(folder / "v.nrrd")
+    nx, ny, nz = volume.dimensions
+    assert lines["points"] == f"{nx} x {ny} x {nz}"
+    assert lines["spacing"] == "(1, 2, 3)"
+    assert lines["origin"] == "(0, 0, 5)"
+    assert lines["bounds"] == f"(0, {nx - 1}, 0, {2 * (ny - 1)}, 5, {5 + 3 * (nz - 1)})"
+    about = json.loads(run(capsys, *arguments, "--json")[1])
+    assert about["range"] == [*volume.finite_range()]
+    assert about["dimensions"] == [nx, ny, nz]
+
+
+def test_view_of_a_volume(folder, capsys, default_runtime, tmp_path):
+    """A volume is shown as ``generate`` and ``view`` of its file show it."""
+    pv = pytest.importorskip("pyvista")
+    looks = ("--cmap", "bone", "--opacity", "linear", "--size", "40x30")
+    direct, file, by_file = (tmp_path / name for name in ("a.png", "v.vdi", "b.png"))
+    assert run(capsys, "view", folder / "v.nrrd", "--screenshot", direct, *looks)[0] == 0
+    assert run(capsys, "generate", folder / "v.nrrd", "-o", file, *looks)[0] == 0
+    assert run(capsys, "view", file, "--screenshot", by_file)[0] == 0
+    one, other = (pv.read(name).active_scalars.astype(int) for name in (direct, by_file))
+    below = one.reshape(30, 40, -1)[12:]  # scalar bars may differ in what they are told
+    assert np.abs(below - other.reshape(30, 40, -1)[12:]).max() <= 1
+    assert np.ptp(below) > 50
 
 
 def test_info_as_json(folder, capsys):

@@ -112,11 +112,8 @@ FORMATS = ("vti", "nrrd", "nhdr", "mha", "mhd", "nii", "nii.gz", "dicom")
 
 def read(path, **options):
     """Read as every verb does that takes a volume."""
-    return read_volume(
-        Namespace(
-            **{"example": None, "volume": str(path), "scalars": None, "preference": None} | options
-        )
-    )
+    absent = ("example", "scalars", "preference", "spacing", "origin")
+    return read_volume(Namespace(**dict.fromkeys(absent) | {"file": str(path)} | options))
 
 
 def marked(volume):
@@ -345,11 +342,11 @@ def test_a_folder_without_slices(files, tmp_path, capsys):
     (tmp_path / "scan").mkdir()
     for name, content in files.items():
         (tmp_path / "scan" / name).write_bytes(content)
-    with pytest.raises(InvalidVolumeError, match=r"scan holds no DICOM slices .* give the folder"):
+    with pytest.raises(InvalidVolumeError, match=r"scan holds no slices .* give the folder"):
         read(tmp_path / "scan")
     for verb in (["generate", "-o", str(tmp_path / "a.vdi")], ["compare", "--out", str(tmp_path)]):
         assert cli.main([verb[0], str(tmp_path / "scan"), *verb[1:]]) == 1
-        assert "holds no DICOM slices" in capsys.readouterr().err
+        assert "holds no slices" in capsys.readouterr().err
     assert not (tmp_path / "a.vdi").exists()
 
 

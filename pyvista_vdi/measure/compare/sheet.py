@@ -41,10 +41,11 @@ def table(report: Report) -> str:
     dimensions = " x ".join(str(n) for n in case["dimensions"])
     lines = [
         f"{case['name']}: {dimensions} {case['dtype']}, {width} x {height} lists",
-        f"at most {case['max_supersegments']} supersegments, step {case['sample_distance']:g}",
+        f"at most {case['max_supersegments']} supersegments",
+        f"step: {case['sample_distance']:g} model units",
         *(f"{name}: {value}" for name, value in report.system.items()),
         "",
-        "Pictures                     angle      SSIM   PSNR dB  worst/255  brightness",
+        "Pictures                   degrees      SSIM   PSNR dB  worst/255  brightness",
     ]
     pairs = {
         "VDI / our raycaster": "vdi_to_raycaster",
@@ -73,12 +74,12 @@ def _timing_lines(report: Report) -> list[str]:
     lines = [
         "",
         f"Frames, ms (median of {report.case['repeats']}; steps of one voxel)",
-        "angle  " + "  ".join(f"{NAMES[n]:>22}" for n in _candidates(report)) + "   VDI / VTK",
+        "degrees" + "  ".join(f"{NAMES[n]:>22}" for n in _candidates(report)) + "   VDI / VTK",
     ]
     for result in report.angles:
         times = "  ".join(f"{result.seconds[n].median * 1e3:22.1f}" for n in _candidates(report))
         ratio = result.ratio_to_vtk
-        lines.append(f"{result.angle:5g}  {times}   {'-' if ratio is None else f'{ratio:9.2f}'}")
+        lines.append(f"{result.angle:7g}{times}   {'-' if ratio is None else f'{ratio:9.2f}'}")
     lines.append("VDI / VTK: the VDI's frame time over that of the faster of VTK's two mappers")
     if report.generation_seconds is not None:
         against = f"{report.generation_ratio:.2f} x our raycaster"

@@ -17,7 +17,13 @@ from pyvista_vdi.errors import InvalidVDIError, VDIFileError
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.whole_file import whole_file
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.vtk_pipeline.filters.convert import FORM_VERSION, vdi_from_image, vdi_to_image
+from pyvista_vdi.vtk_pipeline.filters.convert import (
+    DESCRIPTION,
+    FORM_VERSION,
+    vdi_from_image,
+    vdi_to_image,
+)
+from pyvista_vdi.vtk_pipeline.filters.dense import DESCRIPTION as DENSE_DESCRIPTION
 from pyvista_vdi.vtk_pipeline.filters.dense import is_dense_image, vdi_from_dense_image
 
 #: Names of VTK's compressors, as its writer's methods have them.
@@ -83,6 +89,16 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
         file_bytes=file.stat().st_size,
         memory_bytes=vdi.nbytes,
     )
+
+
+def holds_vdi(path: str | os.PathLike[str]) -> bool:
+    """Whether a ``.vti`` file's header names the arrays of a VDI; False where there is no file."""
+    try:
+        head = Path(path).read_bytes().partition(b"<AppendedData")[0]
+    except OSError:
+        return False
+    names = f"{DESCRIPTION}|{DENSE_DESCRIPTION}".encode()
+    return re.search(rb'<Array type="String" Name="(?:%b)"' % names, head) is not None
 
 
 def _image(path: Any) -> Any:
