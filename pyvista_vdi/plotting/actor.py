@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pyvista as pv
 from pyvista.plotting.mapper import OpenGLGPUVolumeRayCastMapper
 from pyvista.plotting.volume import Volume
 
@@ -45,13 +46,39 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         super().SetMapper(mapper)
         self._held_mapper = mapper
 
+    def SetProperty(self, prop: Any) -> None:  # noqa: N802
+        """Set the volume property, of which the VDI is made anew.
+
+        What is shared with a copy of this actor is not changed for the other.
+
+        Parameters
+        ----------
+        prop : vtkVolumeProperty
+            Changes to it are followed.
+
+        Raises
+        ------
+        UnsupportedError, InvalidArgumentError
+            If a VDI cannot honour it; the property before stays.
+        """
+        mapper = self.GetMapper()
+        source = None if mapper is None else mapper.GetSource()
+        if source is not None and prop is not source.GetVolumeProperty():
+            shown = mapper.painter.input
+            mine = shown if shown.alone else shown.separate()
+            mine.source.SetVolumeProperty(prop)
+            if mine is not shown:
+                mapper.painter.set_input(mine)
+        super().SetProperty(prop)
+
     def copy(self, deep: bool = True) -> PlotterVDIActor:
         """Return another actor that shows the same VDI, with a mapper of its own.
 
         Parameters
         ----------
         deep : bool
-            Copy the volume property as well. A VDI is never copied: it does not change.
+            Copy the volume property and the lookup table as well, so that a change of one actor's
+            is none of the other's. A VDI is never copied: it does not change.
         """
         other = PlotterVDIActor()
         other.ShallowCopy(self)
@@ -70,5 +97,15 @@ class PlotterVDIActor(VDIActorMethods, Volume):
             prop = self.GetProperty()
             copied = type(prop)()  # an actor without its volume has a plain vtkVolumeProperty
             copied.DeepCopy(prop)
+            mapper.lookup_table = _copied(self.mapper.lookup_table)
+            if getattr(prop, "_lookup_table", None) is self.mapper.lookup_table:
+                copied._lookup_table = mapper.lookup_table  # followed from now on, as by PyVista
             other.SetProperty(copied)
         return other
+
+
+def _copied(table: pv.LookupTable) -> pv.LookupTable:
+    copied = pv.LookupTable()
+    copied.DeepCopy(table)
+    vars(copied).update(vars(table))  # the name of its colour map, and the like
+    return copied

@@ -21,7 +21,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.classify import Looks
 from pyvista_vdi.plotting.progress import progress_callback
-from pyvista_vdi.plotting.volumes import as_image
+from pyvista_vdi.plotting.volumes import as_image, held
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, refuse_settings
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
@@ -337,7 +337,7 @@ class AddVDI:
             image, array_name = as_image(volume, scalars, resolution)
             described = Classification(changed, "add_vdi").describe()
             source.SetMetadata({"classification": described})
-            source.SetInputDataObject(image)
+            source.SetInputDataObject(held(image))
             source.SetScalars(array_name, preference)
             source.SetOptions(options)
             source.SetDial(

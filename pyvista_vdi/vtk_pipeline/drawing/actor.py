@@ -45,9 +45,17 @@ class VDIActorMethods:
 
     @property
     def vdi(self: Any) -> VDI | None:
-        """The VDI that is shown; ``None`` until the first frame has made it."""
+        """The VDI that is shown; ``None`` until the first frame has made it.
+
+        Another one that is set is shown from the next frame on, and takes the place of what made
+        the one before: a volume, which is let go of.
+        """
         mapper = self.GetMapper()
         return None if mapper is None else mapper.GetVDI()
+
+    @vdi.setter
+    def vdi(self: Any, vdi: VDI) -> None:
+        self._mapper_for(" that could show a VDI").SetVDI(vdi)
 
     def _mapper_for(self: Any, what: str) -> Any:
         """Return the mapper; without one, say what there cannot be."""
@@ -176,7 +184,7 @@ class VDIActorMethods:
         if source is None:
             raise InvalidArgumentError(
                 "this actor shows a VDI without its volume, which cannot be generated anew: add "
-                "the volume, or set another VDI (actor.GetMapper().SetVDI(vdi))"
+                "the volume, or set another VDI (actor.vdi = another)"
             )
         mapper.painter.upkeep.retry()
         matrix = as_array(self.GetMatrix())

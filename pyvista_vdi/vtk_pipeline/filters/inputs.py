@@ -60,7 +60,16 @@ class SourceInput(Input):
 
     def shared(self) -> Input:
         """Return an input from the same source."""
-        return SourceInput(self.source)
+        return self._from(self.source)
+
+    def separate(self) -> SourceInput:
+        """Return an input from a source of its own, with the same settings and VDI."""
+        return self._from(self.source.Copy())
+
+    def _from(self, source: VDISource) -> SourceInput:
+        other = SourceInput(source)
+        other._camera, other._size = self._camera, self._size
+        return other
 
     def watch(self, changed: Callable[..., Any] | None) -> None:
         """Call back when the source has been modified."""

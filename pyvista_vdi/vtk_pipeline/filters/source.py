@@ -172,6 +172,18 @@ class VDISource(SourceSettings):
         """Return the volume at the input, read again only if it has changed; raises if none is."""
         return self._read(self._input())
 
+    def Copy(self) -> VDISource:
+        """Return another source with this one's input, settings and VDI.
+
+        The volume and its property are shared; what is set of one is not set of the other.
+        """
+        other = VDISource()
+        other.TakeSettings(self)
+        other.SetInputConnection(self.GetInputConnection(0, 0))
+        other._volume, other._volume_key = self._volume, self._volume_key
+        other._vdi, other._request = self._vdi, self._request
+        return other
+
     def _input(self) -> Any:
         """Return the data at the input, brought up to date."""
         if self.GetNumberOfInputConnections(0) == 0:

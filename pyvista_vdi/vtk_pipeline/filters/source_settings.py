@@ -31,6 +31,20 @@ COVERAGES = ("bounds", "view")
 
 Progress = Callable[[float], object]
 
+#: Attributes of a source that are settings as they are.
+_PLAIN = (
+    "_window_size",
+    "_coverage",
+    "_scalars",
+    "_preference",
+    "_options",
+    "_dial",
+    "_device",
+    "_lights",
+    "_progress",
+    "_metadata",
+)
+
 
 def _option(name: str, argument: str, meaning: str, more: str = "") -> tuple[Any, Any]:
     """Return the setter and the getter of one of the :class:`GenerationOptions`, which check."""
@@ -78,6 +92,18 @@ class SourceSettings(Algorithm):
         self._observed: list[tuple[Any, int]] = []
         self._progress: Progress | None = None
         self._metadata: dict[str, Any] = {}
+
+    def TakeSettings(self, other: SourceSettings) -> None:
+        """Set everything as it is set of another source, its input apart."""
+        if other._given is not None:
+            self.SetCamera(other._given.camera, other._given.model_transform)
+        self.SetTrackCamera(other.GetTrackCamera())
+        self._lit_by.Set(other._lit_by.Get())
+        for name in _PLAIN:
+            setattr(self, name, getattr(other, name))
+        self._camera = other.GetCamera()
+        self.SetVolumeProperty(other.GetVolumeProperty())
+        self.Modified()
 
     def SetInputDataObject(self, *args: Any) -> None:
         """Set the volume: a ``vtkImageData`` (optionally after a port number, 0)."""

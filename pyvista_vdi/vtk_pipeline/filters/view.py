@@ -71,7 +71,7 @@ class TrackedCamera:
 
     def __init__(self, camera: Any, model_transform: ArrayLike | None, source: Any) -> None:
         self.camera = camera
-        self._model_transform = model_transform
+        self.model_transform = model_transform
         self._pose = _pose(camera)
         self._source = vtkWeakReference()
         self._source.Set(source)
@@ -102,7 +102,7 @@ class TrackedCamera:
 
     def read(self) -> Camera:
         """Return the view as it is now; raises what :meth:`Camera.from_any` does."""
-        view = Camera.from_any(self.camera, model_transform=self._model_transform)
+        view = Camera.from_any(self.camera, model_transform=self.model_transform)
         self._pose = _pose(self.camera)
         return view
 

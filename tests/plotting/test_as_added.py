@@ -1,0 +1,217 @@
+"""What was added stays as it was added, by the same rules as with ``add_volume``."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import errors
+
+pytestmark = pytest.mark.gl
+
+N = 8
+LOOKS = {"clim": (0, N - 1), "cmap": "gray", "show_scalar_bar": False}
+#: A change that is seen moves pixels by more than 60 of 255, another by none.
+SEEN = 30
+
+
+def ramp():
+    """A grid whose values rise along z, with others along x, and those of cells."""
+    grid = pv.ImageData(dimensions=(N, N, N))
+    grid["x"] = np.float32(grid.points[:, 0])
+    grid["s"] = np.float32(grid.points[:, 2])
+    grid.cell_data["c"] = np.float32(grid.cell_centers().points[:, 2])
+    grid.set_active_scalars("s")
+    return grid
+
+
+def turned(grid):
+    return np.float32(N - 1 - grid.points[:, 2])
+
+
+def write(name):
+    def change(grid):
+        grid[name][:] = grid[name].max() - grid[name]
+
+    return change
+
+
+def view_and(modified):
+    def change(grid):
+        np.asarray(grid["s"])[:] = turned(grid)
+        modified(grid)
+
+    return change
+
+
+CHANGES = {
+    "values in place": ({}, write("s")),
+    "values in place, by name": ({"scalars": "s"}, write("s")),
+    "values in place, of cells": ({"scalars": "c"}, write("c")),
+    "another array's values": ({"scalars": "x"}, write("s")),
+    "a view's values, array modified": (
+        {},
+        view_and(lambda grid: grid.GetPointData().GetArray("s").Modified()),
+    ),
+    "a view's values, grid modified": ({}, view_and(lambda grid: grid.Modified())),
+    "another array of that name": ({}, lambda grid: grid.__setitem__("s", turned(grid))),
+    "the same, by name": ({"scalars": "s"}, lambda grid: grid.__setitem__("s", turned(grid))),
+    "other active scalars": ({}, lambda grid: grid.set_active_scalars("x")),
+    "no such array": ({"scalars": "s"}, lambda grid: grid.point_data.remove("s")),
+    "origin": ({}, lambda grid: setattr(grid, "origin", (3, 0, 0))),
+    "spacing": ({}, lambda grid: setattr(grid, "spacing", (1, 1, 0.5))),
+    "another grid": ({}, lambda grid: grid.copy_from(pv.ImageData(dimensions=(4, 4, 4)))),
+}
+
+
+@pytest.fixture
+def plotter():
+    plotter = pv.Plotter(window_size=(48, 40), off_screen=True)
+    plotter.camera_position = "xz"
+    yield plotter
+    plotter.close()
+
+
+def shown(plotter):
+    plotter.show(auto_close=False)
+    plotter.render()
+    return np.asarray(plotter.screenshot(return_img=True)).astype(int)
+
+
+@pytest.mark.parametrize(("arguments", "change"), CHANGES.values(), ids=CHANGES)
+def test_changes_of_the_grid_show_where_add_volume_s_show(arguments, change):
+    differences = []
+    for method in ("add_volume", "add_vdi"):
+        plotter = pv.Plotter(window_size=(48, 40), off_screen=True)
+        plotter.camera_position = "xz"
+        grid = ramp()
+        getattr(plotter, method)(grid, **LOOKS, **arguments)
+        before = shown(plotter)
+        change(grid)
+        differences.append(np.abs(shown(plotter) - before).max())
+        plotter.close()
+    vtks, ours = differences
+    assert (ours > SEEN) == (vtks > SEEN), differences
+
+
+def test_one_grid_added_twice_shows_each_array_under_its_own_range():
+    grid, judge = ramp(), []
+    plotter = pv.Plotter(shape=(1, 2), window_size=(96, 40), off_screen=True)
+    for column, factor in enumerate((1, -1)):
+        plotter.subplot(0, column)
+        grid["s"] = np.float32(factor * grid.points[:, 2])
+        grid.origin = (2.0 * column, 0, 0)
+        plotter.add_vdi(grid, cmap="gray", show_scalar_bar=False)
+        plotter.camera_position = "xz"
+        judge.append(grid.copy())
+    picture = shown(plotter)
+    ranges = [r.actors[next(iter(r.actors))].mapper.scalar_range for r in plotter.renderers]
+    assert ranges == [(0, N - 1), (1 - N, 0)]
+    plotter.close()
+    for column, alone in enumerate(judge):  # as if it had been the only one
+        plotter = pv.Plotter(shape=(1, 2), window_size=(96, 40), off_screen=True)
+        plotter.subplot(0, column)
+        plotter.add_vdi(alone, cmap="gray", show_scalar_bar=False)
+        plotter.camera_position = "xz"
+        half = slice(48 * column, 48 * column + 48)
+        np.testing.assert_array_equal(picture[:, half], shown(plotter)[:, half])
+        plotter.close()
+
+
+# -- properties, copies and other VDIs -------------------------------------------------------------
+
+
+def test_a_replaced_property_takes_effect(plotter):
+    table = pv.LookupTable("hot", scalar_range=(0, N - 1))
+    table.apply_opacity("linear_r")
+    prop = pv.VolumeProperty(lookup_table=table, opacity_unit_distance=3.0)
+    actor = plotter.add_vdi(ramp(), **LOOKS)
+    before = shown(plotter)
+    actor.prop = prop
+    assert actor.prop is prop
+    after = shown(plotter)
+    assert np.abs(after - before).max() > SEEN
+    plotter.remove_actor(actor)
+    other = plotter.add_vdi(ramp(), cmap=table, opacity_unit_distance=3.0, show_scalar_bar=False)
+    np.testing.assert_array_equal(after, shown(plotter))
+    plotter.remove_actor(other)
+    plotter.add_actor(actor, reset_camera=False)
+    prop.opacity_unit_distance = 60.0  # it is followed
+    assert np.abs(shown(plotter) - after).max() > SEEN
+
+
+def test_a_property_that_a_vdi_cannot_honour_leaves_the_one_before(plotter):
+    actor = plotter.add_vdi(ramp(), **LOOKS)
+    before = actor.prop
+    refused = before.copy()
+    refused.SetTransferFunctionModeTo2D()
+    with pytest.raises(errors.UnsupportedError, match="2D transfer function"):
+        actor.prop = refused
+    assert actor.prop is before
+
+
+def change_shade(actor):
+    actor.prop.shade = True
+    actor.prop.ambient, actor.prop.diffuse = 0.0, 0.1
+
+
+PROPERTIES = {
+    "shade": change_shade,
+    "unit distance": lambda actor: setattr(actor.prop, "opacity_unit_distance", 0.2),
+    "lookup table": lambda actor: setattr(actor.mapper.lookup_table, "cmap", "hot"),
+    "property": lambda actor: setattr(
+        actor, "prop", pv.VolumeProperty(lookup_table=pv.LookupTable("hot", scalar_range=(0, 1)))
+    ),
+}
+
+
+@pytest.mark.parametrize("change", PROPERTIES.values(), ids=PROPERTIES)
+def test_a_copy_s_properties_are_its_own(plotter, change):
+    actor = plotter.add_vdi(ramp(), **LOOKS)
+    before = shown(plotter)
+    vdi = actor.vdi
+    twin = actor.copy()
+    plotter.remove_actor(actor)
+    plotter.add_actor(twin, reset_camera=False)
+    np.testing.assert_array_equal(shown(plotter), before)
+    assert twin.vdi is vdi, "a copy shows the same VDI"
+    change(twin)
+    changed = shown(plotter)
+    assert np.abs(changed - before).max() > SEEN
+    plotter.remove_actor(twin)
+    plotter.add_actor(actor, reset_camera=False)
+    np.testing.assert_array_equal(shown(plotter), before)
+    assert actor.vdi is vdi
+    change(actor)
+    np.testing.assert_array_equal(shown(plotter), changed)
+
+
+def test_a_shallow_copy_shares_its_property_until_it_is_given_another(plotter):
+    actor = plotter.add_vdi(ramp(), **LOOKS)
+    before = shown(plotter)
+    twin = actor.copy(deep=False)
+    assert twin.prop is actor.prop
+    PROPERTIES["property"](twin)
+    np.testing.assert_array_equal(shown(plotter), before)
+    plotter.remove_actor(actor)
+    plotter.add_actor(twin, reset_camera=False)
+    assert np.abs(shown(plotter) - before).max() > SEEN
+
+
+def test_another_vdi_takes_the_place_of_the_first(plotter):
+    actor = plotter.add_vdi(ramp(), **LOOKS)
+    before = shown(plotter)
+    other = pvdi.generate(ramp(), plotter.camera, (48, 40), clim=(0, N - 1), cmap="hot")
+    actor.vdi = other
+    assert actor.vdi is other
+    after = shown(plotter)
+    assert np.abs(after - before).max() > SEEN
+    with pytest.raises(errors.InvalidArgumentError, match="without its volume"):
+        actor.regenerate()
+    with pytest.raises(errors.InvalidArgumentError, match="no mapper that could show"):
+        pvdi.VDIActor().vdi = other
+    with pytest.raises(errors.InvalidVDIError, match="got ImageData"):
+        actor.vdi = ramp()
+    assert actor.vdi is other
