@@ -7,16 +7,20 @@ timers. It prints what failed and ends with status 1, or prints "all well".
 from __future__ import annotations
 
 import sys
+import tempfile
 import threading
 import time
 import traceback
 import warnings
+from itertools import pairwise
 
 import numpy as np
 import pyvista as pv
 from plugin_scenes import LOOKS, soft_ball
+from skimage.io import imread
 from vtkmodules.util.misc import calldata_type
-from vtkmodules.vtkCommonCore import VTK_INT
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import VTK_INT, vtkUnsignedCharArray
 
 from pyvista_vdi.quality.frame_rate import FrameRateController
 
@@ -63,6 +67,14 @@ def wait(plotter, happened):
         assert time.monotonic() < end, "it has not happened"
         plotter.render_window.GetInteractor().ProcessEvents()
         time.sleep(0.005)
+
+
+def pixels(plotter):
+    """What the window shows; nothing is drawn for it."""
+    width, height = plotter.render_window.GetSize()
+    values = vtkUnsignedCharArray()
+    plotter.render_window.GetPixelData(0, 0, width - 1, height - 1, 1, values, 0)
+    return vtk_to_numpy(values).astype(int)
 
 
 def previews_and_screenshots():
@@ -167,7 +179,58 @@ def closing_in_the_middle():
     assert not left, left
 
 
+def every_change_is_shown():
+    """Changes that come faster than VDIs: each is seen, written and shot as it was set."""
+    plotter = pv.Plotter(off_screen=False, window_size=(241, 203))
+    volume = soft_ball()
+    values = volume["v"].copy()
+    actor = plotter.add_vdi(volume, sample_distance=0.002, **LOOKS)
+    plotter.show(interactive_update=True, auto_close=False)
+    shown = []
+    for step in range(20):
+        volume["v"][:] = values * (0.4 if step % 2 else 0.6 + 0.02 * step)
+        plotter.update()
+        assert actor.status.stand_in or actor.status.generation > 1
+        shown.append(pixels(plotter))
+    assert all(np.abs(b - a).max() > 4 for a, b in pairwise(shown)), "a change was not shown"
+    frames = []
+    volume["v"][:] = values
+    for cmap in ("inferno", "bone", "viridis"):
+        actor.mapper.lookup_table.cmap = cmap
+        plotter.update()
+        shot = np.asarray(plotter.screenshot(return_img=True)).astype(int)
+        assert actor.status.mode == "full", actor.status
+        frames.append(shot)
+    assert all(np.abs(b - a).max() > 40 for a, b in pairwise(frames))
+    # Where a pixel lies across the border of a step, VDI and volume may differ by more
+    wait(plotter, lambda: actor.status.progress is None and not actor.status.stand_in)
+    rest = np.asarray(plotter.screenshot(return_img=True)).astype(int)
+    assert np.abs(rest - frames[-1]).max() <= 2, np.abs(rest - frames[-1]).max()
+    plotter.close()
+
+
+def a_movie_has_every_step():
+    """Ten steps, written one after the other, are ten pictures."""
+    volume = soft_ball()
+    values = volume["v"].copy()
+    with tempfile.TemporaryDirectory() as folder:
+        name = f"{folder}/steps.gif"
+        plotter = pv.Plotter(off_screen=False, window_size=(241, 203))
+        plotter.add_vdi(volume, sample_distance=0.002, **LOOKS)
+        plotter.show(interactive_update=True, auto_close=False)
+        plotter.open_gif(name)
+        for step in range(10):
+            volume["v"][:] = values * (1 - 0.08 * step)
+            plotter.write_frame()
+        plotter.close()
+        pictures = np.array(imread(name)).astype(int)
+    assert len(pictures) == 10
+    assert all(np.abs(b - a).max() > 4 for a, b in pairwise(pictures))
+
+
 CASES = (
+    every_change_is_shown,
+    a_movie_has_every_step,
     previews_and_screenshots,
     new_vdi_appears_by_itself,
     held_still_nothing_turns_and_moving_shows_the_new_vdi,

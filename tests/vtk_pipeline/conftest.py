@@ -1,5 +1,6 @@
-"""Every window off-screen, what VTK writes a failure: see ``tests/support/off_screen.py``."""
+"""Windows off-screen, or watched; what VTK writes a failure: ``tests/support`` has the fixtures."""
 
 from off_screen import no_leaks, off_screen, vtk_messages
+from watched_windows import coarsest, gate, no_estimates, plotter
 
-__all__ = ["no_leaks", "off_screen", "vtk_messages"]
+__all__ = ["coarsest", "gate", "no_estimates", "no_leaks", "off_screen", "plotter", "vtk_messages"]

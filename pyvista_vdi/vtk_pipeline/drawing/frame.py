@@ -19,6 +19,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import WindowClock
 
@@ -68,6 +69,8 @@ class Frame:
         Width and height of the viewport in pixels; the image of a preview is smaller.
     vdi : VDI or None
         What is seen: see :meth:`showing`.
+    stand_in : StandIn or None
+        What is seen in place of a VDI that is to come.
     options : RenderOptions
         How it looks; clipping planes are in the camera's world.
     depth : numpy.ndarray or None
@@ -84,6 +87,7 @@ class Frame:
     mapper: Any = None
     full_size: tuple[int, int] = (0, 0)
     vdi: VDI | None = None
+    stand_in: StandIn | None = None
     options: RenderOptions = field(default_factory=RenderOptions)
     depth: Image | None = None
 
@@ -134,15 +138,17 @@ class Frame:
 
     # -- what is seen --------------------------------------------------------------------------
 
-    def showing(self, vdi: VDI) -> Frame:
+    def showing(self, seen: VDI | StandIn) -> Frame:
         """Return the frame of this VDI, with all that its mapper says of its looks."""
         options = RenderOptions(
-            clipping_planes=self._clipping_planes(vdi.bounds),
+            clipping_planes=self._clipping_planes(seen.bounds),
             cropping=self.mapper,
             opacity_multiplier=self.painter.opacity_multiplier,
             transmittance_cutoff=self.painter.transmittance_cutoff,
         )
-        return replace(self, vdi=vdi, options=options)
+        if isinstance(seen, StandIn):
+            return replace(self, stand_in=seen, vdi=None, options=options)
+        return replace(self, vdi=seen, stand_in=None, options=options)
 
     @property
     def key(self) -> Any:
@@ -156,9 +162,10 @@ class Frame:
 
     @property
     def bounds(self) -> tuple[float, ...]:
-        """The VDI's, model frame."""
-        assert self.vdi is not None
-        return self.vdi.bounds
+        """Those of what is seen, model frame."""
+        seen = self.vdi or self.stand_in
+        assert seen is not None
+        return seen.bounds
 
     def coarser(self, size: tuple[int, int]) -> Frame:
         """Return the same view with fewer pixels, which fill the viewport just as exactly.
@@ -174,9 +181,9 @@ class Frame:
         camera = self.camera.replace(model_transform=stretch @ self.camera.model_transform)
         depth = None if self.depth is None else sampled(self.depth, size)
         frame = replace(self, size=size, camera=camera, to_view=stretch @ self.to_view, depth=depth)
-        if self.vdi is None:
+        if self.vdi is None and self.stand_in is None:
             return frame
-        planes = frame._clipping_planes(self.vdi.bounds)
+        planes = frame._clipping_planes(self.bounds)
         return replace(frame, options=self.options.replace(clipping_planes=planes))
 
     def _clipping_planes(self, bounds: tuple[float, ...]) -> list[list[float]]:
@@ -296,6 +303,7 @@ class Drawn:
     depth: Image | None = None  # where its rays ended
     number: int | None = None  # by which an upload is known
     joint: bool = False  # a part of a picture that other actors show the rest of
+    stand_in: bool = False  # of the volume, in place of a VDI
     pixels: Image | None = None
 
     @property

@@ -38,6 +38,9 @@ from pyvista_vdi.vtk_pipeline.filters.inputs import Input
 from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus, Warnings
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import Interaction, WindowClock, reduced
 
+#: Frames per second that stand-ins keep where no rate is asked for: changes are followed by eye.
+_STAND_IN_RATE = 30.0
+
 
 class Painter:
     """What happens behind a :class:`VDIMapper` while a frame is drawn.
@@ -63,7 +66,8 @@ class Painter:
         self._observed: set[str] = set()
         self._texture = ImageTexture()
         self._no_depth = NoDepth()
-        self._drawn: Any = weakref.ref(self)  # the VDI whose images are kept: none yet
+        self._drawn: Any = weakref.ref(self)  # what the images are of that are kept: of none yet
+        self._counted: Any = self._drawn  # the VDI that was shown last
         self._generation = 0
         self._images: Recent[Drawn] = Recent()
         self._free: Image | None = None  # shown by no frame, not even the last
@@ -165,6 +169,7 @@ class Painter:
             progress=self.upkeep.regeneration.progress,
             generation=self._generation,
             vdi=vdi,
+            stand_in=last.stand_in,
         )
 
     # -- a frame ---------------------------------------------------------------------------------
@@ -244,7 +249,9 @@ class Painter:
         frame = self._frame(mapper, renderer)
         if frame is None:
             return self._last
-        part = frame.clock.shared(Overlaps).part(frame, _frames)
+        overlaps = frame.clock.shared(Overlaps)
+        # A volume that stands in has no lists to be merged by
+        part = overlaps.part(frame, _frames) if frame.stand_in is None else None
         if part is not None:
             return part
         frame = replace(frame, depth=frame.clock.shared(OpaqueDepths).read([frame]))
@@ -259,15 +266,17 @@ class Painter:
         frame = Frame.current(renderer, self._actor.Get(), mapper)
         frame.clock.join(self, renderer)
         self._scene = (frame.view.camera, weakref.ref(frame.clock))
-        vdi = self.upkeep.current(frame, self.status, only=len(self.renderers()) == 1)
-        if vdi is None:
+        seen = self.upkeep.current(frame, self.status, only=len(self.renderers()) == 1)
+        if seen is None:
             return None
-        self._place_proxy(vdi.bounds)
-        if vdi is not self._drawn():
+        self._place_proxy(seen.bounds)
+        if seen is not self._drawn():
             self._images.clear()
-            self._drawn = weakref.ref(vdi)
+            self._drawn = weakref.ref(seen)
+        if isinstance(seen, VDI) and seen is not self._counted():
+            self._counted = weakref.ref(seen)
             self._generation += 1
-        return frame.showing(vdi)
+        return frame.showing(seen)
 
     def beside(self, mapper: Any, renderer: Any) -> Frame | None:
         """Return the VDI as it is to be seen beside another one; ``None`` if it is not.
@@ -283,7 +292,8 @@ class Painter:
             return None
         if Frame.current(renderer, actor, mapper).rectangle(bounds) is None:
             return None
-        return self._frame(mapper, renderer)
+        frame = self._frame(mapper, renderer)
+        return None if frame is None or frame.stand_in is not None else frame
 
     def _select(self, mapper: Any, renderer: Any) -> None:
         """Draw what can be picked of what the last frame showed, or the first would show."""
@@ -291,9 +301,9 @@ class Painter:
         self.selection.enter(actor, renderer.GetSelector())
         seen = None
         try:
-            if not isinstance(self._drawn(), VDI):
+            if not isinstance(self._counted(), VDI):
                 self._last = self._paint(mapper, renderer)
-            vdi = self._drawn()
+            vdi = self._counted()
             if isinstance(vdi, VDI):
                 seen = Frame.current(renderer, actor, mapper).showing(vdi)
             self.selection.show(renderer, seen, self.device)
@@ -306,8 +316,19 @@ class Painter:
         """Return the size of this frame's image: that of the viewport, or less."""
         width, height = frame.full_size
         floor = min(1.0, 1 / frame.mapper.GetMaximumImageSampleDistance() ** 2)
-        share = frame.clock.share(frame.renderer, self.interaction, width * height, floor)
+        if frame.stand_in is None:
+            share = frame.clock.share(frame.renderer, self.interaction, width * height, floor)
+        elif self._may_be_coarse(frame):
+            rate = self.interaction.target or _STAND_IN_RATE
+            share = max(frame.stand_in.share(rate, width * height), floor)
+        else:
+            share = 1.0
         return reduced(frame.full_size, share)
+
+    def _may_be_coarse(self, frame: Frame) -> bool:
+        """Whether a stand-in, which is soon replaced, may be drawn with few rays."""
+        allowed = self.interaction.adjust and self.interaction.target != 0
+        return allowed and not frame.clock.takes_picture(frame.renderer)
 
     def _kept(self, frame: Frame) -> Drawn | None:
         """Return the image of exactly this frame, if there is one."""
@@ -319,15 +340,26 @@ class Painter:
         before = time.perf_counter()
         pixels = self._pixels(frame.size)
         width, height = frame.size
-        assert frame.vdi is not None
         out = pixels[: height * width * 4].reshape(height, width, 4)
         request = FrameRequest(
             frame.camera, frame.size, frame.options, frame.depth, self.device, out
         )
-        image = render_vdi(frame.vdi, request)
-        frame.clock.drawn(frame.size, frame.full_size, time.perf_counter() - before)
+        if frame.stand_in is not None:
+            image = frame.stand_in.picture(request)
+            frame.stand_in.took(width * height, time.perf_counter() - before)
+        else:
+            assert frame.vdi is not None
+            image = render_vdi(frame.vdi, request)
+            frame.clock.drawn(frame.size, frame.full_size, time.perf_counter() - before)
         self._raycasts += 1
-        drawn = Drawn(image, frame.full_size, frame.depth, self._raycasts, pixels=pixels)
+        drawn = Drawn(
+            image,
+            frame.full_size,
+            frame.depth,
+            self._raycasts,
+            stand_in=frame.stand_in is not None,
+            pixels=pixels,
+        )
         gone = self._images.keep(frame.key, drawn)
         if gone is not None:
             self._free = gone.pixels

@@ -1,7 +1,8 @@
-"""Which VDI a frame draws: one that is up to date, or the old one while a new one is made."""
+"""What a frame draws: a VDI that is up to date, the volume until there is one, or the old VDI."""
 
 from __future__ import annotations
 
+import logging
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
@@ -9,14 +10,19 @@ from typing import Any
 
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.frame_rate import FrameRateController
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
+from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
+from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.interaction.regeneration import Regeneration
 from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus, Warnings
 from pyvista_vdi.vtk_pipeline.interaction.ticker import Ticker
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import Interaction, WindowClock
+
+_log = logging.getLogger(__name__)
 
 #: Views that a VDI is made to serve, degrees from V_O, where its metadata do not say.
 _VIEW_CONE = 60.0
@@ -34,6 +40,9 @@ class Upkeep:
         self.input: Input | None = None
         self.automatic_view = True
         self.regeneration = Regeneration()
+        self._stand_in: StandIn | None = None
+        self._stand_in_rate = FrameRateController()
+        self._refused: Request | None = None  # of which there can be no stand-in
         self._interaction = interaction
         self._warnings = warnings
         self._texts = texts
@@ -52,6 +61,7 @@ class Upkeep:
         self._failed_at = None
         self._said_far = False
         self.regeneration.cancel()
+        self._stand_in = self._refused = None
         if source is not None:
             source.watch(changed)
 
@@ -70,11 +80,14 @@ class Upkeep:
         """End what goes on; the next frame may begin anew."""
         self._ticker.stop()
         self.regeneration.close()
+        self._stand_in = self._refused = None
 
     # -- in a frame ------------------------------------------------------------------------------
 
-    def current(self, frame: Frame, ask: Callable[[], VDIStatus], *, only: bool) -> VDI | None:
-        """Return the VDI that a frame is to draw.
+    def current(
+        self, frame: Frame, ask: Callable[[], VDIStatus], *, only: bool
+    ) -> VDI | StandIn | None:
+        """Return the VDI that a frame is to draw, or what stands in for the one to come.
 
         ``ask`` gives the status, for a policy that is a callable; ``only`` says whether no other
         renderer shows the actor.
@@ -97,9 +110,9 @@ class Upkeep:
         # A VDI that is drawn in several views is out of date in none of them by itself
         one_view = only and source.alone
         if one_view and self._interaction.asynchronous(frame.renderer.GetRenderWindow()):
-            if decide:
+            if decide or self.regeneration.unseen(source.source, source.stamp()):
                 self._look(source, frame, ask)
-            return source.last()
+            return self._standing_in() or source.last()
         if one_view and decide and self._asked_for(ask):
             source.take_camera(frame.renderer, frame.model_transform)
             source.take_size(frame.renderer)
@@ -111,6 +124,19 @@ class Upkeep:
         """Have the event loop look at what goes on, if something does and no hand moves."""
         if self.regeneration.busy and not self._interaction.moving(window):
             self._ticker.start(window.GetInteractor())
+
+    def _standing_in(self) -> StandIn | None:
+        """Return what is drawn while the VDI shows what is no longer so; None if it need not be."""
+        wanted = self.regeneration.changed
+        if self._stand_in is not None and self._stand_in.request is not wanted:
+            self._stand_in = None  # its buffers go before others are taken
+        if self._stand_in is None and wanted is not None and wanted is not self._refused:
+            try:
+                self._stand_in = StandIn(wanted, self._stand_in_rate)
+            except VDIError as error:  # then the old VDI is what can be drawn
+                self._refused = wanted
+                _log.debug("the volume cannot stand in for its VDI", exc_info=error)
+        return self._stand_in
 
     def _updated(self, source: Input) -> VDI | None:
         """Bring the input up to date, but do not repeat what failed until something changes."""

@@ -109,6 +109,19 @@ class Regeneration:
         """Whether something goes on, or is to be decided, that no frame would show by itself."""
         return self._target is not None or self._estimation.running or self._undecided
 
+    @property
+    def changed(self) -> Request | None:
+        """What a VDI is being made of, where the one that there is was made of something else."""
+        source, target = self._source(), self._target
+        made = None if source is None else source.GetCurrentRequest()
+        if target is None or made is None or target.content == made.content:
+            return None
+        return target
+
+    def unseen(self, source: VDISource, stamp: Any) -> bool:
+        """Whether something may have changed since the last :meth:`look`."""
+        return self._source() is not source or stamp != self._stamp
+
     def ssim(self, vdi: VDI | None) -> float | None:
         """Return the last estimate for this VDI."""
         estimate = self._estimate

@@ -55,8 +55,10 @@ class VDIStatus:
         Share done, 0 to 1, of the VDI that is being made in the background; ``None`` if none is.
     generation : int
         How many VDIs were shown so far, this one included.
+    stand_in : bool
+        Whether the volume itself was drawn, because the VDI shows what has changed since.
     vdi : VDI or None
-        The one that is shown.
+        The one that is shown, or is to be replaced.
     """
 
     mode: Literal["none", "full", "preview"]
@@ -68,6 +70,7 @@ class VDIStatus:
     progress: float | None
     generation: int
     vdi: VDI | None
+    stand_in: bool = False
 
     @property
     def share(self) -> float:
@@ -86,7 +89,8 @@ class VDIStatus:
         if self.mode == "none":
             parts = ["no VDI drawn yet"]
         else:
-            parts = [f"{self.mode}: {self.share:.0%} of {self.full_samples} pixels"]
+            what = f"{self.mode}, the volume itself" if self.stand_in else self.mode
+            parts = [f"{what}: {self.share:.0%} of {self.full_samples} pixels"]
         if self.fps is not None:
             parts.append(f"{self.fps:.3g} frames/s")
         if self.angle is not None:

@@ -180,7 +180,7 @@ class WindowClock:
         if not interaction.wants_preview(window):
             self._know(renderer.GetActiveCamera())
             return 1.0
-        if self._takes_picture(renderer, window):
+        if self.takes_picture(renderer):
             return 1.0
         frame = self._frame
         frame.interactive = True
@@ -260,13 +260,13 @@ class WindowClock:
 
     # -- pictures --------------------------------------------------------------------------------
 
-    def _takes_picture(self, renderer: Any, window: Any) -> bool:
+    def takes_picture(self, renderer: Any) -> bool:
         """Whether this frame is drawn to be kept: such a frame is always full.
 
         A screenshot draws in tiles, or with a camera of its own; an export of vector graphics has
         a helper installed.
         """
-        if self._picture_wanted or tuple(window.GetTileScale()) != (1, 1):
+        if self._picture_wanted or not self.whole_picture:
             return True
         if vtkOpenGLGL2PSHelper.GetInstance() is not None:
             return True

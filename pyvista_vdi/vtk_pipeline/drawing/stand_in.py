@@ -1,0 +1,68 @@
+"""The volume itself, drawn in place of a VDI of what has changed until that VDI has been made."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.errors import DeviceMemoryError
+from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.quality.frame_rate import FrameRateController
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.render import picture_room, raycast_medium
+from pyvista_vdi.vtk_pipeline.filters.source import Request
+
+
+class StandIn:
+    """Volume and look of a request, raycast as generation samples them, in the coming VDI's light.
+
+    It is right from every view. The voxels go to the device once, for it and for the generation,
+    and stay there when only the look changes.
+
+    Parameters
+    ----------
+    request : Request
+        What the VDI is being made of.
+    rate : FrameRateController
+        Knows what rays have cost before, and learns what these do.
+
+    Raises
+    ------
+    VDIError
+        If the device cannot hold the volume in one piece: brick by brick a picture takes too long
+        for a person to wait for it.
+    """
+
+    def __init__(self, request: Request, rate: FrameRateController) -> None:
+        self.request = request
+        self._rate = rate
+        volume, sampling = request.volume, request.options
+        room = picture_room(
+            request.screen.size, sampling.memory_limit, sampling.occlusion_bytes(volume)
+        )
+        runtime = get_runtime(request.device)
+        self._medium = DeviceVolume(runtime, volume, request.transfer_function, sampling, room=room)
+        if self._medium.bricks is not None:
+            with self._medium.giving_bricks_back():
+                raise DeviceMemoryError(f"the volume {volume.name!r} is held brick by brick")
+
+    @property
+    def bounds(self) -> tuple[float, ...]:
+        """The volume's, model frame."""
+        return self.request.volume.bounds
+
+    def share(self, target: float, pixels: int) -> float:
+        """Return the share of its pixels, 0 to 1, at which a picture keeps a rate; 0: not known."""
+        if not self._rate.seconds_per_sample:
+            return 0.0
+        self._rate.target_fps = target
+        return self._rate.choose(pixels) / pixels
+
+    def picture(self, frame: FrameRequest) -> NDArray[np.float32]:
+        """Return the picture, premultiplied RGBA, float32 (H, W, 4), top row first."""
+        return raycast_medium(self._medium, frame, lit_from=self.request.generating[0])
+
+    def took(self, pixels: int, seconds: float) -> None:
+        """Note what a picture has taken."""
+        self._rate.record(pixels, seconds, seconds)

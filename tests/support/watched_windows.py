@@ -1,0 +1,143 @@
+"""Plotters whose window counts as watched by somebody, and what holds up or hurries their work."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+import pyvista as pv
+from plugin_scenes import LOOKS, soft_ball
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.quality import background
+from pyvista_vdi.quality.frame_rate import FrameRateController
+from pyvista_vdi.vtk_pipeline.interaction import estimation
+
+#: Odd, so that no smaller image divides it.
+WINDOW = (241, 203)
+#: Seconds after which something that should have happened has not.
+LONG = 600.0
+MOVING, STILL = 30.0, 0.0001
+
+
+@pytest.fixture
+def plotter():
+    plotter = pv.Plotter(window_size=WINDOW)
+    yield plotter
+    plotter.close()
+
+
+@pytest.fixture
+def gate(monkeypatch):
+    """Holds up what is generated in the background, until it is set."""
+    gate = threading.Event()
+    generate_by_dial = background.generate_by_dial
+
+    def gated(*arguments, device, **keywords):
+        while not gate.is_set():
+            device.give_way()
+            time.sleep(0.001)
+        return generate_by_dial(*arguments, device=device, **keywords)
+
+    monkeypatch.setattr(background, "generate_by_dial", gated)
+    yield gate
+    gate.set()
+
+
+@pytest.fixture
+def coarsest(monkeypatch):
+    """Every preview is as coarse as it may be, whatever frames take."""
+    monkeypatch.setattr(FrameRateController, "choose", lambda controller, full: 1)
+
+
+@pytest.fixture
+def no_estimates(monkeypatch):
+    """Counts estimates, and answers each at once with ``answer.ssim``."""
+
+    class Answer:
+        ssim = 1.0
+        asked = 0
+
+    answer = Answer()
+
+    class Estimator:
+        def __init__(self, *_, **__):
+            pass
+
+        def estimate(self, vdi, camera, size, **shown):
+            answer.asked += 1
+            answer.camera, answer.shown = camera, shown
+            return estimation.ViewError(answer.ssim, 0.0, 0.0, 1.0, 1)
+
+    monkeypatch.setattr(estimation, "ViewErrorEstimator", Estimator)
+    return answer
+
+
+def watched(plotter, volume=None, **options):
+    """Add a ball to a plotter whose window counts as watched, and show it."""
+    options = {"regenerate": "never", **LOOKS, **options}
+    actor = plotter.add_vdi(soft_ball() if volume is None else volume, **options)
+    actor.mapper.SetInteractiveOffScreen(True)
+    plotter.camera_position = ((6, 0, 0), (0, 0, 0), (0, 0, 1))  # Azimuth turns by its degrees
+    plotter.show(auto_close=False)
+    return actor
+
+
+def on_screen(window):
+    """What the window shows, int (H, W, 3); nothing is drawn for it."""
+    width, height = window.GetSize()
+    pixels = vtkUnsignedCharArray()
+    window.GetPixelData(0, 0, width - 1, height - 1, 1, pixels, 0)
+    return vtk_to_numpy(pixels).reshape(height, width, 3)[::-1].astype(int)
+
+
+def frame(plotter, rate=STILL):
+    """Draw a frame at an update rate, and return what the window shows then."""
+    plotter.render_window.SetDesiredUpdateRate(rate)
+    plotter.render()
+    return on_screen(plotter.render_window)
+
+
+def frames_until(plotter, happened):
+    """Draw frames at rest until something is so; all pictures."""
+    pictures = []
+    end = time.monotonic() + LONG
+    while not happened():
+        assert time.monotonic() < end, "it has not happened"
+        pictures.append(frame(plotter))
+        time.sleep(0.005)
+    return pictures
+
+
+def generation_threads():
+    return [t for t in threading.enumerate() if t.name.startswith("pyvista-vdi")]
+
+
+def picture_of(vdi, plotter, **options):
+    """What another plotter shows of a VDI that never changes, from this one's view."""
+    other = pv.Plotter(window_size=plotter.window_size)
+    other.add_vdi(vdi, show_scalar_bar=False, regenerate="never", **options)
+    if plotter.render_window.GetStereoRender():
+        other.render_window.SetStereoType(plotter.render_window.GetStereoType())
+        other.render_window.StereoRenderOn()
+    other.camera = plotter.camera.copy()
+    other.show(auto_close=False)
+    picture = frame(other)
+    other.close()
+    return picture
+
+
+def coarse(plotter, **options):
+    """A ball with two supersegments per list: its VDIs of different views differ visibly."""
+    actor = watched(plotter, max_supersegments=2, **options)
+    plotter.render_window.SetDesiredUpdateRate(STILL)
+    return actor
+
+
+def small_vdi(size=(60, 50), **options):
+    keep = {k: v for k, v in LOOKS.items() if k != "show_scalar_bar"}
+    camera = pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1))
+    return pvdi.generate(soft_ball(12), camera, size, **keep, **options)

@@ -1,0 +1,337 @@
+"""Windows that somebody watches: fewer pixels while a hand moves, full frames and pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista as pv
+from plugin_scenes import LOOKS, opaque_sphere, soft_ball
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonDataModel import vtkPlane
+from vtkmodules.vtkInteractionStyle import vtkInteractorStyleTrackballCamera
+from vtkmodules.vtkRenderingCore import (
+    vtkRenderer,
+    vtkRenderWindow,
+    vtkWindowToImageFilter,
+)
+from vtkmodules.vtkRenderingUI import vtkGenericRenderWindowInteractor
+from watched_windows import (
+    MOVING,
+    WINDOW,
+    frame,
+    on_screen,
+    small_vdi,
+    watched,
+)
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.device.ray_forms import pixel_rays
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, sampled
+from pyvista_vdi.vtk_pipeline.interaction import regeneration
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import reduced
+
+pytestmark = pytest.mark.gl
+
+
+def test_preview_while_the_rate_is_high_and_full_in_the_next_frame(plotter, coarsest):
+    actor = watched(plotter)
+    opaque_sphere(plotter)
+    full = frame(plotter)
+    assert (actor.status.mode, actor.status.share) == ("full", 1.0)
+    plotter.camera.Azimuth(20)
+    preview = frame(plotter, MOVING)
+    status = actor.status
+    assert status.mode == "preview"
+    assert status.full_samples == WINDOW[0] * WINDOW[1]
+    # a sixteenth of the pixels: VTK's image sample distance of 4, both edges rounded
+    assert status.samples == 60 * 51
+    turned = frame(plotter)
+    assert actor.status.mode == "full"
+    assert np.abs(turned - preview).max() > 8, "the preview is no coarser"
+    # Here the preview differs by 0.9 of 255 on average; a picture of elsewhere by 9
+    assert np.abs(turned - preview).mean() < 2
+    plotter.camera.Azimuth(-20)
+    np.testing.assert_array_equal(frame(plotter), full)
+
+
+def test_preview_is_not_shifted_and_the_mesh_stays_crisp(plotter, coarsest):
+    watched(plotter)
+    ball = frame(plotter)
+    plotter.camera.Azimuth(1e-6)
+    preview = frame(plotter, MOVING)
+    y, x = np.mgrid[: WINDOW[1], : WINDOW[0]]
+    centres = []
+    for picture in (ball, preview):
+        weight = np.abs(picture - picture[0, 0]).sum(axis=2)
+        centres.append(((weight * x).sum() / weight.sum(), (weight * y).sum() / weight.sum()))
+    # Half a pixel of the preview is two pixels; seen is .02
+    np.testing.assert_allclose(*centres, atol=0.1)
+    mesh = plotter.add_mesh(
+        pv.Sphere(radius=0.4, center=(1.2, 0, 0)), color="w", reset_camera=False
+    )
+    full = frame(plotter)
+    plotter.camera.Azimuth(1e-6)
+    preview = frame(plotter, MOVING)
+    mesh.visibility = False
+    inside = np.abs(full - frame(plotter)).sum(axis=2) > 200
+    assert inside.sum() > 500
+    # VTK draws the mesh; rays that were not cast at its pixels may tint it at its edge only
+    assert np.median(np.abs(full - preview).max(axis=2)[inside]) == 0
+
+
+def test_coarser_frames_have_the_same_rays():
+    camera = Camera((0, 0, 0), (0, 0, -1), (0, 1, 0), view_angle=40, window_center=(0.2, -0.3))
+    rng = np.random.default_rng(3)
+    matrix = np.eye(4)
+    matrix[:3] += rng.normal(scale=0.2, size=(3, 4))
+    matrix[2, 3] -= 5
+    for parallel in (False, True):
+        camera = camera.replace(model_transform=matrix, parallel_projection=parallel)
+        full = Frame((241, 203), (0, 0), camera, np.eye(4), np.zeros((2, 4)))
+        coarse = full.coarser((60, 51))
+        bounds = (-1, 1, -1, 1, -1, 1)
+        lines = [pixel_rays(f.camera, f.size, bounds) for f in (full, coarse)]
+        for i, j in ((0, 0), (59, 0), (13, 37), (59, 50)):
+            # The same place of the viewport, in pixels from the centre of each
+            u, v = 2 * (i + 0.5) / 60 - 1, 2 * (j + 0.5) / 51 - 1
+            ends = []
+            for ray, (width, height) in zip(lines, (full.size, coarse.size), strict=True):
+                pixel = np.array([1, u * width / 2, v * height / 2])
+                t = 0.7 - ray.reference_depth
+                ends.append(pixel @ ray.origin + t * (pixel @ ray.direction))
+            np.testing.assert_allclose(ends[1], ends[0], atol=1e-12)
+
+
+def test_sampled_depth_is_that_at_the_centres():
+    depth = np.arange(7 * 9, dtype=np.float32).reshape(7, 9)
+    np.testing.assert_array_equal(sampled(depth, (9, 7)), depth)
+    np.testing.assert_array_equal(sampled(depth, (3, 1)), [[28, 31, 34]])
+    assert reduced((241, 203), 1.0) == (241, 203)
+    assert reduced((1, 500), 0.01) == (1, 50)
+
+
+def test_clipping_planes_cut_previews_as_they_cut_full_frames(plotter, coarsest):
+    actor = watched(plotter)
+    plane = vtkPlane()
+    plane.SetNormal(1, 0.3, 0.1)
+    actor.mapper.AddClippingPlane(plane)
+    full = frame(plotter)
+    plotter.camera.Azimuth(1e-6)
+    preview = frame(plotter, MOVING)
+    assert actor.status.mode == "preview"
+    actor.mapper.RemoveAllClippingPlanes()
+    whole = frame(plotter)
+    assert np.abs(whole - full).max() > 40
+    assert np.abs(preview - full).mean() < 0.2 * np.abs(whole - full).mean()
+
+
+def test_cropping_cuts_previews_as_it_cuts_full_frames(plotter, coarsest):
+    actor = watched(plotter, soft_ball(48))
+    actor.mapper.SetCropping(1)
+    actor.mapper.SetCroppingRegionPlanes(-0.4, 0.3, -0.2, 0.5, -0.4, 0.2)
+    actor.mapper.SetCroppingRegionFlagsToCross()
+    plotter.camera.Azimuth(1)
+    preview = frame(plotter, MOVING)
+    assert actor.status.mode == "preview"
+    full = frame(plotter)
+    assert actor.status.mode == "full"
+    actor.mapper.CroppingOff()
+    whole = frame(plotter)
+    assert np.abs(whole - full).max() > 40
+    # A fifth of the pixels along each edge: seen were a mean of 0.4, and 1.9 from the whole
+    assert np.abs(preview - full).mean() < np.abs(whole - full).mean() / 3
+
+
+def test_off_screen_windows_and_pictures_are_always_full(plotter, coarsest):
+    actor = watched(plotter)
+    plotter.camera.Azimuth(20)
+    full = frame(plotter)
+    shot = plotter.screenshot(return_img=True)
+    large = plotter.screenshot(return_img=True, scale=2)
+    depth = plotter.get_image_depth()
+    plotter.camera.Azimuth(-20)
+    frame(plotter, MOVING)
+    plotter.camera.Azimuth(20)
+    frame(plotter, MOVING)
+    assert actor.status.mode == "preview"
+    np.testing.assert_array_equal(plotter.screenshot(return_img=True), shot)
+    assert actor.status.mode == "full"
+    np.testing.assert_array_equal(on_screen(plotter.render_window), full)
+    plotter.camera.Azimuth(1e-9)  # so that no image is kept
+    frame(plotter, MOVING)
+    assert actor.status.mode == "preview", "previews go on after a screenshot"
+    np.testing.assert_allclose(plotter.screenshot(return_img=True, scale=2), large, atol=1)
+    plotter.camera.Azimuth(1e-9)
+    frame(plotter, MOVING)
+    assert actor.status.mode == "preview"
+    np.testing.assert_allclose(plotter.get_image_depth(), depth, atol=1e-5)
+    actor.mapper.SetInteractiveOffScreen(False)
+    plotter.camera.Azimuth(10)
+    frame(plotter, MOVING)
+    assert actor.status.mode == "full"
+
+
+def test_movie_frames_and_vector_graphics_are_full(plotter, coarsest, tmp_path):
+    actor = watched(plotter)
+    modes = []
+    paint = painter_module.Painter.begin
+
+    def noting(painter, mapper):
+        paint(painter, mapper)
+        modes.append(painter.status().mode)
+
+    painter_module.Painter.begin, before = noting, paint
+    try:
+        plotter.camera.Azimuth(10)
+        frame(plotter, MOVING)
+        assert modes.pop() == "preview"
+        plotter.camera.Azimuth(10)
+        plotter.open_gif(str(tmp_path / "movie.gif"))
+        plotter.write_frame()
+        assert modes == ["preview", "full"], "the frame on the screen, and the one that is kept"
+        modes.clear()
+        plotter.camera.Azimuth(10)
+        plotter.save_graphic(str(tmp_path / "scene.svg"))
+        assert modes[0] == "full"
+    finally:
+        painter_module.Painter.begin = before
+    assert actor.status.mode == "full"
+
+
+def test_a_screenshot_filter_of_vtk_gets_full_frames(plotter, coarsest):
+    watched(plotter)
+    plotter.camera.Azimuth(20)
+    full = frame(plotter)
+    plotter.camera.Azimuth(1e-9)
+    frame(plotter, MOVING)
+    for again in range(2):
+        grab = vtkWindowToImageFilter()
+        grab.SetInput(plotter.render_window)
+        grab.ReadFrontBufferOff()
+        plotter.render_window.GetInteractor().Enable()
+        grab.Update()
+        image = grab.GetOutput()
+        width, height, _ = image.GetDimensions()
+        taken = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(height, width, 3)[::-1]
+        np.testing.assert_array_equal(taken, full, err_msg=str(again))
+
+
+def test_an_image_that_is_there_is_better_than_a_preview(plotter, coarsest):
+    actor = watched(plotter)
+    full = frame(plotter)
+    np.testing.assert_array_equal(frame(plotter, MOVING), full)
+    assert actor.status.mode == "full"
+
+
+def test_a_style_starts_and_ends_an_interaction(coarsest):
+    actor = pvdi.VDIActor()
+    mapper = pvdi.VDIMapper()
+    mapper.SetVDI(small_vdi())
+    mapper.SetRegenerate("never")
+    mapper.SetInteractiveOffScreen(True)
+    actor.SetMapper(mapper)
+    renderer, window = vtkRenderer(), vtkRenderWindow()
+    renderer.AddVolume(actor)
+    window.SetOffScreenRendering(1)
+    window.SetSize(200, 160)
+    window.AddRenderer(renderer)
+    interactor = vtkGenericRenderWindowInteractor()
+    interactor.SetRenderWindow(window)
+    style = vtkInteractorStyleTrackballCamera()
+    interactor.SetInteractorStyle(style)
+    interactor.Initialize()
+    window.Render()
+    before = on_screen(window)
+    assert actor.status.mode == "full"
+    interactor.SetEventInformation(100, 80)
+    interactor.LeftButtonPressEvent()
+    modes = []
+    for x in (104, 108, 112):
+        interactor.SetEventInformation(x, 80)
+        interactor.MouseMoveEvent()
+        modes.append(actor.status.mode)
+    interactor.LeftButtonReleaseEvent()
+    assert modes == ["preview"] * 3
+    assert actor.status.mode == "full", "the frame in which the button is released"
+    assert actor.status.angle > 1
+    assert np.abs(on_screen(window) - before).max() > 8
+
+
+def test_vtks_switches_turn_previews_off_and_bound_them(plotter, coarsest):
+    actor = watched(plotter)
+    mapper = actor.mapper
+    assert mapper.GetInteractiveUpdateRate() == 1.0
+    assert mapper.GetAutoAdjustSampleDistances()
+
+    def share():
+        plotter.camera.Azimuth(3)
+        frame(plotter, MOVING)
+        return actor.status.share
+
+    assert share() < 0.1
+    mapper.AutoAdjustSampleDistancesOff()
+    assert share() == 1.0
+    mapper.AutoAdjustSampleDistancesOn()
+    mapper.SetInteractiveUpdateRate(MOVING + 1)
+    assert share() == 1.0
+    mapper.SetInteractiveUpdateRate(MOVING)
+    mapper.SetMaximumImageSampleDistance(2.0)
+    assert share() == pytest.approx(0.25, abs=0.01)
+    mapper.SetMaximumImageSampleDistance(10.0)
+    assert share() < 0.05
+    mapper.SetTargetFrameRate(0)
+    assert share() == 1.0
+    mapper.SetTargetFrameRate(None)
+    assert mapper.GetTargetFrameRate() is None
+    plotter.camera.Azimuth(3)
+    assert share() < 0.05
+
+
+def test_several_vdis_and_two_eyes_share_a_frame(plotter, coarsest):
+    first = watched(plotter)
+    second = plotter.add_vdi(soft_ball(8), target_fps=None, regenerate="never", **LOOKS)
+    second.mapper.SetInteractiveOffScreen(True)
+    second.position = (1.5, 0, 0)
+    plotter.render_window.SetStereoTypeToSplitViewportHorizontal()
+    plotter.render_window.StereoRenderOn()
+    frame(plotter)
+    plotter.camera.Azimuth(10)
+    preview = frame(plotter, MOVING)
+    assert first.status.mode == second.status.mode == "preview"
+    assert first.status.share == second.status.share
+    full = frame(plotter)
+    assert np.abs(full[:, :120] - full[:, 121:]).max() > 8, "the two eyes see the same"
+    assert 0 < np.abs(full - preview).mean() < 2
+
+
+def test_samples_follow_the_time_that_frames_take(plotter, monkeypatch):
+    """With a clock that counts a microsecond per ray, 100 frames a second leave 10 000 rays."""
+    from pyvista_vdi.vtk_pipeline.interaction import window_clock as interaction
+
+    class Clock:
+        now = 0.0
+
+        def perf_counter(self):
+            return self.now
+
+    clock = Clock()
+    render_vdi = painter_module.render_vdi
+
+    def timed(vdi, request):
+        clock.now += 1e-6 * request.size[0] * request.size[1]
+        return render_vdi(vdi, request)
+
+    monkeypatch.setattr(painter_module, "render_vdi", timed)
+    for module in (interaction, painter_module, regeneration):
+        monkeypatch.setattr(module, "time", clock)
+    actor = watched(plotter, target_fps=100.0)
+    for _ in range(8):
+        plotter.camera.Azimuth(3)
+        frame(plotter, MOVING)
+    # the controller's threshold is a tenth, and the edges are rounded to whole pixels
+    assert actor.status.samples == pytest.approx(10_000, rel=0.12)
+    assert actor.status.fps == pytest.approx(100, rel=0.12)
+    frame(plotter)
+    assert actor.status.fps == pytest.approx(1e6 / (WINDOW[0] * WINDOW[1]))

@@ -1,0 +1,478 @@
+"""Windows that somebody watches: VDIs made behind the frames, by estimates and by changes."""
+
+from __future__ import annotations
+
+import gc
+import time
+
+import numpy as np
+import pytest
+import pyvista as pv
+from plugin_scenes import LOOKS, soft_ball
+from vtkmodules.vtkCommonDataModel import vtkPlane
+from watched_windows import (
+    LONG,
+    MOVING,
+    WINDOW,
+    coarse,
+    frame,
+    frames_until,
+    generation_threads,
+    picture_of,
+    small_vdi,
+    watched,
+)
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import DeviceError, VDIWarning
+from pyvista_vdi.quality import background
+from pyvista_vdi.vtk_pipeline.interaction import estimation
+
+pytestmark = pytest.mark.gl
+
+
+@pytest.mark.parametrize("stereo", [False, True])
+def test_each_frame_shows_one_generation(plotter, gate, stereo):
+    wanted = [False]
+    if stereo:
+        plotter.render_window.SetStereoTypeToSplitViewportHorizontal()
+        plotter.render_window.StereoRenderOn()
+    actor = coarse(plotter, regenerate=lambda status: wanted[0])
+    old = actor.vdi
+    plotter.camera.Azimuth(80)
+    before = frame(plotter)
+    wanted[0] = True
+    pictures = [frame(plotter) for _ in range(3)]
+    wanted[0] = False
+    assert actor.status.progress == 0.0
+    assert actor.vdi is old
+    gate.set()
+    pictures += frames_until(plotter, lambda: actor.status.generation == 2)
+    assert actor.vdi is not old
+    assert actor.vdi.camera.position == pytest.approx(plotter.camera.position)
+    assert actor.status.progress is None
+    assert actor.status.angle < 1e-6
+    after = picture_of(actor.vdi, plotter)
+    assert np.abs(after - before).max() > 8, "the two VDIs cannot be told apart"
+    np.testing.assert_array_equal(picture_of(old, plotter), before)
+    kinds = [
+        "old"
+        if np.array_equal(picture, before)
+        else "new"
+        if np.array_equal(picture, after)
+        else "?"
+        for picture in pictures
+    ]
+    assert kinds == ["old"] * (len(kinds) - 1) + ["new"]
+
+
+def test_changed_property_and_data_are_made_behind_the_frames(plotter, gate):
+    volume = soft_ball()
+    actor = watched(plotter, volume)
+    before, old = frame(plotter), actor.vdi
+    plotter.camera.Azimuth(30)
+    turned = frame(plotter)
+    actor.mapper.lookup_table.cmap = "inferno"
+    assert np.abs(frame(plotter) - turned).max() > 40  # the volume stands in
+    assert actor.status.progress == 0.0
+    assert actor.vdi is old
+    gate.set()
+    frames_until(plotter, lambda: actor.vdi is not old)
+    assert actor.vdi.camera.position == old.camera.position, "'never' keeps the view"
+    assert np.abs(frame(plotter) - turned).max() > 40
+    new = actor.vdi
+    volume["v"][:] = 0
+    frames_until(plotter, lambda: actor.vdi is not new)
+    assert actor.vdi.optical_depth.sum() == 0
+    plotter.camera.Azimuth(-30)
+    assert np.abs(frame(plotter) - before).max() > 40
+
+
+def test_changed_data_take_the_current_view(plotter, no_estimates):
+    actor = watched(plotter, regenerate="auto")
+    old = actor.vdi
+    plotter.camera.Azimuth(30)
+    actor.prop.interpolation_type = "linear"
+    frames_until(plotter, lambda: actor.vdi is not old)
+    assert actor.vdi.camera.position == pytest.approx(plotter.camera.position)
+    # asked for by name, a view is taken as it is
+    newer = actor.vdi
+    actor.mapper.GetSource().SetCamera(pvdi.Camera((0, 9, 0), (0, 0, 0), (0, 0, 1)))
+    frames_until(plotter, lambda: actor.vdi is not newer)
+    assert actor.vdi.camera.position == (0, 9, 0)
+
+
+def test_changes_while_one_is_made_begin_another(plotter, gate):
+    actor = watched(plotter)
+    generations = actor.status.generation
+    actor.mapper.lookup_table.cmap = "inferno"
+    frame(plotter)
+    first = actor.mapper.painter.upkeep.regeneration._background.key
+    frame(plotter)
+    assert actor.mapper.painter.upkeep.regeneration._background.key is first
+    actor.mapper.lookup_table.cmap = "bone"
+    frame(plotter)
+    second = actor.mapper.painter.upkeep.regeneration._background.key
+    assert second != first
+    gate.set()
+    frames_until(plotter, lambda: actor.status.generation > generations)
+    colors = pvdi.vtk_pipeline.transfer_function_from_property(actor.prop).colors
+    assert actor.vdi.metadata["transfer_function"]["colors"] == colors.tolist()
+    assert actor.status.generation == generations + 1, "the first was shown"
+
+
+def test_a_change_that_is_undone_is_given_up(plotter, gate):
+    actor = watched(plotter)
+    actor.prop.interpolation_type = "linear"
+    frame(plotter)
+    assert actor.status.progress == 0.0
+    actor.prop.interpolation_type = "nearest"
+    frame(plotter)
+    assert actor.status.progress is None
+
+
+def test_auto_estimates_when_the_view_has_moved_and_regenerates_below_the_bound(
+    plotter, no_estimates
+):
+    actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
+    old = actor.vdi
+    for _ in range(3):
+        frame(plotter)
+    assert no_estimates.asked == 0, "nothing has moved"
+    no_estimates.ssim = 0.91
+    plotter.camera.Azimuth(30)
+    frames_until(plotter, lambda: actor.status.ssim is not None)
+    assert actor.status.ssim == 0.91
+    for _ in range(3):
+        frame(plotter)
+    assert no_estimates.asked == 1
+    assert actor.vdi is old
+    assert not actor.mapper.painter.upkeep.regeneration.busy
+    no_estimates.ssim = 0.89
+    plotter.camera.Azimuth(5)
+    frames_until(plotter, lambda: actor.vdi is not old)
+    assert actor.status.ssim is None, "nothing is known of the new one"
+    asked, new = no_estimates.asked, actor.vdi
+    for _ in range(3):
+        frame(plotter)
+    assert no_estimates.asked == asked
+    assert actor.vdi is new, "a VDI of this very view would be the same again"
+
+
+def test_the_estimate_is_of_the_picture_that_is_shown(plotter, no_estimates):
+    plane = vtkPlane()
+    plane.SetOrigin(0.1, 0.2, 0.3)
+    plane.SetNormal(0.6, 0.0, 0.8)
+    planes = (-0.4, 0.3, -0.2, 0.5, -0.4, 0.2)
+    actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
+    old = actor.vdi
+    actor.mapper.AddClippingPlane(plane)
+    actor.mapper.SetCropping(1)
+    actor.mapper.SetCroppingRegionPlanes(planes)
+    actor.mapper.SetCroppingRegionFlagsToFence()
+    actor.opacity_multiplier = 0.5
+    for _ in range(3):
+        frame(plotter)
+    assert no_estimates.asked == 0, "these changes need no new VDI"
+    plotter.camera.Azimuth(30)
+    frames_until(plotter, lambda: actor.status.ssim is not None)
+    shown = no_estimates.shown
+    assert no_estimates.camera == pvdi.Camera.from_any(plotter.camera)
+    assert shown["cropping"] == pvdi.Cropping(planes, "fence")
+    assert shown["opacity_multiplier"] == 0.5
+    row = np.array(shown["clipping_planes"])[0]
+    np.testing.assert_allclose(row[3:] / np.linalg.norm(row[3:]), (0.6, 0, 0.8), atol=1e-12)
+    # any point of the plane says where it is
+    assert (row[:3] - (0.1, 0.2, 0.3)) @ (0.6, 0, 0.8) == pytest.approx(0, abs=1e-9)
+    actor.opacity_multiplier = 0.8
+    actor.mapper.CroppingOff()
+    for _ in range(3):
+        frame(plotter)
+    assert no_estimates.asked == 1
+    assert actor.vdi is old
+
+
+def test_an_estimate_that_ends_between_two_looks_is_not_asked_for_again(
+    plotter, no_estimates, monkeypatch
+):
+    actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
+    take, missed = estimation.Estimation.take, []
+
+    def too_early(self):
+        job = self._worker.job
+        if job is None or missed:
+            return take(self)
+        self._worker.join()  # it ends right after this look
+        assert not self._worker.running
+        missed.append(job)
+        return None
+
+    monkeypatch.setattr(estimation.Estimation, "take", too_early)
+    plotter.camera.Azimuth(30)
+    frames_until(plotter, lambda: actor.status.ssim is not None)
+    assert len(missed) == 1
+    assert no_estimates.asked == 1
+
+
+def test_auto_bears_more_while_the_view_moves(plotter, no_estimates, gate):
+    actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
+    no_estimates.ssim = 0.85
+    plotter.camera.Azimuth(30)
+    end = time.monotonic() + LONG
+    while actor.status.ssim is None:
+        frame(plotter, MOVING)
+        assert time.monotonic() < end
+    frame(plotter, MOVING)
+    assert actor.status.progress is None
+    frame(plotter)
+    frames_until(plotter, lambda: actor.status.progress is not None)
+
+
+def test_auto_with_the_real_estimate(plotter):
+    actor = coarse(plotter, regenerate="auto", regenerate_below=0.9999)
+    old = actor.vdi
+    plotter.camera.Azimuth(60)
+    frames_until(plotter, lambda: actor.vdi is not old)
+    np.testing.assert_array_equal(frame(plotter), picture_of(actor.vdi, plotter))
+
+
+def test_what_is_made_for_a_view_that_was_left_is_given_up(plotter, gate):
+    asked = [True]
+    actor = coarse(plotter, regenerate=lambda status: asked.pop() if asked else False)
+    plotter.camera.Azimuth(60)
+    frame(plotter)
+    assert actor.status.progress == 0.0
+    plotter.camera.Azimuth(10)
+    frame(plotter)
+    assert actor.status.progress == 0.0, "still nearer to it than to the old"
+    plotter.camera.Azimuth(-65)
+    frame(plotter)
+    assert actor.status.progress is None, "the view has come back"
+    gate.set()
+    for _ in range(3):
+        frame(plotter)
+    assert actor.status.generation == 1
+
+
+def test_callable_gets_the_status_of_the_frames_view(plotter):
+    seen = []
+    actor = watched(plotter, regenerate=lambda status: seen.append(status))
+    plotter.camera.Azimuth(25)
+    frame(plotter)
+    assert seen[-1].angle == pytest.approx(25)
+    assert seen[-1].vdi is actor.vdi
+    before = len(seen)
+    frame(plotter)
+    assert len(seen) == before + 1
+    assert actor.status.generation == 1
+
+
+def test_callable_off_screen_is_asked_and_answered_in_step(plotter):
+    actor = plotter.add_vdi(soft_ball(), regenerate=lambda status: status.angle > 20, **LOOKS)
+    plotter.show(auto_close=False)
+    old = actor.vdi
+    plotter.camera.Azimuth(15)
+    frame(plotter)
+    assert actor.vdi is old
+    plotter.camera.Azimuth(15)
+    frame(plotter)
+    assert actor.vdi is not old
+    assert actor.status.angle < 1e-6
+    assert not generation_threads()
+
+
+def test_off_screen_auto_starts_nothing(plotter, no_estimates):
+    actor = plotter.add_vdi(soft_ball(), regenerate="auto", **LOOKS)
+    plotter.show(auto_close=False)
+    old = actor.vdi
+    for _ in range(3):
+        plotter.camera.Azimuth(40)
+        frame(plotter)
+        assert not generation_threads()
+    assert (actor.vdi is old, no_estimates.asked) == (True, 0)
+    actor.prop.interpolation_type = "linear"
+    frame(plotter)
+    assert actor.vdi is not old, "made before the frame"
+
+
+def test_a_vdi_drawn_in_two_views_belongs_to_neither(no_estimates):
+    plotter = pv.Plotter(window_size=WINDOW, shape=(1, 2))
+    plotter.subplot(0, 0)
+    actor = plotter.add_vdi(soft_ball(), regenerate="auto", **LOOKS)
+    plotter.subplot(0, 1)
+    plotter.add_actor(actor)
+    actor.mapper.SetInteractiveOffScreen(True)
+    plotter.show(auto_close=False)
+    no_estimates.ssim = 0.1
+    old = actor.vdi
+    for _ in range(5):
+        plotter.camera.Azimuth(20)
+        frame(plotter)
+    assert (actor.vdi is old, no_estimates.asked) == (True, 0)
+    actor.prop.interpolation_type = "linear"
+    frame(plotter)
+    assert actor.vdi is not old, "changed data are made in step"
+    plotter.close()
+
+
+def test_copies_share_a_source_and_keep_the_settings(plotter, no_estimates):
+    actor = watched(plotter, regenerate="auto", regenerate_below=0.8)
+    copy = actor.copy()
+    assert copy.mapper.GetInteractiveOffScreen()
+    assert copy.mapper.GetTargetFrameRate() == 30
+    assert copy.mapper.GetRegenerateBelow() == 0.8
+    plotter.add_actor(copy)
+    no_estimates.ssim = 0.1
+    old = actor.vdi
+    plotter.camera.Azimuth(20)
+    for _ in range(5):
+        frame(plotter)
+    assert (actor.vdi is old, copy.vdi is old) == (True, True)
+
+
+def test_explicit_regeneration_gives_up_what_goes_on(plotter, gate):
+    actor = watched(plotter)
+    actor.prop.interpolation_type = "linear"
+    frame(plotter)
+    assert actor.status.progress == 0.0
+    plotter.camera.Azimuth(30)
+    vdi = actor.regenerate()
+    assert actor.status.progress is None
+    frame(plotter)
+    assert actor.vdi is vdi
+    assert actor.status.progress is None
+
+
+def test_what_fails_is_said_once_and_not_repeated(plotter, monkeypatch):
+    actor = watched(plotter, regenerate=lambda status: status.angle > 10)
+    tries = []
+
+    def failing(*_, **__):
+        tries.append(1)
+        raise DeviceError("no more")
+
+    monkeypatch.setattr(background, "generate_by_dial", failing)
+    plotter.camera.Azimuth(40)
+    before = actor.vdi
+    with pytest.warns(VDIWarning, match="cannot be made anew: DeviceError: no more"):
+        frames_until(plotter, lambda: actor.mapper.painter.upkeep.regeneration._failed)
+    for _ in range(5):
+        frame(plotter)
+        time.sleep(0.01)
+    assert len(tries) == 1
+    assert actor.vdi is before
+    monkeypatch.undo()
+    actor.regenerate()
+    frame(plotter)
+    assert actor.vdi is not before
+
+
+def test_what_cannot_be_made_any_more_is_said_and_the_old_stays(plotter):
+    actor = watched(plotter)
+    before = frame(plotter)
+    actor.prop.SetTransferFunctionModeTo2D()
+    with pytest.warns(VDIWarning, match="cannot be made anew: UnsupportedError: .*2D transfer"):
+        frame(plotter)
+    np.testing.assert_array_equal(frame(plotter), before)
+
+
+# -- without the volume ----------------------------------------------------------------------------
+
+
+def test_a_vdi_without_its_volume_says_once_that_the_view_is_far(plotter):
+    actor = plotter.add_vdi(small_vdi(view_cone=50.0))
+    plotter.camera_position = ((5, 4, 3), (0, 0, 0), (0, 0, 1))
+    plotter.show(auto_close=False)
+    plotter.camera.Azimuth(49)
+    plotter.render()
+    plotter.camera.Azimuth(20)
+    with pytest.warns(VDIWarning, match="without its volume it cannot be made anew") as said:
+        plotter.render()
+    assert len(said) == 1
+    plotter.camera.Azimuth(20)
+    plotter.render()  # warnings are errors: it is not said again
+    actor.mapper.SetVDI(small_vdi(view_cone=10.0))
+    with pytest.warns(VDIWarning, match="was to serve 10"):
+        plotter.render()
+    actor.mapper.SetRegenerate("never")
+    actor.mapper.SetVDI(small_vdi(view_cone=10.0))
+    plotter.render()
+
+
+# -- the end ---------------------------------------------------------------------------------------
+
+
+def test_closing_in_the_middle_leaves_no_thread(gate):
+    plotter = pv.Plotter(window_size=WINDOW)
+    actor = watched(plotter, regenerate=lambda status: status.angle > 10, status=True)
+    plotter.camera.Azimuth(30)
+    frame(plotter)
+    assert actor.status.progress == 0.0
+    assert len(generation_threads()) == 1
+    plotter.close()
+    assert not generation_threads()
+
+
+def test_forgetting_a_scene_in_the_middle_leaves_no_thread(gate, no_leaks):
+    def scene():
+        plotter = pv.Plotter(window_size=WINDOW)
+        watched(plotter, regenerate=lambda status: status.angle > 10, status=True)
+        plotter.camera.Azimuth(30)
+        frame(plotter)
+        assert len(generation_threads()) == 1
+        plotter.clear()
+        plotter.close()
+
+    scene()
+    gc.collect()
+    end = time.monotonic() + LONG
+    while generation_threads():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_no_leaks_of_a_watched_scene(no_leaks):
+    plotter = pv.Plotter(window_size=WINDOW)
+    actor = watched(plotter, regenerate=lambda status: status.angle > 10, status=True)
+    plotter.camera.Azimuth(30)
+    frame(plotter, MOVING)
+    frames_until(plotter, lambda: actor.status.generation == 2)
+    plotter.screenshot()
+    plotter.close()
+
+
+def resident():
+    with open("/proc/self/statm") as file:  # noqa: PTH123 - not a file that pathlib knows more of
+        return int(file.read().split()[1]) * 4096
+
+
+def regenerate_repeatedly(times):
+    """Regenerate in the background again and again; bytes of memory per round, after the first."""
+    plotter = pv.Plotter(window_size=(120, 100))
+    actor = watched(plotter, soft_ball(16), regenerate=lambda status: status.angle > 10)
+    start, runtime = None, pvdi.device.get_runtime()
+    before = runtime.allocated
+    for number in range(times):
+        if number == times // 4:  # caches of drivers and allocators are warm
+            gc.collect()
+            start = resident()
+        plotter.camera.Azimuth(30)
+        frames_until(plotter, lambda number=number: actor.status.generation == number + 2)
+    gc.collect()
+    grown = resident() - start
+    allocated, size = runtime.allocated - before, actor.vdi.nbytes
+    plotter.camera.Azimuth(30)
+    frame(plotter)  # in the middle of another
+    plotter.close()
+    assert not generation_threads()
+    return grown / (times - times // 4), size, allocated
+
+
+@pytest.mark.parametrize("times", [12, pytest.param(200, marks=pytest.mark.slow)])
+def test_regenerating_does_not_take_more_and_more_memory(times):
+    grown, size, allocated = regenerate_repeatedly(times)
+    # A generation that was kept would show as its whole size, on the device as well: there are
+    # the volume, the VDI that is shown and buffers of the frame
+    assert allocated < 4 * size
+    if times >= 200:
+        assert grown < 0.25 * size

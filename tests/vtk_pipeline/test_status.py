@@ -1,0 +1,144 @@
+"""What a person is told of a VDI on the screen, what may be set, and how far views are apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from plugin_scenes import LOOKS, soft_ball
+from skimage.io import imread
+from watched_windows import (
+    MOVING,
+    STILL,
+    frame,
+    small_vdi,
+    watched,
+)
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.cli import main
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.vtk_pipeline.filters.view import View
+
+pytestmark = pytest.mark.gl
+
+# -- settings --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"target_fps": -1}, "target_fps must be a number of frames per second, .*got -1"),
+        ({"target_fps": "fast"}, "target_fps .*got 'fast'"),
+        ({"target_fps": np.inf}, "target_fps .*got inf"),
+        ({"target_fps": True}, "target_fps .*got True"),
+        ({"regenerate": "always"}, "regenerate must be 'auto', 'never' or a callable.*'always'"),
+        ({"regenerate": None}, "regenerate must be .*got None"),
+        ({"regenerate_below": 1.5}, "regenerate_below must be an SSIM .*got 1.5"),
+        ({"regenerate_below": "x"}, "regenerate_below must be an SSIM .*got 'x'"),
+    ],
+)
+def test_nonsense_is_refused_by_name(plotter, arguments, message):
+    with pytest.raises(InvalidArgumentError, match=message):
+        plotter.add_vdi(soft_ball(8), **arguments)
+    assert not plotter.actors
+
+
+def test_mapper_refuses_nonsense_too():
+    mapper = pvdi.VDIMapper()
+    with pytest.raises(InvalidArgumentError, match="interactive update rate .*got -1"):
+        mapper.SetInteractiveUpdateRate(-1)
+    with pytest.raises(InvalidArgumentError, match="target frame rate .*got nan"):
+        mapper.SetTargetFrameRate(float("nan"))
+    with pytest.raises(InvalidArgumentError, match="regenerate must be"):
+        mapper.SetRegenerate("often")
+    assert mapper.GetRegenerate() == "auto"
+
+
+# -- status ----------------------------------------------------------------------------------------
+
+
+def test_status_from_before_the_first_frame_on(plotter, gate, coarsest):
+    actor = plotter.add_vdi(soft_ball(), regenerate="never", **LOOKS)
+    assert str(actor.status) == "no VDI drawn yet"
+    assert (actor.status.vdi, actor.status.fps, actor.status.share) == (None, None, 0.0)
+    actor.mapper.SetInteractiveOffScreen(True)
+    plotter.show(auto_close=False)
+    status = actor.status
+    assert (status.mode, status.generation, status.vdi) == ("full", 1, actor.vdi)
+    assert status.fps > 0
+    actor.prop.interpolation_type = "linear"
+    frame(plotter)
+    text = str(actor.status)
+    assert text.startswith("preview, the volume itself: ")
+    assert actor.status.stand_in
+    assert not status.stand_in
+    assert "0° from the generating view, VDI no. 1, making the next: 0%" in text
+    with pytest.raises(AttributeError):
+        status.mode = "preview"
+
+
+def test_corner_text_is_of_the_frame_that_shows_it(plotter, coarsest):
+    actor = watched(plotter, status=True)
+    annotation = actor.mapper.painter.texts._texts[0][0].Get()
+    plotter.camera.Azimuth(20)
+    frame(plotter, MOVING)
+    texts, pictures = [], []
+    for rate in (MOVING, STILL):
+        pictures.append(frame(plotter, rate)[:60, :120])
+        texts.append(annotation.GetText(2))
+    assert texts[0].startswith("preview: 6%")
+    assert texts[1].startswith("full: 100%")
+    assert "20° from" in texts[1]
+    frame(plotter)
+    # It was laid out in that very frame: the next one, with the same text, shows the same
+    annotation.SetText(2, texts[1])
+    assert np.abs(pictures[0] - pictures[1]).max() > 100
+    other = actor.show_status(corner="lower right")
+    plotter.render()
+    assert other.GetText(1).startswith("full")
+    with pytest.raises(InvalidArgumentError, match="corner must be one of .*got 'middle'"):
+        actor.show_status(corner="middle")
+    lone = pvdi.VDIActor()
+    lone.SetMapper(pvdi.VDIMapper())
+    with pytest.raises(InvalidArgumentError, match="nothing shows this actor yet"):
+        lone.show_status()
+
+
+def test_command_line_passes_its_options_on(tmp_path, capsys):
+    small_vdi().save(tmp_path / "ball.vdi")
+    file, picture = str(tmp_path / "ball.vdi"), tmp_path / "ball.png"
+    options = ["--target-fps", "0", "--regenerate", "never"]
+    assert main(["view", file, "--screenshot", str(picture), *options]) == 0
+    plain = imread(picture).astype(int)
+    assert main(["view", file, "--screenshot", str(picture), *options, "--status"]) == 0
+    assert np.abs(imread(picture) - plain).max() > 100, "there is no text"
+    assert main(["view", file, "--target-fps", "-3"]) == 2
+    assert "frames per second, 0 or above; got '-3'" in capsys.readouterr().err
+    assert main(["view", file, "--regenerate", "often"]) == 2
+
+
+# -- views -----------------------------------------------------------------------------------------
+
+
+def test_distance_of_views():
+    bounds = (-1, 1, -1, 1, -1, 1)
+    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
+    view = View(camera, (300, 200))
+    assert view.distance(view, bounds) == 0.0
+    # 10 degrees about the vertical: the nearest corners move by about 9 tan(10 deg) at their depth
+    turned = View(camera.azimuth(10), (300, 200))
+    assert turned.distance(view, bounds) == pytest.approx(0.087, rel=0.2)
+    assert view.distance(turned, bounds) == pytest.approx(turned.distance(view, bounds))
+    panned = View(camera.replace(position=(1, 0, 10), focal_point=(1, 0, 0)), (300, 200))
+    # 1 unit at depth 9, of a half height of 9 tan(15 deg)
+    assert panned.distance(view, bounds) == pytest.approx(1 / (9 * np.tan(np.radians(15))))
+    zoomed = View(camera.replace(view_angle=15), (300, 200))
+    assert zoomed.distance(view, bounds) > 0.4
+    assert View(camera, (600, 400)).distance(view, bounds) > 0.2
+    inside = View(camera.replace(position=(0, 0, 0.5)), (300, 200))
+    assert inside.distance(view, bounds) == np.inf
+    assert inside.distance(inside, bounds) == 0.0
+    parallel = camera.replace(parallel_projection=True, parallel_scale=2)
+    a, b = View(parallel, (300, 200)), View(parallel.azimuth(10), (300, 200))
+    assert 0.05 < a.distance(b, bounds) < 0.2
