@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from pyvista_vdi import _moved, errors
 from pyvista_vdi._version import __version__
 from pyvista_vdi.model import providers
+from pyvista_vdi.plotting import registration
 
 if TYPE_CHECKING:
     from pyvista_vdi import examples
@@ -64,6 +65,7 @@ __all__ = ["__version__", "errors", "examples", *sorted(_HOMES)]
 
 
 _moved.install()
+registration.install()
 # The composition root: what lower rooms need of upper ones, by name and loaded when asked for
 providers.provide(
     image_with_scalars="pyvista_vdi.plotting.volumes:as_image",

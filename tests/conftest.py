@@ -107,7 +107,7 @@ LENGTHY = {
     "io": "deep_exr packed_files vdi_files",
     "measure": "benchmark_model",
     "model": "packing",
-    "plotting": "add_vdi dial shown volume_files",
+    "plotting": "add_vdi as_added dial shown volume_files",
     "quality": "view_error",
     "raycasting": "aligned_view cropping multi_vdi_oracle occupancy packets picking_oracle preview "
     "raycast_oracle skipping",

@@ -41,7 +41,7 @@ _ALIASES = {"rng": "clim", "colormap": "cmap", "backface_culling": "culling"}
 _BELOW_GOAL = 0.02
 
 
-@pv.register_plotter_component("add_vdi")
+@pv.register_plotter_component("add_vdi", override=True)  # of registration._Pending
 class AddVDI:
     """Adds VDIs to a plotter: ``plotter.add_vdi(volume)``.
 

@@ -1,0 +1,76 @@
+"""``add_vdi`` on every class of plotters, as soon as this package and PyVista's plotters are there.
+
+PyVista imports what its entry points name when a plotter lacks an attribute: in
+``BasePlotter.__getattr__``. pyvistaqt's plotters derive from a Qt widget first, whose own
+``__getattr__`` answers before it, so that no entry point is looked at. An attribute of
+``BasePlotter`` itself is found by all of them.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from collections.abc import Sequence
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Any
+
+_PLOTTERS = "pyvista.plotting"
+
+#: What plotters get, and the modules that register it, as the entry points in ``pyproject.toml``.
+COMPONENTS = {"add_vdi": "pyvista_vdi.plotting.component"}
+
+
+class _Pending:
+    """A component whose module is imported when it is first asked for; that takes its place."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __get__(self, plotter: Any, kind: Any) -> Any:
+        for owner in kind.__mro__:
+            if vars(owner).get(self._name) is self:
+                delattr(owner, self._name)
+        importlib.import_module(COMPONENTS[self._name])
+        return getattr(kind if plotter is None else plotter, self._name)
+
+
+class _Watch(MetaPathFinder):
+    """Waits for PyVista's plotters to be imported."""
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Find nothing of its own, and have the plotters' module offer what there is."""
+        if name != _PLOTTERS:
+            return None
+        sys.meta_path.remove(self)
+        spec = importlib.util.find_spec(name)
+        loader: Any = None if spec is None else spec.loader
+        if loader is not None:
+            execute = loader.exec_module
+
+            def exec_module(module: ModuleType) -> None:
+                execute(module)
+                _offer(module)
+
+            loader.exec_module = exec_module
+        return spec
+
+
+def _offer(plotters: ModuleType) -> None:
+    base = getattr(plotters, "BasePlotter", None)  # a module that is being imported has none yet
+    for name, home in COMPONENTS.items():
+        if base is not None and home not in sys.modules:
+            setattr(base, name, _Pending(name))
+
+
+def install() -> None:
+    """Offer it now, or once PyVista's plotters are imported; import nothing."""
+    plotters = sys.modules.get(_PLOTTERS)
+    if plotters is None:
+        sys.meta_path.insert(0, _Watch())
+    else:
+        _offer(plotters)
