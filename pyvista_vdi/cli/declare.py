@@ -314,6 +314,7 @@ def file_format(parser: argparse.ArgumentParser) -> None:
     )
     standard = "leave out of an .exr what makes it exact: tau, and corrections"
     switch(group, "--standard-channels", standard)
+    switch(group, "--linear", "write an .exr's colours as linear light, for compositing")
 
 
 def device(options: Options) -> None:

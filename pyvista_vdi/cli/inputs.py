@@ -175,6 +175,8 @@ def file_options(options: argparse.Namespace) -> dict[str, Any]:
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if options.standard_channels:
         given["exact"] = False
+    if options.linear:
+        given["linear"] = True
     check_write_options(options.output, given)
     return given
 

@@ -37,8 +37,8 @@ def write(vdi: VDI, path: str | os.PathLike[str], **options: Any) -> Path:
     path : path-like
         The target; its name ends in ``.vdi``, ``.exr`` or ``.vti``.
     **options
-        ``compression`` and ``level`` for all; ``precision`` for ``.vdi``, ``exact`` for ``.exr``.
-        See
+        ``compression`` and ``level`` for all; ``precision`` for ``.vdi``; ``exact`` and
+        ``linear`` for ``.exr``. See
         :func:`pyvista_vdi.io.vdi_file.writer.write`, :func:`pyvista_vdi.io.deep_exr.files.write`
         and :func:`pyvista_vdi.vtk_pipeline.filters.vti.write`.
 
@@ -77,7 +77,8 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
     path : path-like
         The file; a name that ends in ``.exr`` makes it an OpenEXR file, ``.vti`` one of VTK.
     **options
-        ``camera`` and ``thickness`` for ``.exr``: see :func:`pyvista_vdi.io.deep_exr.files.read`.
+        ``camera``, ``thickness`` and ``linear`` for ``.exr``: see
+        :func:`pyvista_vdi.io.deep_exr.files.read`.
 
     Returns
     -------
@@ -95,7 +96,7 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
         If VTK is not installed and the name ends in ``.vti``.
     """
     if _is_exr(path):
-        _check_names("read", path, options, ("camera", "thickness"))
+        _check_names("read", path, options, ("camera", "thickness", "linear"))
         return exr.read(path, **options)
     _check_names("read", path, options, ())
     return _vti().read(path) if _is_vti(path) else reader.read(path)
@@ -179,7 +180,7 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
     names: tuple[str, ...] = ("compression", "level")
     compressions: tuple[str, ...] = (*CODECS, "none")
     if _is_exr(path):
-        names, compressions = (*names, "exact"), exr.COMPRESSIONS
+        names, compressions = (*names, "exact", "linear"), exr.COMPRESSIONS
     elif _is_vti(path):
         compressions = _VTI_COMPRESSIONS
     else:

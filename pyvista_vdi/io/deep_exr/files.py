@@ -10,14 +10,29 @@ from __future__ import annotations
 import os
 import struct
 import warnings
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidCameraError, VDIError, VDIFileError, VDIWarning
+from pyvista_vdi.io.deep_exr.corrections import (
+    COLOR_BITS,
+    DEPTH_BITS,
+    OURS,
+    STANDARD,
+    channel_names,
+    corrected,
+    correction,
+    exact_colors,
+    is_correction,
+    relative,
+    straight,
+    whole_numbers,
+)
 from pyvista_vdi.io.deep_exr.layout import (
     DeepImage,
     OtherFormError,
@@ -25,10 +40,17 @@ from pyvista_vdi.io.deep_exr.layout import (
     read_image,
     write_image,
 )
-from pyvista_vdi.io.deep_exr.samples import agrees, media
+from pyvista_vdi.io.deep_exr.linear_light import COLOR_SPACE, to_display, to_linear
+from pyvista_vdi.io.deep_exr.record import (
+    ATTRIBUTE,
+    COUNTS,
+    Record,
+    checksums_of,
+    parsed_record,
+    record_text,
+)
+from pyvista_vdi.io.deep_exr.samples import media
 from pyvista_vdi.io.deep_exr.view import bounds_of_lists, camera_from_matrices, view_matrices
-from pyvista_vdi.io.vdi_file.description import describe, from_json, number, to_json
-from pyvista_vdi.io.vdi_file.layout import FORMAT_NAME
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.whole_file import whole_file
 from pyvista_vdi.model.camera import Camera
@@ -38,23 +60,18 @@ from pyvista_vdi.model.vdi import VDI
 #: The name that a file's name ends in.
 SUFFIX = ".exr"
 
-#: The header's attribute that holds the description in JSON.
-DESCRIPTION_ATTRIBUTE = "pyvistaVDI"
-
-#: Version of that description and of our own channels; of this and of lower ones is read.
-IMAGE_VERSION = 1
+#: x_min, y_min, x_max and y_max of pixels, y downwards, both ends included.
+Box = tuple[int, int, int, int]
 
 #: How samples may be compressed when they are written.
 COMPRESSIONS = ("zips", "none")
 
-#: Predictions smaller than this are taken as 0, so that no processor's treatment of denormal
-#: numbers enters them.
-_SMALLEST = 2.0**-60
+#: Samples whose checksums are taken at a time.
+_PART = 2**18
 
-_STANDARD = ("A", "B", "G", "R", "Z", "ZBack")
-_DEPTH_BITS = ("bits.front", "bits.back")
-_COLOR_BITS = ("bits.red", "bits.green", "bits.blue")
-_OURS = ("tau", *_DEPTH_BITS, *_COLOR_BITS)
+#: How far a matrix of the header may be from the one that was written, relative to its largest
+#: entry: programs keep them in float32, some as text of seven digits.
+_SAME_MATRIX = 1e-5
 
 
 def write(
@@ -64,6 +81,7 @@ def write(
     compression: str = "zips",
     level: int = 1,
     exact: bool = True,
+    linear: bool = False,
 ) -> Path:
     """Write a VDI as an OpenEXR deep scan line image: see :func:`pyvista_vdi.io.write`.
 
@@ -79,18 +97,30 @@ def write(
         Also write the channel ``tau`` and the corrections with which the file reads back to the
         last bit. Without them it has the standard channels alone, and optical depths above about
         ten come back rounded (see ``docs/files.md``).
+    linear : bool
+        Write colours as linear light (sRGB's curve undone), which compositing programs take them
+        for, instead of as a display takes them. The file says so, and reading it gives back the
+        VDI's colours.
     """
     offset = _depth_offset(vdi)
-    names = [*_STANDARD, *(("tau", *_COLOR_BITS) if exact else ())]
-    if exact and offset != 0:
-        names += _DEPTH_BITS
+    names = channel_names(exact, offset)
+
+    def encoded(first: int, last: int) -> dict[str, NDArray[Any]]:
+        channels = _encoded(vdi, slice(first, last), offset, linear)
+        return {name: channels[name] for name in names}
+
+    def parts() -> Iterator[dict[str, NDArray[Any]]]:
+        for first in range(0, max(vdi.n_supersegments, 1), _PART):
+            yield encoded(first, first + _PART)
+
+    checksums = checksums_of(vdi.counts, parts())
     with whole_file(path) as stream:
         write_image(
             stream,
             vdi.counts,
-            {name: np.uint32 if name.startswith("bits.") else np.float32 for name in names},
-            lambda first, last: _encoded(vdi, slice(first, last), offset, exact),
-            _attributes(vdi, offset, exact),
+            {name: np.uint32 if is_correction(name) else np.float32 for name in names},
+            encoded,
+            _attributes(vdi, offset, record_text(vdi, offset, exact, linear, checksums), linear),
             compression=compression,
             level=level,
         )
@@ -102,6 +132,7 @@ def read(
     *,
     camera: Any = None,
     thickness: float | None = None,
+    linear: bool | None = None,
 ) -> VDI:
     """Read a VDI from an OpenEXR deep image: see :func:`pyvista_vdi.read`.
 
@@ -113,14 +144,18 @@ def read(
         The view that the image shows, where the file does not say it, or instead of what it says.
     thickness : float, optional
         World units: given to samples that have none, such as those of surfaces.
+    linear : bool, optional
+        Whether the colours are linear light, to be shown by sRGB's curve; by default what the
+        file says where it is one of ours, and of others no.
 
     Warns
     -----
     VDIWarning
-        If one of our files was changed by another program, or colours are outside 0 to 1.
+        If one of our files was changed by another program, colours are outside 0 to 1, or the
+        file has more deep parts than the one that is read.
     """
     with np.errstate(invalid="ignore"):  # a signalling NaN is refused as any other
-        return _File(path).vdi(camera, thickness)
+        return _File(path).vdi(camera, thickness, linear)
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:
@@ -143,34 +178,34 @@ def _depth_offset(vdi: VDI) -> float:
     return vdi.depth_origin - min(nearest, 0.0)
 
 
-def _attributes(vdi: VDI, offset: float, exact: bool) -> dict[str, tuple[str, bytes]]:
+def _attributes(vdi: VDI, offset: float, record: str, linear: bool) -> dict[str, tuple[str, bytes]]:
     to_camera, to_ndc = view_matrices(vdi.camera, vdi.window_size, offset - vdi.depth_origin)
     half = vdi.camera.half_extent(vdi.window_size)
     center = [c * h for c, h in zip(vdi.camera.window_center, half, strict=True)]
-    description = {**describe(vdi, IMAGE_VERSION), "depth_offset": offset, "exact": exact}
     return {
-        DESCRIPTION_ATTRIBUTE: ("string", to_json(description).encode("ascii")),
+        ATTRIBUTE: ("string", record.encode("ascii")),
         "screenWindowCenter": ("v2f", struct.pack("<2f", *center)),
         "screenWindowWidth": ("float", struct.pack("<f", 2 * half[0])),
-        "software": ("string", str(description["written_by"]).encode()),
+        "software": ("string", f"pyvista-vdi {__version__}".encode()),
         "worldToCamera": matrix_attribute(to_camera),
         "worldToNDC": matrix_attribute(to_ndc),
+        **(COLOR_SPACE if linear else {}),
     }
 
 
-def _encoded(vdi: VDI, part: slice, offset: float, exact: bool) -> dict[str, NDArray[Any]]:
+def _encoded(vdi: VDI, part: slice, offset: float, linear: bool) -> dict[str, NDArray[Any]]:
+    """Return all channels that a file may have."""
     front, back, tau = vdi.front[part], vdi.back[part], vdi.optical_depth[part]
     alpha = opacity(tau).astype(np.float32)
     channels: dict[str, NDArray[Any]]
     channels = {"A": alpha, "Z": _depth(front, offset), "ZBack": _depth(back, offset), "tau": tau}
-    for i, (name, bits) in enumerate(zip("RGB", _COLOR_BITS, strict=True)):
-        straight = vdi.color[part, i]
-        channels[name] = straight * alpha
-        if exact:
-            channels[bits] = _correction(straight, _straight(channels[name], alpha))
-    if exact and offset != 0:
-        for name, bits, exactly in zip(("Z", "ZBack"), _DEPTH_BITS, (front, back), strict=True):
-            channels[bits] = _correction(exactly, _relative(channels[name], offset))
+    for i, (name, bits) in enumerate(zip("RGB", COLOR_BITS, strict=True)):
+        shown = vdi.color[part, i]
+        light = (to_linear(shown) * alpha).astype(np.float32) if linear else shown * alpha
+        channels[name] = light
+        channels[bits] = correction(shown, straight(light, alpha, linear))
+    for name, bits, exactly in zip(("Z", "ZBack"), DEPTH_BITS, (front, back), strict=True):
+        channels[bits] = correction(exactly, relative(channels[name], offset))
     return channels
 
 
@@ -182,52 +217,7 @@ def _depth(relative: NDArray[np.float32], offset: float) -> NDArray[np.float32]:
         return np.maximum(relative.astype(np.float64) + offset, 0).astype(np.float32)
 
 
-# -- what a reader computes from the standard channels, exactly as IEEE 754 says -------------------
-
-
-def _relative(depth: NDArray[np.float32], offset: float) -> NDArray[np.float32]:
-    """Return view depth less the offset, rounded once."""
-    if offset == 0:
-        return depth
-    relative = depth.astype(np.float64) - offset
-    with np.errstate(over="ignore"):
-        return np.where(np.abs(relative) < _SMALLEST, 0, relative).astype(np.float32)
-
-
-def _straight(color: NDArray[np.float32], alpha: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return a premultiplied colour over its opacity, and 0 where that says nothing."""
-    enough = (alpha >= _SMALLEST) & (color >= _SMALLEST)
-    return np.divide(color, alpha, out=np.zeros_like(color), where=enough)
-
-
-def _correction(exact: NDArray[np.float32], predicted: NDArray[np.float32]) -> NDArray[np.uint32]:
-    """Return the difference of bit patterns modulo 2**32, with the sign in the lowest bit."""
-    step = np.ascontiguousarray(exact).view(np.int32) - predicted.view(np.int32)
-    return ((step << 1) ^ (step >> 31)).view(np.uint32)
-
-
-def _corrected(predicted: NDArray[np.float32], correction: NDArray[Any]) -> NDArray[np.float32]:
-    bits = correction.astype(np.uint32, copy=False)
-    step = (bits >> np.uint32(1)) ^ (np.uint32(0) - (bits & np.uint32(1)))
-    return (predicted.view(np.uint32) + step).view(np.float32)
-
-
 # -- reading ---------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _Description:
-    """The entries of our own attribute, checked."""
-
-    camera: Camera
-    window_size: tuple[int, int]
-    n_supersegments: int
-    bounds: tuple[float, ...]
-    depth_origin: float
-    depth_offset: float
-    exact: bool
-    version: int
-    metadata: dict[str, Any]
 
 
 class _File:
@@ -239,23 +229,28 @@ class _File:
         except TypeError as error:
             raise VDIFileError(f"a file's name is a path; got {type(path).__name__}") from error
         self._image = self._read_image()
-        self._description = self._read_description()
-        x0, y0, x1, y1 = self._image.display_window
-        self._window_size = (x1 - x0 + 1, y1 - y0 + 1)
+        self._record = self._read_record()
+        self._changed = self._record.changed(self._image) if self._record else ()
 
-    def vdi(self, camera: Any, thickness: float | None) -> VDI:
+    def vdi(self, camera: Any, thickness: float | None, linear: bool | None) -> VDI:
         """Return the VDI: ours exactly, or what the standard channels say."""
-        if camera is None and thickness is None and self._is_untouched():
-            return self._exact_vdi()
-        return self._standard_vdi(camera, thickness)
+        record, frame = self._record, self._image.display_window
+        if camera is None:
+            frame = self._frame()
+        asked = camera is not None or thickness is not None
+        if record is not None and record.exact and not asked and linear in (None, record.linear):
+            if not self._changed and self._keeps_view(record):
+                return self._exact_vdi(record)
+            self._warn_of_changes()
+        return self._standard_vdi(frame, camera, thickness, linear)
 
     def info(self) -> FileInfo:
         """Return what the file says."""
-        own = self._description
-        vdi = self.vdi(None, None)
+        record = self._record
+        vdi = self.vdi(None, None, None)
         return FileInfo(
             path=self._path,
-            format_version=own.version if own else 2,
+            format_version=record.version if record else 2,
             written_by=str(self._image.attributes.get("software", "")),
             camera=vdi.camera,
             window_size=vdi.window_size,
@@ -271,7 +266,7 @@ class _File:
     # -- what is in the file ---------------------------------------------------------------------
 
     def _read_image(self) -> DeepImage:
-        wanted = {*_STANDARD, *_OURS}
+        wanted = {*STANDARD, *OURS}
         try:
             image = read_image(self._path, wanted.__contains__)
         except OtherFormError as error:
@@ -283,134 +278,146 @@ class _File:
             raise VDIFileError(
                 f"{self._path} has no channel {', '.join(missing)}; it has "
                 f"{', '.join(image.channel_types)}: a VDI needs Z, ZBack, A, R, G and B"
+                f"{_layer_remedy(missing, image.channel_types)}"
             )
-        for name, array in image.channels.items():
-            if len(array) and (array.dtype.kind == "u") != name.startswith("bits."):
-                self._refuse(f"its channel {name} is of type {array.dtype}")
+        for name in STANDARD:
+            kind = image.channel_types.get(name)
+            if kind is not None and kind.kind != "f" and len(image.channels["Z"]):
+                raise VDIFileError(
+                    f"{self._path} holds no VDI: its channel {name} is of type {kind}, and must be "
+                    "float32 or float16; convert it: oiiotool in.exr -d float -o out.exr"
+                )
+        if image.channel_types.get("tau", np.dtype("f4")).kind != "f":
+            del image.channels["tau"]  # another's channel of that name
         return image
 
-    def _read_description(self) -> _Description | None:
-        text = self._image.attributes.get(DESCRIPTION_ATTRIBUTE)
+    def _read_record(self) -> Record | None:
+        text = self._image.attributes.get(ATTRIBUTE)
         if text is None:
             return None
         try:
-            entries = from_json(text)
-            if entries["format"] != FORMAT_NAME or isinstance(entries["version"], bool):
-                raise ValueError("it does not name the format")
-            if not 1 <= entries["version"] <= IMAGE_VERSION:
-                raise VDIFileError(
-                    f"{self._path} is of format version {entries['version']}; this release reads "
-                    f"up to version {IMAGE_VERSION}: upgrade by pip install -U pyvista-vdi"
-                )
-            width, height = entries["window_size"]
-            if not isinstance(entries["metadata"], dict):
-                raise TypeError("its metadata are no dictionary")
-            return _Description(
-                camera=Camera.from_dict(entries["camera"]),
-                window_size=(width, height),
-                n_supersegments=entries["n_supersegments"],
-                bounds=tuple(number(b) for b in entries["bounds"]),
-                depth_origin=number(entries["depth_origin"]),
-                depth_offset=number(entries["depth_offset"]),
-                exact=entries["exact"] is True,
-                version=entries["version"],
-                metadata=entries["metadata"],
-            )
+            return parsed_record(text, self._path)
         except VDIFileError:
             raise
-        except (VDIError, KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
-            self._refuse(f"its attribute {DESCRIPTION_ATTRIBUTE} is incomplete or wrong: {error!r}")
+        except ValueError as error:
+            self._refuse(f"its attribute {ATTRIBUTE} is incomplete or wrong: {error}")
 
-    def _is_untouched(self) -> bool:
-        """Whether the file is as :func:`write` left it, as far as that can be seen."""
-        own, image = self._description, self._image
-        if own is None or not own.exact:
-            return False
-        needed = [*_STANDARD, "tau", *_COLOR_BITS, *(_DEPTH_BITS if own.depth_offset else ())]
-        untouched = (
-            all(image.channel_types.get(n) in (np.float32, np.uint32) for n in needed)
-            and own.window_size == self._window_size
-            and image.data_window == image.display_window
-            and own.n_supersegments == len(image.channels["Z"])
-            and agrees(image.channels["A"], image.channels["tau"])
-            and self._colors_fit()
-        )
-        if not untouched:
-            warnings.warn(
-                f"{self._path} was changed after pyvista-vdi wrote it: its standard channels are "
-                "read, as those of any program's files",
-                VDIWarning,
-                stacklevel=4,
+    # -- what still holds of what we wrote -------------------------------------------------------
+
+    def _frame(self) -> Box:
+        """Return the pixels of the view; both windows of a file of ours are alike."""
+        data, display, record = self._image.data_window, self._image.display_window, self._record
+        if record is None:
+            return display
+        whole = [box for box in (display, data) if _size(box) == record.window_size]
+        if not whole:
+            raise VDIFileError(
+                f"{self._path} was cut or resized after pyvista-vdi wrote it: its display window "
+                f"is {_text(_size(display))}, and its view is of {_text(record.window_size)} "
+                "lists; give the view that it shows: read(..., camera=...)"
             )
-        return untouched
+        if len(whole) == 2 and data != display:
+            raise VDIFileError(
+                f"{self._path} was moved after pyvista-vdi wrote it: its data window begins at "
+                f"{data[:2]}, its display window at {display[:2]}; no view shows it so: move it "
+                "back, or give a view: read(..., camera=...)"
+            )
+        return whole[0]
 
-    def _colors_fit(self) -> bool:
-        color = self._exact_color()
-        return len(color) == 0 or bool(color.min() >= 0 and color.max() <= 1)
+    def _keeps_view(self, record: Record) -> bool:
+        """Whether the header's matrices, where it has them, are those of the record's view."""
+        shift = record.depth_offset - record.depth_origin
+        written = view_matrices(record.camera, record.window_size, shift)
+        for name, matrix in zip(("worldToCamera", "worldToNDC"), written, strict=True):
+            found, size = self._matrix(name), np.abs(matrix[:, :3]).max()
+            if found is not None and not np.allclose(
+                found, matrix, rtol=_SAME_MATRIX, atol=_SAME_MATRIX * size
+            ):
+                return False
+        return True
 
-    def _exact_color(self) -> NDArray[np.float32]:
-        channels = self._image.channels
-        color = np.empty((len(channels["A"]), 3), np.float32)
-        for i, (name, bits) in enumerate(zip("RGB", _COLOR_BITS, strict=True)):
-            predicted = _straight(channels[name], channels["A"])
-            color[:, i] = _corrected(predicted, channels[bits])
-        return color
+    def _warn_of_changes(self) -> None:
+        """Name what was changed: where that is the standard channels, ours follow."""
+        what: tuple[str, ...] = self._changed or ("its matrices",)
+        if COUNTS in what:
+            what = ("the number of samples",)
+        elif set(what) & set(STANDARD):
+            what = tuple(name for name in what if name in STANDARD)
+        warnings.warn(
+            f"{self._path} was changed after pyvista-vdi wrote it ({', '.join(what)}): its "
+            "standard channels are read, as those of any program's files",
+            VDIWarning,
+            stacklevel=5,
+        )
 
     # -- VDIs ------------------------------------------------------------------------------------
 
-    def _exact_vdi(self) -> VDI:
-        own, channels = self._description, self._image.channels
-        assert own is not None
-        front, back = (_relative(channels[n], own.depth_offset) for n in ("Z", "ZBack"))
-        if own.depth_offset:
+    def _exact_vdi(self, record: Record) -> VDI:
+        channels = self._image.channels
+        front, back = (relative(channels[n], record.depth_offset) for n in ("Z", "ZBack"))
+        if record.depth_offset:
             front, back = (
-                _corrected(depth, channels[bits])
-                for depth, bits in zip((front, back), _DEPTH_BITS, strict=True)
+                corrected(depth, whole_numbers(channels[bits]))
+                for depth, bits in zip((front, back), DEPTH_BITS, strict=True)
             )
         return self._checked_vdi(
-            own.camera,
+            record.camera,
             _offsets(self._image.counts),
-            (front, back, self._exact_color(), channels["tau"]),
-            own.bounds,
-            depth_origin=own.depth_origin,
-            metadata=own.metadata,
+            (front, back, exact_colors(channels, record.linear), channels["tau"]),
+            record.bounds,
+            record.window_size,
+            depth_origin=record.depth_origin,
+            metadata=record.metadata,
         )
 
-    def _standard_vdi(self, camera: Any, thickness: float | None) -> VDI:
-        samples = media(*self._samples_in_window(), thickness, str(self._path))
-        width, height = self._window_size
+    def _standard_vdi(
+        self, frame: Box, camera: Any, thickness: float | None, linear: bool | None
+    ) -> VDI:
+        samples = media(*self._samples_in(frame), thickness, str(self._path))
+        width, height = size = _size(frame)
         counts = np.bincount(samples.lists, minlength=width * height).reshape(height, width)
         starts = _offsets(counts).astype(np.int64)
         filled = np.flatnonzero(np.diff(starts))
         nearest = samples.front[starts[filled]].astype(np.float64)
         farthest = samples.back[starts[filled + 1] - 1].astype(np.float64)
-        shift = 0.0
-        own = self._description
-        if camera is None and own is not None and own.window_size == self._window_size:
-            view, shift = own.camera, own.depth_offset - own.depth_origin
+        record, shift = self._record, 0.0
+        bounds: Any = None
+        if camera is None and record is not None and self._keeps_view(record):
+            view, shift = record.camera, record.depth_offset - record.depth_origin
+            if thickness is None and not {COUNTS, "Z", "ZBack"}.intersection(self._changed):
+                bounds = record.bounds
         else:
-            view = self._view(camera, nearest, farthest)
-        bounds = bounds_of_lists(view, self._window_size, counts, nearest - shift, farthest - shift)
-        if own is not None and not own.exact and view == own.camera:
-            bounds = np.array(own.bounds)
+            view = self._view(camera, size, nearest, farthest)
+        if bounds is None:
+            bounds = bounds_of_lists(view, size, counts, nearest - shift, farthest - shift)
+        if linear is None:
+            linear = record is not None and record.linear
+        # What the record says of how the VDI was made is of the samples that were written
+        kept = record is not None and not {COUNTS, *STANDARD}.intersection(self._changed)
         return self._checked_vdi(
             view,
             _offsets(counts),
-            (samples.front, samples.back, samples.color, samples.optical_depth),
+            (
+                samples.front,
+                samples.back,
+                to_display(samples.color).clip(0, 1) if linear else samples.color,
+                samples.optical_depth,
+            ),
             bounds,
+            size,
             depth_origin=-shift,
-            metadata=own.metadata if own is not None else {"read_from": self._path.name},
+            metadata=record.metadata if record and kept else {"read_from": self._path.name},
         )
 
-    def _samples_in_window(self) -> tuple[NDArray[np.int64], dict[str, NDArray[Any]]]:
-        """Return each sample's list, and the channels, of pixels in the display window."""
+    def _samples_in(self, frame: Box) -> tuple[NDArray[np.int64], dict[str, NDArray[Any]]]:
+        """Return each sample's list, and the channels, of pixels in the frame."""
         image = self._image
-        channels = {n: a for n, a in image.channels.items() if not n.startswith("bits.")}
-        width, height = self._window_size
+        channels = {n: a for n, a in image.channels.items() if not is_correction(n)}
+        width, height = _size(frame)
         rows, columns = image.counts.shape
         # Lists count rows from the bottom, y of both windows runs downwards
-        x = np.arange(columns) + (image.data_window[0] - image.display_window[0])
-        y = np.arange(rows) + (image.display_window[3] - image.data_window[3])
+        x = np.arange(columns) + (image.data_window[0] - frame[0])
+        y = np.arange(rows) + (frame[3] - image.data_window[3])
         inside = ((y >= 0) & (y < height))[:, None] & ((x >= 0) & (x < width))
         pixels = y[:, None] * width + x
         lists = np.repeat(pixels.ravel(), image.counts.ravel())
@@ -419,16 +426,13 @@ class _File:
         kept = np.repeat(inside.ravel(), image.counts.ravel())
         return lists[kept], {name: array[kept] for name, array in channels.items()}
 
-    def _view(self, camera: Any, nearest: Any, farthest: Any) -> Camera:
+    def _view(self, camera: Any, size: tuple[int, int], nearest: Any, farthest: Any) -> Camera:
         if camera is not None:
             return Camera.from_any(camera)
         middle = (nearest.min() + farthest.max()) / 2 if len(nearest) else 1.0
         try:
             return camera_from_matrices(
-                self._matrix("worldToCamera"),
-                self._matrix("worldToNDC"),
-                self._window_size,
-                middle,
+                self._matrix("worldToCamera"), self._matrix("worldToNDC"), size, middle
             )
         except InvalidCameraError as error:
             raise VDIFileError(
@@ -442,11 +446,17 @@ class _File:
         return matrix.T if isinstance(matrix, np.ndarray) else None
 
     def _checked_vdi(
-        self, view: Camera, offsets: Any, arrays: tuple[Any, ...], bounds: Any, **options: Any
+        self,
+        view: Camera,
+        offsets: Any,
+        arrays: tuple[Any, ...],
+        bounds: Any,
+        size: tuple[int, int],
+        **options: Any,
     ) -> VDI:
         front, back, color, tau = arrays
         try:
-            return VDI(view, self._window_size, offsets, front, back, color, tau, bounds, **options)
+            return VDI(view, size, offsets, front, back, color, tau, bounds, **options)
         except VDIError as error:
             self._refuse(f"it holds no valid VDI: {error}")
 
@@ -454,6 +464,24 @@ class _File:
         raise VDIFileError(
             f"{self._path} is damaged: {why}; copy it from its source again, or write it anew"
         )
+
+
+def _size(box: Box) -> tuple[int, int]:
+    return box[2] - box[0] + 1, box[3] - box[1] + 1
+
+
+def _text(size: tuple[int, int]) -> str:
+    return f"{size[0]} x {size[1]}"
+
+
+def _layer_remedy(missing: list[str], names: Collection[str]) -> str:
+    """Return how to take the channels of a layer, where one has those that are missing."""
+    layers = {name.rpartition(".")[0] for name in names} - {""}
+    for layer in sorted(layers):
+        if all(f"{layer}.{name}" in names for name in missing):
+            renamed = ",".join(f"{n}={layer}.{n}" for n in STANDARD if f"{layer}.{n}" in names)
+            return f"; take those of its layer {layer}: oiiotool in.exr --ch {renamed} -o out.exr"
+    return ""
 
 
 def _offsets(counts: NDArray[Any]) -> NDArray[np.uint64]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import MissingDependencyError, VDIFileError
+from pyvista_vdi.errors import MissingDependencyError, VDIFileError, VDIWarning
 from pyvista_vdi.io.deep_exr.layout import DeepImage
 from pyvista_vdi.model.camera import MAX_WINDOW_EDGE
 
@@ -19,7 +20,7 @@ _ATTRIBUTES = ("pyvistaVDI", "software", "worldToCamera", "worldToNDC")
 
 
 def read_by_package(path: Path, wanted: set[str], form: str) -> DeepImage:
-    """Read the first deep part of a file.
+    """Read the first deep part of a file; warn where there are more.
 
     The package holds every pixel's samples as an array of its own, which takes about a hundred
     bytes per pixel and channel: this is for files that nothing else reads.
@@ -53,9 +54,9 @@ def read_by_package(path: Path, wanted: set[str], form: str) -> DeepImage:
         ) from error
     try:
         with OpenEXR.File(str(path), header_only=True) as file:
-            index = _deep_part(file, path)
+            index, *others = _deep_parts(file, path)
         with OpenEXR.File(str(path), separate_channels=True) as file:
-            return _image(file.parts[index], wanted)
+            image = _image(file.parts[index], wanted)
     except VDIFileError:
         raise
     except (RuntimeError, ValueError, TypeError, KeyError, MemoryError) as error:
@@ -63,15 +64,26 @@ def read_by_package(path: Path, wanted: set[str], form: str) -> DeepImage:
             f"{path} {form}, and the OpenEXR package cannot read it ({error}); write it as a "
             "deep scan line image with ZIPS compression"
         ) from error
+    if others:
+        warnings.warn(
+            f"{path} has {1 + len(others)} deep parts, of which the first is read, part {index}: "
+            f"take another out by oiiotool in.exr --subimage {others[0]} -o out.exr",
+            VDIWarning,
+            stacklevel=6,
+        )
+    return image
 
 
-def _deep_part(file: Any, path: Path) -> int:
+def _deep_parts(file: Any, path: Path) -> list[int]:
+    deep = []
     for index, part in enumerate(file.parts):
         kind = getattr(part.header.get("type"), "name", "")
         x0, y0, x1, y1 = _box(part.header["dataWindow"])
         if kind in _DEEP_TYPES and max(x1 - x0, y1 - y0) < MAX_WINDOW_EDGE:
-            return index
-    raise VDIFileError(f"{path} has no part that is a deep image")
+            deep.append(index)
+    if not deep:
+        raise VDIFileError(f"{path} has no part that is a deep image")
+    return deep
 
 
 def _image(part: Any, wanted: set[str]) -> DeepImage:

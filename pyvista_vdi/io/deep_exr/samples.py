@@ -92,38 +92,44 @@ def media(
     with np.errstate(divide="ignore", invalid="ignore"):
         straight = color / alpha[:, None]
     seen = Samples(lists, front, back, straight, _optical_depth(alpha, channels))
-    seen = _with_thickness(seen.take(alpha > 0), thickness, name)
+    half = channels["Z"].dtype == np.float16
+    seen = _with_thickness(seen.take(alpha > 0), thickness, name, half)
     _warn_of_colors(color[alpha == 0], seen.color, name)
     seen = seen._replace(color=seen.color.clip(0, 1))
     return _tidy(seen.take(np.lexsort((seen.back, seen.front, seen.lists))), name)
 
 
-def agrees(alpha: NDArray[Any], tau: NDArray[Any]) -> bool:
-    """Whether optical depths and opacities say the same, up to the rounding of float32."""
+def agree(alpha: NDArray[Any], tau: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return where optical depths and opacities say the same, up to the rounding of float32."""
     good = (tau >= 0) & (tau < np.inf)
-    if not good.all():
-        return False
-    # float16 opacities would differ by 2**-12 and then say less than tau does, so they count
-    return bool((np.abs(opacity(tau) - alpha) <= 2.0**-22).all())
+    of_tau = opacity(np.where(good, tau, 0))
+    # float16 opacities would differ by 2**-12 and then say less than tau does, so they count;
+    # the second term is the rounding of denormal opacities
+    same: NDArray[np.bool_] = np.abs(of_tau - alpha) <= 2.0**-22 * alpha + 2.0**-148
+    return good & same
 
 
 def _optical_depth(alpha: NDArray[np.float64], channels: dict[str, NDArray[Any]]) -> Any:
+    """Return tau where it agrees with A: programs that split or fade samples leave it as it was."""
+    of_alpha = np.where(alpha == 1, OPAQUE_OPTICAL_DEPTH, optical_depth_of(alpha))
     tau = channels.get("tau")
-    if tau is not None and agrees(alpha, tau):
-        return tau.astype(np.float64)
-    return np.where(alpha == 1, OPAQUE_OPTICAL_DEPTH, optical_depth_of(alpha))
+    if tau is None:
+        return of_alpha
+    return np.where(agree(alpha, tau), tau.astype(np.float64), of_alpha)
 
 
-def _with_thickness(samples: Samples, thickness: float | None, name: str) -> Samples:
+def _with_thickness(samples: Samples, thickness: float | None, name: str, half: bool) -> Samples:
     flat = samples.back <= samples.front
     if not flat.any():
         return samples
     if thickness is None:
         k = int(np.argmax(flat))
+        why = "they are surfaces, and a VDI holds media; give"
+        if half:
+            why = "depths are half floats, too coarse for thin samples; write Z as float, or give"
         raise VDIFileError(
             f"{name} has {int(flat.sum())} samples without a thickness, the first at depth "
-            f"{samples.front[k]:g}: they are surfaces, and a VDI holds media; give them a "
-            "thickness in world units: read(..., thickness=...)"
+            f"{samples.front[k]:g}: {why} them a thickness in world units: read(..., thickness=...)"
         )
     if not 0 < thickness < np.inf:
         raise InvalidArgumentError(f"thickness must be a positive length; got {thickness!r}")
