@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.classification import DEFAULTS, IN_PLACE, Classification
+from pyvista_vdi.model.classification import BLENDINGS, DEFAULTS, IN_PLACE, Classification
 from pyvista_vdi.model.inputs import as_vdi, as_volume
 from pyvista_vdi.model.options import GenerationOptions, MediumOptions
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
@@ -472,7 +472,10 @@ def render_volume(
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     **classification
-        As for :func:`generate`.
+        As for :func:`generate`, and ``blending="maximum"``, ``"minimum"``, ``"average"`` and
+        ``"additive"``, as in ``add_volume``: the greatest or the least scalar along a ray is
+        classified; or opacity times scalar, which is 0 to 1 over the volume's range, is averaged
+        or integrated over opacity unit distances, as a grey value.
 
     Returns
     -------
@@ -486,32 +489,34 @@ def render_volume(
     InvalidVolumeError, InvalidCameraError, InvalidArgumentError
         If an argument cannot be used.
     UnsupportedError
-        If another blending mode is asked for, or what else a VDI cannot honour.
+        If ``blending`` does not go with another argument, or for what else cannot be honoured.
     MissingDependencyError
         If a colour map or an opacity is named and PyVista is not installed.
     NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
         If there is no device, or it fails.
     """
-    looks = _looks(render_volume, classification)
+    looks = _looks(render_volume, classification, BLENDINGS)
     view = Camera.from_any(camera)
     volume = as_volume(volume, looks.scalars, looks.preference)
-    from pyvista_vdi.volume.render import raycast_volume
-
     cutoff = TRANSMITTANCE_CUTOFF if early_termination else 0.0
     options = RenderOptions(
         clipping_planes, cropping, opacity_multiplier, skip_empty, transmittance_cutoff=cutoff
     )
-    return raycast_volume(
-        volume,
-        looks.transfer_function(volume),
-        _frame(None, view, window_size, options, opaque_depth, device),
-        MediumOptions(
-            sample_distance=sample_distance,
-            lights=lights,
-            ambient_occlusion=ambient_occlusion,
-            memory_limit=memory_limit,  # type: ignore[arg-type]  # a text becomes bytes
-        ),
+    transfer_function = looks.transfer_function(volume)
+    request = _frame(None, view, window_size, options, opaque_depth, device)
+    sampling = MediumOptions(
+        sample_distance=sample_distance,
+        lights=lights,
+        ambient_occlusion=ambient_occlusion,
+        memory_limit=memory_limit,  # type: ignore[arg-type]  # a text becomes bytes
     )
+    if looks.blending != BLENDINGS[0]:
+        from pyvista_vdi.volume.project import project_volume
+
+        return project_volume(volume, transfer_function, request, looks.blending, sampling)
+    from pyvista_vdi.volume.render import raycast_volume
+
+    return raycast_volume(volume, transfer_function, request, sampling)
 
 
 def read(path: str | os.PathLike[str], **options: Any) -> VDI:
@@ -620,6 +625,9 @@ def _frame(
     return FrameRequest(camera, size, options, opaque_depth, device)
 
 
-def _looks(function: Callable[..., Any], given: dict[str, Any]) -> Classification:
+def _looks(
+    function: Callable[..., Any], given: dict[str, Any], blendings: Sequence[str] = BLENDINGS[:1]
+) -> Classification:
     """Return the classification arguments of a call, checked."""
-    return Classification(given, function.__name__, tuple(inspect.signature(function).parameters))
+    names = tuple(inspect.signature(function).parameters)
+    return Classification(given, function.__name__, names, blendings)

@@ -6,8 +6,7 @@
 // -D CROPPED: see lib/cropping.cl
 // -D OPACITY_MULTIPLIER: optical depths are multiplied
 // -D SAMPLED: see volume/samples.cl; some steps of some rows at a time then, as they are sampled
-#include "volume/march.cl"
-#include "lib/cropping.cl"
+#include "volume/cropped_march.cl"
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -23,32 +22,6 @@
     __global float4 *states, /* of each ray: colour and transmittance, what they rounded off */
 #else
 #define PART_PARAMETERS
-#endif
-
-#ifdef CROPPED
-// The kept parts of a ray, in t.
-inline Kept kept_march(const March *march, __global const float *form, float a, float b, uint regions)
-{
-    float at_t0[CROPPING_PLANES], at_t1[CROPPING_PLANES];
-    for (int k = 0; k < CROPPING_PLANES; ++k, form += FORM_SIZE) {
-        const float value = march_value(march, form, a, b);
-        at_t0[k] = fma(march->t0, form_slope(form, a, b), value);
-        at_t1[k] = fma(march->t1, form_slope(form, a, b), value);
-    }
-    return kept_parts(at_t0, at_t1, march->t0, march->t1, regions);
-}
-
-// The share of a step that is kept.
-inline float kept_share(const Kept *kept, float front, float back)
-{
-    float sum = 0.0f;
-    for (int n = 0; n < MOST_KEPT; ++n) {
-        float from = front, to = back;
-        cut_to_part(kept, n, &from, &to);
-        sum += fmax(to - from, 0.0f);
-    }
-    return sum / (back - front);
-}
 #endif
 
 __kernel void render_volume(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any
@@ -36,6 +36,9 @@ DEFAULTS: MappingProxyType[str, Any] = MappingProxyType(
         "interpolation": "nearest",
     }
 )
+
+#: What may become of the scalars along a ray, as ``add_volume`` names it; the first is the default.
+BLENDINGS = ("composite", "maximum", "minimum", "average", "additive")
 
 #: What may be given in place of the arguments above.
 IN_PLACE = ("volume_property", "transfer_function")
@@ -70,6 +73,8 @@ class Classification:
         Name of the function they were given to, for messages.
     others : tuple of str
         That function's other keyword arguments, for suggestions.
+    blendings : sequence of str
+        The blend modes that it has.
 
     Raises
     ------
@@ -82,13 +87,22 @@ class Classification:
     """
 
     def __init__(
-        self, given: Mapping[str, Any], function: str, others: tuple[str, ...] = ()
+        self,
+        given: Mapping[str, Any],
+        function: str,
+        others: tuple[str, ...] = (),
+        blendings: Sequence[str] = BLENDINGS[:1],
     ) -> None:
         refuse_unknown(given, function, (*DEFAULTS, *IN_PLACE, *others))
         self._in_place = {n: given[n] for n in IN_PLACE if given.get(n) is not None}
         self._given = {n: v for n, v in given.items() if n in DEFAULTS}
         self._refuse_mixtures()
-        self._refuse_unsupported()
+        self._refuse_unsupported(blendings)
+
+    @property
+    def blending(self) -> str:
+        """What becomes of the scalars along a ray: one of :data:`BLENDINGS`."""
+        return str(self._given.get("blending", DEFAULTS["blending"]))
 
     @property
     def scalars(self) -> Any:
@@ -140,7 +154,7 @@ class Classification:
             raise InvalidArgumentError(
                 "volume_property and transfer_function were both given: pass one of them"
             )
-        replaced = sorted(set(self._given) - set(_CHOOSE_THE_ARRAY))
+        replaced = sorted(set(self._given) - {*_CHOOSE_THE_ARRAY, "blending"})
         if self._in_place and replaced:
             (name,) = self._in_place
             raise InvalidArgumentError(
@@ -148,12 +162,16 @@ class Classification:
                 f"leave out either {name} or the {'others' if len(replaced) > 1 else 'other'}"
             )
 
-    def _refuse_unsupported(self) -> None:
-        blending = self._given.get("blending", "composite")
-        if blending != "composite":
+    def _refuse_unsupported(self, blendings: Sequence[str]) -> None:
+        if self.blending not in BLENDINGS:
+            raise InvalidArgumentError(
+                f"blending must be one of {', '.join(BLENDINGS)}; got {self.blending!r}"
+            )
+        if self.blending not in blendings:
             raise UnsupportedError(
-                f"blending={blending!r} is not supported: a VDI stores what is composited along a "
-                "ray; pass blending='composite', or draw the volume itself by Plotter.add_volume"
+                f"blending={self.blending!r} is not supported: a VDI stores what is composited "
+                "along a ray; pass blending='composite', or draw the volume itself by "
+                "Plotter.add_volume or pyvista_vdi.render_volume"
             )
         interpolation = self._given.get("interpolation", "nearest")
         if interpolation not in ("nearest", "linear"):

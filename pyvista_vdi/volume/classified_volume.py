@@ -101,6 +101,9 @@ class DeviceVolume:
         How it is sampled; ambient occlusion is computed once for a classification.
     skip_empty : bool
         Pass by macrocells that the transfer function makes transparent; the samples stay the same.
+    by_scalar : bool
+        Look up the medium of each scalar where that can be done; otherwise the table stays the
+        transfer function.
     room : Room, optional
         Memory that there is; a volume for which it is too little is held brick by brick. Without
         it a volume is held in one piece or refused.
@@ -112,6 +115,8 @@ class DeviceVolume:
     bricks : DeviceBricks or None
         What is on the device, where that is not the whole volume: steps must be sampled by a
         :class:`~pyvista_vdi.volume.bricks.StepSampler` before kernels march along them.
+    zero, unit : float
+        Scalar of a voxel that is 0 on the device, and scalars per unit of the device's voxels.
 
     Raises
     ------
@@ -129,6 +134,7 @@ class DeviceVolume:
         options: MediumOptions | None = None,
         *,
         skip_empty: bool = True,
+        by_scalar: bool = True,
         room: Room | None = None,
         **changes: Any,
     ) -> None:
@@ -153,6 +159,7 @@ class DeviceVolume:
             self._voxels, ranges = upload_voxels(runtime, volume, scale, self.defines)
         else:
             ranges = upload_ranges(runtime, volume, scale, self.defines, room)
+        self.zero, self.unit = (0.0, 1.0) if scale is None else (scale.low, scale.unit)
         self._low, span = (low, high - low) if native else (0.0, 1.0 if high > low else 0.0)
         table = np.column_stack([transfer_function.colors, transfer_function.opacities])
         self._entries = len(table)
@@ -166,7 +173,7 @@ class DeviceVolume:
                 self._distances = self._distances_of(runtime, seen)
         if transfer_function.interpolation == "nearest":
             self.defines["NEAREST"] = 1
-            if native and (ends := integer_ends(runtime, volume, ranges)):
+            if by_scalar and native and (ends := integer_ends(runtime, volume, ranges)):
                 self._look_up_by_scalar(runtime, *ends)
         self.runtime = runtime
         self._shading = transfer_function.shading

@@ -30,6 +30,33 @@ _PART_BYTES, _PARTS_IN_LIMIT = 32 * 2**20, 8
 _PIXEL_BYTES = 16 + 4
 
 
+class ClippedRays:
+    """A view's rays through a volume, clipped and cropped as a request says.
+
+    Attributes
+    ----------
+    forms : numpy.ndarray
+        As ``begin_march`` takes them, the planes of cropping behind.
+    planes : int
+        How many of them clip.
+    ends : numpy.ndarray or None
+        Where opaque geometry ends the rays.
+    cropped : device.ray_forms.Cropped
+        The regions that are kept, as kernels take them.
+    defines : dict
+        ``-D`` names of the kernels that read them.
+    """
+
+    def __init__(self, medium: DeviceVolume, request: FrameRequest) -> None:
+        options = request.options
+        march = medium.forms(request.camera, request.size, options.clipping_planes)
+        self.ends = rays.checked_opaque_depth(request.opaque_depth, request.size, march.rays)
+        self.cropped = rays.cropped(march.rays, options.cropping, medium.volume.bounds)
+        self.planes = march.planes + len(self.cropped.planes)
+        self.forms = march.packed(*self.cropped.planes, *self.cropped.forms)
+        self.defines = {**march.defines, **self.cropped.defines}
+
+
 def raycast_volume(
     volume: Volume,
     transfer_function: TransferFunction,
@@ -84,12 +111,9 @@ def raycast_medium(
     """
     runtime, camera, options = medium.runtime, request.camera, request.options
     width, height = size = request.size
-    march = medium.forms(camera, size, options.clipping_planes)
-    ends = rays.checked_opaque_depth(request.opaque_depth, size, march.rays)
-    cropped = rays.cropped(march.rays, options.cropping, medium.volume.bounds)
-    planes = march.planes + len(cropped.planes)
-    forms = march.packed(*cropped.planes, *cropped.forms)
-    defines = {**medium.defines, **march.defines, **cropped.defines}
+    clipped = ClippedRays(medium, request)
+    ends, cropped = clipped.ends, clipped.cropped
+    defines = {**medium.defines, **clipped.defines}
     multiplier: tuple[np.float32, ...] = ()
     if options.opacity_multiplier != 1.0:
         defines["OPACITY_MULTIPLIER"] = 1
@@ -98,13 +122,13 @@ def raycast_medium(
     medium_arguments = medium.medium_arguments(lit_from or camera)
     with ExitStack() as stack:
         keep = stack.enter_context
-        form_buffer = keep(runtime.upload(forms, "rays"))
+        form_buffer = keep(runtime.upload(clipped.forms, "rays"))
         no_ends = np.zeros(1, np.float32)
         depth = keep(runtime.upload(no_ends if ends is None else ends, "opaque depth"))
         image = keep(runtime.result((height, width, 4), name="image"))
         begin = (
             form_buffer,
-            np.int32(planes),
+            np.int32(clipped.planes),
             np.float32(medium.sample_distance),
             np.float32(medium.unit_distance),
         )

@@ -194,8 +194,7 @@ def test_an_unknown_keyword_is_a_type_error(name, suggestion, volume, camera):
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        ({"blending": "maximum"}, UnsupportedError, "blending='maximum' is not .* by .*add_volume"),
-        ({"blending": "minimum"}, UnsupportedError, "blending='minimum' is not .* by .*add_volume"),
+        ({"blending": "mip"}, InvalidArgumentError, "one of composite, maximum, .* got 'mip'"),
         ({"ambient_occlusion": "a"}, InvalidArgumentError, "ambient_occlusion must be True, a rad"),
         ({"ambient_occlusion": -1}, InvalidArgumentError, "radius .* a positive length .* got -1"),
         ({"interpolation": "cubic"}, InvalidArgumentError, "must be 'nearest' or 'linear'"),
@@ -216,6 +215,12 @@ def test_an_unknown_keyword_is_a_type_error(name, suggestion, volume, camera):
 def test_arguments_that_are_refused_by_name(function, arguments, error, message, volume, camera):
     with pytest.raises(error, match=message):
         function(volume, camera, SIZE, **arguments)
+
+
+@pytest.mark.parametrize("blending", ["maximum", "minimum", "average", "additive"])
+def test_a_vdi_composites(blending, volume, camera):
+    with pytest.raises(UnsupportedError, match=f"'{blending}' is not .* by .*render_volume"):
+        api.generate(volume, camera, SIZE, blending=blending)
 
 
 @pytest.mark.parametrize(
