@@ -3,9 +3,9 @@
     python benchmarks/projections.py brain aneurism
 
 A prototype in NumPy, on volumes of 96 points along an edge: parallel lists along z, in each of
-which neighbours are merged at least error until K are left (each keeps the greatest, or the mean, of
-its scalars), seen from angles about y. SSIM is against the picture of the volume itself, taken at
-the same steps between the same points, so that the lists alone make the difference.
+which neighbours are merged at least error until K are left (each keeps the greatest, or the mean,
+of its scalars), seen from angles about y. SSIM is against the picture of the volume itself, taken
+at the same steps between the same points, so that the lists alone make the difference.
 """
 
 from __future__ import annotations
