@@ -1,7 +1,8 @@
-"""``volume.vdi.generate(...)``: the accessor on PyVista's data sets."""
+"""``volume.vdi.generate(...)`` and ``.plot(...)``: the accessor on PyVista's data sets."""
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Sequence
 from typing import Any
 
@@ -53,3 +54,80 @@ class VDIAccessor:
         >>> vdi = volume.vdi.generate(plotter.camera, (64, 48), cmap="bone")  # doctest: +SKIP
         """
         return generate(require_image(self._dataset), camera, window_size, **arguments)
+
+    def plot(
+        self,
+        *,
+        cpos: Any = None,
+        zoom: Any = None,
+        background: Any = None,
+        text: str = "",
+        show_axes: bool | None = None,
+        show_bounds: bool = False,
+        show_grid: bool = False,
+        parallel_projection: bool = False,
+        eye_dome_lighting: bool = False,
+        anti_aliasing: Any = None,
+        **arguments: Any,
+    ) -> Any:
+        """Show this volume's VDI in a window of its own, as ``plot(volume=True)`` shows the volume.
+
+        Parameters
+        ----------
+        cpos, zoom, background, text, show_axes, show_bounds, show_grid, parallel_projection
+            As for ``pyvista.plot``.
+        eye_dome_lighting, anti_aliasing
+            As for ``pyvista.plot``.
+        **arguments
+            Those of ``pyvista.Plotter`` (``off_screen``, ``window_size``, ``theme`` and so on) and
+            of its ``show`` (``screenshot``, ``return_img``, ``jupyter_backend`` and so on); all
+            others go to ``Plotter.add_vdi``.
+
+        Returns
+        -------
+        object
+            What ``Plotter.show`` returns: a picture with ``return_img=True``, the camera's position
+            with ``return_cpos=True``, else nothing, or a notebook's viewer.
+
+        Raises
+        ------
+        TypeError
+            If a keyword is unknown.
+
+        Examples
+        --------
+        >>> import pyvista as pv
+        >>> pv.Wavelet().vdi.plot(cmap="bone", zoom=1.2)  # doctest: +SKIP
+        """
+        plotter = pv.Plotter(**_taken(arguments, pv.Plotter.__init__))
+        showing = _taken(arguments, pv.Plotter.show, "jupyter_kwargs")
+        if plotter.theme.axes.show if show_axes is None else show_axes:
+            plotter.add_axes()
+        if background is not None:
+            plotter.set_background(background)
+        plotter.add_vdi(self._dataset, **arguments)
+        if text:
+            plotter.add_text(text)
+        if show_grid:
+            plotter.show_grid()
+        elif show_bounds:
+            plotter.show_bounds()
+        if cpos is not None:
+            plotter.camera_position = cpos
+        if parallel_projection:
+            plotter.enable_parallel_projection()
+        if eye_dome_lighting:
+            plotter.enable_eye_dome_lighting()
+        if anti_aliasing is False:
+            plotter.disable_anti_aliasing()
+        elif anti_aliasing is not None:
+            plotter.enable_anti_aliasing("msaa" if anti_aliasing is True else anti_aliasing)
+        if zoom is not None:
+            plotter.camera.zoom(zoom)
+        return plotter.show(**showing)
+
+
+def _taken(arguments: dict[str, Any], function: Any, *more: str) -> dict[str, Any]:
+    """Take those of the arguments that are a function's own, and return them."""
+    own = {*inspect.signature(function).parameters, *more}
+    return {name: arguments.pop(name) for name in [*arguments] if name in own}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
+import warnings
 import weakref
 from collections.abc import Callable, Mapping
 from typing import Any, Literal
@@ -11,14 +13,16 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonCore import vtkWeakReference
+from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet
 from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
 from pyvista_vdi.model.classification import DEFAULTS, Classification, refuse_unknown
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
+from pyvista_vdi.plotting.blocks import add_blocks
 from pyvista_vdi.plotting.classify import Looks
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.volumes import as_image, held
@@ -36,6 +40,9 @@ from pyvista_vdi.vtk_pipeline.interaction.window_clock import checked_rate
 
 #: ``add_volume``'s aliases.
 _ALIASES = {"rng": "clim", "colormap": "cmap", "backface_culling": "culling"}
+
+#: ``add_volume``'s names of VTK's mappers.
+_MAPPERS = ("fixed_point", "gpu", "open_gl", "smart", "ugrid")
 
 #: SSIM by which a view may fall below what was asked for before it regenerates.
 _BELOW_GOAL = 0.02
@@ -72,7 +79,7 @@ class AddVDI:
         culling: bool | str = False,
         multi_colors: bool = False,
         blending: str = "composite",
-        mapper: None = None,
+        mapper: str | None = None,
         scalar_bar_args: dict[str, Any] | None = None,
         show_scalar_bar: bool | None = None,
         annotations: dict[float, str] | None = None,
@@ -112,7 +119,7 @@ class AddVDI:
         device: Any = None,
         progress_bar: bool | Callable[[float], object] | None = None,
         **aliases: Any,
-    ) -> PlotterVDIActor:
+    ) -> PlotterVDIActor | list[Any]:
         """Add a volume that turns fluently: frames are raycast from its VDI.
 
         All arguments of ``Plotter.add_volume`` are taken, with its names, defaults and meaning;
@@ -125,10 +132,11 @@ class AddVDI:
 
         Parameters
         ----------
-        volume : pyvista.ImageData or numpy.ndarray or Volume or VDI
+        volume : pyvista.ImageData or numpy.ndarray or pyvista.MultiBlock or Volume or VDI
             A uniform grid (other grids are refused, with the remedy), a NumPy array as
-            ``add_volume`` takes it, a VDI, or a VDI as ``pyvista.read("x.vdi")`` gives it. With a
-            VDI nothing is generated, and arguments that only a volume can honour are refused.
+            ``add_volume`` takes it, blocks of uniform grids, a VDI, or a VDI as
+            ``pyvista.read("x.vdi")`` gives it. With a VDI nothing is generated, and arguments that
+            only a volume can honour are refused.
         scalars : str or numpy.ndarray, optional
             Name of an array, or the values, per point or per cell; RGBA as uint8 (n, 4).
         clim : float or (float, float), optional
@@ -152,9 +160,10 @@ class AddVDI:
             camera move in the picture when the VDI is made anew, and other lights make it anew.
         categories : bool or int
             As many colours as there are different values, or this many.
-        multi_colors, mapper
-            Accepted as ``False`` and ``None`` only: multi-blocks are added block by block, and a
-            VDI has its own mapper.
+        multi_colors : bool
+            Give each block of a ``MultiBlock`` a colour map of its own.
+        mapper : str, optional
+            Names of VTK's volume mappers are taken and mean nothing: a VDI has its own.
         blending : str
             ``"composite"`` only.
         scalar_bar_args, show_scalar_bar, annotations
@@ -228,11 +237,11 @@ class AddVDI:
 
         Returns
         -------
-        PlotterVDIActor
+        PlotterVDIActor or list
             A ``pyvista.Volume``; ``actor.vdi`` is the current VDI, ``actor.regenerate()`` makes
             another from the current view, and ``actor.status`` says how it is drawn. Changes to
-            ``actor.prop`` or to the volume's data make it anew: off-screen before the next frame,
-            on the screen behind the next frames.
+            ``actor.prop`` or to the array's values make it anew: off-screen before the next frame,
+            on the screen behind the next frames. A ``MultiBlock`` gives a list of actors.
 
         Raises
         ------
@@ -253,6 +262,7 @@ class AddVDI:
         >>> actor = plotter.add_vdi(pyvista_vdi.examples.load_brain(), cmap="bone")
         >>> plotter.show()  # doctest: +SKIP
         """
+        arguments = {k: v for k, v in locals().items() if k in _DEFAULTS and k != "volume"}
         refuse_unknown(aliases, "add_vdi", (*_ALIASES, *_DEFAULTS))
         clim, cmap = aliases.get("rng", clim), aliases.get("colormap", cmap)
         culling = aliases.get("backface_culling", culling)
@@ -260,15 +270,9 @@ class AddVDI:
         if plotter is None:
             raise InvalidArgumentError("the plotter of this add_vdi is gone: make another")
         if mapper is not None:
-            raise UnsupportedError(
-                f"mapper={mapper!r} chooses among VTK's volume mappers; a VDI has its own: "
-                "leave it out, or use add_volume"
-            )
-        if multi_colors:
-            raise UnsupportedError(
-                "multi_colors is for multi-block data sets: add the blocks one by one, each with "
-                "its cmap"
-            )
+            _note_mapper(mapper)
+        if isinstance(volume, vtkMultiBlockDataSet):
+            return add_blocks(self, volume, {**arguments, **aliases})
         if target_fps is not None:
             checked_rate("target_fps", target_fps)
         checked_policy(regenerate)
@@ -416,12 +420,33 @@ class AddVDI:
         """Nothing else is held."""
 
 
+# PyVista hands out an object of the class, or the class, where a user looks for the method
+AddVDI.__doc__ = AddVDI.__call__.__doc__
+_signature = inspect.signature(AddVDI.__call__)
+AddVDI.__signature__ = _signature.replace(  # type: ignore[attr-defined]
+    parameters=[each for each in _signature.parameters.values() if each.name != "self"]
+)
+
 #: ``add_vdi``'s arguments and their defaults.
 _DEFAULTS = {
     name: parameter.default
-    for name, parameter in inspect.signature(AddVDI.__call__).parameters.items()
+    for name, parameter in _signature.parameters.items()
     if name not in ("self", "aliases")
 }
+
+
+@functools.cache  # one note is enough
+def _note_mapper(mapper: str) -> None:
+    if mapper not in _MAPPERS:
+        raise InvalidArgumentError(
+            f"mapper={mapper!r} is none of VTK's volume mappers, {', '.join(_MAPPERS)}; a VDI has "
+            "its own: leave it out"
+        )
+    warnings.warn(
+        f"mapper={mapper!r} chooses among VTK's volume mappers and is ignored: a VDI has its own",
+        VDIWarning,
+        stacklevel=3,
+    )
 
 
 def _changed(given: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:

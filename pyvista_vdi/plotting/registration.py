@@ -20,7 +20,10 @@ from typing import Any
 _PLOTTERS = "pyvista.plotting"
 
 #: What plotters get, and the modules that register it, as the entry points in ``pyproject.toml``.
-COMPONENTS = {"add_vdi": "pyvista_vdi.plotting.component"}
+COMPONENTS = {
+    "add_vdi": "pyvista_vdi.plotting.component",
+    "add_vdi_clip_plane": "pyvista_vdi.plotting.clip_plane",
+}
 
 
 class _Pending:

@@ -105,7 +105,7 @@ ROWS = {
         errors.UnsupportedError,
         "not a uniform.*resample",
     ),
-    "blocks": (pv.MultiBlock([VOLUME]), {}, errors.UnsupportedError, "blocks one by one"),
+    "blocks": (pv.MultiBlock([VOLUME, pv.Sphere()]), {}, errors.UnsupportedError, "no volume"),
     "surface": (pv.Sphere(), {}, errors.UnsupportedError, "a surface has no volume"),
     "a path": ("brain.nrrd", {}, errors.InvalidVolumeError, "pyvista.ImageData; got str"),
     # classification
@@ -186,8 +186,7 @@ ROWS = {
         errors.InvalidArgumentError,
         "radius of ambient occlusion.*got 0",
     ),
-    "mapper": (VOLUME, {"mapper": "gpu"}, errors.UnsupportedError, "mapper='gpu'.*has its own"),
-    "multi_colors": (VOLUME, {"multi_colors": True}, errors.UnsupportedError, "block.* one by one"),
+    "mapper": (VOLUME, {"mapper": "cpu"}, errors.InvalidArgumentError, "mapper='cpu' is none of"),
     # generation
     "no supersegments": (
         VOLUME,

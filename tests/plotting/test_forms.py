@@ -1,0 +1,144 @@
+"""The forms in which volumes are shown without ``add_volume(grid)``, and what help says."""
+
+from __future__ import annotations
+
+import inspect
+import warnings
+
+import numpy as np
+import pytest
+import pyvista as pv
+from plugin_scenes import LOOKS, add_judge, add_ours, assert_as_vtk, soft_ball
+
+from pyvista_vdi.errors import UnsupportedError, VDIWarning
+from pyvista_vdi.plotting import component
+
+pytestmark = pytest.mark.gl
+
+SIZE = (60, 50)
+
+
+@pytest.fixture
+def plotter():
+    plotter = pv.Plotter(window_size=SIZE, off_screen=True)
+    yield plotter
+    plotter.close()
+
+
+def shown(plotter):
+    plotter.show(auto_close=False)
+    plotter.render()
+    return np.asarray(plotter.screenshot(return_img=True)).astype(int)
+
+
+def two_balls():
+    left, right = soft_ball(8), soft_ball(8)
+    right.origin = (2.5, -1, -1)
+    return pv.MultiBlock([left, None, right])
+
+
+@pytest.mark.parametrize("multi_colors", [False, True])
+def test_blocks_are_those_that_are_added_one_by_one(plotter, multi_colors):
+    blocks = two_balls()
+    looks = {**LOOKS, "clim": (0.0, 200.0)}
+    actors = plotter.add_vdi(blocks, multi_colors=multi_colors, name="balls", **looks)
+    assert [type(each).__name__ for each in actors] == ["PlotterVDIActor"] * 2
+    names = [name for name in plotter.renderer.actors if name.startswith("balls")]
+    judge = pv.Plotter(window_size=SIZE, off_screen=True)
+    for block, cmap in zip((blocks[0], blocks[2]), ("Reds", "Greens"), strict=True):
+        judge.add_vdi(block, **{**looks, "cmap": cmap if multi_colors else looks["cmap"]})
+    picture = shown(plotter)
+    assert np.abs(picture - shown(judge)).max() == 0
+    assert (np.abs(picture - 255).max(axis=2) > 60).any()
+    vtks = judge.add_volume(blocks, multi_colors=multi_colors, name="balls")
+    assert len(vtks) == 2
+    assert names == [name for name in judge.renderer.actors if name.startswith("balls")]
+    judge.close()
+
+
+def test_blocks_within_blocks_and_none(plotter):
+    actors = plotter.add_vdi(pv.MultiBlock([two_balls(), soft_ball(8)]), **LOOKS)
+    assert [isinstance(each, list) for each in actors] == [True, False]
+    assert plotter.add_vdi(pv.MultiBlock()) == []
+    before = len(plotter.renderer.actors)
+    with pytest.raises(UnsupportedError, match="a surface has no volume"):
+        plotter.add_vdi(pv.MultiBlock([soft_ball(8), pv.MultiBlock([pv.Sphere()])]))
+    assert len(plotter.renderer.actors) == before, "nothing, or all"
+
+
+def test_names_of_vtk_s_mappers_mean_nothing_and_are_noted_once(plotter):
+    component._note_mapper.cache_clear()
+    with pytest.warns(VDIWarning, match="mapper='gpu' chooses among VTK's.*is ignored"):
+        plotter.add_vdi(soft_ball(8), mapper="gpu", multi_colors=True, name="it", **LOOKS)
+    named = shown(plotter)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plotter.add_vdi(soft_ball(8), mapper="gpu", name="it", **LOOKS)
+        plotter.add_vdi(soft_ball(8), name="it", **LOOKS)
+    np.testing.assert_array_equal(shown(plotter), named)
+
+
+@pytest.mark.parametrize("given", ["volume", "actor"])
+def test_a_plane_widget_clips_as_it_clips_a_volume(given):
+    plane = {"normal": "x", "interaction_event": "always"}
+
+    def scene(plotter, add):
+        if add is add_ours and given == "volume":
+            looks = {**LOOKS, "interpolation": "linear", "sample_distance": 0.02}
+            looks["max_supersegments"] = 64
+            widget = plotter.add_vdi_clip_plane(soft_ball(), **plane, **looks)
+            assert widget.IsA("vtkImplicitPlaneWidget")
+        elif add is add_ours:
+            plotter.add_vdi_clip_plane(add(plotter, soft_ball()), **plane)
+        elif add is add_judge:
+            plotter.add_volume_clip_plane(add(plotter, soft_ball()), **plane)
+        else:
+            add(plotter, soft_ball())
+        plotter.clear_plane_widgets()
+
+    assert_as_vtk(scene)
+
+
+def test_plot_of_a_grid_is_what_a_plotter_shows(plotter):
+    volume = soft_ball(8)
+    picture = volume.vdi.plot(
+        off_screen=True,
+        window_size=SIZE,
+        return_img=True,
+        cpos="xy",
+        zoom=1.3,
+        parallel_projection=True,
+        background="tan",
+        show_axes=False,
+        **LOOKS,
+    )
+    plotter.set_background("tan")
+    plotter.add_vdi(volume, **LOOKS)
+    plotter.camera_position = "xy"
+    plotter.enable_parallel_projection()
+    plotter.camera.zoom(1.3)
+    np.testing.assert_array_equal(picture, shown(plotter))
+    vtks = volume.plot(
+        volume=True,
+        off_screen=True,
+        window_size=SIZE,
+        return_img=True,
+        cpos="xy",
+        zoom=1.3,
+        parallel_projection=True,
+        background="tan",
+        show_axes=False,
+        **LOOKS,
+    )
+    # The ball has 8 voxels along an edge; half-voxel steps of both begin elsewhere
+    assert np.abs(picture.astype(int) - vtks).mean() < 4
+    with pytest.raises(TypeError, match="'opcity': did you mean 'opacity'"):
+        volume.vdi.plot(off_screen=True, opcity=1)
+
+
+def test_help_is_the_method_s(plotter):
+    for found in (plotter.add_vdi, type(plotter).add_vdi):
+        assert inspect.getdoc(found).startswith("Add a volume that turns fluently")
+        assert "max_supersegments : int" in inspect.getdoc(found)
+        assert next(iter(inspect.signature(found).parameters)) == "volume"
+    assert "plane widget" in inspect.getdoc(plotter.add_vdi_clip_plane)
