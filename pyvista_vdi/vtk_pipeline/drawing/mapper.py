@@ -233,13 +233,13 @@ class VDIMapperMethods:
         "InteractiveOffScreen",
         "painter.interaction.off_screen",
         "on",
-        """Treat off-screen windows as if somebody watched them (off by default).
+        """Treat off-screen windows as if somebody watched them, or not.
 
-        For server-side rendering, where the window is off-screen and the person in a browser:
-        previews are drawn, and VDIs are made in the background.
+        By default, ``None``, those are that a browser shows through a remote view of trame, as in
+        notebooks: previews are drawn, and VDIs are made in the background.
         """,
-        "Whether off-screen windows are treated as if somebody watched them.",
-        bool,
+        "Whether off-screen windows are treated as watched; ``None`` where trame tells.",
+        lambda on: None if on is None else bool(on),
         modifies=False,
     )
 

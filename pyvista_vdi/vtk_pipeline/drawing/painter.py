@@ -35,6 +35,7 @@ from pyvista_vdi.vtk_pipeline.drawing.shader import place_image
 from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture, NoDepth
 from pyvista_vdi.vtk_pipeline.drawing.upkeep import Upkeep
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
+from pyvista_vdi.vtk_pipeline.interaction.browser import SceneAtHand
 from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus, Warnings
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import Interaction, WindowClock, reduced
 
@@ -75,6 +76,7 @@ class Painter:
         self._last = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
         self._scene: tuple[Camera, weakref.ref[WindowClock]] | None = None
         self._trouble: BaseException | None = None
+        self._scene_at_hand = SceneAtHand(self._say_not_exported)
 
     # -- what is drawn ---------------------------------------------------------------------------
 
@@ -124,7 +126,16 @@ class Painter:
             self.proxy.SetSpacing(*np.maximum(high - low, np.finfo(np.float32).tiny))
 
     def say_not_exported(self) -> None:
-        """Say once that a scene which is written for another renderer lacks the VDI."""
+        """Say once that a scene which is written for another renderer lacks the VDI.
+
+        Not yet where trame has the scene at hand, and shows the pictures that are drawn here.
+        """
+        renderer = self.renderer()
+        window = None if renderer is None else renderer.GetRenderWindow()
+        if window is None or not self._scene_at_hand.is_all(window):
+            self._say_not_exported()
+
+    def _say_not_exported(self) -> None:
         self._warnings.warn(
             "the scene is being exported without its VDI: export_html, export_vtksz and views that "
             "are rendered in the browser (client-side) get an empty box in its place; use "

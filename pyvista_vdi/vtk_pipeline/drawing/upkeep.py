@@ -17,9 +17,10 @@ from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import View
+from pyvista_vdi.vtk_pipeline.interaction import browser
 from pyvista_vdi.vtk_pipeline.interaction.regeneration import Regeneration
 from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus, Warnings
-from pyvista_vdi.vtk_pipeline.interaction.ticker import Ticker
+from pyvista_vdi.vtk_pipeline.interaction.ticker import LoopTicker, Ticker
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import Interaction, WindowClock
 
 _log = logging.getLogger(__name__)
@@ -47,6 +48,7 @@ class Upkeep:
         self._warnings = warnings
         self._texts = texts
         self._ticker = Ticker(self._tick)
+        self._loop_ticker = LoopTicker(self._tick)
         self._clock: Callable[[], WindowClock | None] = lambda: None  # a weak reference
         self._looked_at = (0, 0)
         self._failed_at: Any = None
@@ -78,7 +80,7 @@ class Upkeep:
 
     def close(self) -> None:
         """End what goes on; the next frame may begin anew."""
-        self._ticker.stop()
+        self._stop_ticking()
         self.regeneration.close()
         self._stand_in = self._refused = None
 
@@ -123,7 +125,13 @@ class Upkeep:
     def tick(self, window: Any) -> None:
         """Have the event loop look at what goes on, if something does and no hand moves."""
         if self.regeneration.busy and not self._interaction.moving(window):
+            if browser.watches(window):
+                self._loop_ticker.start()
             self._ticker.start(window.GetInteractor())
+
+    def _stop_ticking(self) -> None:
+        self._ticker.stop()
+        self._loop_ticker.stop()
 
     def _standing_in(self) -> StandIn | None:
         """Return what is drawn while the VDI shows what is no longer so; None if it need not be."""
@@ -217,7 +225,7 @@ class Upkeep:
             return
         swapped = self.collect()
         if not self.regeneration.busy:
-            self._ticker.stop()
+            self._stop_ticking()
         if swapped or self._texts.are_behind(self.regeneration.progress):
             clock.render()
 

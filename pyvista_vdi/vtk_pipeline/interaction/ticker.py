@@ -1,7 +1,8 @@
-"""A timer of a window's interactor, by which the main thread looks at what goes on behind it."""
+"""Timers by which the thread that draws a window looks at what goes on behind it."""
 
 from __future__ import annotations
 
+import asyncio
 import weakref
 from collections.abc import Callable
 from typing import Any
@@ -100,4 +101,42 @@ class Ticker:
             interactor.GetCommand(self._observers[0]).SetAbortFlag(1)
         tick = self._tick()
         if tick is not None:
+            tick()
+
+
+class LoopTicker:
+    """Does the same from the asyncio loop that a frame is drawn in, for windows without events.
+
+    Parameters
+    ----------
+    tick : bound method
+        Held weakly.
+    """
+
+    def __init__(self, tick: Callable[[], None]) -> None:
+        self._tick = weakref.WeakMethod(tick)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._handle: asyncio.TimerHandle | None = None
+
+    def start(self) -> None:
+        """Tick, if it does not already, in the loop that runs in this thread, if one does."""
+        try:
+            loop = asyncio.get_running_loop()
+        except RuntimeError:
+            return
+        if self._handle is None or loop is not self._loop:
+            self.stop()
+            self._loop, self._handle = loop, loop.call_later(PERIOD / 1000, self._on_timer)
+
+    def stop(self) -> None:
+        """End: nothing is left in the loop."""
+        if self._handle is not None:
+            self._handle.cancel()
+        self._handle = None
+
+    def _on_timer(self) -> None:
+        self._handle = None
+        tick = self._tick()
+        if tick is not None:
+            self.start()
             tick()

@@ -15,6 +15,7 @@ from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLGL2PSHelper
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.quality.frame_rate import FrameRateController
+from pyvista_vdi.vtk_pipeline.interaction import browser
 
 T = TypeVar("T")
 
@@ -41,17 +42,19 @@ class Interaction:
     adjust: bool = True
     update_rate: float = 1.0  # 1/s, as in vtkSmartVolumeMapper
     target: float | None = None  # frames per second; None: the window's desired update rate
-    off_screen: bool = False
+    off_screen: bool | None = None  # whether off-screen is watched; None: where a browser does
 
     def watched(self, window: Any) -> bool:
         """Whether somebody looks at the window while it is drawn."""
-        return self.off_screen or bool(window.GetShowWindow())
+        return bool(window.GetShowWindow()) or self._from_afar(window)
 
     def asynchronous(self, window: Any) -> bool:
         """Whether work may go on behind the frames: somebody watches, and can move."""
-        return self.off_screen or (
-            bool(window.GetShowWindow()) and window.GetInteractor() is not None
-        )
+        here = bool(window.GetShowWindow()) and window.GetInteractor() is not None
+        return here or self._from_afar(window)
+
+    def _from_afar(self, window: Any) -> bool:
+        return browser.watches(window) if self.off_screen is None else self.off_screen
 
     def moving(self, window: Any) -> bool:
         """Whether a hand moves, by VTK's convention."""
@@ -160,6 +163,8 @@ class WindowClock:
     def render(self) -> None:
         """Have the window drawn, as from its event loop."""
         window = self._window.Get()
+        if window is not None and browser.push(window):
+            return
         interactor = None if window is None else window.GetInteractor()
         if interactor is not None:
             interactor.Render()

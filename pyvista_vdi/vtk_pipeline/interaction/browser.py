@@ -1,0 +1,102 @@
+"""Off-screen windows that somebody watches in a browser, through a remote view of trame.
+
+``trame_vtk`` keeps for each of its servers a helper, and in it a publisher of pictures, which
+knows the windows that browsers have asked for. Nothing here imports it: where it has not been
+imported, nobody watches by it. Where a version of it keeps other names, nobody seems to.
+"""
+
+from __future__ import annotations
+
+import sys
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import partial
+from typing import Any
+
+
+def watches(window: Any) -> bool:
+    """Whether a browser shows pictures of a window."""
+    return next(_publishers(window), None) is not None
+
+
+def push(window: Any) -> bool:
+    """Have a window drawn and its picture sent to the browsers that show it; whether any does."""
+    publishers = list(_publishers(window))
+    for publisher, number in publishers:
+        publisher.image_push({"view": number})
+    return bool(publishers)
+
+
+class SceneAtHand:
+    """Knows a scene that browsers have been given, but do not draw as long as the server does.
+
+    Parameters
+    ----------
+    begun : bound method
+        Called when a browser begins to draw the scene; held weakly.
+    """
+
+    def __init__(self, begun: Callable[[], object]) -> None:
+        self._begun = weakref.WeakMethod(begun)  # type: ignore[arg-type]
+        self._views: weakref.WeakSet[Any] = weakref.WeakSet()
+
+    def is_all(self, window: Any) -> bool:
+        """Whether a window's scene, which is being written, is only for such browsers."""
+        views = [view for view in _hybrid_views() if view._view is window]
+        if not views or _exporting() or not all(_drawn_by_server(view) for view in views):
+            return False
+        for view in views:
+            if view not in self._views:
+                self._views.add(view)
+                told = partial(_mode_changed, self._begun, weakref.ref(view))
+                view._app.state.change(*_mode_keys(view))(told)
+        return True
+
+
+def _mode_changed(begun: Any, view: Any, /, **_: Any) -> None:
+    """Be told by trame that a view is drawn by the server, or in the browser."""
+    say, of = begun(), view()
+    if say is not None and of is not None and not _drawn_by_server(of):
+        say()
+
+
+def _helpers() -> list[Any]:
+    module = sys.modules.get("trame_vtk.modules.vtk")
+    return list(getattr(module, "HELPERS_PER_SERVER", {}).values())
+
+
+def _publishers(window: Any) -> Iterator[tuple[Any, str]]:
+    """Give those who send pictures of a window to browsers, and the number they know it by."""
+    for helper in _helpers():
+        with suppress(AttributeError):
+            for protocol in helper._root_protocol.getLinkProtocols():
+                for number in list(getattr(protocol, "tracking_views", ())):
+                    if hasattr(protocol, "image_push") and helper.object(number) is window:
+                        yield protocol, number
+
+
+def _hybrid_views() -> list[Any]:
+    """Return trame's views that are drawn by the server or in the browser, as a person chooses."""
+    return [view for helper in _helpers() for view in getattr(helper, "_hybrid_views", {}).values()]
+
+
+def _mode_keys(view: Any) -> tuple[str, str]:
+    """Return the names of what says where a view is drawn: PyVista's, which counts, and trame's."""
+    return f"{view.ref_key}_use_server_rendering", view.mode_key
+
+
+def _drawn_by_server(view: Any) -> bool:
+    state = view._app.state.to_dict()
+    by_server, mode = (state.get(key) for key in _mode_keys(view))
+    return mode == "remote" if by_server is None else bool(by_server)
+
+
+def _exporting() -> bool:
+    """Whether trame asks for the scene to write it somewhere, and not to have it at hand."""
+    frame = sys._getframe()
+    while frame.f_back is not None:
+        frame = frame.f_back
+        if frame.f_code.co_name == "get_standalone_state":
+            return True
+    return False
