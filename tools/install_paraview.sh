@@ -107,16 +107,8 @@ repair_plugin_loader() {
 }
 
 check_plugin() {
-    local variables
-    variables=$("$folder/bin/pyvista-vdi" paraview --environment)
-    (
-        eval "$variables"
-        "$pvpython" -c '
-from paraview import simple
-import numpy, pyvista_vdi
-assert simple.VDISource and simple.VDIToImage and simple.VDIReader
-print("ParaView sees pyvista-vdi", pyvista_vdi.__version__, "and NumPy", numpy.__version__)'
-    ) || fail "ParaView does not load the plugin: see above"
+    "$folder/bin/pyvista-vdi" paraview --check "$pvpython" ||
+        fail "ParaView can make no VDI with $folder as it is: see above"
 }
 
 say_how() {

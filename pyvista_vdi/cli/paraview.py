@@ -3,19 +3,40 @@
 from __future__ import annotations
 
 import argparse
+import os
 import shlex
+import subprocess
 import sysconfig
 from pathlib import Path
 
-from pyvista_vdi.errors import UnsupportedError
+from pyvista_vdi.errors import MissingDependencyError, NoDeviceError, UnsupportedError
 
 #: The package, and the plugin in it.
 _PACKAGE = Path(__file__).resolve().parents[1]
 PLUGIN = _PACKAGE / "paraview" / "vdi_plugin.py"
 
+#: What ParaView's Python is asked: status 3 says that the plugin is there, and no device.
+_QUESTIONS = """
+import os, sys
+from paraview import simple
+import numpy, pyvista_vdi
+simple.VDISource, simple.VDIToImage, simple.VDIReader
+print("ParaView sees pyvista-vdi", pyvista_vdi.__version__, "and NumPy", numpy.__version__)
+from pyvista_vdi.device import describe_devices, list_devices
+print(describe_devices(), flush=True)
+os._exit(0 if any(device.usable for device in list_devices()) else 3)
+"""
+_NO_DEVICE = 3
+
 
 def paraview(options: argparse.Namespace) -> int:
-    """Print the plugin's path, or the variables that make ParaView find it and this package."""
+    """Print the plugin's path, or the variables that make ParaView find it and this package.
+
+    With ``--check``, start ParaView's Python with these and see whether it can make a VDI.
+    """
+    if options.check:
+        _check(options.check)
+        return 0
     if not options.environment:
         print(PLUGIN)
         return 0
@@ -23,6 +44,35 @@ def paraview(options: argparse.Namespace) -> int:
         value = shlex.quote(":".join(map(str, folders)))
         print(f'export {variable}={value}"${{{variable}:+:${variable}}}"')
     return 0
+
+
+def _check(pvpython: str) -> None:
+    """Print what ParaView's Python finds: this package, the plugin, the devices.
+
+    Raises
+    ------
+    MissingDependencyError
+        If there is no such ``pvpython``, or it does not load the plugin.
+    NoDeviceError
+        If it finds no device that can be used.
+    """
+    environment = dict(os.environ)
+    for variable, folders in _variables().items():
+        before = [environment[variable]] if environment.get(variable) else []
+        environment[variable] = ":".join([*map(str, folders), *before])
+    try:
+        done = subprocess.run([pvpython, "-c", _QUESTIONS], env=environment, check=False)
+    except OSError as error:
+        raise MissingDependencyError(
+            f"{pvpython} does not start ({error}): install ParaView, or name its pvpython"
+        ) from error
+    if done.returncode == _NO_DEVICE:
+        raise NoDeviceError(f"{pvpython} loads the plugin, and finds no OpenCL device: see above")
+    if done.returncode:
+        raise MissingDependencyError(
+            f"{pvpython} does not load the plugin (status {done.returncode}): see above, and "
+            "docs/guide_paraview.md"
+        )
 
 
 def _variables() -> dict[str, list[Path]]:

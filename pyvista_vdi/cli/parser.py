@@ -175,6 +175,12 @@ def _add_paraview(parser: argparse.ArgumentParser) -> None:
         "print, for a shell's eval, the variables that make ParaView find this package and "
         "load the plugin",
     )
+    check = (
+        "start ParaView's Python, see that it loads the plugin, and list the devices that it "
+        "finds; PVPYTHON: where that is, if not on the PATH"
+    )
+    declare.option(parser, "--check", check, "PVPYTHON", nargs="?", const="pvpython")
+
 
 
 def _add_render(parser: argparse.ArgumentParser) -> None:

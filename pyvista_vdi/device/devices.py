@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
-from pyvista_vdi.device.icd import Discovery, drivers_visible
+from pyvista_vdi.device.icd import Discovery, drivers_visible, own_loader_bound
 from pyvista_vdi.errors import DeviceError, MissingDependencyError, NoDeviceError
 
 DEVICE_VARIABLE = "PYVISTA_VDI_DEVICE"
@@ -280,7 +280,8 @@ def opencl() -> ModuleType:
 
 def _import_pyopencl() -> ModuleType:
     try:
-        return importlib.import_module("pyopencl")
+        with own_loader_bound():
+            return importlib.import_module("pyopencl")
     except ImportError as exc:
         raise MissingDependencyError(
             f"pyopencl cannot be imported ({exc}); install it with  pip install --upgrade pyopencl"

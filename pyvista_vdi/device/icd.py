@@ -6,11 +6,16 @@ Linux wheels bring reads the folder named by ``OCL_ICD_VENDORS`` in place of
 ``/etc/OpenCL/vendors``, once, when the platforms are first listed. :func:`drivers_visible` names a
 temporary folder there that holds copies of the system's vendor files and one for Intel's library,
 and puts the environment back afterwards.
+
+A program that Python runs in may be linked to a loader itself, and may have asked it already: what
+ParaView loads is, and hwloc asks it when MPI starts. pyopencl's calls would then go to that one,
+which knows nothing of pip's driver any more. :func:`own_loader_bound` binds them to pyopencl's.
 """
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import importlib.metadata
 import importlib.util
 import os
@@ -163,3 +168,23 @@ def drivers_visible() -> Iterator[Discovery]:
             yield discovery
         finally:
             os.environ.pop("OCL_ICD_VENDORS", None)
+
+
+@contextlib.contextmanager
+def own_loader_bound() -> Iterator[None]:
+    """While inside, pyopencl is imported with its own loader, whatever loader the process has.
+
+    By default a library's symbols are looked for in the program and what that is linked to first,
+    and only then in what the library itself brings. Nothing is done where the program has no
+    OpenCL loader, nor where the C library knows no other order.
+    """
+    flags = getattr(os, "RTLD_DEEPBIND", 0)  # of glibc
+    if not flags or not hasattr(ctypes.CDLL(None), "clGetPlatformIDs"):
+        yield
+        return
+    before = sys.getdlopenflags()
+    sys.setdlopenflags(before | flags)
+    try:
+        yield
+    finally:
+        sys.setdlopenflags(before)

@@ -647,6 +647,34 @@ def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
     assert shown.stdout.splitlines() == [f"{site}:/before", f"{site}/pyvista_vdi/paraview"]
 
 
+@pytest.mark.parametrize(
+    ("does", "said"),
+    [
+        ('echo "$PYTHONPATH:$PV_PLUGIN_PATH"', None),
+        ("exit 3", "loads the plugin, and finds no OpenCL device"),
+        ("exit 1", "does not load the plugin (status 1)"),
+    ],
+)
+def test_paraview_is_asked_whether_it_finds_a_device(
+    plain_installation, tmp_path, capfd, monkeypatch, does, said
+):
+    monkeypatch.setenv("PYTHONPATH", "/before")
+    monkeypatch.delenv("PV_PLUGIN_PATH", raising=False)
+    pvpython = tmp_path / "pvpython"
+    pvpython.write_text(f"#!/bin/sh\n{does}\n")
+    pvpython.chmod(0o755)
+    if said is None:
+        site = plain_installation.parent
+        expected = f"{site}:/before:{site}/pyvista_vdi/paraview\n"
+        assert run(capfd, "paraview", "--check", pvpython) == (0, expected, "")
+    else:
+        assert said in complaint(capfd, "paraview", "--check", pvpython)
+
+
+def test_paraview_that_is_not_there(plain_installation, capsys):
+    assert "does not start" in complaint(capsys, "paraview", "--check", "/no/pvpython")
+
+
 def test_paraview_is_not_shown_a_second_vtk(plain_installation, capsys):
     (plain_installation.parent / "vtkmodules").mkdir()
     message = complaint(capsys, "paraview", "--environment")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import sys
 import threading
@@ -276,6 +277,30 @@ def test_search_path_is_left_alone(vendors, monkeypatch, case, note):
         assert dict(os.environ) == before
     assert discovery.added is None
     assert note in discovery.note
+
+
+def test_programs_with_a_loader_of_their_own_see_every_driver(tmp_path):
+    """As in ParaView, whose libraries have asked their loader before Python runs.
+
+    The program's loader is a copy of pyopencl's under another name, and knows no driver.
+    """
+    spec = importlib.util.find_spec("pyopencl")
+    loaders = sorted((Path(spec.origin).parent / ".libs").glob("libOpenCL*"))
+    if not hasattr(os, "RTLD_DEEPBIND") or not loaders:
+        pytest.skip("this pyopencl brings no loader, or the C library binds in one order only")
+    own = loaders[0].name.encode()
+    copied = tmp_path / "libOpenCL.so"
+    copied.write_bytes(loaders[0].read_bytes().replace(own, own[::-1]))
+    listed = "import pyvista_vdi\nprint([d.full_name for d in pyvista_vdi.list_devices()])\n"
+    asked_before = (
+        "import ctypes, os\n"
+        f"os.environ['OCL_ICD_VENDORS'] = {str(tmp_path)!r}\n"
+        f"ctypes.CDLL({str(copied)!r}, ctypes.RTLD_GLOBAL).clGetPlatformIDs(0, None, None)\n"
+        "del os.environ['OCL_ICD_VENDORS']\n"
+    )
+    alone, beside = run_python(listed), run_python(asked_before + listed)
+    assert alone.returncode == beside.returncode == 0, alone.stderr + beside.stderr
+    assert beside.stdout == alone.stdout
 
 
 def test_once_listed_devices_come_without_a_lock():

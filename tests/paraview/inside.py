@@ -84,6 +84,12 @@ def save_pixels(picture, path):
     np.save(path, vtk_to_numpy(array))
 
 
+def devices(folder):
+    """Say which devices ParaView's Python finds."""
+    found = [[info.platform, info.usable] for info in pyvista_vdi.list_devices()]
+    (folder / "devices.json").write_text(json.dumps(found))
+
+
 def pipeline(folder):
     """Read, generate, write, read, picture, screenshot, states."""
     scene = {

@@ -22,6 +22,7 @@ from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumePrope
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import examples
+from pyvista_vdi.device.icd import INTEL_LIBRARY
 from pyvista_vdi.model.metrics import compare_images, over_background
 from pyvista_vdi.model.standard_cases import filling_camera
 
@@ -121,6 +122,15 @@ def volume_property(scene):
     prop.SetScalarOpacityUnitDistance(scene["unit distance"])
     prop.SetInterpolationTypeToLinear()
     return prop
+
+
+def test_pips_driver_is_found(paraview, tmp_path):
+    """ParaView has loaded the system's OpenCL loader, and hwloc has asked it, before Python runs."""
+    site = Path(os.environ[FOLDER_VARIABLE])
+    if not (site / "lib" / INTEL_LIBRARY).is_file():
+        pytest.skip(f"{site} was made without the extra cpu")
+    paraview("devices", tmp_path)
+    assert ["Intel(R) OpenCL", True] in json.loads((tmp_path / "devices.json").read_text())
 
 
 def test_vdi_is_what_generate_makes(made, default_runtime):
