@@ -3,8 +3,8 @@
 The truth of a rung is made whole: its VDI is generated, rendered at the promised angle and compared
 with our volume raycaster's picture. What the dial predicts for it comes from its short measurement.
 What is calibrated is fitted to all volumes but one and tested on that one, for each in turn; the
-tables show these predictions. Writes ``dial_WxH.json`` and ``.md``; a run that is stopped goes on
-where it was.
+tables show these predictions. Edges along lists are those of pictures from V_O. Writes
+``dial_WxH.json`` and ``.md``; a run that is stopped goes on where it was.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.report import table, write_text
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.metrics import compare_images, list_edges, list_places
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -50,8 +50,11 @@ from pyvista_vdi.quality.dial import (
     QUALITIES,
     ROUGH,
     TARGET_ANGLE,
+    Dial,
     Measurement,
     Prediction,
+    Setting,
+    chosen,
     predictions,
 )
 from pyvista_vdi.quality.probe import Scene, turned
@@ -75,9 +78,9 @@ def main() -> int:
     width, height = options.size
     target = options.out / f"dial_{width}x{height}.json"
     cases: dict[str, Case] = json.loads(target.read_text()) if target.exists() else {}
-    for name, look in tqdm(chosen(options), unit="case"):
+    for name, look in tqdm(cases_of(options), unit="case"):
         entry = cases.setdefault(f"{name}/{look}", {})
-        parts = ("frames",) if options.frames else ("truth", "measured")
+        parts = ("frames",) if options.frames else ("truth", "measured", "edges")
         if all(part in entry for part in parts) and not options.redo:
             continue
         volume = examples.load_data(name, as_volume=True)
@@ -85,10 +88,12 @@ def main() -> int:
         camera = filling_camera(volume.bounds, options.size)
         if options.frames:
             entry["frames"] = frames(volume, table, camera, options)
-        else:
+        elif "measured" not in entry or "edges" not in entry or options.redo:
             entry["measured"] = measured(volume, table, camera, options)
         if not options.frames and "truth" not in entry:
             entry["truth"] = list(truth(volume, table, camera, options))
+        if not options.frames and "edges" not in entry:
+            entry["edges"] = edges(volume, table, camera, options)
         save(cases, target)
     complete = {k: case for k, case in cases.items() if "measured" in case and "truth" in case}
     write_text(target.with_suffix(".md"), "\n".join([*tables(complete, options.size), ""]))
@@ -112,7 +117,7 @@ def parsed() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def chosen(options: argparse.Namespace) -> list[tuple[str, str]]:
+def cases_of(options: argparse.Namespace) -> list[tuple[str, str]]:
     """Return volumes and transfer functions that are at hand; name the volumes that are not."""
     return [
         (name, look)
@@ -142,6 +147,7 @@ def measured(
         "sparse": found.sparse,
         "dense": found.dense,
         "least": found.least,
+        "list_edges": [[lists, ratio] for lists, ratio in found.list_edges.items()],
         "counts": found.counts.tolist(),
         "measuring_over_generating": measuring / generating,
     }
@@ -172,6 +178,32 @@ def truth(
             "supersegments": vdi.n_supersegments,
             "bytes": prepared_vdi(runtime, vdi).list_bytes,
         }
+
+
+def edges(
+    volume: Volume, table: TransferFunction, camera: Camera, options: argparse.Namespace
+) -> list[float]:
+    """Return the edges along lists that each rung shows from V_O."""
+    runtime = get_runtime(options.device)
+    picture = render_volume(volume, camera, options.size, transfer_function=table, device=runtime)
+    found = []
+    for setting in LADDER:
+        if setting.lists >= 1:
+            found.append(0.0)
+            continue
+        vdi = generate_vdi(
+            volume,
+            camera,
+            setting.window_size(options.size),
+            table,
+            max_supersegments=setting.max_supersegments,
+            precision=setting.precision,
+            device=runtime,
+        )
+        seen = render(vdi, camera, options.size, device=runtime)
+        places = list_places(camera, options.size, vdi.window_size)
+        found.append(list_edges(seen, picture, *places).ratio)
+    return found
 
 
 def frames(
@@ -256,8 +288,29 @@ def tables(cases: dict[str, Case], size: tuple[int, int]) -> list[str]:
         "**What a quality gives**: the true SSIM of the rung that is chosen",
         "",
         *table(
-            ("quality", "asked", "cases", "true: mean", "least", "short of it by most", "reached"),
-            [_of_quality(name, goal, rows) for name, goal in QUALITIES.items() if goal is not None],
+            (
+                "quality",
+                "asked",
+                "cases",
+                "true: mean",
+                "least",
+                "short of it by most",
+                "reached",
+                "edges along lists, at most",
+            ),
+            [
+                _of_quality(name, goal, rows, size)
+                for name, goal in QUALITIES.items()
+                if goal is not None
+            ],
+        ),
+        "",
+        "**Edges along lists** at V_O, of rungs of fewer than a list per pixel; error: predicted",
+        "over true",
+        "",
+        *table(
+            ("lists per pixel, N_S", "median", "least", "most", "error: median", "5 %", "95 %"),
+            [_of_edges(s, rows) for s in LADDER if s.lists < 1],
         ),
         "",
         "**Bytes and frames**, predicted over true. A frame's time is over one of the rough VDI,",
@@ -290,14 +343,19 @@ def predicted(cases: dict[str, Case], size: tuple[int, int]) -> list[Case]:
                 continue
             ladder = _ladder(case, size, **calibrated)
             reaching = {
-                _first(ladder, goal): name for name, goal in QUALITIES.items() if goal is not None
+                ladder.index(chosen(Dial.of(name), ladder, size).prediction): name
+                for name, goal in QUALITIES.items()
+                if goal is not None
             }
-            for i, (rung, true) in enumerate(zip(ladder, case["truth"], strict=True)):
+            true_edges = case.get("edges", [0.0] * len(ladder))
+            of_rungs = zip(ladder, case["truth"], true_edges, strict=True)
+            for i, (rung, true, edges_seen) in enumerate(of_rungs):
                 rows.append(
                     {
                         "case": key,
                         "setting": rung.setting,
-                        "ladder": [r.ssim for r in ladder],
+                        "ladder": ladder,
+                        "edges": edges_seen,
                         "true": true["ssim"],
                         "error": rung.ssim - true["ssim"],
                         "bytes": rung.nbytes / true["bytes"],
@@ -337,7 +395,10 @@ def fitted(
 def _ladder(case: Case, size: tuple[int, int], **calibrated: Any) -> tuple[Prediction, ...]:
     found = case["measured"]
     losses = (found[name] for name in ("rough", "sparse", "dense"))
-    measurement = Measurement(*losses, np.array(found["counts"]), 1.0, found["least"])
+    edges_by_lists = dict(found.get("list_edges", ()))
+    measurement = Measurement(
+        *losses, np.array(found["counts"]), 1.0, found["least"], edges_by_lists
+    )
     return predictions(measurement, size, **calibrated)
 
 
@@ -350,17 +411,14 @@ def _timed(cases: dict[str, Case], size: tuple[int, int]) -> list[float]:
     ]
 
 
-def _first(ladder: tuple[Prediction, ...], goal: float) -> int:
-    reaching = [i for i, rung in enumerate(ladder) if rung.ssim >= goal]
-    return reaching[0] if reaching else len(ladder) - 1
-
-
-def _of_quality(name: str, goal: float, rows: list[Case]) -> tuple[Any, ...]:
-    true = []
+def _of_quality(name: str, goal: float, rows: list[Case], size: tuple[int, int]) -> tuple[Any, ...]:
+    true, seen = [], []
     for case in sorted({row["case"] for row in rows}):
         of_case = [row for row in rows if row["case"] == case]
-        reaching = [i for i, ssim in enumerate(of_case[0]["ladder"]) if ssim >= goal]
-        true.append(of_case[reaching[0] if reaching else -1]["true"])
+        ladder = of_case[0]["ladder"]
+        row = of_case[ladder.index(chosen(Dial.of(name), ladder, size).prediction)]
+        true.append(row["true"])
+        seen.append(row["edges"])
     reached = sum(ssim >= goal for ssim in true)
     return (
         name,
@@ -370,6 +428,22 @@ def _of_quality(name: str, goal: float, rows: list[Case]) -> tuple[Any, ...]:
         f"{min(true):.4f}",
         f"{max(0.0, goal - min(true)):.4f}",
         f"{reached / len(true):.0%}",
+        f"{max(seen):.2f}",
+    )
+
+
+def _of_edges(setting: Setting, rows: list[Case]) -> tuple[Any, ...]:
+    of_setting = [
+        (row["edges"], rung.list_edges)
+        for row in rows
+        for rung in row["ladder"]
+        if row["setting"] == rung.setting == setting and row["edges"] > 0
+    ]
+    true = [seen for seen, _ in of_setting] or [math.nan]
+    return (
+        f"{setting.lists:.3g}, {setting.max_supersegments}",
+        *(f"{n:.2f}" for n in (statistics.median(true), min(true), max(true))),
+        *_spread([said / seen for seen, said in of_setting]),
     )
 
 

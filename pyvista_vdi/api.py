@@ -231,8 +231,8 @@ def render(
     camera : pyvista.Camera or vtkCamera or Camera
         The new view V_N. Its model transform places the VDI's model frame in the world.
     window_size : (int, int), optional
-        Width and height of the image in pixels; the VDI's own by default. Of several VDIs, it can
-        be left out where all have the same.
+        Width and height of the image in pixels; by default those the VDI was made for,
+        :attr:`VDI.picture_size`. Of several VDIs, it can be left out where all have the same.
     opaque_depth : array_like of float32, shape (H, W), optional
         Depth at which each ray ends: distance from the eye along the view direction, world
         units, top row first; infinity where nothing is opaque.
@@ -388,7 +388,7 @@ def pick(
         x and y in pixels, VTK's display coordinates: whole numbers are pixels' centres and y = 0
         is the bottom row, so that pixel (x, y) is ``image[height - 1 - y, x]`` of a picture.
     window_size : (int, int), optional
-        Width and height of the view in pixels; the VDI's own by default.
+        Width and height of the view in pixels; :attr:`VDI.picture_size` by default.
     opacity_threshold : float
         Opacity that the hit has to reach, at least 0 and less than 1; the default is that of
         VTK's pickers for volumes. With 0, whatever absorbs light at all is hit.
@@ -620,8 +620,8 @@ def _frame(
     opaque_depth: ArrayLike | None,
     device: Any = None,
 ) -> FrameRequest:
-    """Return the request of a frame, by default of a VDI's own size."""
-    size: Any = window_size if vdi is None or window_size is not None else vdi.window_size
+    """Return the request of a frame, by default of the size that a VDI was made for."""
+    size: Any = window_size if vdi is None or window_size is not None else vdi.picture_size
     return FrameRequest(camera, size, options, opaque_depth, device)
 
 

@@ -33,7 +33,7 @@ def render(options: argparse.Namespace) -> int:
     image = render_vdi(
         vdis if several else first,
         view,
-        options.size or first.window_size,
+        options.size or first.picture_size,
         model_transforms=transforms if several else None,
         transmittance_cutoff=options.transmittance_cutoff,
         device=options.device,
@@ -53,7 +53,7 @@ def view(options: argparse.Namespace) -> int:
         _show(volume, filling_camera(volume.bounds, size), size, looks, options, screenshot)
     else:
         vdi = read(options.file)
-        size = options.size or vdi.window_size
+        size = options.size or vdi.picture_size
         _show(vdi, vdi.camera, size, classification(options), options, screenshot)
     if screenshot is not None:
         print(f"{printable(options.screenshot)}: written")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.errors import InvalidVDIError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.packing import Packing, check_precision, packing_of
 from pyvista_vdi.model.providers import provider
@@ -117,6 +117,18 @@ class VDI:
         arrays = (self.offsets, self.front, self.back, self.color, self.optical_depth)
         packed = 0 if self.packing is None else self.packing.nbytes
         return sum(array.nbytes for array in arrays) + packed
+
+    @property
+    def picture_size(self) -> tuple[int, int]:
+        """Width and height of the pictures that it was made for, pixels.
+
+        The window that was asked for where a dial has chosen the lists, else :attr:`window_size`.
+        """
+        dial = self.metadata.get("dial")
+        try:
+            return check_window_size(dial["window_size"])  # type: ignore[index]
+        except (TypeError, KeyError, InvalidArgumentError):  # no dial's, or what somebody has put
+            return self.window_size
 
     @property
     def precision(self) -> str:

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +31,11 @@ QUALITIES: dict[str, float | None] = {
     "balanced": 0.96,
     "fast": 0.93,
 }
+
+#: Edges along lists, see :func:`~pyvista_vdi.model.metrics.list_edges`, that a picture from V_O may
+#: have at most, and the goals for which that is held: below, squares are the price of speed.
+MAX_LIST_EDGES = 1.25
+SSIM_WITHOUT_SQUARES = 0.96
 
 #: Degrees from V_O at which a target is to be reached unless another angle is asked for.
 TARGET_ANGLE = 30.0
@@ -133,6 +138,12 @@ class Dial:
     max_bytes: int | None = None
     angle: float = TARGET_ANGLE
 
+    @property
+    def list_edges(self) -> float:
+        """Goal: edges along lists in the picture from V_O, at most."""
+        held = self.ssim is not None and self.ssim >= SSIM_WITHOUT_SQUARES
+        return MAX_LIST_EDGES if held else math.inf
+
     @classmethod
     def of(
         cls,
@@ -230,6 +241,8 @@ class Prediction:
         Bytes of the VDI on the device.
     fps : float
         Full frames of that window per second.
+    list_edges : float
+        Edges along lists of the picture from V_O; 0 with a list per pixel or more.
     """
 
     setting: Setting
@@ -237,6 +250,7 @@ class Prediction:
     ssim: float
     nbytes: int
     fps: float
+    list_edges: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -276,6 +290,7 @@ class Choice:
                 "ssim": round(chosen.ssim, 4),
                 "bytes": chosen.nbytes,
                 "fps": float(f"{chosen.fps:.3g}"),
+                "list_edges": float(f"{chosen.list_edges:.3g}"),
             },
             "missed": list(self.missed),
         }
@@ -339,12 +354,16 @@ def chosen(
         within = max(1, fast)
     if dial.ssim is None:
         return Choice(dial, ladder[within - 1], tuple(missed), window_size)
-    reaching = [i for i, rung in enumerate(ladder) if rung.ssim >= dial.ssim]
+    reaching = [
+        i
+        for i, rung in enumerate(ladder)
+        if rung.ssim >= dial.ssim and rung.list_edges <= dial.list_edges
+    ]
     wanted = reaching[0] if reaching else len(ladder) - 1
     rung = ladder[min(wanted, within - 1)]
+    name = f"quality={dial.quality!r}" if dial.quality else "target_ssim"
+    limits = [f"{n}={v}" for n, v in dial.to_dict().items() if n in ("max_bytes", "target_fps")]
     if rung.ssim < dial.ssim:
-        name = f"quality={dial.quality!r}" if dial.quality else "target_ssim"
-        limits = [f"{n}={v}" for n, v in dial.to_dict().items() if n in ("max_bytes", "target_fps")]
         held = within <= wanted
         missed.append(
             f"{name} asks for an SSIM of {dial.ssim:g} at {dial.angle:g} degrees; "
@@ -352,6 +371,14 @@ def chosen(
             + (f"what is within {' and '.join(limits)}" if held else "the best settings")
             + ("; allow more, or ask for less" if held else "; ask for less, or a smaller angle")
             + (_UNAVOIDABLE.format(least) if least > (1 - rung.ssim) / 2 else "")
+        )
+    elif rung.list_edges > dial.list_edges:
+        lists = " x ".join(str(n) for n in rung.window_size)
+        missed.append(
+            f"{name} asks for pictures without squares: {lists} lists, which are what is within "
+            f"{' and '.join(limits)}, are predicted to show edges of {rung.list_edges:.2g} times "
+            f"the steps between them, above {dial.list_edges:g}; allow more, or ask for a smaller "
+            "window"
         )
     return Choice(dial, rung, tuple(missed), window_size)
 
@@ -375,6 +402,8 @@ class Measurement:
         int64: lists of the rough VDI by their length.
     frame_seconds : float
         Of a full frame of the rough VDI.
+    list_edges : mapping
+        Edges along lists of the picture from V_O, by lists per pixel below 1.
     """
 
     rough: float
@@ -383,6 +412,7 @@ class Measurement:
     counts: NDArray[np.int64]
     frame_seconds: float
     least: float = 0.0
+    list_edges: Mapping[float, float] = field(default_factory=dict)
 
 
 def predictions(
@@ -420,6 +450,7 @@ def predictions(
                 1.0 - min(1.0, loss),
                 _bytes(measured.counts, setting, window_size),
                 1.0 / (measured.frame_seconds * cost),
+                measured.list_edges.get(setting.lists, 0.0),
             )
         )
     return tuple(out)

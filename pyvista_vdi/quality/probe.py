@@ -20,7 +20,7 @@ from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.metrics import SSIM_WINDOW
+from pyvista_vdi.model.metrics import SSIM_WINDOW, ListEdges, list_edges, list_places
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -28,6 +28,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import (
     DENSE,
+    LADDER,
     ROUGH,
     SPARSE,
     Choice,
@@ -38,7 +39,7 @@ from pyvista_vdi.quality.dial import (
     predictions,
     refuse_settings,
 )
-from pyvista_vdi.quality.tiles import TileSample, tiles_ssim, window_pixels
+from pyvista_vdi.quality.tiles import REACH, TileSample, tiles_ssim, window_pixels
 from pyvista_vdi.quality.view_error import ViewErrorEstimator, world_centre
 from pyvista_vdi.raycasting.raycast import render_vdi
 
@@ -228,9 +229,10 @@ class Scene:
         counts = np.bincount(rough.counts.reshape(-1), minlength=2)
         tiles = estimator.sample(rough, self.view, self.window_size)
         seconds = self._frame_seconds(rough)
+        edges = self._list_edges(estimator, rough)
         if tiles is None:
-            return Measurement(0.0, 0.0, 0.0, counts, seconds)
-        truth = [estimator.volume_tile(lens, tiles.size) for lens in self._lenses(tiles)]
+            return Measurement(0.0, 0.0, 0.0, counts, seconds, list_edges=edges)
+        truth = self._volume_tiles(estimator, self.view, tiles)
         losses = []
         for setting in (ROUGH, SPARSE, DENSE):
             self._go_on()
@@ -238,7 +240,52 @@ class Scene:
             losses.append(_loss(tiles, pictures, truth))
         losses.append(self._least(estimator, tiles, truth))
         at_rough, sparse, dense, least = (min(1.0, max(0.0, loss)) for loss in losses)
-        return Measurement(at_rough, sparse, dense, counts, seconds, least)
+        return Measurement(at_rough, sparse, dense, counts, seconds, least, edges)
+
+    def _list_edges(self, estimator: ViewErrorEstimator, rough: VDI) -> dict[float, float]:
+        """Return the edges along lists of pictures from V_O, by lists per pixel below 1.
+
+        A list shows what its centre ray meets, exactly, wherever it is cut: at V_O the volume's
+        picture of as many pixels as there are lists is what they show.
+        """
+        tiles = estimator.sample(rough, self.camera, self.window_size)
+        if tiles is None:
+            return {}
+        pictures = self._volume_tiles(estimator, self.camera, tiles)
+        found = {}
+        for setting in LADDER:
+            if setting.lists >= 1 or setting.lists in found:
+                continue
+            self._go_on()
+            steps = [
+                self._steps(estimator, corner, picture, setting)
+                for corner, picture in zip(tiles.corners.tolist(), pictures, strict=True)
+            ]
+            across, within = np.average(steps, axis=0, weights=1 / tiles.chances).tolist()
+            found[setting.lists] = ListEdges(across, within).ratio
+        return found
+
+    def _steps(
+        self,
+        estimator: ViewErrorEstimator,
+        corner: Sequence[int],
+        picture: NDArray[np.float32],
+        setting: Setting,
+    ) -> tuple[float, float]:
+        """Return the mean steps across and within lists of a tile at V_O, its margin left out."""
+        window = setting.window_size(self.window_size)
+        inner = tuple(slice(REACH, edge - REACH) for edge in picture.shape[:2])
+        places = list_places(self.camera, self.window_size, window)
+        columns, rows = (
+            np.floor(place[first:][part]).astype(int)
+            for place, first, part in zip(places, corner, inner[::-1], strict=True)
+        )
+        first = (int(columns[0]), int(rows[0]))
+        size = (int(columns[-1]) - first[0] + 1, int(rows[-1]) - first[1] + 1)
+        lists = estimator.volume_tile(self.camera.tile(window, first, size), size)
+        squares = lists[np.ix_(rows - first[1], columns - first[0])]
+        edges = list_edges(squares, picture[inner], columns, rows)
+        return edges.across, edges.within
 
     def _least(
         self, estimator: ViewErrorEstimator, tiles: TileSample, truth: list[NDArray[np.float32]]
@@ -253,7 +300,7 @@ class Scene:
         shown = RenderOptions(clipping_planes=None if covered else sides)
         pictures = [
             estimator.volume_tile(lens, tiles.size, shown, lit_from=self.camera)
-            for lens in self._lenses(tiles)
+            for lens in self._lenses(self.view, tiles)
         ]
         return _loss(tiles, pictures, truth)
 
@@ -261,10 +308,15 @@ class Scene:
         if self.progress is not None and self.progress(0.0) is False:
             raise Cancelled("choosing the settings of a VDI was cancelled")
 
-    def _lenses(self, tiles: TileSample) -> list[Camera]:
-        """Return the view that each tile has."""
+    def _lenses(self, view: Camera, tiles: TileSample) -> list[Camera]:
+        """Return the view that each tile of a view has."""
         corners = tiles.corners.tolist()
-        return [self.view.tile(self.window_size, corner, tiles.size) for corner in corners]
+        return [view.tile(self.window_size, corner, tiles.size) for corner in corners]
+
+    def _volume_tiles(
+        self, estimator: ViewErrorEstimator, view: Camera, tiles: TileSample
+    ) -> list[NDArray[np.float32]]:
+        return [estimator.volume_tile(lens, tiles.size) for lens in self._lenses(view, tiles)]
 
     def _whole(self, setting: Setting) -> VDI:
         return self._generated(self.camera, setting.window_size(self.window_size), setting)
@@ -284,7 +336,7 @@ class Scene:
     ) -> list[NDArray[np.float32]]:
         """Return the tiles' pictures, by the whole VDI if there is one, or else as is cheaper."""
         window = setting.window_size(self.window_size)
-        lenses = self._lenses(tiles)
+        lenses = self._lenses(self.view, tiles)
         if whole is not None:
             return [render_vdi(whole, self._frame(lens, tiles.size)) for lens in lenses]
         met = [

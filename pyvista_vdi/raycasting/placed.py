@@ -115,8 +115,8 @@ def _digest(vdi: VDI) -> bytes:
 
 
 def common_window_size(placed: Sequence[PlacedVDI]) -> tuple[int, int]:
-    """Return the window size of VDIs, all of which must have the same."""
-    sizes = {one.vdi.window_size for one in placed}
+    """Return the size of the pictures of VDIs, all of which must have the same."""
+    sizes = {one.vdi.picture_size for one in placed}
     if len(sizes) > 1:
         raise InvalidArgumentError(
             f"the VDIs have different window sizes, {sorted(sizes)}: say which the image is to "

@@ -388,6 +388,11 @@ def test_generate_by_a_dial(folder, capsys, default_runtime, tmp_path):
     dial = vdi.metadata["dial"]
     assert dial["asked"] == {"quality": "fast", "max_bytes": 10**9}
     assert (dial["angle"], dial["window_size"], vdi.precision) == (20, [60, 40], "8-byte")
+    # Pictures have the window that was asked for, not that of the lists
+    assert vdi.window_size != (60, 40)
+    picture = tmp_path / "a.png"
+    status, out, _ = run(capsys, "render", target, "-o", picture)
+    assert (status, out) == (0, f"{picture}: 60 x 40\n")
     # The precision alone is no dial
     status, out, _ = run(capsys, *arguments, "--precision", "16-byte")
     assert (status, io.read(target).precision) == (0, "16-byte")

@@ -9,6 +9,7 @@ import json
 import math
 import re
 import warnings
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,13 +21,14 @@ from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, VDIWarning
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.metrics import compare_images, list_edges, list_places
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 from pyvista_vdi.quality import probe as dial_measurement
 from pyvista_vdi.quality.dial import (
     DENSE,
     LADDER,
+    MAX_LIST_EDGES,
     QUALITIES,
     TARGET_ANGLE,
     Dial,
@@ -121,6 +123,35 @@ def test_the_cheapest_rung_that_reaches_the_goal_within_the_limits(asked, rung):
     choice = chosen(Dial.of(**asked), RUNGS, WINDOW)
     assert choice.prediction is RUNGS[rung]
     assert choice.missed == ()
+
+
+@pytest.mark.parametrize(
+    ("asked", "rung"),
+    [
+        ({"quality": "high"}, 2),  # which the first would reach by SSIM
+        ({"quality": "balanced"}, 2),
+        ({"target_ssim": 0.96}, 2),
+        ({"quality": "fast"}, 0),
+        ({"target_ssim": math.nextafter(0.96, 0)}, 0),
+        ({"max_bytes": 250}, 1),
+    ],
+)
+def test_goals_hold_squares_below_their_bound(asked, rung):
+    edges = (3.0, math.nextafter(MAX_LIST_EDGES, 2), MAX_LIST_EDGES, 0.0)
+    rungs = [
+        replace(one, ssim=0.99, list_edges=edge) for one, edge in zip(RUNGS, edges, strict=True)
+    ]
+    choice = chosen(Dial.of(**asked), rungs, WINDOW)
+    assert choice.prediction is rungs[rung]
+    assert choice.missed == ()
+    # A limit goes before it, and the squares are told
+    if rung == 2:
+        choice = chosen(Dial.of(**asked, max_bytes=120), rungs, WINDOW)
+        assert choice.prediction is rungs[0]
+        assert len(choice.missed) == 1
+        assert re.search(r"without squares: 10 x 10 lists, .* max_bytes=120", choice.missed[0])
+        assert "edges of 3 times" in choice.missed[0]
+        assert choice.to_dict()["predicted"]["list_edges"] == 3
 
 
 def test_some_bytes_are_left_free_because_sizes_are_predicted():
@@ -318,6 +349,30 @@ def test_predicted_bytes_are_within_the_margin_of_the_true_ones(shipped):
     assert np.abs(ratios - 1).max() <= 0.05, ratios.round(3)
 
 
+def test_no_squares_are_seen_in_a_smooth_field(default_runtime):
+    """Where SSIM is content with a quarter of a list per pixel, whose squares anybody sees."""
+    volume, camera = ball(48), filling_camera(ball(48).bounds, (240, 180))
+    picture = raycast_volume(volume, camera, (240, 180), TRANSFER)
+    rungs = predictions(
+        Scene(
+            volume, camera, (240, 180), TRANSFER, TARGET_ANGLE, default_runtime, GenerationOptions()
+        ).measure(),
+        (240, 180),
+    )
+    assert rungs[0].ssim > QUALITIES["high"]
+    for rung in (rungs[0], rungs[1], rungs[2]):
+        vdi = generated(default_runtime, volume, camera, rung.window_size)
+        seen = render_vdi(vdi, camera, (240, 180), device=default_runtime)
+        places = list_places(camera, (240, 180), rung.window_size)
+        true = list_edges(seen, picture, *places).ratio
+        assert (true > MAX_LIST_EDGES) == (rung.setting.lists < 0.5)
+        # Nine tiles' steps against all, which differ as the field's slope does
+        assert rung.list_edges == pytest.approx(true, rel=0.25)
+    choice = chosen(Dial.of("high"), rungs, (240, 180))
+    assert choice.prediction is rungs[2]
+    assert {rung.list_edges for rung in rungs if rung.setting.lists >= 1} == {0.0}
+
+
 # -- the measurement -------------------------------------------------------------------------------
 
 
@@ -493,11 +548,17 @@ def test_metadata_say_what_was_asked_chosen_and_predicted(runtime, tmp_path):
     again = pvdi.read(vdi.save(tmp_path / "a.vdi"))
     assert again.metadata["dial"] == found
     assert again.precision == "8-byte"
+    # It remembers the pictures that it is for, whatever its lists are
+    assert again.picture_size == WINDOW != again.window_size
+    assert pvdi.render(again, VIEW, device=runtime).shape == (WINDOW[1], WINDOW[0], 4)
 
 
 @pytest.mark.parametrize("foreign", [3, {}, {"chosen": 1}, {"chosen": {"window_size": [1]}}])
 def test_foreign_metadata_are_not_described(foreign):
     assert describe({"dial": foreign}) is None
+    vdi = generated()
+    vdi.metadata["dial"] = foreign if foreign == 3 else {"window_size": foreign}
+    assert vdi.picture_size == vdi.window_size == WINDOW
 
 
 def test_a_target_that_is_missed_is_warned_of_where_it_was_asked(default_runtime):
