@@ -40,6 +40,7 @@ def compare(options: argparse.Namespace) -> int:
         window_size=options.size,
         angles=options.angles,
         max_supersegments=options.max_supersegments,
+        precision=options.precision,
         sample_distance=options.sample_distance,
         repeats=options.repeats,
         vtk=not options.no_vtk,
@@ -49,7 +50,7 @@ def compare(options: argparse.Namespace) -> int:
     volume = read_volume(options)
     with measuring("comparing") as bar:
         report, vdi, images = measure(volume, settings, bar)
-    vdi.save(files["vdi"])
+    vdi.save(files["vdi"], compression=options.compression)
     sizes = {**report.sizes, "file_bytes": files["vdi"].stat().st_size}
     report = replace(report, sizes=sizes)
     write_png(contact_sheet(report, images), files["png"])

@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 from pyvista_vdi._version import __version__
 from pyvista_vdi.cli import declare
+from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.standard_cases import ANGLES, ELEVATION, WINDOW_SIZE
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
@@ -250,6 +251,20 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
     declare.no_vtk(parser)
     declare.classification(parser, tables=False)
     declare.longest(parser)
+    declare.option(
+        parser,
+        "--precision",
+        "of the supersegments: exact (default, 24 bytes each), 16-byte or 8-byte",
+        choices=PRECISIONS,
+        default="exact",
+    )
+    declare.option(
+        parser,
+        "--compression",
+        "of the .vdi: lz4 (default), zstd or none",
+        choices=("lz4", "zstd", "none"),
+        default="lz4",
+    )
     declare.step(parser)
     declare.device(parser)
 

@@ -38,6 +38,7 @@ from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest,
 from pyvista_vdi.model.standard_cases import ANGLES, WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.volume.render import raycast_volume
 
@@ -74,6 +75,8 @@ class Settings:
         New views, degrees of ``Azimuth`` from V_O.
     max_supersegments : int
         Longest list.
+    precision : str
+        Of the supersegments, see :meth:`VDI.with_precision`.
     sample_distance : float, optional
         The accuracy step, model units; half the smallest spacing by default.
     repeats : int
@@ -90,6 +93,7 @@ class Settings:
     window_size: tuple[int, int] = WINDOW_SIZE
     angles: tuple[float, ...] = ANGLES
     max_supersegments: int = 20
+    precision: str = "exact"
     sample_distance: float | None = None
     repeats: int = 3
     vtk: bool = True
@@ -163,7 +167,8 @@ class Report:
     system : dict
         Device, driver, OpenGL, versions.
     sizes : dict of str to int
-        Supersegments, lists, and bytes: of the volume, of the VDI in memory, of its dense form.
+        Supersegments, lists, and bytes: of the volume, of the VDI in the process's memory
+        and on the device, of its dense form.
     generation_seconds, full_raycast_seconds : Timing, optional
         Generation, and our volume raycaster at the same step without early termination; ``None``
         where nothing was timed.
@@ -327,6 +332,7 @@ class _Bench:
             size,
             self._table,
             max_supersegments=self._settings.max_supersegments,
+            precision=self._settings.precision,
             sample_distance=self.step,
             device=self._device,
         )
@@ -351,6 +357,7 @@ class _Bench:
             "classification": self._looks,
             "window_size": list(settings.window_size),
             "max_supersegments": settings.max_supersegments,
+            "precision": settings.precision,
             "sample_distance": self.step,
             "timing_sample_distance": self.voxel,
             "repeats": settings.repeats,
@@ -365,6 +372,7 @@ class _Bench:
             "occupied_lists": int(np.count_nonzero(vdi.counts)),
             "lists": width * height,
             "vdi_bytes": vdi.nbytes,
+            "device_bytes": prepared_vdi(self._device, vdi).list_bytes,
             "dense_bytes": width * height * self._settings.max_supersegments * _DENSE_BYTES,
         }
 

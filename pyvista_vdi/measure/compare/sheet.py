@@ -41,7 +41,7 @@ def table(report: Report) -> str:
     dimensions = " x ".join(str(n) for n in case["dimensions"])
     lines = [
         f"{case['name']}: {dimensions} {case['dtype']}, {width} x {height} lists",
-        f"at most {case['max_supersegments']} supersegments",
+        f"at most {case['max_supersegments']} supersegments ({case['precision']})",
         f"step: {case['sample_distance']:g} model units",
         *(f"{name}: {value}" for name, value in report.system.items()),
         "",
@@ -62,7 +62,8 @@ def table(report: Report) -> str:
     lines += [
         "",
         f"Sizes: volume {_mebibytes(sizes['volume_bytes'])}, VDI "
-        f"{_mebibytes(sizes['vdi_bytes'])} in memory ({sizes['supersegments']} supersegments in "
+        f"{_mebibytes(sizes['vdi_bytes'])} in memory, {_mebibytes(sizes['device_bytes'])} on the "
+        f"device ({sizes['supersegments']} supersegments in "
         f"{sizes['occupied_lists']} of {sizes['lists']} lists), dense form "
         f"{_mebibytes(sizes['dense_bytes'])}"
         + (f", file {_mebibytes(sizes['file_bytes'])}" if "file_bytes" in sizes else ""),
