@@ -14,7 +14,7 @@ from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.device import Runtime, aligned_empty, get_runtime
-from pyvista_vdi.errors import DeviceError, InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest
 from pyvista_vdi.model.vdi import VDI
@@ -210,12 +210,10 @@ class Painter:
         self._last = self._guarded(self._paint, mapper, renderer) or self._last
         window, drawn = renderer.GetRenderWindow(), self._last
         WindowClock.of(window).showed(drawn.preview)
-        try:
-            self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
-            self._no_depth.show(window, mapper)
-            place_image(self._actor.Get(), *viewport(renderer))
-        except DeviceError as error:
-            self._cannot_draw(error)
+        actor = self._actor.Get()
+        unit = self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
+        place_image(actor, unit, *viewport(renderer))
+        self._no_depth.show(window, mapper)
         self.texts.write(renderer, self.status)
         self.upkeep.tick(window)
 
@@ -317,10 +315,10 @@ class Painter:
             vdi = self._counted()
             if isinstance(vdi, VDI):
                 seen = Frame.current(renderer, actor, mapper).showing(vdi)
-            self.selection.show(renderer, seen, self.device)
+            self.selection.show(actor, renderer, seen, self.device)
         except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
             self._warnings.warn(f"the VDI cannot be picked: {type(error).__name__}: {error}", error)
-            self.selection.show(renderer, None, self.device)
+            self.selection.show(actor, renderer, None, self.device)
         self._no_depth.show(renderer.GetRenderWindow(), mapper)
 
     def preview_size(self, frame: Frame) -> tuple[int, int]:

@@ -21,7 +21,7 @@ from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit, Pick, pick_vdi
 from pyvista_vdi.raycasting.raycast import render_first_hits
 from pyvista_vdi.vtk_pipeline.drawing.frame import Area, Frame, Image
-from pyvista_vdi.vtk_pipeline.drawing.shader import show_first_hits, show_image
+from pyvista_vdi.vtk_pipeline.drawing.shader import place_texture, show_first_hits, show_image
 from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture
 
 
@@ -61,7 +61,7 @@ class Selection:
         if keys is not None:
             keys.Remove(vtkOpenGLActor.GLDepthMaskOverride())
 
-    def show(self, renderer: Any, seen: Frame | None, device: Any) -> None:
+    def show(self, actor: Any, renderer: Any, seen: Frame | None, device: Any) -> None:
         """Raycast and bind the hits in the selector's area; none if nothing is seen."""
         window, selector = renderer.GetRenderWindow(), renderer.GetSelector()
         if self._picking:
@@ -70,14 +70,15 @@ class Selection:
         cells = selector.GetFieldAssociation() == vtkDataObject.FIELD_ASSOCIATION_CELLS
         if seen is None or seen.vdi is None or not cells:
             nothing = _packed((0, 0, 0, 0), np.empty((0, 0), np.float32))
-            self.texture.show(window, nothing, None, smooth=False)
+            place_texture(actor, self.texture.show(window, nothing, None, smooth=False))
             return
         area = _area(seen, selector.GetArea())
         key = (weakref.ref(seen.vdi), seen.key, area, self.opacity, self.accumulated)
         if self._drawn is None or self._drawn[0] != key:
             self._drawn = (key, _packed(area, self._depths(seen, area, device)))
             self._uploads += 1
-        self.texture.show(window, self._drawn[1], self._uploads, smooth=False)
+        unit = self.texture.show(window, self._drawn[1], self._uploads, smooth=False)
+        place_texture(actor, unit)
 
     def release(self) -> None:
         """Free the texture."""

@@ -1,8 +1,4 @@
-"""What takes the place of VTK's ray caster in the fragment shader of a VDI's actor.
-
-The sampler is never set: VTK allows no sampler to be set in the frame that builds the shader, and
-its default is texture unit 0, where the mapper puts a texture.
-"""
+"""What takes the place of VTK's ray caster in the fragment shader of a VDI's actor."""
 
 from __future__ import annotations
 
@@ -12,6 +8,14 @@ from vtkmodules.vtkCommonCore import reference
 from vtkmodules.vtkRenderingCore import vtkHardwareSelector
 
 _DECLARATION = "//VTK::Base::Dec\nuniform sampler2D vdiImage;\n"
+
+#: A sampler takes the number of its texture unit, and VTK knows of no custom uniform of that kind:
+#: it sets an integer, and declares it, which is no declaration of the sampler under another name.
+_UNIFORMS = """
+#define vdiImage vdiImageUnit
+//VTK::CustomUniforms::Dec
+#undef vdiImage
+"""
 
 #: Where the viewport is in the framebuffer, pixels: left edge, upper edge, 1 / width, -1 / height.
 _VIEWPORT = "vdiViewport"
@@ -54,7 +58,8 @@ _CELL = """
 """
 
 
-#: What in VTK's template calls its ray caster.
+#: What in VTK's template calls its ray caster, and what declares custom uniforms.
+_CUSTOM = "//VTK::CustomUniforms::Dec"
 _CALL = "//VTK::CallWorker::Impl"
 
 
@@ -63,14 +68,21 @@ def show_image(actor: Any) -> None:
     shader = actor.GetShaderProperty()
     if _replacement(shader) is None:
         shader.AddFragmentShaderReplacement("//VTK::Base::Dec", True, _DECLARATION, False)
+        shader.AddFragmentShaderReplacement(_CUSTOM, True, _UNIFORMS, False)
     _replace(shader, _LOOKUP)
 
 
-def place_image(actor: Any, origin: tuple[int, int], size: tuple[int, int]) -> None:
-    """Say where in the framebuffer the viewport is that the image fills, pixels."""
+def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int, int]) -> None:
+    """Say in which texture unit the image is, and which viewport it fills, framebuffer pixels."""
+    place_texture(actor, unit)
     (x, y), (width, height) = origin, size
     place = (float(x), float(y + height), 1 / max(1, width), -1 / max(1, height))
     actor.GetShaderProperty().GetFragmentCustomUniforms().SetUniform4f(_VIEWPORT, place)
+
+
+def place_texture(actor: Any, unit: int) -> None:
+    """Say in which texture unit the image is, in the frame that begins."""
+    actor.GetShaderProperty().GetFragmentCustomUniforms().SetUniformi("vdiImage", unit)
 
 
 def show_first_hits(actor: Any, selection_pass: int) -> None:

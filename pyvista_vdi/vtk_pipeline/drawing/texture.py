@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from vtkmodules.vtkCommonCore import VTK_FLOAT
 from vtkmodules.vtkRenderingOpenGL2 import vtkTextureObject
 
-from pyvista_vdi.errors import DeviceError
-
 
 class _Texture:
     """A texture that is made when it is first shown, and filled again in another window."""
@@ -48,13 +46,12 @@ class ImageTexture(_Texture):
 
     def show(
         self, window: Any, image: NDArray[np.float32], number: int | None, *, smooth: bool
-    ) -> None:
-        """Bind an image for the shader, in the window's context, which is current.
+    ) -> int:
+        """Bind an image for the shader, in the window's context; return its texture unit.
 
         ``image`` is RGBA, float32 (H, W, 4), its rows in the order that the shader takes them in.
         Where ``number`` is that of last time it is not uploaded again. With ``smooth`` texels are
-        interpolated linearly: a full frame's texels are the pixels. DeviceError is raised if OpenGL
-        binds it where the shader does not look.
+        interpolated linearly: a full frame's texels are the pixels.
         """
         filled = self._in_context(window)
         texture = self._texture
@@ -66,14 +63,7 @@ class ImageTexture(_Texture):
             texture.Create2DFromRaw(width, height, 4, VTK_FLOAT, image)
             self._uploaded = number
         texture.Activate()
-        # The sampler of the actor's shader keeps its default, unit 0: see actor.py
-        if texture.GetTextureUnit() != 0:
-            unit = texture.GetTextureUnit()
-            texture.Deactivate()
-            raise DeviceError(
-                f"OpenGL gave its image texture unit {unit} in place of 0; another object leaves "
-                "a texture active"
-            )
+        return int(texture.GetTextureUnit())
 
     def release(self) -> None:
         """Free the texture and its object."""
