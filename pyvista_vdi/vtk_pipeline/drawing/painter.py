@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -20,6 +20,7 @@ from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.vtk_pipeline.drawing import passes
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
 from pyvista_vdi.vtk_pipeline.drawing.frame import (
     Drawn,
@@ -206,7 +207,10 @@ class Painter:
         if renderer.GetSelector() is not None:
             self._select(mapper, renderer)
             return
-        self.selection.leave(self._actor.Get())
+        names = passes.classes(renderer)
+        for effect in passes.effects(names):
+            self._warnings.warn(effect)
+        self.selection.leave(self._actor.Get(), occluded="vtkSSAOPass" in names)
         self._last = self._guarded(self._paint, mapper, renderer) or self._last
         window, drawn = renderer.GetRenderWindow(), self._last
         WindowClock.of(window).showed(drawn.preview)
@@ -400,12 +404,8 @@ class Painter:
         return renderers[0] if renderers else None
 
     def renderers(self) -> list[Any]:
-        """Return all renderers that show the actor."""
-        actor = self._actor.Get()
-        if actor is None:
-            return []
-        consumers = [actor.GetConsumer(i) for i in range(actor.GetNumberOfConsumers())]
-        return [c for c in consumers if c is not None and c.IsA("vtkRenderer")]
+        """Return all renderers that show the actor, by itself or as a part of an assembly."""
+        return list(dict.fromkeys(_renderers_of(self._actor.Get())))
 
     def _watch(self, renderer: Any) -> None:
         """From now on, know which renderer is between its StartEvent and EndEvent."""
@@ -416,6 +416,16 @@ class Painter:
         active = self._active  # a VTK weak reference: no cycle through the observer
         renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
         renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
+
+
+def _renderers_of(prop: Any) -> Iterator[Any]:
+    """Yield the renderers that show a prop, and those that show what it is a part of."""
+    for i in range(0 if prop is None else prop.GetNumberOfConsumers()):
+        consumer = prop.GetConsumer(i)
+        if consumer is not None and consumer.IsA("vtkRenderer"):
+            yield consumer
+        elif consumer is not None and consumer.IsA("vtkProp"):
+            yield from _renderers_of(consumer)
 
 
 def _is_viewport(renderer: Any) -> bool:

@@ -54,9 +54,12 @@ class Selection:
             actor.SetPropertyKeys(keys)
         keys.Set(vtkOpenGLActor.GLDepthMaskOverride(), 1)
 
-    def leave(self, actor: Any) -> None:
-        """Have it draw its image, in the frame that begins, whatever was drawn last."""
-        show_image(actor)
+    def leave(self, actor: Any, *, occluded: bool) -> None:
+        """Have it draw its image, in the frame that begins, whatever was drawn last.
+
+        ``occluded`` is for :func:`show_image`.
+        """
+        show_image(actor, occluded=occluded)
         keys = actor.GetPropertyKeys()
         if keys is not None:
             keys.Remove(vtkOpenGLActor.GLDepthMaskOverride())

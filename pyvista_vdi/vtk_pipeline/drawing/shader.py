@@ -28,6 +28,14 @@ _LOOKUP = f"""
   finalizeRayCast();
 """
 
+#: Under screen-space ambient occlusion finalizeRayCast writes depth, place and normal of what VTK's
+#: ray caster has hit: nothing, far away. A VDI leaves those that are there.
+_UNSEEN = """
+  gl_FragDepth = 0.0;
+  fragOutput1 = vec4(0.0);
+  fragOutput2 = vec4(0.0);
+"""
+
 #: For a selection's passes. Row 0 of the texture is one texel of numbers that no uniform can carry:
 #: the area's lower left corner in the framebuffer and its size, pixels. Above it lie the area's
 #: hits: (window depth, -, -, 1), or zeros for none.
@@ -62,14 +70,27 @@ _CELL = """
 _CUSTOM = "//VTK::CustomUniforms::Dec"
 _CALL = "//VTK::CallWorker::Impl"
 
+#: What only VTK's ray caster needs, and render passes would add to.
+_UNUSED = (
+    "//VTK::ComputeLighting::Dec",
+    "//VTK::ComputeColor::Dec",
+    "//VTK::Shading::Impl",
+    "//VTK::RenderToImage::Impl",
+)
 
-def show_image(actor: Any) -> None:
-    """Have an actor's shader look its colours up in an image of the viewport."""
+
+def show_image(actor: Any, *, occluded: bool = False) -> None:
+    """Have an actor's shader look its colours up in an image of the viewport.
+
+    ``occluded`` says whether the frame has a pass of screen-space ambient occlusion.
+    """
     shader = actor.GetShaderProperty()
     if _replacement(shader) is None:
         shader.AddFragmentShaderReplacement("//VTK::Base::Dec", True, _DECLARATION, False)
         shader.AddFragmentShaderReplacement(_CUSTOM, True, _UNIFORMS, False)
-    _replace(shader, _LOOKUP)
+        for unused in _UNUSED:
+            shader.AddFragmentShaderReplacement(unused, True, "", False)
+    _replace(shader, _LOOKUP + _UNSEEN if occluded else _LOOKUP)
 
 
 def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int, int]) -> None:

@@ -1,0 +1,49 @@
+"""Render passes of a renderer that do not see a VDI as it is: what there is to be said of them.
+
+They work on the depth buffer or draw meshes anew, and a VDI, like every volume, is drawn after what
+is opaque and writes no depth.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+#: What happens to a VDI under a pass of this class.
+_EFFECTS = {
+    "vtkSSAOPass": (
+        "screen-space ambient occlusion (enable_ssao) does not see the VDI, which is as dark as "
+        "what is behind it; ambient_occlusion= of add_vdi (VDISource.SetAmbientOcclusion) is its "
+        "own. VTK's message that volumes must be shaded is about its own mappers"
+    ),
+    "vtkShadowMapPass": (
+        "shadows (enable_shadows) are drawn with their meshes after the VDI, as after every "
+        "volume: it is missing where a mesh is behind it, and casts no shadow; disable_shadows() "
+        "shows it"
+    ),
+    "vtkDepthOfFieldPass": (
+        "depth of field (enable_depth_of_field) does not see the VDI, which is as sharp as what "
+        "is behind it; disable_depth_of_field() shows it"
+    ),
+}
+
+
+def classes(renderer: Any) -> set[str]:
+    """Return the names of the classes of all passes of a renderer."""
+    return _below(renderer.GetPass())
+
+
+def effects(names: set[str]) -> list[str]:
+    """Return what passes of these classes do to a VDI, one text for each that does something."""
+    return [text for name, text in _EFFECTS.items() if name in names]
+
+
+def _below(render_pass: Any) -> set[str]:
+    if render_pass is None:
+        return set()
+    found = {render_pass.GetClassName()}
+    if hasattr(render_pass, "GetDelegatePass"):
+        found |= _below(render_pass.GetDelegatePass())
+    members = render_pass.GetPasses() if hasattr(render_pass, "GetPasses") else None
+    for i in range(members.GetNumberOfItems() if members is not None else 0):
+        found |= _below(members.GetItemAsObject(i))
+    return found
