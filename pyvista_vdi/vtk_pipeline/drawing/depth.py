@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 from vtkmodules.vtkRenderingCore import vtkActor2D, vtkMapper, vtkVolume
 
-from pyvista_vdi.vtk_pipeline.drawing.frame import Area, Frame, Image, Matrix, Recent, depths_of
+from pyvista_vdi.vtk_pipeline.drawing.frame import (
+    Area,
+    Frame,
+    Image,
+    Matrix,
+    Recent,
+    consumers,
+    depths_of,
+)
 
 #: Pixels around a rectangle that are read as well: a pixel is drawn where its centre is inside.
 _MARGIN = 2
@@ -48,7 +56,8 @@ class OpaqueDepths:
         frame = frames[0]
         renderer = frame.renderer  # it has drawn what is opaque
         farthest = max(own.depths_of(own.bounds)[1] for own in frames)
-        opaque = _opaque_before(renderer, frame.to_view, farthest)
+        drawing = [thing for own in frames for thing in consumers(own.actor)]
+        opaque = _opaque_before(renderer, frame.to_view, farthest, drawing)
         if opaque is None:
             return None
         if renderer.GetPass() is not None or not all(_is_plain(prop) for prop in opaque):
@@ -69,11 +78,14 @@ class OpaqueDepths:
         return known.depth
 
 
-def _opaque_before(renderer: Any, to_view: Matrix, farthest: float) -> list[Any] | None:
+def _opaque_before(
+    renderer: Any, to_view: Matrix, farthest: float, drawing: Sequence[Any]
+) -> list[Any] | None:
     """Return the opaque props of a renderer that reach before a view depth; ``None`` if none do.
 
-    Conservative: what has no bounds counts. An empty list stands for what a lower layer drew, if
-    its depth was kept.
+    Conservative: what has no bounds counts, and so do the assemblies that are ``drawing``: they
+    must not be asked, for an answer would end their walk through their parts. An empty list stands
+    for what a lower layer drew, if its depth was kept.
     """
     if renderer.GetPreserveDepthBuffer():
         return []
@@ -82,6 +94,9 @@ def _opaque_before(renderer: Any, to_view: Matrix, farthest: float) -> list[Any]
     for i in range(props.GetNumberOfItems()):
         prop = props.GetItemAsObject(i)
         if not prop.GetVisibility() or isinstance(prop, vtkActor2D | vtkVolume):
+            continue
+        if prop in drawing:
+            found.append(prop)
             continue
         if not prop.HasOpaqueGeometry():
             continue

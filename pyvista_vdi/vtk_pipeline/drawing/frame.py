@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -360,6 +361,16 @@ def _framebuffer_depth(window: Any, corner: tuple[int, int], size: tuple[int, in
     pixels.UnBind()  # it binds itself to be released, and would catch VTK's next glReadPixels
     texture.ReleaseGraphicsResources(window)
     return z.reshape(height, width)
+
+
+def consumers(prop: Any) -> Iterator[Any]:
+    """Yield the renderers that show a prop, the assemblies that it is a part of, and theirs."""
+    for i in range(0 if prop is None else prop.GetNumberOfConsumers()):
+        consumer = prop.GetConsumer(i)
+        if consumer is not None:
+            yield consumer
+            if consumer.IsA("vtkProp"):
+                yield from consumers(consumer)
 
 
 def viewport(renderer: Any) -> tuple[tuple[int, int], tuple[int, int]]:

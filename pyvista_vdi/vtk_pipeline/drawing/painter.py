@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -27,6 +27,7 @@ from pyvista_vdi.vtk_pipeline.drawing.frame import (
     Frame,
     Image,
     Recent,
+    consumers,
     same_depth,
     viewport,
 )
@@ -405,7 +406,8 @@ class Painter:
 
     def renderers(self) -> list[Any]:
         """Return all renderers that show the actor, by itself or as a part of an assembly."""
-        return list(dict.fromkeys(_renderers_of(self._actor.Get())))
+        there = consumers(self._actor.Get())
+        return list(dict.fromkeys(c for c in there if c.IsA("vtkRenderer")))
 
     def _watch(self, renderer: Any) -> None:
         """From now on, know which renderer is between its StartEvent and EndEvent."""
@@ -416,16 +418,6 @@ class Painter:
         active = self._active  # a VTK weak reference: no cycle through the observer
         renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
         renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
-
-
-def _renderers_of(prop: Any) -> Iterator[Any]:
-    """Yield the renderers that show a prop, and those that show what it is a part of."""
-    for i in range(0 if prop is None else prop.GetNumberOfConsumers()):
-        consumer = prop.GetConsumer(i)
-        if consumer is not None and consumer.IsA("vtkRenderer"):
-            yield consumer
-        elif consumer is not None and consumer.IsA("vtkProp"):
-            yield from _renderers_of(consumer)
 
 
 def _is_viewport(renderer: Any) -> bool:
