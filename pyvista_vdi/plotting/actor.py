@@ -25,6 +25,39 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
         super().__init__(theme=theme)
         self._become_vdi_mapper()
 
+    @property
+    def dataset(self) -> Any:
+        """The volume that the VDI is made of; without one, a box of the VDI's bounds."""
+        return pv.wrap(self.GetDataSetInput())
+
+    @dataset.setter
+    def dataset(self, volume: Any) -> None:
+        source = self.GetSource()
+        if source is None:
+            self.SetInputDataObject(volume)  # a VDI, or refused by name
+        else:
+            source.SetInputDataObject(volume)
+
+    def copy(self) -> PlotterVDIMapper:
+        """Return a mapper, for another actor, that draws the same VDI in the same way.
+
+        A VDI is never copied: it does not change. The lookup table is shared.
+        """
+        other = PlotterVDIMapper(theme=self._theme)
+        other.lookup_table = self.lookup_table
+        other.scalar_range = self.scalar_range
+        if self.painter.input is not None:
+            other.painter.set_input(self.painter.input.shared())
+        other.SetDevice(self.GetDevice())
+        other.painter.take_settings(self.painter)
+        other.SetCropping(self.GetCropping())
+        other.SetCroppingRegionPlanes(self.GetCroppingRegionPlanes())
+        other.SetCroppingRegionFlags(self.GetCroppingRegionFlags())
+        planes = self.GetClippingPlanes()
+        for i in range(0 if planes is None else planes.GetNumberOfItems()):
+            other.AddClippingPlane(planes.GetItem(i))
+        return other
+
 
 class PlotterVDIActor(VDIActorMethods, Volume):
     """What ``Plotter.add_vdi`` returns: a ``pyvista.Volume`` with :attr:`vdi`."""
@@ -82,16 +115,7 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         """
         other = PlotterVDIActor()
         other.ShallowCopy(self)
-        mapper = PlotterVDIMapper(theme=self.mapper._theme)
-        mapper.lookup_table = self.mapper.lookup_table
-        mapper.scalar_range = self.mapper.scalar_range
-        if self.mapper.painter.input is not None:
-            mapper.painter.set_input(self.mapper.painter.input.shared())
-        mapper.SetDevice(self.mapper.GetDevice())
-        mapper.painter.take_settings(self.mapper.painter)
-        mapper.SetCropping(self.mapper.GetCropping())
-        mapper.SetCroppingRegionPlanes(self.mapper.GetCroppingRegionPlanes())
-        mapper.SetCroppingRegionFlags(self.mapper.GetCroppingRegionFlags())
+        mapper = self.mapper.copy()
         other.SetMapper(mapper)
         if deep:
             prop = self.GetProperty()

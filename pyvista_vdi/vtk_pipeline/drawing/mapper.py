@@ -83,6 +83,12 @@ class VDIMapperMethods:
         self.painter.say_not_exported()
         return super().GetInputDataObject(*args)  # type: ignore[misc]
 
+    def GetDataSetInput(self) -> Any:
+        """Return the volume that the VDI is made of; without one, the box of the VDI's bounds."""
+        source = self.GetSource()
+        volume = None if source is None else source.GetInputDataObject(0, 0)
+        return self.painter.proxy if volume is None else volume
+
     def SetVDI(self, vdi: VDI) -> None:
         """Draw this VDI."""
         self._set_input(input_of(vdi))

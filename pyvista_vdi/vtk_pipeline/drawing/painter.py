@@ -31,6 +31,7 @@ from pyvista_vdi.vtk_pipeline.drawing.frame import (
     same_depth,
     viewport,
 )
+from pyvista_vdi.vtk_pipeline.drawing.grabbing import Grabbing
 from pyvista_vdi.vtk_pipeline.drawing.overlap import Overlaps
 from pyvista_vdi.vtk_pipeline.drawing.selection import Selection
 from pyvista_vdi.vtk_pipeline.drawing.shader import place_image
@@ -96,6 +97,11 @@ class Painter:
         """Forget that actor, if it is this one."""
         if self._actor.Get() is actor:
             self._actor.Set(None)
+
+    @property
+    def actor(self) -> Any:
+        """Whose matrix and renderers count; ``None`` if there is none."""
+        return self._actor.Get()
 
     @property
     def input(self) -> Input | None:
@@ -214,7 +220,9 @@ class Painter:
         self.selection.leave(self._actor.Get(), occluded="vtkSSAOPass" in names)
         self._last = self._guarded(self._paint, mapper, renderer) or self._last
         window, drawn = renderer.GetRenderWindow(), self._last
-        WindowClock.of(window).showed(drawn.preview)
+        clock = WindowClock.of(window)
+        clock.showed(drawn.preview)
+        clock.shared(Grabbing).join(self, window.GetInteractor())
         actor = self._actor.Get()
         unit = self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
         place_image(actor, unit, *viewport(renderer))

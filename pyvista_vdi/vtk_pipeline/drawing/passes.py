@@ -43,7 +43,7 @@ def _below(render_pass: Any) -> set[str]:
     found = {render_pass.GetClassName()}
     if hasattr(render_pass, "GetDelegatePass"):
         found |= _below(render_pass.GetDelegatePass())
-    members = render_pass.GetPasses() if hasattr(render_pass, "GetPasses") else None
-    for i in range(members.GetNumberOfItems() if members is not None else 0):
+    members: Any = render_pass.GetPasses() if hasattr(render_pass, "GetPasses") else None
+    for i in range(0 if members is None else members.GetNumberOfItems()):
         found |= _below(members.GetItemAsObject(i))
     return found

@@ -1,0 +1,83 @@
+"""Styles that move actors (trackball and joystick actor): how a hand takes hold of a VDI.
+
+They ask a cell picker of their own, which classifies the proxy's scalars: all transparent, and so a
+VDI is looked through. For the moment in which a button goes down where a pick hits a VDI, what is
+in front of it considered, its proxy has a scalar that is opaque.
+"""
+
+from __future__ import annotations
+
+import weakref
+from typing import Any
+
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk
+
+_STYLES = ("vtkInteractorStyleTrackballActor", "vtkInteractorStyleJoystickActor")
+_BUTTONS = ("LeftButtonPressEvent", "MiddleButtonPressEvent", "RightButtonPressEvent")
+
+#: Priorities of observers before and after the style's, which is 0.
+_BEFORE, _AFTER = 1.0, -1.0
+
+
+class Grabbing:
+    """What can be taken hold of in a window: ``clock.shared(Grabbing)``."""
+
+    def __init__(self) -> None:
+        self._painters: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._watched: set[str] = set()
+        self._transparent: list[tuple[Any, Any]] = []  # point data and scalars of solid proxies
+
+    def join(self, painter: Any, interactor: Any) -> None:
+        """Note that a painter draws in the window; called in each of its frames."""
+        self._painters.add(painter)
+        if interactor is None or interactor.GetAddressAsString("") in self._watched:
+            return
+        self._watched.add(interactor.GetAddressAsString(""))
+        weak = weakref.ref(self)
+
+        def pressed(caller: Any, _: str) -> None:
+            grabbing = weak()
+            if grabbing is not None:
+                grabbing._begin(caller)
+
+        def taken(*_: Any) -> None:
+            grabbing = weak()
+            if grabbing is not None:
+                grabbing._end()
+
+        for event in _BUTTONS:
+            interactor.AddObserver(event, pressed, _BEFORE)
+            interactor.AddObserver(event, taken, _AFTER)
+
+    def _begin(self, interactor: Any) -> None:
+        self._end()  # another observer may have ended the last event before it came here
+        style = interactor.GetInteractorStyle()
+        if style is not None and style.IsA("vtkInteractorStyleSwitch"):
+            style = style.GetCurrentStyle()
+        if style is None or not any(style.IsA(name) for name in _STYLES):
+            return
+        x, y = interactor.GetEventPosition()
+        renderer = interactor.FindPokedRenderer(x, y)
+        there = [p for p in list(self._painters) if renderer in p.renderers()]
+        hit = [p for p in there if p.actor.pick(x, y, renderer=renderer) is not None]
+        for painter in hit:  # after the picks, which draw
+            data = painter.proxy.GetPointData()
+            solid = np.full((8, data.GetScalars().GetNumberOfComponents()), _opaque(painter.actor))
+            self._transparent.append((data, data.GetScalars()))
+            data.SetScalars(numpy_to_vtk(solid, deep=True))
+
+    def _end(self) -> None:
+        for data, scalars in self._transparent:
+            data.SetScalars(scalars)
+        self._transparent.clear()
+
+
+def _opaque(actor: Any) -> float:
+    """Return the scalar that an actor's property makes most opaque."""
+    function, node = actor.GetProperty().GetScalarOpacity(), [0.0] * 4
+    best = (-1.0, 0.0)
+    for i in range(function.GetSize()):
+        function.GetNodeValue(i, node)
+        best = max(best, (node[1], node[0]))
+    return best[1]

@@ -1,0 +1,389 @@
+"""A VDI beside everything else that a plotter can add, before and after it: as beside a volume.
+
+The judge is the same scene with ``add_volume``. Where VTK's own volume is missing or wrong, which
+is known and said, it is our picture of the plain scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import pyvista as pv
+from plugin_scenes import (
+    LOOKS,
+    TOLERANCE,
+    add_judge,
+    add_nothing,
+    add_ours,
+    assert_as_vtk,
+    draw,
+    soft_ball,
+)
+from pyvista import Plotter
+from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
+from vtkmodules.vtkCommonDataModel import vtkPlane
+from vtkmodules.vtkRenderingCore import vtkAssembly, vtkPropAssembly
+
+from pyvista_vdi.errors import VDIWarning
+
+pytestmark = pytest.mark.gl
+
+WINDOW = (120, 100)
+VIEW = ((4.5, 4.0, 3.0), (0.2, 0.0, 0.0), (0.0, 0.0, 1.0))
+
+Add = Callable[[Plotter], object]
+
+
+def beside() -> pv.PolyData:
+    """A mesh whose half is inside the ball."""
+    return pv.Sphere(radius=0.5, center=(0.5, 0.7, 0.5), theta_resolution=12, phi_resolution=12)
+
+
+def blocks() -> pv.MultiBlock:
+    cube = pv.Cube(center=(0.9, -0.4, 0.3), x_length=0.7, y_length=0.7, z_length=0.7)
+    return pv.MultiBlock({"ball": beside(), "cube": cube})
+
+
+def checks() -> pv.Texture:
+    squares = np.indices((16, 16)).sum(axis=0) % 2 * 255
+    return pv.Texture(np.repeat(squares[..., np.newaxis], 3, axis=2).astype(np.uint8))
+
+
+def sky() -> pv.Texture:
+    """A cube map of six plain colours."""
+    texture = pv.Texture()
+    texture.SetMipmap(True)
+    texture.SetInterpolate(True)
+    texture.cube_map = True
+    for face, color in enumerate(np.eye(6, 3) * 120 + 100):
+        image = pv.ImageData(dimensions=(8, 8, 1))
+        image["color"] = np.tile(color, (64, 1)).astype(np.uint8)
+        texture.SetInputDataObject(face, image)
+    return texture
+
+
+def lit_by_the_sky(plotter: Plotter) -> None:
+    plotter.set_environment_texture(sky(), is_srgb=True)
+    plotter.renderer.GetEnvMapPrefiltered().SetPrefilterLevels(3)  # of 8 x 8 texels
+    plotter.renderer.GetEnvMapPrefiltered().SetPrefilterMaxSamples(8)
+    plotter.renderer.GetEnvMapIrradiance().SetIrradianceSize(8)
+    plotter.renderer.GetEnvMapIrradiance().SetIrradianceStep(0.5)
+    plotter.renderer.GetEnvMapLookupTable().SetLUTSize(16)
+    plotter.renderer.GetEnvMapLookupTable().SetLUTSamples(8)
+    plotter.add_mesh(beside(), pbr=True, metallic=0.8, roughness=0.2, color="w")
+
+
+def skybox(plotter: Plotter) -> None:
+    plotter.add_actor(sky().to_skybox())
+
+
+def textured(plotter: Plotter) -> None:
+    mesh = pv.Plane(center=(0.4, 0.5, 0.2), direction=(1, 0.6, 0.3), i_size=2, j_size=2)
+    plotter.add_mesh(mesh, texture=checks())
+
+
+def with_scalars(plotter: Plotter) -> None:
+    mesh = beside()
+    mesh["height"] = mesh.points[:, 2]
+    plotter.add_mesh(mesh, cmap="plasma", scalar_bar_args={"title": "height"})
+
+
+def peeled(plotter: Plotter) -> None:
+    plotter.enable_depth_peeling(4)
+    plotter.add_mesh(beside(), color="r", opacity=0.5)
+    plotter.add_mesh(pv.Plane(direction=(1, 1, 0), i_size=2, j_size=2), color="b", opacity=0.5)
+
+
+def part_of_an_assembly(plotter: Plotter) -> None:
+    assembly = vtkPropAssembly()
+    assembly.AddPart(pv.Actor(pv.DataSetMapper(beside())))
+    plotter.add_actor(assembly)
+
+
+def charted(plotter: Plotter) -> None:
+    chart = pv.Chart2D(size=(0.4, 0.4), loc=(0.0, 0.6))
+    chart.line([0, 1, 2], [2, 1, 3])
+    plotter.add_chart(chart)
+
+
+def another_volume(plotter: Plotter) -> None:
+    moved = pv.Transform().translate(0, 2.5, 0).matrix
+    plotter.add_volume(soft_ball(12), mapper="gpu", user_matrix=moved, **LOOKS)
+
+
+def line_of(points: int = 20) -> pv.PolyData:
+    t = np.linspace(0, 6, points)
+    return pv.Spline(np.column_stack([np.cos(t), np.sin(t), t / 4 - 0.7]), points)
+
+
+def corners() -> pv.PolyData:
+    return pv.PolyData([[0.9, 0.5, 0.5], [0.2, 0.9, 0.8], [-0.8, 0.4, 0.9]])
+
+
+#: What a plotter can add, or switch on, that VTK's own volume is right beside.
+KINDS: dict[str, Add] = {
+    "mesh": lambda p: p.add_mesh(beside(), color="w"),
+    "scalars": with_scalars,
+    "edges": lambda p: p.add_mesh(beside(), show_edges=True, line_width=2),
+    "wireframe": lambda p: p.add_mesh(beside(), style="wireframe"),
+    "unstructured grid": lambda p: p.add_mesh(beside().delaunay_3d(), color="w"),
+    "silhouette": lambda p: p.add_mesh(beside(), silhouette=True),
+    "vertices": lambda p: p.add_mesh(beside(), show_vertices=True),
+    "texture": textured,
+    "multi-block": lambda p: p.add_mesh(blocks(), multi_colors=True),
+    "composite": lambda p: p.add_composite(blocks(), color="orange"),
+    "translucent blocks": lambda p: p.add_composite(blocks(), opacity=0.5),
+    "environment": lit_by_the_sky,
+    "skybox": skybox,
+    "points": lambda p: p.add_points(beside().points, color="r", point_size=4),
+    "spheres": lambda p: p.add_points(
+        beside().points, color="r", point_size=8, render_points_as_spheres=True
+    ),
+    "gaussians": lambda p: p.add_mesh(beside(), style="points_gaussian", point_size=6),
+    "lines": lambda p: p.add_mesh(line_of(), color="k", line_width=3),
+    "tubes": lambda p: p.add_mesh(line_of(), color="k", line_width=3, render_lines_as_tubes=True),
+    "segments": lambda p: p.add_lines(line_of(20).points, color="k", width=2),
+    "arrows": lambda p: p.add_arrows(corners().points, np.eye(3), mag=0.4),
+    "point labels": lambda p: p.add_point_labels(corners(), ["a", "b", "c"], font_size=8),
+    "text": lambda p: p.add_text("beside", font_size=6),
+    "3D text": lambda p: p.add_mesh(pv.Text3D("abc", height=0.5, center=(0.8, 0.5, 0.5))),
+    "title": lambda p: p.add_title("above", font_size=6),
+    "legend": lambda p: p.add_legend([("ball", "r"), ("cube", "b")]),
+    "scale": lambda p: p.add_legend_scale(),
+    "axes": lambda p: p.add_axes(),
+    "axes actor": lambda p: p.add_actor(pv.AxesAssembly(scale=1.3)),
+    "axes at origin": lambda p: p.add_axes_at_origin(),
+    "box axes": lambda p: p.add_box_axes(),
+    "bounding box": lambda p: p.add_bounding_box(),
+    "grid": lambda p: p.show_grid(),
+    "bounds": lambda p: p.show_bounds(grid="back", font_size=6),
+    "floor": lambda p: p.add_floor("-z", color="w", pad=0.5),
+    "ruler": lambda p: p.add_ruler((-1, -1, 1), (1, 1, 1)),
+    "background gradient": lambda p: p.set_background("w", top="b"),
+    "chart": charted,
+    "cursor": lambda p: p.add_cursor(bounds=(-1, 1, -1, 1, -1, 1)),
+    "light": lambda p: p.add_light(pv.Light(position=(3, 3, 3), color="r")),
+    "other volume": another_volume,
+    "translucent mesh": lambda p: p.add_mesh(beside(), color="r", opacity=0.5),
+    "depth peeling": peeled,
+    "assembly": part_of_an_assembly,
+    "plane widget": lambda p: p.add_plane_widget(lambda *_: None),
+    "box widget": lambda p: p.add_box_widget(lambda *_: None),
+    "slider": lambda p: p.add_slider_widget(lambda *_: None, (0, 1)),
+    "line widget": lambda p: p.add_line_widget(lambda *_: None),
+    "sphere widget": lambda p: p.add_sphere_widget(lambda *_: None, radius=0.6),
+    "spline widget": lambda p: p.add_spline_widget(lambda *_: None),
+    "button": lambda p: p.add_checkbox_button_widget(lambda *_: None, size=20),
+    "clip plane of a mesh": lambda p: p.add_mesh_clip_plane(beside()),
+    "slice of a mesh": lambda p: p.add_mesh_slice(soft_ball(12)),
+    "orientation widget": lambda p: p.add_camera_orientation_widget(),
+    "logo": lambda p: p.add_logo_widget(),
+    "msaa": lambda p: (p.enable_anti_aliasing("msaa"), p.add_mesh(beside(), color="w")),
+    "fxaa": lambda p: (p.enable_anti_aliasing("fxaa"), p.add_mesh(beside(), color="w")),
+    "hidden lines": lambda p: (
+        p.enable_hidden_line_removal(),
+        p.add_mesh(beside(), style="wireframe"),
+    ),
+    "parallel": lambda p: (p.enable_parallel_projection(), p.add_mesh(beside(), color="w")),
+    "stereo": lambda p: (p.enable_stereo_render(), p.add_mesh(beside(), color="w")),
+}
+
+#: Those that draw in different ways; the others are marked slow.
+QUICK = (
+    *("mesh", "texture", "multi-block", "environment", "skybox", "gaussians", "tubes"),
+    *("point labels", "grid", "chart", "other volume", "depth peeling", "plane widget"),
+)
+
+#: Pixels in which a mesh itself differs: points and lines at the window's very last bits.
+STRAYS = 6
+
+
+def picture(kind: Add, add: Callable[..., object], *, later: bool = False) -> np.ndarray:
+    """Draw a scene; ``later``: the neighbour comes when the volume has been drawn."""
+    plotter = pv.Plotter(window_size=WINDOW)
+    plotter.set_background("lightsteelblue")
+    if later:
+        add(plotter, soft_ball(16))
+        plotter.camera_position = VIEW
+        plotter.show(auto_close=False)
+        kind(plotter)
+    else:
+        kind(plotter)
+        add(plotter, soft_ball(16), reset_camera=False)
+    plotter.camera_position = VIEW
+    plotter.show(auto_close=False)
+    image = plotter.screenshot(return_img=True)[..., :3].astype(int)
+    plotter.close()
+    return image
+
+
+@pytest.mark.parametrize(
+    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in KINDS]
+)
+def test_a_vdi_beside_it_is_drawn_as_a_volume_is(name):
+    kind = KINDS[name]
+    judge = picture(kind, add_judge)
+    assert np.abs(judge - picture(kind, add_nothing)).max() > 40, "VTK's volume is not seen"
+    for later in (False, True):
+        off = np.abs(picture(kind, add_ours, later=later) - judge).max(axis=-1)
+        count = np.count_nonzero(off > TOLERANCE)
+        assert count <= STRAYS, f"later={later}: {count} pixels are off by up to {off.max()}"
+
+
+# -- assemblies ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", [vtkPropAssembly, vtkAssembly])
+@pytest.mark.parametrize("how", ["one", "nested", "two"])
+def test_parts_of_an_assembly_are_drawn(kind, how):
+    """All of them, and what they end at: the assembly is not asked while it walks its parts."""
+
+    def scene(plotter, add):
+        parts = [add(plotter, soft_ball(16)) for _ in range(2 if how == "two" else 1)]
+        if add is add_nothing:
+            return
+        if how == "two":
+            parts[1].user_matrix = pv.Transform().translate(0.5, 1.2, 0).matrix
+        assembly = kind()
+        for part in parts:
+            plotter.remove_actor(part, render=False)
+            assembly.AddPart(part)
+        if how == "nested":
+            inner, assembly = assembly, kind()
+            assembly.AddPart(inner)
+        plotter.add_actor(assembly, reset_camera=False)
+        plotter.add_mesh(beside(), color="w", reset_camera=False)
+
+    assert_as_vtk(scene, lambda p: shot_from(p, VIEW), window_size=WINDOW)
+
+
+def shot_from(plotter: Plotter, view: object) -> np.ndarray:
+    plotter.camera_position = view
+    plotter.show(auto_close=False)  # VTK's first frame with depth of field is black
+    return plotter.screenshot(return_img=True)
+
+
+# -- render passes ---------------------------------------------------------------------------------
+
+
+def before_a_wall(plotter: Plotter, add: Callable[..., object], **looks: object) -> None:
+    plotter.disable_anti_aliasing()  # passes draw without
+    add(plotter, soft_ball(16), **looks)
+    plotter.add_mesh(pv.Plane(center=(0, 0, -1.2), i_size=5, j_size=5), color="w")
+    plotter.add_mesh(beside(), color="w")
+
+
+def seen_under(
+    enable: Callable[[Plotter], object] | None, add: Callable[..., object], **looks: object
+) -> np.ndarray:
+    def scene(plotter, add):
+        if enable is not None:
+            enable(plotter)
+        before_a_wall(plotter, add, **looks)
+
+    return draw(add, scene, lambda p: shot_from(p, VIEW), window_size=WINDOW)
+
+
+@pytest.mark.parametrize("shade", [True, False])
+def test_screen_space_ambient_occlusion_keeps_the_vdi(shade):
+    """It is as dark as what is behind it; VTK's own volume is missing here."""
+    before, messages = vtkOutputWindow.GetInstance(), vtkStringOutputWindow()
+    vtkOutputWindow.SetInstance(messages)
+    try:
+        with pytest.warns(VDIWarning, match=r"ambient occlusion \(enable_ssao\) does not see"):
+            ours = seen_under(Plotter.enable_ssao, add_ours, shade=shade)
+    finally:
+        vtkOutputWindow.SetInstance(before)
+    assert "Shader" not in messages.GetOutput()
+    plain = seen_under(None, add_ours, shade=shade)
+    dark = seen_under(Plotter.enable_ssao, add_nothing) / seen_under(None, add_nothing)
+    assert np.abs(plain - seen_under(None, add_nothing)).max() > 40
+    # 1 of 255 in the dividend is rounded, and in the picture: at the darkest mesh 1 in 80 of 255
+    assert np.abs(ours - plain * dark).max() <= TOLERANCE
+
+
+def test_shadows_are_drawn_as_over_a_volume_and_a_warning_says_so():
+    judge = seen_under(Plotter.enable_shadows, add_judge)
+    with pytest.warns(VDIWarning, match=r"shadows \(enable_shadows\) are drawn .* after the VDI"):
+        ours = seen_under(Plotter.enable_shadows, add_ours)
+    assert np.abs(ours - judge).max() <= TOLERANCE
+
+
+def test_depth_of_field_says_that_it_does_not_see_a_vdi():
+    with pytest.warns(VDIWarning, match=r"depth of field \(enable_depth_of_field\) does not see"):
+        ours = seen_under(Plotter.enable_depth_of_field, add_ours)
+    assert np.abs(ours - seen_under(Plotter.enable_depth_of_field, add_nothing)).max() > 40
+
+
+# -- moving actors ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rgba", [False, True])
+def test_a_style_that_moves_actors_moves_what_is_seen(rgba):
+    ball = soft_ball(16)
+    if rgba:
+        ball["v"] = np.repeat(ball["v"][:, np.newaxis], 4, axis=1).astype(np.uint8)
+    plotter = pv.Plotter(window_size=WINDOW)
+    actor = add_ours(plotter, ball)
+    mesh = plotter.add_mesh(pv.Sphere(radius=0.15, center=(-0.9, 0.9, 0.9)), color="w")
+    plotter.camera_position = VIEW
+    plotter.enable_trackball_actor_style()
+    plotter.show(auto_close=False)
+    plotter.renderer.SetWorldPoint(-0.9, 0.9, 0.9, 1)  # in the box, beside the ball
+    plotter.renderer.WorldToDisplay()
+    corner = [round(x) for x in plotter.renderer.GetDisplayPoint()[:2]]
+
+    def drag(x, y):
+        """Press, move and release; return which of the two it has moved."""
+        before = [str(a.GetMatrix()) for a in (actor, mesh)]
+        hand = plotter.iren.interactor
+        for dx, event in enumerate(("LeftButtonPress", "MouseMove", "MouseMove")):
+            hand.SetEventInformation(x + 4 * dx, y + 2 * dx, 0, 0, chr(0), 0, None)
+            hand.InvokeEvent(f"{event}Event")
+        hand.InvokeEvent("LeftButtonReleaseEvent")
+        return [str(a.GetMatrix()) != b for a, b in zip((actor, mesh), before, strict=True)]
+
+    assert drag(*(round(n / 2) for n in WINDOW)) == [True, False]
+    plotter.camera_position = VIEW
+    actor.user_matrix = np.eye(4)
+    plotter.render()
+    assert drag(*corner) == [False, True]
+    assert drag(2, 2) == [False, False]
+    plotter.close()
+
+
+def test_a_mapper_s_data_set_is_what_was_added():
+    ball = soft_ball(16)
+    plotter = pv.Plotter(window_size=WINDOW)
+    actor = add_ours(plotter, ball)
+    assert actor.mapper.dataset.dimensions == ball.dimensions
+    np.testing.assert_array_equal(actor.mapper.dataset["v"], ball["v"])
+    vdi = actor.regenerate()
+    alone = plotter.add_vdi(vdi)
+    assert alone.mapper.dataset.bounds == pytest.approx(ball.bounds)
+    other = ball.copy()
+    other["v"] = ball["v"][::-1].copy()
+    actor.mapper.dataset = other
+    assert not actor.regenerate().equals(vdi)
+    plotter.close()
+
+
+def test_a_mapper_s_copy_draws_the_same_behind_another_actor():
+    plotter = pv.Plotter(window_size=WINDOW)
+    plotter.set_background("lightsteelblue")
+    actor = add_ours(plotter, soft_ball(16))
+    plane = vtkPlane()
+    plane.SetNormal(1, 0.3, 0)
+    actor.mapper.AddClippingPlane(plane)
+    actor.opacity_multiplier = 2.0
+    plotter.camera_position = VIEW
+    before = plotter.screenshot(return_img=True)
+    other = type(actor)()
+    other.mapper = actor.mapper.copy()
+    assert other.mapper.scalar_range == actor.mapper.scalar_range
+    plotter.remove_actor(actor)
+    plotter.add_actor(other, reset_camera=False)
+    np.testing.assert_array_equal(plotter.screenshot(return_img=True), before)
+    plotter.close()
