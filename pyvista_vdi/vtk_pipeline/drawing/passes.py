@@ -13,7 +13,7 @@ _EFFECTS = {
     "vtkSSAOPass": (
         "screen-space ambient occlusion (enable_ssao) does not see the VDI, which is as dark as "
         "what is behind it; ambient_occlusion= of add_vdi (VDISource.SetAmbientOcclusion) is its "
-        "own. VTK's message that volumes must be shaded is about its own mappers"
+        "own. VTK's error that volumes must be shaded is about its own mappers"
     ),
     "vtkShadowMapPass": (
         "shadows (enable_shadows) are drawn with their meshes after the VDI, as after every "
