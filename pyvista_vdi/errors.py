@@ -8,12 +8,15 @@ __all__ = [
     "DeviceError",
     "DeviceMemoryError",
     "InvalidArgumentError",
+    "InvalidArgumentTypeError",
     "InvalidCameraError",
     "InvalidVDIError",
     "InvalidVolumeError",
+    "InvalidVolumeTypeError",
     "KernelBuildError",
     "MissingDependencyError",
     "NoDeviceError",
+    "UnknownArrayError",
     "UnsupportedError",
     "VDIError",
     "VDIFileError",
@@ -36,6 +39,16 @@ class InvalidVolumeError(VDIError, ValueError):
     """A volume cannot be used: no scalars, too few planes, no finite value, an unknown array."""
 
 
+class InvalidVolumeTypeError(InvalidVolumeError, TypeError):
+    """What was given is no volume, or its scalars are no numbers."""
+
+
+class UnknownArrayError(InvalidVolumeError, KeyError):
+    """A volume has no array of that name; the message lists those that it has."""
+
+    __str__ = Exception.__str__  # KeyError's puts the message in quotes
+
+
 class InvalidCameraError(VDIError, ValueError):
     """A camera defines no view, for instance because eye and focal point coincide."""
 
@@ -44,8 +57,15 @@ class InvalidArgumentError(VDIError, ValueError):
     """Any other argument is out of its range: a window size, a limit, a tolerance, a name."""
 
 
-class UnsupportedError(VDIError, NotImplementedError):
-    """A feature was asked for that cannot be honoured; it is refused by name, never ignored."""
+class InvalidArgumentTypeError(InvalidArgumentError, TypeError):
+    """An argument is of a type that is not taken: a text for a number, say."""
+
+
+class UnsupportedError(VDIError, NotImplementedError, TypeError, ValueError):
+    """A feature was asked for that cannot be honoured; it is refused by name, never ignored.
+
+    It is a TypeError and a ValueError, too: PyVista refuses such data sets and values by these.
+    """
 
 
 class MissingDependencyError(VDIError, ImportError):

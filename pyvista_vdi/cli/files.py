@@ -110,7 +110,7 @@ def _text(about: FileInfo) -> str:
         "eye": _vector(view.position),
         "looking at": f"{_vector(view.focal_point)}, up {_vector(view.view_up)}, {lens}",
         "bounds": _vector(about.bounds),
-        "depth origin": f"{about.depth_origin:g}",
+        "depth origin": _number(about.depth_origin),
         **{name: _short(value) for name, value in about.metadata.items()},
     }
     return _table(rows)
@@ -122,7 +122,11 @@ def _table(rows: dict[str, str]) -> str:
 
 
 def _vector(values: Any) -> str:
-    return f"({', '.join(f'{v:g}' for v in values)})"
+    return f"({', '.join(map(_number, values))})"
+
+
+def _number(value: float) -> str:
+    return f"{value + 0.0:g}"  # no zero has a sign
 
 
 def _short(value: Any, longest: int = 100) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
 
 #: Bytes in units of memory, by their names in lower case.
 _UNITS = {
@@ -30,6 +30,12 @@ def as_float(value: Any) -> float:
         return float(value)
     except (TypeError, ValueError, OverflowError):
         return math.nan
+
+
+def not_taken(value: Any) -> type[InvalidArgumentError]:
+    """Return the error by which ``value`` is refused where a number is wanted."""
+    number = isinstance(value, int | float | np.number)
+    return InvalidArgumentError if number else InvalidArgumentTypeError
 
 
 def as_range(values: Any) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.checks import as_float, not_taken
 
 Vector: TypeAlias = tuple[float, float, float]
 
@@ -225,12 +226,9 @@ class Lights:
 
 
 def _number(name: str, value: Any) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
+    number = as_float(value)
     if not math.isfinite(number):
-        raise InvalidArgumentError(f"{name} must be a finite number; got {value!r}")
+        raise not_taken(value)(f"{name} must be a finite number; got {value!r}")
     return number
 
 

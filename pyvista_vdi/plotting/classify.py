@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import sys
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import (
     InvalidArgumentError,
+    InvalidArgumentTypeError,
     InvalidVolumeError,
     MissingDependencyError,
     VDIWarning,
 )
-from pyvista_vdi.model.checks import as_float
+from pyvista_vdi.model.checks import as_float, not_taken
+from pyvista_vdi.model.classification import BLENDINGS
 from pyvista_vdi.model.lighting import Shading
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.vtk_pipeline.filters.properties import (
@@ -28,6 +31,19 @@ from pyvista_vdi.vtk_pipeline.filters.properties import (
 
 #: Most entries of a table: building it takes PyVista time by the square, a second from here on.
 _MAX_COLORS = 4096
+
+#: ``add_volume``'s names of VTK's mappers.
+_MAPPERS = ("fixed_point", "gpu", "open_gl", "smart", "ugrid")
+
+#: PyVista's other names and VTK's numbers of blending modes.
+_BLENDING_NAMES = dict(enumerate(BLENDINGS)) | {
+    "comp": "composite",
+    "max": "maximum",
+    "min": "minimum",
+    "avg": "average",
+    **{f"{name}_intensity": name for name in ("maximum", "minimum", "average")},
+    **dict.fromkeys(("add", "sum"), "additive"),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,9 +67,9 @@ class Looks:
     interpolation: str = "nearest"
     shade: bool = False
     ambient: float | None = None
-    diffuse: float = 0.7
-    specular: float = 0.2
-    specular_power: float = 10.0
+    diffuse: float | None = 0.7
+    specular: float | None = 0.2
+    specular_power: float | None = 10.0
 
     def of_rgba(self) -> Looks:
         """Return those of RGBA scalars: opacity is linear over ``clim``, as in ``add_volume``."""
@@ -71,9 +87,15 @@ class Looks:
         n_colors = self.n_colors
         if self.categories:
             count = self.categories
+            if not isinstance(count, int | np.integer):
+                raise InvalidArgumentTypeError(
+                    f"categories must be True, False or a whole number; got {count!r}"
+                )
             n_colors = len(np.unique(scalars)) if count is True else int(count)
-        if not (isinstance(n_colors, int | np.integer) and 1 <= n_colors <= _MAX_COLORS):
-            raise InvalidArgumentError(
+        whole = isinstance(n_colors, int | np.integer)
+        if not (whole and 1 <= n_colors <= _MAX_COLORS):
+            error = InvalidArgumentError if whole else InvalidArgumentTypeError
+            raise error(
                 f"n_colors must be a whole number from 1 to {_MAX_COLORS}; got {n_colors!r}"
             )
         theme = self.theme or pv.global_theme
@@ -102,7 +124,7 @@ class Looks:
             )
         given = self.opacity_unit_distance
         if given is not None and not 0 < as_float(given) < np.inf:
-            raise InvalidArgumentError(
+            raise not_taken(given)(
                 f"opacity_unit_distance must be a positive length in model units; got {given!r}"
             )
         prop = pv.VolumeProperty(
@@ -117,11 +139,12 @@ class Looks:
         return prop
 
     def light(self, prop: pv.VolumeProperty) -> None:
-        """Set how a property reflects light; ``None`` leaves its ambient coefficient."""
-        ambient = prop.ambient if self.ambient is None else self.ambient
-        checked = Shading(ambient, self.diffuse, self.specular, self.specular_power)
-        prop.ambient, prop.diffuse = checked.ambient, checked.diffuse
-        prop.specular, prop.specular_power = checked.specular, checked.specular_power
+        """Set how a property reflects light; ``None`` leaves a coefficient as it is."""
+        names = [field.name for field in fields(Shading)]
+        given = {name: getattr(self, name) for name in names}
+        checked = Shading(**{n: getattr(prop, n) if v is None else v for n, v in given.items()})
+        for name in names:
+            setattr(prop, name, getattr(checked, name))
         prop.shade = bool(self.shade)
 
 
@@ -146,6 +169,29 @@ def transfer_function_from_arguments(
     return function.replace(unit_distance=None)
 
 
+@functools.cache  # one note is enough
+def note_mapper(mapper: str) -> None:
+    """Say that a name of VTK's mappers means nothing here, and refuse another."""
+    if mapper not in _MAPPERS:
+        raise InvalidArgumentTypeError(
+            f"mapper={mapper!r} is none of VTK's volume mappers, {', '.join(_MAPPERS)}; a VDI has "
+            "its own: leave it out"
+        )
+    warnings.warn(
+        f"mapper={mapper!r} chooses among VTK's volume mappers and is ignored: a VDI has its own",
+        VDIWarning,
+        stacklevel=3,
+    )
+
+
+def blending_name(mode: Any) -> str:
+    """Return a blending mode's name, as PyVista's mappers understand names and VTK's numbers."""
+    if not isinstance(mode, str | int):
+        raise InvalidArgumentTypeError(f"blending must be a name; got {mode!r}")
+    name = mode.lower() if isinstance(mode, str) else mode
+    return str(_BLENDING_NAMES.get(name, name))
+
+
 def _scalar_range(scalars: NDArray[Any], clim: float | ArrayLike | None) -> tuple[float, float]:
     if clim is None:
         values = np.asarray(scalars)
@@ -162,7 +208,7 @@ def _scalar_range(scalars: NDArray[Any], clim: float | ArrayLike | None) -> tupl
     try:
         low, high = (float(v) for v in clim)  # type: ignore[union-attr, arg-type]
     except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidArgumentError(
+        raise InvalidArgumentTypeError(
             f"clim must be one number or a pair (low, high); got {clim!r}"
         ) from error
     if not (np.isfinite(low) and np.isfinite(high) and low <= high):
@@ -178,13 +224,14 @@ def _color_map(cmap: Any) -> Any:
     except ModuleNotFoundError as error:
         raise MissingDependencyError(str(error)) from error
     except (TypeError, ValueError) as error:
+        kind = InvalidArgumentError if isinstance(error, ValueError) else InvalidArgumentTypeError
         hint = ""
         if isinstance(cmap, str):
             import matplotlib as mpl
 
             near = difflib.get_close_matches(cmap, list(mpl.colormaps), n=3)
             hint = f": did you mean {' or '.join(map(repr, near))}?" if near else ""
-        raise InvalidArgumentError(
+        raise kind(
             f"cmap={cmap!r} is no colour map (a name, a list of colour names, a matplotlib "
             f"colour map or a pyvista.LookupTable){hint}"
         ) from error
@@ -214,9 +261,9 @@ def _opacity_names(error: Exception) -> list[str]:
 
 def _checked_opacities(opacity: Any, n_colors: int) -> Any:
     try:
-        values = np.asarray(opacity, dtype=float)
+        values = np.asarray(opacity).astype(float, casting="same_kind")
     except (TypeError, ValueError) as error:
-        raise InvalidArgumentError(
+        raise InvalidArgumentTypeError(
             f"opacity must be a name, a number or an array of numbers; got {opacity!r}"
         ) from error
     if values.ndim == 0:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import functools
 import inspect
-import warnings
 import weakref
 from collections.abc import Callable, Mapping
 from typing import Any, Literal
@@ -17,13 +15,17 @@ from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet
 from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidArgumentTypeError,
+    UnsupportedError,
+)
 from pyvista_vdi.model.classification import DEFAULTS, Classification, refuse_unknown
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.blocks import add_blocks
-from pyvista_vdi.plotting.classify import Looks
+from pyvista_vdi.plotting.classify import Looks, blending_name, note_mapper
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.volumes import as_image, held
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, refuse_settings
@@ -40,9 +42,6 @@ from pyvista_vdi.vtk_pipeline.interaction.window_clock import checked_rate
 
 #: ``add_volume``'s aliases.
 _ALIASES = {"rng": "clim", "colormap": "cmap", "backface_culling": "culling"}
-
-#: ``add_volume``'s names of VTK's mappers.
-_MAPPERS = ("fixed_point", "gpu", "open_gl", "smart", "ugrid")
 
 #: SSIM by which a view may fall below what was asked for before it regenerates.
 _BELOW_GOAL = 0.02
@@ -78,7 +77,7 @@ class AddVDI:
         categories: bool | int = False,
         culling: bool | str = False,
         multi_colors: bool = False,
-        blending: str = "composite",
+        blending: str | int = "composite",
         mapper: str | None = None,
         scalar_bar_args: dict[str, Any] | None = None,
         show_scalar_bar: bool | None = None,
@@ -87,9 +86,9 @@ class AddVDI:
         preference: Literal["point", "cell"] = "point",
         opacity_unit_distance: float | None = None,
         shade: bool = False,
-        diffuse: float = 0.7,
-        specular: float = 0.2,
-        specular_power: float = 10.0,
+        diffuse: float | None = 0.7,
+        specular: float | None = 0.2,
+        specular_power: float | None = 10.0,
         render: bool | None = True,
         user_matrix: Any = None,
         log_scale: bool = False,
@@ -246,7 +245,8 @@ class AddVDI:
         Raises
         ------
         TypeError
-            If a keyword is unknown.
+            If a keyword is unknown. Other errors are, besides, those that ``add_volume`` raises: a
+            TypeError for a type that is not taken, a KeyError for an array that is not there.
         InvalidVolumeError, InvalidArgumentError, InvalidCameraError, InvalidVDIError
             If an argument cannot be used.
         UnsupportedError
@@ -270,7 +270,11 @@ class AddVDI:
         if plotter is None:
             raise InvalidArgumentError("the plotter of this add_vdi is gone: make another")
         if mapper is not None:
-            _note_mapper(mapper)
+            note_mapper(mapper)
+        if not isinstance(scalar_bar_args, Mapping | None):
+            raise InvalidArgumentTypeError(
+                f"scalar_bar_args must be a dictionary; got {scalar_bar_args!r}"
+            )
         if isinstance(volume, vtkMultiBlockDataSet):
             return add_blocks(self, volume, {**arguments, **aliases})
         if target_fps is not None:
@@ -308,6 +312,7 @@ class AddVDI:
             specular_power=specular_power,
         )
         get_runtime(device)  # a missing device is said here, not while a frame is drawn
+        blending = blending_name(blending)
         classified = {"scalars": scalars, "preference": preference, "blending": blending}
         changed = _changed({**classified, **vars(looks)}, DEFAULTS)
         shown: VDI | VDISource
@@ -433,20 +438,6 @@ _DEFAULTS = {
     for name, parameter in _signature.parameters.items()
     if name not in ("self", "aliases")
 }
-
-
-@functools.cache  # one note is enough
-def _note_mapper(mapper: str) -> None:
-    if mapper not in _MAPPERS:
-        raise InvalidArgumentError(
-            f"mapper={mapper!r} is none of VTK's volume mappers, {', '.join(_MAPPERS)}; a VDI has "
-            "its own: leave it out"
-        )
-    warnings.warn(
-        f"mapper={mapper!r} chooses among VTK's volume mappers and is ignored: a VDI has its own",
-        VDIWarning,
-        stacklevel=3,
-    )
 
 
 def _changed(given: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:

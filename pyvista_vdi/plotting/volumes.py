@@ -7,7 +7,12 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, UnsupportedError
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidVolumeError,
+    InvalidVolumeTypeError,
+    UnsupportedError,
+)
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.convert import to_image_data
 from pyvista_vdi.vtk_pipeline.filters.convert import require_image
@@ -69,7 +74,7 @@ def _with_values(image: Any, values: Any) -> pv.ImageData:
     if values.ndim == 2 and values.shape[1] in (3, 4) and not rgba:
         raise UnsupportedError(_rgba(values))
     if not np.issubdtype(values.dtype, np.number) and values.dtype != bool:
-        raise InvalidVolumeError(f"scalars must be numbers; got {values.dtype}")
+        raise InvalidVolumeTypeError(f"scalars must be numbers; got {values.dtype}")
     n_points, n_cells = image.GetNumberOfPoints(), image.GetNumberOfCells()
     if not (values.ndim == 1 or rgba) or len(values) not in (n_points, n_cells):
         raise InvalidVolumeError(

@@ -308,6 +308,23 @@ def test_nothing_that_a_file_says_reaches_the_terminal_raw(folder, capsys, tmp_p
     assert complaint(capsys, "info", tmp_path / "\x1b[2J.vdi").startswith(str(tmp_path))
 
 
+def test_no_zero_has_a_sign(capsys, tmp_path):
+    vdi = pvdi.VDI(
+        pvdi.Camera((-0.0, -0.0, 5), (0, 0, 0), (0, 1, 0)),
+        (1, 1),
+        [0, 0],
+        *([], [], np.empty((0, 3)), []),
+        (-1, 1, -1, 1, -1, -0.0),
+        depth_origin=-0.0,
+    )
+    vdi.save(tmp_path / "a.vdi")
+    status, out, _ = run(capsys, "info", tmp_path / "a.vdi")
+    assert status == 0
+    assert re.search(r"^depth origin +0$", out, re.MULTILINE)
+    assert re.search(r"^eye +\(0, 0, 5\)$", out, re.MULTILINE)
+    assert not re.search(r"-0\b(?!\.)", out)
+
+
 # -- verbs -----------------------------------------------------------------------------------------
 
 

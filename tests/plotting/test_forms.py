@@ -11,7 +11,7 @@ import pyvista as pv
 from plugin_scenes import LOOKS, add_judge, add_ours, assert_as_vtk, soft_ball
 
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
-from pyvista_vdi.plotting import component
+from pyvista_vdi.plotting import classify
 
 pytestmark = pytest.mark.gl
 
@@ -67,7 +67,7 @@ def test_blocks_within_blocks_and_none(plotter):
 
 
 def test_names_of_vtk_s_mappers_mean_nothing_and_are_noted_once(plotter):
-    component._note_mapper.cache_clear()
+    classify.note_mapper.cache_clear()
     with pytest.warns(VDIWarning, match="mapper='gpu' chooses among VTK's.*is ignored"):
         plotter.add_vdi(soft_ball(8), mapper="gpu", multi_colors=True, name="it", **LOOKS)
     named = shown(plotter)

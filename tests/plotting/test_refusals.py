@@ -340,3 +340,84 @@ def test_reader_refuses_unknown_options_and_says_what_is_wrong(tmp_path):
     if "kwargs" in inspect.signature(pv.read).parameters:  # PyVista 0.48 hands no options on
         with pytest.raises(errors.InvalidArgumentError, match="with the options none; got colour"):
             pv.read(path, colour=1)
+
+
+#: Arguments that ``add_volume`` refuses as well, each by a builtin that scripts catch.
+REFUSED_BY_BOTH = [
+    {"scalars": "w"},
+    {"scalars": np.full(N, "a")},
+    {"scalars": np.zeros(5)},
+    {"scalars": np.zeros((N, 3))},
+    {"clim": (1, 2, 3)},
+    {"clim": "wide"},
+    {"clim": (None, 1)},
+    {"opacity": None},
+    {"opacity": [None]},
+    {"opacity": ["a"]},
+    {"opacity": {"a": 1}},
+    {"opacity": "sigmoit"},
+    {"opacity": 1.5},
+    {"n_colors": 2.5},
+    {"n_colors": None},
+    {"cmap": 5},
+    {"cmap": ("red", "blue")},
+    {"cmap": "viridi"},
+    {"ambient": "a", "shade": True},
+    {"diffuse": "a", "shade": True},
+    {"opacity_unit_distance": "a"},
+    {"mapper": "cpu"},
+    {"blending": "brightest"},
+    {"blending": None},
+    {"culling": "sideways"},
+    {"scalar": "v"},
+    {"opcity": 1},
+    {"volume": None},
+    {"volume": "brain.nrrd"},
+    {"volume": [[[1.0]]]},
+    {"volume": pv.Sphere()},
+    {"volume": no_scalars()},
+]
+
+
+@pytest.mark.parametrize("arguments", REFUSED_BY_BOTH, ids=lambda a: repr(a)[:40])
+def test_errors_are_those_of_add_volume_too(plotter, arguments):
+    arguments = {"volume": VOLUME.copy(), **arguments}
+    raised = []
+    for add in (plotter.add_volume, plotter.add_vdi):
+        with pytest.raises(Exception) as caught:  # noqa: PT011 - which is compared below
+            add(**arguments)
+        raised.append(caught.value)
+    vtks, ours = raised
+    builtins = [kind for kind in (TypeError, KeyError, ValueError) if isinstance(vtks, kind)]
+    assert builtins, f"add_volume raises {vtks!r}"
+    assert isinstance(ours, tuple(builtins)), f"{ours!r} in place of {vtks!r}"
+    assert isinstance(ours, errors.VDIError) or "keyword" in str(ours) or "culling" in arguments
+    assert not str(ours).startswith(("'", '"')), "KeyError's quotes"
+
+
+def test_what_is_refused_is_named_as_it_was_given(plotter):
+    with pytest.raises(errors.InvalidArgumentTypeError, match="array of numbers; got None"):
+        plotter.add_vdi(VOLUME, opacity=None)
+    with pytest.raises(errors.InvalidArgumentTypeError, match="scalar_bar_args must.*'bar'"):
+        plotter.add_vdi(VOLUME, scalar_bar_args="bar")
+    assert not plotter.renderer.actors
+
+
+def test_coefficients_that_are_none_are_vtk_s(plotter):
+    names = ("ambient", "diffuse", "specular", "specular_power")
+    props = [
+        add(VOLUME.copy(), shade=True, **dict.fromkeys(names)).prop
+        for add in (plotter.add_volume, plotter.add_vdi)
+    ]
+    assert [getattr(props[0], n) for n in names] == [getattr(props[1], n) for n in names]
+
+
+@pytest.mark.parametrize("mode", ["Composite", "comp", 0])
+def test_composite_blending_has_pyvista_s_names(plotter, mode):
+    plotter.add_vdi(VOLUME, blending=mode)
+
+
+@pytest.mark.parametrize("mode", ["max", "Maximum", "maximum_intensity", 1])
+def test_other_blending_is_refused_by_any_of_its_names(plotter, mode):
+    with pytest.raises(errors.UnsupportedError, match="blending='maximum'"):
+        plotter.add_vdi(VOLUME, blending=mode)

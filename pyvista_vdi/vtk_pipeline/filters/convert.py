@@ -18,6 +18,8 @@ from pyvista_vdi.errors import (
     InvalidCameraError,
     InvalidVDIError,
     InvalidVolumeError,
+    InvalidVolumeTypeError,
+    UnknownArrayError,
     UnsupportedError,
 )
 from pyvista_vdi.model.camera import Camera
@@ -59,7 +61,7 @@ def require_image(data: Any) -> vtkImageData:
     if isinstance(data, vtkImageData):
         return data
     if not hasattr(data, "GetClassName"):
-        raise InvalidVolumeError(
+        raise InvalidVolumeTypeError(
             f"expected a vtkImageData or pyvista.ImageData; got {type(data).__name__}"
         )
     raise _refusal(type(data))
@@ -182,7 +184,7 @@ def scalars_of(image: vtkImageData, name: str | None, preference: str = "point")
     lower = {each.lower(): each for each in reversed(names)}
     near = [lower[m] for m in difflib.get_close_matches(str(name).lower(), list(lower), n=1)]
     hint = f"did you mean {near[0]!r}? Its" if near else "its"
-    raise InvalidVolumeError(f"the volume has no array {name!r}: {hint} arrays are {names}")
+    raise UnknownArrayError(f"the volume has no array {name!r}: {hint} arrays are {names}")
 
 
 def _array_names(attributes: dict[str, Any]) -> list[str]:
