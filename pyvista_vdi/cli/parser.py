@@ -183,7 +183,6 @@ def _add_paraview(parser: argparse.ArgumentParser) -> None:
     declare.option(parser, "--check", check, "PVPYTHON", nargs="?", const="pvpython")
 
 
-
 def _add_render(parser: argparse.ArgumentParser) -> None:
     declare.option(
         parser,

@@ -15,7 +15,8 @@ from typing import Any
 
 from paraview.util.vtkAlgorithm import smdomain, smhint, smproperty, smproxy
 from vtkmodules.vtkCommonCore import vtkOutputWindow
-from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
+from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData, vtkPiecewiseFunction
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
 
 try:
@@ -31,7 +32,7 @@ from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, watch
-from pyvista_vdi.vtk_pipeline.filters.convert import scalars_of, volume_from_vtk
+from pyvista_vdi.vtk_pipeline.filters.convert import require_image, scalars_of, volume_from_vtk
 
 #: What ParaView's plugin manager shows.
 paraview_plugin_name = "VDI"
@@ -366,8 +367,10 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
         return int(super().RequestInformation(request, inputs, outputs))
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
+        # A script may connect what ParaView's menus do not offer
+        image = require_image(vtkDataObject.GetData(inputs[0], 0))
         self._set_view()
-        self._set_looks(vtkImageData.GetData(inputs[0], 0))
+        self._set_looks(image)
         super()._execute(inputs, outputs)
 
     def _set_view(self) -> None:
@@ -409,7 +412,7 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
 
 
 @smproxy.filter(name="VDIToImage", label="VDI To Image", support_reload=False)
-@smhint.xml('<ShowInMenu category="VDI" />')
+@smhint.xml('<ShowInMenu category="VDI" /><RepresentationType view="RenderView" type="Slice" />')
 @smproperty.xml(
     _VIEW_XML.format(default="The VDI's own", size="0 0", least=0, note="0: the VDI's own.")
     + _DEVICE_XML
@@ -419,9 +422,26 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
 class VDIToImage(_Looking, vtk_pipeline.VDIToImage):
     """A picture of a VDI: :class:`pyvista_vdi.vtk_pipeline.VDIToImage`."""
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._shown: set[str] = set()
+        self._watching = False
+
     def _execute(self, inputs: Any, outputs: Any) -> None:
         self.SetCamera(self._given_camera())
         super()._execute(inputs, outputs)
+        if not self._watching:
+            self._watching = _Client.watch(self, "RegisterEvent", VDIToImage._show_as_it_is)
+
+    def _show_as_it_is(self) -> None:
+        """Turn off *Map Scalars*, once, wherever the picture has just been shown."""
+        client = _Client.of(self, silent=True)
+        for name, representation in client.representations() if client else ():
+            mapped = representation.GetProperty("MapScalars")
+            if name not in self._shown and mapped is not None:
+                self._shown.add(name)
+                mapped.SetElement(0, 0)
+                representation.UpdateVTKObjects()
 
 
 @smproxy.reader(
@@ -432,15 +452,62 @@ class VDIToImage(_Looking, vtk_pipeline.VDIToImage):
     support_reload=False,
 )
 @smproperty.xml(
-    """<StringVectorProperty name="FileName" command="SetFileName" number_of_elements="1"
+    """<StringVectorProperty name="FileName" command="AddFileName" repeat_command="1"
+                             clean_command="ClearFileNames" number_of_elements="0"
                              animateable="0" panel_visibility="never">
          <FileListDomain name="files" />
          <Hints><FileChooser extensions="vdi exr" file_description="Volumetric Depth Image" />
          </Hints>
-       </StringVectorProperty>"""
+       </StringVectorProperty>
+       <DoubleVectorProperty name="TimestepValues" command="GetTimestepValues" repeatable="1"
+                             information_only="1" si_class="vtkSITimeStepsProperty">
+         <TimeStepsInformationHelper />
+       </DoubleVectorProperty>"""
 )
 class VDIReader(vtk_pipeline.VDIReader):
-    """A VDI from a file: :class:`pyvista_vdi.vtk_pipeline.VDIReader`."""
+    """VDIs from files, one per time step: :class:`pyvista_vdi.vtk_pipeline.VDIReader`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._series: list[str] = []
+
+    def AddFileName(self, path: str) -> None:
+        """Append a file, the next time step."""
+        self._series.append(path)
+        self.SetFileName(self._series[0])
+        self.Modified()
+
+    def ClearFileNames(self) -> None:
+        """Begin anew."""
+        self._series.clear()
+        self.SetFileName(None)
+
+    def GetTimestepValues(self) -> list[float] | None:
+        """Return the time of each file, its place in the series; ``None`` for one file."""
+        return [float(i) for i in range(len(self._series))] if len(self._series) > 1 else None
+
+    def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Announce the extent and the times."""
+        pipeline = vtkStreamingDemandDrivenPipeline
+        information, times = outputs.GetInformationObject(0), self.GetTimestepValues()
+        if times is None:
+            information.Remove(pipeline.TIME_STEPS())
+            information.Remove(pipeline.TIME_RANGE())
+        else:
+            information.Set(pipeline.TIME_STEPS(), times, len(times))
+            information.Set(pipeline.TIME_RANGE(), [times[0], times[-1]], 2)
+        return int(super().RequestInformation(request, inputs, outputs))
+
+    def _execute(self, inputs: Any, outputs: Any) -> None:
+        key = vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
+        information = outputs.GetInformationObject(0)
+        time = information.Get(key) if information.Has(key) else 0.0
+        if self._series:  # the last file that is not after the time
+            self._path = self._series[min(max(int(time), 0), len(self._series) - 1)]
+        super()._execute(inputs, outputs)
+        if len(self._series) > 1:
+            image = vtkImageData.GetData(outputs, 0)
+            image.GetInformation().Set(vtkDataObject.DATA_TIME_STEP(), time)
 
 
 @smproxy.writer(
@@ -475,20 +542,44 @@ class _Client:
         self.manager = manager
         self.proxy = proxy
 
-    @classmethod
-    def of(cls, algorithm: Any) -> _Client | None:
-        """Return the client side, or ``None`` after having said why there is none."""
+    @staticmethod
+    def _manager() -> Any:
         from paraview.modules.vtkRemotingServerManager import vtkSMProxyManager
 
-        manager: Any = None
-        if vtkSMProxyManager.IsInitialized():
-            manager = vtkSMProxyManager.GetProxyManager().GetActiveSessionProxyManager()
+        if not vtkSMProxyManager.IsInitialized():
+            return None
+        return vtkSMProxyManager.GetProxyManager().GetActiveSessionProxyManager()
+
+    @classmethod
+    def of(cls, algorithm: Any, *, silent: bool = False) -> _Client | None:
+        """Return the client side, or ``None`` after having said why there is none."""
+        manager = cls._manager()
         for i in range(manager.GetNumberOfProxies("sources") if manager else 0):
             proxy = manager.GetProxy("sources", manager.GetProxyName("sources", i))
             if proxy.GetClientSideObject() is algorithm:
                 return cls(manager, proxy)
-        _say(algorithm, "client and server are two processes: set the properties from the client")
+        if not silent:
+            problem = "client and server are two processes: set the properties from the client"
+            _say(algorithm, problem)
         return None
+
+    @classmethod
+    def watch(cls, algorithm: Any, event: str, changed: Callable[[Any], None]) -> bool:
+        """Call ``changed(algorithm)`` at an event of the manager; return whether there is one."""
+        manager = cls._manager()
+        return manager is not None and bool(watch(manager, algorithm, changed, event))
+
+    def representations(self) -> list[tuple[str, Any]]:
+        """Return the names and proxies of what shows the algorithm's output in views."""
+        found = []
+        for i in range(self.manager.GetNumberOfProxies("representations")):
+            name = self.manager.GetProxyName("representations", i)
+            proxy = self.manager.GetProxy("representations", name)
+            source = proxy.GetProperty("Input")
+            inputs = source.GetNumberOfProxies() if source is not None else 0
+            if inputs and source.GetProxy(0) is self.proxy:
+                found.append((name, proxy))
+        return found
 
     def values(self, name: str, proxy: Any = None) -> list[Any]:
         """Return a property's values, of this algorithm or of another proxy."""

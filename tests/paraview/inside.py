@@ -207,6 +207,36 @@ def settings(folder):
     (folder / "settings.json").write_text(json.dumps(found))
 
 
+def series(folder):
+    """Write three VDIs, open them as one series, and show each step."""
+    source = simple.VDISource(Input=simple.Wavelet(), WindowSize=[60, 40])
+    for step, longest in enumerate((3, 5, 9)):
+        source.MaxSupersegments = longest
+        simple.SaveData(str(folder / f"x_{step}.vdi"), source)
+    reader = simple.OpenDataFile([str(folder / f"x_{step}.vdi") for step in range(3)])
+    picture = simple.VDIToImage(Input=reader, Azimuth=30)
+    view = black_view((60, 40))
+    shown = simple.Show(picture, view)
+    found = {
+        "times": list(reader.TimestepValues),
+        "shown": [shown.Representation.GetData(), list(shown.ColorArrayName), shown.MapScalars],
+        "longest": [],
+    }
+    scene = simple.GetAnimationScene()
+    scene.UpdateAnimationUsingDataTimeSteps()
+    for time in range(3):
+        scene.AnimationTime = time
+        simple.Render(view)
+        found["longest"].append(int(vdi_from_image(fetched(reader)).counts.max()))
+        save_pixels(picture, folder / f"step_{time}.npy")
+    shown.MapScalars = 1  # stays as it is set
+    simple.Show(reader, simple.CreateRenderView())
+    found["set by hand"] = shown.MapScalars
+    one = simple.OpenDataFile(str(folder / "x_1.vdi"))
+    found["times of one"] = list(one.TimestepValues)
+    (folder / "series.json").write_text(json.dumps(found))
+
+
 def mistakes(folder):
     """Do what cannot be done; ParaView says why, and goes on."""
     source = simple.VDISource(Input=simple.Wavelet())
@@ -215,6 +245,8 @@ def mistakes(folder):
     source.CameraPosition = source.CameraFocalPoint = [1, 2, 3]
     source.UpdatePipeline()
     empty = source.GetDataInformation().GetNumberOfPoints()
+    clipped = simple.VDISource(Input=simple.Clip(Input=source.Input))
+    clipped.UpdatePipeline()
     source.View = 0
     source.UpdatePipeline()
     full = source.GetDataInformation().GetNumberOfPoints()

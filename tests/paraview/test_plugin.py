@@ -125,7 +125,7 @@ def volume_property(scene):
 
 
 def test_pips_driver_is_found(paraview, tmp_path):
-    """ParaView has loaded the system's OpenCL loader, and hwloc has asked it, before Python runs."""
+    """ParaView has loaded the system's OpenCL loader, and hwloc has asked it, before Python."""
     site = Path(os.environ[FOLDER_VARIABLE])
     if not (site / "lib" / INTEL_LIBRARY).is_file():
         pytest.skip(f"{site} was made without the extra cpu")
@@ -222,6 +222,22 @@ def test_settings_reach_the_vdi(paraview, tmp_path):
     assert camera["parallel_scale"] == pytest.approx(50 * 72 / 40)
 
 
+def test_a_series_is_one_source_with_time_steps(paraview, tmp_path, default_runtime):
+    paraview("series", tmp_path)
+    found = json.loads((tmp_path / "series.json").read_text())
+    assert found["times"] == [0, 1, 2]
+    assert found["times of one"] == []
+    assert found["longest"] == [3, 5, 9]
+    # Colours are shown as they are, without a table, until somebody wants one
+    assert found["shown"] == ["Slice", ["POINTS", "RGBA"], 0]
+    assert found["set by hand"] == 1
+    for step in range(3):
+        vdi = pvdi.read(tmp_path / f"x_{step}.vdi")
+        expected = pvdi.render(vdi, vdi.camera.azimuth(30))
+        apart = np.abs(pixels(tmp_path / f"step_{step}.npy", (60, 40)) - expected).max(axis=2)
+        assert (apart > ROUNDING).mean() <= SHARE_OF_BORDER_PIXELS
+
+
 def test_mistakes_are_said_and_nothing_breaks(paraview, tmp_path):
     said = paraview("mistakes", tmp_path)
     assert json.loads((tmp_path / "mistakes.json").read_text()) == [0, 30 * 20]
@@ -229,7 +245,9 @@ def test_mistakes_are_said_and_nothing_breaks(paraview, tmp_path):
     assert "VDIToImage: this vtkImageData is not a VDI" in said
     assert f"VDIReader: {tmp_path}/absent.vdi cannot be read" in said
     assert f"VDIWriter: {tmp_path}/no folder/x.vdi cannot be written" in said
-    assert len(said.splitlines()) == 4
+    assert "VDISource: a vtkUnstructuredGrid is not a uniform grid" in said
+    assert "Resample To Image" in said
+    assert len(said.splitlines()) == 5
 
 
 def test_paraviews_own_python_bears_our_numpy(paraview, tmp_path):

@@ -135,7 +135,9 @@ def pair(
     return set_it, get_it
 
 
-def watch(thing: Any, algorithm: Any, changed: Callable[[Any], None]) -> int:
+def watch(
+    thing: Any, algorithm: Any, changed: Callable[[Any], None], event: str = "ModifiedEvent"
+) -> int:
     """Call ``changed(algorithm)`` when a VTK object is modified, which does not keep the algorithm.
 
     Returns the observer's tag.
@@ -148,7 +150,7 @@ def watch(thing: Any, algorithm: Any, changed: Callable[[Any], None]) -> int:
         if found is not None:
             changed(found)
 
-    return int(thing.AddObserver("ModifiedEvent", modified))
+    return int(thing.AddObserver(event, modified))
 
 
 def whole_extent(information: Any) -> tuple[int, ...] | None:

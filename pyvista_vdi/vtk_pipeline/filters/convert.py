@@ -41,7 +41,10 @@ FORM_VERSION = 1
 #: Ragged arrays in field data, with their number of components.
 _RAGGED = {"front": 1, "back": 1, "color": 3, "optical_depth": 1}
 
-_RESAMPLE = "resample it: pyvista.ImageData(...).sample(grid), or vtkResampleToImage"
+_RESAMPLE = (
+    "resample it: pyvista.ImageData(...).sample(grid), or vtkResampleToImage (in ParaView the "
+    "filter Resample To Image)"
+)
 
 #: What to do with data sets that are not uniform grids.
 _REMEDIES = {
