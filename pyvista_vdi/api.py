@@ -103,7 +103,7 @@ def generate(
         What a supersegment takes on devices and in files, see :meth:`VDI.with_precision`.
     quality : {"reference", "high", "balanced", "fast"}, optional
         Choose the settings by how good pictures are to be: an SSIM of 0.98, 0.96 or 0.93 against
-        volume rendering. ``"reference"`` is what is made where nothing is given. The dial, which
+        volume rendering, and with the first two no squares of lists. ``"reference"`` is what is made where nothing is given. The dial, which
         is this argument and the four below, measures the scene on the device, once, and then
         chooses the lists of the window, ``max_supersegments`` and ``precision``, so that these
         and ``tolerance`` cannot be given as well. ``window_size`` is then that of the pictures,
