@@ -103,12 +103,13 @@ def generate(
         What a supersegment takes on devices and in files, see :meth:`VDI.with_precision`.
     quality : {"reference", "high", "balanced", "fast"}, optional
         Choose the settings by how good pictures are to be: an SSIM of 0.98, 0.96 or 0.93 against
-        volume rendering, and with the first two no squares of lists. ``"reference"`` is what is made where nothing is given. The dial, which
-        is this argument and the four below, measures the scene on the device, once, and then
-        chooses the lists of the window, ``max_supersegments`` and ``precision``, so that these
-        and ``tolerance`` cannot be given as well. ``window_size`` is then that of the pictures,
-        and the VDI's own may be smaller or larger. ``vdi.metadata["dial"]`` says what was chosen
-        and what it is predicted to give; docs/dial.md, how well.
+        volume rendering, and with the first two no squares of lists. ``"reference"`` is what is
+        made where nothing is given. The dial, which is this argument and the four below, measures
+        the scene on the device, once, and then chooses the lists of the window,
+        ``max_supersegments`` and ``precision``, so that these and ``tolerance`` cannot be given as
+        well. ``window_size`` is then that of the pictures, and the VDI's own may be smaller or
+        larger. ``vdi.metadata["dial"]`` says what was chosen and what it is predicted to give;
+        docs/dial.md, how well.
     target_ssim : float, optional
         The same by a number, 0 to 1, in place of ``quality``.
     target_fps : float, optional
