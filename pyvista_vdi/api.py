@@ -531,7 +531,8 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
     **options
         For ``.exr`` files of other programs: ``camera``, the view that the image shows, where
         the file does not say it; ``thickness``, world units, given to samples that have none
-        (surfaces).
+        (surfaces); ``linear``, whether the colours are linear light. For all files ``progress``,
+        called with the finished fraction, 0 to 1.
 
     Returns
     -------

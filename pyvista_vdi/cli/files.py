@@ -45,14 +45,16 @@ def info(options: argparse.Namespace) -> int:
 def convert(options: argparse.Namespace) -> int:
     """Read a VDI and write it in the format of another name."""
     from pyvista_vdi.api import read
-    from pyvista_vdi.cli.inputs import file_options, given_camera, say_vdi
+    from pyvista_vdi.cli.inputs import file_options, given_camera, measuring, part, say_vdi
     from pyvista_vdi.io import checked_target
 
     target = checked_target(options.output)
     file_arguments = file_options(options)
     foreign = {"camera": given_camera(options), "thickness": options.thickness}
-    vdi = read(options.file, **{name: v for name, v in foreign.items() if v is not None})
-    vdi.save(target, **file_arguments)
+    given = {name: value for name, value in foreign.items() if value is not None}
+    with measuring("converting") as bar:
+        vdi = read(options.file, progress=part(bar, 0.0, 0.5, "reading"), **given)
+        vdi.save(target, progress=part(bar, 0.5, 1.0, "writing"), **file_arguments)
     say_vdi(options, vdi)
     return 0
 

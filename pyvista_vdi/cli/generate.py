@@ -80,7 +80,8 @@ def generate(options: argparse.Namespace) -> int:
             **arguments,
         )
     seconds = time.perf_counter() - start
-    vdi.save(target, **file_arguments)
+    with measuring("writing it") as bar:
+        vdi.save(target, progress=bar, **file_arguments)
     say_vdi(options, vdi, f", {seconds:.1f} s")
     chosen = describe(vdi.metadata)
     if chosen is not None:

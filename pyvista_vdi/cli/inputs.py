@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any, TypeVar
 
 from pyvista_vdi.cli.text import mebibytes, printable
@@ -24,6 +25,10 @@ from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.progress import DelayedBar
 
 _T = TypeVar("_T")
+
+#: Seconds between two looks of a bar at the clock.
+_PULSE = 0.5
+
 
 #: Options that are arguments of the same name, given only if the user gave them.
 _CLASSIFICATION = (
@@ -119,9 +124,16 @@ def require_new(path: Path, options: argparse.Namespace) -> None:
 
 @contextmanager
 def measuring(label: str, results: Path | None = None) -> Iterator[DelayedBar]:
-    """Show a bar; after Ctrl-C say what ``--resume`` can go on with."""
-    bar = DelayedBar(label=label)
+    """Show a bar that is alive; after Ctrl-C say what ``--resume`` can go on with."""
+    bar, finished = DelayedBar(label=label), Event()
+
+    def pulse() -> None:
+        while not finished.wait(_PULSE):
+            bar.pulse()
+
+    pulsing = Thread(target=pulse, daemon=True)
     try:
+        pulsing.start()
         yield bar
     except KeyboardInterrupt:
         if results is not None and results.exists():
@@ -131,7 +143,14 @@ def measuring(label: str, results: Path | None = None) -> Iterator[DelayedBar]:
             )
         raise
     finally:
+        finished.set()
         bar.close()
+
+
+def part(bar: DelayedBar, first: float, last: float, doing: str) -> Callable[[float], None]:
+    """Return what shows a part of the work on its part of a bar."""
+    bar(first, doing)
+    return lambda fraction: bar(first + fraction * (last - first), doing)
 
 
 def say_written(files: Iterable[Path]) -> None:

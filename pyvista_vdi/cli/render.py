@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 import warnings
 from typing import Any
 
@@ -10,9 +12,9 @@ import numpy as np
 
 from pyvista_vdi.api import read
 from pyvista_vdi.api import render as render_vdi
-from pyvista_vdi.cli.inputs import camera, classification, is_volume, read_volume
+from pyvista_vdi.cli.inputs import camera, classification, is_volume, measuring, part, read_volume
 from pyvista_vdi.cli.text import printable
-from pyvista_vdi.errors import VDIWarning
+from pyvista_vdi.errors import UnsupportedError, VDIWarning
 from pyvista_vdi.io import checked_png_target, to_bytes, write_png
 from pyvista_vdi.measure.vtk_baselines import aim
 from pyvista_vdi.model.camera import Camera
@@ -21,23 +23,30 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.imports import import_pyvista
 
+#: VTK's windows that are on no screen.
+_OFF_SCREEN_WINDOWS = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
+
 
 def render(options: argparse.Namespace) -> int:
     """Render a VDI from a new view and write the picture."""
     target = checked_png_target(options.output)
-    vdis = [read(file) for file in options.files]
-    first = vdis[0]
-    view = camera(options, first.camera)
-    several = len(vdis) > 1
-    transforms = [vdi.camera.model_transform for vdi in vdis]
-    image = render_vdi(
-        vdis if several else first,
-        view,
-        options.size or first.picture_size,
-        model_transforms=transforms if several else None,
-        transmittance_cutoff=options.transmittance_cutoff,
-        device=options.device,
-    )
+    vdis, share = [], 0.5 / len(options.files)
+    with measuring("rendering") as bar:
+        for k, file in enumerate(options.files):
+            vdis.append(read(file, progress=part(bar, k * share, (k + 1) * share, "reading")))
+        bar(0.5, "drawing")
+        first = vdis[0]
+        view = camera(options, first.camera)
+        several = len(vdis) > 1
+        transforms = [vdi.camera.model_transform for vdi in vdis]
+        image = render_vdi(
+            vdis if several else first,
+            view,
+            options.size or first.picture_size,
+            model_transforms=transforms if several else None,
+            transmittance_cutoff=options.transmittance_cutoff,
+            device=options.device,
+        )
     write_png(to_bytes(image, options.background), target)
     print(f"{printable(options.output)}: {image.shape[1]} x {image.shape[0]}")
     return 0
@@ -46,6 +55,8 @@ def render(options: argparse.Namespace) -> int:
 def view(options: argparse.Namespace) -> int:
     """Open a plotter on a VDI, or write what it shows."""
     screenshot = options.screenshot and str(checked_png_target(options.screenshot))
+    if screenshot is None:
+        _require_screen()
     if is_volume(options):
         looks = classification(options)
         volume = read_volume(options)
@@ -58,6 +69,26 @@ def view(options: argparse.Namespace) -> int:
     if screenshot is not None:
         print(f"{printable(options.screenshot)}: written")
     return 0
+
+
+def _require_screen() -> None:
+    """Refuse where VTK would draw a window that nobody can see, and return from it at once."""
+    from vtkmodules.vtkRenderingCore import vtkRenderWindow
+
+    if not sys.platform.startswith("linux"):
+        return
+    display, trouble = os.environ.get("DISPLAY"), ""
+    if not display:
+        trouble = "DISPLAY names no X display"
+    elif (kind := vtkRenderWindow().GetClassName()) in _OFF_SCREEN_WINDOWS:
+        trouble = (
+            f"VTK draws in a {kind}, off-screen: the display {display} cannot be reached, or "
+            "VTK_DEFAULT_OPENGL_WINDOW asks for it"
+        )
+    if trouble:
+        raise UnsupportedError(
+            f"no window can be opened: {trouble}; write a picture instead: --screenshot FILE.png"
+        )
 
 
 def _show(

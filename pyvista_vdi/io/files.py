@@ -9,6 +9,7 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDIFileError
 from pyvista_vdi.io.deep_exr import files as exr
+from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import layout, reader, writer
 from pyvista_vdi.io.vdi_file.chunks import CODECS
 from pyvista_vdi.io.vdi_file.reader import FileInfo
@@ -24,7 +25,13 @@ SUFFIXES = (layout.SUFFIX, exr.SUFFIX, VTI_SUFFIX)
 _VTI_COMPRESSIONS = ("lz4", "zlib", "lzma", "none")
 
 
-def write(vdi: VDI, path: str | os.PathLike[str], **options: Any) -> Path:
+def write(
+    vdi: VDI,
+    path: str | os.PathLike[str],
+    *,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Path:
     """Write a VDI to a file, as ``.vdi``, as an OpenEXR deep image or as VTK's image.
 
     The file appears whole or not at all: it is written under a temporary name in the same folder
@@ -36,6 +43,9 @@ def write(vdi: VDI, path: str | os.PathLike[str], **options: Any) -> Path:
         What to write.
     path : path-like
         The target; its name ends in ``.vdi``, ``.exr`` or ``.vti``.
+    progress : callable, optional
+        Called with the finished fraction, 0 to 1; when it returns False, nothing is written. VTK
+        does not say how far it is: of ``.vti`` with 1 alone.
     **options
         ``compression`` and ``level`` for all; ``precision`` for ``.vdi``; ``exact`` and
         ``linear`` for ``.exr``. See
@@ -53,6 +63,8 @@ def write(vdi: VDI, path: str | os.PathLike[str], **options: Any) -> Path:
         If the target cannot be written, or the metadata hold what JSON cannot.
     InvalidArgumentError
         If an option is unknown or out of its range.
+    Cancelled
+        If ``progress`` returned False.
     MissingDependencyError
         If VTK is not installed and the name ends in ``.vti``.
 
@@ -63,19 +75,23 @@ def write(vdi: VDI, path: str | os.PathLike[str], **options: Any) -> Path:
     target = checked_target(path)
     check_write_options(target, options)
     if _is_exr(target):
-        return exr.write(vdi, target, **options)
+        return exr.write(vdi, target, progress=progress, **options)
     if _is_vti(target):
-        return _vti().write(vdi, target, **options)  # type: ignore[no-any-return]
-    return writer.write(vdi, target, **options)
+        written: Path = _vti().write(vdi, target, **options)
+        Pieces(progress, 1)()
+        return written
+    return writer.write(vdi, target, progress=progress, **options)
 
 
-def read(path: str | os.PathLike[str], **options: Any) -> VDI:
+def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **options: Any) -> VDI:
     """Read a VDI from a ``.vdi`` file, an OpenEXR deep image or VTK's image file.
 
     Parameters
     ----------
     path : path-like
         The file; a name that ends in ``.exr`` makes it an OpenEXR file, ``.vti`` one of VTK.
+    progress : callable, optional
+        As for :func:`write`.
     **options
         ``camera``, ``thickness`` and ``linear`` for ``.exr``: see
         :func:`pyvista_vdi.io.deep_exr.files.read`.
@@ -92,14 +108,20 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
         says which and what can be done.
     InvalidArgumentError
         If an option is unknown.
+    Cancelled
+        If ``progress`` returned False.
     MissingDependencyError
         If VTK is not installed and the name ends in ``.vti``.
     """
     if _is_exr(path):
         _check_names("read", path, options, ("camera", "thickness", "linear"))
-        return exr.read(path, **options)
+        return exr.read(path, progress=progress, **options)
     _check_names("read", path, options, ())
-    return _vti().read(path) if _is_vti(path) else reader.read(path)
+    if _is_vti(path):
+        vdi: VDI = _vti().read(path)
+        Pieces(progress, 1)()
+        return vdi
+    return reader.read(path, progress=progress)
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:

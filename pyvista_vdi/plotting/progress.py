@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable
+from threading import RLock
 from typing import Any
 
 from tqdm import tqdm
@@ -19,32 +21,43 @@ class DelayedBar:
         self._label = label
         self._disable = False if always else None  # None: tqdm asks whether it is a terminal
         self._bar: Any = None
+        self._began = 0.0
+        self._lock = RLock()
 
     def __call__(self, fraction: float, doing: str | None = None) -> None:
         """Show the fraction done, 0 to 1, and what is being done."""
-        if self._bar is not None and fraction < self._bar.n:
-            self.close()  # the work before was given up
-        if self._bar is None:
-            self._bar = tqdm(
-                total=1.0,
-                desc=self._label,
-                delay=PATIENCE,
-                disable=self._disable,
-                file=sys.stderr,
-                leave=False,
-                bar_format="{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}",
-            )
-        if doing is not None:
-            self._bar.set_description_str(f"{self._label}: {doing}", refresh=False)
-        self._bar.update(fraction - self._bar.n)
-        if fraction >= 1.0:
-            self.close()
+        with self._lock:
+            if self._bar is not None and fraction < self._bar.n:
+                self.close()  # the work before was given up
+            if self._bar is None:
+                self._began = time.monotonic()
+                self._bar = tqdm(
+                    total=1.0,
+                    desc=self._label,
+                    delay=PATIENCE,
+                    disable=self._disable,
+                    file=sys.stderr,
+                    leave=False,
+                    bar_format="{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}",
+                )
+            if doing is not None:
+                self._bar.set_description_str(f"{self._label}: {doing}", refresh=False)
+            self._bar.update(fraction - self._bar.n)
+            if fraction >= 1.0:
+                self.close()
+
+    def pulse(self) -> None:
+        """Show the time that has passed, where work does not say how far it is; from any thread."""
+        with self._lock:
+            if self._bar is not None and time.monotonic() - self._began >= PATIENCE:
+                self._bar.refresh()
 
     def close(self) -> None:
         """Take the bar away."""
-        if self._bar is not None:
-            self._bar.close()
-            self._bar = None
+        with self._lock:
+            if self._bar is not None:
+                self._bar.close()
+                self._bar = None
 
 
 def progress_callback(

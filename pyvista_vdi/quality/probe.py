@@ -10,6 +10,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,8 @@ TILE_SIZE = 32
 _PART_OVERHEAD = 8000
 #: Frames of the rough VDI that are timed; the shortest counts.
 _FRAMES = 2
+#: The share of the work that measuring is taken for, and the parts that it reports.
+_MEASURING, _PARTS = 0.5, 4
 #: Scenes that are remembered.
 _REMEMBERED = 32
 
@@ -82,10 +85,11 @@ def generate_by_dial(
     options = GenerationOptions.of(options, changes)
     if dial is not None:
         scene = (volume, camera, window_size, transfer_function)
-        choice = choose(*scene, dial, options, device=device, progress=progress)
+        choice = choose(*scene, dial, options, device=device, progress=_counted(progress))
         window_size = choice.prediction.window_size
         options = choice.prediction.setting.applied_to(options)
         metadata = {**(metadata or {}), "dial": choice.to_dict()}
+        progress = _rest(progress)
     return generate_vdi(
         volume,
         camera,
@@ -96,6 +100,21 @@ def generate_by_dial(
         progress=progress,
         metadata=metadata,
     )
+
+
+def _counted(progress: Progress | None) -> Progress | None:
+    """Return what reports parts of a measurement as parts of the whole work."""
+    if progress is None:
+        return None
+    parts = count()
+    return lambda _: progress(_MEASURING * min(1.0, next(parts) / _PARTS))
+
+
+def _rest(progress: Progress | None) -> Progress | None:
+    """Return what reports a generation as the rest of the work, behind the measurement."""
+    if progress is None:
+        return None
+    return lambda fraction: progress(_MEASURING + (1 - _MEASURING) * fraction)
 
 
 def choose(

@@ -494,7 +494,17 @@ def test_a_choice_can_be_cancelled(default_runtime):
         generated(
             default_runtime, quality="fast", progress=lambda f: seen.append(f) or len(seen) < 3
         )
-    assert seen == [0.0] * 3
+    assert seen == [0.0, 0.125, 0.25]
+
+
+def test_a_bar_moves_while_it_measures_and_while_it_generates(default_runtime):
+    dial_measurement.forget()
+    seen = []
+    generated(default_runtime, quality="fast", progress=seen.append)
+    assert seen == sorted(seen)
+    assert sum(0 < fraction < 0.5 for fraction in seen) >= 2
+    assert 0.5 in seen
+    assert seen[-1] == 1.0
 
 
 def test_a_volume_out_of_view_is_made_as_cheaply_as_can_be(default_runtime):

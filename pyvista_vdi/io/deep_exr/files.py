@@ -51,6 +51,7 @@ from pyvista_vdi.io.deep_exr.record import (
 )
 from pyvista_vdi.io.deep_exr.samples import media
 from pyvista_vdi.io.deep_exr.view import bounds_of_lists, camera_from_matrices, view_matrices
+from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.whole_file import whole_file
 from pyvista_vdi.model.camera import Camera
@@ -82,6 +83,7 @@ def write(
     level: int = 1,
     exact: bool = True,
     linear: bool = False,
+    progress: Progress | None = None,
 ) -> Path:
     """Write a VDI as an OpenEXR deep scan line image: see :func:`pyvista_vdi.io.write`.
 
@@ -101,6 +103,8 @@ def write(
         Write colours as linear light (sRGB's curve undone), which compositing programs take them
         for, instead of as a display takes them. The file says so, and reading it gives back the
         VDI's colours.
+    progress : callable, optional
+        As for :func:`pyvista_vdi.io.write`.
     """
     offset = _depth_offset(vdi)
     names = channel_names(exact, offset)
@@ -123,6 +127,7 @@ def write(
             _attributes(vdi, offset, record_text(vdi, offset, exact, linear, checksums), linear),
             compression=compression,
             level=level,
+            progress=progress,
         )
     return Path(os.path.realpath(path))
 
@@ -133,6 +138,7 @@ def read(
     camera: Any = None,
     thickness: float | None = None,
     linear: bool | None = None,
+    progress: Progress | None = None,
 ) -> VDI:
     """Read a VDI from an OpenEXR deep image: see :func:`pyvista_vdi.read`.
 
@@ -147,6 +153,8 @@ def read(
     linear : bool, optional
         Whether the colours are linear light, to be shown by sRGB's curve; by default what the
         file says where it is one of ours, and of others no.
+    progress : callable, optional
+        As for :func:`pyvista_vdi.io.write`.
 
     Warns
     -----
@@ -155,7 +163,7 @@ def read(
         file has more deep parts than the one that is read.
     """
     with np.errstate(invalid="ignore"):  # a signalling NaN is refused as any other
-        return _File(path).vdi(camera, thickness, linear)
+        return _File(path, progress).vdi(camera, thickness, linear)
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:
@@ -223,12 +231,12 @@ def _depth(relative: NDArray[np.float32], offset: float) -> NDArray[np.float32]:
 class _File:
     """A deep image that has been read; says what it holds."""
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], progress: Progress | None = None) -> None:
         try:
             self._path = Path(path)
         except TypeError as error:
             raise VDIFileError(f"a file's name is a path; got {type(path).__name__}") from error
-        self._image = self._read_image()
+        self._image = self._read_image(progress)
         self._record = self._read_record()
         self._changed = self._record.changed(self._image) if self._record else ()
 
@@ -265,10 +273,10 @@ class _File:
 
     # -- what is in the file ---------------------------------------------------------------------
 
-    def _read_image(self) -> DeepImage:
+    def _read_image(self, progress: Progress | None) -> DeepImage:
         wanted = {*STANDARD, *OURS}
         try:
-            image = read_image(self._path, wanted.__contains__)
+            image = read_image(self._path, wanted.__contains__, progress)
         except OtherFormError as error:
             from pyvista_vdi.io.deep_exr.package import read_by_package
 

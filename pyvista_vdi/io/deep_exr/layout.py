@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import VDIFileError
+from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.model.camera import MAX_WINDOW_EDGE
 
 #: The first four bytes of every OpenEXR file.
@@ -108,6 +109,7 @@ def write_image(
     *,
     compression: str,
     level: int,
+    progress: Progress | None = None,
 ) -> None:
     """Write a deep scan line image.
 
@@ -127,6 +129,8 @@ def write_image(
         One of :data:`COMPRESSIONS`, not ``"rle"``.
     level : int
         zlib's effort, 1 to 9.
+    progress : callable, optional
+        Called with the finished fraction.
     """
     height, width = counts.shape
     ends = np.cumsum(counts.sum(axis=1, dtype=np.int64))
@@ -169,10 +173,11 @@ def write_image(
         packed = _packed(data, compression, level)
         return _CHUNK.pack(y, len(sums), len(packed), len(data)) + sums + packed
 
-    offsets = []
+    offsets, done = [], Pieces(progress, height)
     for written in _in_threads(chunk, range(height)):
         offsets.append(stream.tell())
         stream.write(written)
+        done()
     stream.seek(table_at)
     stream.write(np.array(offsets, "<u8").tobytes())
     stream.seek(0, os.SEEK_END)
@@ -213,7 +218,9 @@ def _packed(data: bytes, compression: str, level: int) -> bytes:
 # -- reading ---------------------------------------------------------------------------------------
 
 
-def read_image(path: Path, wanted: Callable[[str], bool]) -> DeepImage:
+def read_image(
+    path: Path, wanted: Callable[[str], bool], progress: Progress | None = None
+) -> DeepImage:
     """Read a deep scan line image, trusting nothing that it says before it is checked.
 
     Parameters
@@ -222,6 +229,8 @@ def read_image(path: Path, wanted: Callable[[str], bool]) -> DeepImage:
         The file.
     wanted : callable
         Which channels are read, by name.
+    progress : callable, optional
+        Called with the finished fraction.
 
     Returns
     -------
@@ -235,7 +244,7 @@ def read_image(path: Path, wanted: Callable[[str], bool]) -> DeepImage:
     OtherFormError
         If it is a deep image in another form; the message says which.
     """
-    return _Image(path).read(wanted)
+    return _Image(path).read(wanted, progress)
 
 
 def read_attributes(path: Path) -> dict[str, Any]:
@@ -266,8 +275,9 @@ class _Image:
         self._check_windows()
         self._types = self._read_channel_list()
 
-    def read(self, wanted: Callable[[str], bool]) -> DeepImage:
+    def read(self, wanted: Callable[[str], bool], progress: Progress | None) -> DeepImage:
         counts, chunks = self._read_counts()
+        names = [name for name in self._types if wanted(name)]
         return DeepImage(
             attributes=self.attributes,
             data_window=self.attributes["dataWindow"],
@@ -275,7 +285,7 @@ class _Image:
             compression=self._compression,
             channel_types=self._types,
             counts=counts,
-            channels=self._read_channels(counts, chunks, [n for n in self._types if wanted(n)]),
+            channels=self._read_channels(counts, chunks, names, progress),
         )
 
     # -- header ----------------------------------------------------------------------------------
@@ -419,6 +429,7 @@ class _Image:
         counts: NDArray[np.int64],
         chunks: list[tuple[memoryview, int]],
         wanted: list[str],
+        progress: Progress | None,
     ) -> dict[str, NDArray[Any]]:
         ends = np.cumsum(counts.sum(axis=1)).tolist()
         arrays = {name: np.empty(ends[-1], self._types[name]) for name in wanted}
@@ -433,8 +444,9 @@ class _Image:
                     arrays[name][first:last] = np.frombuffer(data[at:end], kind)
                 at = end
 
+        done = Pieces(progress, len(chunks))
         for _ in _in_threads(unpack, range(len(chunks))):
-            pass
+            done()
         return arrays
 
     def _unpacked(self, packed: memoryview, size: int, y: int) -> memoryview:

@@ -46,6 +46,7 @@ def write_chunks(
     codec: str,
     level: int,
     encoded: Callable[[int, int], NDArray[Any]],
+    done: Callable[[], object],
 ) -> list[tuple[int, int]]:
     """Compress an array chunk by chunk and write it.
 
@@ -61,6 +62,8 @@ def write_chunks(
         Effort of the compressor, 1 to 9.
     encoded : callable
         ``encoded(first, last)`` gives those rows as they are stored: little-endian, contiguous.
+    done : callable
+        Called after each chunk.
 
     Returns
     -------
@@ -87,6 +90,7 @@ def write_chunks(
             for chunk, checksum in pool.map(compressed, firsts[start : start + ahead]):
                 stream.write(chunk)
                 index.append((len(chunk), checksum))
+                done()
     return index
 
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidVDIError, VDIError, VDIFileError
+from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.chunks import (
     CODECS,
     DamagedChunkError,
@@ -117,10 +118,10 @@ class FileInfo:
     depth_step: float = 1.0
 
 
-def read(path: str | os.PathLike[str]) -> VDI:
+def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDI:
     """Read a VDI from a .vdi file: see :func:`pyvista_vdi.io.read`."""
     with _OpenFile(path) as file:
-        return file.vdi()
+        return file.vdi(progress)
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:
@@ -169,7 +170,7 @@ class _OpenFile:
         self._archive.close()
         self._stream.close()
 
-    def vdi(self) -> VDI:
+    def vdi(self, progress: Progress | None) -> VDI:
         """Return the VDI with its arrays, all checked."""
         info = self.info
         try:
@@ -178,13 +179,13 @@ class _OpenFile:
                 counts = pool.submit(self._decoded_counts, packed.pop("counts"))
                 packing: Packing | None = None
                 if info.precision == "8-byte":
-                    stored = self._decoded_codes(packed, pool)
+                    stored = self._decoded_codes(packed, pool, progress)
                     offsets = counts.result()
                     rows = CHUNK_ROWS[info.format_version]
                     packing = packed_8(info.depth_step, offsets, stored, rows)
                     media = packing.media(np.diff(offsets).astype(np.int64))
                 else:
-                    media = self._decoded_media(packed, pool)
+                    media = self._decoded_media(packed, pool, progress)
                     offsets = counts.result()
                     if info.precision == "16-byte":
                         packing = Packed16(media["color"].view(np.uint32).reshape(-1))
@@ -336,7 +337,10 @@ class _OpenFile:
         return offsets
 
     def _decoded_media(
-        self, packed: dict[str, PackedArray], pool: ThreadPoolExecutor
+        self,
+        packed: dict[str, PackedArray],
+        pool: ThreadPoolExecutor,
+        progress: Progress | None,
     ) -> dict[str, NDArray[Any]]:
         """Return front, back, color and optical depth, each decompressed where it will stay."""
         n, names = self.info.n_supersegments, ("front", "back", "color", "optical_depth")
@@ -352,12 +356,17 @@ class _OpenFile:
             for name in ("color", "optical_depth"):
                 packed[name].read(first, rows[name])
 
-        for _ in pool.map(lambda rows: decode(*rows), packed["optical_depth"].ranges()):
-            pass  # raises what went wrong
+        parts = list(packed["optical_depth"].ranges())
+        done = Pieces(progress, len(parts))
+        for _ in pool.map(lambda rows: decode(*rows), parts):  # raises what went wrong
+            done()
         return media
 
     def _decoded_codes(
-        self, packed: dict[str, PackedArray], pool: ThreadPoolExecutor
+        self,
+        packed: dict[str, PackedArray],
+        pool: ThreadPoolExecutor,
+        progress: Progress | None,
     ) -> dict[str, NDArray[Any]]:
         """Return the arrays of the 8-byte form as they are stored."""
         stored = {
@@ -369,8 +378,9 @@ class _OpenFile:
             packed[name].read(first, stored[name][first:last])
 
         tasks = [(name, *rows) for name, array in packed.items() for rows in array.ranges()]
-        for _ in pool.map(lambda task: decode(*task), tasks):
-            pass  # raises what went wrong
+        done = Pieces(progress, len(tasks))
+        for _ in pool.map(lambda task: decode(*task), tasks):  # raises what went wrong
+            done()
         return stored
 
     def _packed(self) -> dict[str, PackedArray]:

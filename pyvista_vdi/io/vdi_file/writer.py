@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.chunks import DEFAULT_LEVELS, write_chunks
 from pyvista_vdi.io.vdi_file.description import describe, to_json
 from pyvista_vdi.io.vdi_file.layout import (
@@ -37,6 +38,7 @@ def write(
     compression: str = "lz4",
     level: int | None = None,
     precision: str | None = None,
+    progress: Progress | None = None,
 ) -> Path:
     """Write a VDI to a file, exactly or packed: see :func:`pyvista_vdi.io.write`.
 
@@ -53,6 +55,8 @@ def write(
     precision : {"exact", "16-byte", "8-byte"}, optional
         Bytes of a supersegment before they are compressed, as for
         :meth:`pyvista_vdi.VDI.with_precision`; the VDI's own by default.
+    progress : callable, optional
+        As for :func:`pyvista_vdi.io.write`.
     """
     vdi = vdi if precision is None else vdi.with_precision(precision)
     counts = _smallest(np.diff(vdi.offsets))
@@ -66,13 +70,14 @@ def write(
     )
     description = _described(vdi, arrays, compression)
     effort = DEFAULT_LEVELS[compression] if level is None else level
+    done = Pieces(progress, sum(layout.n_chunks for layout in arrays.values()))
     with whole_file(path) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(_member(DESCRIPTION), description)
         index: list[tuple[int, int]] = []
         for name, layout in arrays.items():
             with archive.open(_member(name), "w", force_zip64=True) as member:
                 encoded = _encoder(name, layout, vdi, counts)
-                index += write_chunks(member, layout, compression, effort, encoded)
+                index += write_chunks(member, layout, compression, effort, encoded, done)
         archive.writestr(_member(INDEX), np.array(index, INDEX_DTYPE).tobytes())
     return Path(os.path.realpath(path))
 

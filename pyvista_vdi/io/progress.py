@@ -1,0 +1,23 @@
+"""How much of a file is read or written, for whoever waits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pyvista_vdi.errors import Cancelled
+
+#: Called with the finished fraction, 0 to 1; work ends where it returns False.
+Progress = Callable[[float], object]
+
+
+class Pieces:
+    """Counts pieces of work and reports their share."""
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self._progress, self._total, self._done = progress, max(1, total), 0
+
+    def __call__(self) -> None:
+        """Say that one more is done; raises Cancelled where the callback returns False."""
+        self._done += 1
+        if self._progress is not None and self._progress(self._done / self._total) is False:
+            raise Cancelled("reading or writing the file was cancelled")

@@ -1,0 +1,154 @@
+"""Bars that show how far reading, writing, drawing and measuring are; a window without a screen."""
+
+from __future__ import annotations
+
+import io as text_io
+import os
+import shutil
+import subprocess
+import sys
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from deep_programs import pair
+from virtual_screen import virtual_screen
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import cli
+from pyvista_vdi.cli import inputs
+from pyvista_vdi.errors import Cancelled
+from pyvista_vdi.plotting import progress
+
+VDI = pair()[0]
+
+
+class Bar:
+    """Stands for every bar; keeps what it was told."""
+
+    told: ClassVar[list] = []
+
+    def __init__(self, label):
+        self.label = label
+
+    def __call__(self, fraction, doing=None):
+        self.told.append((self.label, round(fraction, 6), doing))
+
+    def pulse(self):
+        pass
+
+    def close(self):
+        pass
+
+
+@pytest.fixture
+def told(monkeypatch):
+    monkeypatch.setattr(inputs, "DelayedBar", Bar)
+    monkeypatch.setattr(Bar, "told", [])
+    return Bar.told
+
+
+@pytest.mark.parametrize("suffix", [".vdi", ".exr", ".vti"])
+def test_files_say_how_far_they_are(suffix, tmp_path):
+    path, written, read = tmp_path / f"a{suffix}", [], []
+    VDI.save(path, progress=written.append)
+    assert pvdi.read(path, progress=read.append).equals(VDI)
+    for fractions in (written, read):
+        assert fractions == sorted(fractions)
+        assert fractions[-1] == 1.0
+    if suffix == ".exr":
+        assert len(written) == len(read) == VDI.window_size[1]
+
+
+@pytest.mark.parametrize("suffix", [".vdi", ".exr"])
+def test_a_callback_ends_reading_and_writing(suffix, tmp_path):
+    path = VDI.save(tmp_path / f"a{suffix}")
+    before = path.read_bytes()
+    with pytest.raises(Cancelled, match="reading or writing"):
+        pair()[1].save(path, progress=lambda _: False)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    with pytest.raises(Cancelled, match="reading or writing"):
+        pvdi.read(path, progress=lambda _: False)
+
+
+def test_convert_has_a_bar(told, tmp_path):
+    first = VDI.save(tmp_path / "a.exr")
+    assert cli.main(["convert", str(first), "-o", str(tmp_path / "b.exr")]) == 0
+    assert {(label, doing) for label, _, doing in told} == {
+        ("converting", "reading"),
+        ("converting", "writing"),
+    }
+    fractions = [fraction for _, fraction, _ in told]
+    assert fractions == sorted(fractions)
+    assert (fractions[0], fractions[-1]) == (0, 1)
+    assert len(set(fractions)) == 2 * VDI.window_size[1] + 1
+
+
+def test_render_has_a_bar(told, tmp_path, default_runtime):
+    files = [str(vdi.save(tmp_path / f"{i}.exr")) for i, vdi in enumerate(pair())]
+    assert cli.main(["render", *files, "-o", str(tmp_path / "a.png")]) == 0
+    assert told[-1] == ("rendering", 0.5, "drawing")
+    fractions = [fraction for _, fraction, _ in told]
+    assert fractions == sorted(fractions)
+    assert len(set(fractions)) == 2 * VDI.window_size[1] + 1
+
+
+def test_generate_has_a_bar_for_its_file(told, tmp_path, default_runtime):
+    np.save(tmp_path / "v.npy", np.random.default_rng(1).random((8, 8, 8), np.float32))
+    arguments = ["generate", str(tmp_path / "v.npy"), "-o", str(tmp_path / "a.exr")]
+    assert cli.main([*arguments, "--size", "16x12"]) == 0
+    assert told[-1] == ("writing it", 1.0, None)
+
+
+def test_a_bar_shows_the_time_where_work_does_not_say_how_far_it_is(monkeypatch):
+    stream = text_io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    bar = progress.DelayedBar(always=True, label="rendering")
+    bar.pulse()  # not begun: nothing to show
+    assert stream.getvalue() == ""
+    bar(0.5, "drawing")
+    before = stream.getvalue()
+    bar.pulse()
+    assert "rendering: drawing:  50%" in stream.getvalue()[len(before) :]
+    bar.close()
+    before = stream.getvalue()
+    bar.pulse()
+    assert stream.getvalue() == before
+
+
+# -- a window without a screen ---------------------------------------------------------------------
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems have a screen")
+@pytest.mark.parametrize("display", [None, ":4711"])
+def test_view_without_a_display_says_so(display, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("pyvista")
+    if display is None:
+        monkeypatch.delenv("DISPLAY", raising=False)
+    else:
+        monkeypatch.setenv("DISPLAY", display)
+        monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    assert cli.main(["view", str(VDI.save(tmp_path / "a.vdi"))]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("pyvista-vdi: error: no window can be opened: ")
+    assert error.endswith("write a picture instead: --screenshot FILE.png\n")
+    assert ("DISPLAY names no X display" if display is None else display) in error
+
+
+def test_view_takes_a_display_that_is_there():
+    pytest.importorskip("pyvista")
+    if not sys.platform.startswith("linux") or shutil.which("Xvfb") is None:
+        pytest.skip("Xvfb is not installed")
+    code = "from pyvista_vdi.cli.render import _require_screen; _require_screen(); print('taken')"
+    kept = {k: v for k, v in os.environ.items() if k != "VTK_DEFAULT_OPENGL_WINDOW"}
+    with virtual_screen() as display:
+        result = subprocess.run(
+            [sys.executable, "-c", code],
+            env={**kept, "DISPLAY": display},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    assert (result.returncode, result.stdout) == (0, "taken\n"), result.stderr
