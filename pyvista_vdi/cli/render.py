@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 import warnings
 from typing import Any
 
@@ -22,9 +20,7 @@ from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.imports import import_pyvista
-
-#: VTK's windows that are on no screen.
-_OFF_SCREEN_WINDOWS = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
+from pyvista_vdi.plotting.screen import why_no_window
 
 
 def render(options: argparse.Namespace) -> int:
@@ -55,8 +51,10 @@ def render(options: argparse.Namespace) -> int:
 def view(options: argparse.Namespace) -> int:
     """Open a plotter on a VDI, or write what it shows."""
     screenshot = options.screenshot and str(checked_png_target(options.screenshot))
-    if screenshot is None:
-        _require_screen()
+    if screenshot is None and (trouble := why_no_window()) is not None:
+        raise UnsupportedError(
+            f"no window can be opened: {trouble}; write a picture instead: --screenshot FILE.png"
+        )
     if is_volume(options):
         looks = classification(options)
         volume = read_volume(options)
@@ -69,26 +67,6 @@ def view(options: argparse.Namespace) -> int:
     if screenshot is not None:
         print(f"{printable(options.screenshot)}: written")
     return 0
-
-
-def _require_screen() -> None:
-    """Refuse where VTK would draw a window that nobody can see, and return from it at once."""
-    from vtkmodules.vtkRenderingCore import vtkRenderWindow
-
-    if not sys.platform.startswith("linux"):
-        return
-    display, trouble = os.environ.get("DISPLAY"), ""
-    if not display:
-        trouble = "DISPLAY names no X display"
-    elif (kind := vtkRenderWindow().GetClassName()) in _OFF_SCREEN_WINDOWS:
-        trouble = (
-            f"VTK draws in a {kind}, off-screen: the display {display} cannot be reached, or "
-            "VTK_DEFAULT_OPENGL_WINDOW asks for it"
-        )
-    if trouble:
-        raise UnsupportedError(
-            f"no window can be opened: {trouble}; write a picture instead: --screenshot FILE.png"
-        )
 
 
 def _show(

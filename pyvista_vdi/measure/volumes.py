@@ -53,6 +53,13 @@ def _resampled(nodes: tuple[float, ...]) -> NDArray[np.float64]:
     return np.interp(at, np.arange(len(nodes)), nodes)
 
 
+def _is_folder(file: Path) -> bool:
+    try:
+        return file.is_dir()
+    except OSError:  # a name that is too long; whoever opens it says so
+        return False
+
+
 def read_file(file: Path) -> Any:
     """Read a volume of any format that can be read here, or a folder of slices.
 
@@ -61,7 +68,7 @@ def read_file(file: Path) -> Any:
     NRRD and folders of TIFF or PNG become a Volume and need no PyVista; others, folders of DICOM
     among them, become a ``pyvista.ImageData``.
     """
-    if file.is_dir():
+    if _is_folder(file):
         slices = image_stack.slices_in(file)
         if slices:
             return image_stack.read_stack(slices)

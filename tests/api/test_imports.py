@@ -51,7 +51,7 @@ LEVELS = (
 
 #: Rooms in a room, likewise from the lowest to the highest.
 LEVELS_WITHIN = {
-    "io": (("whole_file",), ("png", "vdi_file"), ("deep_exr",), ("files",)),
+    "io": (("whole_file", "progress"), ("png", "vdi_file"), ("deep_exr",), ("files",)),
     "vtk_pipeline": (("filters",), ("interaction",), ("drawing",)),
 }
 

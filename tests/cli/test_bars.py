@@ -141,7 +141,7 @@ def test_view_takes_a_display_that_is_there():
     pytest.importorskip("pyvista")
     if not sys.platform.startswith("linux") or shutil.which("Xvfb") is None:
         pytest.skip("Xvfb is not installed")
-    code = "from pyvista_vdi.cli.render import _require_screen; _require_screen(); print('taken')"
+    code = "from pyvista_vdi.plotting.screen import why_no_window; print(why_no_window())"
     kept = {k: v for k, v in os.environ.items() if k != "VTK_DEFAULT_OPENGL_WINDOW"}
     with virtual_screen() as display:
         result = subprocess.run(
@@ -151,4 +151,4 @@ def test_view_takes_a_display_that_is_there():
             text=True,
             check=False,
         )
-    assert (result.returncode, result.stdout) == (0, "taken\n"), result.stderr
+    assert (result.returncode, result.stdout) == (0, "None\n"), result.stderr
