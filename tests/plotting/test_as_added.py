@@ -97,18 +97,17 @@ def test_changes_of_the_grid_show_where_add_volume_s_show(arguments, change):
 
 
 def test_one_grid_added_twice_shows_each_array_under_its_own_range():
-    grid, judge = ramp(), []
+    grid, judge, actors = ramp(), [], []
     plotter = pv.Plotter(shape=(1, 2), window_size=(96, 40), off_screen=True)
     for column, factor in enumerate((1, -1)):
         plotter.subplot(0, column)
         grid["s"] = np.float32(factor * grid.points[:, 2])
         grid.origin = (2.0 * column, 0, 0)
-        plotter.add_vdi(grid, cmap="gray", show_scalar_bar=False)
+        actors.append(plotter.add_vdi(grid, cmap="gray", show_scalar_bar=False))
         plotter.camera_position = "xz"
         judge.append(grid.copy())
     picture = shown(plotter)
-    ranges = [r.actors[next(iter(r.actors))].mapper.scalar_range for r in plotter.renderers]
-    assert ranges == [(0, N - 1), (1 - N, 0)]
+    assert [each.mapper.scalar_range for each in actors] == [(0, N - 1), (1 - N, 0)]
     plotter.close()
     for column, alone in enumerate(judge):  # as if it had been the only one
         plotter = pv.Plotter(shape=(1, 2), window_size=(96, 40), off_screen=True)
