@@ -21,7 +21,7 @@ from pyvista_vdi.raycasting.raycast import render_vdi
 
 #: Pixels along each edge of the frame that a new VDI is tried with: what the first real frame
 #: would have to compile and upload is there then.
-_TRIAL_SIZE = 8
+TRIAL_SIZE = 8
 
 _SIGNATURE = inspect.signature(GenerationOptions)
 
@@ -103,7 +103,7 @@ class BackgroundGeneration:
             vdi = generate_by_dial(
                 *arguments, metadata=metadata, device=runtime, progress=report, **changes
             )
-            trial = FrameRequest(vdi.camera, (_TRIAL_SIZE, _TRIAL_SIZE), device=runtime)
+            trial = FrameRequest(vdi.camera, (TRIAL_SIZE, TRIAL_SIZE), device=runtime)
             render_vdi(vdi, trial)
             return vdi
 

@@ -113,7 +113,7 @@ def frames_until(plotter, happened):
 
 
 def generation_threads():
-    return [t for t in threading.enumerate() if t.name.startswith("pyvista-vdi")]
+    return [t for t in threading.enumerate() if t.name == "pyvista-vdi generation"]
 
 
 def picture_of(vdi, plotter, **options):

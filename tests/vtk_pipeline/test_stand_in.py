@@ -11,6 +11,7 @@ from vtkmodules.vtkCommonDataModel import vtkPlane
 from vtkmodules.vtkRenderingCore import vtkPropPicker
 from watched_windows import WINDOW, frame, frames_until, picture_of, watched
 
+from pyvista_vdi.device import programs
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.vtk_pipeline.drawing import stand_in
 
@@ -144,3 +145,14 @@ def test_full_where_no_rate_is_to_be_kept_and_picked_as_the_vdi(plotter, gate):
     picker = vtkPropPicker()
     picker.Pick(WINDOW[0] // 2, WINDOW[1] // 2, 0, plotter.renderer)
     assert picker.GetViewProp() is actor
+
+
+def test_the_first_change_waits_for_no_compiler(plotter, gate, monkeypatch):
+    volume = soft_ball()
+    volume["v"] = (volume["v"] / 2).astype(np.int8)  # which no other test here has had compiled
+    actor = watched(plotter, volume)
+    actor.mapper.painter.upkeep._preparation.join()
+    monkeypatch.setattr(programs, "build", None)
+    volume["v"][:] //= 2
+    frame(plotter)
+    assert actor.status.stand_in

@@ -8,10 +8,14 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
+from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import VDIError
+from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.background import TRIAL_SIZE
 from pyvista_vdi.quality.frame_rate import FrameRateController
 from pyvista_vdi.quality.view_error import angle_from_generating_view
+from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
@@ -44,6 +48,7 @@ class Upkeep:
         self._stand_in: StandIn | None = None
         self._stand_in_rate = FrameRateController()
         self._refused: Request | None = None  # of which there can be no stand-in
+        self._preparation = Worker("pyvista-vdi stand-in")
         self._interaction = interaction
         self._warnings = warnings
         self._texts = texts
@@ -82,6 +87,8 @@ class Upkeep:
         """End what goes on; the next frame may begin anew."""
         self._stop_ticking()
         self.regeneration.close()
+        self._preparation.clear()
+        self._preparation.join()
         self._stand_in = self._refused = None
 
     # -- in a frame ------------------------------------------------------------------------------
@@ -107,11 +114,15 @@ class Upkeep:
         # Once for both eyes of a stereo pair, and not between the tiles of a picture
         now = (frame.clock.number, id(frame.clock))
         decide, self._looked_at = frame.clock.whole_picture and now != self._looked_at, now
-        if source.last() is None:
-            return self._updated(source)
         # A VDI that is drawn in several views is out of date in none of them by itself
         one_view = only and source.alone
-        if one_view and self._interaction.asynchronous(frame.renderer.GetRenderWindow()):
+        behind = one_view and self._interaction.asynchronous(frame.renderer.GetRenderWindow())
+        if source.last() is None:
+            vdi = self._updated(source)
+            if behind:
+                self._prepare(source.source.GetCurrentRequest())
+            return vdi
+        if behind:
             if decide or self.regeneration.unseen(source.source, source.stamp()):
                 self._look(source, frame, ask)
             return self._standing_in() or source.last()
@@ -132,6 +143,18 @@ class Upkeep:
     def _stop_ticking(self) -> None:
         self._ticker.stop()
         self._loop_ticker.stop()
+
+    def _prepare(self, made: Request | None) -> None:
+        """Have compiled, behind the frames, what the first change would wait for."""
+        if made is None:
+            return
+
+        def draw_one(_runtime: Runtime, _report: Callable[[float], None]) -> bool:
+            trial = FrameRequest(made.screen.camera, (TRIAL_SIZE, TRIAL_SIZE))
+            StandIn(made, FrameRateController()).picture(trial)
+            return True
+
+        self._preparation.put(Job(draw_one, made.device))
 
     def _standing_in(self) -> StandIn | None:
         """Return what is drawn while the VDI shows what is no longer so; None if it need not be."""
