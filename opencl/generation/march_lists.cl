@@ -31,11 +31,7 @@ inline void store_last_run(__global float *records, Int starts, Int count, Run r
 
 KERNEL_OF_LANES void march_lists(
     MEDIUM_PARAMETERS
-    __global const float *forms,     // see begin_march
-    int planes,
-    float sample_distance,           // model units
-    float unit_distance,             // opacity unit distance, model units
-    int width, int height,           // of V_O's window
+    VIEW_PARAMETERS
     int first_row, int rows,
     int first_step, int steps,       // of this chunk
     int grain,                       // steps in a voxel

@@ -13,7 +13,7 @@
 #include "lib/transpose.cl"
 #include "raycasting/list_rays.cl"
 #include "raycasting/pixels.cl"
-#include "raycasting/supersegments.cl"
+#include "raycasting/frame.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Lane p * PACKET_BUNDLES + n has place p in the n-th bundle: vectors of bundles become vectors of lanes within each 128 bits
@@ -238,19 +238,7 @@ inline Real4 media_at(SUPERSEGMENTS_PARAMETERS const Lists *lists, int k, Faces 
 #endif
 
 KERNEL_OF_LANES void raycast_aligned_view(
-    __global const HEADER_T *headers,   // of the bundles of lists, see raycasting/supersegments.cl
-    SUPERSEGMENTS_PARAMETERS            // see raycasting/supersegments.cl
-    int lists_wide, int lists_high,     // window of V_O
-    float depth_origin,                 // world units
-    __global const float *forms,        // list coordinates, model direction, then `planes` to clip to
-    int planes,
-    int width, int height,              // window of V_N
-    __global const float *opaque_depth, // t at which each pixel's ray ends, top row first, if has_opaque_depth
-    int has_opaque_depth,
-    float transmittance_cutoff,         // the ray ends where less than this is left
-    __global const ulong *masks,        // this one and the next two are not looked at: lists say by themselves what is empty
-    float first_depth,
-    float slabs_per_depth,
+    FRAME_PARAMETERS                    // masks are not looked at: lists say by themselves what is empty
     int2 origin,                        // the pixel of list (0, 0); maybe beside the window
     __global float4 *image)             // premultiplied RGBA, top row first
 {
@@ -296,7 +284,7 @@ KERNEL_OF_LANES void raycast_aligned_view(
         int k = 0;
         for (; k < lists.longest; ++k) {
             const Faces at = faces_at(SUPERSEGMENTS_ARGUMENTS &lists, k);
-            going = going && k < lists.list.count && at.front < end && !(seen.sums.w < transmittance_cutoff);
+            going = going && k < lists.list.count && at.front < end && !(seen.sums.w < cutoff);
             const Real from = HIGHER_OF(at.front, begin);
             const Real to = LOWER_OF(at.back, end);
             const Int meet = going && from < to;

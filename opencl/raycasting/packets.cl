@@ -14,6 +14,7 @@
 #include "raycasting/lists.cl"
 #include "raycasting/stepping.cl"
 #include "raycasting/pixels.cl"
+#include "raycasting/frame.cl"
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -124,7 +125,7 @@ inline void composite_met(Seen *seen, Met *met, const ListRays *rays, const Sens
 __attribute__((always_inline))
 inline void sweep(Seen *seen, const ListRays *rays, const Axis *p, const Axis *q, Int going, Int first_p, Int first_q,
                   bool away, __global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int lists_wide, float depth_origin,
-                  float transmittance_cutoff, __global const ulong *masks, float first_depth, float slabs_per_depth)
+                  float cutoff, __global const ulong *masks, float first_depth, float slabs_per_depth)
 {
     const Sense sense = sense_of(rays, away);
     const Real r_end = rays->r_begin + 1.0f;
@@ -154,7 +155,7 @@ inline void sweep(Seen *seen, const ListRays *rays, const Axis *p, const Axis *q
 #endif
         const Real r_p = CROSSINGS(p, (Real)(P));
         // By the columns before: where a ray goes does not wait for what it sees in this one
-        const Int dark = seen->sums.w < transmittance_cutoff;
+        const Int dark = seen->sums.w < cutoff;
         if (!ANY(column))
             continue;
         for (int place_q = least_of(now.q, column);; ++place_q) {
@@ -220,19 +221,7 @@ inline void sweep(Seen *seen, const ListRays *rays, const Axis *p, const Axis *q
 }
 
 KERNEL_OF_LANES void raycast_packets(
-    __global const HEADER_T *headers,   // of the bundles of lists, see raycasting/supersegments.cl
-    SUPERSEGMENTS_PARAMETERS            // see raycasting/supersegments.cl
-    int lists_wide, int lists_high,     // window of V_O
-    float depth_origin,                 // world units
-    __global const float *forms,        // list coordinates, model direction, then `planes` to clip to
-    int planes,
-    int width, int height,              // window of V_N
-    __global const float *opaque_depth, // t at which each pixel's ray ends, top row first, if has_opaque_depth
-    int has_opaque_depth,
-    float transmittance_cutoff,         // the ray ends where less than this is left
-    __global const ulong *masks,        // occupied slabs of each stack, if SKIP_EMPTY
-    float first_depth,                  // where slab 0 begins, view depth less depth_origin
-    float slabs_per_depth,
+    FRAME_PARAMETERS
     float4 epipole,                     // see across_strip
     int4 part,                          // of the window: first strip, how many, number of each strip's first packet
     __global float4 *image)             // premultiplied RGBA, top row first
@@ -281,11 +270,11 @@ KERNEL_OF_LANES void raycast_packets(
         take_step(&q, way & 4);
         if (away)
             sweep(&seen, &rays, &p, &q, going, first_p, first_q, true, headers,
-                  SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin, transmittance_cutoff, masks, first_depth,
+                  SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin, cutoff, masks, first_depth,
                   slabs_per_depth);
         else
             sweep(&seen, &rays, &p, &q, going, first_p, first_q, false, headers,
-                  SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin, transmittance_cutoff, masks, first_depth,
+                  SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin, cutoff, masks, first_depth,
                   slabs_per_depth);
     }
     write_pixels(image, &pixels, composited(&seen));

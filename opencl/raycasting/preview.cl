@@ -8,6 +8,7 @@
 #include "raycasting/list_rays.cl"
 #include "raycasting/lists.cl"
 #include "raycasting/pixels.cl"
+#include "raycasting/frame.cl"
 #include "raycasting/stacks.cl"
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF
@@ -135,19 +136,7 @@ inline float r_at(const Crossing *crossing, float share, const ListRays *rays, D
 }
 
 __kernel void preview(
-    __global const HEADER_T *headers,   // of the bundles of lists, see raycasting/supersegments.cl
-    SUPERSEGMENTS_PARAMETERS            // see raycasting/supersegments.cl
-    int lists_wide, int lists_high,     // window of V_O
-    float depth_origin,                 // world units
-    __global const float *forms,        // list coordinates, model direction, then `planes` to clip to
-    int planes,
-    int width, int height,              // window of V_N
-    __global const float *opaque_depth, // t at which each pixel's ray ends, top row first, if has_opaque_depth
-    int has_opaque_depth,
-    float transmittance_cutoff,         // the ray ends where less than this is left
-    __global const ulong *masks,        // occupied slabs of each stack
-    float first_depth,                  // where slab 0 begins, view depth less depth_origin
-    float slabs_per_depth,
+    FRAME_PARAMETERS
     CROPPING_PARAMETER                  // regions that are kept
     __global const uint *counts,        // supersegments in each cell: stacks_high, stacks_wide, SLABS
     int samples,                        // per ray
@@ -185,7 +174,7 @@ __kernel void preview(
     int halves = 1;                                   // the next event: middle of a part where odd, its end where even
     int guess = 0;
     walk = begin_walk(&cells);
-    while (weight > 0.0f && seen.sums.w >= transmittance_cutoff) {
+    while (weight > 0.0f && seen.sums.w >= cutoff) {
         const bool more = next_cell(&walk, &cells, &crossing);
         // What rounding left of the last part ends with the ray
         const float weight_until = more ? weight_before + crossing.weight : INFINITY;

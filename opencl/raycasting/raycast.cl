@@ -23,6 +23,7 @@
 #include "raycasting/lists.cl"
 #include "raycasting/stepping.cl"
 #include "raycasting/pixels.cl"
+#include "raycasting/frame.cl"
 #include "raycasting/segments.cl"
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF
@@ -297,20 +298,7 @@ inline Int surely_covered(__global const float *forms, Real a, Real b, float mar
 #define raycast raycast_blocks
 #endif
 KERNEL_OF_LANES void raycast(
-    __global const HEADER_T *headers,   // of the bundles of lists, see raycasting/supersegments.cl
-    SUPERSEGMENTS_PARAMETERS            // see raycasting/supersegments.cl
-    int lists_wide, int lists_high,     // window of V_O
-    float depth_origin,                 // world units
-    __global const float *forms,        // list coordinates, model direction, then `planes` to clip to
-    int planes,
-    int width, int height,              // window of V_N
-    __global const float *opaque_depth, // t at which each pixel's ray ends, top row first, if has_opaque_depth
-    int has_opaque_depth,
-    float cutoff,                       // the ray ends where less transmittance than this is left; SEGMENTS: behind this much
-                                        // optical depth
-    __global const ulong *masks,        // occupied slabs of each stack, if SKIP_EMPTY
-    float first_depth,                  // where slab 0 begins, view depth less depth_origin
-    float slabs_per_depth,
+    FRAME_PARAMETERS                    // SEGMENTS: `cutoff` is the optical depth behind which rays end
     CROPPING_PARAMETER                  // regions that are kept
 #if defined(SEGMENTS)
     __global const int2 *cells,         // see lib/rays.cl

@@ -30,6 +30,9 @@ typedef struct {
 #define MEDIUM_PARAMETERS                                                                                                 \
     __global const VOXEL_T *voxels, int4 size, __global const float4 *table, int entries, float low, float per_scalar,    \
         __global const uchar *distances, int4 macrocells, SHADING_PARAMETERS
+// And behind it: the view's rays. forms: see begin_march; lengths: model units; the window: pixels
+#define VIEW_PARAMETERS                                                                                                   \
+    __global const float *forms, int planes, float sample_distance, float unit_distance, int width, int height,
 #define MEDIUM {voxels, size, table, entries, low, per_scalar, distances, macrocells SHADING_ARGUMENTS}
 
 typedef struct {

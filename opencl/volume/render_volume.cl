@@ -26,11 +26,7 @@
 
 __kernel void render_volume(
     MEDIUM_PARAMETERS
-    __global const float *forms,          // see begin_march
-    int planes,
-    float sample_distance,                // model units
-    float unit_distance,                  // model units
-    int width, int height,
+    VIEW_PARAMETERS
     __global const float *opaque_depth,   // t at which each pixel's ray ends, top row first, if has_opaque_depth
     int has_opaque_depth,
     float transmittance_cutoff,           // the ray ends where no more than this is left; negative: never
