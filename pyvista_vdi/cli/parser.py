@@ -167,6 +167,7 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
     declare.option(group, "--camera-json", view, "FILE")
     thickness = "world units, given to samples that have none (surfaces)"
     declare.option(group, "--thickness", thickness, "LENGTH", float)
+    declare.switch(group, "--from-linear", "the colours are linear light: show it by sRGB's curve")
 
 
 def _add_paraview(parser: argparse.ArgumentParser) -> None:

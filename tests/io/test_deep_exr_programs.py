@@ -187,6 +187,41 @@ def test_a_merged_file_in_the_command_line(tmp_path, default_runtime):
     assert (tmp_path / "a.png").stat().st_size > 0
 
 
+def test_samples_that_were_only_gathered(tmp_path, default_runtime):
+    """As Nuke's DeepMerge leaves them: unsorted and overlapping."""
+    images = [
+        layout.read_image(vdi.save(tmp_path / "a.exr", exact=False), lambda _: True)
+        for vdi in (B, A)
+    ]
+    counts = sum(image.counts for image in images)
+    pixel = [np.repeat(np.arange(counts.size), image.counts.ravel()) for image in images]
+    order = np.argsort(np.concatenate(pixel), kind="stable")
+    channels = {
+        name: np.concatenate([image.channels[name] for image in images])[order]
+        for name in images[0].channels
+    }
+    matrices = ("worldToCamera", "worldToNDC")
+    path = tmp_path / "gathered.exr"
+    with path.open("wb") as stream:
+        layout.write_image(
+            stream,
+            counts,
+            dict.fromkeys(channels, np.float32),
+            lambda first, last: {name: array[first:last] for name, array in channels.items()},
+            {n: layout.matrix_attribute(images[0].attributes[n].T) for n in matrices},
+            compression="zips",
+            level=1,
+        )
+    vdi = pvdi.read(path)
+    assert vdi.n_supersegments > A.n_supersegments + B.n_supersegments  # taken apart at every face
+    for angle in (0, 25):
+        view = VIEW.azimuth(angle)
+        truth = pvdi.render([A, B], view, (80, 60))
+        # As in test_merged_files_show_both
+        difference = np.abs(pvdi.render(vdi, view, (80, 60)) - truth).max()
+        assert difference < (6e-4 if angle else 1e-5), angle
+
+
 def test_volumes_merged_by_oiiotool(tmp_path, default_runtime):
     """Two volumes that overlap, with all their supersegments."""
     program, openexr = shutil.which("oiiotool"), pytest.importorskip("OpenEXR")
@@ -423,6 +458,10 @@ def test_linear_in_the_command_line(tmp_path, capsys):
     assert np.allclose(channels["G"], to_linear(A.color[:, 1]) * alphas(A), rtol=1e-6, atol=1e-7)
     assert cli.main(["convert", str(there), "-o", str(back)]) == 0
     assert pvdi.read(back).equals(A)
+    capsys.readouterr()
+    theirs = A.save(tmp_path / "d.exr", exact=False)
+    assert cli.main(["convert", str(theirs), "-o", str(back), "--from-linear"]) == 0
+    assert np.allclose(pvdi.read(back).color, to_display(A.color), atol=1e-6)
     capsys.readouterr()
     assert cli.main(["convert", str(first), "-o", str(back), "--linear"]) == 1
     assert "got linear" in capsys.readouterr().err
