@@ -1,4 +1,4 @@
-"""ParaView's plugin: VDI Source, VDI To Image, a reader and a writer.
+"""ParaView's plugin: VDI Source, VDI To Image, VDI In Scene, a reader and a writer.
 
 ParaView loads this file by its path (``pyvista-vdi paraview`` prints it): Tools > Manage
 Plugins, ``paraview.simple.LoadPlugin`` or ``PV_PLUGIN_PATH``. Nothing else imports it. It declares
@@ -14,9 +14,15 @@ from pathlib import Path
 from typing import Any
 
 from paraview.util.vtkAlgorithm import smdomain, smhint, smproperty, smproxy
-from vtkmodules.vtkCommonCore import vtkOutputWindow
-from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData, vtkPiecewiseFunction
+from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkWeakReference
+from vtkmodules.vtkCommonDataModel import (
+    vtkDataObject,
+    vtkImageData,
+    vtkPiecewiseFunction,
+    vtkPolyData,
+)
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkFiltersSources import vtkOutlineSource
 from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
 
 try:
@@ -32,7 +38,12 @@ from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, watch
-from pyvista_vdi.vtk_pipeline.filters.convert import require_image, scalars_of, volume_from_vtk
+from pyvista_vdi.vtk_pipeline.filters.convert import (
+    require_image,
+    scalars_of,
+    vdi_from_image,
+    volume_from_vtk,
+)
 
 #: What ParaView's plugin manager shows.
 paraview_plugin_name = "VDI"
@@ -444,6 +455,87 @@ class VDIToImage(_Looking, vtk_pipeline.VDIToImage):
                 representation.UpdateVTKObjects()
 
 
+@smproxy.filter(name="VDIInScene", label="VDI In Scene", support_reload=False)
+@smhint.xml('<ShowInMenu category="VDI" />')
+@smproperty.input(name="Input", port_index=0)
+@smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
+class VDIInScene(Algorithm):
+    """A VDI among the objects of render views.
+
+    ParaView's representations are written in C++. Hence the output is the outline of the VDI's
+    bounds, which ParaView shows, and a :class:`pyvista_vdi.VDIActor` joins it in each render view
+    in which it is visible. Client and server must be one process.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(
+            nInputPorts=1, inputType="vtkImageData", nOutputPorts=1, outputType="vtkPolyData"
+        )
+        self._vdi: Any = None
+        self._actors: dict[str, Any] = {}
+        self._watching = False
+
+    def _execute(self, inputs: Any, outputs: Any) -> None:
+        self._vdi = vdi_from_image(vtkImageData.GetData(inputs[0], 0))
+        for actor in self._actors.values():
+            actor.vdi = self._vdi
+        outline = vtkOutlineSource()
+        outline.SetBounds(self._vdi.bounds)
+        outline.Update()
+        vtkPolyData.GetData(outputs, 0).ShallowCopy(outline.GetOutput())
+        if not self._watching and _Client.of(self) is not None:
+            self._watching = _Client.watch(self, "RegisterEvent", VDIInScene._join_views)
+        self._join_views()
+
+    def _join_views(self) -> None:
+        """Put an actor into each render view that has none; its frames decide if it is seen."""
+        client = _Client.of(self, silent=True)
+        for view in client.views() if client else ():
+            name = view.GetGlobalIDAsString()
+            if self._vdi is None or name in self._actors:
+                continue
+            mapper, actor = vtk_pipeline.VDIMapper(), vtk_pipeline.VDIActor()
+            mapper.SetVDI(self._vdi)
+            actor.SetMapper(mapper)
+            actor.PickableOff()  # ParaView's selections know its own props only
+            self._actors[name] = actor
+            _enter(view, actor, self)
+
+    def visible_in(self, view: Any) -> bool:
+        """Whether a view shows the output."""
+        client = _Client.of(self, silent=True)
+        shown = view.GetProperty("Representations")
+        proxies = [shown.GetProxy(i) for i in range(shown.GetNumberOfProxies())]
+        return client is not None and any(
+            representation in proxies and representation.GetProperty("Visibility").GetElement(0)
+            for _, representation in client.representations()
+        )
+
+
+def _enter(view: Any, actor: Any, algorithm: VDIInScene) -> None:
+    """Add an actor to a view, which is seen with the algorithm's output and leaves with it."""
+    weak_view, weak_algorithm = vtkWeakReference(), vtkWeakReference()
+    weak_view.Set(view)
+    weak_algorithm.Set(algorithm)
+    weak_actor = vtkWeakReference()
+    weak_actor.Set(actor)
+
+    def started(renderer: Any, event: str) -> None:
+        shown, owner, where = weak_actor.Get(), weak_algorithm.Get(), weak_view.Get()
+        if shown is None:
+            return
+        if owner is None or where is None:
+            renderer.RemoveViewProp(shown)
+        else:
+            shown.SetVisibility(owner.visible_in(where))
+            if shown.GetVisibility():  # else wrong beside what is translucent
+                renderer.SetUseDepthPeelingForVolumes(False)
+
+    renderer = view.GetClientSideObject().GetRenderer()
+    renderer.AddViewProp(actor)
+    renderer.AddObserver("StartEvent", started)
+
+
 @smproxy.reader(
     name="VDIReader",
     label="VDI Reader",
@@ -568,6 +660,13 @@ class _Client:
         """Call ``changed(algorithm)`` at an event of the manager; return whether there is one."""
         manager = cls._manager()
         return manager is not None and bool(watch(manager, algorithm, changed, event))
+
+    def views(self) -> list[Any]:
+        """Return the proxies of render views."""
+        number = self.manager.GetNumberOfProxies("views")
+        names = [self.manager.GetProxyName("views", i) for i in range(number)]
+        views = [self.manager.GetProxy("views", name) for name in names]
+        return [view for view in views if hasattr(view.GetClientSideObject(), "GetRenderer")]
 
     def representations(self) -> list[tuple[str, Any]]:
         """Return the names and proxies of what shows the algorithm's output in views."""

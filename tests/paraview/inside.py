@@ -154,6 +154,49 @@ def volume(folder):
     simple.SaveData(str(folder / "screen.vdi"), source)
 
 
+def scene(folder):
+    """Show a VDI in a scene in place of ParaView's own volume, and take it away again."""
+    source = brain_source()
+    other = black_view(SIZE)
+    view = black_view(SIZE)
+    shown = simple.Show(source.Input, view, "UniformGridRepresentation")
+    shown.Representation = "Volume"
+    simple.ColorBy(shown, ("POINTS", "ImageScalars"))
+    shown.LookupTable = source.ColorFunction
+    shown.ScalarOpacityFunction = source.OpacityFunction
+    shown.ScalarOpacityUnitDistance = UNIT_DISTANCE
+    shown.SetScalarBarVisibility(view, False)
+    ball = simple.Show(simple.Sphere(Center=[90, 20, 90], Radius=40), view)
+    ball.Ambient, ball.Diffuse = 1, 0
+    view.CameraPosition = [380, -330, 300]
+    view.CameraFocalPoint = [90, 108, 90]
+    view.CameraViewUp = [0, 0, 1]
+    view.CameraViewAngle = 28
+    simple.SetActiveView(view)
+    simple.Render(view)
+    source.SMProxy.InvokeCommand("TakeActiveView")
+
+    def shot(name, where=view):
+        simple.SaveScreenshot(str(folder / f"{name}.png"), where, ImageResolution=SIZE)
+
+    in_scene = simple.VDIInScene(Input=source)
+    for name, turn in (("own", 0), ("turned", 10)):
+        view.GetActiveCamera().Azimuth(turn)
+        simple.Hide(in_scene, view)
+        simple.Show(source.Input, view)
+        shot(f"volume_{name}")
+        simple.Hide(source.Input, view)
+        shot(f"nothing_{name}")
+        outline = simple.Show(in_scene, view)
+        outline.Opacity = 0
+        shot(f"scene_{name}")
+    shot("other", other)
+    simple.Delete(other)
+    simple.Delete(in_scene)
+    del in_scene, outline
+    shot("deleted")
+
+
 def settings(folder):
     """Say what the properties became, and what a change of them did."""
     scalars, color, opacity = brain()

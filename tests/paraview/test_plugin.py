@@ -41,6 +41,10 @@ SHARE_OF_BORDER_PIXELS = 1e-3
 #: An opacity and a colour in eight bits each, their product in eight bits: 1.5 / 255 at most.
 BLENDED = 2 / 255
 
+#: SSIM of a VDI in a scene against ParaView's own volume there: measured 0.9998 from the generating
+#: view, 0.9967 turned by 10 degrees, 0.89 without either.
+LIKE_THE_VOLUME = {"own": 0.998, "turned": 0.99}
+
 
 def _missing():
     if shutil.which("pvpython") is None:
@@ -198,6 +202,21 @@ def test_vdi_looks_like_paraviews_own_volume(paraview, tmp_path):
     assert judge.max() > 0.5
     # 0.9994 measured; steps of the mapper are its own choice
     assert compare_images(judge, found).ssim > 0.998
+
+
+def test_vdi_in_a_scene_stands_for_paraviews_own_volume(paraview, tmp_path):
+    """With a ball half inside it: seen where its outline is visible, and gone with its filter."""
+    paraview("scene", tmp_path)
+    for name, least in LIKE_THE_VOLUME.items():
+        judge, found, without = (
+            screenshot(tmp_path / f"{kind}_{name}.png") for kind in ("volume", "scene", "nothing")
+        )
+        assert compare_images(judge, found).ssim > least
+        assert compare_images(judge, without).ssim < 0.95
+    assert screenshot(tmp_path / "other.png").max() == 0
+    np.testing.assert_array_equal(
+        screenshot(tmp_path / "deleted.png"), screenshot(tmp_path / "nothing_turned.png")
+    )
 
 
 def test_settings_reach_the_vdi(paraview, tmp_path):

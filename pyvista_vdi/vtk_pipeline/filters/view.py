@@ -17,7 +17,9 @@ from pyvista_vdi.model.coverage import bounds_corners
 
 def as_array(matrix: Any) -> NDArray[np.float64]:
     """Return a ``vtkMatrix4x4`` as float64 (4, 4)."""
-    return np.array(matrix.GetData(), dtype=np.float64).reshape(4, 4)
+    elements = [0.0] * 16
+    matrix.DeepCopy(elements, matrix)  # GetData() gives Python an address before VTK 9.3
+    return np.array(elements).reshape(4, 4)
 
 
 @dataclass(frozen=True)
