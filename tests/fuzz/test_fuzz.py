@@ -131,7 +131,9 @@ def test_nothing_in_the_package_makes_code_or_objects_of_data():
                 names = [alias.name for alias in node.names]
             elif isinstance(node, ast.ImportFrom):
                 names = [node.module or ""]
-            used = {name.split(".")[0] for name in names} & (_MODULES | {"subprocess"})
+            # ParaView's own Python is asked for its devices, by a text that is part of the package
+            others = set() if path.parts[-2:] == ("cli", "paraview.py") else {"subprocess"}
+            used = {name.split(".")[0] for name in names} & (_MODULES | others)
             assert not used, f"{path}:{node.lineno} imports {used}"
         for call in _calls(tree):
             function = call.func
