@@ -118,6 +118,7 @@ LENGTHY = {
 
 #: And those of which it runs none.
 LENGTHIEST = {
+    "drop_in": "arguments changes data neighbours views",
     "extremes": "determinism",
     "faults": "disk_faults interrupts threads_and_forks",
     "fuzz": "fuzz",

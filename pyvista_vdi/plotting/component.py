@@ -360,7 +360,8 @@ class AddVDI:
             source.SetDevice(device)
             source.SetProgressCallback(progress_callback(progress_bar))
             read = source.GetVolume()
-            title = read.name
+            # As add_volume: values that come without a name have none
+            title = read.name if scalars is None or isinstance(scalars, str) else ""
             if read.rgba:
                 looks, show_scalar_bar = looks.of_rgba(), False
             table = looks.lookup_table(read.array)

@@ -1,0 +1,289 @@
+"""Scenes that are drawn twice, with ``add_volume`` and with ``add_vdi``, and what each must show.
+
+A case is a function ``scene(plotter, add)`` as a user's script has it; ``add`` is the plotter's
+``add_volume``, then its ``add_vdi``. It returns nothing, and the picture is a screenshot, or a list
+of pictures that it took. The kinds of cases are the files ``test_*.py`` beside this one.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import pyvista as pv
+from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
+
+from pyvista_vdi import compare_images
+from pyvista_vdi.errors import VDIError, VDIWarning
+
+#: The issue's bound for a picture.
+LEAST_SSIM = 0.98
+#: Mean difference of a block of 8 x 8 pixels, of 255: SSIM alone would bear another colour in a
+#: small part of the window. Voxels' edges, which two samplings meet differently, stay below.
+LARGEST_BLOCK = 16.0
+WINDOW = (200, 150)
+CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
+#: The page that make_page.py writes of all cases.
+PAGE = CHECKOUT / "docs" / "drop_in.md"
+
+Scene = Callable[[pv.Plotter, "Add"], Any]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One script, and what is expected of it.
+
+    Parameters
+    ----------
+    name : str
+        What the page calls it.
+    scene : callable
+        Takes a plotter and an :class:`Add`.
+    window : dict
+        Arguments of the plotter.
+    refused : (str, str), optional
+        A pattern of the error (or warning) by which a VDI refuses it, and the reason for it.
+    both_refuse : bool
+        ``add_volume`` raises, and so does ``add_vdi``: one of this package's errors, or the same.
+    warns : str, optional
+        A pattern of a ``VDIWarning`` that comes with the right picture.
+    note : str
+        Where ``add_volume`` is wrong: how, and what the picture is compared with instead.
+    quick : bool
+        Runs with every change, not only at night.
+    defect : str
+        What is known to be wrong at present.
+    """
+
+    name: str
+    scene: Scene
+    window: dict[str, Any] = field(default_factory=dict)
+    refused: tuple[str, str] | None = None
+    both_refuse: bool = False
+    warns: str | None = None
+    note: str = ""
+    quick: bool = False
+    defect: str = ""
+
+
+class Kind:
+    """Cases of a kind, each a test of the module that names them."""
+
+    def __init__(self, title: str) -> None:
+        self.title = title
+        self.cases: list[Case] = []
+
+    def add(self, name: str, scene: Scene, **how: Any) -> None:
+        """Add a case."""
+        assert name not in {case.name for case in self.cases}, name
+        self.cases.append(Case(name, scene, **how))
+
+    def case(self, **how: Any) -> Callable[[Scene], Scene]:
+        """Add the decorated function as a case of its own name."""
+
+        def add(scene: Scene) -> Scene:
+            self.add(scene.__name__.replace("_", " "), scene, **how)
+            return scene
+
+        return add
+
+    def test(self) -> Callable[[Case], None]:
+        """Return a test of all cases."""
+
+        @pytest.mark.parametrize(
+            "case", [pytest.param(case, id=case.name, marks=_marks(case)) for case in self.cases]
+        )
+        def test(case: Case, default_runtime: object) -> None:
+            found = outcome(case)
+            assert not found.wrong, found.wrong
+            if found.ssim is not None and PAGE.is_file():
+                # The page's figure is of one machine: drivers' rounding gets .005
+                assert found.ssim >= least_ssims()[self.title] - 0.005, "make_page.py writes it"
+
+        return test
+
+
+def least_ssims() -> dict[str, float]:
+    """Return what the page says of each kind by its title."""
+    rows = re.findall(r"^\| ([^*|]+) \|(?: \d+ \|){5} ([\d.]+) \|$", PAGE.read_text(), re.M)
+    return {title: float(ssim) for title, ssim in rows}
+
+
+def _marks(case: Case) -> list[Any]:
+    marks = [pytest.mark.gl]
+    if not case.quick:
+        marks.append(pytest.mark.slow)
+    if case.defect:
+        marks.append(pytest.mark.xfail(reason=case.defect, strict=True))
+    return marks
+
+
+class Add:
+    """What a scene adds a volume with."""
+
+    def __init__(self, plotter: pv.Plotter, ours: bool) -> None:
+        self._plotter = plotter
+        self.ours = ours
+
+    def __call__(self, volume: Any, *arguments: Any, **keywords: Any) -> Any:
+        """Add a volume to the plotter, or to ``to=``; VTK at steps of half a voxel."""
+        plotter = keywords.pop("to", self._plotter)
+        if self.ours:
+            return plotter.add_vdi(volume, *arguments, **keywords)
+        actor = plotter.add_volume(volume, *arguments, **keywords)
+        for each in actor if isinstance(actor, list) else [actor]:
+            half_voxel_steps(each)
+        return actor
+
+
+def half_voxel_steps(actor: Any) -> None:
+    """Have VTK's mapper of an actor take steps of half the smallest spacing, in the world."""
+    mapper = actor.mapper
+    for switch in ("SetAutoAdjustSampleDistances", "SetInteractiveAdjustSampleDistances"):
+        if hasattr(mapper, switch):
+            getattr(mapper, switch)(0)
+    if not isinstance(mapper.dataset, pv.ImageData):
+        return
+    scale = np.linalg.svd(pv.array_from_vtkmatrix(actor.GetMatrix())[:3, :3], compute_uv=False)
+    step = min(mapper.dataset.spacing) * scale.min() / 2
+    for name in ("SetSampleDistance", "SetInteractiveSampleDistance"):
+        if hasattr(mapper, name):
+            getattr(mapper, name)(step)
+    if hasattr(mapper, "SetImageSampleDistance"):
+        mapper.SetImageSampleDistance(1.0)
+
+
+@dataclass
+class Drawn:
+    """What a scene gave one way: pictures or an error, and what was said."""
+
+    pictures: list[np.ndarray] = field(default_factory=list)
+    error: Exception | None = None
+    said: list[str] = field(default_factory=list)
+    ours: list[str] = field(default_factory=list)
+    empty: np.ndarray | None = None
+
+
+def draw(case: Case, ours: bool) -> Drawn:
+    """Draw a case one way."""
+    drawn = Drawn()
+    theme = pv.themes.Theme()
+    theme.load_theme(pv.global_theme)
+    output, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
+    vtkOutputWindow.SetInstance(output)
+    plotter = pv.Plotter(off_screen=True, **{"window_size": WINDOW, **case.window})
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                pictures = case.scene(plotter, Add(plotter, ours))
+                if pictures is None:
+                    pictures = [shot(plotter)]
+                    drawn.empty = without_volumes(plotter)
+                drawn.pictures = [np.asarray(each)[..., :3] for each in pictures]
+            except Exception as error:
+                drawn.error = error
+    finally:
+        plotter.close()
+        pv.close_all()
+        pv.global_theme.load_theme(theme)
+        vtkOutputWindow.SetInstance(before)
+    for each in caught:
+        to = drawn.ours if issubclass(each.category, VDIWarning) else drawn.said
+        to.append(f"{each.category.__name__}: {each.message}")
+    if output.GetOutput():
+        drawn.said.append(re.sub("0x[0-9a-f]+", "", output.GetOutput()))
+    return drawn
+
+
+def shot(plotter: pv.Plotter, **how: Any) -> np.ndarray:
+    """Show a plotter off-screen and return its picture."""
+    if plotter.render_window.GetNeverRendered() or plotter._first_time:
+        plotter.show(auto_close=False)
+    plotter.render()
+    return np.array(plotter.screenshot(return_img=True, **how))
+
+
+def without_volumes(plotter: pv.Plotter) -> np.ndarray:
+    """Return the picture without volumes, which says whether there were any in it."""
+    for renderer in plotter.renderers:
+        for prop in renderer.GetViewProps():
+            if prop.IsA("vtkVolume") or prop.IsA("vtkAssembly") or prop.IsA("vtkPropAssembly"):
+                prop.SetVisibility(False)
+    return shot(plotter)[..., :3]
+
+
+@dataclass
+class Outcome:
+    """How a case came out: what is wrong with it, if anything, and the least SSIM."""
+
+    wrong: str = ""
+    ssim: float | None = None
+    block: float | None = None
+    theirs: Drawn = field(default_factory=Drawn)
+    ours: Drawn = field(default_factory=Drawn)
+
+
+def outcome(case: Case) -> Outcome:
+    """Draw a case both ways and judge it."""
+    ours = draw(case, ours=True)
+    found = Outcome(ours=ours)
+    if case.refused:
+        said = [f"{ours.error}"] if isinstance(ours.error, VDIError) else ours.ours
+        if not any(re.search(case.refused[0], each) for each in said):
+            found.wrong = f"is not refused by {case.refused[0]!r}: {ours.error!r}, {ours.ours}"
+        return found
+    found.theirs = theirs = draw(case, ours=False)
+    found.wrong = _errors(case, theirs, ours) or _pictures(found, case)
+    return found
+
+
+def _errors(case: Case, theirs: Drawn, ours: Drawn) -> str:
+    if case.both_refuse:
+        if theirs.error is None or not isinstance(ours.error, VDIError | type(theirs.error)):
+            return f"add_volume: {theirs.error!r}; add_vdi: {ours.error!r}"
+        return ""
+    for who, drawn in (("add_volume", theirs), ("add_vdi", ours)):
+        if drawn.error is not None:
+            return f"{who}: {drawn.error!r}"
+    expected = [each for each in ours.ours if case.warns and re.search(case.warns, each)]
+    if case.warns and not expected:
+        return f"no warning {case.warns!r}"
+    unexpected = [each for each in ours.ours if each not in expected]
+    unexpected += [each for each in ours.said if each not in theirs.said]
+    return f"said {unexpected}" if unexpected else ""
+
+
+def _pictures(found: Outcome, case: Case) -> str:
+    theirs, ours = found.theirs, found.ours
+    if case.both_refuse:
+        return ""
+    if [each.shape for each in theirs.pictures] != [each.shape for each in ours.pictures]:
+        return (
+            f"pictures of {[each.shape for each in theirs.pictures]} and "
+            f"{[each.shape for each in ours.pictures]}"
+        )
+    if theirs.empty is not None and np.ptp(theirs.empty - theirs.pictures[0].astype(int)) < 20:
+        return "add_volume's own picture shows no volume"
+    pairs = list(zip(ours.pictures, theirs.pictures, strict=True))
+    found.ssim = min(compare_images(a / 255, b / 255).ssim for a, b in pairs)
+    found.block = max(_largest_block(a, b) for a, b in pairs)
+    if not found.ssim >= LEAST_SSIM:
+        return f"SSIM {found.ssim:.4f}"
+    if found.block > LARGEST_BLOCK:
+        return f"SSIM {found.ssim:.4f}, but 8 x 8 pixels differ by {found.block:.1f} of 255"
+    return ""
+
+
+def _largest_block(a: np.ndarray, b: np.ndarray, n: int = 8) -> float:
+    height, width = (size // n * n for size in a.shape[:2])
+    difference = a[:height, :width].astype(float) - b[:height, :width]
+    blocks = difference.reshape(height // n, n, width // n, n, 3).mean(axis=(1, 3))
+    return float(np.abs(blocks).max())
