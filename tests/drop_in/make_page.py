@@ -26,7 +26,7 @@ voxel) and once with `add_vdi`. It **works** if the pictures' SSIM is at least {
 of 8 x 8 pixels differs by more than {block:g} of 255; where `add_volume` is wrong, the picture is
 compared with one that is right, which the case names. What a VDI cannot do is **refused** by an
 error or a warning that names it. The scripts are `tests/drop_in/`; all run every night, {quick} of
-them with every change.
+them with every change, and these every night in windows on a (virtual) screen, too.
 
 | kind | cases | work | refused | `add_volume` refuses, too | open | least SSIM |
 |---|---|---|---|---|---|---|

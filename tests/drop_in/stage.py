@@ -171,14 +171,14 @@ class Drawn:
     empty: np.ndarray | None = None
 
 
-def draw(case: Case, ours: bool) -> Drawn:
+def draw(case: Case, ours: bool, off_screen: bool = True) -> Drawn:
     """Draw a case one way."""
     drawn = Drawn()
     theme = pv.themes.Theme()
     theme.load_theme(pv.global_theme)
     output, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
     vtkOutputWindow.SetInstance(output)
-    plotter = pv.Plotter(off_screen=True, **{"window_size": WINDOW, **case.window})
+    plotter = pv.Plotter(off_screen=off_screen, **{"window_size": WINDOW, **case.window})
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
@@ -204,9 +204,9 @@ def draw(case: Case, ours: bool) -> Drawn:
 
 
 def shot(plotter: pv.Plotter, **how: Any) -> np.ndarray:
-    """Show a plotter off-screen and return its picture."""
+    """Show a plotter, without handing control to its window, and return its picture."""
     if plotter.render_window.GetNeverRendered() or plotter._first_time:
-        plotter.show(auto_close=False)
+        plotter.show(auto_close=False, interactive_update=not plotter.off_screen)
     plotter.render()
     return np.array(plotter.screenshot(return_img=True, **how))
 
@@ -231,16 +231,16 @@ class Outcome:
     ours: Drawn = field(default_factory=Drawn)
 
 
-def outcome(case: Case) -> Outcome:
+def outcome(case: Case, off_screen: bool = True) -> Outcome:
     """Draw a case both ways and judge it."""
-    ours = draw(case, ours=True)
+    ours = draw(case, True, off_screen)
     found = Outcome(ours=ours)
     if case.refused:
         said = [f"{ours.error}"] if isinstance(ours.error, VDIError) else ours.ours
         if not any(re.search(case.refused[0], each) for each in said):
             found.wrong = f"is not refused by {case.refused[0]!r}: {ours.error!r}, {ours.ours}"
         return found
-    found.theirs = theirs = draw(case, ours=False)
+    found.theirs = theirs = draw(case, False, off_screen)
     found.wrong = _errors(case, theirs, ours) or _pictures(found, case)
     return found
 
