@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from drop_in.stage import Kind, shot
+from drop_in.stage import Kind, half_voxel_steps, shot
 from drop_in.volumes import grid, values
 
 kind = Kind("Changes after the first picture")
@@ -282,6 +282,17 @@ widget(
     "add_volume_clip_plane, not implicit",
     lambda pl, actor: pl.add_volume_clip_plane(actor, normal="y", implicit=False),
 )
+
+
+@kind.case()
+def a_clip_plane_of_a_grid(pl: pv.Plotter, add: Any) -> None:
+    """``add_vdi_clip_plane(grid)`` in place of ``add_volume_clip_plane(grid)``."""
+    put = pl.add_vdi_clip_plane if add.ours else pl.add_volume_clip_plane
+    put(grid(), normal="x", show_scalar_bar=False)
+    if not add.ours:
+        half_voxel_steps(pl.volume)
+
+
 widget(
     "add_slider_widget",
     lambda pl, actor: pl.add_slider_widget(lambda value: None, (0, 1), title="x"),
