@@ -1,7 +1,7 @@
-"""What a folder of DICOM slices says of itself, as far as a volume needs it.
+"""What a folder of DICOM slices holds and says of itself, as far as a volume needs it.
 
-VTK's reader takes all slices of a folder for one volume and drops where they lie in the patient:
-pydicom reads that.
+VTK's reader takes all slices of a folder for one volume, in an order that is not always theirs, and
+drops where they lie in the patient: pydicom reads slices one by one.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError, MissingDependencyError, UnsupportedError
+from pyvista_vdi.model.host_memory import require_free_memory
 
 #: What is read of a header, by DICOM's keywords.
 _WANTED = [
@@ -26,6 +27,7 @@ _WANTED = [
     "ImageOrientationPatient",
     "Rows",
     "PixelSpacing",
+    "InstanceNumber",
 ]
 
 #: Transfer syntaxes whose pixels VTK reads.
@@ -45,6 +47,7 @@ class Slice:
     orientation: NDArray[np.float64] | None  # directions of columns and rows, (2, 3)
     thickness: float | None
     spacing: NDArray[np.float64] | None  # between rows and between columns
+    number: int  # in the order in which they were taken; 0 where the file does not say
 
 
 def slices_of(folder: Path) -> list[Slice]:
@@ -97,9 +100,62 @@ def read_slice(path: Path) -> Slice | None:
                 _numbers(header, "ImageOrientationPatient", (2, 3)),
                 None if thickness is None else float(thickness),
                 _numbers(header, "PixelSpacing", (2,)),
+                int(header.get("InstanceNumber") or 0),
             )
     except Exception:  # damage shows at whatever pydicom comes to first
         return None
+
+
+def values_of(slices: list[Slice]) -> NDArray[Any]:
+    """Return the values of slices in their order, (slices, rows, columns), the first row lowest.
+
+    They are as the files mean them: rescaled, whole numbers where slope and intercept are.
+    """
+    first = _values(slices[0])
+    require_free_memory(
+        first.nbytes * len(slices),
+        f"the {len(slices)} slices in {slices[0].path.parent}",
+        "take fewer of them",
+    )
+    array = np.empty((len(slices), *first.shape), first.dtype)
+    for i, one in enumerate(slices):
+        values = _values(one)
+        if values.shape != first.shape:
+            raise InvalidVolumeError(
+                f"{one.path} is {' x '.join(map(str, values.shape))} pixels, and "
+                f"{slices[0].path.name} is {' x '.join(map(str, first.shape))}: the slices of a "
+                "volume have one size"
+            )
+        if values.dtype != array.dtype:  # rescaled in another way than those before
+            array = array.astype(np.promote_types(array.dtype, values.dtype))
+        array[i] = values[::-1]
+    return array
+
+
+def _values(one: Slice) -> NDArray[Any]:
+    try:
+        data = _pydicom().dcmread(one.path)
+        values: NDArray[Any] = data.pixel_array
+        slope = float(data.get("RescaleSlope", 1) or 1)
+        intercept = float(data.get("RescaleIntercept", 0) or 0)
+    except Exception as error:  # damage shows at whatever pydicom comes to first
+        raise InvalidVolumeError(f"{one.path} cannot be read as a DICOM slice: {error}") from error
+    if values.ndim != 2:
+        raise UnsupportedError(
+            f"{one.path} holds pixels of {values.shape}, not one slice of grey values: extract the "
+            "frames, or convert colours to grey values"
+        )
+    if (slope, intercept) == (1, 0):
+        return values
+    if slope.is_integer() and intercept.is_integer():
+        # By what may be stored, so that the slices of a series have one type
+        bits, signed = int(data.BitsStored), int(data.PixelRepresentation)
+        stored = (-signed << bits - 1, (1 << bits - signed) - 1, values.min(), values.max())
+        limits = [int(slope) * int(n) + int(intercept) for n in stored]
+        for kind in ("uint8", "int16", "uint16", "int32"):
+            if np.iinfo(kind).min <= min(limits) and max(limits) <= np.iinfo(kind).max:
+                return (values.astype(np.int64) * int(slope) + int(intercept)).astype(kind)
+    return (values * slope + intercept).astype(np.float32)
 
 
 def _numbers(header: Any, name: str, shape: tuple[int, ...]) -> NDArray[np.float64] | None:

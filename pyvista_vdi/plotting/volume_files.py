@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from vtkmodules.vtkIOImage import vtkDICOMImageReader, vtkMetaImageReader, vtkNIFTIImageReader
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIError, VDIWarning
-from pyvista_vdi.plotting.dicom import Slice, read_slice, require_uncompressed, slices_of
+from pyvista_vdi.plotting.dicom import Slice, read_slice, require_uncompressed, slices_of, values_of
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
 
 #: Names of files that hold VDIs, not volumes.
@@ -222,22 +222,15 @@ def _with_spacing(data: pv.ImageData, one: Slice) -> pv.ImageData:
 def _dicom_series(folder: Path) -> pv.ImageData:
     """Read a folder's slices, and put them where they lie in the patient.
 
-    VTK counts rows upwards and sorts slices by descending place along the normal, the cross
-    product of the directions of columns and rows.
+    Rows count upwards, and slices by descending place along the normal, the cross product of the
+    directions of columns and rows: as VTK has them.
     """
-    slices = slices_of(folder)
-    reader = vtkDICOMImageReader()
-    reader.SetDirectoryName(str(folder))
-    data = _with_spacing(_read_whole(reader, folder), slices[0])
-    if data.dimensions[2] != len(slices):
-        raise InvalidVolumeError(
-            f"of the {len(slices)} slices in the folder {folder} VTK's reader takes "
-            f"{data.dimensions[2]}: are all of the same size?"
-        )
+    slices = sorted(slices_of(folder), key=lambda one: (one.number, one.path.name))
     if len(slices) < 2:
         raise InvalidVolumeError(f"the folder {folder} holds one DICOM slice: a volume needs two")
     positions, orientations = ([getattr(s, n) for s in slices] for n in ("position", "orientation"))
     if any(p is None for p in positions) or any(o is None for o in orientations):
+        data = _stacked(slices)
         apart = slices[0].thickness or data.spacing[0]
         warnings.warn(
             f"slices in the folder {folder} do not say where they lie or how they are turned: rows "
@@ -269,6 +262,7 @@ def _dicom_series(folder: Path) -> pv.ImageData:
             VDIWarning,
             stacklevel=4,
         )
+    data = _stacked([slices[i] for i in np.argsort(-places)])
     n_rows = data.dimensions[1]
     step = (ordered[-1] - ordered[0]) / (len(slices) - 1)  # of a tilted gantry not the normal
     to_world = np.eye(4)
@@ -277,3 +271,10 @@ def _dicom_series(folder: Path) -> pv.ImageData:
     to_world[:3, 2] = step
     to_world[:3, 3] = ordered[0] + down * data.spacing[1] * (n_rows - 1)
     return _place(data, to_world, folder)
+
+
+def _stacked(slices: list[Slice]) -> pv.ImageData:
+    array = values_of(slices)
+    data = pv.ImageData(dimensions=array.shape[::-1])
+    data.point_data["values"] = array.ravel()
+    return _with_spacing(data, slices[0])
