@@ -379,7 +379,8 @@ REFUSED_BY_BOTH = [
 ]
 
 
-@pytest.mark.parametrize("arguments", REFUSED_BY_BOTH, ids=lambda a: repr(a)[:40])
+# Processes that share the tests must have one name for each: none with an address in it
+@pytest.mark.parametrize("arguments", REFUSED_BY_BOTH, ids="-".join)
 def test_errors_are_those_of_add_volume_too(plotter, arguments):
     arguments = {"volume": VOLUME.copy(), **arguments}
     raised = []
