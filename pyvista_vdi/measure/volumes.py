@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -53,13 +54,6 @@ def _resampled(nodes: tuple[float, ...]) -> NDArray[np.float64]:
     return np.interp(at, np.arange(len(nodes)), nodes)
 
 
-def _is_folder(file: Path) -> bool:
-    try:
-        return file.is_dir()
-    except OSError:  # a name that is too long; whoever opens it says so
-        return False
-
-
 def read_file(file: Path) -> Any:
     """Read a volume of any format that can be read here, or a folder of slices.
 
@@ -68,7 +62,7 @@ def read_file(file: Path) -> Any:
     NRRD and folders of TIFF or PNG become a Volume and need no PyVista; others, folders of DICOM
     among them, become a ``pyvista.ImageData``.
     """
-    if _is_folder(file):
+    if os.path.isdir(file):  # noqa: PTH112 - pathlib's raises for a name that is too long
         slices = image_stack.slices_in(file)
         if slices:
             return image_stack.read_stack(slices)
@@ -97,7 +91,7 @@ def _read_raw(file: Path) -> Volume:
             f"kingsnake_1024x1024x795_uint8.raw, with a type of {', '.join(VOXEL_TYPES)}"
         )
     nx, ny, nz = (int(found[i]) for i in (1, 2, 3))
-    if not file.is_file():
+    if not os.path.isfile(file):  # noqa: PTH113 - pathlib's raises for a name that is too long
         raise InvalidVolumeError(f"{file} does not exist: check the volume's path")
     dtype = np.dtype(found[4].lower()).newbyteorder("<")
     expected = nx * ny * nz * dtype.itemsize

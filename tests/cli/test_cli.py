@@ -202,6 +202,7 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
             "both say how good pictures are to be",
         ),
         (["compare", "v.nrrd", "--out", "v.nrrd"], "the folder v.nrrd cannot be made"),
+        (["info", "x" * 300], "x does not exist: check the volume's path"),
     ],
 )
 def test_mistakes_that_the_work_finds(arguments, message, folder, capsys, monkeypatch):
@@ -218,6 +219,8 @@ def test_mistakes_that_the_work_finds(arguments, message, folder, capsys, monkey
     [
         (["none.nrrd"], "none.nrrd cannot be read .*No such file"),
         (["none.vti"], "none.vti does not exist: check the volume's path"),
+        (["x" * 300], "x does not exist: check the volume's path"),
+        (["x" * 300 + "_4x4x4_uint8.raw"], "raw does not exist: check the volume's path"),
         (["a.vdi"], "a.vdi is a VDI, not a volume"),
         (["camera.json"], "camera.json cannot be read as a volume"),
         (["v.nrrd", "--scalars", "density"], "no array 'density'"),
