@@ -211,7 +211,8 @@ run_tests_on_second_implementation() {
 # Those that are slow, on every implementation.
 run_slow_tests() {
     export PYVISTA_VDI_TEST_DEVICES=all
-    run_tests -m "slow and not paraview"
+    # A file of forty minutes is shared, too: not by files
+    run_tests -m "slow and not paraview" --dist worksteal
 }
 
 # Each target guided by coverage, where atheris has a wheel for this Python.
