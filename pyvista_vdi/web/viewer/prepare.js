@@ -1,0 +1,153 @@
+// A VDI's arrays to what the shader reads: textures as typed arrays, made off the main thread.
+import { frameOf, listSpace } from "./rays.js";
+
+/** Texels in a row of the textures that hold supersegments. */
+export const TEXTURE_WIDTH = 4096;
+/** Lists along an edge of a stack of the occupancy grid, and its slabs: bits of two words. */
+export const STACK_SHIFT = 4;
+const SLABS = 64;
+const LARGEST = 3.4028234663852886e38;
+const SMALLEST = 1.1754943508222875e-38;
+
+/**
+ * Prepare a VDI for a {@link Raycaster}.
+ *
+ * @param {object} vdi As decode.js makes it.
+ * @returns {object} Its lists as textures (typed arrays), its list space, and what it is.
+ */
+export function prepare(vdi) {
+  const frame = frameOf(vdi);
+  const space = listSpace(frame, vdi);
+  const packed = vdi.precision === "8-byte";
+  const n = vdi.offsets[vdi.offsets.length - 1];
+  const arrays = packed ? packedLists(vdi, frame, space, n) : exactLists(vdi, frame, space, n);
+  return {
+    windowSize: vdi.windowSize, camera: vdi.camera, bounds: vdi.bounds, level: vdi.level,
+    pictureSize: vdi.pictureSize, metadata: vdi.metadata, n, frame, space, packed, ...arrays,
+    step: packed ? vdi.depthStep * frame.scale : 0,
+  };
+}
+
+/** The buffers of what {@link prepare} made, to be handed over between threads. */
+export function transferables(prepared) {
+  return ["lists", "faces", "media", "masks"]
+    .filter((name) => prepared[name]).map((name) => prepared[name].buffer);
+}
+
+const texels = (n) => TEXTURE_WIDTH * Math.max(1, Math.ceil(n / TEXTURE_WIDTH));
+
+// Model' length of a list's centre ray per unit of view depth (world').
+function centreRay(space, [width, height], list) {
+  const a = (list % width) + 0.5 - width / 2;
+  const b = Math.floor(list / width) + 0.5 - height / 2;
+  const [one, ofA, ofB] = space.perDepth;
+  return Math.hypot(one[0] + a * ofA[0] + b * ofB[0], one[1] + a * ofA[1] + b * ofB[1],
+    one[2] + a * ofA[2] + b * ofB[2]);
+}
+
+function exactLists(vdi, frame, space, n) {
+  const { offsets, windowSize, front, back, color, opticalDepth } = vdi;
+  const lists = new Uint32Array(2 * windowSize[0] * windowSize[1]);
+  const faces = new Float32Array(2 * texels(n));
+  const media = new Float32Array(4 * texels(n));
+  const { parallel, shifted, origin, nearest } = space;
+  const coordinate = (offset) => {
+    if (parallel) return offset;
+    const depth = Math.max(offset + origin, nearest);
+    return shifted ? (depth - origin) / depth : -1 / depth;
+  };
+  const slabs = occupancy(vdi, frame);
+  for (let list = 0; list < lists.length / 2; ++list) {
+    const begin = offsets[list], end = offsets[list + 1];
+    lists[2 * list] = begin;
+    lists[2 * list + 1] = end - begin;
+    if (begin === end) continue;
+    const perDepth = centreRay(space, windowSize, list);
+    for (let k = begin; k < end; ++k) {
+      const length = Math.max((back[k] - front[k]) * frame.scale * perDepth, SMALLEST);
+      faces[2 * k] = coordinate(front[k] * frame.scale);
+      faces[2 * k + 1] = coordinate(back[k] * frame.scale);
+      media[4 * k] = color[3 * k];
+      media[4 * k + 1] = color[3 * k + 1];
+      media[4 * k + 2] = color[3 * k + 2];
+      media[4 * k + 3] = Math.min(opticalDepth[k] / length, LARGEST);
+      slabs.occupy(list, front[k], back[k]);
+    }
+  }
+  return { lists, faces, media, ...slabs.grid };
+}
+
+// Lists of 8-byte supersegments: (first, count and stride, origin, 1 over a code's model' length).
+function packedLists(vdi, frame, space, n) {
+  const { offsets, windowSize, words, origin, stride, depthStep } = vdi;
+  const lists = new Uint32Array(4 * windowSize[0] * windowSize[1]);
+  const floats = new Float32Array(lists.buffer);
+  const slabs = occupancy(vdi, frame);
+  for (let list = 0; list < lists.length / 4; ++list) {
+    const begin = offsets[list], end = offsets[list + 1];
+    lists[4 * list] = begin;
+    lists[4 * list + 1] = (end - begin) | (stride[list] << 16);
+    lists[4 * list + 2] = origin[list];
+    if (begin === end) continue;
+    const code = stride[list] * depthStep * frame.scale * centreRay(space, windowSize, list);
+    floats[4 * list + 3] = Math.min(1 / Math.max(code, SMALLEST), LARGEST);
+    for (let k = begin; k < end; ++k) {
+      const word = words[2 * k];
+      const depth = (c) => (origin[list] + c * stride[list]) * depthStep;
+      slabs.occupy(list, depth(word & 16383), depth((word >>> 14) & 16383));
+    }
+  }
+  let faces = words;
+  if (words.length !== 2 * texels(n)) {
+    faces = new Uint32Array(2 * texels(n));
+    faces.set(words);
+  }
+  return { lists, faces, ...slabs.grid };
+}
+
+// The occupancy grid (paper, section 4): one bit for each slab of equal view depth of each stack.
+function occupancy({ windowSize, offsets, ...vdi }, frame) {
+  let near = Infinity, far = -Infinity;
+  const see = (front, back) => {
+    near = Math.min(near, front);
+    far = Math.max(far, back);
+  };
+  for (let list = 0; list + 1 < offsets.length; ++list) {
+    const begin = offsets[list], last = offsets[list + 1] - 1;
+    if (begin > last) continue;
+    if (vdi.words) {
+      const depth = (c) => (vdi.origin[list] + c * vdi.stride[list]) * vdi.depthStep;
+      see(depth(vdi.words[2 * begin] & 16383), depth((vdi.words[2 * last] >>> 14) & 16383));
+    } else {
+      see(vdi.front[begin], vdi.back[last]);
+    }
+  }
+  const perDepth = far > near ? SLABS / (far - near) : 1;
+  // Depths that are looked up are rounded: a tenth of a slab, and as many units in the last place
+  // of the depth as a ray's coordinates are off by
+  const margin = 0.1 + 64 * 2 ** -23 * perDepth * Math.max(Math.abs(near), Math.abs(far),
+    Math.abs(far + vdi.depthOrigin));
+  const stacks = windowSize.map((lists) => ((lists - 1) >> STACK_SHIFT) + 1);
+  const masks = new Uint32Array(2 * stacks[0] * stacks[1]);
+  const slab = (x) => Math.min(Math.max(Math.floor(x), 0), SLABS - 1);
+  return {
+    grid: {
+      masks, stacks, firstDepth: (near < far ? near : 0) * frame.scale,
+      slabsPerDepth: perDepth / frame.scale,
+    },
+    occupy(list, front, back) {
+      const i = (list % windowSize[0]) >> STACK_SHIFT;
+      const j = Math.floor(list / windowSize[0]) >> STACK_SHIFT;
+      const at = 2 * (j * stacks[0] + i);
+      const first = slab((front - near) * perDepth - margin);
+      const last = slab((back - near) * perDepth + margin);
+      if (first < 32) masks[at] |= bits(first, Math.min(last, 31));
+      if (last >= 32) masks[at + 1] |= bits(Math.max(first - 32, 0), last - 32);
+    },
+  };
+}
+
+// Bits first to last of a word, both included.
+function bits(first, last) {
+  return (-1 << first) & (-1 >>> (31 - last));
+}

@@ -1,0 +1,179 @@
+// A VDI in WebGL 2: textures of its lists, and a fragment shader that casts a ray for each pixel.
+import { TEXTURE_WIDTH } from "./prepare.js";
+import { frameForms, isParallel, pixelRays } from "./rays.js";
+import { MOST_PLANES, VERTEX_SHADER, fragmentShader } from "./shader.js";
+
+/** A ray ends where less transmittance than this is left. */
+const TRANSMITTANCE_CUTOFF = 1e-6;
+
+/** Draws prepared VDIs from any view into the bound framebuffer. */
+export class Raycaster {
+  /** @param {WebGL2RenderingContext} gl */
+  constructor(gl) {
+    this.gl = gl;
+    this.programs = new Map();
+    this.vdi = null;
+    this.vertices = gl.createVertexArray();
+  }
+
+  /**
+   * Take a VDI; the one before is drawn until its textures are there, and is freed then.
+   *
+   * @param {object} prepared What prepare.js makes.
+   * @throws {Error} If this machine's textures cannot hold it.
+   */
+  set(prepared) {
+    const { gl } = this;
+    const largest = gl.getParameter(gl.MAX_TEXTURE_SIZE);
+    const rows = Math.ceil(prepared.n / TEXTURE_WIDTH);
+    if (Math.max(rows, TEXTURE_WIDTH, ...prepared.windowSize) > largest) {
+      throw new Error(
+        `The VDI has ${prepared.n} supersegments in ${prepared.windowSize.join(" x ")} lists, ` +
+        `which take textures of up to ${Math.max(rows, ...prepared.windowSize)} texels along an ` +
+        `edge; this browser's MAX_TEXTURE_SIZE is ${largest}: make it with fewer lists.`);
+    }
+    const textures = {
+      lists: prepared.packed
+        ? this.texture(prepared.lists, "RGBA32UI", prepared.windowSize[0])
+        : this.texture(prepared.lists, "RG32UI", prepared.windowSize[0]),
+      masks: this.texture(prepared.masks, "RG32UI", prepared.stacks[0]),
+      faces: this.texture(prepared.faces, prepared.packed ? "RG32UI" : "RG32F", TEXTURE_WIDTH),
+    };
+    if (!prepared.packed) textures.media = this.texture(prepared.media, "RGBA32F", TEXTURE_WIDTH);
+    if (gl.getError() === gl.OUT_OF_MEMORY) {
+      Object.values(textures).forEach((texture) => gl.deleteTexture(texture));
+      throw new Error(`The graphics memory cannot hold ${prepared.n} supersegments.`);
+    }
+    this.free();
+    this.vdi = { ...prepared, textures, lists: null, masks: null, faces: null, media: null };
+  }
+
+  texture(array, format, width) {
+    const { gl } = this;
+    const isFloat = format.endsWith("F"), channels = format.startsWith("RGBA") ? 4 : 2;
+    const texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl[format], width, array.length / channels / width);
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, array.length / channels / width,
+      gl[(channels === 4 ? "RGBA" : "RG") + (isFloat ? "" : "_INTEGER")],
+      isFloat ? gl.FLOAT : gl.UNSIGNED_INT, array);
+    return texture;
+  }
+
+  /**
+   * Draw premultiplied RGBA into the bound framebuffer, by its blending; bottom row first.
+   *
+   * @param {object} view
+   * @param {object} view.camera position, focal_point, view_up and view_angle (degrees) or
+   *   parallel_scale: VTK's meanings, world units.
+   * @param {number} view.width Pixels, as height; the viewport is set to them.
+   * @param {number[]} [view.corner] Of the viewport.
+   * @param {{origin: number[], normal: number[]}[]} [view.clippingPlanes] World; the side that the
+   *   normal points to is kept.
+   * @param {WebGLTexture} [view.depthTexture] R32F: view depth of what is opaque, world units, at
+   *   each texel of the framebuffer; rays end there.
+   */
+  draw({ camera, width, height, corner = [0, 0], clippingPlanes = [], depthTexture = null }) {
+    const { gl, vdi } = this;
+    if (!vdi) return;
+    const { space, frame, windowSize } = vdi;
+    const rays = pixelRays(frame, camera, [width, height]);
+    const { coordinates, planes } = frameForms(frame, space, windowSize, rays, isParallel(camera),
+      clippingPlanes);
+    if (planes.length > MOST_PLANES) {
+      throw new Error(`A VDI is clipped to at most ${clippingPlanes.length - planes.length +
+        MOST_PLANES} planes, not to ${clippingPlanes.length}.`);
+    }
+    const { program, uniforms: u } = this.program(
+      [space.parallel && "PARALLEL", space.shifted && "SHIFTED", vdi.packed && "PACKED",
+        depthTexture && "OPAQUE"].filter(Boolean));
+    gl.useProgram(program);
+    gl.viewport(...corner, width, height);
+    const halves = (forms) => [0, 3].map((k) => forms.flatMap((form) => form.slice(k, k + 3)));
+    const [formValue, formSlope] = halves(coordinates);
+    const [planeValue, planeSlope] = halves(planes);
+    gl.uniform2f(u.corner, ...corner);
+    gl.uniform2f(u.middle, width / 2, height / 2);
+    gl.uniform3fv(u.formValue, formValue);
+    gl.uniform3fv(u.formSlope, formSlope);
+    gl.uniform3fv(u.planeValue, planeValue);
+    gl.uniform3fv(u.planeSlope, planeSlope);
+    gl.uniform1i(u.planes, planes.length);
+    gl.uniformMatrix3fv(u.direction, false, rays.direction.flat());
+    gl.uniform2i(u.window, ...windowSize);
+    gl.uniform2i(u.stacks, ...vdi.stacks);
+    gl.uniform1f(u.depthOrigin, space.origin);
+    gl.uniform1f(u.firstDepth, vdi.firstDepth);
+    gl.uniform1f(u.slabsPerDepth, vdi.slabsPerDepth);
+    gl.uniform1f(u.cutoff, TRANSMITTANCE_CUTOFF);
+    gl.uniform1f(u.codeStep, vdi.step);
+    gl.uniform1f(u.nearest, space.parallel ? -1e30 : space.nearest - space.origin);
+    gl.uniform1f(u.worldScale, frame.scale);
+    gl.uniform1f(u.reference, rays.reference);
+    const bound = depthTexture ? { ...vdi.textures, opaque: depthTexture } : vdi.textures;
+    Object.entries(bound).forEach(([name, texture], unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      gl.uniform1i(u[name], unit);
+    });
+    gl.bindVertexArray(this.vertices);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.bindVertexArray(null);
+    gl.activeTexture(gl.TEXTURE0);
+  }
+
+  program(defines) {
+    const { gl } = this;
+    const key = defines.join();
+    if (!this.programs.has(key)) {
+      const program = linked(gl, VERTEX_SHADER, fragmentShader(defines));
+      const uniforms = {};
+      for (let k = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); k-- > 0; ) {
+        const { name } = gl.getActiveUniform(program, k);
+        uniforms[name.replace("[0]", "")] = gl.getUniformLocation(program, name);
+      }
+      this.programs.set(key, { program, uniforms });
+    }
+    return this.programs.get(key);
+  }
+
+  free() {
+    if (this.vdi) Object.values(this.vdi.textures).forEach((texture) => this.gl.deleteTexture(texture));
+    this.vdi = null;
+  }
+
+  /** Free all of the graphics memory that it has taken. */
+  dispose() {
+    this.free();
+    this.programs.forEach(({ program }) => this.gl.deleteProgram(program));
+    this.programs.clear();
+    this.gl.deleteVertexArray(this.vertices);
+  }
+}
+
+/**
+ * Compile and link a program.
+ *
+ * @throws {Error} With the compiler's words, if it refuses.
+ */
+export function linked(gl, vertex, fragment) {
+  const program = gl.createProgram();
+  for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+    const shader = gl.createShader(kind);
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+    gl.deleteShader(shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !gl.isContextLost()) {
+      throw new Error(`This browser's graphics driver refuses a shader: ${gl.getShaderInfoLog(shader)}`);
+    }
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+    throw new Error(`This browser's graphics driver refuses a program: ${gl.getProgramInfoLog(program)}`);
+  }
+  return program;
+}
