@@ -336,6 +336,21 @@ def gaps_and_thicknesses(
     return gaps.astype(np.uint16), (back - front).astype(np.uint16)
 
 
+def channel_differences(colors: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return (blue, green - blue, red - blue) of (red, green, blue), uint8 (n, 3), modulo 256.
+
+    Most colour maps' channels rise and fall together: the differences are small or repeat.
+    """
+    red, green, blue = colors.T
+    return np.stack([blue, green - blue, red - blue], axis=1)
+
+
+def colors_of_differences(differences: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return what :func:`channel_differences` was given."""
+    blue, green, red = differences.T
+    return np.stack([red + blue, green + blue, blue], axis=1)
+
+
 def packed_8(
     step: float,
     offsets: NDArray[np.uint64],

@@ -47,7 +47,7 @@ OWN_BYTES = 8 * 2**20
 #: What a device may be asked for while fuzzing: pictures and VDIs stay small.
 DEVICE_BYTES = 64 * 2**20
 
-COMPRESSIONS = ("zstd", "lz4", "none")
+COMPRESSIONS = ("zstd", "lz4", "deflate", "none")
 
 
 @contextlib.contextmanager

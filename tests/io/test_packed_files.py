@@ -18,7 +18,7 @@ from pyvista_vdi.cli import main
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.io.vdi_file.layout import CHUNK_ROWS, INDEX_DTYPE
 
-CODECS = ("lz4", "zstd", "none")
+CODECS = ("lz4", "zstd", "deflate", "none")
 JUNK = (None, -1, True, 2**70, 1e300, "x", [], {}, [1], [[]], {"a": 1})
 PACKED = ("16-byte", "8-byte")
 ARRAYS = ("counts", "origin", "stride", "front", "back", "color", "optical_depth")

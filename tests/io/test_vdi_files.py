@@ -27,7 +27,7 @@ from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.io.vdi_file import chunks, writer
 from pyvista_vdi.io.vdi_file.layout import CHUNK_ROWS, INDEX_DTYPE
 
-CODECS = ("lz4", "zstd", "none")
+CODECS = ("lz4", "zstd", "deflate", "none")
 ARRAYS = ("counts", "front", "back", "color", "optical_depth")
 STORED = Path(__file__).parent / "files"
 
@@ -360,7 +360,7 @@ def test_links_are_followed(tmp_path):
     [
         (
             {"compression": "gzip"},
-            r"compression of .* must be one of lz4, zstd and none; got 'gzip'",
+            r"compression of .* must be one of lz4, zstd, deflate and none; got 'gzip'",
         ),
         ({"level": 0}, "level must be a whole number from 1 to 9; got 0"),
         ({"level": "best"}, "level must be a whole number from 1 to 9; got 'best'"),
@@ -424,11 +424,11 @@ def test_another_archive_with_a_description(tmp_path):
 
 
 def test_a_newer_version(file):
-    edit_description(file, version=4, written_by="pyvista-vdi 9.0")
+    edit_description(file, version=5, written_by="pyvista-vdi 9.0")
     with pytest.raises(
         VDIFileError,
-        match=r"is of format version 4, written by 'pyvista-vdi 9\.0'; this is pyvista-vdi .*, "
-        r"which reads up to version 3: upgrade by pip install -U pyvista-vdi",
+        match=r"is of format version 5, written by 'pyvista-vdi 9\.0'; this is pyvista-vdi .*, "
+        r"which reads up to version 4: upgrade by pip install -U pyvista-vdi",
     ):
         io.read(file)
 

@@ -14,14 +14,17 @@ from typing import Any
 import numpy as np
 
 #: Highest version of the format; files of this and of lower versions are read.
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 
 #: What is written for each precision: version 3 only where version 2 has no place for it.
-VERSION_OF = {"exact": 2, "16-byte": 3, "8-byte": 3}
+_VERSION_OF = {"exact": 2, "16-byte": 3, "8-byte": 3}
+
+#: The codec of version 4, which browsers decode by themselves, and the version of no other.
+DEFLATE = "deflate"
 
 #: Rows of an array in one chunk, for each version. What one chunk holds of all arrays, 1.5 MiB,
 #: stays in a core's cache until it has been decoded; larger chunks do not compress better.
-CHUNK_ROWS = {1: 1 << 18, 2: 1 << 16, 3: 1 << 16}
+CHUNK_ROWS = {1: 1 << 18, 2: 1 << 16, 3: 1 << 16, 4: 1 << 16}
 
 #: What a description calls the format.
 FORMAT_NAME = "pyvista-vdi"
@@ -31,6 +34,11 @@ SUFFIX = ".vdi"
 
 #: The archive's first member.
 DESCRIPTION = "vdi.json"
+
+#: In version 4 the member behind the description: a whole .vdi file of fewer lists, which can be
+#: drawn until the rest is there. It is left out where a list stands for fewer than COARSE_STEP².
+COARSE = "coarse.vdi"
+COARSE_STEP = 4
 
 #: The archive's last member, since version 2: bytes and CRC-32 of every chunk, in the order of
 #: the arrays. A chunk is found, read and checked by itself.
@@ -53,7 +61,7 @@ class Layout:
         Shape of a row.
     n_rows : int
         Number of rows.
-    filter : {"none", "difference"}
+    filter : {"none", "difference", "channel-difference"}
         What was done to the rows before they were compressed.
     chunk_rows : int
         Rows that are compressed together.
@@ -82,6 +90,11 @@ class Layout:
             "shape": [self.n_rows, *self.row_shape],
             "filter": self.filter,
         }
+
+
+def version_of(precision: str, codec: str) -> int:
+    """Return the version that is written: the lowest that has a place for both."""
+    return FORMAT_VERSION if codec == DEFLATE else _VERSION_OF[precision]
 
 
 def layouts(
@@ -120,7 +133,9 @@ def layouts(
             "origin": Layout(np.dtype("<i4"), (), n_lists, "none", rows),
             "stride": Layout(u2, (), n_lists, "none", rows),
             **{name: Layout(u2, (), n, "difference", rows) for name in ("front", "back")},
-            "color": Layout(np.dtype("|u1"), (3,), n, "none", rows),
+            "color": Layout(
+                np.dtype("|u1"), (3,), n, "none" if version < 4 else "channel-difference", rows
+            ),
             "optical_depth": Layout(u2, (), n, "none", rows),
         }
     f4, kind = np.dtype("<f4"), "difference" if filtered else "none"

@@ -30,6 +30,7 @@ from pyvista_vdi.io.vdi_file.chunks import (
 from pyvista_vdi.io.vdi_file.description import from_json, number
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
+    DEFLATE,
     DESCRIPTION,
     FORMAT_NAME,
     FORMAT_VERSION,
@@ -41,7 +42,13 @@ from pyvista_vdi.io.vdi_file.layout import (
 )
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.host_memory import aligned_empty
-from pyvista_vdi.model.packing import Packed16, Packing, check_precision, packed_8
+from pyvista_vdi.model.packing import (
+    Packed16,
+    Packing,
+    check_precision,
+    colors_of_differences,
+    packed_8,
+)
 from pyvista_vdi.model.vdi import VDI
 
 #: The first bytes: a ZIP member's local header, whose name stands at byte 30.
@@ -91,7 +98,8 @@ class FileInfo:
     metadata : dict
         What made the VDI.
     codec : str
-        How the arrays are compressed: ``"zstd"``, ``"lz4"`` or ``"none"``.
+        How the arrays are compressed: ``"zstd"``, ``"lz4"``, ``"deflate"`` or
+        ``"none"``.
     file_bytes : int
         Size of the file.
     memory_bytes : int
@@ -267,6 +275,8 @@ class _OpenFile:
                 self._refuse("its metadata or codec are of the wrong kind")
             if d["codec"] not in (*CODECS, "none"):
                 self._refuse(f"its codec {d['codec']!r} is unknown")
+            if (d["codec"] == DEFLATE) != (d["version"] >= 4):
+                self._refuse(f"version {d['version']} has no codec {d['codec']!r}")
             rows = CHUNK_ROWS[d["version"]]
             if d["chunk_rows"] != rows:
                 self._refuse(f"chunk_rows is {d['chunk_rows']!r}, not {rows}")
@@ -375,7 +385,10 @@ class _OpenFile:
         }
 
         def decode(name: str, first: int, last: int) -> None:
-            packed[name].read(first, stored[name][first:last])
+            rows = stored[name][first:last]
+            packed[name].read(first, rows)
+            if packed[name].layout.filter == "channel-difference":
+                rows[:] = colors_of_differences(rows)
 
         tasks = [(name, *rows) for name, array in packed.items() for rows in array.ranges()]
         done = Pieces(progress, len(tasks))
@@ -501,4 +514,4 @@ def _decode_depths_2(
 
 
 #: How each version of the format stores the depths of a chunk.
-_DEPTHS = {1: _decode_depths_1, 2: _decode_depths_2, 3: _decode_depths_2}
+_DEPTHS = {1: _decode_depths_1, 2: _decode_depths_2, 3: _decode_depths_2, 4: _decode_depths_2}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import os
 import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +17,25 @@ from pyvista_vdi.io.vdi_file.chunks import DEFAULT_LEVELS, write_chunks
 from pyvista_vdi.io.vdi_file.description import describe, to_json
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
+    COARSE,
+    COARSE_STEP,
+    DEFLATE,
     DESCRIPTION,
     INDEX,
     INDEX_DTYPE,
-    VERSION_OF,
     Layout,
     layouts,
+    version_of,
 )
 from pyvista_vdi.io.whole_file import whole_file
-from pyvista_vdi.model.packing import Packed8, Packed16, gaps_and_thicknesses
+from pyvista_vdi.model.coarser import coarser
+from pyvista_vdi.model.packing import (
+    DEPTH_CODES,
+    Packed8,
+    Packed16,
+    channel_differences,
+    gaps_and_thicknesses,
+)
 from pyvista_vdi.model.vdi import VDI
 
 #: The oldest time that ZIP knows; a real one would make equal VDIs differ.
@@ -46,12 +57,13 @@ def write(
     ----------
     vdi, path
         As there; the name ends in ``.vdi``.
-    compression : {"lz4", "zstd", "none"}
+    compression : {"lz4", "zstd", "deflate", "none"}
         ``"lz4"`` is the fastest to write and to read, ``"zstd"`` makes files a few percent
-        smaller, ``"none"`` leaves plain little-endian arrays.
+        smaller, ``"deflate"`` is for pages: browsers decode it, and draw a coarse level that it
+        begins with while they read the rest. ``"none"`` leaves plain little-endian arrays.
     level : int, optional
-        Effort of the compressor, 1 to 9; 9 for lz4 and 1 for zstd by default. Higher levels are
-        slower to write, not to read.
+        Effort of the compressor, 1 to 9; 9 for lz4, 6 for deflate and 1 for zstd by default. Higher
+        levels are slower to write, not to read.
     precision : {"exact", "16-byte", "8-byte"}, optional
         Bytes of a supersegment before they are compressed, as for
         :meth:`pyvista_vdi.VDI.with_precision`; the VDI's own by default.
@@ -59,27 +71,65 @@ def write(
         As for :func:`pyvista_vdi.io.write`.
     """
     vdi = vdi if precision is None else vdi.with_precision(precision)
+    with whole_file(path) as stream:
+        write_to(stream, vdi, compression, level, progress)
+    return Path(os.path.realpath(path))
+
+
+def write_to(
+    stream: IO[bytes],
+    vdi: VDI,
+    compression: str,
+    level: int | None = None,
+    progress: Progress | None = None,
+    *,
+    coarse: bool = True,
+) -> None:
+    """Write a .vdi file to a stream that can be sought in.
+
+    Parameters
+    ----------
+    stream : file-like
+        Takes the bytes.
+    vdi, compression, level, progress
+        As for :func:`write`; the VDI has the precision to write.
+    coarse : bool
+        Whether a file of version 4 begins with a coarse level.
+    """
     counts = _smallest(np.diff(vdi.offsets))
     arrays = layouts(
         vdi.window_size,
         vdi.n_supersegments,
         counts.dtype,
         filtered=compression != "none",
-        version=VERSION_OF[vdi.precision],
+        version=version_of(vdi.precision, compression),
         precision=vdi.precision,
     )
     description = _described(vdi, arrays, compression)
     effort = DEFAULT_LEVELS[compression] if level is None else level
     done = Pieces(progress, sum(layout.n_chunks for layout in arrays.values()))
-    with whole_file(path) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(_member(DESCRIPTION), description)
+        if coarse and compression == DEFLATE and _has_coarse(vdi):
+            archive.writestr(_member(COARSE), _coarse(vdi, effort))
         index: list[tuple[int, int]] = []
         for name, layout in arrays.items():
             with archive.open(_member(name), "w", force_zip64=True) as member:
                 encoded = _encoder(name, layout, vdi, counts)
                 index += write_chunks(member, layout, compression, effort, encoded, done)
         archive.writestr(_member(INDEX), np.array(index, INDEX_DTYPE).tobytes())
-    return Path(os.path.realpath(path))
+
+
+def _has_coarse(vdi: VDI) -> bool:
+    return min(vdi.window_size) >= COARSE_STEP and int(vdi.counts.max()) <= DEPTH_CODES
+
+
+def _coarse(vdi: VDI, level: int) -> bytes:
+    """Return the bytes of a file of fewer lists."""
+    stream = io.BytesIO()
+    small = coarser(vdi, COARSE_STEP).with_precision("8-byte")
+    write_to(stream, small, DEFLATE, level, coarse=False)
+    return stream.getvalue()
 
 
 def _member(name: str) -> zipfile.ZipInfo:
@@ -97,7 +147,7 @@ def _smallest(counts: NDArray[Any]) -> NDArray[Any]:
 
 
 def _described(vdi: VDI, arrays: Mapping[str, Layout], codec: str) -> str:
-    version = VERSION_OF[vdi.precision]
+    version = version_of(vdi.precision, codec)
     entries = describe(vdi, version)
     metadata = entries.pop("metadata")
     packed: dict[str, Any] = {} if version < 3 else {"precision": vdi.precision}
@@ -141,6 +191,8 @@ def _code_encoder(name: str, layout: Layout, vdi: VDI) -> Callable[[int, int], N
             rows = gaps_and_thicknesses(packed, vdi.offsets, first, last)[name == "back"]
         elif name == "color":
             rows = packed.colors(first, last)
+            if layout.filter == "channel-difference":
+                rows = channel_differences(rows)
         elif name == "optical_depth":
             rows = packed.tau_codes(first, last)
         elif name == "origin":
