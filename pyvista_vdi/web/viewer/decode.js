@@ -1,0 +1,384 @@
+// Bytes of a .vdi file to a VDI (docs/files.md). Nothing that a file says is trusted before it is
+// checked: checksums of all members, sizes that are declared against those that are there, codes
+// and depths against a VDI's rules; and nothing is allocated for a mere declaration.
+
+import {
+  REMEDY, VDIFileError, bytesOfBase64, crc32, damaged, inflate, unblosc, unshuffle,
+} from "./unpack.js";
+
+const VERSIONS = [2, 3, 4];
+const CHUNK_ROWS = 1 << 16;
+const DEPTH_CODES = 16383; // Constants of docs/conventions.md, "Packed supersegments"
+const TAU_CODES = 4095;
+const GRID = 2 ** 24 - 2 ** 15;
+const MAX_EDGE = 65536;
+const DESCRIPTION = "vdi.json";
+const COARSE = "coarse.vdi";
+
+/**
+ * Takes a .vdi file piece by piece; gives its coarse level as soon as that is there.
+ *
+ * @param {(vdi: object) => void} onLevel Called with the VDI of each level, "coarse" before "full".
+ */
+export class LevelDecoder {
+  constructor(onLevel) {
+    this.onLevel = onLevel;
+    this.bytes = new Uint8Array(1 << 16);
+    this.length = 0;
+    this.text = ""; // base64 that is not yet four characters
+    this.beginning = true; // whether a coarse level may still come
+  }
+
+  /**
+   * Take the bytes that follow.
+   *
+   * @param {Uint8Array|string} piece Bytes, or base64 text.
+   */
+  async push(piece) {
+    if (typeof piece === "string") {
+      const text = this.text + piece.replace(/\s+/g, "");
+      this.text = text.slice(text.length & ~3);
+      piece = bytesOfBase64(text.slice(0, text.length & ~3));
+    }
+    const length = this.length + piece.length;
+    if (length > this.bytes.length) {
+      const larger = new Uint8Array(Math.max(length, 2 * this.bytes.length));
+      larger.set(this.bytes.subarray(0, this.length));
+      this.bytes = larger;
+    }
+    this.bytes.set(piece, this.length);
+    this.length = length;
+    if (this.beginning) await this.lookForCoarse();
+  }
+
+  /** Say that there are no more bytes; resolves when the full level has been given. */
+  async end() {
+    if (this.text) damaged("its base64 text ends within a byte");
+    if (!this.length) damaged("it is empty");
+    this.onLevel(await decodeVDI(this.bytes.subarray(0, this.length)));
+  }
+
+  async lookForCoarse() {
+    const members = new Map();
+    for (const member of membersOf(this.bytes.subarray(0, this.length), true)) {
+      members.set(member.name, member);
+      if (members.size === 2) break;
+    }
+    if (members.size < 2) return;
+    this.beginning = false;
+    const coarse = members.get(COARSE);
+    if (!coarse) return;
+    const whole = described(members);
+    const vdi = await decodeVDI(checkedMember(coarse), "coarse");
+    this.onLevel({ ...vdi, metadata: whole.metadata, pictureSize: pictureSize(whole) });
+  }
+}
+
+/**
+ * Decode a whole .vdi file.
+ *
+ * @param {Uint8Array} bytes The file.
+ * @param {"coarse"|"full"} level What the VDI is said to be.
+ * @returns {Promise<object>} windowSize [W, H], camera, bounds, depthOrigin, metadata, pictureSize,
+ *   level, precision ("exact" or "8-byte"), offsets: Uint32Array(W H + 1). Exact: front, back,
+ *   opticalDepth: Float32Array(n), color: Float32Array(3 n). 8-byte: words: Uint32Array(2 n),
+ *   origin: Int32Array(W H), stride: Uint16Array(W H), depthStep. Frames and units:
+ *   docs/conventions.md, "The arrays of a VDI".
+ * @throws {VDIFileError} A sentence that says what is wrong.
+ */
+export async function decodeVDI(bytes, level = "full") {
+  try {
+    return await decodedFile(bytes, level);
+  } catch (error) {
+    if (error instanceof RangeError) {
+      throw new VDIFileError(`the VDI takes more memory than the browser gives (${error.message})`);
+    }
+    throw error;
+  }
+}
+
+async function decodedFile(bytes, level) {
+  const members = new Map();
+  for (const member of membersOf(bytes, false)) {
+    if (members.has(member.name)) damaged(`two of its members are called ${member.name}`);
+    members.set(member.name, member);
+  }
+  const file = described(members);
+  const arrays = packedArrays(file, members);
+  const counts = await unpacked(file, arrays.counts);
+  const offsets = offsetsOf(counts, arrays.counts.itemBytes, file.n);
+  const vdi = {
+    windowSize: file.window_size, camera: file.camera, bounds: file.bounds,
+    depthOrigin: file.depth_origin, metadata: file.metadata, pictureSize: pictureSize(file), level,
+    precision: file.precision === "8-byte" ? "8-byte" : "exact", offsets,
+  };
+  const decode = file.precision === "8-byte" ? decodedCodes : decodedMedia;
+  return Object.assign(vdi, await decode(file, arrays, offsets));
+}
+
+// -- archive and description ---------------------------------------------------------------------
+
+// Members in the order in which they lie, by their local headers alone, as a stream brings them.
+// Of the beginning of a file those that are whole.
+function* membersOf(bytes, beginning) {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  const name = new TextDecoder();
+  let at = 0;
+  while (at + 30 <= bytes.length && view.getUint32(at, true) === 0x04034b50) {
+    const start = at + 30 + view.getUint16(at + 26, true) + view.getUint16(at + 28, true);
+    if (start > bytes.length) break;
+    const nameEnd = at + 30 + view.getUint16(at + 26, true);
+    const member = {
+      name: name.decode(bytes.subarray(at + 30, nameEnd)), crc: view.getUint32(at + 14, true),
+    };
+    let size = view.getUint32(at + 22, true);
+    if (size === 0xffffffff && start >= nameEnd + 20 && view.getUint16(nameEnd, true) === 1) {
+      size = Number(view.getBigUint64(nameEnd + 4, true)); // ZIP64
+    }
+    if (view.getUint16(at + 8, true) || view.getUint16(at + 6, true) & 9) {
+      damaged(`its member ${member.name} is not stored plainly`);
+    }
+    if (start + size > bytes.length) break;
+    at = start + size;
+    yield { ...member, bytes: bytes.subarray(start, at) };
+  }
+  if (beginning || (at && view.byteLength >= at + 4 && view.getUint32(at, true) === 0x02014b50)) {
+    return;
+  }
+  if (at) damaged(`it is truncated or changed behind its byte ${at}`);
+  const head = [...bytes.subarray(0, 4)].map((b) => b.toString(16).padStart(2, "0")).join(" ");
+  throw new VDIFileError(
+    bytes.length >= 30 && view.getUint32(0, true) !== 0x04034b50
+      ? `this is no VDI file: it begins with the bytes ${head}, a .vdi file with 50 4b 03 04`
+      : `the VDI file is truncated: it ends after ${bytes.length} bytes; ${REMEDY}`
+  );
+}
+
+function checkedMember({ name, crc, bytes }) {
+  if (crc32(bytes) !== crc) damaged(`the checksum of its member ${name} differs`);
+  return bytes;
+}
+
+function described(members) {
+  const member = members.get(DESCRIPTION);
+  if (!member) throw new VDIFileError(`this is no VDI file: its member ${DESCRIPTION} is missing`);
+  let d;
+  try {
+    d = JSON.parse(new TextDecoder().decode(checkedMember(member)));
+  } catch (error) {
+    if (error instanceof VDIFileError) throw error;
+    damaged(`its description is no JSON (${error.message})`);
+  }
+  if (d?.format !== "pyvista-vdi") {
+    throw new VDIFileError(`this is no VDI file: ${DESCRIPTION} does not name the format`);
+  }
+  if (!VERSIONS.includes(d.version)) {
+    throw new VDIFileError(
+      `the VDI file is of version ${d.version}, and this viewer reads versions 2 to 4: ` +
+        "write it anew by pyvista-vdi convert x.vdi -o y.vdi --compression deflate"
+    );
+  }
+  if (d.codec === "zstd") {
+    throw new VDIFileError(
+      "the VDI file is compressed with zstd, which browsers do not decode: " +
+        "pyvista-vdi convert x.vdi -o y.vdi --compression deflate"
+    );
+  }
+  const isWhole = (x, least, most) => Number.isInteger(x) && x >= least && x <= most;
+  const areNumbers = (x, length) =>
+    Array.isArray(x) && x.length === length && x.every(Number.isFinite);
+  const good = {
+    codec: (d.version > 3 ? ["deflate"] : ["none", "lz4"]).includes(d.codec),
+    window_size: areNumbers(d.window_size, 2) &&
+      d.window_size.every((x) => isWhole(x, 1, MAX_EDGE)),
+    n_supersegments: isWhole(d.n_supersegments, 0, 2 ** 30),
+    chunk_rows: d.chunk_rows === CHUNK_ROWS,
+    bounds: areNumbers(d.bounds, 6) && [0, 2, 4].every((k) => d.bounds[k] <= d.bounds[k + 1]),
+    depth_origin: Number.isFinite(d.depth_origin),
+    precision: d.version === 2 || ["exact", "16-byte", "8-byte"].includes(d.precision),
+    depth_step: d.precision !== "8-byte" || Number.isInteger(Math.log2(d.depth_step)),
+    camera: isCamera(d.camera, areNumbers),
+    metadata: d.metadata !== null && typeof d.metadata === "object",
+  };
+  for (const [name, is] of Object.entries(good)) {
+    const what = String(JSON.stringify(d[name])).slice(0, 80);
+    if (!is) damaged(`its description's ${name} is ${what}`);
+  }
+  return { ...d, n: d.n_supersegments, precision: d.version === 2 ? "exact" : d.precision };
+}
+
+function isCamera(c, areNumbers) {
+  return c !== null && typeof c === "object" &&
+    ["position", "focal_point", "view_up"].every((name) => areNumbers(c[name], 3)) &&
+    c.position.some((x, k) => x !== c.focal_point[k]) &&
+    c.view_angle > 0 && c.view_angle < 180 && c.parallel_scale > 0 &&
+    c.parallel_scale < Infinity && areNumbers(c.window_center, 2) &&
+    areNumbers(c.model_transform?.flat?.(), 16);
+}
+
+function pictureSize(file) {
+  const size = file.metadata.dial?.window_size;
+  const good = Array.isArray(size) && size.length === 2 &&
+    size.every((x) => Number.isInteger(x) && x >= 1 && x <= MAX_EDGE);
+  return good ? size : file.window_size;
+}
+
+// Each array's rows, its type and its chunks, which must be as many and as long as its rows need.
+function packedArrays(file, members) {
+  const [n, lists] = [file.n, file.window_size[0] * file.window_size[1]];
+  const kind = { "|u1": 1, "<u2": 2, "<u4": 4 }[file.arrays?.counts?.dtype];
+  if (!kind) damaged("the type of its counts is unknown");
+  const depth = file.codec === "none" ? "none" : "difference";
+  const wanted = file.precision === "8-byte" ? {
+    counts: [lists, kind], origin: [lists, 4], stride: [lists, 2], front: [n, 2, 1, "difference"],
+    back: [n, 2, 1, "difference"],
+    color: [n, 1, 3, file.version > 3 ? "channel-difference" : "none"], optical_depth: [n, 2],
+  } : {
+    counts: [lists, kind], front: [n, 4, 1, depth], back: [n, 4, 1, depth],
+    color: file.precision === "exact" ? [n, 4, 3] : [n, 4], optical_depth: [n, 4],
+  };
+  const index = members.get("chunks");
+  if (!index) damaged("it is truncated, or its member chunks is missing");
+  const chunks = new DataView(checkedMember(index).slice().buffer);
+  let k = 0;
+  for (const [name, [rows, itemBytes, items = 1, filter = "none"]] of Object.entries(wanted)) {
+    if (file.arrays[name]?.filter !== filter || file.arrays[name]?.shape?.[0] !== rows) {
+      damaged(`array ${name} is not described as its lists need it`);
+    }
+    const member = members.get(name);
+    if (!member) damaged(`it is truncated, or its member ${name} is missing`);
+    const bytes = checkedMember(member);
+    const array = { name, rows, itemBytes, rowBytes: itemBytes * items, chunks: [] };
+    let at = 0;
+    for (let first = 0; first < rows; first += CHUNK_ROWS, ++k) {
+      if (8 * k + 8 > chunks.byteLength) damaged(`it has ${k} chunks where more belong`);
+      const size = chunks.getUint32(8 * k, true);
+      const raw = Math.min(CHUNK_ROWS, rows - first) * array.rowBytes;
+      const possible = { none: size === raw, lz4: size > 16 && raw <= 255 * size }[file.codec];
+      if (!(possible ?? raw <= 1032 * size) || at + size > bytes.length) {
+        damaged(`${size} bytes cannot hold the ${raw} of a chunk of array ${name}`);
+      }
+      array.chunks.push({ bytes: bytes.subarray(at, at + size), raw });
+      at += size;
+    }
+    if (at !== bytes.length) damaged(`array ${name} has ${bytes.length} bytes, its chunks ${at}`);
+    wanted[name] = array;
+  }
+  if (8 * k !== chunks.byteLength) damaged(`it has ${chunks.byteLength / 8} chunks, not ${k}`);
+  return wanted;
+}
+
+// -- chunks --------------------------------------------------------------------------------------
+
+// The bytes of an array's rows.
+async function unpacked(file, array) {
+  const out = new Uint8Array(array.rows * array.rowBytes);
+  let at = 0;
+  for (const { bytes, raw } of array.chunks) {
+    const rows = out.subarray(at, at + raw);
+    if (file.codec === "none") rows.set(bytes);
+    else if (file.codec === "lz4") unblosc(bytes, rows, array.itemBytes);
+    else unshuffle(await inflate(bytes, raw), rows, array.rowBytes);
+    at += raw;
+  }
+  array.chunks = null;
+  return out;
+}
+
+// -- arrays --------------------------------------------------------------------------------------
+
+// Running sum of the lists' lengths, with 0 before it.
+function offsetsOf(bytes, itemBytes, n) {
+  const counts = typed({ 1: Uint8Array, 2: Uint16Array, 4: Uint32Array }[itemBytes], bytes);
+  const offsets = new Uint32Array(counts.length + 1);
+  let sum = 0;
+  for (let list = 0; list < counts.length && sum <= n; ++list) {
+    offsets[list + 1] = sum += counts[list];
+  }
+  if (sum !== n) damaged(`its lists do not hold ${n} supersegments`);
+  return offsets;
+}
+
+const typed = (Kind, bytes) => new Kind(bytes.buffer, 0, bytes.length / Kind.BYTES_PER_ELEMENT);
+
+async function decodedCodes(file, arrays, offsets) {
+  const { n, depth_step: depthStep } = file;
+  const origin = typed(Int32Array, await unpacked(file, arrays.origin));
+  const stride = typed(Uint16Array, await unpacked(file, arrays.stride));
+  for (let list = 0; list < origin.length; ++list) {
+    const first = origin[list];
+    const step = stride[list];
+    if ((step > 0) !== (offsets[list + 1] > offsets[list]) || (!step && first)) {
+      damaged("the lists with a stride are not those with supersegments");
+    }
+    if (Math.abs(first) > GRID || first + step * DEPTH_CODES > GRID + DEPTH_CODES + 1) {
+      damaged("a list's depths lie beyond the VDI's grid");
+    }
+  }
+  const gaps = typed(Uint16Array, await unpacked(file, arrays.front));
+  const thicknesses = typed(Uint16Array, await unpacked(file, arrays.back));
+  const color = await unpacked(file, arrays.color);
+  const tau = typed(Uint16Array, await unpacked(file, arrays.optical_depth));
+  const words = new Uint32Array(2 * n);
+  const differ = file.arrays.color.filter === "channel-difference";
+  let begun = 0; // the back before, in codes
+  for (let k = 0, list = 0; k < n; ++k) {
+    while (offsets[list + 1] <= k) ++list;
+    if (k === offsets[list] || k % CHUNK_ROWS === 0) begun = 0; // codes begin anew
+    const front = begun + gaps[k];
+    const back = (begun = front + thicknesses[k]);
+    if (back <= front || back > DEPTH_CODES || tau[k] > TAU_CODES) {
+      damaged("a supersegment has no thickness, or a code beyond its largest");
+    }
+    words[2 * k] = front | (back << 14) | (tau[k] << 28);
+    const blue = color[3 * k + (differ ? 0 : 2)];
+    const green = color[3 * k + 1] + (differ ? blue : 0);
+    const red = color[3 * k + (differ ? 2 : 0)] + (differ ? blue : 0);
+    words[2 * k + 1] = (tau[k] >> 4) | ((red & 255) << 8) | ((green & 255) << 16) | (blue << 24);
+  }
+  return { words, origin, stride, depthStep };
+}
+
+async function decodedMedia(file, arrays, offsets) {
+  const front = typed(Float32Array, await unpacked(file, arrays.front));
+  const back = typed(Float32Array, await unpacked(file, arrays.back));
+  if (file.arrays.front.filter === "difference") sumDepths(front, back);
+  let color = await unpacked(file, arrays.color);
+  color = file.precision === "exact" ? typed(Float32Array, color)
+    : colorsOf16Bytes(typed(Uint32Array, color));
+  const opticalDepth = typed(Float32Array, await unpacked(file, arrays.optical_depth));
+  for (let k = 0, list = 0; k < file.n; ++k) {
+    while (offsets[list + 1] <= k) ++list;
+    const sorted = k === offsets[list] || back[k - 1] <= front[k];
+    if (!(sorted && front[k] < back[k] && Number.isFinite(back[k] - front[k]))) {
+      damaged("the depths of a list are not finite, sorted and disjoint");
+    }
+    if (!(opticalDepth[k] >= 0 && opticalDepth[k] < Infinity)) {
+      damaged("an optical depth is not finite and at least 0");
+    }
+  }
+  if (!color.every((c) => c >= 0 && c <= 1)) damaged("a colour is not within 0 and 1");
+  return { front, back, color, opticalDepth };
+}
+
+// Differences of bit patterns to depths: a front less the back before it, a back less its front.
+function sumDepths(front, back) {
+  const [gaps, thicknesses] = [new Uint32Array(front.buffer), new Uint32Array(back.buffer)];
+  let before = 0;
+  for (let k = 0; k < gaps.length; ++k) {
+    if (k % CHUNK_ROWS === 0) before = 0;
+    gaps[k] += before;
+    thicknesses[k] += gaps[k];
+    before = thicknesses[k];
+  }
+}
+
+function colorsOf16Bytes(packed) {
+  const color = new Float32Array(3 * packed.length);
+  for (let k = 0; k < packed.length; ++k) {
+    color[3 * k] = (packed[k] & 2047) * Math.fround(1 / 2047);
+    color[3 * k + 1] = ((packed[k] >>> 11) & 2047) * Math.fround(1 / 2047);
+    color[3 * k + 2] = (packed[k] >>> 22) * Math.fround(1 / 1023);
+  }
+  return color;
+}

@@ -1,0 +1,160 @@
+// Checksums and codecs: what lies in a file to the bytes that it stands for.
+
+/** What to do about a file that is not as it was written. */
+export const REMEDY = "load it again, or copy it from its source again";
+
+/** What is wrong with a file, as a sentence. */
+export class VDIFileError extends Error {
+  constructor(message) {
+    super(message);
+    this.name = "VDIFileError";
+  }
+}
+
+/** Throw a {@link VDIFileError} that says why a file is not what was written. */
+export function damaged(why) {
+  throw new VDIFileError(`the VDI file is damaged: ${why}; ${REMEDY}`);
+}
+
+/** The bytes that base64 text stands for; its length is a multiple of four. */
+export function bytesOfBase64(text) {
+  try {
+    if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
+    const letters = atob(text);
+    const bytes = new Uint8Array(letters.length);
+    for (let k = 0; k < bytes.length; ++k) bytes[k] = letters.charCodeAt(k);
+    return bytes;
+  } catch {
+    return damaged("its text is no base64");
+  }
+}
+
+// Four tables, by which four bytes are taken in at once
+let crcTables = null;
+
+function makeCrcTables() {
+  const tables = [0, 1, 2, 3].map(() => new Uint32Array(256));
+  for (let n = 0; n < 256; ++n) {
+    let c = n;
+    for (let bit = 0; bit < 8; ++bit) c = c & 1 ? 0xedb88320 ^ (c >>> 1) : c >>> 1;
+    tables[0][n] = c;
+  }
+  for (let k = 1; k < 4; ++k) {
+    for (let n = 0; n < 256; ++n) {
+      const c = tables[k - 1][n];
+      tables[k][n] = tables[0][c & 255] ^ (c >>> 8);
+    }
+  }
+  return tables;
+}
+
+/** The CRC-32 of bytes, as ZIP has it. */
+export function crc32(bytes) {
+  const [t0, t1, t2, t3] = (crcTables ??= makeCrcTables());
+  let c = -1;
+  let k = 0;
+  for (; k + 4 <= bytes.length; k += 4) {
+    c ^= bytes[k] | (bytes[k + 1] << 8) | (bytes[k + 2] << 16) | (bytes[k + 3] << 24);
+    c = t3[c & 255] ^ t2[(c >>> 8) & 255] ^ t1[(c >>> 16) & 255] ^ t0[c >>> 24];
+  }
+  for (; k < bytes.length; ++k) c = t0[(c ^ bytes[k]) & 255] ^ (c >>> 8);
+  return ~c >>> 0;
+}
+
+/** Decompress a zlib stream to exactly `raw` bytes; nothing more is ever unpacked. */
+export async function inflate(bytes, raw) {
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const reader = stream.getReader();
+  const out = new Uint8Array(raw);
+  let at = 0;
+  try {
+    for (;;) {
+      const { done, value } = await reader.read();
+      if (done) break;
+      if (at + value.length > raw) throw new RangeError("more than belongs there");
+      out.set(value, at);
+      at += value.length;
+    }
+  } catch {
+    at = -1;
+  }
+  reader.cancel().catch(() => {});
+  if (at !== raw) damaged(`a chunk does not decompress to the ${raw} bytes that it stands for`);
+  return out;
+}
+
+/** Byte planes to elements: first the first bytes of all, then the second ones. */
+export function unshuffle(planes, out, size) {
+  const n = Math.floor(out.length / size);
+  for (let plane = 0; plane < size; ++plane) {
+    const from = plane * n;
+    for (let k = 0, to = plane; k < n; ++k, to += size) out[to] = planes[from + k];
+  }
+  out.set(planes.subarray(n * size, out.length), n * size);
+}
+
+/** Decompress a frame of Blosc 1 with LZ4 (c-blosc, README_CHUNK_FORMAT.rst) into `out`. */
+export function unblosc(bytes, out, itemBytes) {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  const wrong = () => damaged("a chunk is not in Blosc's format with lz4");
+  const [flags, typeSize] = [bytes[2], bytes[3]];
+  const blockBytes = view.getUint32(8, true);
+  if (bytes[0] !== 2 || typeSize !== itemBytes || view.getUint32(4, true) !== out.length) wrong();
+  if (view.getUint32(12, true) !== bytes.length) wrong();
+  if (flags & 2) { // the bytes as they are
+    if (bytes.length !== out.length + 16) wrong();
+    out.set(bytes.subarray(16));
+    return;
+  }
+  if (flags >> 5 !== 1 || flags & 4 || !blockBytes || blockBytes > out.length) wrong();
+  const block = new Uint8Array(blockBytes);
+  for (let first = 0, k = 0; first < out.length; first += blockBytes, ++k) {
+    const size = Math.min(blockBytes, out.length - first);
+    if (20 + 4 * k > bytes.length) wrong();
+    let at = view.getUint32(16 + 4 * k, true);
+    const split = !(flags & 16) && size === blockBytes && typeSize <= 16 && size / typeSize >= 128;
+    const parts = split ? typeSize : 1;
+    for (let part = 0; part < parts; ++part) {
+      if (at + 4 > bytes.length) wrong();
+      const packed = view.getUint32(at, true);
+      at += 4;
+      if (at + packed > bytes.length) wrong();
+      const target = block.subarray((part * size) / parts, ((part + 1) * size) / parts);
+      if (packed === target.length) target.set(bytes.subarray(at, at + packed));
+      else if (!unlz4(bytes.subarray(at, at + packed), target)) wrong();
+      at += packed;
+    }
+    const rows = out.subarray(first, first + size);
+    if (flags & 1 && typeSize > 1) unshuffle(block, rows, typeSize);
+    else rows.set(block.subarray(0, size));
+  }
+}
+
+// A block of LZ4; whether it fills `out` exactly, and from within both.
+function unlz4(from, out) {
+  let at = 0;
+  let to = 0;
+  while (at < from.length) {
+    const token = from[at++];
+    let length = token >> 4;
+    if (length === 15) {
+      let more;
+      do length += more = from[at++]; while (more === 255);
+    }
+    if (!(at + length <= from.length && to + length <= out.length)) return false;
+    for (const end = at + length; at < end;) out[to++] = from[at++];
+    if (at === from.length) break; // the last sequence has literals alone
+    const distance = from[at] | (from[at + 1] << 8);
+    at += 2;
+    length = token & 15;
+    if (length === 15) {
+      let more;
+      do length += more = from[at++]; while (more === 255);
+    }
+    length += 4;
+    const within = at <= from.length && to + length <= out.length;
+    if (!(within && distance && distance <= to)) return false;
+    for (const end = to + length; to < end; ++to) out[to] = out[to - distance];
+  }
+  return to === out.length;
+}

@@ -1,0 +1,31 @@
+// What runs in the worker: bytes come, prepared levels go. A page that may start none runs it, too.
+import { LevelDecoder } from "./decode.js";
+import { prepare, transferables } from "./prepare.js";
+
+/**
+ * Decode files whose pieces come as messages, one file after the other.
+ *
+ * Messages to it are `{ piece }` (Uint8Array, or base64 text) and `{ end: true }`. It sends
+ * `{ ready: true }` when it listens and `{ prepared }` for each level, and answers a message by
+ * `{ done: true }`, or by `{ error }`, a sentence, after which it is of no use.
+ *
+ * @param {object} scope The worker's global scope, or what stands for it: `postMessage`, and
+ *   `onmessage`, which is set here.
+ */
+export function serve(scope) {
+  const give = (vdi) => {
+    const prepared = prepare(vdi);
+    scope.postMessage({ prepared }, transferables(prepared));
+  };
+  let decoder = new LevelDecoder(give);
+  scope.onmessage = async ({ data: { piece, end } }) => {
+    try {
+      await (end ? decoder.end() : decoder.push(piece));
+      if (end) decoder = new LevelDecoder(give);
+      scope.postMessage({ done: true });
+    } catch (error) {
+      scope.postMessage({ error: String(error?.message ?? error) });
+    }
+  };
+  scope.postMessage({ ready: true });
+}
