@@ -1,6 +1,6 @@
 // A VDI in WebGL 2: textures of its lists, and a fragment shader that casts a ray for each pixel.
 import { TEXTURE_WIDTH } from "./prepare.js";
-import { frameForms, isParallel, pixelRays } from "./rays.js";
+import { frameForms, frameOf, isParallel, pixelRays } from "./rays.js";
 import { MOST_PLANES, VERTEX_SHADER, fragmentShader } from "./shader.js";
 
 /** A ray ends where less transmittance than this is left. */
@@ -68,7 +68,8 @@ export class Raycaster {
    *
    * @param {object} view
    * @param {object} view.camera position, focal_point, view_up and view_angle (degrees) or
-   *   parallel_scale: VTK's meanings, world units.
+   *   parallel_scale: VTK's meanings, world units; model_transform, if the model lies elsewhere in
+   *   the world than it did for the VDI.
    * @param {number} view.width Pixels, as height; the viewport is set to them.
    * @param {number[]} [view.corner] Of the viewport.
    * @param {{origin: number[], normal: number[]}[]} [view.clippingPlanes] World; the side that the
@@ -79,7 +80,8 @@ export class Raycaster {
   draw({ camera, width, height, corner = [0, 0], clippingPlanes = [], depthTexture = null }) {
     const { gl, vdi } = this;
     if (!vdi) return;
-    const { space, frame, windowSize } = vdi;
+    const { space, bounds, windowSize } = vdi;
+    const frame = camera.model_transform ? frameOf({ bounds, camera }) : vdi.frame;
     const rays = pixelRays(frame, camera, [width, height]);
     const { coordinates, planes } = frameForms(frame, space, windowSize, rays, isParallel(camera),
       clippingPlanes);

@@ -41,6 +41,11 @@ export function halfExtent(camera, [width, height]) {
   return camera.use_horizontal_view_angle ? [tangent, tangent / aspect] : [tangent * aspect, tangent];
 }
 
+// The same, in parallel projection in world'.
+function halfExtentIn(frame, camera, size) {
+  return times(halfExtent(camera, size), isParallel(camera) ? frame.scale : 1);
+}
+
 /** The frame of a VDI: model transform, bounds and scale, from its camera and bounds. */
 export function frameOf(vdi) {
   const { bounds } = vdi;
@@ -102,7 +107,7 @@ export function listSpace(frame, vdi) {
   const [near, far] = depthRange(frame, toView);
   const origin = vdi.depthOrigin * frame.scale;
   const shifted = !parallel && far > 0 && far <= 2 * Math.min(near, origin);
-  const [halfWidth, halfHeight] = halfExtent(camera, windowSize);
+  const [halfWidth, halfHeight] = halfExtentIn(frame, camera, windowSize);
   const denominator = parallel ? [0, 0, 0, 1] : toView[2];
   const [cx, cy] = windowCentre(camera);
   const side = (row, half, centre, lists) =>
@@ -135,8 +140,7 @@ export function pixelRays(frame, camera, size) {
   const [near] = depthRange(frame, toView);
   const parallel = isParallel(camera);
   const reference = parallel ? near : Math.max(near, 0);
-  const scale = parallel ? frame.scale : 1;
-  const [halfWidth, halfHeight] = times(halfExtent(camera, size), scale);
+  const [halfWidth, halfHeight] = halfExtentIn(frame, camera, size);
   const [cx, cy] = windowCentre(camera);
   const slope = [[cx * halfWidth, cy * halfHeight, 0], [halfWidth, 0, 0], [0, halfHeight, 0]];
   const forward = [[0, 0, 1], [0, 0, 0], [0, 0, 0]];
