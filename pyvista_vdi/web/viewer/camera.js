@@ -1,0 +1,90 @@
+// Views as VTK's vtkCamera has them, and its movements: pure functions of plain objects.
+import { cameraAxes, isParallel } from "./rays.js";
+
+const minus = (a, b) => a.map((x, k) => x - b[k]);
+const plus = (a, b, s = 1) => a.map((x, k) => x + s * b[k]);
+
+/**
+ * Return a view as the viewer keeps it; refuse one that shows nothing.
+ *
+ * @param {object} camera position, focal_point, view_up (three numbers each, world units) and
+ *   view_angle (vertical, degrees) or parallel_scale (half the viewport's height, world units).
+ * @throws {TypeError} That names what is wrong.
+ */
+export function checkedCamera(camera) {
+  const vector = (name) => {
+    const value = camera?.[name] && [...camera[name]];
+    if (value?.length !== 3 || !value.every(Number.isFinite)) {
+      throw new TypeError(`A camera's ${name} is three finite numbers; got ${camera?.[name]}.`);
+    }
+    return value;
+  };
+  const checked = Object.fromEntries(["position", "focal_point", "view_up"]
+    .map((name) => [name, vector(name)]));
+  if (!(Math.hypot(...minus(checked.focal_point, checked.position)) > 0)) {
+    throw new TypeError("A camera's position and focal point differ; these are the same point.");
+  }
+  const parallel = isParallel(camera);
+  const name = parallel ? "parallel_scale" : "view_angle";
+  const value = Number(camera[name] ?? NaN);
+  if (!(value > 0 && value < (parallel ? Infinity : 180))) {
+    throw new TypeError(`A camera's ${name} is a positive number${parallel ? "" : " below 180"}; ` +
+      `got ${camera[name]}.`);
+  }
+  checked[name] = value;
+  if (!cameraAxes(checked).flat().every(Number.isFinite)) {
+    throw new TypeError("A camera's view_up is not parallel to its direction; this one is.");
+  }
+  return checked;
+}
+
+// Turn a vector about an axis, degrees (Rodrigues).
+function turned(vector, axis, degrees) {
+  const length = Math.hypot(...axis), [x, y, z] = axis.map((c) => c / length);
+  const angle = (degrees * Math.PI) / 180, c = Math.cos(angle), s = Math.sin(angle);
+  const along = (x * vector[0] + y * vector[1] + z * vector[2]) * (1 - c);
+  const [u, v, w] = vector;
+  return [
+    u * c + (y * w - z * v) * s + x * along,
+    v * c + (z * u - x * w) * s + y * along,
+    w * c + (x * v - y * u) * s + z * along,
+  ];
+}
+
+const around = (camera, axis, degrees) => ({
+  ...camera,
+  position: plus(camera.focal_point,
+    turned(minus(camera.position, camera.focal_point), axis, degrees)),
+});
+
+const upright = (camera) => ({ ...camera, view_up: cameraAxes(camera)[1] });
+
+/** Turn about the view up, then about the horizontal axis: Azimuth, Elevation; degrees. */
+export function rotated(camera, azimuth, elevation) {
+  const next = around(camera, camera.view_up, azimuth);
+  const [right] = cameraAxes(next);
+  return upright(around(next, right, -elevation));
+}
+
+/** Turn about the direction of view: Roll; degrees. */
+export function rolled(camera, degrees) {
+  const [, , forward] = cameraAxes(camera);
+  return upright({ ...camera, view_up: turned(camera.view_up, forward, degrees) });
+}
+
+/** Come nearer by a factor: Dolly, or in parallel projection a smaller scale. */
+export function nearer(camera, factor) {
+  if (isParallel(camera)) return { ...camera, parallel_scale: camera.parallel_scale / factor };
+  const from = minus(camera.position, camera.focal_point);
+  return { ...camera, position: plus(camera.focal_point, from, 1 / factor) };
+}
+
+/** Move with what is in the focal plane: by parts of the viewport's height, right and up. */
+export function panned(camera, right, up) {
+  const axes = cameraAxes(camera);
+  const distance = Math.hypot(...minus(camera.focal_point, camera.position));
+  const height = 2 * (isParallel(camera) ? camera.parallel_scale
+    : distance * Math.tan((camera.view_angle * Math.PI) / 360));
+  const move = (point) => plus(plus(point, axes[0], -right * height), axes[1], -up * height);
+  return { ...camera, position: move(camera.position), focal_point: move(camera.focal_point) };
+}

@@ -1,0 +1,369 @@
+// <vdi-viewer src="brain.vdi">: a VDI that people turn. docs/web.md has its contract.
+import { checkedCamera } from "./camera.js";
+import { interact } from "./interaction.js";
+import { embedded, load } from "./loader.js";
+import { Pacer } from "./pacer.js";
+import { Raycaster } from "./raycast.js";
+import { isParallel } from "./rays.js";
+
+const STYLE = `
+:host { display: block; position: relative; width: 100%; aspect-ratio: 16 / 9; overflow: hidden;
+  background: black; }
+:host([hidden]) { display: none; }
+canvas, img { position: absolute; width: 100%; height: 100%; inset: 0; }
+canvas { touch-action: none; outline-offset: -2px; }
+img { object-fit: contain; }
+p { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.5em 1em; font: 14px sans-serif;
+  color: white; background: #000a; }
+progress { position: absolute; inset: auto 0 0 0; width: 100%; height: 3px; border: 0; }
+[hidden] { display: none; }`;
+
+/** Milliseconds after the last movement from which a view rests, and is drawn with all pixels. */
+const REST = 150;
+
+/** The element. */
+export class VDIViewer extends HTMLElement {
+  static observedAttributes = ["src", "background", "still"];
+
+  #parts = {};
+  #gl = null;
+  #raycaster = null;
+  #pacer = null;
+  #prepared = null;
+  #camera = null;
+  #planes = [];
+  #status = { state: "empty", progress: 0 };
+  #ready = resolvers();
+  #loading = null; // an AbortController
+  #connected = null; // another
+  #moved = -Infinity;
+  #drawing = false;
+  #asked = false;
+  #scene = null;
+
+  constructor() {
+    super();
+    const root = this.attachShadow({ mode: "open" });
+    root.innerHTML = `<style>${STYLE}</style><img hidden alt=""><canvas tabindex="0" role="img">` +
+      `</canvas><slot hidden></slot><progress max="1" hidden></progress><p role="alert" hidden></p>`;
+    for (const name of ["img", "canvas", "progress", "p"]) this.#parts[name] = root.querySelector(name);
+    this.#ready.promise.catch(() => {}); // who awaits it is told; nobody need
+  }
+
+  // -- the contract ------------------------------------------------------------------------------
+
+  /** Fulfilled with the element when all of the VDI is drawn; rejected if it cannot be. */
+  get ready() {
+    return this.#ready.promise;
+  }
+
+  /** The view: position, focal_point, view_up and view_angle or parallel_scale; null before one. */
+  get camera() {
+    return this.#camera && structuredClone(this.#camera);
+  }
+
+  set camera(camera) {
+    this.#camera = checkedCamera(camera);
+    this.#announceCamera();
+    this.invalidate();
+  }
+
+  /** What is behind the VDI: a CSS colour, or three numbers from 0 to 1. */
+  get background() {
+    return this.getAttribute("background") ?? "black";
+  }
+
+  set background(color) {
+    const css = typeof color === "string" ? color
+      : `rgb(${[...color].map((c) => `${100 * c}%`).join(" ")})`;
+    if (!CSS.supports("background", css)) {
+      throw new TypeError(`A background is a CSS colour or three numbers; got ${color}.`);
+    }
+    this.setAttribute("background", css);
+  }
+
+  /** Planes that clip the VDI: [{origin, normal}], world; the side of the normal is kept. */
+  get clippingPlanes() {
+    return structuredClone(this.#planes);
+  }
+
+  set clippingPlanes(planes) {
+    this.#planes = [...planes].map(({ origin, normal }) => ({ origin: [...origin], normal: [...normal] }));
+    this.invalidate();
+  }
+
+  /** What is going on: state ("empty", "loading", "coarse", "full", "error"), progress, ... */
+  get status() {
+    const { n, windowSize, level, precision } = this.#prepared ?? {};
+    const pixels = this.#pacer?.share ?? 1;
+    return { ...this.#status, supersegments: n, lists: windowSize, level, precision, pixels };
+  }
+
+  /**
+   * The picture at full quality: premultiplied RGBA, 8 bits, top row first, without background.
+   *
+   * @param {{width: number, height: number}} size Pixels.
+   * @returns {Promise<{width: number, height: number, data: Uint8ClampedArray}>}
+   */
+  async screenshot({ width = this.#parts.canvas.width, height = this.#parts.canvas.height } = {}) {
+    await this.ready;
+    const gl = this.#gl;
+    const largest = gl.getParameter(gl.MAX_RENDERBUFFER_SIZE);
+    if (![width, height].every((edge) => Number.isInteger(edge) && edge > 0 && edge <= largest)) {
+      throw new RangeError(`A screenshot is 1 to ${largest} pixels wide and high; ` +
+        `got ${width} x ${height}.`);
+    }
+    const target = this.#pacer.target(width, height);
+    try {
+      await this.#pacer.inBands(target, width, height, this.#painter(this.#camera, width, height));
+      const data = new Uint8ClampedArray(4 * width * height), row = 4 * width;
+      const upsideDown = new Uint8Array(data.length);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+      gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, upsideDown);
+      for (let y = 0; y < height; ++y) {
+        data.set(upsideDown.subarray((height - 1 - y) * row, (height - y) * row), y * row);
+      }
+      return { width, height, data };
+    } finally {
+      this.#pacer.free(target);
+    }
+  }
+
+  /**
+   * Show what a URL, bytes or a stream hold: a .vdi file.
+   *
+   * @param {string|URL|Uint8Array|ReadableStream} source
+   * @returns {Promise<VDIViewer>} When all of it is drawn.
+   */
+  async load(source) {
+    this.#loading?.abort();
+    const loading = (this.#loading = new AbortController());
+    if (this.#status.state !== "empty") this.#renew();
+    const { promise } = this.#ready;
+    this.#tell({ state: "loading", progress: 0, message: undefined });
+    try {
+      await load(source, {
+        signal: loading.signal,
+        onLevel: (prepared) => !loading.signal.aborted && this.setPrepared(prepared),
+        onProgress: (progress) => !loading.signal.aborted && this.#tell({ progress }),
+      });
+    } catch (error) {
+      if (!loading.signal.aborted) this.#fail(error);
+    }
+    return promise;
+  }
+
+  /** Show the bytes of a .vdi file; what is there stays until they are decoded. */
+  showBytes(bytes) {
+    return this.load(bytes);
+  }
+
+  /** Show what prepare.js has made of a VDI: swapped whole. */
+  setPrepared(prepared) {
+    try {
+      if (this.#raycaster) this.#raycaster.set(prepared);
+      this.#prepared = prepared;
+    } catch (error) {
+      this.#fail(error);
+      return;
+    }
+    if (!this.#camera) this.resetCamera();
+    this.#tell({ state: prepared.level === "coarse" ? "coarse" : "full",
+      ...(prepared.level === "coarse" ? {} : { progress: 1 }) });
+    this.invalidate();
+  }
+
+  /** Go back to the view that the VDI was made for. */
+  resetCamera() {
+    const of = this.#prepared?.camera;
+    if (of) {
+      const { parallel_scale, view_angle, ...rest } = of;
+      this.camera = isParallel(of) ? { ...rest, parallel_scale, parallel_projection: true }
+        : { ...rest, view_angle, parallel_projection: false };
+    }
+  }
+
+  /** What is drawn among VDIs, see scene.js: draw(gl, target, camera, width, height) -> depth. */
+  get scene() {
+    return this.#scene;
+  }
+
+  set scene(scene) {
+    this.#scene = scene;
+    if (this.#gl) scene?.restore?.(this.#gl);
+    this.invalidate();
+  }
+
+  // -- life --------------------------------------------------------------------------------------
+
+  connectedCallback() {
+    const { canvas } = this.#parts;
+    const { signal } = (this.#connected = new AbortController());
+    if (!this.hasAttribute("aria-label")) canvas.setAttribute("aria-label", "volume, to be turned");
+    const gl = canvas.getContext("webgl2", { antialias: false, depth: false, alpha: true });
+    if (!gl) {
+      this.#parts.canvas.hidden = true;
+      this.#parts.img.hidden = !this.#parts.img.getAttribute("src");
+      this.#fail(new Error("This browser draws no WebGL 2, which turning this picture takes."));
+      return;
+    }
+    this.#gl = gl;
+    this.#begin();
+    canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      this.#raycaster = this.#pacer = null;
+    }, { signal });
+    canvas.addEventListener("webglcontextrestored", () => this.#begin(), { signal });
+    const viewer = this;
+    interact(canvas, {
+      get camera() { return viewer.#camera; },
+      move(camera) { viewer.camera = camera; },
+      rest() { viewer.#moved = -Infinity; viewer.invalidate(); },
+      reset() { viewer.resetCamera(); },
+    }, signal);
+    const sizes = new ResizeObserver(() => this.#resize());
+    sizes.observe(this);
+    signal.addEventListener("abort", () => sizes.disconnect());
+    if (this.#status.state === "empty" && !this.getAttribute("src")) {
+      const within = embedded(this);
+      if (within) this.load(within);
+    }
+  }
+
+  disconnectedCallback() {
+    this.#connected?.abort();
+    this.#loading?.abort();
+    this.#raycaster?.dispose();
+    this.#pacer?.dispose();
+    this.#scene?.dispose?.();
+    this.#raycaster = this.#pacer = null;
+  }
+
+  attributeChangedCallback(name, before, value) {
+    if (name === "src" && value) this.load(new URL(value, document.baseURI));
+    if (name === "background") this.style.background = value ?? "";
+    if (name === "still" && value) this.#parts.img.src = value;
+  }
+
+  // Take the graphics that there is, at first and after it was lost.
+  #begin() {
+    const gl = this.#gl;
+    if (gl.isContextLost()) return;
+    this.#raycaster = new Raycaster(gl);
+    this.#pacer = new Pacer(gl);
+    this.#scene?.restore?.(gl);
+    this.#resize();
+    if (this.#prepared) this.setPrepared(this.#prepared);
+  }
+
+  #resize() {
+    const { canvas } = this.#parts, density = window.devicePixelRatio || 1;
+    const size = [this.clientWidth, this.clientHeight].map((edge) => Math.max(1, Math.round(edge * density)));
+    if (canvas.width === size[0] && canvas.height === size[1]) return;
+    [canvas.width, canvas.height] = size;
+    this.#moved = performance.now(); // the first picture of a new size is a quick one
+    this.invalidate(false);
+  }
+
+  // -- frames ------------------------------------------------------------------------------------
+
+  /** Draw again; after a movement with few pixels first. */
+  invalidate(moves = true) {
+    if (moves) this.#moved = performance.now();
+    this.#asked = true;
+    if (!this.#drawing && this.#raycaster && this.#prepared) {
+      this.#drawing = true;
+      requestAnimationFrame(() => this.#frames());
+    }
+  }
+
+  // Frames until nothing is asked for: while the view moves with the pixels that the rate allows,
+  // then all, in bands that a new movement breaks off.
+  async #frames() {
+    try {
+      while (this.#raycaster && this.isConnected) {
+        const pacer = this.#pacer, { width, height } = this.#parts.canvas;
+        const moving = performance.now() - this.#moved < REST;
+        this.#asked = false;
+        const camera = this.#camera;
+        const size = moving ? pacer.sizeFor(width, height) : [width, height];
+        const full = size[0] === width && size[1] === height;
+        const target = pacer.screen(width, height);
+        const done = await pacer.inBands(target, ...size, this.#painter(camera, ...size),
+          () => !full || !this.#asked || moving);
+        if (this.#gl.isContextLost()) return;
+        if (pacer !== this.#pacer || !done) continue;
+        pacer.show(target, size, [width, height]);
+        this.#drawn(full);
+        if (this.#asked) continue;
+        if (full) return;
+        await new Promise((resolve) => setTimeout(resolve,
+          Math.max(0, REST - (performance.now() - this.#moved))));
+      }
+    } catch (error) {
+      if (!this.#gl.isContextLost()) this.#fail(error);
+    } finally {
+      this.#drawing = false;
+      if (this.#asked && this.#raycaster && this.isConnected && this.#status.state !== "error") {
+        this.invalidate(false);
+      }
+    }
+  }
+
+  // What draws a view into the bound target: called for each band, with the scissor set.
+  #painter(camera, width, height) {
+    const gl = this.#gl, raycaster = this.#raycaster, scene = this.#scene, planes = this.#planes;
+    let depthTexture = null;
+    return (target, isFirst) => {
+      if (isFirst && scene) {
+        gl.disable(gl.SCISSOR_TEST);
+        depthTexture = scene.draw(gl, target, camera, width, height);
+        gl.enable(gl.SCISSOR_TEST);
+        gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+      }
+      gl.enable(gl.BLEND);
+      gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+      raycaster.draw({ camera, width, height, clippingPlanes: planes, depthTexture });
+      gl.disable(gl.BLEND);
+    };
+  }
+
+  #drawn(full) {
+    const { state } = this.#status;
+    this.dispatchEvent(new CustomEvent("framedrawn", { detail: { full, state } }));
+    if (full && state === "full") this.#ready.resolve(this);
+  }
+
+  #announceCamera() {
+    this.dispatchEvent(new CustomEvent("camerachange", { detail: { camera: this.camera } }));
+  }
+
+  #tell(changes) {
+    Object.assign(this.#status, changes);
+    const { state, progress, message } = this.#status, { progress: bar, p } = this.#parts;
+    bar.hidden = !(state === "loading" || state === "coarse");
+    bar.value = progress;
+    p.hidden = state !== "error";
+    p.textContent = message ?? "";
+  }
+
+  #fail(error) {
+    const message = error.message ?? String(error);
+    this.#tell({ state: "error", message });
+    this.#ready.reject(error);
+    this.dispatchEvent(new CustomEvent("error", { detail: { message } }));
+  }
+
+  #renew() {
+    this.#ready = resolvers();
+    this.#ready.promise.catch(() => {});
+  }
+}
+
+function resolvers() {
+  const made = {};
+  made.promise = new Promise((resolve, reject) => Object.assign(made, { resolve, reject }));
+  return made;
+}
+
+if (!customElements.get("vdi-viewer")) customElements.define("vdi-viewer", VDIViewer);

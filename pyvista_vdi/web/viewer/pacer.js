@@ -1,0 +1,118 @@
+// Keeps a frame rate: frames with fewer pixels while a view moves, full ones in bands.
+
+/** Seconds that a frame of a movement may take. */
+const FRAME_SECONDS = 1 / 30;
+/** Seconds of a band of a full frame: what a new movement waits for, at most. */
+const BAND_SECONDS = 1 / 20;
+/** Least share of the pixels: a quarter along each edge. */
+const LEAST_SHARE = 1 / 16;
+/** Share of a frame by which its size may miss the goal before it is changed. */
+const DEAD_BAND = 0.25;
+
+/** Targets to draw into, and how many pixels they can have. */
+export class Pacer {
+  #perPixel = null; // seconds, by the frames before
+  #screen = null;
+
+  /** @param {WebGL2RenderingContext} gl */
+  constructor(gl) {
+    this.gl = gl;
+    this.share = 1; // of the pixels, in the frame before
+  }
+
+  /** Pixels of the next frame of a movement in a window of width x height. */
+  sizeFor(width, height) {
+    const pixels = width * height;
+    if (this.#perPixel !== null) {
+      const share = Math.min(Math.max(FRAME_SECONDS / (this.#perPixel * pixels), LEAST_SHARE), 1);
+      if (share === 1 || Math.abs(share / this.share - 1) > DEAD_BAND) this.share = share;
+    }
+    const edge = Math.sqrt(this.share);
+    return [Math.max(1, Math.round(width * edge)), Math.max(1, Math.round(height * edge))];
+  }
+
+  /**
+   * Draw a picture band by band, and wait for each.
+   *
+   * @param {object} target Of {@link target}.
+   * @param {function(object, boolean)} paint Draws into the target; true: for the first band.
+   * @param {function(): boolean} [goesOn] Asked between bands.
+   * @returns {Promise<boolean>} Whether it was finished.
+   */
+  async inBands(target, width, height, paint, goesOn = () => true) {
+    const { gl } = this;
+    const rows = this.#perPixel === null ? height
+      : Math.max(1, Math.floor(BAND_SECONDS / (this.#perPixel * width)));
+    let seconds = 0;
+    for (let row = 0; row < height; row += rows) {
+      if (gl.isContextLost() || (row > 0 && !goesOn())) return false;
+      const began = performance.now();
+      gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+      gl.enable(gl.SCISSOR_TEST);
+      gl.scissor(0, row, width, Math.min(rows, height - row));
+      gl.clearColor(0, 0, 0, 0);
+      gl.clear(gl.COLOR_BUFFER_BIT);
+      paint(target, row === 0);
+      gl.disable(gl.SCISSOR_TEST);
+      await finished(gl);
+      seconds += (performance.now() - began) / 1000;
+    }
+    const perPixel = seconds / (width * height);
+    this.#perPixel = this.#perPixel === null ? perPixel : 0.5 * (this.#perPixel + perPixel);
+    return true;
+  }
+
+  /** A target of some pixels: RGBA, 8 bits. */
+  target(width, height) {
+    const { gl } = this;
+    const texture = gl.createTexture(), framebuffer = gl.createFramebuffer();
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA8, width, height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+    return { texture, framebuffer, width, height };
+  }
+
+  /** The target of the frames of a window, made anew when its size changes. */
+  screen(width, height) {
+    if (this.#screen?.width !== width || this.#screen.height !== height) {
+      this.free(this.#screen);
+      this.#screen = this.target(width, height);
+    }
+    return this.#screen;
+  }
+
+  /** Bring the lower left part of a target to the canvas, made as large as that is. */
+  show({ framebuffer }, [width, height], [canvasWidth, canvasHeight]) {
+    const { gl } = this;
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, framebuffer);
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
+    gl.blitFramebuffer(0, 0, width, height, 0, 0, canvasWidth, canvasHeight, gl.COLOR_BUFFER_BIT,
+      width === canvasWidth ? gl.NEAREST : gl.LINEAR);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  }
+
+  free(target) {
+    if (!target) return;
+    this.gl.deleteFramebuffer(target.framebuffer);
+    this.gl.deleteTexture(target.texture);
+  }
+
+  dispose() {
+    this.free(this.#screen);
+    this.#screen = null;
+  }
+}
+
+// Wait until the device has done what it was told, without holding up the page.
+async function finished(gl) {
+  const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+  gl.flush();
+  for (;;) {
+    await new Promise((resolve) => setTimeout(resolve, 1));
+    const state = gl.isContextLost() ? gl.WAIT_FAILED : gl.clientWaitSync(fence, 0, 0);
+    if (state !== gl.TIMEOUT_EXPIRED) break;
+  }
+  gl.deleteSync(fence);
+}
