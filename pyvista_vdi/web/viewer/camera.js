@@ -32,6 +32,7 @@ export function checkedCamera(camera) {
       `got ${camera[name]}.`);
   }
   checked[name] = value;
+  if (camera.window_center) checked.window_center = [...camera.window_center];
   if (!cameraAxes(checked).flat().every(Number.isFinite)) {
     throw new TypeError("A camera's view_up is not parallel to its direction; this one is.");
   }
