@@ -124,11 +124,7 @@ class VDI:
 
         The window that was asked for where a dial has chosen the lists, else :attr:`window_size`.
         """
-        dial = self.metadata.get("dial")
-        try:
-            return check_window_size(dial["window_size"])  # type: ignore[index]
-        except (TypeError, KeyError, InvalidArgumentError):  # no dial's, or what somebody has put
-            return self.window_size
+        return picture_size(self.window_size, self.metadata)
 
     @property
     def precision(self) -> str:
@@ -334,3 +330,11 @@ def _checked_bounds(bounds: ArrayLike) -> tuple[float, float, float, float, floa
         )
     x0, x1, y0, y1, z0, z1 = box.tolist()
     return x0, x1, y0, y1, z0, z1
+
+
+def picture_size(window_size: tuple[int, int], metadata: Mapping[str, Any]) -> tuple[int, int]:
+    """Return :attr:`VDI.picture_size` of a VDI of these lists and metadata."""
+    try:
+        return check_window_size(metadata["dial"]["window_size"])
+    except (TypeError, KeyError, InvalidArgumentError):  # no dial's, or what somebody has put
+        return window_size

@@ -425,7 +425,9 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
 @smproxy.filter(name="VDIToImage", label="VDI To Image", support_reload=False)
 @smhint.xml('<ShowInMenu category="VDI" /><RepresentationType view="RenderView" type="Slice" />')
 @smproperty.xml(
-    _VIEW_XML.format(default="The VDI's own", size="0 0", least=0, note="0: the VDI's own.")
+    _VIEW_XML.format(
+        default="The VDI's own", size="0 0", least=0, note="0: that of the VDI's pictures."
+    )
     + _DEVICE_XML
 )
 @smproperty.input(name="Input", port_index=0)

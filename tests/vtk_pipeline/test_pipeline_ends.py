@@ -9,6 +9,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkImagingCore import vtkImageFlip
 from vtkmodules.vtkRenderingCore import vtkCamera
 
 import pyvista_vdi as pvdi
@@ -76,6 +77,28 @@ def test_extent_is_known_before_the_picture(vdi):
         expected = (0, width - 1, 0, height - 1, 0, 0)
         assert picture.GetOutputInformation(0).Get(key) == expected
     assert picture.GetOutputDataObject(0).GetNumberOfPoints() == 0
+
+
+@pytest.mark.parametrize("given", ["data", "file"])
+def test_pictures_of_a_dials_vdi_have_the_size_that_was_asked_for(given, vdi, tmp_path):
+    names = ("camera", "window_size", "offsets", "front", "back", "color", "optical_depth")
+    arrays = {name: getattr(vdi, name) for name in (*names, "bounds", "depth_origin")}
+    lists = pvdi.VDI(**arrays, metadata={"dial": {"window_size": [64, 48]}})
+    picture = to_image(lists)
+    if given == "file":
+        lists.save(tmp_path / "ball.vdi")
+        reader = VDIReader()
+        reader.SetFileName(tmp_path / "ball.vdi")
+        picture.SetInputConnection(reader.GetOutputPort())
+    behind = vtkImageFlip()  # it asks for what was announced before there was a picture
+    behind.SetInputConnection(picture.GetOutputPort())
+    behind.SetFilteredAxis(1)
+    behind.Update()
+    flipped = pixels(behind.GetOutput(), "RGBA")[::-1]
+    np.testing.assert_array_equal(flipped, to_bytes(pvdi.render(lists, lists.camera, (64, 48))))
+    picture.SetWindowSize(7, 5)
+    behind.Update()
+    assert behind.GetOutput().GetDimensions() == (7, 5, 1)
 
 
 def test_picture_is_made_again_only_if_something_changed(vdi):

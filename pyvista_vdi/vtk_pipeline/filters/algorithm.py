@@ -8,7 +8,7 @@ from operator import attrgetter
 from typing import Any
 
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
-from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkWeakReference
+from vtkmodules.vtkCommonCore import VTK_UNSIGNED_INT, vtkOutputWindow, vtkWeakReference
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
@@ -25,8 +25,11 @@ class Algorithm(VTKPythonAlgorithmBase):
     """An algorithm whose errors reach whoever asked for the update.
 
     Python's ``Update`` raises them; an update that VTK asks for writes them to VTK's output window
-    and gives an empty output.
+    and gives an empty output. ``picture_size`` is that of the VDI that it gives, as it
+    announces it, or ``None``: VTK's information has no place for it.
     """
+
+    picture_size: tuple[int, int] | None = None
 
     def __init__(self, **ports: Any) -> None:
         super().__init__(**ports)
@@ -159,14 +162,21 @@ def whole_extent(information: Any) -> tuple[int, ...] | None:
     return information.Get(key) if information is not None and information.Has(key) else None
 
 
-def announce(outputs: Any, window_size: tuple[int, int]) -> None:
-    """Tell the pipeline that an image of one point per pixel will come."""
+def announce(
+    outputs: Any, window_size: tuple[int, int], scalars: tuple[int, int] = (VTK_UNSIGNED_INT, 1)
+) -> None:
+    """Tell the pipeline that an image of one point per pixel will come.
+
+    ``scalars`` are VTK's number of a type, and components: those of the form of a VDI by default.
+    VTK's filters of images write as many as they were told into what they allocate.
+    """
     width, height = window_size
     information = outputs.GetInformationObject(0)
     extent = (0, width - 1, 0, height - 1, 0, 0)
     information.Set(vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT(), extent, 6)
     information.Set(vtkImageData.SPACING(), (1.0, 1.0, 1.0), 3)
     information.Set(vtkImageData.ORIGIN(), (0.0, 0.0, 0.0), 3)
+    vtkDataObject.SetPointDataActiveScalarInfo(information, *scalars)
 
 
 def ask_for_all(inputs: Any) -> None:

@@ -9,6 +9,7 @@ from vtkmodules.vtkCommonDataModel import vtkImageData
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.io import checked_target, read, read_info
+from pyvista_vdi.model.vdi import picture_size
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, accessors, announce
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image
 
@@ -40,10 +41,11 @@ class VDIReader(Algorithm):
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the output's extent: one point per list; reads the file's description only."""
         try:
-            size = read_info(self._path).window_size if self._path else (1, 1)
+            about = read_info(self._path) if self._path else None
         except (VDIError, OSError):  # RequestData says it
-            size = (1, 1)
-        announce(outputs, size)
+            about = None
+        self.picture_size = picture_size(about.window_size, about.metadata) if about else None
+        announce(outputs, about.window_size if about else (1, 1))
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:

@@ -2,28 +2,40 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from vtkmodules.vtkCommonCore import VTK_UNSIGNED_CHAR
 from vtkmodules.vtkCommonDataModel import vtkImageData
 
+from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.io import to_bytes
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.render_options import FrameRequest
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, picture_size
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     DEVICE,
     Algorithm,
     accessors,
     announce,
+    ask_for_all,
     whole_extent,
 )
-from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, to_vtk, vdi_from_image
+from pyvista_vdi.vtk_pipeline.filters.convert import (
+    DESCRIPTION,
+    is_vdi_image,
+    to_vtk,
+    vdi_from_image,
+    view_from_description,
+)
 
 #: Point scalars of the picture: straight RGBA, uint8.
 STRAIGHT = "RGBA"
+#: Their type and components.
+SCALARS = (VTK_UNSIGNED_CHAR, 4)
 #: Its other point array: what was rendered, premultiplied RGBA, float32.
 PREMULTIPLIED = "premultiplied"
 
@@ -97,12 +109,15 @@ class VDIToImage(Algorithm):
     SetDevice, GetDevice = accessors("Device", "_device", "device", *DEVICE)
 
     def SetWindowSize(self, *size: Any) -> None:
-        """Set the picture's width and height in pixels; ``None``, the default, is the VDI's own."""
+        """Set the picture's width and height in pixels.
+
+        ``None``, the default, is :attr:`VDI.picture_size`.
+        """
         pair = size[0] if len(size) == 1 else size
         self._change("_window_size", None if pair is None else check_window_size(pair))
 
     def GetWindowSize(self) -> tuple[int, int] | None:
-        """Return the picture's width and height in pixels, or ``None`` for the VDI's own."""
+        """Return the picture's width and height in pixels, or ``None`` for the VDI's."""
         return self._window_size
 
     def GetImage(self) -> vtkImageData:
@@ -118,19 +133,31 @@ class VDIToImage(Algorithm):
 
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the output's extent: one point per pixel."""
-        size = self._window_size
-        whole = whole_extent(inputs[0].GetInformationObject(0))
-        if size is None and whole is not None:
-            size = whole[1] - whole[0] + 1, whole[3] - whole[2] + 1
-        announce(outputs, size or (1, 1))
+        announce(outputs, self._window_size or self._announced_size(inputs) or (1, 1), SCALARS)
         return 1
+
+    def _announced_size(self, inputs: Any) -> tuple[int, int] | None:
+        """Return the size of the pictures that the VDI was made for, as far as it is known."""
+        size = getattr(self.GetInputAlgorithm(0, 0), "picture_size", None)
+        if size is not None:
+            return size  # type: ignore[no-any-return]
+        image = vtkImageData.GetData(inputs[0], 0)
+        if is_vdi_image(image):
+            with contextlib.suppress(InvalidVDIError):  # _execute says it
+                metadata = view_from_description(image, DESCRIPTION)["metadata"]
+                return picture_size(image.GetDimensions()[:2], metadata)
+        whole = whole_extent(inputs[0].GetInformationObject(0))
+        return (whole[1] - whole[0] + 1, whole[3] - whole[2] + 1) if whole else None
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
         vdi = self._read(vtkImageData.GetData(inputs[0], 0))
         view = vdi.camera if self._camera is None else self._camera
         view = view.azimuth(self._azimuth) if self._azimuth else view
         view = view.elevation(self._elevation) if self._elevation else view
-        size = self._window_size or vdi.window_size
+        size = self._window_size or vdi.picture_size
+        # Known only now, where another program's reader gives the VDI
+        announce(outputs, size, SCALARS)
+        ask_for_all([outputs])
         pixels = render_vdi(vdi, FrameRequest(view, size, device=self._device))
         vtkImageData.GetData(outputs, 0).ShallowCopy(rgba_to_image(pixels))
 

@@ -208,7 +208,8 @@ class VDISource(SourceSettings):
             camera = None  # RequestData says what is wrong with it
         if grid is not None and camera is not None and self._window_size is not None:
             _, (width, height) = self._view(grid, camera, self._window_size, warn=False)
-        announce(outputs, (width, height))
+        self.picture_size = width, height
+        announce(outputs, self.picture_size)
         return 1
 
     def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
