@@ -101,6 +101,12 @@ inline bool clip_from_entry(__global const float *planes, int count, float a, fl
 }
 #endif
 
+// Offsets of pixels from the middle of so many.
+inline Real offsets_from_middle(Int pixels, int count)
+{
+    return TO_REAL(pixels) + 0.5f - 0.5f * (float)count;
+}
+
 // Pixel of a work-item: blocks of 4 x 4 pixels, so that neighbouring items walk through the same lists and voxels.
 inline int2 block_pixel(uint item, int width)
 {
@@ -108,6 +114,25 @@ inline int2 block_pixel(uint item, int width)
     const uint columns = (uint)(width + 3) >> 2;
     return (int2)((int)((block % columns) << 2 | (item & 3)), (int)((block / columns) << 2 | (item >> 2 & 3)));
 }
+
+#if LANES == 1
+// The ray of a pixel.
+typedef struct {
+    bool present; // the pixel is in the window
+    float a, b;   // its offsets
+    size_t place; // in pictures, top row first
+} Ray;
+
+inline Ray ray_of_pixel(int2 pixel, int width, int height)
+{
+    Ray ray;
+    ray.present = pixel.x < width && pixel.y < height;
+    ray.a = offsets_from_middle(pixel.x, width);
+    ray.b = offsets_from_middle(pixel.y, height);
+    ray.place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
+    return ray;
+}
+#endif
 
 // The rays of a work-item through some rows of a window, from `first` on: one, or those of a block.
 typedef struct {
@@ -123,8 +148,8 @@ inline Rays rays_of_block(uint first, int width, int height, int first_row, int 
     rays.x = corner.x + (LANE_NUMBERS & 3);
     rays.y = corner.y + (LANE_NUMBERS >> 2);
     rays.present = (rays.x < width) & (rays.y < rows);
-    rays.a = TO_REAL(rays.x) + 0.5f - 0.5f * (float)width;
-    rays.b = TO_REAL(first_row + rays.y) + 0.5f - 0.5f * (float)height;
+    rays.a = offsets_from_middle(rays.x, width);
+    rays.b = offsets_from_middle(first_row + rays.y, height);
     return rays;
 }
 

@@ -1,5 +1,5 @@
-// The pixels of a work-item's rays (lib/lanes.cl).
-#include "lib/lanes.cl"
+// The pixels of a work-item's rays.
+#include "lib/rays.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 #define BLOCK 4 // rays along each edge of a block, which vectors follow
@@ -15,12 +15,6 @@ inline Pixels pixels_at(Int x, Int y, Int in_window, int width, int height)
     STORE_LANES((height - 1 - y) * width + x, 0, pixels.places);
     STORE_LANES(in_window, 0, pixels.wanted);
     return pixels;
-}
-
-// Offsets of pixels from the middle of so many.
-inline Real offsets_from_middle(Int pixels, int count)
-{
-    return TO_REAL(pixels) + 0.5f - 0.5f * (float)count;
 }
 
 // t at which the rays end.

@@ -142,17 +142,13 @@ __kernel void preview(
     int samples,                        // per ray
     __global float4 *image)             // premultiplied RGBA, top row first
 {
-    const int2 pixel = block_pixel((uint)get_global_id(0), width);
-    if (pixel.x >= width || pixel.y >= height)
+    const Ray pixel = ray_of_pixel(block_pixel((uint)get_global_id(0), width), width, height);
+    if (!pixel.present)
         return;
-    const float a = offsets_from_middle(pixel.x, width);
-    const float b = offsets_from_middle(pixel.y, height);
-    const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
-
-    const ListRays ray = begin_rays(forms, planes, CROPPING_ARGUMENT a, b, has_opaque_depth ? opaque_depth[place] : INFINITY, true,
-                                depth_origin);
+    const float t_end = has_opaque_depth ? opaque_depth[pixel.place] : INFINITY;
+    const ListRays ray = begin_rays(forms, planes, CROPPING_ARGUMENT pixel.a, pixel.b, t_end, true, depth_origin);
     if (!ray.present) {
-        image[place] = (float4)(0.0f);
+        image[pixel.place] = (float4)(0.0f);
         return;
     }
     const ListRays *const rays = &ray;
@@ -210,5 +206,5 @@ __kernel void preview(
         weight_before = weight_until;
         length_before += crossing.length;
     }
-    image[place] = composited(&seen);
+    image[pixel.place] = composited(&seen);
 }

@@ -15,22 +15,19 @@ __kernel void project(
     float per_range, float at_zero,       // scalar to 0 .. 1 over the volume's range
     __global float4 *image)               // premultiplied RGBA, top row first
 {
-    const int2 pixel = block_pixel((uint)get_global_id(0), width);
-    if (pixel.x >= width || pixel.y >= height)
+    const Ray ray = ray_of_pixel(block_pixel((uint)get_global_id(0), width), width, height);
+    if (!ray.present)
         return;
-    const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
-    const float b = (float)pixel.y + 0.5f - 0.5f * (float)height;
-    const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
-    const float t_end = has_opaque_depth ? opaque_depth[place] : INFINITY;
+    const float t_end = has_opaque_depth ? opaque_depth[ray.place] : INFINITY;
 
     float extreme = NAN;
     float sum = 0.0f, lost = 0.0f; // and what it rounded off
     float length = 0.0f;           // that was sampled, steps
     March march;
-    if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, t_end)) {
+    if (begin_march(&march, forms, planes, ray.a, ray.b, sample_distance, unit_distance, t_end)) {
         const Medium medium = MEDIUM;
 #ifdef CROPPED
-        const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, a, b, regions);
+        const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, ray.a, ray.b, regions);
 #endif
         float front = step_face(&march, 0);
         for (int k = 0; k < march.steps; ++k) {
@@ -73,5 +70,5 @@ __kernel void project(
         color = (float4)((float3)(clamp(grey, 0.0f, 1.0f)), 1.0f);
     }
 #endif
-    image[place] = color;
+    image[ray.place] = color;
 }

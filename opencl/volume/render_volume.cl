@@ -42,12 +42,10 @@ __kernel void render_volume(
 #else
     const int first_step = 0, steps = INT_MAX;
 #endif
-    if (pixel.x >= width || pixel.y >= height)
+    const Ray ray = ray_of_pixel(pixel, width, height);
+    if (!ray.present)
         return;
-    const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
-    const float b = (float)pixel.y + 0.5f - 0.5f * (float)height;
-    const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
-    const float t_end = has_opaque_depth ? opaque_depth[place] : INFINITY;
+    const float t_end = has_opaque_depth ? opaque_depth[ray.place] : INFINITY;
 
     Seen seen = nothing_seen();
 #ifdef SAMPLED
@@ -57,10 +55,10 @@ __kernel void render_volume(
     }
 #endif
     March march;
-    if (begin_march(&march, forms, planes, a, b, sample_distance, unit_distance, t_end)) {
+    if (begin_march(&march, forms, planes, ray.a, ray.b, sample_distance, unit_distance, t_end)) {
         const Medium medium = MEDIUM;
 #ifdef CROPPED
-        const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, a, b, regions);
+        const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, ray.a, ray.b, regions);
 #endif
         int k = first_step;
         const int end = march.steps - first_step > steps ? first_step + steps : march.steps;
@@ -89,5 +87,5 @@ __kernel void render_volume(
     state[0] = seen.sums;
     state[1] = seen.compensation;
 #endif
-    image[place] = composited(&seen);
+    image[ray.place] = composited(&seen);
 }
