@@ -42,6 +42,7 @@ from pyvista_vdi.model.metrics import compare_images, list_edges, list_places
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import (
     EXPONENT,
@@ -161,15 +162,7 @@ def truth(
     runtime = get_runtime(options.device)
     picture = render_volume(volume, view, options.size, transfer_function=table, device=runtime)
     for setting in LADDER:
-        vdi = generate_vdi(
-            volume,
-            camera,
-            setting.window_size(options.size),
-            table,
-            max_supersegments=setting.max_supersegments,
-            precision=setting.precision,
-            device=runtime,
-        )
+        vdi = made_by(setting, volume, table, camera, options)
         seen = render(vdi, view, options.size, device=runtime)
         yield {
             "lists": setting.lists,
@@ -178,6 +171,25 @@ def truth(
             "supersegments": vdi.n_supersegments,
             "bytes": prepared_vdi(runtime, vdi).list_bytes,
         }
+
+
+def made_by(
+    setting: Setting,
+    volume: Volume,
+    table: TransferFunction,
+    camera: Camera,
+    options: argparse.Namespace,
+) -> VDI:
+    """Return the VDI of a rung."""
+    return generate_vdi(
+        volume,
+        camera,
+        setting.window_size(options.size),
+        table,
+        max_supersegments=setting.max_supersegments,
+        precision=setting.precision,
+        device=options.device,
+    )
 
 
 def edges(
@@ -191,15 +203,7 @@ def edges(
         if setting.lists >= 1:
             found.append(0.0)
             continue
-        vdi = generate_vdi(
-            volume,
-            camera,
-            setting.window_size(options.size),
-            table,
-            max_supersegments=setting.max_supersegments,
-            precision=setting.precision,
-            device=runtime,
-        )
+        vdi = made_by(setting, volume, table, camera, options)
         seen = render(vdi, camera, options.size, device=runtime)
         places = list_places(camera, options.size, vdi.window_size)
         found.append(list_edges(seen, picture, *places).ratio)
@@ -212,15 +216,7 @@ def frames(
     """Return what a frame of each of the first rungs takes, over one of the rough VDI."""
     view = turned(camera, volume.bounds, TARGET_ANGLE)
     vdis = [
-        generate_vdi(
-            volume,
-            camera,
-            setting.window_size(options.size),
-            table,
-            max_supersegments=setting.max_supersegments,
-            precision=setting.precision,
-            device=options.device,
-        )
+        made_by(setting, volume, table, camera, options)
         for setting in (ROUGH, *LADDER[:TIMED_RUNGS])
     ]
     seconds: list[list[float]] = [[] for _ in vdis]

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import inspect
-import weakref
 from typing import Any
 
 import pyvista as pv
 
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.plotting.registration import Component
 
 
 @pv.register_plotter_component("add_vdi_clip_plane", override=True)  # of registration._Pending
-class AddVDIClipPlane:
+class AddVDIClipPlane(Component):
     """Adds VDIs that a plane widget clips: ``plotter.add_vdi_clip_plane(volume)``.
 
     Parameters
@@ -20,9 +19,6 @@ class AddVDIClipPlane:
     plotter : pyvista.BasePlotter
         Held weakly.
     """
-
-    def __init__(self, plotter: Any) -> None:
-        self._plotter = weakref.ref(plotter)
 
     def __call__(self, volume: Any, **arguments: Any) -> Any:
         """Clip a VDI by a plane widget, as ``Plotter.add_volume_clip_plane`` clips a volume.
@@ -57,9 +53,7 @@ class AddVDIClipPlane:
         >>> widget = plotter.add_vdi_clip_plane(pv.Wavelet(), normal="x", cmap="bone")
         >>> plotter.show()  # doctest: +SKIP
         """
-        plotter = self._plotter()
-        if plotter is None:
-            raise InvalidArgumentError("the plotter of this add_vdi_clip_plane is gone")
+        plotter = self._plotter
         taken = inspect.signature(type(plotter).add_volume_clip_plane).parameters
         own = {name: arguments.pop(name) for name in [*arguments] if name in taken}
         if not isinstance(volume, pv.plotting.volume.Volume):

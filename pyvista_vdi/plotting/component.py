@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import weakref
 from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
@@ -16,7 +15,6 @@ from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import (
-    InvalidArgumentError,
     InvalidArgumentTypeError,
     UnsupportedError,
 )
@@ -27,6 +25,7 @@ from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.blocks import add_blocks
 from pyvista_vdi.plotting.classify import Looks, blending_name, note_mapper
 from pyvista_vdi.plotting.progress import progress_callback
+from pyvista_vdi.plotting.registration import Component
 from pyvista_vdi.plotting.volumes import as_image, held
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, refuse_settings
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
@@ -48,7 +47,7 @@ _BELOW_GOAL = 0.02
 
 
 @pv.register_plotter_component("add_vdi", override=True)  # of registration._Pending
-class AddVDI:
+class AddVDI(Component):
     """Adds VDIs to a plotter: ``plotter.add_vdi(volume)``.
 
     Parameters
@@ -58,7 +57,7 @@ class AddVDI:
     """
 
     def __init__(self, plotter: Any) -> None:
-        self._plotter = weakref.ref(plotter)
+        super().__init__(plotter)
         self._actors: list[Any] = []
 
     def __call__(
@@ -266,9 +265,7 @@ class AddVDI:
         refuse_unknown(aliases, "add_vdi", (*_ALIASES, *_DEFAULTS))
         clim, cmap = aliases.get("rng", clim), aliases.get("colormap", cmap)
         culling = aliases.get("backface_culling", culling)
-        plotter = self._plotter()
-        if plotter is None:
-            raise InvalidArgumentError("the plotter of this add_vdi is gone: make another")
+        plotter = self._plotter
         if mapper is not None:
             note_mapper(mapper)
         if not isinstance(scalar_bar_args, Mapping | None):

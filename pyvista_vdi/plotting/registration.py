@@ -11,11 +11,14 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
+import weakref
 from collections.abc import Sequence
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
+
+from pyvista_vdi.errors import InvalidArgumentError
 
 _PLOTTERS = "pyvista.plotting"
 
@@ -24,6 +27,26 @@ COMPONENTS = {
     "add_vdi": "pyvista_vdi.plotting.component",
     "add_vdi_clip_plane": "pyvista_vdi.plotting.clip_plane",
 }
+
+
+class Component:
+    """What a plotter has got from this package.
+
+    Parameters
+    ----------
+    plotter : pyvista.BasePlotter
+        Held weakly.
+    """
+
+    def __init__(self, plotter: Any) -> None:
+        self._held = weakref.ref(plotter)
+
+    @property
+    def _plotter(self) -> Any:
+        plotter = self._held()
+        if plotter is None:
+            raise InvalidArgumentError("the plotter is gone: make another, and add the VDI to that")
+        return plotter
 
 
 class _Pending:
