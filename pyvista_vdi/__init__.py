@@ -68,6 +68,7 @@ _moved.install()
 registration.install()
 # The composition root: what lower rooms need of upper ones, by name and loaded when asked for
 providers.provide(
+    html_files="pyvista_vdi.web.page",
     image_with_scalars="pyvista_vdi.plotting.volumes:as_image",
     transfer_function_from_arguments="pyvista_vdi.plotting.classify:transfer_function_from_arguments",
     transfer_function_from_property="pyvista_vdi.vtk_pipeline:transfer_function_from_property",

@@ -527,7 +527,7 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
     ----------
     path : path-like
         A ``.vdi`` file, an OpenEXR deep image, whose name ends in ``.exr``, or a VDI's VTK form
-        in one of VTK's image files, ``.vti``.
+        in one of VTK's image files, ``.vti``, or a page with a VDI in it, ``.html``.
     **options
         For ``.exr`` files of other programs: ``camera``, the view that the image shows, where
         the file does not say it; ``thickness``, world units, given to samples that have none

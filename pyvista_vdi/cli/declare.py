@@ -16,7 +16,7 @@ from pyvista_vdi.quality.dial import QUALITIES, TARGET_ANGLE
 #: Where options go: a verb's parser, or a group of it.
 Options = argparse._ActionsContainer
 
-VDI_FILE = "a .vdi file, an .exr deep image, or a VDI as .vti"
+VDI_FILE = "a .vdi file, an .exr deep image, a VDI as .vti, or a page of one, .html"
 
 VOLUME_FILE = (
     "a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), .npy, a raw file "
@@ -123,7 +123,7 @@ def vdi_file(options: Options) -> None:
     option(options, "file", VDI_FILE, "FILE")
 
 
-def output(options: Options, text: str = ".vdi, .exr or .vti to write") -> None:
+def output(options: Options, text: str = ".vdi, .exr, .vti or .html to write") -> None:
     """Add the file to write."""
     options.add_argument("-o", "--output", metavar="FILE", required=True, help=text)
 
@@ -299,17 +299,18 @@ def file_format(parser: argparse.ArgumentParser) -> None:
     option(
         group,
         "--compression",
-        "of .vdi: lz4 (default), zstd or none; of .exr: zips (default) or none; of .vti: lz4 "
-        "(default), zlib, lzma or none",
-        choices=("lz4", "zstd", "zips", "zlib", "lzma", "none"),
+        "of .vdi: lz4 (default), zstd, deflate (for pages) or none; of .exr: zips (default) or "
+        "none; of .vti: lz4 (default), zlib, lzma or none; of .html: deflate",
+        choices=("lz4", "zstd", "deflate", "zips", "zlib", "lzma", "none"),
     )
-    level = "1 (fast) to 9 (small); by default 9 for lz4 and 1 for the others"
+    level = "1 (fast) to 9 (small); by default 9 for lz4, 6 for deflate, 1 for others"
     option(group, "--level", level, "N", int)
     option(
         group,
         "--precision",
         "of .vdi: exact (24 bytes per supersegment before they are compressed; default of "
-        "generate), 16-byte or 8-byte; convert keeps what the file has",
+        "generate), 16-byte or 8-byte; convert keeps what the file has; of .html: 8-byte by "
+        "default",
         choices=PRECISIONS,
     )
     standard = "leave out of an .exr what makes it exact: tau, and corrections"

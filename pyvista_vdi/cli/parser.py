@@ -261,8 +261,8 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
     declare.option(
         parser,
         "--compression",
-        "of the .vdi: lz4 (default), zstd or none",
-        choices=("lz4", "zstd", "none"),
+        "of the .vdi: lz4 (default), zstd, deflate or none",
+        choices=("lz4", "zstd", "deflate", "none"),
         default="lz4",
     )
     declare.step(parser)
@@ -403,7 +403,7 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "convert": (
         "files",
-        "write a VDI in another format: .vdi, OpenEXR deep image or VTK's .vti",
+        "write a VDI in another format: .vdi, OpenEXR deep image, VTK's .vti, or a page, .html",
         "pyvista-vdi convert knee.vdi -o knee.exr",
         _add_convert,
     ),

@@ -1,4 +1,4 @@
-"""The format of a file follows from its name: ``.vdi``, ``.exr`` or, by VTK, ``.vti``."""
+"""A file's format follows from its name: ``.vdi``, ``.exr``, ``.html`` or, by VTK, ``.vti``."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pyvista_vdi.io.deep_exr import files as exr
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import layout, reader, writer
 from pyvista_vdi.io.vdi_file.chunks import CODECS
+from pyvista_vdi.io.vdi_file.layout import DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.whole_file import check_writable, with_suffix
 from pyvista_vdi.model.packing import check_precision
@@ -20,7 +21,8 @@ from pyvista_vdi.model.vdi import VDI
 
 #: What the name of a file may end in; the first is our own format.
 VTI_SUFFIX = ".vti"
-SUFFIXES = (layout.SUFFIX, exr.SUFFIX, VTI_SUFFIX)
+HTML_SUFFIX = ".html"
+SUFFIXES = (layout.SUFFIX, exr.SUFFIX, VTI_SUFFIX, HTML_SUFFIX)
 
 _VTI_COMPRESSIONS = ("lz4", "zlib", "lzma", "none")
 
@@ -32,7 +34,7 @@ def write(
     progress: Progress | None = None,
     **options: Any,
 ) -> Path:
-    """Write a VDI to a file, as ``.vdi``, as an OpenEXR deep image or as VTK's image.
+    """Write a VDI to a file: ``.vdi``, an OpenEXR deep image, VTK's image, or a page with a viewer.
 
     The file appears whole or not at all: it is written under a temporary name in the same folder
     and moved into place, and what was there before stays until then.
@@ -42,15 +44,15 @@ def write(
     vdi : VDI
         What to write.
     path : path-like
-        The target; its name ends in ``.vdi``, ``.exr`` or ``.vti``.
+        The target; its name ends in ``.vdi``, ``.exr``, ``.vti`` or ``.html``.
     progress : callable, optional
         Called with the finished fraction, 0 to 1; when it returns False, nothing is written. VTK
         does not say how far it is: of ``.vti`` with 1 alone.
     **options
-        ``compression`` and ``level`` for all; ``precision`` for ``.vdi``; ``exact`` and
-        ``linear`` for ``.exr``. See
-        :func:`pyvista_vdi.io.vdi_file.writer.write`, :func:`pyvista_vdi.io.deep_exr.files.write`
-        and :func:`pyvista_vdi.vtk_pipeline.filters.vti.write`.
+        ``compression`` and ``level`` for all; ``precision`` for ``.vdi`` and ``.html``, there
+        ``title`` and ``background`` as well; ``exact`` and ``linear`` for ``.exr``. See
+        :func:`pyvista_vdi.io.vdi_file.writer.write`, :func:`pyvista_vdi.io.deep_exr.files.write`,
+        :func:`pyvista_vdi.vtk_pipeline.filters.vti.write` and :func:`pyvista_vdi.web.page.page`.
 
     Returns
     -------
@@ -80,16 +82,19 @@ def write(
         written: Path = _vti().write(vdi, target, **options)
         Pieces(progress, 1)()
         return written
+    if _is_html(target):
+        return provider("html_files").write(vdi, target, progress=progress, **options)  # type: ignore[no-any-return]
     return writer.write(vdi, target, progress=progress, **options)
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **options: Any) -> VDI:
-    """Read a VDI from a ``.vdi`` file, an OpenEXR deep image or VTK's image file.
+    """Read a VDI from a ``.vdi`` file, an OpenEXR deep image, VTK's image file or a page.
 
     Parameters
     ----------
     path : path-like
-        The file; a name that ends in ``.exr`` makes it an OpenEXR file, ``.vti`` one of VTK.
+        The file; a name that ends in ``.exr`` makes it an OpenEXR file, ``.vti`` one of VTK,
+        ``.html`` a page.
     progress : callable, optional
         As for :func:`write`.
     **options
@@ -121,6 +126,8 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
         vdi: VDI = _vti().read(path)
         Pieces(progress, 1)()
         return vdi
+    if _is_html(path):
+        return provider("html_files").read(path, progress=progress)  # type: ignore[no-any-return]
     return reader.read(path, progress=progress)
 
 
@@ -130,7 +137,7 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
     Parameters
     ----------
     path : path-like
-        A ``.vdi``, ``.exr`` or ``.vti`` file.
+        A ``.vdi``, ``.exr``, ``.vti`` or ``.html`` file.
 
     Returns
     -------
@@ -144,6 +151,8 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
     """
     if _is_vti(path):
         return _vti().read_info(path)  # type: ignore[no-any-return]
+    if _is_html(path):
+        return provider("html_files").read_info(path)  # type: ignore[no-any-return]
     return exr.read_info(path) if _is_exr(path) else reader.read_info(path)
 
 
@@ -158,7 +167,8 @@ def is_vdi_file(path: str | os.PathLike[str]) -> bool:
     Returns
     -------
     bool
-        For ``.vti``, whether the image is a VDI's; for unknown names, whether it begins as ours.
+        For ``.vti`` and ``.html``, whether a VDI is in it; for unknown names, whether it begins
+        as ours.
 
     Raises
     ------
@@ -167,6 +177,8 @@ def is_vdi_file(path: str | os.PathLike[str]) -> bool:
     """
     if _is_vti(path):
         return _vti().holds_vdi(path)  # type: ignore[no-any-return]
+    if _is_html(path):
+        return provider("html_files").holds_vdi(path)  # type: ignore[no-any-return]
     if Path(path).suffix.lower() in SUFFIXES:
         return True
     return os.path.isfile(path) and reader.begins_as_vdi(path)  # noqa: PTH113 - too long a name, too
@@ -205,14 +217,16 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
         names, compressions = (*names, "exact", "linear"), exr.COMPRESSIONS
     elif _is_vti(path):
         compressions = _VTI_COMPRESSIONS
+    elif _is_html(path):
+        names, compressions = (*names, "precision", "title", "background"), (DEFLATE,)
     else:
         names = (*names, "precision")
     _check_names("written", path, options, names)
     compression, level = options.get("compression", compressions[0]), options.get("level", 1)
     if compression not in compressions:
+        known = f"one of {', '.join(compressions[:-1])} and " if compressions[1:] else ""
         raise InvalidArgumentError(
-            f"compression of {path} must be one of {', '.join(compressions[:-1])} and "
-            f"{compressions[-1]}; got {compression!r}"
+            f"compression of {path} must be {known}{compressions[-1]}; got {compression!r}"
         )
     if isinstance(level, bool) or not isinstance(level, int) or not 1 <= level <= 9:
         raise InvalidArgumentError(f"level must be a whole number from 1 to 9; got {level!r}")
@@ -226,6 +240,10 @@ def _is_exr(path: Any) -> bool:
 
 def _is_vti(path: Any) -> bool:
     return str(path).lower().endswith(VTI_SUFFIX)
+
+
+def _is_html(path: Any) -> bool:
+    return str(path).lower().endswith(HTML_SUFFIX)
 
 
 def _vti() -> Any:

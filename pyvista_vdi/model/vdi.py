@@ -202,7 +202,7 @@ class VDI:
     # -- files -----------------------------------------------------------------------------------
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a ``.vdi``, ``.exr`` or ``.vti`` file that :func:`pyvista_vdi.read` opens.
+        """Write a ``.vdi``, ``.exr``, ``.vti`` or ``.html`` file that `pyvista_vdi.read` opens.
 
         The options are those of :func:`pyvista_vdi.io.write`.
         """

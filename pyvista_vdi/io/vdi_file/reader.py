@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from threading import Lock
-from typing import Any, NoReturn
+from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,15 +126,26 @@ class FileInfo:
     depth_step: float = 1.0
 
 
-def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDI:
-    """Read a VDI from a .vdi file: see :func:`pyvista_vdi.io.read`."""
-    with _OpenFile(path) as file:
+def read(
+    path: str | os.PathLike[str],
+    *,
+    progress: Progress | None = None,
+    stream: BinaryIO | None = None,
+) -> VDI:
+    """Read a VDI from a .vdi file: see :func:`pyvista_vdi.io.read`.
+
+    ``stream`` holds the file where it lies within another, at ``path``.
+    """
+    with _OpenFile(path, stream) as file:
         return file.vdi(progress)
 
 
-def read_info(path: str | os.PathLike[str]) -> FileInfo:
-    """Read what a .vdi file says about itself: see :func:`pyvista_vdi.io.read_info`."""
-    with _OpenFile(path) as file:
+def read_info(path: str | os.PathLike[str], *, stream: BinaryIO | None = None) -> FileInfo:
+    """Read what a .vdi file says about itself: see :func:`pyvista_vdi.io.read_info`.
+
+    ``stream`` as for :func:`read`.
+    """
+    with _OpenFile(path, stream) as file:
         return file.info
 
 
@@ -151,10 +162,10 @@ def begins_as_vdi(path: str | os.PathLike[str]) -> bool:
 class _OpenFile:
     """A .vdi file whose description has been read and checked."""
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], stream: BinaryIO | None = None) -> None:
         try:
             self._path = Path(path)
-            self._stream = self._path.open("rb")
+            self._stream = self._path.open("rb") if stream is None else stream
         except (OSError, ValueError, TypeError) as error:
             raise VDIFileError(
                 f"{path!s} cannot be read: {getattr(error, 'strerror', None) or error}"
@@ -294,7 +305,7 @@ class _OpenFile:
                 depth_origin=number(d["depth_origin"]),
                 metadata=d["metadata"],
                 codec=d["codec"],
-                file_bytes=os.fstat(self._stream.fileno()).st_size,
+                file_bytes=self._file_bytes(),
                 memory_bytes=(n_lists + 1) * 8 + n * 24 + packed_bytes[precision],
                 precision=precision,
                 depth_step=number(d["depth_step"]) if precision == "8-byte" else 1.0,
@@ -303,6 +314,10 @@ class _OpenFile:
             raise
         except (VDIError, KeyError, TypeError, ValueError, OverflowError) as error:
             self._refuse(f"its description is incomplete or wrong: {error!r}")
+
+    def _file_bytes(self) -> int:
+        """Return the bytes of the file, or of what lies within another."""
+        return self._stream.seek(0, os.SEEK_END)
 
     def _checked_layouts(self) -> dict[str, Layout]:
         """Return the arrays' layouts, which must be what window and length imply."""

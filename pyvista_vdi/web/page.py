@@ -1,0 +1,237 @@
+"""One HTML file with the viewer and a VDI: opens from disk, offline, and loads nothing."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import html
+import io
+import os
+import re
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi._version import __version__
+from pyvista_vdi.errors import VDIFileError
+from pyvista_vdi.io.progress import Progress
+from pyvista_vdi.io.vdi_file import reader
+from pyvista_vdi.io.vdi_file.layout import COARSE, DEFLATE
+from pyvista_vdi.io.vdi_file.reader import FileInfo
+from pyvista_vdi.io.vdi_file.writer import write_to
+from pyvista_vdi.io.whole_file import whole_file
+from pyvista_vdi.model.compositing import opacity, transmittance
+from pyvista_vdi.model.metrics import over_background
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.web.bundle import viewer_script
+
+#: What the script elements that hold a .vdi file as base64 say of themselves.
+DATA_TYPE = "application/vdi+base64"
+
+#: Longest edge of the still picture, pixels, and the quality of its JPEG.
+_STILL_EDGE, _STILL_QUALITY = 480, 75
+
+_DATA = re.compile(rb'<script type="%b">([^<]*)</script>' % re.escape(DATA_TYPE).encode())
+
+# Nothing is loaded, from nowhere: what the page needs is in it.
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' blob:; style-src 'unsafe-inline'; "
+    "img-src data: blob:; worker-src blob:; child-src blob:"
+)
+
+# The coarse level stands before the script, which finds it there; the rest may still be coming.
+_PAGE = """\
+<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="generator" content="pyvista-vdi {version}">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<title>{title}</title>
+<style>
+html, body {{ height: 100%; margin: 0; background: {background}; color: gray; }}
+vdi-viewer {{ width: 100%; height: 100%; aspect-ratio: auto; }}
+vdi-viewer:not(:defined) {{ display: block; text-align: center; }}
+p {{ font: 14px sans-serif; text-align: center; }}
+</style>
+</head>
+<body>
+<vdi-viewer background="{background}">
+<img alt="{title}" src="data:image/jpeg;base64,{still}">
+<noscript><p>Scripts are turned off: this is a still picture of what could be turned.</p></noscript>
+<script type="{kind}">{first}</script>
+<script>
+{script}</script>
+<script type="{kind}">{rest}</script>
+</vdi-viewer>
+</body>
+</html>
+"""
+
+
+def page(
+    vdi: VDI,
+    *,
+    title: str = "VDI",
+    background: Sequence[float] = (0.0, 0.0, 0.0),
+    precision: str | None = None,
+    level: int | None = None,
+    progress: Progress | None = None,
+) -> bytes:
+    """Return an HTML page that shows a VDI, as large as the window.
+
+    Parameters
+    ----------
+    vdi : VDI
+        What to show.
+    title : str
+        Of the page.
+    background : (float, float, float)
+        RGB, 0 to 1, behind the VDI.
+    precision : {"exact", "16-byte", "8-byte"}, optional
+        Bytes of a supersegment before they are compressed; ``"8-byte"`` by default.
+    level : int, optional
+        Effort of the compressor (deflate), 1 to 9; 6 by default.
+    progress : callable, optional
+        As for :func:`pyvista_vdi.io.write`.
+
+    Returns
+    -------
+    bytes
+        UTF-8 text.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If the background is no colour, or a list is too long for the precision.
+    """
+    stream = io.BytesIO()
+    write_to(stream, vdi.with_precision(precision or "8-byte"), DEFLATE, level, progress)
+    data = stream.getvalue()
+    cut = _end_of_coarse(stream)
+    percents = " ".join(f"{100 * channel:g}%" for channel in background)
+    text = _PAGE.format(
+        version=__version__,
+        policy=_POLICY,
+        title=html.escape(title),
+        background=f"rgb({percents})",
+        still=base64.b64encode(_still(vdi, background)).decode(),
+        kind=DATA_TYPE,
+        first=base64.b64encode(data[:cut]).decode(),
+        script=viewer_script(),
+        rest=base64.b64encode(data[cut:]).decode(),
+    )
+    return text.encode()
+
+
+def write(
+    vdi: VDI,
+    path: str | os.PathLike[str],
+    *,
+    compression: str = DEFLATE,
+    level: int | None = None,
+    precision: str | None = None,
+    title: str | None = None,
+    background: Sequence[float] = (0.0, 0.0, 0.0),
+    progress: Progress | None = None,
+) -> Path:
+    """Write a page with a VDI: see :func:`pyvista_vdi.io.write`, and :func:`page`.
+
+    ``compression`` is deflate, the one that browsers decode; the title is the file's name by
+    default.
+    """
+    target = Path(os.path.realpath(path))
+    content = page(
+        vdi,
+        title=target.stem if title is None else title,
+        background=background,
+        precision=precision,
+        level=level,
+        progress=progress,
+    )
+    with whole_file(target) as stream:
+        stream.write(content)
+    return target
+
+
+def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDI:
+    """Read the VDI that a page shows: see :func:`pyvista_vdi.io.read`."""
+    return reader.read(path, progress=progress, stream=_data(path))
+
+
+def read_info(path: str | os.PathLike[str]) -> FileInfo:
+    """Read what a page's VDI says about itself: see :func:`pyvista_vdi.io.read_info`."""
+    return reader.read_info(path, stream=_data(path))
+
+
+def holds_vdi(path: str | os.PathLike[str]) -> bool:
+    """Whether a page has a VDI in it; False where there is no such file."""
+    try:
+        return _DATA.search(Path(path).read_bytes()) is not None
+    except OSError:
+        return False
+
+
+def _data(path: str | os.PathLike[str]) -> BinaryIO:
+    """Return the .vdi file in a page."""
+    try:
+        content = Path(path).read_bytes()
+    except (OSError, TypeError, ValueError) as error:
+        raise VDIFileError(
+            f"{path} cannot be read: {getattr(error, 'strerror', None) or error}"
+        ) from error
+    parts = _DATA.findall(content)
+    if not parts:
+        raise VDIFileError(
+            f"{path} is not a page with a VDI: it has no <script type={DATA_TYPE!r}>; "
+            "such a page is written by VDI.save() or 'pyvista-vdi convert'"
+        )
+    try:
+        return io.BytesIO(base64.b64decode(b"".join(b"".join(parts).split()), validate=True))
+    except binascii.Error as error:
+        raise VDIFileError(
+            f"{path} is damaged: what it holds of a VDI is no base64 ({error}); "
+            "copy it from its source again, or generate the VDI anew"
+        ) from error
+
+
+def _end_of_coarse(stream: BinaryIO) -> int:
+    """Return how many bytes of a .vdi file show its coarse level, as a multiple of three."""
+    with zipfile.ZipFile(stream) as archive:
+        members = archive.infolist()
+    behind = 2 if members[1].filename == COARSE else 1
+    return -(-members[behind].header_offset // 3) * 3
+
+
+def _still(vdi: VDI, background: Sequence[float]) -> bytes:
+    """Return the picture from the generating view as a small JPEG."""
+    from PIL import Image
+
+    pixels = np.rint(over_background(_from_generating_view(vdi), background) * 255)
+    width, height = vdi.picture_size
+    scale = min(1.0, _STILL_EDGE / max(width, height))
+    size = (max(1, round(width * scale)), max(1, round(height * scale)))
+    stream = io.BytesIO()
+    picture = Image.fromarray(pixels.astype(np.uint8)).resize(size)
+    picture.save(stream, format="jpeg", quality=_STILL_QUALITY)
+    return stream.getvalue()
+
+
+def _from_generating_view(vdi: VDI) -> NDArray[np.float64]:
+    """Composite each list's own supersegments: premultiplied RGBA (H, W, 4), top row first."""
+    counts = vdi.counts.reshape(-1)
+    tau = np.minimum(vdi.optical_depth, 100.0).astype(np.float64)
+    sums = np.concatenate([[0.0], np.cumsum(tau)])
+    before = sums[:-1] - np.repeat(sums[vdi.offsets.view(np.int64)[:-1]], counts)
+    share = transmittance(np.maximum(before, 0.0)) * opacity(tau)
+    own = np.repeat(np.arange(len(counts)), counts)
+    channels = [*(share * vdi.color.T.astype(np.float64)), share]
+    sums_of = [np.bincount(own, channel, len(counts)) for channel in channels]
+    width, height = vdi.window_size
+    picture: NDArray[np.float64] = np.stack(sums_of, axis=1).reshape(height, width, 4)
+    return picture[::-1]
