@@ -203,6 +203,7 @@ export class VDIViewer extends HTMLElement {
     const gl = canvas.getContext("webgl2", { antialias: false, depth: false, alpha: true });
     if (!gl) {
       this.#parts.canvas.hidden = true;
+      this.#parts.img.src ||= this.querySelector("img")?.src ?? "";
       this.#parts.img.hidden = !this.#parts.img.getAttribute("src");
       this.#fail(new Error("This browser draws no WebGL 2, which turning this picture takes."));
       return;

@@ -46,17 +46,23 @@ export async function load(source, { onLevel, onProgress = () => {}, signal }) {
   if (port instanceof Worker) idle.push(port);
 }
 
+const EMBEDDED = 'script[type="application/vdi+base64"]';
+
 /**
- * The base64 text in an element's `<script type="application/vdi+base64">`, one or several, as far
- * as the page has been read.
+ * The base64 text in an element's `<script type="application/vdi+base64">`, one or several, as the
+ * page is read.
  *
  * @param {Element} element
- * @returns {AsyncGenerator<string>} For {@link load}.
+ * @returns {AsyncGenerator<string>|null} For {@link load}; null where there is no such script yet.
  */
-export async function* embedded(element) {
+export function embedded(element) {
+  return element.querySelector(EMBEDDED) && embeddedTexts(element);
+}
+
+async function* embeddedTexts(element) {
   for (let taken = 0; ;) {
     const parsed = document.readyState !== "loading";
-    const scripts = element.querySelectorAll('script[type="application/vdi+base64"]');
+    const scripts = element.querySelectorAll(EMBEDDED);
     // The last one may still be growing
     while (taken < scripts.length - (parsed ? 0 : 1)) yield scripts[taken++].textContent;
     if (parsed) return;
