@@ -39,9 +39,9 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.classify import Looks
+from pyvista_vdi.quality.when_anew import REGENERATE_BELOW
 from pyvista_vdi.reference.generate import medium_at
 from pyvista_vdi.reference.shading import lit_colors
-from pyvista_vdi.vtk_pipeline.interaction.regeneration import REGENERATE_BELOW
 
 Array = NDArray[Any]
 

@@ -64,6 +64,13 @@ def parse_count(text: str) -> int:
     return int(text)
 
 
+def parse_port(text: str) -> int:
+    """Return a port's number, 0 to 65535."""
+    if not text.isdecimal() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"a port is a number up to 65535; got {text!r}")
+    return int(text)
+
+
 def parse_rate(text: str) -> float:
     """Return frames per second."""
     try:
@@ -130,17 +137,25 @@ def output(options: Options, text: str = ".vdi, .exr, .vti or .html to write") -
 
 def volume(options: Options) -> None:
     """Add the volume: a file's name, or one that is known; and where its voxels lie."""
-    _file_or_example(options, VOLUME_FILE, "VOLUME")
+    _file_or_example(options, "file", VOLUME_FILE, "VOLUME")
+
+
+def volumes(options: Options) -> None:
+    """Add volumes, the time steps of one."""
+    text = f"{VOLUME_FILE}; several are time steps"
+    _file_or_example(options, "files", text, "VOLUME", nargs="*", default=[])
 
 
 def vdi_or_volume(options: Options) -> None:
     """Add what to show: a VDI or a volume."""
-    _file_or_example(options, f"{VDI_FILE}; or a volume: {VOLUME_FILE}", "FILE")
+    _file_or_example(options, "file", f"{VDI_FILE}; or a volume: {VOLUME_FILE}", "FILE")
 
 
-def _file_or_example(options: Options, text: str, metavar: str) -> None:
+def _file_or_example(
+    options: Options, name: str, text: str, metavar: str, nargs: str = "?", **more: Any
+) -> None:
     source = options.add_mutually_exclusive_group(required=True)
-    option(source, "file", text, metavar, nargs="?")
+    option(source, name, text, metavar, nargs=nargs, **more)
     option(
         source,
         "--example",
@@ -261,8 +276,13 @@ def limits(parser: argparse.ArgumentParser) -> None:
     option(group, "--tolerance", "error traded for length", kind=float, default=0.0)
     cone = "half angle of the cone of new views to serve (default: 60)"
     option(group, "--view-cone", cone, "DEGREES", float, default=60.0)
+    memory_limit(group)
+
+
+def memory_limit(options: Options) -> None:
+    """Add how much memory of the device is taken."""
     option(
-        group,
+        options,
         "--memory-limit",
         "most memory to take on the device, like 2GiB; a volume that does not fit goes there "
         "brick by brick (default: what the device has)",

@@ -240,6 +240,30 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
     declare.device(parser)
 
 
+def _add_serve(parser: argparse.ArgumentParser) -> None:
+    declare.volumes(parser)
+    group = parser.add_argument_group("server")
+    host = "address to listen at (default: 127.0.0.1, this machine alone)"
+    declare.option(group, "--host", host, "ADDRESS", default="127.0.0.1")
+    port = "(default: 8765; 0: one that is free)"
+    declare.option(group, "--port", port, "N", declare.parse_port, default=8765)
+    token = "what the URL must carry (default: a random one)"
+    declare.option(group, "--token", token, "TEXT")
+    names = "another name by which browsers may call this server; may be repeated"
+    declare.option(group, "--allow-host", names, "NAME", action="append", default=[])
+    text = "most lists of a VDI (default: 1280x720)"
+    declare.option(group, "--lists", text, "WxH", declare.parse_size, default=(1280, 720))
+    below = "estimated SSIM below which a view gets a VDI of its own (default: 0.95)"
+    declare.option(group, "--regenerate-below", below, "SSIM", float, default=0.95)
+    declare.classification(parser)
+    declare.occlusion(parser)
+    group = parser.add_argument_group("limits")
+    declare.longest(group, "longest list (default: 20)")
+    declare.step(group, "step along the ray, model units (default: half the smallest spacing)")
+    declare.memory_limit(group)
+    declare.device(parser)
+
+
 def _add_compare(parser: argparse.ArgumentParser) -> None:
     declare.volume(parser)
     declare.option(parser, "--out", "where the files go", "FOLDER", default=".")
@@ -376,6 +400,12 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
         "open a window in which a VDI, or a volume by a VDI of it, can be turned",
         "pyvista-vdi view knee.vdi",
         _add_view,
+    ),
+    "serve": (
+        "serve",
+        "serve VDIs of a volume to web pages, in which it is turned while it stays here",
+        "pyvista-vdi serve knee.nrrd --cmap bone --opacity sigmoid_6",
+        _add_serve,
     ),
     "info": (
         "files",

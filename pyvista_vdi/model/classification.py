@@ -94,10 +94,25 @@ class Classification:
         blendings: Sequence[str] = BLENDINGS[:1],
     ) -> None:
         refuse_unknown(given, function, (*DEFAULTS, *IN_PLACE, *others))
+        self._function = function
         self._in_place = {n: given[n] for n in IN_PLACE if given.get(n) is not None}
         self._given = {n: v for n, v in given.items() if n in DEFAULTS}
         self._refuse_mixtures()
         self._refuse_unsupported(blendings)
+
+    @property
+    def given(self) -> Mapping[str, Any]:
+        """The arguments as they were given."""
+        return {**self._given, **self._in_place}
+
+    @property
+    def in_place(self) -> bool:
+        """Whether a transfer function or a property stands in place of ``add_volume``'s."""
+        return bool(self._in_place)
+
+    def changed(self, changes: Mapping[str, Any]) -> Classification:
+        """Return these arguments with some of them changed."""
+        return Classification({**self.given, **changes}, self._function)
 
     @property
     def blending(self) -> str:
@@ -146,8 +161,7 @@ class Classification:
 
     def describe(self) -> dict[str, Any]:
         """Return the arguments as given, in values that JSON can hold."""
-        described = {**self._given, **self._in_place}
-        return {name: _plain(value) for name, value in described.items()}
+        return {name: _plain(value) for name, value in self.given.items()}
 
     def _refuse_mixtures(self) -> None:
         if len(self._in_place) > 1:

@@ -94,6 +94,43 @@ def covering_view(
     return camera.replace(window_center=middle / new_half, **lens), (width, height)
 
 
+def view_in_sight(
+    camera: Camera, window_size: Sequence[int], corners: ArrayLike
+) -> tuple[Camera, tuple[int, int]] | None:
+    """Cut a view's window down to the pixels in which a volume can be seen.
+
+    Parameters
+    ----------
+    camera : Camera
+        The view on the screen, with the model transform in it.
+    window_size : (int, int)
+        The screen's width and height in pixels.
+    corners : array_like of float, shape (n, 3)
+        Points whose convex hull contains the volume, model frame.
+
+    Returns
+    -------
+    (Camera, (int, int)) or None
+        The view of the smallest rectangle of whole pixels of the window that the projected corners
+        allow, and its size: the whole window where a corner is behind the eye or close to it.
+        ``None`` if nothing of the volume is in the window.
+    """
+    size = check_window_size(window_size)
+    points = np.asarray(corners, dtype=np.float64)
+    pixels = _project(camera, size, points)
+    low, high = np.zeros(2), np.asarray(size, dtype=np.float64)
+    if pixels is not None:
+        low = np.maximum(low, np.floor(pixels.min(axis=0) + _SLACK))
+        high = np.minimum(high, np.ceil(pixels.max(axis=0) - _SLACK))
+    elif ((points @ camera.model_to_view[2, :3] + camera.model_to_view[2, 3]) <= 0).all():
+        return None
+    width, height = (int(n) for n in high - low)
+    if width <= 0 or height <= 0:
+        return None
+    corner = (int(low[0]), size[1] - int(high[1]))
+    return camera.tile(size, corner, (width, height)), (width, height)
+
+
 #: Which of the six numbers of bounds are x, y and z of each corner, int (3, 8).
 _CORNERS = np.array(np.meshgrid([0, 1], [2, 3], [4, 5])).reshape(3, 8)
 

@@ -28,6 +28,7 @@ VERBS = (
     "generate",
     "render",
     "view",
+    "serve",
     "info",
     "compare",
     "benchmark",
@@ -119,7 +120,7 @@ def test_version(capsys):
     ("arguments", "message"),
     [
         (["generat"], "there is no verb 'generat': did you mean 'generate'?"),
-        (["zzz"], "there is no verb 'zzz': known are devices, generate, render, view, info, com"),
+        (["zzz"], "there is no verb 'zzz': known are devices, generate, render, view, serve"),
         (["info"], "one of the arguments FILE --example is required; see pyvista-vdi info --help"),
         # Not "argument VOLUME: not allowed with argument --example" for the value behind it
         (
@@ -143,6 +144,8 @@ def test_version(capsys):
         (["generate", "a", "-o", "b", "--quality", "best"], "invalid choice: 'best'"),
         (["generate", "a", "-o", "b", "--position", "1", "2"], "expected 3 arguments"),
         (["compare", "a", "--angles", "0;5"], "got '0;5'"),
+        (["serve", "a", "--port", "65536"], "a port is a number up to 65535; got '65536'"),
+        (["serve"], "one of the arguments VOLUME --example is required"),
         (["compare", "a", "--repeats", "0"], "a whole number above 0; got '0'"),
         (["render", "a", "-o", "b", "--background", "pinkish"], "'pinkish' is no colour"),
         (["render", "a", "-o", "b", "--background", "0,0,2"], "R,G,B from 0 to 1"),

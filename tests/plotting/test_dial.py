@@ -11,9 +11,9 @@ from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarnin
 from pyvista_vdi.quality import probe as dial_measurement
 from pyvista_vdi.quality.background import BackgroundGeneration
 from pyvista_vdi.quality.dial import LADDER, Dial
+from pyvista_vdi.quality.when_anew import REGENERATE_BELOW
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.dense import VDIToDenseImage
-from pyvista_vdi.vtk_pipeline.interaction.regeneration import REGENERATE_BELOW
 
 pytestmark = pytest.mark.gl
 

@@ -17,12 +17,13 @@ from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.cropping import checked_opacity_multiplier
 from pyvista_vdi.model.render_options import checked_transmittance_cutoff
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.when_anew import checked_bound
 from pyvista_vdi.raycasting.picking import checked_opacity
 from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
 from pyvista_vdi.vtk_pipeline.filters.algorithm import DEVICE, accessors
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
-from pyvista_vdi.vtk_pipeline.interaction.regeneration import checked_bound, checked_policy
+from pyvista_vdi.vtk_pipeline.interaction.regeneration import checked_policy
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import checked_rate
 
 #: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.

@@ -1,8 +1,7 @@
-"""A view on the screen, how far two of them are apart, and a camera whose views are followed."""
+"""The view that a renderer shows, and a camera whose views are followed."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkCommonCore import vtkWeakReference
 
+from pyvista_vdi.model import view as model_view
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.coverage import bounds_corners
 
 
 def as_array(matrix: Any) -> NDArray[np.float64]:
@@ -23,11 +22,8 @@ def as_array(matrix: Any) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True)
-class View:
-    """A camera, with the actor's matrix in it, and the viewport's size in pixels."""
-
-    camera: Camera
-    size: tuple[int, int]
+class View(model_view.View):
+    """A view that a renderer shows."""
 
     @classmethod
     def of(cls, renderer: Any, model_transform: NDArray[np.float64]) -> View:
@@ -35,33 +31,6 @@ class View:
         camera = Camera.from_any(renderer.GetActiveCamera(), model_transform=model_transform)
         width, height = renderer.GetSize()
         return cls(camera, (max(1, width), max(1, height)))
-
-    def distance(self, other: View, bounds: tuple[float, ...]) -> float:
-        """Return by how much the corners of a volume's bounds differ between two pictures.
-
-        Largest distance of a corner's places in the two pictures, each from the picture's centre
-        ray and in its own pixels, over half this picture's height. 0 for the same view; about the
-        angle in radians where an object that fills the picture is turned; infinite where a corner
-        is behind an eye. It sees turning, panning, zooming and resizing alike.
-        """
-        if self == other:
-            return 0.0
-        places = [view._pixels(bounds) for view in (self, other)]
-        if places[0] is None or places[1] is None:
-            return math.inf
-        apart = np.linalg.norm(places[0] - places[1], axis=1)
-        return float(apart.max()) / (self.size[1] / 2)
-
-    def _pixels(self, bounds: tuple[float, ...]) -> NDArray[np.float64] | None:
-        """Return the corners' places in pixels from the centre ray, (8, 2); None behind the eye."""
-        camera = self.camera
-        corners = np.column_stack([bounds_corners(bounds), np.ones(8)])
-        x, y, z, _ = camera.model_to_view @ corners.T
-        per_unit = np.asarray(self.size) / 2 / camera.half_extent(self.size)
-        places = np.column_stack([x, y]) * per_unit
-        if camera.parallel_projection:
-            return places
-        return None if z.min() <= 0 else places / z[:, None]
 
 
 class TrackedCamera:

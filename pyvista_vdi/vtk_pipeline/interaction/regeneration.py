@@ -9,10 +9,16 @@ from collections.abc import Callable
 from typing import Any, Literal, TypeAlias
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import BackgroundGeneration
+from pyvista_vdi.quality.when_anew import (
+    AT_HOME,
+    OUT_OF_DATE,
+    REGENERATE_BELOW,
+    estimate_is_old,
+    is_poor,
+)
 from pyvista_vdi.vtk_pipeline.filters.source import Request, VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.interaction.estimation import Estimate, Estimation
@@ -20,28 +26,10 @@ from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 
 Policy: TypeAlias = "Literal['auto', 'never'] | Callable[[VDIStatus], object]"
 
-#: Estimated SSIM below which a view at rest gets a VDI of its own. Over the measured views a VDI
-#: of 20 supersegments keeps .96 to .99 when it is only turned; zooming in by two, or looking past
-#: what V_O's window covered, falls below (docs/regeneration.md).
-REGENERATE_BELOW = 0.95
-
-#: While the view moves this multiple of the error is borne: what is made then is soon out of date.
-_PATIENCE_IN_MOTION = 2.0
 #: Seconds between two estimates while the view moves: each takes time from the frames.
 _ESTIMATE_PERIOD_IN_MOTION = 0.5
 #: Seconds without another view after which the view is at rest.
 _SETTLED = 0.15
-
-# Distances between views as View.distance has them: about radians, for a volume that fills the
-# picture.
-
-#: Nearer to V_O than this, a VDI of the view itself would show the same.
-_AT_HOME = 0.02
-#: Farther than this from the last estimate's view, another is made: at rest, and in motion.
-_ANOTHER_ESTIMATE = 0.005
-_ANOTHER_ESTIMATE_IN_MOTION = 0.3
-#: Farther than this from the view that a VDI is being made for, it is given up.
-_OUT_OF_DATE = 0.7
 
 
 def checked_policy(policy: Any) -> Policy:
@@ -52,16 +40,6 @@ def checked_policy(policy: Any) -> Policy:
         "regenerate must be 'auto', 'never' or a callable that takes a VDIStatus and says whether "
         f"to regenerate; got {policy!r}"
     )
-
-
-def checked_bound(ssim: Any) -> float:
-    """Return an SSIM between 0 and 1."""
-    bound = as_float(ssim)
-    if isinstance(ssim, bool) or not 0 <= bound <= 1:
-        raise InvalidArgumentError(
-            f"regenerate_below must be an SSIM between 0 and 1; got {ssim!r}"
-        )
-    return bound
 
 
 class Regeneration:
@@ -218,18 +196,20 @@ class Regeneration:
         vdi, view, made = source.GetCurrentVDI(), self._view, source.GetCurrentRequest()
         if self._target is not None or self._estimation.running or self._failed:
             return
-        if vdi is None or view is None or made is None or self._apart(made.screen) <= _AT_HOME:
+        if vdi is None or view is None or made is None or self._apart(made.screen) <= AT_HOME:
             return
         estimate, resting = self._estimate, self._resting
-        again = _ANOTHER_ESTIMATE if resting else _ANOTHER_ESTIMATE_IN_MOTION
-        if estimate is None or estimate.vdi is not vdi or self._apart(estimate.view) > again:
+        if (
+            estimate is None
+            or estimate.vdi is not vdi
+            or estimate_is_old(self._apart(estimate.view), moving=not resting)
+        ):
             now = time.perf_counter()
             if resting or now - self._estimated_at >= _ESTIMATE_PERIOD_IN_MOTION:
                 self._estimated_at = now
                 self._estimation.start(vdi, made, view, self._options)
             return
-        allowed = (1 - self.bound) * (1 if resting else _PATIENCE_IN_MOTION)
-        if estimate.error.ssim < 1 - allowed:
+        if is_poor(estimate.error.ssim, self.bound, moving=not resting):
             self._start(source.MakeRequest(view), for_view=True)
 
     @property
@@ -281,7 +261,7 @@ class Regeneration:
         if self._target is None or made is None or not self._for_view:
             return
         away = self._apart(self._target.screen)
-        if away > _OUT_OF_DATE or away > self._apart(made.screen):
+        if away > OUT_OF_DATE or away > self._apart(made.screen):
             self._give_up()
 
     def _give_up(self) -> None:

@@ -1,0 +1,258 @@
+// A viewer whose VDIs a server makes: `pyvista-vdi serve`. docs/web.md, "Served", has the protocol.
+//
+// The viewer draws what it has. Its view is told to the server, which sends another VDI when it
+// finds that the picture is too far from the volume's: a coarse one first. Each is swapped whole.
+
+/** Milliseconds between two messages of a moving view, and without one after which it rests. */
+const VIEW_PERIOD = 50;
+const VIEW_RESTS = 150;
+/** Milliseconds until a lost connection is tried again: twice as long each time, up to the last. */
+const FIRST_RETRY = 500;
+const LAST_RETRY = 15000;
+/** The server's longest edge of a picture, pixels. */
+const LONGEST_EDGE = 8192;
+/** Why a server ends a connection for good: the client has said something wrong. */
+const REFUSED = 1008;
+
+/**
+ * The VDIs of a server in a viewer.
+ *
+ * Events: `hello` (detail: what the server offers), `status` (detail: {doing, text}).
+ */
+export class RemoteVDI extends EventTarget {
+  /**
+   * @param {HTMLElement} viewer - A `<vdi-viewer>`.
+   * @param {string} url - Of the socket, with the token.
+   */
+  constructor(viewer, url) {
+    super();
+    this.viewer = viewer;
+    this.url = url;
+    this.hello = null;
+    this.received = { coarse: 0, full: 0, bytes: 0 };
+    this._said = new Map(); // the last message of each kind, said again to a new connection
+    this._retry = FIRST_RETRY;
+    this._showing = null;
+    this._next = null;
+    this._timer = 0;
+    this._restTimer = 0;
+    this._viewSentAt = -Infinity;
+    this._onCamera = () => this._viewMoved();
+    viewer.addEventListener("camerachange", this._onCamera);
+    this._sizes = new ResizeObserver(this._onCamera);
+    this._sizes.observe(viewer);
+    this._connect();
+  }
+
+  /** Change the transfer function: {cmap, opacity, clim}; what is left out is the server's. */
+  setLook(look) {
+    this._say({ type: "look", ...look });
+  }
+
+  /** Show a time step, counted from 0. */
+  setStep(step) {
+    this._say({ type: "time", step });
+  }
+
+  /** Clip by planes, [{origin, normal}], world coordinates: here at once, and in estimates. */
+  setClippingPlanes(planes) {
+    this.viewer.clippingPlanes = planes;
+    this._say({ type: "clip", planes: planes.map((p) => [...p.origin, ...p.normal]) });
+  }
+
+  /** End the connection for good. The viewer goes on drawing what it has. */
+  close() {
+    this.viewer.removeEventListener("camerachange", this._onCamera);
+    this._sizes.disconnect();
+    clearTimeout(this._timer);
+    clearTimeout(this._restTimer);
+    clearTimeout(this._retryTimer);
+    this._closed = true;
+    this._socket.close();
+  }
+
+  _connect() {
+    const socket = new WebSocket(this.url);
+    socket.binaryType = "arraybuffer";
+    this._socket = socket;
+    this._incoming = null;
+    socket.onmessage = ({ data }) => {
+      if (typeof data === "string") this._hear(JSON.parse(data));
+      else this._take(new Uint8Array(data));
+    };
+    socket.onclose = ({ code, reason }) => {
+      if (this._closed || socket !== this._socket) return;
+      const again = code !== REFUSED;
+      const why = reason || "no connection to the server";
+      this._status(null, again ? `${why}; trying again` : why);
+      if (!again) return;
+      this._retryTimer = setTimeout(() => this._connect(), this._retry);
+      this._retry = Math.min(2 * this._retry, LAST_RETRY);
+    };
+  }
+
+  _hear(message) {
+    if (message.type === "hello") {
+      const first = this.hello === null;
+      this.hello = message;
+      this._retry = FIRST_RETRY;
+      if (first) this.viewer.camera = message.camera;
+      this._said.forEach((said) => this._socket.send(JSON.stringify(said)));
+      this._sendView(false);
+      this._status(null, "");
+      this.dispatchEvent(new CustomEvent("hello", { detail: message }));
+    } else if (message.type === "vdi") {
+      // One that has not come whole is given up by the server
+      this._incoming = { ...message, file: new Uint8Array(message.bytes), filled: 0 };
+    } else if (message.type === "status") {
+      this._status(message.doing, "");
+    } else if (message.type === "error") {
+      this._status(null, message.message);
+    }
+  }
+
+  _take(part) {
+    const incoming = this._incoming;
+    if (incoming === null || incoming.filled + part.length > incoming.file.length) return;
+    incoming.file.set(part, incoming.filled);
+    incoming.filled += part.length;
+    this.received.bytes += part.length;
+    if (incoming.filled < incoming.file.length) return;
+    this._incoming = null;
+    this._next = incoming;
+    if (this._showing === null) this._show();
+  }
+
+  /** Decode and swap what has come, one after the other: the last one counts. */
+  async _show() {
+    while (this._next !== null) {
+      this._showing = this._next;
+      this._next = null;
+      try {
+        await this.viewer.showBytes(this._showing.file);
+        this.received[this._showing.level] += 1;
+      } catch (error) {
+        this._status(null, error.message);
+      }
+    }
+    this._showing = null;
+  }
+
+  _viewMoved() {
+    clearTimeout(this._restTimer);
+    this._restTimer = setTimeout(() => this._sendView(false), VIEW_RESTS);
+    if (this._timer) return;
+    const wait = Math.max(0, this._viewSentAt + VIEW_PERIOD - performance.now());
+    this._timer = setTimeout(() => {
+      this._timer = 0;
+      // A slow line is not filled with views that nobody will look at
+      if (this._socket.bufferedAmount === 0) this._sendView(true);
+    }, wait);
+  }
+
+  _sendView(moving) {
+    const { viewer } = this;
+    if (this.hello === null || this._socket.readyState !== WebSocket.OPEN) return;
+    const density = globalThis.devicePixelRatio || 1;
+    const edge = (length) => Math.min(LONGEST_EDGE, Math.max(1, Math.round(length * density)));
+    const size = [edge(viewer.clientWidth), edge(viewer.clientHeight)];
+    const { position, focal_point, view_up, view_angle, parallel_scale } = viewer.camera;
+    const lens = parallel_scale === undefined ? { view_angle } : { parallel_scale };
+    const camera = { position, focal_point, view_up, ...lens };
+    if (!moving) clearTimeout(this._restTimer);
+    this._viewSentAt = performance.now();
+    this._socket.send(JSON.stringify({ type: "view", camera, size, moving }));
+  }
+
+  _say(message) {
+    this._said.set(message.type, message);
+    if (this.hello !== null && this._socket.readyState === WebSocket.OPEN) {
+      this._socket.send(JSON.stringify(message));
+    }
+  }
+
+  _status(doing, text) {
+    this.dispatchEvent(new CustomEvent("status", { detail: { doing, text } }));
+  }
+}
+
+/** Return an element with attributes and children. */
+function htmlElement(name, attributes = {}, ...children) {
+  const made = Object.assign(document.createElement(name), attributes);
+  made.append(...children);
+  return made;
+}
+
+/** Fill a panel with plain controls of what the server offers. */
+function fillPanel(panel, remote, hello) {
+  const labelled = (text, ...inputs) => htmlElement("label", {}, text, ...inputs);
+  const choice = (names, value) => {
+    const select = htmlElement("select", {}, ...names.map((name) => htmlElement("option", {}, name)));
+    if (!names.includes(value)) select.prepend(htmlElement("option", { value: "" }, "as started"));
+    select.value = names.includes(value) ? value : "";
+    return select;
+  };
+  const controls = [];
+  if (hello.cmaps.length > 0) {
+    const cmap = choice(hello.cmaps, hello.look.cmap);
+    const opacity = choice(hello.opacities, hello.look.opacity);
+    const [low, high] = hello.range.map((value) =>
+      htmlElement("input", { type: "number", step: "any", placeholder: String(value), size: 6 }),
+    );
+    const changed = () => {
+      const look = {};
+      if (cmap.value) look.cmap = cmap.value;
+      if (opacity.value) look.opacity = opacity.value;
+      const ends = [low, high].map((end, i) => (end.value ? Number(end.value) : hello.range[i]));
+      if ((low.value || high.value) && ends[0] < ends[1]) look.clim = ends;
+      remote.setLook(look);
+    };
+    [cmap, opacity, low, high].forEach((input) => input.addEventListener("change", changed));
+    controls.push(labelled("Colours", cmap), labelled("Opacity", opacity));
+    controls.push(labelled("Range", low, high));
+  }
+  const axis = choice(["no plane", "x", "y", "z"], "no plane");
+  const place = htmlElement("input", { type: "range", min: 0, max: 1, step: 0.01, value: 0.5 });
+  const flip = htmlElement("input", { type: "checkbox" });
+  const clipped = () => {
+    const k = ["x", "y", "z"].indexOf(axis.value);
+    if (k < 0) return remote.setClippingPlanes([]);
+    const origin = [0, 1, 2].map((i) => (hello.bounds[2 * i] + hello.bounds[2 * i + 1]) / 2);
+    const [least, most] = hello.bounds.slice(2 * k, 2 * k + 2);
+    origin[k] = least + Number(place.value) * (most - least);
+    const normal = [0, 0, 0];
+    normal[k] = flip.checked ? -1 : 1;
+    return remote.setClippingPlanes([{ origin, normal }]);
+  };
+  [axis, place, flip].forEach((input) => input.addEventListener("input", clipped));
+  controls.push(labelled("Clip", axis, place), labelled("other side", flip));
+  if (hello.steps > 1) {
+    const time = htmlElement("input", { type: "range", min: 0, max: hello.steps - 1, value: 0 });
+    time.addEventListener("input", () => remote.setStep(Number(time.value)));
+    controls.push(labelled("Time", time));
+  }
+  panel.replaceChildren(...controls);
+}
+
+/**
+ * Connect a page's viewer to the server that the page came from.
+ *
+ * @param {HTMLElement} viewer - A `<vdi-viewer>`.
+ * @param {HTMLElement} panel - Gets the controls.
+ * @param {HTMLElement} line - Gets what goes on, as text.
+ * @returns {RemoteVDI} The connection.
+ */
+export function connectPage(viewer, panel, line) {
+  const url = new URL("socket", location.href);
+  url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+  url.search = location.search;
+  const remote = new RemoteVDI(viewer, url.href);
+  remote.addEventListener("hello", ({ detail }) => fillPanel(panel, remote, detail), {
+    once: true,
+  });
+  const words = { estimate: "looking", vdi: "making a VDI of this view" };
+  remote.addEventListener("status", ({ detail }) => {
+    line.textContent = detail.text || words[detail.doing] || "";
+  });
+  return remote;
+}

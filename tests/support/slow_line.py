@@ -1,0 +1,74 @@
+"""A line between a client and a server that is as slow as one asks: a proxy on this machine."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+
+#: Bytes taken up at a time: a few packets, so that a slow line is even.
+_PIECE = 4096
+
+
+class SlowLine:
+    """Forwards connections to a port at so many bytes a second, so many seconds later.
+
+    Attributes
+    ----------
+    port : int
+        Where it listens.
+    down, up : int
+        Bytes that went to clients, and from them.
+    """
+
+    def __init__(self, port, *, rate, latency):
+        self._to, self._rate, self._latency = port, rate, latency
+        self.port = self.down = self.up = 0
+        self._ends = []
+
+    async def __aenter__(self):
+        self._server = await asyncio.start_server(self._connected, "127.0.0.1", 0)
+        self.port = self._server.sockets[0].getsockname()[1]
+        return self
+
+    async def __aexit__(self, *_):
+        self._server.close()
+        for writer in self._ends:
+            writer.transport.abort()
+        await asyncio.gather(*(w.wait_closed() for w in self._ends), return_exceptions=True)
+
+    async def _connected(self, reader, writer):
+        way = socket.socket()
+        way.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _PIECE)  # no more is on the line
+        way.setblocking(False)
+        await asyncio.get_running_loop().sock_connect(way, ("127.0.0.1", self._to))
+        there, back = await asyncio.open_connection(sock=way, limit=_PIECE)
+        self._ends += [writer, back]
+        with contextlib.suppress(ConnectionError, asyncio.CancelledError):
+            await asyncio.gather(
+                self._carry(there, writer, "down"), self._carry(reader, back, "up")
+            )
+
+    async def _carry(self, reader, writer, way):
+        loop = asyncio.get_running_loop()
+        held = max(1, int(self._rate * self._latency / _PIECE))  # what is on the line at once
+        line = asyncio.Queue(held)
+
+        async def deliver():
+            while (item := await line.get()) is not None:
+                due, data = item
+                await asyncio.sleep(max(0.0, due - loop.time()))
+                writer.write(data)
+                await writer.drain()
+            writer.close()
+
+        async def take_up():
+            free = loop.time()
+            while data := await reader.read(_PIECE):
+                setattr(self, way, getattr(self, way) + len(data))
+                free = max(free, loop.time()) + len(data) / self._rate
+                await line.put((free + self._latency, data))
+                await asyncio.sleep(max(0.0, free - loop.time()))
+            await line.put(None)
+
+        await asyncio.gather(deliver(), take_up())
