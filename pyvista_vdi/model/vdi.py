@@ -216,6 +216,10 @@ class VDI:
             f"{self.n_supersegments} supersegments, {self.nbytes / 2**20:.1f} MiB)"
         )
 
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
+        """Return what a notebook shows: a viewer, or a picture."""
+        return provider("notebook_bundle")(self, include, exclude)
+
     # -- rules -----------------------------------------------------------------------------------
 
     def _check_lists(self) -> None:

@@ -1,0 +1,69 @@
+"""The picture of a VDI that stands where no viewer can."""
+
+from __future__ import annotations
+
+import io
+from base64 import b64encode
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.api import render
+from pyvista_vdi.errors import NoDeviceError
+from pyvista_vdi.io import to_bytes
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.web.camera import camera_of, viewer_camera
+
+#: Longest edge of a picture that is kept in a saved notebook, pixels.
+_EDGE = 800
+
+
+def picture(
+    vdi: VDI,
+    camera: dict[str, Any],
+    window_size: Sequence[int] | None = None,
+    background: Sequence[float] | None = None,
+) -> NDArray[np.uint8]:
+    """Return what a viewer shows: uint8 (H, W, 3) RGB, or (H, W, 4) without a background.
+
+    Parameters
+    ----------
+    vdi : VDI
+        What it shows.
+    camera : dict
+        Its view, in the viewer's form.
+    window_size : (int, int), optional
+        Width and height in pixels; by default those the VDI was made for.
+    background : (float, float, float), optional
+        RGB, 0 to 1.
+    """
+    # Where the model is in the world is the VDI's own: the viewer's camera does not say it
+    placed = vdi.camera.model_transform
+    image = render(vdi, camera_of(camera).replace(model_transform=placed), window_size)
+    return to_bytes(image, background)
+
+
+def still(
+    vdi: VDI,
+    camera: dict[str, Any] | None = None,
+    background: Sequence[float] | None = None,
+) -> str | None:
+    """Return a view, the VDI's own by default, as base64 PNG; ``None`` without a device."""
+    share = min(1, _EDGE / max(vdi.picture_size))
+    size = [max(1, round(edge * share)) for edge in vdi.picture_size]
+    camera = viewer_camera(vdi.camera, vdi.picture_size) if camera is None else camera
+    try:
+        return png(picture(vdi, camera, size, background))
+    except NoDeviceError:
+        return None
+
+
+def png(pixels: NDArray[np.uint8]) -> str:
+    """Return an image, uint8 (H, W, 3) or (H, W, 4), as base64 PNG."""
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, format="png")
+    return b64encode(stream.getvalue()).decode()
