@@ -19,6 +19,9 @@ from pyvista_vdi.errors import (
     MissingDependencyError,
 )
 
+#: Volumes that take seconds to read, by the same readers as the others.
+LARGE = ("allen_mouse_brain", "berea", "t1w_head", "visible_female_head")
+
 SHIPPED = sorted(name for name, example in examples.VOLUMES.items() if example.shipped)
 
 
@@ -66,7 +69,13 @@ def test_same_grid_as_pyvista_reads(name):
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize("name", sorted(set(examples.VOLUMES) - set(SHIPPED)))
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name in LARGE))
+        for name in sorted(set(examples.VOLUMES) - set(SHIPPED))
+    ],
+)
 def test_other_volumes_read_as_pyvista_reads(name):
     require_data(name)
     _compare_with_pyvista(name)

@@ -67,7 +67,7 @@ for each in (
 arguments("opacity=0.1", opacity=0.1)
 arguments("opacity=1.0", opacity=1.0)
 arguments("opacity=1, an int", opacity=1)
-arguments("opacity: a list", opacity=[0, 0, 0.02, 0.9, 1.0], quick=True)
+arguments("opacity: a list", opacity=[0, 0, 0.02, 0.9, 1.0])
 arguments("opacity: a tuple", opacity=(0, 0.5, 0.1, 0.8))
 arguments("opacity: two entries", opacity=[0.0, 0.4])
 arguments("opacity: an array up to 1", opacity=np.linspace(0, 0.7, 11))
@@ -179,7 +179,7 @@ def several() -> pv.ImageData:
     return volume
 
 
-arguments("scalars by name", volume=several, scalars="waves", quick=True)
+arguments("scalars by name", volume=several, scalars="waves")
 arguments("scalars of cells by name", volume=several, scalars="cells")
 kind.add(
     "scalars of both, points preferred",

@@ -43,7 +43,7 @@ def to(target: str, **values: Any) -> Any:
 
 
 # -- the actor
-change("visibility", to("actor", visibility=False), quick=True)
+change("visibility", to("actor", visibility=False))
 change("position", to("actor", position=(0.4, 0.2, 0)), quick=True)
 change("scale", to("actor", scale=(1.2, 0.8, 1.0)))
 change("orientation", to("actor", orientation=(20, 30, 10)))

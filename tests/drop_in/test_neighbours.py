@@ -94,7 +94,7 @@ neighbour(
     lambda pl: pl.add_mesh(ball(), silhouette={"color": "red", "line_width": 4}),
     first=False,
 )
-neighbour("outline", lambda pl: pl.add_mesh(grid().outline(), color="k"), quick=True)
+neighbour("outline", lambda pl: pl.add_mesh(grid().outline(), color="k"))
 neighbour(
     "contours of the volume",
     lambda pl: pl.add_mesh(grid().contour([150.0]), opacity=0.5, show_scalar_bar=False),

@@ -27,7 +27,7 @@ INSIDE = "coverage='bounds' needs the eye outside"
 
 # -- cameras
 for name in ("xy", "xz", "yz", "yx", "zx", "zy", "isometric"):
-    view(f"view_{name}", lambda pl, name=name: getattr(pl, f"view_{name}")(), quick=name == "xz")
+    view(f"view_{name}", lambda pl, name=name: getattr(pl, f"view_{name}")())
 view("view_xy from behind", lambda pl: pl.view_xy(negative=True))
 view("view_vector", lambda pl: pl.view_vector((1, 2, -0.5), viewup=(0, 1, 0)))
 view("parallel projection", lambda pl: pl.enable_parallel_projection(), quick=True)
@@ -79,7 +79,7 @@ view("set_scale smaller", lambda pl: pl.set_scale(xscale=0.4, yscale=0.8))
 
 # -- backgrounds and anti-aliasing
 view("set_background", lambda pl: pl.set_background("lightsteelblue"))
-view("set_background, gradient", lambda pl: pl.set_background("black", top="white"), quick=True)
+view("set_background, gradient", lambda pl: pl.set_background("black", top="white"))
 view(
     "set_background, all",
     lambda pl: pl.set_background("gray", all_renderers=True),

@@ -30,6 +30,11 @@ whole_file_module = importlib.import_module("pyvista_vdi.io.whole_file")
 posix = pytest.mark.skipif(os.name != "posix", reason="POSIX signals and limits")
 formats = pytest.mark.parametrize("suffix", io.SUFFIXES)
 
+#: With processes: a `.vti` file goes the way of the others (`io.whole_file`), hence every night.
+formats_in_processes = pytest.mark.parametrize(
+    "suffix", [pytest.param(s, marks=[pytest.mark.slow] * (s == ".vti")) for s in io.SUFFIXES]
+)
+
 #: Where this process finds what tests share.
 SUPPORT = Path(__file__).parents[1] / "support"
 
@@ -270,7 +275,7 @@ def killed_at(moment, path):
 
 
 @posix
-@formats
+@formats_in_processes
 @pytest.mark.parametrize(
     "moments", [(0, 7, 9999), pytest.param((*range(40), 9999), marks=pytest.mark.slow)]
 )
@@ -310,7 +315,7 @@ while not select.select([sys.stdin], [], [], 0)[0]:
 """
 
 
-@formats
+@formats_in_processes
 def test_two_processes_that_save_to_one_name(suffix, tmp_path):
     """Whoever reads meanwhile finds one of their files, whole."""
     path = vdi_number(1).save(tmp_path / f"a{suffix}")

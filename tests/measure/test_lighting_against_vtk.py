@@ -30,6 +30,9 @@ CASES = {
     "RGBA, shaded": {"rgba": True, "shade": True},
 }
 
+#: Every night only: "dimmed headlight", "spotlight" and the shaded ones take the same way and more.
+LIKE_OTHERS = ("coloured headlight", "scene light", "gradient opacity", "RGBA")
+
 
 def the_property(volume, case):
     from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
@@ -88,7 +91,9 @@ def coloured(volume):
 
 
 @pytest.mark.gl
-@pytest.mark.parametrize("name", list(CASES))
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LIKE_OTHERS)) for n in CASES]
+)
 def test_pictures_are_those_of_vtk(name, default_runtime):
     pytest.importorskip("pyvista")
     from pyvista_vdi.measure.vtk_baselines import VTKBaseline

@@ -73,7 +73,13 @@ def test_shipped_volumes_small(name, transfer_function, interpolation, default_r
 
 @pytest.mark.gl
 @pytest.mark.parametrize(
-    ("name", "interpolation"), [*product(("brain", "rayleigh_taylor"), ("nearest", "linear"))]
+    ("name", "interpolation"),
+    [
+        ("brain", "linear"),
+        ("rayleigh_taylor", "nearest"),
+        pytest.param("brain", "nearest", marks=pytest.mark.slow),
+        pytest.param("rayleigh_taylor", "linear", marks=pytest.mark.slow),
+    ],
 )
 def test_shipped_volumes_against_vtk(name, interpolation, default_runtime):
     """The soft transfer function's bounds; measured small: SSIM .9949, PSNR 40.0 dB at least."""
