@@ -209,6 +209,9 @@ class VDIWidget(anywidget.AnyWidget):
             write_png(pixels, filename)
         return pixels
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.vdi!r})"
+
     def _encoded(self, vdi: VDI) -> bytes:
         fits = self._precision is not None or vdi.counts.max() <= DEPTH_CODES
         sent = vdi.with_precision(self._precision or "8-byte") if fits else vdi
@@ -220,7 +223,6 @@ class VDIWidget(anywidget.AnyWidget):
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """Return the view, and a picture for where there can be no view."""
         data, metadata = super()._repr_mimebundle_(**kwargs)
-        data["text/plain"] = f"VDIWidget({self.vdi!r})"
         shown = self._still()
         return (data if shown is None else {**data, "image/png": shown}), metadata
 

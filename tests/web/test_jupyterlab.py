@@ -1,0 +1,269 @@
+"""VDIs in a real JupyterLab in a real browser: turned there, read in the kernel, and saved."""
+
+from __future__ import annotations
+
+import base64
+import importlib.util
+import io
+import json
+import os
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.web.camera import camera_of, viewer_camera
+
+MISSING = [
+    name
+    for name in ("jupyterlab", "ipykernel", "anywidget", "pyvista")
+    if importlib.util.find_spec(name) is None
+]
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.gl,
+    pytest.mark.skipif(
+        bool(MISSING),
+        reason=f"needs {', '.join(MISSING)}: pip install 'pyvista-vdi[browser,notebook,plot]'",
+    ),
+]
+
+#: Seconds after which something that should have happened has not.
+LONG = 300
+SIZE = (192, 108)
+
+CELLS = (
+    """
+import json
+import numpy as np
+import pyvista as pv
+import pyvista_vdi as pvdi
+from pyvista_vdi.web.camera import viewer_camera
+from pyvista_vdi.web.widget import VDIWidget
+vdi = pvdi.read("ball.vdi")
+widget = VDIWidget(vdi, background="white")
+widget
+""",
+    "print(json.dumps(widget.camera))",
+    "widget.camera = vdi.camera.azimuth(60)",
+    "vdi",
+    """
+volume = pv.Wavelet(extent=(-12, 12) * 3)
+plotter = pv.Plotter(window_size=(192, 108))
+actor = plotter.add_vdi(volume, cmap="viridis", show_scalar_bar=False)
+plotter.show(jupyter_backend="vdi")
+""",
+    "print(json.dumps(viewer_camera(plotter.camera)))",
+    "plotter.view_xz()",
+)
+TURNED, SHOWN, PLOTTED = 0, 3, 4  # cells with viewers
+READ, READ_PLOTTER = 1, 5  # that print a camera
+SET, SET_PLOTTER = 2, 6  # that set one
+
+
+@pytest.fixture(scope="module")
+def vdi():
+    x = np.linspace(-1, 1, 24)
+    radius = np.sqrt(x[:, None, None] ** 2 + x[:, None] ** 2 + x**2)
+    density = 255 * np.clip(1 - radius, 0, 1).astype(np.float32)
+    volume = pvdi.Volume(density, (2 / 23,) * 3, (-1, -1, -1))
+    camera = pvdi.Camera((3, 2, 5), (0, 0, 0), (0, 1, 0))
+    return pvdi.generate(volume, camera, SIZE, cmap="viridis", opacity=[0, 0.1, 0.4, 0.9])
+
+
+@pytest.fixture
+def lab(vdi, tmp_path, monkeypatch):
+    """Start a JupyterLab in a folder with a notebook; give the folder and the notebook's URL."""
+    folder = tmp_path / "books"
+    folder.mkdir()
+    vdi.save(folder / "ball.vdi")
+    cells = [
+        {
+            "cell_type": "code",
+            "id": f"cell{k}",
+            "metadata": {},
+            "source": text.strip(),
+            "outputs": [],
+            "execution_count": None,
+        }
+        for k, text in enumerate(CELLS)
+    ]
+    kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    book = {
+        "cells": cells,
+        "metadata": {"kernelspec": kernel},
+        "nbformat": 4,
+        "nbformat_minor": 5,
+    }
+    (folder / "book.ipynb").write_text(json.dumps(book))
+    own = {f"JUPYTER_{kind}_DIR": str(tmp_path / kind) for kind in ("CONFIG", "DATA", "RUNTIME")}
+    environment = {**os.environ, **own, "IPYTHONDIR": str(tmp_path / "ipython")}
+    command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root"]
+    command += [f"--ServerApp.root_dir={folder}", "--ServerApp.ip=127.0.0.1"]
+    command += ["--ServerApp.port=0", "--IdentityProvider.token=known"]
+    command += ["--LabApp.expose_app_in_browser=True", "--LabApp.news_url="]
+    command += ["--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate"]
+    with (tmp_path / "log").open("w") as log:
+        process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
+    try:
+        yield folder, f"{_address(process, tmp_path)}doc/tree/book.ipynb?token=known"
+    finally:
+        process.terminate()
+        process.wait(LONG)
+
+
+def _address(process, folder):
+    """Return a server's URL as soon as it answers: it writes it to a file of its own."""
+    end = time.monotonic() + LONG
+    while time.monotonic() < end:
+        assert process.poll() is None, (folder / "log").read_text()
+        for file in (folder / "RUNTIME").glob(f"jpserver-{process.pid}.json"):
+            try:
+                url = json.loads(file.read_text())["url"]
+                with urllib.request.urlopen(f"{url}api?token=known", timeout=LONG):
+                    return url
+            except (ValueError, urllib.error.URLError):
+                pass
+        time.sleep(0.2)
+    raise AssertionError((folder / "log").read_text())
+
+
+class Notebook:
+    """A notebook in a browser's page."""
+
+    def __init__(self, page, url):
+        self.page = page
+        self.hosts = set()
+        page.set_default_timeout(LONG * 1000)
+        page.on("request", lambda request: self.hosts.add(request.url.partition("?")[0]))
+        page.goto(url)
+        page.wait_for_selector("text=/Python 3.*Idle/")
+
+    def run(self, k):
+        """Run a cell; return what it printed."""
+        self.page.evaluate(
+            """async (k) => {
+              jupyterapp.shell.currentWidget.content.activeCellIndex = k;
+              await jupyterapp.commands.execute("notebook:run-cell");
+            }""",
+            k,
+        )
+        return "".join(self.cell(k).locator(".jp-OutputArea-output pre").all_inner_texts())
+
+    def cell(self, k):
+        return self.page.locator(".jp-Notebook .jp-CodeCell").nth(k)
+
+    def viewer(self, k):
+        """Return a cell's viewer once all of its VDI is drawn."""
+        viewer = self.cell(k).locator("vdi-viewer")
+        viewer.scroll_into_view_if_needed()
+        viewer.evaluate("(viewer) => viewer.ready.then(() => null)")
+        return viewer
+
+    def camera(self, k):
+        return self.viewer(k).evaluate("(viewer) => viewer.camera")
+
+    def drag(self, k):
+        """Turn a viewer by hand, and wait until it has turned."""
+        before, box = self.camera(k), self.viewer(k).bounding_box()
+        x, y = box["x"] + box["width"] / 3, box["y"] + box["height"] / 2
+        self.page.mouse.move(x, y)
+        self.page.mouse.down()
+        self.page.mouse.move(x + 40, y + 12, steps=3)
+        self.page.mouse.up()
+        until(lambda: self.camera(k) != before)
+
+    def picture(self, k):
+        """Return what a viewer shows, premultiplied RGBA from 0 to 1."""
+        shot = self.viewer(k).evaluate(
+            """async (viewer, [width, height]) => {
+              const { data } = await viewer.screenshot({ width, height });
+              return btoa(Array.from(data, (b) => String.fromCharCode(b)).join(""));
+            }""",
+            SIZE,
+        )
+        return np.frombuffer(base64.b64decode(shot), np.uint8).reshape(*SIZE[::-1], 4) / 255
+
+
+def until(condition):
+    end = time.monotonic() + LONG
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.1)
+
+
+@pytest.fixture
+def notebook(lab, chromium):
+    context = chromium.new_context(viewport={"width": 900, "height": 1400})
+    yield Notebook(context.new_page(), lab[1])
+    context.close()
+
+
+def assert_alike(picture, expected):
+    """Hold the viewer's picture to the bound of issue 17."""
+    assert np.mean(np.abs(picture - expected).max(axis=2) <= 2 / 255) >= 0.999
+
+
+def test_in_jupyterlab(notebook, lab, vdi):
+    notebook.run(TURNED)
+    assert notebook.camera(TURNED) == viewer_camera(vdi.camera)
+    sent = vdi.with_precision("8-byte")
+    assert_alike(notebook.picture(TURNED), pvdi.render(sent, vdi.camera))
+
+    # Turned by hand, read in the kernel, which may be told while a cell runs, or before
+    notebook.drag(TURNED)
+    turned = notebook.camera(TURNED)
+    until(lambda: json.loads(notebook.run(READ)) == turned)
+    assert_alike(notebook.picture(TURNED), pvdi.render(sent, camera_of(turned)))
+
+    # Set in the kernel, seen in the browser
+    notebook.run(SET)
+    until(lambda: notebook.camera(TURNED) == viewer_camera(vdi.camera.azimuth(60)))
+
+    notebook.run(SHOWN)
+    assert_alike(notebook.picture(SHOWN), pvdi.render(sent, vdi.camera))
+
+    # A plotter's
+    notebook.run(PLOTTED)
+    first = json.loads(notebook.run(READ_PLOTTER))
+    assert notebook.camera(PLOTTED) == first
+    assert notebook.picture(PLOTTED)[..., 3].max() > 0.5
+    notebook.drag(PLOTTED)
+    turned = notebook.camera(PLOTTED)
+    until(lambda: json.loads(notebook.run(READ_PLOTTER)) == turned)
+    notebook.run(SET_PLOTTER)
+    until(lambda: notebook.camera(PLOTTED) == json.loads(notebook.run(READ_PLOTTER)) != turned)
+    if "PYVISTA_VDI_PICTURES" in os.environ:
+        notebook.page.screenshot(path=f"{os.environ['PYVISTA_VDI_PICTURES']}/jupyterlab.png")
+
+    # Saved: the pictures are there for who does not run it
+    notebook.page.evaluate("jupyterapp.commands.execute('docmanager:save')")
+    path = lab[0] / "book.ipynb"
+    until(lambda: len(_pictures(path)) == 3)
+    pictures = _pictures(path)
+    expected = pvdi.io.to_bytes(pvdi.render(vdi, vdi.camera))
+    np.testing.assert_array_equal(pictures[SHOWN], expected)
+    assert pictures[TURNED].shape == pictures[PLOTTED].shape == (*SIZE[::-1], 3)
+
+    # Nothing came from elsewhere
+    server = lab[1].partition("/doc")[0]
+    foreign = [url for url in notebook.hosts if not url.startswith((server, "blob:", "data:"))]
+    assert not foreign
+
+
+def _pictures(path):
+    """Return the pictures that a notebook's file holds, by cell."""
+    found = {}
+    for k, cell in enumerate(json.loads(path.read_text())["cells"]):
+        for output in cell["outputs"]:
+            if "image/png" in output.get("data", {}):
+                png = base64.b64decode(output["data"]["image/png"])
+                found[k] = np.asarray(Image.open(io.BytesIO(png)))
+    return found
