@@ -17,6 +17,7 @@ from pyvista_vdi import VDI, Camera, io
 from pyvista_vdi.cli import main
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.io.vdi_file.layout import CHUNK_ROWS, INDEX_DTYPE
+from pyvista_vdi.model.packing import channel_differences, colors_of_differences
 
 CODECS = ("lz4", "zstd", "deflate", "none")
 JUNK = (None, -1, True, 2**70, 1e300, "x", [], {}, [1], [[]], {"a": 1})
@@ -109,6 +110,13 @@ def test_several_chunks(precision, tmp_path):
     assert info.memory_bytes == packed.nbytes
 
 
+def test_differences_of_channels_give_back_every_colour():
+    colors = np.random.default_rng(3).integers(0, 256, (1000, 3), dtype=np.uint8)
+    stored = channel_differences(colors)
+    np.testing.assert_array_equal(stored[:, 0], colors[:, 2])
+    np.testing.assert_array_equal(colors_of_differences(stored), colors)
+
+
 def test_an_empty_vdi(tmp_path):
     for precision in PACKED:
         vdi = large_vdi((3, 2), per_list=1)
@@ -126,11 +134,12 @@ def test_exact_files_are_what_they_were(tmp_path):
 def test_packed_files_are_smaller(tmp_path):
     sizes = [
         large_vdi().save(tmp_path / "a.vdi", precision=precision, compression=codec).stat().st_size
-        for codec in ("none", "lz4")
+        for codec in ("none", "lz4", "deflate")
         for precision in ("exact", "16-byte", "8-byte")
     ]
     assert sizes[0] > sizes[1] > sizes[2]
     assert sizes[3] > sizes[4] > sizes[5]
+    assert sizes[6] > sizes[7] > sizes[8]
 
 
 def test_options_are_checked_before(tmp_path):

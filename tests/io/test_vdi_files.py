@@ -26,6 +26,7 @@ from pyvista_vdi import VDI, Camera, io
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.io.vdi_file import chunks, writer
 from pyvista_vdi.io.vdi_file.layout import CHUNK_ROWS, INDEX_DTYPE
+from pyvista_vdi.model.coarser import coarser
 
 CODECS = ("lz4", "zstd", "deflate", "none")
 ARRAYS = ("counts", "front", "back", "color", "optical_depth")
@@ -433,9 +434,13 @@ def test_a_newer_version(file):
         io.read(file)
 
 
-def test_every_truncation_is_noticed(file):
-    whole = file.read_bytes()
+@pytest.mark.parametrize("codec", ["lz4", "deflate"])
+def test_every_truncation_is_noticed(codec, file):
+    """One of version 4 has a whole file in it, which is not taken for the rest."""
+    whole = small_vdi().save(file, compression=codec).read_bytes()
     cuts = {*range(200), *range(0, len(whole), 97), *range(len(whole) - 120, len(whole))}
+    coarse_ends = whole.find(b"PK\5\6", 0, -22) + 22
+    cuts |= {coarse_ends, coarse_ends + 1} if codec == "deflate" else set()
     for cut in sorted(cuts):
         file.write_bytes(whole[:cut])
         with pytest.raises(VDIFileError, match=r"is (truncated|damaged|not a VDI)"):
@@ -615,6 +620,44 @@ def test_chunks_of_noise(data, seed, tmp_path_factory):
     rewrite(path, edit)
     with contextlib.suppress(VDIFileError):
         io.read(path)
+
+
+@pytest.mark.parametrize("more", [b"", b"\0" * 10**8])
+def test_streams_of_zlib_that_lie_about_their_size(more, tmp_path):
+    path = io.write(large_vdi((8, 8)), tmp_path / "a.vdi", compression="deflate")
+
+    def edit(members):
+        raw = zlib.decompress(members["front"])
+        members["front"] = zlib.compress(raw + more if more else raw[:-1])
+
+    rewrite(path, edit)
+    tracemalloc.start()
+    try:
+        with pytest.raises(VDIFileError, match="a stream of zlib does not end after the 512 bytes"):
+            io.read(path)
+        assert tracemalloc.get_traced_memory()[1] < 10**7
+    finally:
+        tracemalloc.stop()
+
+
+def test_version_4_begins_with_a_coarse_level(tmp_path):
+    vdi = large_vdi((18, 12))
+    path = io.write(vdi, tmp_path / "a.vdi", compression="deflate")
+    with zipfile.ZipFile(path) as archive:
+        assert archive.namelist() == ["vdi.json", "coarse.vdi", *ARRAYS, "chunks"]
+        (tmp_path / "coarse.vdi").write_bytes(archive.read("coarse.vdi"))
+    coarse = io.read(tmp_path / "coarse.vdi")
+    assert coarse.equals(coarser(vdi).with_precision("8-byte"))
+    assert io.read_info(tmp_path / "coarse.vdi").format_version == 4
+    with zipfile.ZipFile(io.write(large_vdi((18, 3)), path, compression="deflate")) as archive:
+        assert "coarse.vdi" not in archive.namelist()
+
+
+@pytest.mark.parametrize(("version", "codec"), [(4, "lz4"), (3, "deflate"), (2, "deflate")])
+def test_versions_and_codecs_belong_together(version, codec, file):
+    edit_description(file, version=version, codec=codec, precision="exact")
+    with pytest.raises(VDIFileError, match=f"version {version} has no codec '{codec}'"):
+        io.read(file)
 
 
 def test_lists_that_do_not_add_up(tmp_path):

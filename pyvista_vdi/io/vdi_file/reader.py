@@ -247,6 +247,11 @@ class _OpenFile:
                 f"{self._path} is truncated: the directory at its end is missing or damaged "
                 f"({error}); {_REMEDY}"
             ) from error
+        # Of a file that ends within or behind its coarse level the directory found is that one's
+        if archive.infolist() and archive.infolist()[0].header_offset != 0:
+            raise VDIFileError(
+                f"{self._path} is truncated: the directory at its end is missing; {_REMEDY}"
+            )
         names = archive.namelist()
         if len(set(names)) < len(names):
             self._refuse("two of its members have the same name")
