@@ -130,8 +130,9 @@ class AddVDI(Component):
         Parameters
         ----------
         volume : pyvista.ImageData or numpy.ndarray or pyvista.MultiBlock or Volume or VDI
-            A uniform grid (other grids are refused, with the remedy), a NumPy array as
-            ``add_volume`` takes it, blocks of uniform grids, a VDI, or a VDI as
+            A uniform grid, or a rectilinear one of equidistant points (other grids are refused,
+            with the remedy), a NumPy array as ``add_volume`` takes it, blocks of uniform grids, a
+            VDI, or a VDI as
             ``pyvista.read("x.vdi")`` gives it. With a VDI nothing is generated, and arguments that
             only a volume can honour are refused.
         scalars : str or numpy.ndarray, optional

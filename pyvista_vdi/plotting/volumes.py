@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
+from vtkmodules.vtkCommonDataModel import vtkRectilinearGrid
 
 from pyvista_vdi.errors import (
     InvalidArgumentError,
@@ -15,7 +16,7 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.convert import to_image_data
-from pyvista_vdi.vtk_pipeline.filters.convert import require_image
+from pyvista_vdi.vtk_pipeline.filters.convert import as_numpy, require_image
 
 #: What ``add_volume`` calls scalars that are given as an array.
 _UNNAMED = "Data"
@@ -27,17 +28,45 @@ def as_image(volume: Any, scalars: Any, resolution: Any) -> tuple[Any, str | Non
     ``volume`` is a grid, a NumPy array with the spacing ``resolution``, or a Volume; the user's own
     grid is returned where that is possible, so that changes to it are seen. ``scalars`` is a name,
     or values per point or cell, which go into a shallow copy. Other grids are refused with a
-    remedy.
+    remedy; a rectilinear one whose points are equidistant is a uniform one.
     """
     if isinstance(volume, np.ndarray):
         image = _from_array(volume, resolution)
     elif isinstance(volume, Volume):
         image = to_image_data(volume)
     else:
-        image = require_image(volume)
+        image = require_image(_as_uniform(volume))
     if scalars is None or isinstance(scalars, str):
         return image, scalars
     return _with_values(image, np.asarray(scalars)), _UNNAMED
+
+
+def _as_uniform(grid: Any) -> Any:
+    """Return a rectilinear grid of equidistant points as that uniform grid; else what is given.
+
+    Equidistant: within four units of the last place of the farthest coordinate, as it is stored,
+    which is what rounding leaves of ``linspace``. The arrays are shared.
+    """
+    if not isinstance(grid, vtkRectilinearGrid):
+        return grid
+    axes = [as_numpy(grid.GetXCoordinates()), as_numpy(grid.GetYCoordinates())]
+    axes.append(as_numpy(grid.GetZCoordinates()))
+    spacing = []
+    for axis in axes:
+        places = axis.astype(np.float64)
+        step = (places[-1] - places[0]) / (len(places) - 1) if len(places) > 1 else 0.0
+        rounding = np.finfo(axis.dtype if axis.dtype.kind == "f" else float).eps
+        off = np.abs(places - (places[0] + step * np.arange(len(places)))).max()
+        if not (step > 0 and off <= 4 * rounding * np.abs(places).max()):
+            return grid
+        spacing.append(step)
+    image = pv.ImageData(
+        dimensions=grid.GetDimensions(), spacing=spacing, origin=[float(axis[0]) for axis in axes]
+    )
+    image.GetPointData().ShallowCopy(grid.GetPointData())
+    image.GetCellData().ShallowCopy(grid.GetCellData())
+    image.GetFieldData().ShallowCopy(grid.GetFieldData())
+    return image
 
 
 def held(image: Any) -> pv.ImageData:

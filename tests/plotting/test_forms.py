@@ -66,6 +66,24 @@ def test_blocks_within_blocks_and_none(plotter):
     assert len(plotter.renderer.actors) == before, "nothing, or all"
 
 
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_a_rectilinear_grid_of_equidistant_points_is_the_uniform_grid(plotter, dtype):
+    ball = soft_ball(12)
+    axis = np.linspace(-1, 1, 12, dtype=dtype)
+    grid = pv.RectilinearGrid(axis, axis, axis)
+    grid["v"] = ball["v"].copy()
+    actor = plotter.add_vdi(grid, **LOOKS)
+    first = shown(plotter)
+    plotter.remove_actor(actor)
+    plotter.add_vdi(ball, **LOOKS)
+    # Bounds differ by rounding
+    assert np.abs(shown(plotter) - first).max() <= 1
+    assert np.ptp(first) > 40
+    axis[3] += 0.001
+    with pytest.raises(UnsupportedError, match=r"not a uniform grid.*resample"):
+        plotter.add_vdi(pv.RectilinearGrid(axis, axis, axis))
+
+
 def test_names_of_vtk_s_mappers_mean_nothing_and_are_noted_once(plotter):
     classify.note_mapper.cache_clear()
     with pytest.warns(VDIWarning, match="mapper='gpu' chooses among VTK's.*is ignored"):
