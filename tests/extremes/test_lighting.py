@@ -76,8 +76,14 @@ def test_worlds(runtime, worst, scale, offset, lit_by, look):
     check(runtime, worst, volume, function, None if lit_by == "headlight" else lamps(volume))
 
 
-@pytest.mark.parametrize("look", LOOKS)
-@pytest.mark.parametrize("lit_by", ["headlight", "lamps"])
+@pytest.mark.parametrize(
+    ("lit_by", "look"),
+    [
+        *(("headlight", look) for look in LOOKS),
+        ("lamps", "both"),
+        pytest.param("lamps", "shaded", marks=pytest.mark.slow),  # "both" is shaded as well
+    ],
+)
 @pytest.mark.parametrize("spacing", [(1, 1, 1000), (1000, 1, 1), (1, 0.001, 1)], ids=str)
 def test_anisotropy(runtime, worst, spacing, lit_by, look):
     """Normals are transformed as normals: those of a needle or of a plate.
