@@ -136,7 +136,7 @@ class VDIWidget(anywidget.AnyWidget):
 
     Examples
     --------
-    >>> from pyvista_vdi.web.widget import VDIWidget  # doctest: +SKIP
+    >>> from pyvista_vdi.web import VDIWidget  # doctest: +SKIP
     >>> widget = VDIWidget(vdi, background="white")  # doctest: +SKIP
     >>> widget  # doctest: +SKIP
     """

@@ -46,7 +46,7 @@ import numpy as np
 import pyvista as pv
 import pyvista_vdi as pvdi
 from pyvista_vdi.web.camera import viewer_camera
-from pyvista_vdi.web.widget import VDIWidget
+from pyvista_vdi.web import VDIWidget
 vdi = pvdi.read("ball.vdi")
 widget = VDIWidget(vdi, background="white")
 widget
@@ -103,11 +103,22 @@ def lab(vdi, tmp_path, monkeypatch):
         "nbformat_minor": 5,
     }
     (folder / "book.ipynb").write_text(json.dumps(book))
+    settings = tmp_path / "settings"
+    settings.mkdir()
+    (settings / "overrides.json").write_text(
+        json.dumps(
+            {
+                "@jupyterlab/apputils-extension:notification": {"fetchNews": "false"},
+                "@jupyter-widgets/jupyterlab-manager:plugin": {"saveState": True},
+            }
+        )
+    )
     own = {f"JUPYTER_{kind}_DIR": str(tmp_path / kind) for kind in ("CONFIG", "DATA", "RUNTIME")}
     environment = {**os.environ, **own, "IPYTHONDIR": str(tmp_path / "ipython")}
     command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root"]
     command += [f"--ServerApp.root_dir={folder}", "--ServerApp.ip=127.0.0.1"]
     command += ["--ServerApp.port=0", "--IdentityProvider.token=known"]
+    command += [f"--LabApp.app_settings_dir={settings}"]
     command += ["--LabApp.expose_app_in_browser=True", "--LabApp.news_url="]
     command += ["--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate"]
     with (tmp_path / "log").open("w") as log:
@@ -200,9 +211,9 @@ def until(condition):
 
 
 @pytest.fixture
-def notebook(lab, chromium):
+def context(chromium):
     context = chromium.new_context(viewport={"width": 900, "height": 1400})
-    yield Notebook(context.new_page(), lab[1])
+    yield context
     context.close()
 
 
@@ -211,7 +222,8 @@ def assert_alike(picture, expected):
     assert np.mean(np.abs(picture - expected).max(axis=2) <= 2 / 255) >= 0.999
 
 
-def test_in_jupyterlab(notebook, lab, vdi):
+def test_in_jupyterlab(context, lab, vdi):
+    notebook = Notebook(context.new_page(), lab[1])
     notebook.run(TURNED)
     assert notebook.camera(TURNED) == viewer_camera(vdi.camera)
     sent = vdi.with_precision("8-byte")
@@ -251,6 +263,20 @@ def test_in_jupyterlab(notebook, lab, vdi):
     expected = pvdi.io.to_bytes(pvdi.render(vdi, vdi.camera))
     np.testing.assert_array_equal(pictures[SHOWN], expected)
     assert pictures[TURNED].shape == pictures[PLOTTED].shape == (*SIZE[::-1], 3)
+
+    # The viewer as well, where the state of widgets is saved: another kernel knows nothing of it
+    notebook.page.evaluate(
+        """async () => {
+          await jupyterapp.shell.currentWidget.sessionContext.shutdown();
+        }"""
+    )
+    notebook.page.close()
+    again = Notebook(context.new_page(), lab[1])
+    assert again.camera(TURNED) == viewer_camera(vdi.camera.azimuth(60))
+    assert_alike(again.picture(TURNED), pvdi.render(sent, vdi.camera.azimuth(60)))
+    again.drag(SHOWN)
+    if "PYVISTA_VDI_PICTURES" in os.environ:
+        again.page.screenshot(path=f"{os.environ['PYVISTA_VDI_PICTURES']}/again.png")
 
     # Nothing came from elsewhere
     server = lab[1].partition("/doc")[0]

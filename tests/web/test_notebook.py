@@ -8,6 +8,7 @@ import io
 import json
 import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from pyvista_vdi.web.notebook import mime_bundle, show_plotter
 
 anywidget = pytest.importorskip("anywidget", reason="needs the extra notebook")
 
-from pyvista_vdi.web.widget import VDIWidget  # noqa: E402
+from pyvista_vdi.web import VDIWidget  # noqa: E402
 
 WIDGET_VIEW = "application/vnd.jupyter.widget-view+json"
 SIZE = (96, 64)
@@ -293,6 +294,19 @@ def test_without_anywidget_a_plotter_shows_a_picture_and_says_why(plotter, monke
 def test_pyvista_finds_the_backend():
     (entry,) = importlib.metadata.entry_points(group="pyvista.jupyter_backends", name="vdi")
     assert entry.load() is show_plotter
+
+
+@pytest.mark.gl
+def test_the_example_s_cells_run():
+    example = Path(__file__).parents[2] / "examples" / "notebook.ipynb"
+    names = {}
+    for cell in json.loads(example.read_text(encoding="utf-8"))["cells"]:
+        if cell["cell_type"] == "code":
+            assert not cell["outputs"]
+            exec("".join(cell["source"]), names)
+    assert names["widget"].camera == viewer_camera(names["vdi"].camera.azimuth(40))
+    assert names["plotter"].camera.position[2] > 0
+    names["plotter"].close()
 
 
 # -- the view in a page ----------------------------------------------------------------------------
