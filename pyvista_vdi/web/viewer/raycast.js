@@ -1,10 +1,13 @@
 // A VDI in WebGL 2: textures of its lists, and a fragment shader that casts a ray for each pixel.
 import { TEXTURE_WIDTH } from "./prepare.js";
-import { frameForms, frameOf, isParallel, pixelRays } from "./rays.js";
+import { frameForms, frameOf, isParallel, pixelRays, pixelsOfBoxes } from "./rays.js";
 import { MOST_PLANES, VERTEX_SHADER, fragmentShader } from "./shader.js";
 
 /** A ray ends where less transmittance than this is left. */
 const TRANSMITTANCE_CUTOFF = 1e-6;
+
+/** Rows of pixels that are drawn at once. */
+const STRIP = 16;
 
 /** Draws prepared VDIs from any view into the bound framebuffer. */
 export class Raycaster {
@@ -64,7 +67,8 @@ export class Raycaster {
   }
 
   /**
-   * Draw premultiplied RGBA into the bound framebuffer, by its blending; bottom row first.
+   * Draw premultiplied RGBA into the bound framebuffer, by its blending; bottom row first. Leaves
+   * the scissor test disabled.
    *
    * @param {object} view
    * @param {object} view.camera position, focal_point, view_up and view_angle (degrees) or
@@ -91,7 +95,7 @@ export class Raycaster {
     }
     const { program, uniforms: u } = this.program(
       [space.parallel && "PARALLEL", space.shifted && "SHIFTED", vdi.packed && "PACKED",
-        depthTexture && "OPAQUE"].filter(Boolean));
+        depthTexture && "OPAQUE"].filter(Boolean), planes.length);
     gl.useProgram(program);
     gl.viewport(...corner, width, height);
     const halves = (forms) => [0, 3].map((k) => forms.flatMap((form) => form.slice(k, k + 3)));
@@ -103,7 +107,6 @@ export class Raycaster {
     gl.uniform3fv(u.formSlope, formSlope);
     gl.uniform3fv(u.planeValue, planeValue);
     gl.uniform3fv(u.planeSlope, planeSlope);
-    gl.uniform1i(u.planes, planes.length);
     gl.uniformMatrix3fv(u.direction, false, rays.direction.flat());
     gl.uniform2i(u.window, ...windowSize);
     gl.uniform2i(u.stacks, ...vdi.stacks);
@@ -122,16 +125,27 @@ export class Raycaster {
       gl.uniform1i(u[name], unit);
     });
     gl.bindVertexArray(this.vertices);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    // Only where something may be seen: strip by strip, from the first to the last such pixel
+    const boxes = pixelsOfBoxes(frame, camera, [width, height], vdi.corners);
+    gl.enable(gl.SCISSOR_TEST);
+    for (let y = 0; y < height; y += STRIP) {
+      const here = boxes.filter(([, , y0, y1]) => y0 < y + STRIP && y1 > y);
+      const x = Math.min(...here.map((box) => box[0])) & ~1;
+      const wide = Math.max(...here.map((box) => box[1])) - x;
+      if (!here.length || wide <= 0) continue;
+      gl.scissor(corner[0] + x, corner[1] + y, wide, Math.min(STRIP, height - y));
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+    }
+    gl.disable(gl.SCISSOR_TEST);
     gl.bindVertexArray(null);
     gl.activeTexture(gl.TEXTURE0);
   }
 
-  program(defines) {
+  program(defines, planes) {
     const { gl } = this;
-    const key = defines.join();
+    const key = [...defines, planes].join();
     if (!this.programs.has(key)) {
-      const program = linked(gl, VERTEX_SHADER, fragmentShader(defines));
+      const program = linked(gl, VERTEX_SHADER, fragmentShader(defines, planes));
       const uniforms = {};
       for (let k = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); k-- > 0; ) {
         const { name } = gl.getActiveUniform(program, k);

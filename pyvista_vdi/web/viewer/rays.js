@@ -196,3 +196,35 @@ export function frameForms(frame, space, windowSize, rays, parallel, clippingPla
   }
   return { coordinates, planes };
 }
+
+/**
+ * Rectangles of pixels that boxes are seen in.
+ *
+ * @param {object} frame Of {@link frameOf}, of the new view.
+ * @param {object} camera Of the new view.
+ * @param {number[]} size Of its window, pixels.
+ * @param {Float64Array} corners Of boxes, model', eight points each.
+ * @returns {number[][]} x0, x1, y0, y1 of each, two pixels more to each side, row 0 at the bottom;
+ *   all of the window for a box that is not in front of the eye.
+ */
+export function pixelsOfBoxes(frame, camera, size, corners) {
+  const toView = modelToView(frame, camera);
+  const half = halfExtentIn(frame, camera, size), centre = windowCentre(camera);
+  const parallel = isParallel(camera);
+  const rectangles = [];
+  for (let at = 0; at < corners.length; at += 24) {
+    const low = [Infinity, Infinity], high = [-Infinity, -Infinity];
+    for (let k = at; k < at + 24; k += 3) {
+      const point = [corners[k], corners[k + 1], corners[k + 2], 1];
+      const [x, y, z] = toView.map((row) => dot(row, point));
+      [x, y].forEach((value, axis) => {
+        const on = (value / (parallel ? 1 : z) / half[axis] - centre[axis] + 1) * size[axis] / 2;
+        low[axis] = Math.min(low[axis], parallel || z > NEAREST_DEPTH ? on : -Infinity);
+        high[axis] = Math.max(high[axis], parallel || z > NEAREST_DEPTH ? on : Infinity);
+      });
+    }
+    rectangles.push([0, 1].flatMap((axis) => [
+      Math.max(Math.floor(low[axis] - 2), 0), Math.min(Math.ceil(high[axis] + 2), size[axis])]));
+  }
+  return rectangles;
+}
