@@ -217,6 +217,25 @@ def test_rays_end_at_opaque_depths_in_numbers(raycaster):
     check_ends(raycaster, range(6, 60))
 
 
+def test_a_scissor_that_is_set_holds(raycaster):
+    """The viewer draws large pictures band by band, with blending."""
+    _, vdi, camera, _ = random_case([0, 0], "around")
+    size = (40, 37)
+    raycaster.give(vdi)
+    whole = raycaster.draw(camera, size)
+    assert whole.any()
+    page = raycaster.page
+    page.evaluate("() => { gl.enable(gl.SCISSOR_TEST); gl.scissor(5, 9, 20, 11); }")
+    part = raycaster.draw(camera, size)
+    expected = np.zeros_like(whole)
+    rows, columns = slice(37 - 20, 37 - 9), slice(5, 25)  # top row first
+    expected[rows, columns] = whole[rows, columns]
+    assert expected.any()
+    assert np.array_equal(part, expected)
+    assert page.evaluate("() => [...gl.getParameter(gl.SCISSOR_BOX)]") == [5, 9, 20, 11]
+    assert page.evaluate("() => gl.isEnabled(gl.SCISSOR_TEST)")
+
+
 def test_a_vdi_of_one_list_and_one_of_none(raycaster):
     camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))
     bounds = (-1, 1, -1, 1, -1, 1)

@@ -67,8 +67,8 @@ export class Raycaster {
   }
 
   /**
-   * Draw premultiplied RGBA into the bound framebuffer, by its blending; bottom row first. Leaves
-   * the scissor test disabled.
+   * Draw premultiplied RGBA into the bound framebuffer, by its blending; bottom row first. A
+   * scissor that is set holds.
    *
    * @param {object} view
    * @param {object} view.camera position, focal_point, view_up and view_angle (degrees) or
@@ -125,20 +125,30 @@ export class Raycaster {
       gl.uniform1i(u[name], unit);
     });
     gl.bindVertexArray(this.vertices);
-    // Only where something may be seen: strip by strip, from the first to the last such pixel
-    const boxes = pixelsOfBoxes(frame, camera, [width, height], vdi.corners);
-    gl.enable(gl.SCISSOR_TEST);
-    for (let y = 0; y < height; y += STRIP) {
-      const here = boxes.filter(([, , y0, y1]) => y0 < y + STRIP && y1 > y);
-      const x = Math.min(...here.map((box) => box[0])) & ~1;
-      const wide = Math.max(...here.map((box) => box[1])) - x;
-      if (!here.length || wide <= 0) continue;
-      gl.scissor(corner[0] + x, corner[1] + y, wide, Math.min(STRIP, height - y));
-      gl.drawArrays(gl.TRIANGLES, 0, 3);
-    }
-    gl.disable(gl.SCISSOR_TEST);
+    this.drawStrips(pixelsOfBoxes(frame, camera, [width, height], vdi.corners), corner, height);
     gl.bindVertexArray(null);
     gl.activeTexture(gl.TEXTURE0);
+  }
+
+  // Draw only where something may be seen: strip by strip, from the first to the last such pixel,
+  // within the scissor that is set.
+  drawStrips(boxes, [left, bottom], height) {
+    const { gl } = this;
+    const set = gl.isEnabled(gl.SCISSOR_TEST) ? gl.getParameter(gl.SCISSOR_BOX) : null;
+    const [firstX, firstY, wide, high] = set ?? [left, bottom, Infinity, height];
+    gl.enable(gl.SCISSOR_TEST);
+    for (let row = 0; row < height; row += STRIP) {
+      const here = boxes.filter(([, , y0, y1]) => y0 < row + STRIP && y1 > row);
+      const x0 = Math.max(left + Math.min(...here.map(([x]) => x)), firstX);
+      const x1 = Math.min(left + Math.max(...here.map(([, x]) => x)), firstX + wide);
+      const y0 = Math.max(bottom + row, firstY);
+      const y1 = Math.min(bottom + Math.min(row + STRIP, height), firstY + high);
+      if (!here.length || x0 >= x1 || y0 >= y1) continue;
+      gl.scissor(x0, y0, x1 - x0, y1 - y0);
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+    }
+    if (set) gl.scissor(...set);
+    else gl.disable(gl.SCISSOR_TEST);
   }
 
   program(defines, planes) {
