@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import asyncio
 import weakref
+from contextlib import suppress
 from typing import Any
 
+import numpy as np
+
+from pyvista_vdi.vtk_pipeline.interaction import browser
 from pyvista_vdi.web.camera import viewer_camera
 from pyvista_vdi.web.still import png
 from pyvista_vdi.web.widget import VDIWidget
+
+#: Seconds without a turn from which a view rests.
+_REST = 0.2
 
 
 class PlotterWidget(VDIWidget):
     """What ``plotter.show(jupyter_backend="vdi")`` shows.
 
     What is turned in the browser turns the plotter's camera; after each ``plotter.render()`` the
-    browser has the plotter's camera, background and VDI.
+    browser has the plotter's camera, background and VDI. When a view rests the plotter is rendered
+    in the kernel's event loop: its VDI is kept up to date as in a window on a screen.
 
     Parameters
     ----------
@@ -30,6 +39,10 @@ class PlotterWidget(VDIWidget):
         self._plotter = weakref.ref(plotter)
         self._actor = actor
         self._picture = picture
+        self._rest: asyncio.TimerHandle | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        with suppress(RuntimeError):  # none runs: then the plotter is rendered by who holds it
+            self._loop = asyncio.get_running_loop()
         super().__init__(actor.vdi, camera=plotter.camera, background=plotter.background_color)
         self._picture_size = list(plotter.window_size)
         self.observe(self._turn, "camera")
@@ -41,16 +54,34 @@ class PlotterWidget(VDIWidget):
                 widget._follow()
 
         plotter.renderer.AddObserver("EndEvent", rendered)
+        browser.follow(self)
+
+    @property
+    def window(self) -> Any:
+        """The plotter's render window, or ``None`` when it is gone or closed."""
+        plotter = self._plotter()
+        return None if plotter is None else plotter.render_window
+
+    def draw(self) -> None:
+        """Render the plotter, if it is there."""
+        self._rest = None
+        plotter = self._open_plotter()
+        if plotter is not None:
+            plotter.render()
 
     def _open_plotter(self) -> Any:
         """Return the plotter, or ``None`` when it is gone or closed."""
         plotter = self._plotter()
-        return None if plotter is None or plotter.render_window is None else plotter
+        return None if self.window is None else plotter
+
+    @staticmethod
+    def _plotter_camera(plotter: Any) -> dict[str, Any]:
+        return viewer_camera(plotter.camera, plotter.window_size)
 
     def _turn(self, change: Any) -> None:
         """Give the plotter the camera that has changed in the browser, or here."""
         plotter = self._open_plotter()
-        if plotter is None or viewer_camera(plotter.camera, plotter.window_size) == change.new:
+        if plotter is None or _same(self._plotter_camera(plotter), change.new):
             return
         state, camera = change.new, plotter.camera
         camera.position, camera.focal_point = state["position"], state["focal_point"]
@@ -61,16 +92,36 @@ class PlotterWidget(VDIWidget):
             camera.SetUseHorizontalViewAngle(False)
             camera.view_angle = state["view_angle"]
         plotter.renderer.ResetCameraClippingRange()
+        if self._loop is not None:  # messages may come in a thread of their own
+            self._loop.call_soon_threadsafe(self._wait_for_rest)
+
+    def _wait_for_rest(self) -> None:
+        if self._rest is not None:
+            self._rest.cancel()
+        assert self._loop is not None
+        self._rest = self._loop.call_later(_REST, self.draw)
 
     def _follow(self) -> None:
         """Take what the plotter has drawn; parts of a larger picture have other cameras."""
         plotter = self._open_plotter()
         if plotter is None or tuple(plotter.render_window.GetTileScale()) != (1, 1):
             return
-        self.camera = plotter.camera
+        camera = self._plotter_camera(plotter)
+        if not _same(camera, self.camera):
+            self.camera = camera
         self.background = plotter.background_color
         if self._actor.vdi not in (None, self.vdi):
             self.vdi = self._actor.vdi
 
     def _still(self) -> str:
         return png(self._picture)
+
+
+def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    """Whether two views are the same but for rounding: VTK scales directions to length 1.
+
+    A view that came back so would stop a hand that has moved on.
+    """
+    return set(one) == set(other) and all(
+        np.allclose(one[name], other[name], rtol=1e-12, atol=1e-12) for name in one
+    )

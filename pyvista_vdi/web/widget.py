@@ -172,7 +172,7 @@ class VDIWidget(anywidget.AnyWidget):
     @vdi.setter
     def vdi(self, vdi: Any) -> None:
         vdi = as_vdi(vdi)
-        self._file = self._encoded(vdi)
+        self._file = self._encoded(vdi, coarse=False)  # the one before is better meanwhile
         self._vdi = vdi
 
     def screenshot(
@@ -212,12 +212,12 @@ class VDIWidget(anywidget.AnyWidget):
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.vdi!r})"
 
-    def _encoded(self, vdi: VDI) -> bytes:
+    def _encoded(self, vdi: VDI, *, coarse: bool = True) -> bytes:
         fits = self._precision is not None or vdi.counts.max() <= DEPTH_CODES
         sent = vdi.with_precision(self._precision or "8-byte") if fits else vdi
         stream = io.BytesIO()
         # A cell waits for it: the fastest level, at a tenth more bytes than the best
-        write_to(stream, sent, DEFLATE, level=1)
+        write_to(stream, sent, DEFLATE, 1, coarse=coarse)
         return stream.getvalue()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:

@@ -57,14 +57,15 @@ widget
     """
 volume = pv.Wavelet(extent=(-12, 12) * 3)
 plotter = pv.Plotter(window_size=(192, 108))
-actor = plotter.add_vdi(volume, cmap="viridis", show_scalar_bar=False)
+actor = plotter.add_vdi(volume, cmap="viridis", show_scalar_bar=False, regenerate_below=1.0)
 plotter.show(jupyter_backend="vdi")
 """,
     "print(json.dumps(viewer_camera(plotter.camera)))",
     "plotter.view_xz()",
+    "print(json.dumps(viewer_camera(actor.vdi.camera)))",
 )
 TURNED, SHOWN, PLOTTED = 0, 3, 4  # cells with viewers
-READ, READ_PLOTTER = 1, 5  # that print a camera
+READ, READ_PLOTTER, READ_VDI = 1, 5, 7  # that print a camera
 SET, SET_PLOTTER = 2, 6  # that set one
 
 
@@ -222,6 +223,10 @@ def assert_alike(picture, expected):
     assert np.mean(np.abs(picture - expected).max(axis=2) <= 2 / 255) >= 0.999
 
 
+def same_place(one, other):
+    return np.allclose(one["position"], other["position"], rtol=1e-9)
+
+
 def test_in_jupyterlab(context, lab, vdi):
     notebook = Notebook(context.new_page(), lab[1])
     notebook.run(TURNED)
@@ -250,6 +255,9 @@ def test_in_jupyterlab(context, lab, vdi):
     notebook.drag(PLOTTED)
     turned = notebook.camera(PLOTTED)
     until(lambda: json.loads(notebook.run(READ_PLOTTER)) == turned)
+    # The view rests there: the kernel makes a VDI of it, and the browser is given that
+    until(lambda: same_place(json.loads(notebook.run(READ_VDI)), turned))
+    assert notebook.camera(PLOTTED) == turned
     notebook.run(SET_PLOTTER)
     until(lambda: notebook.camera(PLOTTED) == json.loads(notebook.run(READ_PLOTTER)) != turned)
     if "PYVISTA_VDI_PICTURES" in os.environ:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import importlib.metadata
 import io
@@ -266,6 +267,29 @@ def test_a_plotter_and_its_viewer_have_one_camera(plotter):
     assert widget.camera == viewer_camera(plotter.camera)
     plotter.close()
     widget.camera = turned  # the browser still has the VDI
+
+
+@pytest.mark.gl
+def test_a_view_that_rests_gets_a_vdi_of_its_own(plotter):
+    """As in a window on the screen, and seen by the viewer, in the loop that cells run in."""
+
+    async def in_a_kernel():
+        actor = plotter.add_vdi(
+            as_image(soft_ball()), cmap="bone", show_scalar_bar=False, regenerate_below=1.0
+        )
+        widget = show(plotter)
+        first, file = widget.vdi, widget._file
+        turned = viewer_camera(pvdi.Camera.from_any(plotter.camera).azimuth(70))
+        widget.set_state({"camera": turned})
+        while widget.vdi is first:
+            await asyncio.sleep(0.02)
+        assert widget.vdi is actor.vdi
+        assert widget._file != file
+        assert widget.camera == turned  # to the last bit: nobody has touched it
+        generating = viewer_camera(widget.vdi.camera)
+        np.testing.assert_allclose(generating["position"], turned["position"], rtol=1e-12)
+
+    asyncio.run(asyncio.wait_for(in_a_kernel(), 300))
 
 
 @pytest.mark.gl

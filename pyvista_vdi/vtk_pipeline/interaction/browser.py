@@ -1,8 +1,9 @@
-"""Off-screen windows that somebody watches in a browser, through a remote view of trame.
+"""Off-screen windows that somebody watches in a browser: a remote view of trame, a viewer of VDIs.
 
-``trame_vtk`` keeps for each of its servers a helper, and in it a publisher of pictures, which
-knows the windows that browsers have asked for. Nothing here imports it: where it has not been
-imported, nobody watches by it. Where a version of it keeps other names, nobody seems to.
+A viewer that draws VDIs by itself says so (:func:`follow`). ``trame_vtk`` keeps for each of its
+servers a helper, and in it a publisher of pictures, which knows the windows that browsers have
+asked for. Nothing here imports it: where it has not been imported, nobody watches by it. Where a
+version of it keeps other names, nobody seems to.
 """
 
 from __future__ import annotations
@@ -12,20 +13,39 @@ import weakref
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
+
+
+class Follower(Protocol):
+    """What shows, in a browser, the VDIs of a window as they are after each of its frames."""
+
+    window: Any
+
+    def draw(self) -> object:
+        """Have the window drawn: something in it is new."""
+
+
+_followers: weakref.WeakSet[Follower] = weakref.WeakSet()
+
+
+def follow(follower: Follower) -> None:
+    """Keep, weakly, what follows a window."""
+    _followers.add(follower)
 
 
 def watches(window: Any) -> bool:
-    """Whether a browser shows pictures of a window."""
-    return next(_publishers(window), None) is not None
+    """Whether a browser shows pictures of a window, or follows it."""
+    return bool(_following(window)) or next(_publishers(window), None) is not None
 
 
 def push(window: Any) -> bool:
     """Have a window drawn and its picture sent to the browsers that show it; whether any does."""
-    publishers = list(_publishers(window))
+    publishers, followers = list(_publishers(window)), _following(window)
     for publisher, number in publishers:
         publisher.image_push({"view": number})
-    return bool(publishers)
+    for follower in followers[:1]:  # a frame is seen by all
+        follower.draw()
+    return bool(publishers or followers)
 
 
 class SceneAtHand:
@@ -59,6 +79,10 @@ def _mode_changed(begun: Any, view: Any, /, **_: Any) -> None:
     say, of = begun(), view()
     if say is not None and of is not None and not _drawn_by_server(of):
         say()
+
+
+def _following(window: Any) -> list[Follower]:
+    return [follower for follower in _followers if follower.window is window]
 
 
 def _helpers() -> list[Any]:
