@@ -142,7 +142,8 @@ class Page:
 def open_page(chromium):
     """Open a page with a viewer of ``size`` CSS pixels, or one of ``files`` by its ``name``.
 
-    What the page complains of fails the test, but for what ``expected`` (a pattern) is found in.
+    ``before`` runs before anything else. What the page complains of fails the test, but for what
+    ``expected`` (a pattern) is found in.
     """
     contexts, pages = [], []
 
@@ -151,6 +152,7 @@ def open_page(chromium):
         *,
         attributes="",
         script="",
+        before="",
         files=None,
         name=None,
         expected=None,
@@ -163,6 +165,7 @@ def open_page(chromium):
                 attributes=attributes, script=script, width=size[0], height=size[1]
             )
         context = chromium.new_context(**options)
+        context.add_init_script(before)
         contexts.append(context)
         page = Page(context.new_page(), files, expected)
         pages.append(page)

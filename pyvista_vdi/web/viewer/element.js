@@ -200,7 +200,7 @@ export class VDIViewer extends HTMLElement {
     const { canvas } = this.#parts;
     const { signal } = (this.#connected = new AbortController());
     if (!this.hasAttribute("aria-label")) canvas.setAttribute("aria-label", "volume, to be turned");
-    const gl = canvas.getContext("webgl2", { antialias: false, depth: false, alpha: true });
+    const gl = canvas.getContext("webgl2", { antialias: false, depth: false });
     if (!gl) {
       this.#parts.canvas.hidden = true;
       this.#parts.img.src ||= this.querySelector("img")?.src ?? "";
@@ -208,13 +208,16 @@ export class VDIViewer extends HTMLElement {
       this.#fail(new Error("This browser draws no WebGL 2, which turning this picture takes."));
       return;
     }
+    if (!this.#gl) {
+      canvas.addEventListener("webglcontextlost", (event) => {
+        event.preventDefault();
+        this.#raycaster = this.#pacer = null;
+      });
+      canvas.addEventListener("webglcontextrestored", () => this.isConnected && this.#begin());
+    }
     this.#gl = gl;
-    this.#begin();
-    canvas.addEventListener("webglcontextlost", (event) => {
-      event.preventDefault();
-      this.#raycaster = this.#pacer = null;
-    }, { signal });
-    canvas.addEventListener("webglcontextrestored", () => this.#begin(), { signal });
+    if (gl.isContextLost()) gl.getExtension("WEBGL_lose_context")?.restoreContext();
+    else this.#begin();
     const viewer = this;
     interact(canvas, {
       get camera() { return viewer.#camera; },
@@ -238,6 +241,8 @@ export class VDIViewer extends HTMLElement {
     this.#pacer?.dispose();
     this.#scene?.dispose?.();
     this.#raycaster = this.#pacer = null;
+    // Browsers keep some sixteen contexts, and take the oldest from who still shows it
+    this.#gl?.getExtension("WEBGL_lose_context")?.loseContext();
   }
 
   attributeChangedCallback(name, before, value) {
