@@ -63,23 +63,25 @@ def show_plotter(plotter: Any, *, screenshot: Any = None, **options: Any) -> Any
     from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 
     plotter.render()  # VDIs are made in the first frame
-    shown = [actor for actor in plotter.renderer.actors.values() if actor.GetVisibility()]
-    vdis = [actor for actor in shown if isinstance(actor, VDIActorMethods) and actor.vdi]
+    shown = {k: actor for k, actor in plotter.renderer.actors.items() if actor.GetVisibility()}
+    vdis = [name for name, actor in shown.items() if isinstance(actor, VDIActorMethods)]
     if not vdis:
         return _shown_by_pyvista(plotter, screenshot, options)
     try:
+        from pyvista_vdi.web.placing import left_out
         from pyvista_vdi.web.plotter_widget import PlotterWidget
     except MissingDependencyError as error:
         warnings.warn(str(error), stacklevel=2)
         return _shown_by_pyvista(plotter, screenshot, options)
-    if len(shown) > 1:
-        left_out = ", ".join(name for name, actor in plotter.actors.items() if actor is not vdis[0])
+    actor = shown.pop(vdis[0])
+    without = [*shown, *left_out(actor)]
+    if without:
         warnings.warn(
-            f"the notebook's viewer shows one VDI alone, without {left_out}: see all by "
+            f"the notebook's viewer shows one VDI alone, without {', '.join(without)}: see all by "
             'jupyter_backend="server"',
             stacklevel=2,
         )
-    return PlotterWidget(plotter, vdis[0], plotter.screenshot(screenshot, return_img=True))
+    return PlotterWidget(plotter, actor, plotter.screenshot(screenshot, return_img=True))
 
 
 def _shown_by_pyvista(plotter: Any, screenshot: Any, options: dict[str, Any]) -> Any:

@@ -11,6 +11,7 @@ import numpy as np
 
 from pyvista_vdi.vtk_pipeline.interaction import browser
 from pyvista_vdi.web.camera import viewer_camera
+from pyvista_vdi.web.placing import as_shown, look_of, planes_of
 from pyvista_vdi.web.still import png
 from pyvista_vdi.web.widget import VDIWidget
 
@@ -22,7 +23,8 @@ class PlotterWidget(VDIWidget):
     """What ``plotter.show(jupyter_backend="vdi")`` shows.
 
     What is turned in the browser turns the plotter's camera; after each ``plotter.render()`` the
-    browser has the plotter's camera, background and VDI. When a view rests the plotter is rendered
+    browser has the plotter's camera and background, and the VDI with its clipping planes, opacity
+    multiplier and place. When a view rests the plotter is rendered
     in the kernel's event loop: its VDI is kept up to date as in a window on a screen.
 
     Parameters
@@ -43,7 +45,10 @@ class PlotterWidget(VDIWidget):
         self._loop: asyncio.AbstractEventLoop | None = None
         with suppress(RuntimeError):  # none runs: then the plotter is rendered by who holds it
             self._loop = asyncio.get_running_loop()
-        super().__init__(actor.vdi, camera=plotter.camera, background=plotter.background_color)
+        self._look = look_of(actor)
+        shown = as_shown(actor)
+        super().__init__(shown, camera=plotter.camera, background=plotter.background_color)
+        self.clipping_planes = planes_of(actor)
         self._picture_size = list(plotter.window_size)
         self.observe(self._turn, "camera")
         me = weakref.ref(self)
@@ -110,8 +115,10 @@ class PlotterWidget(VDIWidget):
         if not _same(camera, self.camera):
             self.camera = camera
         self.background = plotter.background_color
-        if self._actor.vdi not in (None, self.vdi):
-            self.vdi = self._actor.vdi
+        self.clipping_planes = planes_of(self._actor)
+        if self._actor.vdi is not None and look_of(self._actor) != self._look:
+            self._look = look_of(self._actor)
+            self.vdi = as_shown(self._actor)
 
     def _still(self) -> str:
         return png(self._picture)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.api import render
 from pyvista_vdi.errors import NoDeviceError
@@ -25,6 +25,7 @@ def picture(
     camera: dict[str, Any],
     window_size: Sequence[int] | None = None,
     background: Sequence[float] | None = None,
+    clipping_planes: ArrayLike | None = None,
 ) -> NDArray[np.uint8]:
     """Return what a viewer shows: uint8 (H, W, 3) RGB, or (H, W, 4) without a background.
 
@@ -38,10 +39,13 @@ def picture(
         Width and height in pixels; by default those the VDI was made for.
     background : (float, float, float), optional
         RGB, 0 to 1.
+    clipping_planes : array_like of float, shape (k, 6), optional
+        As for :func:`pyvista_vdi.render`.
     """
     # Where the model is in the world is the VDI's own: the viewer's camera does not say it
     placed = vdi.camera.model_transform
-    image = render(vdi, camera_of(camera).replace(model_transform=placed), window_size)
+    view = camera_of(camera).replace(model_transform=placed)
+    image = render(vdi, view, window_size, clipping_planes=clipping_planes)
     return to_bytes(image, background)
 
 
@@ -49,13 +53,14 @@ def still(
     vdi: VDI,
     camera: dict[str, Any] | None = None,
     background: Sequence[float] | None = None,
+    clipping_planes: ArrayLike | None = None,
 ) -> str | None:
     """Return a view, the VDI's own by default, as base64 PNG; ``None`` without a device."""
     share = min(1, _EDGE / max(vdi.picture_size))
     size = [max(1, round(edge * share)) for edge in vdi.picture_size]
     camera = viewer_camera(vdi.camera, vdi.picture_size) if camera is None else camera
     try:
-        return png(picture(vdi, camera, size, background))
+        return png(picture(vdi, camera, size, background, clipping_planes))
     except NoDeviceError:
         return None
 

@@ -16,6 +16,7 @@ from pyvista_vdi.io.vdi_file.layout import DEFLATE
 from pyvista_vdi.io.vdi_file.writer import write_to
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.packing import DEPTH_CODES
+from pyvista_vdi.model.render_options import checked_planes
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.web.bundle import viewer_script
 from pyvista_vdi.web.camera import viewer_camera
@@ -60,23 +61,26 @@ function render({ model, el }) {
   const takeBackground = () => {
     viewer.background = model.get("background") ?? "transparent";
   };
+  const takePlanes = () => {
+    viewer.clippingPlanes = model.get("clipping_planes")
+      .map((plane) => ({ origin: plane.slice(0, 3), normal: plane.slice(3) }));
+  };
   const takeFile = () => {
     const { buffer, byteOffset, byteLength } = model.get("_file");
     viewer.showBytes(new Uint8Array(buffer, byteOffset, byteLength));
   };
   el.replaceChildren(viewer);
-  takeBackground();
-  takeFile();
-  takeCamera();
+  const taken = {
+    background: takeBackground, clipping_planes: takePlanes, _file: takeFile, camera: takeCamera,
+  };
+  for (const [name, take] of Object.entries(taken)) {
+    take();
+    model.on(`change:${name}`, take);
+  }
   viewer.addEventListener("camerachange", onCamera);
-  model.on("change:camera", takeCamera);
-  model.on("change:background", takeBackground);
-  model.on("change:_file", takeFile);
   return () => {
     cancelAnimationFrame(told);
-    model.off("change:camera", takeCamera);
-    model.off("change:background", takeBackground);
-    model.off("change:_file", takeFile);
+    for (const [name, take] of Object.entries(taken)) model.off(`change:${name}`, take);
     viewer.remove();
   };
 }
@@ -96,6 +100,13 @@ class _ColorTrait(traitlets.TraitType["str | None", Any]):
 
     def validate(self, obj: Any, value: Any) -> str | None:
         return None if value is None else _hex(value)
+
+
+class _PlanesTrait(traitlets.TraitType[list[list[float]], Any]):
+    """Clipping planes as lists of six numbers."""
+
+    def validate(self, obj: Any, value: Any) -> list[list[float]]:
+        return [list(plane) for plane in checked_planes(value)]
 
 
 class VDIWidget(anywidget.AnyWidget):
@@ -128,6 +139,9 @@ class VDIWidget(anywidget.AnyWidget):
         told of each change.
     background : str or None
         ``#rrggbb``; whatever the argument takes can be set. A traitlet.
+    clipping_planes : list of list of float
+        Origin and normal of each plane, world coordinates; the side that the normal points to is
+        kept. Anything of the shape (k, 6) can be set, or ``None``. A traitlet.
 
     Raises
     ------
@@ -146,6 +160,7 @@ class VDIWidget(anywidget.AnyWidget):
     _picture_size = traitlets.List(traitlets.Int(), [1, 1]).tag(sync=True)
     camera = _CameraTrait(allow_none=False).tag(sync=True)
     background = _ColorTrait(None, allow_none=True).tag(sync=True)
+    clipping_planes = _PlanesTrait([]).tag(sync=True)
 
     def __init__(
         self,
@@ -204,7 +219,8 @@ class VDIWidget(anywidget.AnyWidget):
         VDIFileError
             If the file cannot be written.
         """
-        pixels = picture(self.vdi, self.camera, window_size, _rgb(self.background))
+        background = _rgb(self.background)
+        pixels = picture(self.vdi, self.camera, window_size, background, self.clipping_planes)
         if filename is not None:
             write_png(pixels, filename)
         return pixels
@@ -228,7 +244,7 @@ class VDIWidget(anywidget.AnyWidget):
 
     def _still(self) -> str | None:
         """Return that picture as base64 PNG, if it can be had."""
-        return still(self.vdi, self.camera, _rgb(self.background))
+        return still(self.vdi, self.camera, _rgb(self.background), self.clipping_planes)
 
 
 def _hex(color: Any) -> str:

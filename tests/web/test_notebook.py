@@ -270,6 +270,50 @@ def test_a_plotter_and_its_viewer_have_one_camera(plotter):
 
 
 @pytest.mark.gl
+def test_what_is_seen_of_a_vdi_in_its_plotter_is_seen_in_the_viewer(plotter):
+    """Where it has been moved and turned to, through how much of it one sees, and its clipping."""
+    actor = plotter.add_vdi(
+        as_image(soft_ball()), cmap="bone", show_scalar_bar=False, regenerate="never"
+    )
+    plotter.set_background("black")
+    widget = show(plotter)
+    actor.rotate_z(25)
+    actor.position = (0.3, -0.1, 0.2)
+    actor.opacity_multiplier = 0.5
+    plane = pytest.importorskip("vtkmodules.vtkCommonDataModel").vtkPlane()
+    plane.SetOrigin(1.2, 0.8, 1.3)
+    plane.SetNormal(-1, 0.3, 0)
+    actor.mapper.AddClippingPlane(plane)
+    plotter.render()
+    assert widget.clipping_planes == [[1.2, 0.8, 1.3, -1, 0.3, 0]]
+    np.testing.assert_array_equal(widget.vdi.camera.model_transform[:3, 3], (0.3, -0.1, 0.2))
+    expected = pvdi.render(
+        actor.vdi,
+        pvdi.Camera.from_any(plotter.camera, model_transform=widget.vdi.camera.model_transform),
+        SIZE,
+        clipping_planes=widget.clipping_planes,
+        opacity_multiplier=0.5,
+    )[..., :3]
+    # One step for rounding, another for that of the moved view
+    assert np.abs(widget.screenshot(window_size=SIZE) / 255 - expected).max() <= 2 / 255
+    assert expected.max() > 0.2
+
+
+@pytest.mark.gl
+def test_what_the_viewer_leaves_out_is_named(plotter):
+    import pyvista as pv
+
+    actor = plotter.add_vdi(as_image(soft_ball()), cmap="bone", show_scalar_bar=False)
+    plotter.add_mesh(pv.Sphere(), name="a ball")
+    plotter.screenshot()
+    actor.scale = 1, 2, 1
+    actor.mapper.SetCropping(True)
+    actor.mapper.SetCroppingRegionPlanes(0, 1, 0, 1, 0, 1)
+    with pytest.warns(UserWarning, match="without a ball, its cropping, its scale"):
+        show_plotter(plotter)
+
+
+@pytest.mark.gl
 def test_a_view_that_rests_gets_a_vdi_of_its_own(plotter):
     """As in a window on the screen, and seen by the viewer, in the loop that cells run in."""
 
@@ -360,7 +404,9 @@ window.begun = true;
 
 
 def test_the_view_draws_and_shares_its_camera(open_page, widget, vdi):
+    planes = [[0.1, 0, 0, -1, 0.2, 0]]
     state = {"camera": widget.camera, "background": "#ffffff", "_picture_size": SIZE}
+    state["clipping_planes"] = planes
     files = {
         "widget.html": PAGE.replace("STATE", json.dumps(state)),
         "widget.js": VDIWidget._esm,
@@ -380,7 +426,8 @@ def test_the_view_draws_and_shares_its_camera(open_page, widget, vdi):
         ".then((shot) => textOf(shot.data))"
     )
     got = np.frombuffer(base64.b64decode(shot), np.uint8).reshape(*SIZE[::-1], 4) / 255
-    expected = pvdi.render(vdi.with_precision("8-byte"), vdi.camera.azimuth(25))
+    sent = vdi.with_precision("8-byte")
+    expected = pvdi.render(sent, vdi.camera.azimuth(25), clipping_planes=planes)
     apart = np.abs(got - expected).max(axis=2)
     assert np.mean(apart <= 2 / 255) >= 0.999  # the bound of issue 17
 

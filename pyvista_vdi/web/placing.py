@@ -1,0 +1,81 @@
+"""A plotter's VDI as a viewer can show it, which knows of VDIs, planes and a camera alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.model.cropping import Cropping
+from pyvista_vdi.model.vdi import VDI
+
+#: Largest departure of a rotation from one, by rounding of its matrix.
+_RIGID = 1e-9
+
+
+def look_of(actor: Any) -> tuple[Any, ...]:
+    """Return what :func:`as_shown` depends on; another value asks for another VDI."""
+    return actor.vdi, actor.opacity_multiplier, _matrix(actor).tobytes()
+
+
+def as_shown(actor: Any) -> VDI:
+    """Return an actor's VDI, thinned or thickened by its multiplier, and where the actor is.
+
+    A VDI moves with its generating view. So it can be where the actor has been moved and turned
+    to, but not where it has been stretched: see :func:`left_out`.
+    """
+    vdi, multiplier = actor.vdi, actor.opacity_multiplier
+    motion = _motion(actor)
+    camera = vdi.camera
+    if motion is not None and not np.array_equal(motion, np.eye(4)):
+        position, focal_point = (
+            (motion @ (*point, 1))[:3] for point in (camera.position, camera.focal_point)
+        )
+        camera = camera.replace(
+            position=position,
+            focal_point=focal_point,
+            view_up=motion[:3, :3] @ camera.view_up,
+            model_transform=_matrix(actor),
+        )
+    if camera is vdi.camera and multiplier == 1:
+        return vdi  # type: ignore[no-any-return]
+    return VDI(
+        camera,
+        vdi.window_size,
+        vdi.offsets,
+        vdi.front,
+        vdi.back,
+        vdi.color,
+        vdi.optical_depth * np.float32(multiplier),
+        vdi.bounds,
+        depth_origin=vdi.depth_origin,
+        metadata=vdi.metadata,
+    )
+
+
+def planes_of(actor: Any) -> list[list[float]]:
+    """Return the clipping planes of an actor's mapper, origin and normal of each, world."""
+    planes = actor.GetMapper().GetClippingPlanes()
+    items = [planes.GetItem(i) for i in range(0 if planes is None else planes.GetNumberOfItems())]
+    return [[*plane.GetOrigin(), *plane.GetNormal()] for plane in items]
+
+
+def left_out(actor: Any) -> list[str]:
+    """Return what a viewer does not show of how an actor is drawn."""
+    cropped = Cropping.from_any(actor.GetMapper()) is not None
+    return ["its cropping"] * cropped + ["its scale"] * (_motion(actor) is None)
+
+
+def _motion(actor: Any) -> Any:
+    """Return the motion of an actor since its VDI was made, (4, 4); ``None`` if it is none."""
+    motion = _matrix(actor) @ np.linalg.inv(actor.vdi.camera.model_transform)
+    turn = motion[:3, :3]
+    if np.abs(turn @ turn.T - np.eye(3)).max() > _RIGID or np.linalg.det(turn) < 0:
+        return None
+    return motion
+
+
+def _matrix(actor: Any) -> NDArray[np.float64]:
+    matrix = actor.GetMatrix()
+    return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
