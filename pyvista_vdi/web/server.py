@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import functools
 import hmac
 import inspect
 import ipaddress
@@ -26,6 +27,7 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.quality.when_anew import REGENERATE_BELOW, checked_bound
+from pyvista_vdi.web.camera import viewer_camera
 from pyvista_vdi.web.messages import MAX_MESSAGE, BadMessageError, wish_after
 from pyvista_vdi.web.served_page import served_page
 from pyvista_vdi.web.session import Client
@@ -60,6 +62,8 @@ _THREADS = 2
 _log = logging.getLogger(__name__)
 
 _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+#: Sends one message to a client.
+_Put = Callable[[str | bytes], Awaitable[None]]
 
 
 class Server:
@@ -235,7 +239,8 @@ class Server:
         try:
             await connection.prepare(request)
             _keep_queue_short(request.transport)
-            await self._talk(client, connection)
+            put = functools.partial(self._put, connection, request.transport)
+            await self._talk(client, connection, put)
         finally:
             self.clients.discard(client)
             client.close()
@@ -243,11 +248,11 @@ class Server:
                 request.transport.abort()  # also where it takes nothing that it is sent
         return connection
 
-    async def _talk(self, client: Client, connection: web.WebSocketResponse) -> None:
+    async def _talk(self, client: Client, connection: web.WebSocketResponse, put: _Put) -> None:
         """Hear a client, make and send what it asks for, until one of these ends."""
         doing: tuple[Awaitable[Any], ...] = (
             self._hear(client, connection),
-            self._send(client, connection),
+            self._send(client, put),
             client.work(),
             client.left.wait(),
         )
@@ -262,7 +267,7 @@ class Server:
         for error in ends:
             if isinstance(error, BadMessageError):
                 code, reason = WSCloseCode.POLICY_VIOLATION, str(error)
-            elif isinstance(error, asyncio.TimeoutError | ConnectionError):
+            elif isinstance(error, ConnectionError):
                 return
             elif isinstance(error, Exception):
                 _log.error("a client was sent away", exc_info=error)
@@ -278,21 +283,19 @@ class Server:
                 raise BadMessageError("messages are text")
             client.hear(wish_after(message.data, client.wish, self._source.offer))
 
-    async def _send(self, client: Client, connection: web.WebSocketResponse) -> None:
-        await self._put(connection, json.dumps(self._hello()))
+    async def _send(self, client: Client, put: _Put) -> None:
+        await put(json.dumps(self._hello()))
         while True:
             await client.news.wait()
             client.news.clear()
             while client.notes:
                 _, note = client.notes.popitem()
-                await self._put(connection, json.dumps(note))
+                await put(json.dumps(note))
             file = client.next_file()
             if file is not None:
-                await self._send_file(client, connection, *file)
+                await self._send_file(client, put, *file)
 
-    async def _send_file(
-        self, client: Client, connection: web.WebSocketResponse, made: Made, file: bytes
-    ) -> None:
+    async def _send_file(self, client: Client, put: _Put, made: Made, file: bytes) -> None:
         head = {
             "type": "vdi",
             "level": made.level,
@@ -300,28 +303,35 @@ class Server:
             "lists": list(made.window_size),
             "step": made.wish.step,
         }
-        await self._put(connection, json.dumps(head))
+        await put(json.dumps(head))
         for first in range(0, len(file), CHUNK):
             if client.is_outdone(made):
                 client.given_up(made)
                 return
-            await self._put(connection, file[first : first + CHUNK])
+            await put(file[first : first + CHUNK])
         client.sent(made)
 
-    async def _put(self, connection: web.WebSocketResponse, data: str | bytes) -> None:
-        """Send one message; TimeoutError where the client takes none for too long."""
-        sent = connection.send_str(data) if isinstance(data, str) else connection.send_bytes(data)
-        await asyncio.wait_for(sent, self._stalled)
+    async def _put(
+        self, connection: web.WebSocketResponse, transport: Any, data: str | bytes
+    ) -> None:
+        """Send one message, or drop a client that takes none for too long."""
+        # Not asyncio.wait_for, which before Python 3.12 may lose that the task was cancelled
+        drop = asyncio.get_running_loop().call_later(self._stalled, transport.abort)
+        try:
+            if isinstance(data, str):
+                await connection.send_str(data)
+            else:
+                await connection.send_bytes(data)
+        finally:
+            drop.cancel()
 
     def _hello(self) -> dict[str, Any]:
         source = self._source
-        view = filling_camera(source.bounds, (4, 3))
-        names = ("position", "focal_point", "view_up", "view_angle")
         return {
             "type": "hello",
             "protocol": PROTOCOL,
             "bounds": list(source.bounds),
-            "camera": {name: getattr(view, name) for name in names},
+            "camera": viewer_camera(filling_camera(source.bounds, (4, 3))),
             "steps": source.offer.steps,
             "cmaps": list(source.offer.cmaps),
             "opacities": list(source.offer.opacities),
