@@ -232,7 +232,7 @@ class VDIWidget(anywidget.AnyWidget):
         fits = self._precision is not None or vdi.counts.max() <= DEPTH_CODES
         sent = vdi.with_precision(self._precision or "8-byte") if fits else vdi
         stream = io.BytesIO()
-        # A cell waits for it: the fastest level, at a tenth more bytes than the best
+        # A cell waits for it: a twentieth more bytes than by level 6, in half the time
         write_to(stream, sent, DEFLATE, 1, coarse=coarse)
         return stream.getvalue()
 

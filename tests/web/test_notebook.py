@@ -337,6 +337,17 @@ def test_a_view_that_rests_gets_a_vdi_of_its_own(plotter):
 
 
 @pytest.mark.gl
+def test_pyvista_takes_the_backend_by_itself_where_trame_is_not_installed(plotter):
+    import pyvista as pv
+
+    names = [backend.name for backend in pv.registered_jupyter_backends()]
+    if names != ["vdi"]:
+        pytest.skip(f"other backends are installed: {', '.join(names)}")
+    actor = plotter.add_vdi(as_image(soft_ball()), cmap="bone", show_scalar_bar=False)
+    assert plotter.show(return_viewer=True).vdi is actor.vdi
+
+
+@pytest.mark.gl
 def test_a_scene_without_vdis_is_shown_as_ever(plotter, monkeypatch):
     import pyvista as pv
 
