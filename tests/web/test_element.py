@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from io import BytesIO
 
 import numpy as np
@@ -306,3 +307,55 @@ def test_elements_come_and_go(vdi, data, open_page):
         )
     page.load(data)
     assert worst(page.screenshot(vdi.camera, SIZE), vdi, vdi.camera) <= CLOSE
+
+
+#: Counts what a page has of each kind of WebGL's objects.
+COUNTING = """
+window.alive = {};
+const of = WebGL2RenderingContext.prototype;
+for (const kind of ["Texture", "Framebuffer", "Program", "VertexArray", "Shader"]) {
+  const [make, free] = [of["create" + kind], of["delete" + kind]];
+  alive[kind] = 0;
+  of["create" + kind] = function (...rest) { ++alive[kind]; return make.apply(this, rest); };
+  of["delete" + kind] = function (what) { alive[kind] -= !!what; return free.call(this, what); };
+}
+"""
+
+
+@pytest.mark.slow
+def test_memory_stays_flat_over_frames_and_swaps(data, open_page):
+    """Ten thousand frames, and two hundred other VDIs, whose textures replace those before."""
+    page = open_page((64, 36), before=COUNTING)
+    page.load(data)
+    page.evaluate(
+        f"""async () => {{
+          const bytes = bytesOf({base64.b64encode(data).decode()!r});
+          window.use = async (frames, swaps) => {{
+            for (let k = 0; k < frames; ++k) {{
+              const angle = k / 50, {{ position: [x, y, z], ...rest }} = viewer.camera;
+              const drawn = new Promise((resolve) =>
+                viewer.addEventListener("framedrawn", resolve, {{ once: true }}));
+              viewer.camera = {{ ...rest, position: [x + 0.1 * Math.cos(angle), y, z] }};
+              await drawn;
+              if (k % Math.ceil(frames / swaps) === 0) await viewer.showBytes(bytes.slice());
+              heard.length = 0;
+            }}
+            await viewer.showBytes(bytes.slice());
+          }};
+        }}"""
+    )
+    session = page.page.context.new_cdp_session(page.page)
+
+    def memory():
+        page.wait_for("viewer.status.state === 'full'")
+        session.send("HeapProfiler.collectGarbage")
+        used = session.send("Runtime.getHeapUsage")
+        return page.evaluate("alive"), used["usedSize"] + used.get("backingStorageSize", 0)
+
+    page.evaluate("use(500, 20)")
+    objects, used = memory()
+    page.evaluate("use(10000, 200)")
+    objects_after, used_after = memory()
+    assert objects_after == objects
+    # Compiled code comes and goes. The 200 VDIs, if kept, would be some 40 MB
+    assert used_after < used + 2e6
