@@ -177,7 +177,8 @@ function occupiedBoxes({ windowSize, camera }, frame, space, grid) {
         for (const a of ends(column, windowSize[0])) {
           for (const b of ends(row, windowSize[1])) {
             const along = (rows, k) => rows[0][k] + a * rows[1][k] + b * rows[2][k];
-            corners.push(...[0, 1, 2].map((k) => along(rays.origin, k) + t * along(rays.direction, k)));
+            corners.push(...[0, 1, 2].map(
+              (k) => along(rays.origin, k) + t * along(rays.direction, k)));
           }
         }
       }

@@ -109,7 +109,6 @@ export class Raycaster {
     gl.uniform3fv(u.planeSlope, planeSlope);
     gl.uniformMatrix3fv(u.direction, false, rays.direction.flat());
     gl.uniform2i(u.window, ...windowSize);
-    gl.uniform2i(u.stacks, ...vdi.stacks);
     gl.uniform1f(u.depthOrigin, space.origin);
     gl.uniform1f(u.firstDepth, vdi.firstDepth);
     gl.uniform1f(u.slabsPerDepth, vdi.slabsPerDepth);
@@ -167,7 +166,8 @@ export class Raycaster {
   }
 
   free() {
-    if (this.vdi) Object.values(this.vdi.textures).forEach((texture) => this.gl.deleteTexture(texture));
+    const textures = Object.values(this.vdi?.textures ?? {});
+    textures.forEach((texture) => this.gl.deleteTexture(texture));
     this.vdi = null;
   }
 
@@ -194,12 +194,14 @@ export function linked(gl, vertex, fragment) {
     gl.attachShader(program, shader);
     gl.deleteShader(shader);
     if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !gl.isContextLost()) {
-      throw new Error(`This browser's graphics driver refuses a shader: ${gl.getShaderInfoLog(shader)}`);
+      const words = gl.getShaderInfoLog(shader);
+      throw new Error(`This browser's graphics driver refuses a shader: ${words}`);
     }
   }
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
-    throw new Error(`This browser's graphics driver refuses a program: ${gl.getProgramInfoLog(program)}`);
+    const words = gl.getProgramInfoLog(program);
+    throw new Error(`This browser's graphics driver refuses a program: ${words}`);
   }
   return program;
 }

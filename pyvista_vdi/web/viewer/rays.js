@@ -38,7 +38,8 @@ export function halfExtent(camera, [width, height]) {
   const aspect = width / height;
   if (isParallel(camera)) return [camera.parallel_scale * aspect, camera.parallel_scale];
   const tangent = Math.tan((camera.view_angle * Math.PI) / 360);
-  return camera.use_horizontal_view_angle ? [tangent, tangent / aspect] : [tangent * aspect, tangent];
+  if (camera.use_horizontal_view_angle) return [tangent, tangent / aspect];
+  return [tangent * aspect, tangent];
 }
 
 // The same, in parallel projection in world'.
@@ -130,7 +131,8 @@ export function listSpace(frame, vdi) {
 }
 
 /**
- * The rays of a window's pixels in the model' frame: P(t) = (1, a, b) origin + t (1, a, b) direction.
+ * The rays of a window's pixels in the model' frame:
+ * P(t) = (1, a, b) origin + t (1, a, b) direction.
  *
  * @returns {{origin: number[][], direction: number[][], reference: number}} rows for 1, a and b;
  *   `reference`: view depth of t = 0, world'.
@@ -145,7 +147,8 @@ export function pixelRays(frame, camera, size) {
   const slope = [[cx * halfWidth, cy * halfHeight, 0], [halfWidth, 0, 0], [0, halfHeight, 0]];
   const forward = [[0, 0, 1], [0, 0, 0], [0, 0, 0]];
   const zero = [[0, 0, 0], [0, 0, 0], [0, 0, 0]];
-  let [origin, direction] = parallel ? [slope, forward] : [zero, slope.map((s, k) => add(s, forward[k]))];
+  let [origin, direction] = parallel
+    ? [slope, forward] : [zero, slope.map((s, k) => add(s, forward[k]))];
   const perPixel = [1, 2 / size[0], 2 / size[1]];
   origin = origin.map((row, k) => times(add(row, times(direction[k], reference)), perPixel[k]));
   direction = direction.map((row, k) => times(row, perPixel[k]));

@@ -41,7 +41,6 @@ uniform vec3 formValue[4], formSlope[4]; // u, v, depth coordinate, denominator:
 uniform vec3 planeValue[PLANES], planeSlope[PLANES];
 uniform mat3 direction;           // model' length per t: columns for 1, a and b
 uniform ivec2 window;             // lists
-uniform ivec2 stacks;
 uniform float depthOrigin;        // world'
 uniform float firstDepth, slabsPerDepth; // of the occupancy grid, offsets from the depth origin
 uniform float cutoff;
@@ -59,7 +58,6 @@ uniform float worldScale, reference;
 out vec4 seen;
 
 #define INFINITE 1e30
-#define TURNS_PER_LOOK 4
 
 ivec2 texel(int k) { return ivec2(k & ((1 << WIDTH_SHIFT) - 1), k >> WIDTH_SHIFT); }
 
@@ -167,7 +165,8 @@ vec2 crossings(vec2 cell) { return (cell + ahead - zero) * inverse; }
 // The indices that stepping from some would have reached at r, but not beyond a stack's edge.
 vec2 cellReached(vec2 cell, vec2 edge, vec2 step_, float r, vec2 middle_) {
   vec2 behind = edge + step_;
-  vec2 reached = clamp(floor(r * along.xy + deep.xy + middle_), min(cell, behind), max(cell, behind));
+  vec2 reached = floor(r * along.xy + deep.xy + middle_);
+  reached = clamp(reached, min(cell, behind), max(cell, behind));
   bvec2 moved = notEqual(reached, cell);
   bvec2 tooFar = greaterThan(crossings(reached - step_), vec2(r));
   bvec2 farther = lessThanEqual(crossings(reached), vec2(r));
@@ -270,7 +269,8 @@ CLIPPING
         }
         vec2 to = cellReached(cell, edge, step_, until, half_);
         bvec2 moves = notEqual(to, cell);
-        if (until >= rEnd || any(lessThan(to, vec2(0.0))) || any(greaterThan(to, last))) goes = false;
+        goes = until < rEnd && all(greaterThanEqual(to, vec2(0.0))) &&
+          all(lessThanEqual(to, last));
         if (!goes || !any(moves)) break;
         vec2 entered = crossings(to - step_);
         if (moves.x) r = max(r, entered.x);
