@@ -29,6 +29,7 @@ ARGUMENTS = {
     "pipeline.py": ["picture.png"],
     "plotter.py": [],
     "tradeoff.py": [],
+    "web_page.py": ["page.html"],
 }
 
 
@@ -55,6 +56,7 @@ def run_example(name, folder):
     assert done.returncode == 0, done.stderr
     assert "VDIWarning" not in done.stderr
     suffix = ".gif" if name == "interactive.py" else ".png"
+    suffix = Path(arguments[0]).suffix if arguments else suffix
     target = folder / (arguments[0] if arguments else Path(name).with_suffix(suffix))
     assert list(folder.glob(f"*{suffix}")) == [target]
     return done.stdout, target
@@ -104,3 +106,10 @@ def test_tradeoff_example_draws_its_three_fronts(tmp_path):
     assert all(f"{kind}: " in said for kind in ("frame", "memory", "generation"))
     panels = np.array_split(imread(target)[..., :3].astype(int), 3, axis=1)
     assert all(np.ptp(panel) > 100 for panel in panels)
+
+
+def test_a_page_is_written(tmp_path):
+    """It opens again in there; tests/web look at such pages in a browser."""
+    printed, target = run_example("web_page.py", tmp_path)
+    assert "supersegments" in printed
+    assert b"<vdi-viewer" in target.read_bytes()
