@@ -320,6 +320,7 @@ def check_pictures(raycaster, vdi, cameras, size):
         raycaster.give(kept)
         for name, camera in cameras.items():
             wanted = pvdi.render(kept, camera, size)
+            assert wanted[..., 3].max() > 0.1
             error = 255 * np.abs(raycaster.draw(camera, size) - wanted).max(axis=-1)
             share = float(np.mean(error <= 2))
             print(f"{precision:6} {name:12} {share:.4%} within 2/255, at most {error.max():.2f}")
