@@ -291,6 +291,7 @@ export class VDIViewer extends HTMLElement {
         const pacer = this.#pacer, { width, height } = this.#parts.canvas;
         const moving = performance.now() - this.#moved < REST;
         this.#asked = false;
+        const shown = this.#prepared;
         const camera = this.#camera;
         const size = moving ? pacer.sizeFor(width, height) : [width, height];
         const full = size[0] === width && size[1] === height;
@@ -300,7 +301,7 @@ export class VDIViewer extends HTMLElement {
         if (this.#gl.isContextLost()) return;
         if (pacer !== this.#pacer || !done) continue;
         pacer.show(target, size, [width, height]);
-        this.#drawn(full);
+        this.#drawn(full, shown === this.#prepared);
         if (this.#asked) continue;
         if (full) return;
         await new Promise((resolve) => setTimeout(resolve,
@@ -334,10 +335,11 @@ export class VDIViewer extends HTMLElement {
     };
   }
 
-  #drawn(full) {
+  // What was drawn, and whether it is still what is to be shown: another level may have come since.
+  #drawn(full, latest) {
     const { state } = this.#status;
     this.dispatchEvent(new CustomEvent("framedrawn", { detail: { full, state } }));
-    if (full && state === "full") this.#ready.resolve(this);
+    if (full && latest && state === "full") this.#ready.resolve(this);
   }
 
   #announceCamera() {
