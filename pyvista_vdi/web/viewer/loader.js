@@ -66,6 +66,7 @@ async function* embeddedTexts(element) {
     // The last one may still be growing
     while (taken < scripts.length - (parsed ? 0 : 1)) yield scripts[taken++].textContent;
     if (parsed) return;
+    if (document.readyState !== "loading") continue; // it was read while the text was taken
     await new Promise((resolve) => {
       new MutationObserver((_, observer) => {
         observer.disconnect();
