@@ -250,9 +250,9 @@ def occlusion(parser: argparse.ArgumentParser) -> None:
     option(group, "--occlusion-strength", strength, "S", float)
 
 
-def longest(options: Options, text: str | None = None) -> None:
+def longest(options: Options, text: str | None = None, default: int = 20) -> None:
     """Add how long lists may be."""
-    option(options, "--max-supersegments", text, "N", int, default=20)
+    option(options, "--max-supersegments", text, "N", int, default=default)
 
 
 def step(options: Options, text: str | None = None) -> None:

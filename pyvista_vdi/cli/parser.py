@@ -258,7 +258,7 @@ def _add_serve(parser: argparse.ArgumentParser) -> None:
     declare.classification(parser)
     declare.occlusion(parser)
     group = parser.add_argument_group("limits")
-    declare.longest(group, "longest list (default: 20)")
+    declare.longest(group, "longest list (default: 8)", 8)
     declare.step(group, "step along the ray, model units (default: half the smallest spacing)")
     declare.memory_limit(group)
     declare.device(parser)

@@ -46,6 +46,9 @@ PROTOCOL = 1
 HOST, PORT = "127.0.0.1", 8765
 #: Most lists of a VDI unless told otherwise.
 LISTS = 1280 * 720
+#: Longest list unless told otherwise. What is sent serves views near its own until the next: on the
+#: brain, 20 degrees away, lists of 20 would bring .004 of SSIM for 2.2 times the bytes.
+LONGEST = 8
 #: Most clients at once; the next is told so.
 MAX_CLIENTS = 256
 #: Bytes of one message of a VDI. Between two of them a transfer can be given up.
@@ -348,7 +351,7 @@ def serve(
     token: str | None = None,
     hosts: Sequence[str] = (),
     lists: int = LISTS,
-    max_supersegments: int = 20,
+    max_supersegments: int = LONGEST,
     sample_distance: float | None = None,
     ambient_occlusion: Any = None,
     memory_limit: int | float | str | None = None,
@@ -382,7 +385,7 @@ def serve(
     lists : int
         Most lists of a VDI; fewer where fewer of the page's pixels show the volume.
     max_supersegments, sample_distance, ambient_occlusion, memory_limit
-        As for :func:`pyvista_vdi.generate`.
+        As for :func:`pyvista_vdi.generate`; shorter lists by default, which are sent sooner.
     regenerate_below : float
         Estimated SSIM below which a page's view gets a VDI of its own; while it moves, twice the
         error is borne.

@@ -96,11 +96,16 @@ class Client:
             self._woken.set()
 
     def is_outdone(self, made: Made) -> bool:
-        """Whether a VDI that is being sent is to give way: a full one does, a coarse one never."""
-        return made.level == "full" and (self.waiting is not None or self.is_out_of_date(made.wish))
+        """Whether a VDI that is being sent is to give way: a full one may, a coarse one never.
+
+        Not because the view has moved on: it serves views around its own, too, and what was sent
+        of it would be lost. Only where that asks for another, which then waits.
+        """
+        outdone = self.waiting is not None or made.wish.content != self.wish.content
+        return made.level == "full" and outdone
 
     def is_out_of_date(self, wish: Wish) -> bool:
-        """Whether a full VDI for a former wish is not worth making or sending."""
+        """Whether a full VDI for a former wish is not worth making."""
         return wish.content != self.wish.content or self._apart(wish) > _FULL_OUT_OF_DATE
 
     def close(self) -> None:

@@ -29,8 +29,8 @@ from pyvista_vdi.web.messages import Offer, Wish
 
 _T = TypeVar("_T")
 
-#: Lists of a coarse VDI at most: 320 x 180. 8-byte and deflated these are 0.2 to 0.6 MiB, which is
-#: a tenth to a quarter of a second at 20 Mbit/s.
+#: Lists of a coarse VDI at most: 320 x 180. With 8 supersegments at most, 8-byte and deflated, a
+#: quarter of 640 x 360 lists of the brain is 0.4 MB: 0.15 s at 20 Mbit/s, of SSIM .967.
 COARSE_LISTS = 320 * 180
 #: A coarse VDI has at most this share of the lists of the full one; where that would leave fewer
 #: than the second number, the full one is made at once.

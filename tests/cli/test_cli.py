@@ -175,7 +175,7 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
         (["render", "a.vdi", "-o", "a.png", "--view-angle", "180"], "between 0 and 180 degrees"),
         (
             ["generate", "v.nrrd", "-o", "b.png"],
-            "the name must end in .vdi or .exr or .vti, for instance 'b.vdi'",
+            "the name must end in .vdi or .exr or .vti or .html, for instance 'b.vdi'",
         ),
         (["generate", "v.nrrd", "-o", "no/b.vdi"], "the folder .*no does not exist; create it"),
         (["generate", "--example", "nothing", "-o", "b.vdi"], "no example volume is called 'noth"),

@@ -8,6 +8,11 @@ import socket
 
 #: Bytes taken up at a time: a few packets, so that a slow line is even.
 _PIECE = 4096
+#: Bytes that the system may hold before the line: with fewer, local connections stand still at
+#: times, and with its own choice, megabytes, whatever is sent has been sent.
+_HELD = 65536
+#: Seconds by which a piece may be late without the line being slower for it.
+_LATE = 0.05
 
 
 class SlowLine:
@@ -39,7 +44,7 @@ class SlowLine:
 
     async def _connected(self, reader, writer):
         way = socket.socket()
-        way.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _PIECE)  # no more is on the line
+        way.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _HELD)
         way.setblocking(False)
         await asyncio.get_running_loop().sock_connect(way, ("127.0.0.1", self._to))
         there, back = await asyncio.open_connection(sock=way, limit=_PIECE)
@@ -59,14 +64,16 @@ class SlowLine:
                 due, data = item
                 await asyncio.sleep(max(0.0, due - loop.time()))
                 writer.write(data)
-                await writer.drain()
+                with contextlib.suppress(ConnectionError):  # who is gone needs nothing more
+                    await writer.drain()
             writer.close()
 
         async def take_up():
             free = loop.time()
             while data := await reader.read(_PIECE):
                 setattr(self, way, getattr(self, way) + len(data))
-                free = max(free, loop.time()) + len(data) / self._rate
+                # Not from now on: sleeps last longer than asked for, which would slow the line
+                free = max(free, loop.time() - _LATE) + len(data) / self._rate
                 await line.put((free + self._latency, data))
                 await asyncio.sleep(max(0.0, free - loop.time()))
             await line.put(None)

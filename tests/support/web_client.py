@@ -75,12 +75,17 @@ class WebClient:
                 return found
             assert not isinstance(found, int), f"the server has ended the connection: {found}"
 
+    @property
+    def is_whole(self):
+        """Whether all of the VDI has come that the last head was of."""
+        return self.head is not None and sum(map(len, self.parts)) == self.head["bytes"]
+
     async def file(self):
         """Return the head and the bytes of the next VDI that comes whole."""
         while True:
             found = await self.receive()
             assert not isinstance(found, int), f"the server has ended the connection: {found}"
-            if isinstance(found, bytes) and sum(map(len, self.parts)) == self.head["bytes"]:
+            if isinstance(found, bytes) and self.is_whole:
                 return self.head, b"".join(self.parts)
 
     async def vdi(self, level=None):

@@ -92,7 +92,7 @@ def test_only_lists_in_view_are_sent(talk):
 
     vdi, said = talk(story)
     assert vdi.window_size == SIZE
-    whole = pvdi.generate(HIGH, near, SIZE, precision="8-byte", **LOOK)
+    whole = pvdi.generate(HIGH, near, SIZE, precision="8-byte", max_supersegments=8, **LOOK)
     assert np.array_equal(pvdi.render(vdi, near, SIZE), pvdi.render(whole, near, SIZE))
     assert said[-1] == {"type": "status", "doing": None}  # nothing is in view: nothing was sent
     assert sum(m["type"] == "vdi" for m in said) == 2
@@ -133,7 +133,7 @@ def test_transfer_function_and_time_are_changed_by_messages(talk):
 
     for vdi, volume in zip(talk(story), (HIGH, LOW), strict=True):
         look = {"cmap": "hot", "opacity": [0, 0.2, 1], "clim": (0, 200)}
-        whole = pvdi.generate(volume, CAMERA, SIZE, precision="8-byte", **look)
+        whole = pvdi.generate(volume, CAMERA, SIZE, precision="8-byte", max_supersegments=8, **look)
         picture, other = pvdi.render(vdi, CAMERA, SIZE), pvdi.render(whole, CAMERA, SIZE)
         assert _ssim(picture, other) > 0.999  # the same rays but for rounding
 
