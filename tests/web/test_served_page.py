@@ -92,29 +92,24 @@ def test_the_page_is_the_viewer_and_leaks_nothing(server):
 def test_a_page_is_sent_what_its_view_needs(page):
     _wait(page, "remote.received.full === 1")
     assert page.evaluate("remote.received.coarse") == 1
-    assert _ssim_of(page) > ENOUGH
-
     page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 4 }")
-    picture, camera = _picture(page)  # at once, by the VDI that it has
-    assert camera.view_angle == 4
-    assert picture[..., 3].max() > 0.5
     _wait(page, "remote.received.full === 2")
     assert _ssim_of(page) > ENOUGH
 
+
+@pytest.mark.slow
+def test_look_clipping_and_time_are_changed_in_the_page(page):
+    _wait(page, "remote.received.full === 1")
     page.get_by_label("Colours").select_option("hot")
-    _wait(page, "remote.received.full >= 3")
+    _wait(page, "remote.received.full >= 2")
     assert _ssim_of(page, cmap="hot") > ENOUGH
 
     page.get_by_label("Clip").first.select_option("x")
     assert page.evaluate("viewer.clippingPlanes") == [{"origin": [0, 0, 0], "normal": [1, 0, 0]}]
-    _, camera = _picture(page)
-    truth = pvdi.render_volume(
-        BALL, camera, SIZE, **{**LOOK, "cmap": "hot"}, clipping_planes=[(0, 0, 0, 1, 0, 0)]
-    )
-    assert pvdi.compare_images(_picture(page)[0], truth).ssim > ENOUGH
+    assert _ssim_of(page, cmap="hot", clipping_planes=[(0, 0, 0, 1, 0, 0)]) > ENOUGH
 
     page.get_by_label("Time").fill("1")
-    _wait(page, "remote.received.full >= 4")
+    _wait(page, "remote.received.full >= 3")
 
 
 @pytest.mark.slow
