@@ -10,6 +10,8 @@ export VTK_DEFAULT_OPENGL_WINDOW=${VTK_DEFAULT_OPENGL_WINDOW:-vtkEGLRenderWindow
 export PYVISTA_OFF_SCREEN=true
 # A machine without an OpenCL device fails the tests that need one instead of skipping them
 export PYVISTA_VDI_REQUIRE_DEVICE=1
+# One without a browser does so, too
+export PYVISTA_VDI_REQUIRE_BROWSER=1
 # The tests refuse to run on the sources of a checkout
 export PYVISTA_VDI_REQUIRE_INSTALLED=1
 # Tests of the distributions compare them with the files of the checkout
