@@ -87,7 +87,8 @@ class Page:
         page.route(SITE + "**", lambda route: self._answer(route, files))
 
     def _hear(self, message):
-        if message.type == "error":
+        # Calls that WebGL refuses are warnings to Chromium
+        if message.type == "error" or "GL_INVALID" in message.text:
             self._complain(message.text)
 
     def _complain(self, text):

@@ -293,9 +293,10 @@ def test_dense_screens_and_other_sizes(vdi, data, open_page):
     page.wait_for(AT_REST)
 
 
-def test_elements_come_and_go(vdi, data, open_page):
+@pytest.mark.parametrize("elements", [2, pytest.param(20, marks=pytest.mark.slow)])
+def test_elements_come_and_go(elements, vdi, data, open_page):
     page = open_page(SIZE)
-    for _ in range(20):  # browsers keep some 16 contexts
+    for _ in range(elements):  # browsers keep some 16 contexts
         page.load(data)
         page.evaluate(
             """() => {

@@ -278,11 +278,11 @@ def test_long_lists_and_empty_space_between_them(raycaster):
     vdi = layers((90, 60), 300)
     assert np.diff(vdi.offsets).max() > 200
     size = (80, 60)
-    for turn in (0, 20, 90, 200):
-        camera = vdi.camera.azimuth(turn)
-        for precision in PRECISIONS:
-            kept = vdi.with_precision(precision)
-            raycaster.give(kept)
+    for precision, turns in (("exact", (20, 200)), ("8-byte", (0, 90))):
+        kept = vdi.with_precision(precision)
+        raycaster.give(kept)
+        for turn in turns:
+            camera = vdi.camera.azimuth(turn)
             wanted = pvdi.render(kept, camera, size)
             error = np.abs(raycaster.draw(camera, size) - wanted).max(axis=-1)
             assert np.mean(wanted[..., 3] > 0.1) > 0.02

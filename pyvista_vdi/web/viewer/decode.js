@@ -19,10 +19,13 @@ const COARSE = "coarse.vdi";
  * Takes a .vdi file piece by piece; gives its coarse level as soon as that is there.
  *
  * @param {(vdi: object) => void} onLevel Called with the VDI of each level, "coarse" before "full".
+ * @param {(vdi: object) => void} onBegin Called before a coarse level, which is in 8 bytes, with
+ *   the camera, windowSize, bounds and depthOrigin.
  */
 export class LevelDecoder {
-  constructor(onLevel) {
+  constructor(onLevel, onBegin) {
     this.onLevel = onLevel;
+    this.onBegin = onBegin;
     this.bytes = new Uint8Array(1 << 16);
     this.length = 0;
     this.text = ""; // base64 that is not yet four characters
@@ -69,6 +72,10 @@ export class LevelDecoder {
     const coarse = members.get(COARSE);
     if (!coarse) return;
     const whole = described(members);
+    this.onBegin({
+      windowSize: whole.window_size, camera: whole.camera, bounds: whole.bounds,
+      depthOrigin: whole.depth_origin,
+    });
     const vdi = await decodeVDI(checkedMember(coarse), "coarse");
     this.onLevel({ ...vdi, metadata: whole.metadata, pictureSize: pictureSize(whole) });
   }

@@ -144,6 +144,7 @@ export class VDIViewer extends HTMLElement {
     try {
       await load(source, {
         signal: loading.signal,
+        onBegin: (vdi) => !loading.signal.aborted && this.#warmUp(vdi),
         onLevel: (prepared) => !loading.signal.aborted && this.setPrepared(prepared),
         onProgress: (progress) => !loading.signal.aborted && this.#tell({ progress }),
       });
@@ -200,8 +201,14 @@ export class VDIViewer extends HTMLElement {
     const { canvas } = this.#parts;
     const { signal } = (this.#connected = new AbortController());
     if (!this.hasAttribute("aria-label")) canvas.setAttribute("aria-label", "volume, to be turned");
+    // First: decoding goes on while the browser starts its graphics
+    if (this.#status.state === "empty" && !this.getAttribute("src")) {
+      const within = embedded(this);
+      if (within) this.load(within);
+    }
     const gl = canvas.getContext("webgl2", { antialias: false, depth: false });
     if (!gl) {
+      this.#loading?.abort();
       this.#parts.canvas.hidden = true;
       this.#parts.img.src ||= this.querySelector("img")?.src ?? "";
       this.#parts.img.hidden = !this.#parts.img.getAttribute("src");
@@ -228,10 +235,6 @@ export class VDIViewer extends HTMLElement {
     const sizes = new ResizeObserver(() => this.#resize());
     sizes.observe(this);
     signal.addEventListener("abort", () => sizes.disconnect());
-    if (this.#status.state === "empty" && !this.getAttribute("src")) {
-      const within = embedded(this);
-      if (within) this.load(within);
-    }
   }
 
   disconnectedCallback() {
@@ -315,6 +318,16 @@ export class VDIViewer extends HTMLElement {
         this.invalidate(false);
       }
     }
+  }
+
+  // Have the program compiled while the first lists are still being decoded.
+  #warmUp(vdi) {
+    const { width, height } = this.#parts.canvas;
+    if (!this.#raycaster || this.#prepared) return;
+    this.#gl.bindFramebuffer(this.#gl.FRAMEBUFFER, this.#pacer.screen(width, height).framebuffer);
+    this.#gl.enable(this.#gl.BLEND);
+    this.#raycaster.warmUp(vdi);
+    this.#gl.disable(this.#gl.BLEND);
   }
 
   // What draws a view into the bound target: called for each band, with the scissor set.

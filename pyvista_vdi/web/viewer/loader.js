@@ -13,13 +13,17 @@ const idle = []; // workers that have nothing to do
  * @param {object} options
  * @param {(prepared: object) => void} options.onLevel Called with each level as prepare.js makes
  *   it; its `level` is "coarse" or "full".
+ * @param {(vdi: object) => void} [options.onBegin] Called before a coarse level with its camera,
+ *   windowSize, bounds and depthOrigin.
  * @param {(fraction: number) => void} [options.onProgress] Called with the share that was read,
  *   0 to 1, where the length is known.
  * @param {AbortSignal} [options.signal] Ends it; the promise is then rejected by its reason.
  * @returns {Promise<void>} Resolves when the full level has been given.
  * @throws {VDIFileError} A sentence that says what is wrong.
  */
-export async function load(source, { onLevel, onProgress = () => {}, signal }) {
+export async function load(
+  source, { onLevel, onBegin = () => {}, onProgress = () => {}, signal }
+) {
   signal?.throwIfAborted();
   const aborted = new Promise((_, reject) => {
     signal?.addEventListener("abort", () => reject(signal.reason), { once: true });
@@ -30,7 +34,7 @@ export async function load(source, { onLevel, onProgress = () => {}, signal }) {
     port.onmessage = ({ data }) => {
       if (data.error) reject(new VDIFileError(data.error));
       else if (data.done) resolve();
-      else if (!signal?.aborted) onLevel(data.prepared);
+      else if (!signal?.aborted) data.begun ? onBegin(data.begun) : onLevel(data.prepared);
     };
     port.onerror = (event) => reject(new VDIFileError(`the VDI is not decoded: ${event.message}`));
     port.postMessage(message);

@@ -23,7 +23,9 @@ export class Pacer {
   /** Pixels of the next frame of a movement in a window of width x height. */
   sizeFor(width, height) {
     const pixels = width * height;
-    if (this.#perPixel !== null) {
+    if (this.#perPixel === null) { // unknown yet: whatever the machine, soon
+      this.share = LEAST_SHARE;
+    } else {
       const share = Math.min(Math.max(FRAME_SECONDS / (this.#perPixel * pixels), LEAST_SHARE), 1);
       if (share === 1 || Math.abs(share / this.share - 1) > DEAD_BAND) this.share = share;
     }

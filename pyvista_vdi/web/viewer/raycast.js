@@ -1,6 +1,6 @@
 // A VDI in WebGL 2: textures of its lists, and a fragment shader that casts a ray for each pixel.
 import { TEXTURE_WIDTH } from "./prepare.js";
-import { frameForms, frameOf, isParallel, pixelRays, pixelsOfBoxes } from "./rays.js";
+import { frameForms, frameOf, isParallel, listSpace, pixelRays, pixelsOfBoxes } from "./rays.js";
 import { MOST_PLANES, VERTEX_SHADER, fragmentShader } from "./shader.js";
 
 /** A ray ends where less transmittance than this is left. */
@@ -93,9 +93,7 @@ export class Raycaster {
       throw new Error(`A VDI is clipped to at most ${clippingPlanes.length - planes.length +
         MOST_PLANES} planes, not to ${clippingPlanes.length}.`);
     }
-    const { program, uniforms: u } = this.program(
-      [space.parallel && "PARALLEL", space.shifted && "SHIFTED", vdi.packed && "PACKED",
-        depthTexture && "OPAQUE"].filter(Boolean), planes.length);
+    const { program, uniforms: u } = this.program(space, vdi.packed, depthTexture, planes);
     gl.useProgram(program);
     gl.viewport(...corner, width, height);
     const halves = (forms) => [0, 3].map((k) => forms.flatMap((form) => form.slice(k, k + 3)));
@@ -150,11 +148,35 @@ export class Raycaster {
     else gl.disable(gl.SCISSOR_TEST);
   }
 
-  program(defines, planes) {
+  /**
+   * Have the program for V_O of a VDI in 8 bytes compiled, which takes longer than a frame: by a
+   * pixel of the bound framebuffer, in which no ray is left.
+   *
+   * @param {object} vdi camera, windowSize, bounds and depthOrigin of what will be set.
+   */
+  warmUp(vdi) {
+    const { gl } = this, { camera, windowSize } = vdi;
+    const frame = frameOf(vdi), space = listSpace(frame, vdi);
+    const rays = pixelRays(frame, camera, windowSize);
+    const { planes } = frameForms(frame, space, windowSize, rays, space.parallel, []);
+    const { program, uniforms } = this.program(space, true, null, planes);
+    gl.useProgram(program);
+    gl.uniform3fv(uniforms.planeValue, new Float32Array(3 * planes.length).fill(-1));
+    const everything = this.texture(new Uint32Array(4), "RGBA32UI", 1);
+    gl.viewport(0, 0, 1, 1);
+    gl.bindVertexArray(this.vertices);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.bindVertexArray(null);
+    gl.deleteTexture(everything);
+  }
+
+  program({ parallel, shifted }, packed, opaque, { length }) {
     const { gl } = this;
-    const key = [...defines, planes].join();
+    const defines = [parallel && "PARALLEL", shifted && "SHIFTED", packed && "PACKED",
+      opaque && "OPAQUE"].filter(Boolean);
+    const key = [...defines, length].join();
     if (!this.programs.has(key)) {
-      const program = linked(gl, VERTEX_SHADER, fragmentShader(defines, planes));
+      const program = linked(gl, VERTEX_SHADER, fragmentShader(defines, length));
       const uniforms = {};
       for (let k = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); k-- > 0; ) {
         const { name } = gl.getActiveUniform(program, k);

@@ -6,7 +6,7 @@ import { prepare, transferables } from "./prepare.js";
  * Decode files whose pieces come as messages, one file after the other.
  *
  * Messages to it are `{ piece }` (Uint8Array, or base64 text) and `{ end: true }`. It sends
- * `{ ready: true }` when it listens and `{ prepared }` for each level, and answers a message by
+ * `{ ready: true }` when it listens, `{ begun }` and `{ prepared }` for each level, and answers a message by
  * `{ done: true }`, or by `{ error }`, a sentence, after which it is of no use.
  *
  * @param {object} scope The worker's global scope, or what stands for it: `postMessage`, and
@@ -17,11 +17,12 @@ export function serve(scope) {
     const prepared = prepare(vdi);
     scope.postMessage({ prepared }, transferables(prepared));
   };
-  let decoder = new LevelDecoder(give);
+  const begin = (begun) => scope.postMessage({ begun });
+  let decoder = new LevelDecoder(give, begin);
   scope.onmessage = async ({ data: { piece, end } }) => {
     try {
       await (end ? decoder.end() : decoder.push(piece));
-      if (end) decoder = new LevelDecoder(give);
+      if (end) decoder = new LevelDecoder(give, begin);
       scope.postMessage({ done: true });
     } catch (error) {
       scope.postMessage({ error: String(error?.message ?? error) });
