@@ -1,5 +1,8 @@
 """``add_vdi`` on every class of plotters, as soon as this package and PyVista's plotters are there.
 
+Besides, ``export_html`` of a plotter with VDIs writes a page that shows them; of others it is
+PyVista's own.
+
 PyVista imports what its entry points name when a plotter lacks an attribute: in
 ``BasePlotter.__getattr__``. pyvistaqt's plotters derive from a Qt widget first, whose own
 ``__getattr__`` answers before it, so that no entry point is looked at. An attribute of
@@ -8,6 +11,7 @@ PyVista imports what its entry points name when a plotter lacks an attribute: in
 
 from __future__ import annotations
 
+import functools
 import importlib
 import importlib.util
 import sys
@@ -19,6 +23,7 @@ from types import ModuleType
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.providers import provider
 
 _PLOTTERS = "pyvista.plotting"
 
@@ -91,6 +96,30 @@ def _offer(plotters: ModuleType) -> None:
     for name, home in COMPONENTS.items():
         if base is not None and home not in sys.modules:
             setattr(base, name, _Pending(name))
+    if base is not None and hasattr(base, "export_html"):
+        base.export_html = _with_vdis(base.export_html)
+
+
+def _with_vdis(export_html: Any) -> Any:
+    """Return ``Plotter.export_html`` that knows of VDIs."""
+
+    @functools.wraps(export_html)
+    def export(plotter: Any, filename: Any, *args: Any, **options: Any) -> Any:
+        if args or options or not _shows_vdis(plotter):
+            return export_html(plotter, filename, *args, **options)
+        return provider("scene_pages")(plotter, filename)
+
+    return export
+
+
+def _shows_vdis(plotter: Any) -> bool:
+    """Whether a plotter has visible VDIs."""
+    module = sys.modules.get("pyvista_vdi.vtk_pipeline.drawing.actor")
+    return module is not None and any(
+        isinstance(actor, module.VDIActorMethods) and actor.GetVisibility()
+        for renderer in plotter.renderers
+        for actor in renderer.actors.values()
+    )
 
 
 def install() -> None:

@@ -32,6 +32,9 @@ from pyvista_vdi.web.bundle import viewer_script
 #: What the script elements that hold a .vdi file as base64 say of themselves.
 DATA_TYPE = "application/vdi+base64"
 
+#: The same, of what is beside the VDI: see web/scenes/scene.py.
+_SCENE = '<script type="application/vdi-scene+base64">{}</script>\n'
+
 #: Longest edge of the still picture, pixels, and the quality of its JPEG.
 _STILL_EDGE, _STILL_QUALITY = 480, 75
 
@@ -62,7 +65,7 @@ p {{ font: 14px sans-serif; text-align: center; }}
 <img alt="{title}" src="data:image/jpeg;base64,{still}">
 <noscript><p>Scripts are turned off: this is a still picture of what could be turned.</p></noscript>
 <script type="{kind}">{first}</script>
-<script>
+{scene}<script>
 {script}</script>
 <script type="{kind}">{rest}</script>
 </vdi-viewer>
@@ -107,21 +110,65 @@ def page(
     InvalidArgumentError
         If the background is no colour, or a list is too long for the precision.
     """
+    sent = vdi.with_precision(precision or "8-byte")
+    percents = " ".join(f"{100 * channel:g}%" for channel in background)
+    still = over_background(_from_generating_view(vdi), background)
+    return assembled(
+        sent,
+        title=title,
+        background=f"rgb({percents})",
+        still=np.rint(still * 255).astype(np.uint8),
+        still_size=vdi.picture_size,
+        level=level,
+        progress=progress,
+    )
+
+
+def assembled(
+    vdi: VDI,
+    *,
+    title: str,
+    background: str,
+    still: NDArray[np.uint8],
+    still_size: Sequence[int],
+    scene: bytes | None = None,
+    level: int | None = None,
+    progress: Progress | None = None,
+) -> bytes:
+    """Return a page of its parts.
+
+    Parameters
+    ----------
+    vdi : VDI
+        As it is sent.
+    title : str
+        Of the page.
+    background : str
+        As CSS has it.
+    still : numpy.ndarray
+        uint8 (H, W, 3), the picture where nothing can be turned.
+    still_size : (int, int)
+        Width and height that it is shown as, or smaller.
+    scene : bytes, optional
+        What is seen beside the VDI: see :mod:`pyvista_vdi.web.scenes.scene`.
+    level, progress : optional
+        As for :func:`page`.
+    """
     stream = io.BytesIO()
-    write_to(stream, vdi.with_precision(precision or "8-byte"), DEFLATE, level, progress)
+    write_to(stream, vdi, DEFLATE, level, progress)
     data = stream.getvalue()
     cut = _end_of_coarse(stream)
-    percents = " ".join(f"{100 * channel:g}%" for channel in background)
     text = _PAGE.format(
         version=__version__,
         policy=_POLICY,
         title=html.escape(title),
-        background=f"rgb({percents})",
-        still=base64.b64encode(_still(vdi, background)).decode(),
+        background=background,
+        still=_text(_jpeg(still, still_size)),
         kind=DATA_TYPE,
-        first=base64.b64encode(data[:cut]).decode(),
-        script=viewer_script(),
-        rest=base64.b64encode(data[cut:]).decode(),
+        first=_text(data[:cut]),
+        scene="" if scene is None else _SCENE.format(_text(scene)),
+        script=viewer_script(scene=scene is not None),
+        rest=_text(data[cut:]),
     )
     return text.encode()
 
@@ -205,17 +252,18 @@ def _end_of_coarse(stream: BinaryIO) -> int:
     return -(-members[behind].header_offset // 3) * 3
 
 
-def _still(vdi: VDI, background: Sequence[float]) -> bytes:
-    """Return the picture from the generating view as a small JPEG."""
+def _text(data: bytes) -> str:
+    return base64.b64encode(data).decode()
+
+
+def _jpeg(pixels: NDArray[np.uint8], size: Sequence[int]) -> bytes:
+    """Return a picture as a small JPEG."""
     from PIL import Image
 
-    pixels = np.rint(over_background(_from_generating_view(vdi), background) * 255)
-    width, height = vdi.picture_size
-    scale = min(1.0, _STILL_EDGE / max(width, height))
-    size = (max(1, round(width * scale)), max(1, round(height * scale)))
+    scale = min(1.0, _STILL_EDGE / max(size))
+    small = (max(1, round(size[0] * scale)), max(1, round(size[1] * scale)))
     stream = io.BytesIO()
-    picture = Image.fromarray(pixels.astype(np.uint8)).resize(size)
-    picture.save(stream, format="jpeg", quality=_STILL_QUALITY)
+    Image.fromarray(pixels).resize(small).save(stream, format="jpeg", quality=_STILL_QUALITY)
     return stream.getvalue()
 
 

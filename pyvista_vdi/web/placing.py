@@ -38,8 +38,14 @@ def as_shown(actor: Any) -> VDI:
             view_up=motion[:3, :3] @ camera.view_up,
             model_transform=_matrix(actor),
         )
+    return thinned(vdi, multiplier, camera)
+
+
+def thinned(vdi: VDI, multiplier: float, camera: Any = None) -> VDI:
+    """Return a VDI with its optical depths multiplied, seen from another camera if one is given."""
+    camera = vdi.camera if camera is None else camera
     if camera is vdi.camera and multiplier == 1:
-        return vdi  # type: ignore[no-any-return]
+        return vdi
     return VDI(
         camera,
         vdi.window_size,
@@ -63,8 +69,12 @@ def planes_of(actor: Any) -> list[list[float]]:
 
 def left_out(actor: Any) -> list[str]:
     """Return what a viewer does not show of how an actor is drawn."""
-    cropped = Cropping.from_any(actor.GetMapper()) is not None
-    return ["its cropping"] * cropped + ["its scale"] * (_motion(actor) is None)
+    return ["its cropping"] * cropped(actor) + ["its scale"] * (_motion(actor) is None)
+
+
+def cropped(actor: Any) -> bool:
+    """Whether an actor's mapper crops its VDI."""
+    return Cropping.from_any(actor.GetMapper()) is not None
 
 
 def _motion(actor: Any) -> Any:

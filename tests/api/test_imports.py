@@ -61,7 +61,7 @@ LEVELS_WITHIN = {
 }
 
 #: Rooms that need VTK or PyVista in order to be imported.
-WITH_VTK = ("vtk_pipeline", "plotting", "paraview")
+WITH_VTK = ("vtk_pipeline", "plotting", "paraview", "web.scenes")
 
 #: Slow to import, or optional: never loaded by ``import pyvista_vdi``.
 HEAVY = (
@@ -225,7 +225,8 @@ def _engine_modules():
     return sorted(
         f"pyvista_vdi.{name}"
         for name in names
-        if name.partition(".")[0] not in (*WITH_VTK, "__main__", "__init__")
+        if not f"{name}.".startswith(tuple(f"{room}." for room in (*WITH_VTK, "__main__")))
+        and name != "__init__"
     )
 
 

@@ -30,6 +30,7 @@ ARGUMENTS = {
     "plotter.py": [],
     "tradeoff.py": [],
     "web_page.py": ["page.html"],
+    "web_scene.py": ["scene.html"],
 }
 
 
@@ -113,3 +114,9 @@ def test_a_page_is_written(tmp_path):
     printed, target = run_example("web_page.py", tmp_path)
     assert "supersegments" in printed
     assert b"<vdi-viewer" in target.read_bytes()
+
+
+def test_a_scene_is_written(tmp_path):
+    printed, target = run_example("web_scene.py", tmp_path)
+    assert "MiB" in printed
+    assert b"application/vdi-scene+base64" in target.read_bytes()

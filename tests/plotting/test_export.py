@@ -13,7 +13,10 @@ from pyvista_vdi.errors import VDIWarning
 
 pytestmark = pytest.mark.gl
 
-MESSAGE = "exported without its VDI: export_html, export_vtksz and views .* empty box.*screenshots"
+MESSAGE = (
+    "exported without its VDI: trame's export_html, export_vtksz and views .* empty box.*"
+    "plotter.export_html, screenshots"
+)
 
 
 @pytest.fixture

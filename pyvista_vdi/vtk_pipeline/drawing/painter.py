@@ -145,9 +145,9 @@ class Painter:
 
     def _say_not_exported(self) -> None:
         self._warnings.warn(
-            "the scene is being exported without its VDI: export_html, export_vtksz and views that "
-            "are rendered in the browser (client-side) get an empty box in its place; use "
-            "screenshots, movies, or server-side rendering"
+            "the scene is being exported without its VDI: trame's export_html, export_vtksz and "
+            "views that are rendered in the browser (client-side) get an empty box in its place; "
+            "use plotter.export_html, screenshots, movies, or server-side rendering"
         )
 
     def release(self) -> None:

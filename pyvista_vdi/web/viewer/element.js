@@ -12,6 +12,7 @@ const STYLE = `
 :host([hidden]) { display: none; }
 canvas, img { position: absolute; width: 100%; height: 100%; inset: 0; }
 canvas { touch-action: none; outline-offset: -2px; }
+.over { pointer-events: none; }
 img { object-fit: contain; }
 p { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.5em 1em; font: 14px sans-serif;
   color: white; background: #000a; }
@@ -45,8 +46,9 @@ export class VDIViewer extends HTMLElement {
     super();
     const root = this.attachShadow({ mode: "open" });
     root.innerHTML = `<style>${STYLE}</style><img hidden alt=""><canvas tabindex="0" role="img">` +
-      `</canvas><slot hidden></slot><progress max="1" hidden></progress><p role="alert" hidden></p>`;
+      `</canvas><canvas class="over" hidden></canvas><slot hidden></slot><progress max="1" hidden></progress><p role="alert" hidden></p>`;
     for (const name of ["img", "canvas", "progress", "p"]) this.#parts[name] = root.querySelector(name);
+    this.#parts.over = root.querySelector(".over");
     this.#ready.promise.catch(() => {}); // who awaits it is told; nobody need
   }
 
@@ -100,7 +102,8 @@ export class VDIViewer extends HTMLElement {
   }
 
   /**
-   * The picture at full quality: premultiplied RGBA, 8 bits, top row first, without background.
+   * The picture at full quality: premultiplied RGBA, 8 bits, top row first, without background; a
+   * scene's texts are in it.
    *
    * @param {{width: number, height: number}} size Pixels.
    * @returns {Promise<{width: number, height: number, data: Uint8ClampedArray}>}
@@ -119,6 +122,7 @@ export class VDIViewer extends HTMLElement {
       const data = new Uint8ClampedArray(4 * width * height), row = 4 * width;
       const upsideDown = new Uint8Array(data.length);
       gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+      this.#scene?.paintTexts(this.#camera, width, height);
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, upsideDown);
       for (let y = 0; y < height; ++y) {
         data.set(upsideDown.subarray((height - 1 - y) * row, (height - y) * row), y * row);
@@ -174,9 +178,9 @@ export class VDIViewer extends HTMLElement {
     this.invalidate();
   }
 
-  /** Go back to the view that the VDI was made for. */
+  /** Go back to the view that the VDI was made for, or in which the scene began. */
   resetCamera() {
-    const of = this.#prepared?.camera;
+    const of = this.#scene?.camera ?? this.#prepared?.camera;
     if (of) {
       const { parallel_scale, view_angle, ...rest } = of;
       this.camera = isParallel(of) ? { ...rest, parallel_scale, parallel_projection: true }
@@ -184,15 +188,28 @@ export class VDIViewer extends HTMLElement {
     }
   }
 
-  /** What is drawn among VDIs, see scene.js: draw(gl, target, camera, width, height) -> depth. */
+  /** What is seen beside the VDI: a Scene of scene.js, or null. Swapped whole. */
   get scene() {
     return this.#scene;
   }
 
   set scene(scene) {
+    if (scene === this.#scene) return;
+    const first = !this.#scene;
+    this.#scene?.dispose();
     this.#scene = scene;
-    if (this.#gl) scene?.restore?.(this.#gl);
-    this.invalidate();
+    this.#parts.over.hidden = true;
+    this.invalidate(false);
+    if (!scene) return;
+    scene.changed = () => this.invalidate(false);
+    scene.failed = (error) => this.#fail(error);
+    if (this.#raycaster) this.#give(scene);
+    scene.loaded.then(() => {
+      if (scene !== this.#scene) return;
+      if (first && scene.camera) this.camera = scene.camera;
+      this.#parts.over.hidden = false;
+      this.invalidate(false);
+    }, (error) => scene === this.#scene && this.#fail(error));
   }
 
   // -- life --------------------------------------------------------------------------------------
@@ -242,7 +259,7 @@ export class VDIViewer extends HTMLElement {
     this.#loading?.abort();
     this.#raycaster?.dispose();
     this.#pacer?.dispose();
-    this.#scene?.dispose?.();
+    this.#scene?.dispose();
     this.#raycaster = this.#pacer = null;
     // Browsers keep some sixteen contexts, and take the oldest from who still shows it
     this.#gl?.getExtension("WEBGL_lose_context")?.loseContext();
@@ -260,9 +277,17 @@ export class VDIViewer extends HTMLElement {
     if (gl.isContextLost()) return;
     this.#raycaster = new Raycaster(gl);
     this.#pacer = new Pacer(gl);
-    this.#scene?.restore?.(gl);
+    if (this.#scene) this.#give(this.#scene);
     this.#resize();
     if (this.#prepared) this.setPrepared(this.#prepared);
+  }
+
+  #give(scene) {
+    try {
+      scene.restore(this.#gl);
+    } catch (error) {
+      this.#fail(error);
+    }
   }
 
   #resize() {
@@ -299,11 +324,13 @@ export class VDIViewer extends HTMLElement {
         const size = moving ? pacer.sizeFor(width, height) : [width, height];
         const full = size[0] === width && size[1] === height;
         const target = pacer.screen(width, height);
-        const done = await pacer.inBands(target, ...size, this.#painter(camera, ...size),
+        const painter = this.#painter(camera, ...size, size[0] / this.clientWidth, moving);
+        const done = await pacer.inBands(target, ...size, painter,
           () => !full || !this.#asked || moving);
         if (this.#gl.isContextLost()) return;
         if (pacer !== this.#pacer || !done) continue;
         pacer.show(target, size, [width, height]);
+        this.#scene?.annotate(this.#parts.over, camera, [width, height]);
         this.#drawn(full, shown === this.#prepared);
         if (this.#asked) continue;
         if (full) return;
@@ -330,29 +357,28 @@ export class VDIViewer extends HTMLElement {
     this.#gl.disable(this.#gl.BLEND);
   }
 
-  // What draws a view into the bound target: called for each band, with the scissor set.
-  #painter(camera, width, height) {
+  // What draws a view into the bound target: called for each band, with the scissor set. `density`:
+  // pixels of it for one of the page, which lines and points are as wide as.
+  #painter(camera, width, height, density = 1, moving = false) {
     const gl = this.#gl, raycaster = this.#raycaster, scene = this.#scene, planes = this.#planes;
-    let depthTexture = null;
     return (target, isFirst) => {
-      if (isFirst && scene) {
-        gl.disable(gl.SCISSOR_TEST);
-        depthTexture = scene.draw(gl, target, camera, width, height);
-        gl.enable(gl.SCISSOR_TEST);
-        gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+      if (scene) {
+        scene.paint(raycaster, { target, isFirst, camera, width, height, density, moving,
+          clippingPlanes: planes });
+        return;
       }
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-      raycaster.draw({ camera, width, height, clippingPlanes: planes, depthTexture });
+      raycaster.draw({ camera, width, height, clippingPlanes: planes });
       gl.disable(gl.BLEND);
     };
   }
 
   // What was drawn, and whether it is still what is to be shown: another level may have come since.
   #drawn(full, latest) {
-    const { state } = this.#status;
+    const { state } = this.#status, whole = this.#scene?.complete ?? true;
     this.dispatchEvent(new CustomEvent("framedrawn", { detail: { full, state } }));
-    if (full && latest && state === "full") this.#ready.resolve(this);
+    if (full && latest && whole && state === "full") this.#ready.resolve(this);
   }
 
   #announceCamera() {

@@ -205,10 +205,12 @@ export class Raycaster {
 /**
  * Compile and link a program.
  *
+ * @param {string[]} [attributes] Names of the vertex shader's inputs, in the order of their places.
  * @throws {Error} With the compiler's words, if it refuses.
  */
-export function linked(gl, vertex, fragment) {
+export function linked(gl, vertex, fragment, attributes = []) {
   const program = gl.createProgram();
+  attributes.forEach((name, place) => gl.bindAttribLocation(program, place, name));
   for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, source);

@@ -1,0 +1,243 @@
+"""A renderer's scene as the viewer shows it: VDIs among meshes, lines, points and texts."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from vtkmodules.vtkRenderingCore import vtkActor, vtkProp3D
+
+from pyvista_vdi.errors import UnsupportedError
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
+from pyvista_vdi.web.camera import viewer_camera
+from pyvista_vdi.web.encode import encoded
+from pyvista_vdi.web.placing import cropped, planes_of, thinned
+from pyvista_vdi.web.scenes.annotations import annotations_of
+from pyvista_vdi.web.scenes.meshes import shapes_of
+
+#: The numbers of a scene's arrays in JavaScript: their names there, by NumPy's.
+_KINDS = {
+    "float32": "Float32Array",
+    "int16": "Int16Array",
+    "uint8": "Uint8Array",
+    "uint32": "Uint32Array",
+}
+
+#: vtkLight's types.
+_LIGHTS = {1: "head", 2: "camera", 3: "scene"}
+
+#: Actors that turn or scale with the view, which the viewer's matrices do not.
+_NOT_PLAIN = ("vtkFollower", "vtkProp3DFollower", "vtkAxisFollower")
+
+_GRADIENTS = {0: "to top", 1: "to right"}  # vtkViewport's vertical and horizontal
+
+
+@dataclass
+class Scene:
+    """What is shown of a renderer.
+
+    Attributes
+    ----------
+    vdi : VDI
+        The first one, as it is sent.
+    data : bytes
+        All the rest, as scene.js takes it.
+    background : str
+        As CSS has it.
+    left_out : list of str
+        What is not shown, by name.
+    """
+
+    vdi: VDI
+    data: bytes
+    background: str
+    left_out: list[str]
+
+
+@dataclass
+class _Packed:
+    """Arrays one behind the other."""
+
+    arrays: list[NDArray[Any]] = field(default_factory=list)
+
+    def keep(self, array: NDArray[Any]) -> int:
+        """Take an array, and return its number."""
+        self.arrays.append(np.ascontiguousarray(array))
+        return len(self.arrays) - 1
+
+    def deflated(self, head: dict[str, Any]) -> bytes:
+        """Return the scene: the length of a JSON text, the text, and the arrays; deflated."""
+        described, at, parts = [], 0, []
+        for array in self.arrays:
+            # Planes of bytes: they deflate to about two thirds
+            data = array.view(np.uint8).reshape(-1, array.itemsize).T.tobytes()
+            described.append([_KINDS[array.dtype.name], at, array.size])
+            data += b"\0" * (-len(data) % 4)
+            parts.append(data)
+            at += len(data)
+        text = json.dumps({**head, "arrays": described}, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        return zlib.compress(len(text).to_bytes(4, "little") + text + b"".join(parts), 6)
+
+
+def scene_of(renderer: Any, names: dict[str, Any] | None = None, *, camera: bool = True) -> Scene:
+    """Return what a renderer shows, for the viewer.
+
+    Parameters
+    ----------
+    renderer : vtkRenderer
+        It has been drawn, so that its VDIs are there.
+    names : dict of str to vtkProp, optional
+        What its props are called, for what is said of those that are left out.
+    camera : bool
+        Whether its view is that in which the viewer begins.
+
+    Raises
+    ------
+    UnsupportedError
+        If it shows no VDI.
+    """
+    called = {prop: name for name, prop in (names or {}).items() if "(Addr" not in name}
+    packed, left_out = _Packed(), _environment(renderer)
+    shapes: list[dict[str, Any]] = []
+    texts: list[dict[str, Any]] = []
+    bodies: list[tuple[VDI, dict[str, Any]]] = []
+    for prop, matrix in _props(renderer):
+        missing: list[str] = []
+        known = True
+        if isinstance(prop, VDIActorMethods):
+            if prop.vdi is not None:  # type: ignore[attr-defined]
+                bodies.append(_body(prop, matrix, missing))
+        elif isinstance(prop, vtkActor) and _is_plain(prop):
+            shapes += shapes_of(prop, matrix, packed.keep, missing)
+        else:
+            described = annotations_of(prop, renderer, missing)
+            known = described is not None
+            texts += described or []
+        title = called.get(prop, type(prop).__name__)
+        if not known:
+            left_out.append(title)
+        left_out += [f"{what} ({title})" for what in missing]
+    if not bodies:
+        raise UnsupportedError("the renderer shows no VDI, so there is nothing for the viewer")
+    described = [{**more, "file": None} for _, more in bodies]
+    for (vdi, _), entry in zip(bodies[1:], described[1:], strict=True):
+        entry["file"] = packed.keep(np.frombuffer(encoded(vdi, coarse=True), np.uint8))
+    head = {
+        "camera": _camera(renderer) if camera else None,
+        "size": list(renderer.GetSize()),
+        "bounds": _bounds(renderer),
+        "lights": list(_lights(renderer)),
+        "shapes": shapes,
+        "texts": texts,
+        "vdis": described,
+    }
+    background = _background(renderer, left_out)
+    return Scene(bodies[0][0], packed.deflated(head), background, list(dict.fromkeys(left_out)))
+
+
+def _props(renderer: Any) -> Iterator[tuple[Any, NDArray[np.float64]]]:
+    """Give what is visible, the parts of assemblies by themselves, and where it is."""
+    props = renderer.GetViewProps()
+    for prop in [props.GetItemAsObject(i) for i in range(props.GetNumberOfItems())]:
+        if not prop.GetVisibility():
+            continue
+        if not isinstance(prop, vtkProp3D) or prop.GetNumberOfPaths() <= 1:
+            matrix = prop.GetMatrix() if hasattr(prop, "GetMatrix") else None
+            yield prop, _array(matrix)
+            continue
+        paths = []
+        prop.InitPathTraversal()
+        while (path := prop.GetNextPath()) is not None:
+            nodes = [path.GetItemAsObject(k) for k in range(path.GetNumberOfItems())]
+            paths.append(([node.GetViewProp() for node in nodes], nodes[-1].GetMatrix()))
+        for parts, matrix in paths:
+            if all(part.GetVisibility() for part in parts):
+                yield parts[-1], _array(matrix)
+
+
+def _array(matrix: Any) -> NDArray[np.float64]:
+    if matrix is None:
+        return np.eye(4)
+    return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
+
+
+def _is_plain(prop: Any) -> bool:
+    shader = prop.GetShaderProperty()
+    changed = shader is not None and (
+        shader.GetNumberOfShaderReplacements() or shader.HasFragmentShaderCode()
+    )
+    return prop.GetMapper() is not None and not changed and not any(map(prop.IsA, _NOT_PLAIN))
+
+
+def _body(actor: Any, matrix: Any, missing: list[str]) -> tuple[VDI, dict[str, Any]]:
+    if cropped(actor):
+        missing.append("cropping")
+    vdi = thinned(actor.vdi, actor.opacity_multiplier)
+    return vdi, {"planes": planes_of(actor), "matrix": matrix.tolist()}
+
+
+def _camera(renderer: Any) -> dict[str, Any]:
+    return viewer_camera(renderer.GetActiveCamera(), renderer.GetSize())
+
+
+def _bounds(renderer: Any) -> list[float] | None:
+    """Return the box by which VTK sets its clipping range, which translucent layers depend on."""
+    bounds = renderer.ComputeVisiblePropBounds()
+    return list(bounds) if bounds[0] <= bounds[1] else None
+
+
+def _lights(renderer: Any) -> Iterator[dict[str, Any]]:
+    lights = renderer.GetLights()
+    for light in [lights.GetItemAsObject(i) for i in range(lights.GetNumberOfItems())]:
+        if not light.GetSwitch():
+            continue
+        kind = _LIGHTS[light.GetLightType()]
+        # Lights of the camera are given where it stands at (0, 0, 1) and looks at the origin
+        yield {
+            "kind": kind,
+            "color": [channel * light.GetIntensity() for channel in light.GetDiffuseColor()],
+            "position": list(light.GetPosition()) if kind != "head" else [0, 0, 1],
+            "focalPoint": list(light.GetFocalPoint()) if kind != "head" else [0, 0, 0],
+            "positional": bool(light.GetPositional()),
+            "cone": light.GetConeAngle(),
+            "exponent": light.GetExponent(),
+            "attenuation": list(light.GetAttenuationValues()),
+        }
+
+
+def _environment(renderer: Any) -> list[str]:
+    """Name what is drawn around a renderer's props, and cannot be shown."""
+    left_out = []
+    if renderer.GetPass() is not None:
+        left_out.append(f"its render pass ({renderer.GetPass().GetClassName()})")
+    if renderer.GetUseHiddenLineRemoval():
+        left_out.append("hidden line removal")
+    if renderer.GetUseShadows():
+        left_out.append("shadows")
+    return left_out
+
+
+def _background(renderer: Any, left_out: list[str]) -> str:
+    """Return a renderer's background as CSS."""
+    if renderer.GetTexturedBackground():
+        left_out.append("the background's texture")
+    color = css(renderer.GetBackground())
+    if not renderer.GetGradientBackground():
+        return color
+    direction = _GRADIENTS.get(renderer.GetGradientMode())
+    if direction is None:
+        left_out.append("the background's radial gradient")
+        return color
+    return f"linear-gradient({direction}, {color}, {css(renderer.GetBackground2())})"
+
+
+def css(color: Sequence[float]) -> str:
+    """Return RGB from 0 to 1 as CSS."""
+    return f"rgb({' '.join(f'{100 * channel:g}%' for channel in color)})"

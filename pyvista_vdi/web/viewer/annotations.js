@@ -1,0 +1,93 @@
+// Texts and scalar bars over a picture, drawn by the page's own fonts at the screen's own pixels.
+
+const FAMILIES = { Arial: "Arial, Helvetica, 'Liberation Sans', sans-serif",
+  Courier: "'Courier New', Courier, 'Liberation Mono', monospace",
+  Times: "'Times New Roman', Times, 'Liberation Serif', serif" };
+
+const css = ([r, g, b, a = 1]) => `rgb(${100 * r}% ${100 * g}% ${100 * b}% / ${a})`;
+
+/**
+ * Draw what web/scenes/annotations.py has described.
+ *
+ * @param {CanvasRenderingContext2D} on A canvas of width x height pixels.
+ * @param {object[]} items
+ * @param {number[]} from Width and height, pixels, of the window that the items are of.
+ * @param {function(number[]): number[]|null} project World to parts of the window, from the lower
+ *   left corner; null for what is behind the eye.
+ */
+export function annotate(on, items, from, project) {
+  const { width, height } = on.canvas;
+  on.clearRect(0, 0, width, height);
+  const scale = Math.min(width / from[0], height / from[1]);
+  for (const item of items) {
+    on.save();
+    if (item.kind === "box") drawBox(on, item, width, height, scale);
+    else drawText(on, item, width, height, scale, project);
+    on.restore();
+  }
+}
+
+function drawBox(on, { place, color, colors, upright, outline, line }, width, height, scale) {
+  const [x0, y0, x1, y1] = [place[0] * width, place[1] * height, place[2] * width, place[3] * height];
+  if (color) {
+    on.fillStyle = css(color);
+    on.fillRect(x0, height - y1, x1 - x0, y1 - y0);
+  }
+  const count = (colors?.length ?? 0) / 4;
+  for (let k = 0; k < count; ++k) {
+    const [r, g, b, a] = colors.slice(4 * k, 4 * k + 4);
+    on.fillStyle = `rgb(${r} ${g} ${b} / ${a / 255})`;
+    // To whole pixels: two that share one would be seen through
+    const ends = (low, high) => [k, k + 1].map((n) => Math.round(low + (high - low) * n / count));
+    const [from, to] = upright ? ends(y0, y1) : ends(x0, x1);
+    if (upright) on.fillRect(x0, height - to, x1 - x0, to - from);
+    else on.fillRect(from, height - y1, to - from, y1 - y0);
+  }
+  if (outline) {
+    on.strokeStyle = css(outline);
+    on.lineWidth = line * scale;
+    on.strokeRect(x0, height - y1, x1 - x0, y1 - y0);
+  }
+}
+
+function drawText(on, item, width, height, scale, project) {
+  const place = item.at ? project(item.at) : item.place;
+  if (!place) return;
+  const size = item.size * scale;
+  const style = `${item.italic ? "italic " : ""}${item.bold ? "bold " : ""}`;
+  on.font = `${style}${size}px ${FAMILIES[item.family] ?? FAMILIES.Arial}`;
+  on.translate(place[0] * width, (1 - place[1]) * height);
+  on.rotate((-item.angle * Math.PI) / 180);
+  on.textBaseline = "alphabetic";
+  const lines = item.text.split("\n");
+  // As VTK has it: the height of a line is that of the font's letters with what hangs below them
+  const measured = on.measureText("_/7Agfy");
+  const up = measured.actualBoundingBoxAscent, down = measured.actualBoundingBoxDescent;
+  const step = (up + down) * item.spacing * 1.1;
+  const high = up + down + step * (lines.length - 1);
+  const top = { top: 0, middle: -high / 2, bottom: -high }[item.along];
+  const wide = Math.max(...lines.map((line) => on.measureText(line).width));
+  const left = { left: 0, center: -wide / 2, right: -wide }[item.across];
+  const margin = 2 * scale;
+  const around = [left - margin, top - margin, wide + 2 * margin, high + 2 * margin];
+  if (item.background) {
+    on.fillStyle = css(item.background);
+    on.fillRect(...around);
+  }
+  if (item.frame) {
+    on.strokeStyle = css(item.frame);
+    on.lineWidth = item.frame[3] * scale;
+    on.strokeRect(...around);
+  }
+  const write = (dx, dy, color) => {
+    on.fillStyle = css(color);
+    on.textAlign = item.across;
+    lines.forEach((line, k) => on.fillText(line, dx, top + up + step * k + dy));
+  };
+  if (item.shadow) {
+    const luminance = 0.3 * item.color[0] + 0.59 * item.color[1] + 0.11 * item.color[2];
+    const grey = luminance > 0.5 ? 0 : 1;
+    write(item.shadow[0] * scale, -item.shadow[1] * scale, [grey, grey, grey, item.color[3]]);
+  }
+  write(0, 0, item.color);
+}
