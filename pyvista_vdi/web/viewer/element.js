@@ -361,10 +361,10 @@ export class VDIViewer extends HTMLElement {
   // pixels of it for one of the page, which lines and points are as wide as.
   #painter(camera, width, height, density = 1, moving = false) {
     const gl = this.#gl, raycaster = this.#raycaster, scene = this.#scene, planes = this.#planes;
-    return (target, isFirst) => {
+    const view = { camera, width, height, density, moving, clippingPlanes: planes };
+    return (target) => {
       if (scene) {
-        scene.paint(raycaster, { target, isFirst, camera, width, height, density, moving,
-          clippingPlanes: planes });
+        scene.paint(raycaster, target, view);
         return;
       }
       gl.enable(gl.BLEND);

@@ -23,6 +23,7 @@ export class Scene {
   #gl = null;
   #programs = new Map();
   #buffers = null;
+  #drawn = null; // the view whose meshes they hold
   #shapes = [];
   #bodies = []; // VDIs; the first is the viewer's own
   #vertices = null;
@@ -80,7 +81,7 @@ export class Scene {
   restore(gl) {
     this.#gl = gl;
     this.#programs.clear();
-    this.#buffers = null;
+    this.#buffers = this.#drawn = null;
     this.#vertices = gl.createVertexArray();
     if (!gl.getExtension("EXT_color_buffer_float")) {
       throw new Error("This browser's graphics cannot draw depths as numbers " +
@@ -119,17 +120,20 @@ export class Scene {
    * Draw a view, or a band of it, into the bound target, with the scissor set.
    *
    * @param {Raycaster} raycaster The viewer's own VDI.
-   * @param {object} view target, isFirst (band), camera, width, height, density (pixels of it for
-   *   one of the page), moving, clippingPlanes.
+   * @param {object} target Of a Pacer.
+   * @param {object} view camera, width, height, density (pixels of it for one of the page), moving,
+   *   clippingPlanes; the same object for all bands of a picture.
    */
-  paint(raycaster, view) {
-    const gl = this.#gl, { target, isFirst, width, height } = view;
+  paint(raycaster, target, view) {
+    const gl = this.#gl, { width, height } = view;
+    if (!gl) return; // another scene has taken its place meanwhile
     let depthTexture = null;
     if (this.#shapes.length) {
-      if (isFirst) {
+      if (this.#drawn !== view) { // in the first band, and where another picture came between
         gl.disable(gl.SCISSOR_TEST);
-        this.#drawShapes(view);
+        this.#drawShapes(target, view);
         gl.enable(gl.SCISSOR_TEST);
+        this.#drawn = view;
       }
       gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.#buffers.color.framebuffer);
       gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, target.framebuffer);
@@ -164,8 +168,8 @@ export class Scene {
 
   // -- meshes ------------------------------------------------------------------------------------
 
-  #drawShapes(view) {
-    const gl = this.#gl, { target, width, height } = view;
+  #drawShapes(target, view) {
+    const gl = this.#gl, { width, height } = view;
     const opaque = this.#shapes.filter(({ translucent }) => !translucent);
     const layers = this.#shapes.filter(({ translucent }) => translucent);
     const buffers = this.#sized(target.width, target.height, layers.length > 0);
@@ -392,7 +396,7 @@ export class Scene {
       gl.deleteTexture(sums ?? null);
       renderbuffers.forEach((buffer) => gl.deleteRenderbuffer(buffer));
     }
-    this.#buffers = null;
+    this.#buffers = this.#drawn = null;
   }
 }
 
