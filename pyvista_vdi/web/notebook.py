@@ -63,25 +63,27 @@ def show_plotter(plotter: Any, *, screenshot: Any = None, **options: Any) -> Any
     from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 
     plotter.render()  # VDIs are made in the first frame
-    shown = {k: actor for k, actor in plotter.renderer.actors.items() if actor.GetVisibility()}
-    vdis = [name for name, actor in shown.items() if isinstance(actor, VDIActorMethods)]
-    if not vdis:
+    renderer = plotter.renderer
+    shown = [actor for actor in renderer.actors.values() if actor.GetVisibility()]
+    if not any(isinstance(actor, VDIActorMethods) for actor in shown):
         return _shown_by_pyvista(plotter, screenshot, options)
     try:
-        from pyvista_vdi.web.placing import left_out
         from pyvista_vdi.web.plotter_widget import PlotterWidget
     except MissingDependencyError as error:
         warnings.warn(str(error), stacklevel=2)
         return _shown_by_pyvista(plotter, screenshot, options)
-    actor = shown.pop(vdis[0])
-    without = [*shown, *left_out(actor)]
+    from pyvista_vdi.web.scenes.export import around
+    from pyvista_vdi.web.scenes.scene import scene_of
+
+    scene = scene_of(renderer, renderer.actors, camera=False)
+    without = [*scene.left_out, *around(plotter)]
     if without:
         warnings.warn(
-            f"the notebook's viewer shows one VDI alone, without {', '.join(without)}: see all by "
+            f"the notebook's viewer shows the scene without {', '.join(without)}: see all by "
             'jupyter_backend="server"',
             stacklevel=2,
         )
-    return PlotterWidget(plotter, actor, plotter.screenshot(screenshot, return_img=True))
+    return PlotterWidget(plotter, scene, plotter.screenshot(screenshot, return_img=True))
 
 
 def _shown_by_pyvista(plotter: Any, screenshot: Any, options: dict[str, Any]) -> Any:

@@ -23,7 +23,7 @@ def as_shown(actor: Any) -> VDI:
     """Return an actor's VDI, thinned or thickened by its multiplier, and where the actor is.
 
     A VDI moves with its generating view. So it can be where the actor has been moved and turned
-    to, but not where it has been stretched: see :func:`left_out`.
+    to, but not where it has been stretched: that takes a scene.
     """
     vdi, multiplier = actor.vdi, actor.opacity_multiplier
     motion = _motion(actor)
@@ -65,11 +65,6 @@ def planes_of(actor: Any) -> list[list[float]]:
     planes = actor.GetMapper().GetClippingPlanes()
     items = [planes.GetItem(i) for i in range(0 if planes is None else planes.GetNumberOfItems())]
     return [[*plane.GetOrigin(), *plane.GetNormal()] for plane in items]
-
-
-def left_out(actor: Any) -> list[str]:
-    """Return what a viewer does not show of how an actor is drawn."""
-    return ["its cropping"] * cropped(actor) + ["its scale"] * (_motion(actor) is None)
 
 
 def cropped(actor: Any) -> bool:

@@ -1,4 +1,4 @@
-"""``PlotterWidget``: a plotter's VDI in a notebook's output, with the plotter's camera."""
+"""``PlotterWidget``: a plotter's scene in a notebook's output, with the plotter's camera."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.vtk_pipeline.interaction import browser
+from pyvista_vdi.web.bundle import viewer_script
 from pyvista_vdi.web.camera import viewer_camera
 from pyvista_vdi.web.placing import as_shown, look_of, planes_of
 from pyvista_vdi.web.still import png
-from pyvista_vdi.web.widget import VDIWidget
+from pyvista_vdi.web.widget import RENDER, VDIWidget
 
 #: Seconds without a turn from which a view rests.
 _REST = 0.2
@@ -23,23 +24,25 @@ class PlotterWidget(VDIWidget):
     """What ``plotter.show(jupyter_backend="vdi")`` shows.
 
     What is turned in the browser turns the plotter's camera; after each ``plotter.render()`` the
-    browser has the plotter's camera and background, and the VDI with its clipping planes, opacity
-    multiplier and place. When a view rests the plotter is rendered
-    in the kernel's event loop: its VDI is kept up to date as in a window on a screen.
+    browser has the plotter's camera and background, its VDIs with their clipping planes, opacity
+    multipliers and places, and its meshes, lines, points and texts. When a view rests the plotter
+    is rendered in the kernel's event loop: its VDIs are kept up to date as in a window on a screen.
 
     Parameters
     ----------
     plotter : pyvista.Plotter
         Rendered before; held weakly.
-    actor : PlotterVDIActor
-        Its VDI that is shown.
+    scene : Scene
+        What its active renderer shows.
     picture : numpy.ndarray
         uint8 (H, W, 3), the plotter's picture, which is kept in a saved notebook.
     """
 
-    def __init__(self, plotter: Any, actor: Any, picture: Any) -> None:
+    _esm = viewer_script(scene=True, module=True) + RENDER
+
+    def __init__(self, plotter: Any, scene: Any, picture: Any) -> None:
         self._plotter = weakref.ref(plotter)
-        self._actor = actor
+        self._actor = actor = scene.actor
         self._picture = picture
         self._rest: asyncio.TimerHandle | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -49,6 +52,7 @@ class PlotterWidget(VDIWidget):
         shown = as_shown(actor)
         super().__init__(shown, camera=plotter.camera, background=plotter.background_color)
         self.clipping_planes = planes_of(actor)
+        self._take(scene)
         self._picture_size = list(plotter.window_size)
         self.observe(self._turn, "camera")
         me = weakref.ref(self)
@@ -116,9 +120,22 @@ class PlotterWidget(VDIWidget):
             self.camera = camera
         self.background = plotter.background_color
         self.clipping_planes = planes_of(self._actor)
+        self._take_if_new(plotter.renderer)
         if self._actor.vdi is not None and look_of(self._actor) != self._look:
             self._look = look_of(self._actor)
             self.vdi = as_shown(self._actor)
+
+    def _take_if_new(self, renderer: Any) -> None:
+        from pyvista_vdi.web.scenes.scene import scene_of, state_of
+
+        if self._known != state_of(renderer):
+            self._take(scene_of(renderer, camera=False))
+
+    def _take(self, scene: Any) -> None:
+        self._known = scene.state
+        if scene.data != self._scene:
+            self._scene = scene.data
+        self._gradient = scene.background if "gradient" in scene.background else ""
 
     def _still(self) -> str:
         return png(self._picture)

@@ -32,7 +32,7 @@ except ImportError as error:
     ) from error
 
 #: What anywidget calls in the page: a view of the model that the kernel's widget is.
-_RENDER = """
+RENDER = """
 function render({ model, el }) {
   const viewer = document.createElement("vdi-viewer");
   const [width, height] = model.get("_picture_size");
@@ -59,19 +59,27 @@ function render({ model, el }) {
     told = told || requestAnimationFrame(tellCamera);
   };
   const takeBackground = () => {
-    viewer.background = model.get("background") ?? "transparent";
+    viewer.background = model.get("_gradient") || (model.get("background") ?? "transparent");
   };
   const takePlanes = () => {
-    viewer.clippingPlanes = model.get("clipping_planes")
-      .map((plane) => ({ origin: plane.slice(0, 3), normal: plane.slice(3) }));
+    // A scene has its own
+    const planes = model.get("_scene")?.byteLength ? [] : model.get("clipping_planes");
+    viewer.clippingPlanes =
+      planes.map((plane) => ({ origin: plane.slice(0, 3), normal: plane.slice(3) }));
+  };
+  const bytesOf = ({ buffer, byteOffset, byteLength }) =>
+    new Uint8Array(buffer, byteOffset, byteLength);
+  const takeScene = () => {
+    const packed = model.get("_scene"); // of a plotter
+    if (packed?.byteLength) viewer.scene = new Scene(bytesOf(packed));
   };
   const takeFile = () => {
-    const { buffer, byteOffset, byteLength } = model.get("_file");
-    viewer.showBytes(new Uint8Array(buffer, byteOffset, byteLength));
+    viewer.showBytes(bytesOf(model.get("_file")));
   };
   el.replaceChildren(viewer);
   const taken = {
-    background: takeBackground, clipping_planes: takePlanes, _file: takeFile, camera: takeCamera,
+    background: takeBackground, _gradient: takeBackground, clipping_planes: takePlanes,
+    _scene: takeScene, _file: takeFile, camera: takeCamera,
   };
   for (const [name, take] of Object.entries(taken)) {
     take();
@@ -155,8 +163,10 @@ class VDIWidget(anywidget.AnyWidget):
     >>> widget  # doctest: +SKIP
     """
 
-    _esm = viewer_script(module=True) + _RENDER
+    _esm = viewer_script(module=True) + RENDER
     _file = traitlets.Bytes().tag(sync=True)
+    _scene = traitlets.Bytes().tag(sync=True)  # what else a plotter shows
+    _gradient = traitlets.Unicode("").tag(sync=True)  # CSS of a plotter's background
     _picture_size = traitlets.List(traitlets.Int(), [1, 1]).tag(sync=True)
     camera = _CameraTrait(allow_none=False).tag(sync=True)
     background = _ColorTrait(None, allow_none=True).tag(sync=True)

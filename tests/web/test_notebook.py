@@ -306,11 +306,36 @@ def test_what_the_viewer_leaves_out_is_named(plotter):
     actor = plotter.add_vdi(as_image(soft_ball()), cmap="bone", show_scalar_bar=False)
     plotter.add_mesh(pv.Sphere(), name="a ball")
     plotter.screenshot()
-    actor.scale = 1, 2, 1
     actor.mapper.SetCropping(True)
     actor.mapper.SetCroppingRegionPlanes(0, 1, 0, 1, 0, 1)
-    with pytest.warns(UserWarning, match="without a ball, its cropping, its scale"):
+    plotter.add_point_labels([[0.0, 0.0, 0.0]], ["here"], name="a label")
+    with pytest.warns(UserWarning, match=r"without cropping \(\w+\), a label.*: see all by"):
         show_plotter(plotter)
+
+
+@pytest.mark.gl
+def test_a_scene_is_sent_again_when_something_in_it_is_another(plotter):
+    import pyvista as pv
+
+    plotter.add_vdi(as_image(soft_ball()), cmap="bone", regenerate="never")
+    sphere = plotter.add_mesh(pv.Sphere(), color="w")
+    widget = show(plotter)
+    scenes = [widget._scene]
+    plotter.camera.azimuth = 30
+    plotter.render()
+    assert widget._scene is scenes[0]  # the view has a trait of its own
+    for change in (
+        lambda: setattr(sphere.prop, "color", "red"),
+        lambda: setattr(sphere, "position", (1, 0, 0)),
+        lambda: plotter.add_text("a text"),
+        lambda: setattr(sphere, "visibility", False),
+        lambda: plotter.set_background("w", top="b"),
+    ):
+        change()
+        plotter.render()
+        scenes.append(widget._scene)
+    assert len(set(scenes)) >= len(scenes) - 1  # a background is no part of it
+    assert widget._gradient.startswith("linear-gradient")
 
 
 @pytest.mark.gl
@@ -395,7 +420,9 @@ PAGE = """<!doctype html><meta charset="utf-8"><div id="one" style="width: 192px
 <div id="two" style="width: 192px"></div><script type="module">
 import widget from "./widget.js";
 const heard = {}, values = STATE;
-values._file = new DataView(await (await fetch("x.vdi")).arrayBuffer());
+const fetched = async (name) => new DataView(await (await fetch(name)).arrayBuffer());
+values._file = await fetched("x.vdi");
+if (values._scene) values._scene = await fetched("x.scene");
 window.sent = [];
 window.model = {
   get: (name) => values[name],
@@ -460,3 +487,48 @@ def test_the_view_draws_and_shares_its_camera(open_page, widget, vdi):
     page.evaluate("leave.forEach((go) => go())")
     left = "[model.listeners(), document.querySelectorAll('vdi-viewer').length]"
     assert page.evaluate(left) == [0, 0]
+
+
+@pytest.mark.gl
+def test_the_view_shows_a_plotter_s_scene_and_another_in_its_place(open_page, plotter):
+    import pyvista as pv
+
+    plotter.add_vdi(as_image(soft_ball()), cmap="bone", show_scalar_bar=False, regenerate="never")
+    center = np.add(plotter.center, (0, 0, 0.9))
+    ball = plotter.add_mesh(pv.Sphere(radius=0.2, center=center), color="red", lighting=False)
+    plotter.view_xy()
+    plotter.set_background("k")
+    widget = show(plotter)
+    state = {"camera": widget.camera, "background": None, "_picture_size": SIZE}
+    state |= {"clipping_planes": [], "_scene": True}
+    files = {
+        "widget.html": PAGE.replace("STATE", json.dumps(state)),
+        "widget.js": widget._esm,
+        "x.vdi": widget._file,
+        "x.scene": widget._scene,
+    }
+    page = open_page(name="widget.html", files=files)
+    page.wait_for("window.begun")
+    size = f"{{ width: {SIZE[0]}, height: {SIZE[1]} }}"
+
+    def red():
+        shot = page.evaluate(f"viewers[0].screenshot({size}).then((shot) => textOf(shot.data))")
+        got = np.frombuffer(base64.b64decode(shot), np.uint8).reshape(*SIZE[::-1], 4).astype(int)
+        return got[..., 0] - got[..., 1] > 200
+
+    expected = plotter.screenshot().astype(int)
+    expected = expected[..., 0] - expected[..., 1] > 200
+    assert expected.sum() > 40
+    assert (red() != expected).sum() < 0.1 * expected.sum()  # pixels of the silhouette
+    ball.visibility = False
+    plotter.render()
+    page.evaluate(
+        """(text) => {
+          const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+          window.before = viewers[0].scene;
+          model.set("_scene", new DataView(bytes.buffer));
+          return viewers[0].scene.whole.then(() => true);
+        }""",
+        base64.b64encode(widget._scene).decode(),
+    )
+    assert not red().any()

@@ -17,7 +17,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.web.camera import viewer_camera
 from pyvista_vdi.web.encode import encoded
-from pyvista_vdi.web.placing import cropped, planes_of, thinned
+from pyvista_vdi.web.placing import cropped, look_of, planes_of, thinned
 from pyvista_vdi.web.scenes.annotations import annotations_of
 from pyvista_vdi.web.scenes.meshes import shapes_of
 
@@ -46,6 +46,10 @@ class Scene:
     ----------
     vdi : VDI
         The first one, as it is sent.
+    actor : VDIActor
+        Its actor.
+    state : tuple
+        Of :func:`state_of`.
     data : bytes
         All the rest, as scene.js takes it.
     background : str
@@ -55,6 +59,8 @@ class Scene:
     """
 
     vdi: VDI
+    actor: Any
+    state: Any
     data: bytes
     background: str
     left_out: list[str]
@@ -108,12 +114,14 @@ def scene_of(renderer: Any, names: dict[str, Any] | None = None, *, camera: bool
     shapes: list[dict[str, Any]] = []
     texts: list[dict[str, Any]] = []
     bodies: list[tuple[VDI, dict[str, Any]]] = []
+    actors: list[Any] = []
     for prop, matrix in _props(renderer):
         missing: list[str] = []
         known = True
         if isinstance(prop, VDIActorMethods):
             if prop.vdi is not None:  # type: ignore[attr-defined]
                 bodies.append(_body(prop, matrix, missing))
+                actors.append(prop)
         elif isinstance(prop, vtkActor) and _is_plain(prop):
             shapes += shapes_of(prop, matrix, packed.keep, missing)
         else:
@@ -139,7 +147,30 @@ def scene_of(renderer: Any, names: dict[str, Any] | None = None, *, camera: bool
         "vdis": described,
     }
     background = _background(renderer, left_out)
-    return Scene(bodies[0][0], packed.deflated(head), background, list(dict.fromkeys(left_out)))
+    return Scene(
+        vdi=bodies[0][0],
+        actor=actors[0],
+        state=state_of(renderer),
+        data=packed.deflated(head),
+        background=background,
+        left_out=list(dict.fromkeys(left_out)),
+    )
+
+
+def state_of(renderer: Any) -> tuple[Any, ...]:
+    """Return what a scene depends on, but for its camera; another value asks for another scene."""
+    props = renderer.GetViewProps()
+    states: list[Any] = []
+    for prop in [props.GetItemAsObject(i) for i in range(props.GetNumberOfItems())]:
+        state: list[Any] = [prop.GetAddressAsString(""), bool(prop.GetVisibility())]
+        if isinstance(prop, VDIActorMethods):
+            # The mapper is modified in each frame
+            state += [*look_of(prop), *map(tuple, planes_of(prop))]
+        else:
+            state.append(prop.GetRedrawMTime())
+        states.append(tuple(state))
+    lights = json.dumps(list(_lights(renderer)))
+    return tuple(states), tuple(renderer.GetSize()), lights, _background(renderer, [])
 
 
 def _props(renderer: Any) -> Iterator[tuple[Any, NDArray[np.float64]]]:

@@ -40,7 +40,8 @@ export class VDIViewer extends HTMLElement {
   #moved = -Infinity;
   #drawing = false;
   #asked = false;
-  #scene = null;
+  #scene = null; // what is drawn
+  #coming = null; // what will be, as soon as it can
 
   constructor() {
     super();
@@ -190,26 +191,28 @@ export class VDIViewer extends HTMLElement {
 
   /** What is seen beside the VDI: a Scene of scene.js, or null. Swapped whole. */
   get scene() {
-    return this.#scene;
+    return this.#coming;
   }
 
   set scene(scene) {
-    if (scene === this.#scene) return;
-    const first = !this.#scene;
+    if (scene === this.#coming) return;
+    this.#coming = scene;
+    const isWanted = () => scene === this.#coming;
+    if (scene) scene.failed = (error) => isWanted() && this.#fail(error);
+    if (!scene || !this.#scene) this.#takeScene(scene);
+    else scene.whole.then(() => isWanted() && this.#takeScene(scene), () => {});
+    scene?.loaded.then(() => {
+      if (isWanted() && scene.camera) this.camera = scene.camera;
+    }, () => {});
+  }
+
+  #takeScene(scene) {
     this.#scene?.dispose();
     this.#scene = scene;
-    this.#parts.over.hidden = true;
+    this.#parts.over.hidden = !scene;
+    if (scene) scene.changed = () => this.invalidate(false);
+    if (scene && this.#raycaster) this.#give(scene);
     this.invalidate(false);
-    if (!scene) return;
-    scene.changed = () => this.invalidate(false);
-    scene.failed = (error) => this.#fail(error);
-    if (this.#raycaster) this.#give(scene);
-    scene.loaded.then(() => {
-      if (scene !== this.#scene) return;
-      if (first && scene.camera) this.camera = scene.camera;
-      this.#parts.over.hidden = false;
-      this.invalidate(false);
-    }, (error) => scene === this.#scene && this.#fail(error));
   }
 
   // -- life --------------------------------------------------------------------------------------

@@ -33,15 +33,21 @@ export class Scene {
   constructor(bytes) {
     /** The view that the scene begins in, if it says one; null before it is loaded. */
     this.camera = null;
-    /** Called when there is more to be seen. */
-    this.changed = () => {};
+    /** Called when there is more to be seen, and with what is wrong. */
+    this.changed = this.failed = () => {};
     /** Whether all of it can be drawn. */
     this.complete = false;
-    /** Fulfilled when meshes and texts are there; rejected with what is wrong. */
+    /** Fulfilled when meshes and texts are there. */
     this.loaded = this.#load(bytes);
-    this.loaded.catch(() => {});
+    /** Fulfilled when all can be drawn. */
+    this.whole = this.loaded.then((others) => Promise.all(others)).then(() => {
+      this.complete = true;
+      this.changed();
+    });
+    this.whole.catch((error) => this.failed(error));
   }
 
+  // Returns promises of the VDIs that are in it.
   async #load(bytes) {
     const { head, arrays } = await unpackedScene(bytes);
     this.head = head;
@@ -55,19 +61,9 @@ export class Scene {
       for (const map of [shape.table, shape.texture]) if (map) map.data = arrays[map.texels];
     }
     if (this.#gl) this.restore(this.#gl);
-    const others = head.vdis.map(({ file }, k) => file === null ? null
+    this.changed();
+    return head.vdis.map(({ file }, k) => file === null ? null
       : load(arrays[file], { onLevel: (prepared) => this.#take(k, prepared) }));
-    this.#await(others);
-  }
-
-  async #await(others) {
-    try {
-      await Promise.all(others);
-      this.complete = true;
-      this.changed();
-    } catch (error) {
-      this.failed?.(error);
-    }
   }
 
   #take(k, prepared) {
@@ -83,7 +79,7 @@ export class Scene {
     this.#programs.clear();
     this.#buffers = this.#drawn = null;
     this.#vertices = gl.createVertexArray();
-    if (!gl.getExtension("EXT_color_buffer_float")) {
+    if (this.#shapes.length && !gl.getExtension("EXT_color_buffer_float")) {
       throw new Error("This browser's graphics cannot draw depths as numbers " +
         "(EXT_color_buffer_float), by which meshes hide a volume.");
     }
