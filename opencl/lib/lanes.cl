@@ -2,6 +2,7 @@
 //
 // -D LANES  1 (default): a work-item follows one ray, and what vectors there are is the compiler's business
 //           16: it follows that many together, in vectors that are written out
+// -D FUNCTIONS_BY_LANE  the driver's functions may round a vector otherwise than a number: it is not asked for them
 //
 // A formula is written once, of Real, Int and Uint; only loads, stores and transposes differ (#if LANES == 1). Truth values are
 // Int: 1 in one lane, all bits in a vector. They are joined by &, | and !, never by ~, and are not counted with: COUNT is.
@@ -105,6 +106,25 @@ typedef union {
     Int all;
     int each[LANES];
 } Places;
+
+// A function of the driver's, of each lane: by itself, if a vector's is another one
+#if LANES == 1 || !defined(FUNCTIONS_BY_LANE)
+#define FUNCTION_OF_LANES(name, of_number)          \
+    inline Real name(Real x)                        \
+    {                                               \
+        return of_number(x);                        \
+    }
+#else
+#define FUNCTION_OF_LANES(name, of_number)                                                                              \
+    inline Real name(Real x)                                                                                            \
+    {                                                                                                                   \
+        const float *of_x = (const float *)&x;                                                                          \
+        return (Real)(of_number(of_x[0]), of_number(of_x[1]), of_number(of_x[2]), of_number(of_x[3]),                   \
+                      of_number(of_x[4]), of_number(of_x[5]), of_number(of_x[6]), of_number(of_x[7]),                   \
+                      of_number(of_x[8]), of_number(of_x[9]), of_number(of_x[10]), of_number(of_x[11]),                 \
+                      of_number(of_x[12]), of_number(of_x[13]), of_number(of_x[14]), of_number(of_x[15]));              \
+    }
+#endif
 
 // The lower and the higher of two numbers that are never NaN: one instruction each
 #define LOWER_OF(x, y) SELECT(y, x, (x) < (y))

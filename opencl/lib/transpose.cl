@@ -20,4 +20,16 @@ inline Real4 transpose(Real4 rows)
     return REAL4(FIRST_HALVES(first_01, first_23).JOINED, SECOND_HALVES(first_01, first_23).JOINED,
                  FIRST_HALVES(second_01, second_23).JOINED, SECOND_HALVES(second_01, second_23).JOINED);
 }
+
+// Four numbers of each lane, from the `at`-th four on.
+inline Real4 load_fours(__global const float4 *from, Int at)
+{
+    const Places places = {at};
+    Place *each = places.each;
+#define FOUR(n) (*((__global const volatile float4 *)from + each[n]))
+#define FOURS(n) (Real)(FOUR(n), FOUR((n) + 4), FOUR((n) + 8), FOUR((n) + 12))
+    return transpose(REAL4(FOURS(0), FOURS(1), FOURS(2), FOURS(3)));
+#undef FOUR
+#undef FOURS
+}
 #endif

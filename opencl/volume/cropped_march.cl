@@ -7,11 +7,11 @@
 
 #ifdef CROPPED
 // The kept parts of a ray, in t.
-inline Kept kept_march(const March *march, __global const float *form, float a, float b, uint regions)
+inline Kept kept_march(const March *march, __global const float *form, Real a, Real b, uint regions)
 {
-    float at_t0[CROPPING_PLANES], at_t1[CROPPING_PLANES];
+    Real at_t0[CROPPING_PLANES], at_t1[CROPPING_PLANES];
     for (int k = 0; k < CROPPING_PLANES; ++k, form += FORM_SIZE) {
-        const float value = march_value(march, form, a, b);
+        const Real value = march_value(march, form, a, b);
         at_t0[k] = fma(march->t0, form_slope(form, a, b), value);
         at_t1[k] = fma(march->t1, form_slope(form, a, b), value);
     }
@@ -19,11 +19,11 @@ inline Kept kept_march(const March *march, __global const float *form, float a, 
 }
 
 // The share of a step that is kept.
-inline float kept_share(const Kept *kept, float front, float back)
+inline Real kept_share(const Kept *kept, Real front, Real back)
 {
-    float sum = 0.0f;
+    Real sum = 0.0f;
     for (int n = 0; n < MOST_KEPT; ++n) {
-        float from = front, to = back;
+        Real from = front, to = back;
         cut_to_part(kept, n, &from, &to);
         sum += fmax(to - from, 0.0f);
     }

@@ -6,7 +6,7 @@
 // -D BY_SCALAR     with NEAREST and voxels of integers: the table holds the medium of each scalar from `low` on, of which no
 //                  voxel is outside (volume/scalar_media.cl); otherwise it is classified at each sample
 // -D DOUBLE_FLOAT_RAYS   see lib/rays.cl: t counts from where the ray enters
-// -D LANES         see lib/lanes.cl; 16 with BY_SCALAR and INDEX_T of uint, and without DOUBLE_FLOAT_RAYS, SAMPLED and what is below
+// -D LANES         see lib/lanes.cl; 16 with INDEX_T of uint, and without DOUBLE_FLOAT_RAYS, SAMPLED, RGBA and what is below
 #include "lib/rays.cl"
 #include "lib/transpose.cl"
 #include "lib/classification.cl"
@@ -160,13 +160,7 @@ inline Real4 entry_of(__global const float4 *table, Uint entry)
     __global const ulong *halves = (__global const ulong *)(table + entry);
     return (float4)(as_float2(halves[0]), as_float2(halves[1]));
 #else
-    const Places places = {AS_INT(entry)};
-    Place *at = places.each;
-#define ENTRY(n) (*((__global const volatile float4 *)table + at[n]))
-#define ENTRIES(n) (Real)(ENTRY(n), ENTRY((n) + 4), ENTRY((n) + 8), ENTRY((n) + 12))
-    return transpose(REAL4(ENTRIES(0), ENTRIES(1), ENTRIES(2), ENTRIES(3)));
-#undef ENTRY
-#undef ENTRIES
+    return load_fours(table, AS_INT(entry));
 #endif
 }
 #endif
@@ -179,10 +173,11 @@ inline Real4 medium_at(const Medium *medium, Real x, Real y, Real z, Real units)
     Real4 sample = entry_of(medium->table, min(AS_UINT(scalar - (int)medium->low), (uint)(medium->entries - 1)));
     sample.w = scaled_to_step(sample.w, units);
 #else
-    const float scalar = sample_volume(medium->voxels, medium->size, x, y, z);
-    float4 sample = classify(scalar, medium->table, medium->entries, medium->low, medium->per_scalar);
-    if (sample.w > 0.0f)
-        sample.w = step_optical_depth(sample.w, units);
+    const Real scalar = sample_volume(medium->voxels, medium->size, x, y, z);
+    Real4 sample = classify(scalar, medium->table, medium->entries, medium->low, medium->per_scalar);
+    const Int some = sample.w > 0.0f;
+    if (ANY(some))
+        sample.w = SELECT((Real)(0.0f), step_optical_depth(sample.w, units), some);
 #endif
 #if defined(RGBA) || defined(SHADED) || defined(GRADIENT_OPACITY) || defined(OCCLUSION)
     if (sample.w > 0.0f) {

@@ -5,6 +5,7 @@
 // -D COMPENSATED: see lib/compositing.cl; DOUBLE_FLOAT_RAYS: see lib/rays.cl
 // -D CROPPED: see lib/cropping.cl
 // -D OPACITY_MULTIPLIER: optical depths are multiplied
+// -D LANES: see volume/march.cl
 // -D SAMPLED: see volume/samples.cl; some steps of some rows at a time then, as they are sampled
 #include "volume/cropped_march.cl"
 #include "lib/compositing.cl"
@@ -24,7 +25,9 @@
 #define PART_PARAMETERS
 #endif
 
-__kernel void render_volume(
+// Work-items are pixels in blocks of 4 x 4, or the blocks.
+
+KERNEL_OF_LANES void render_volume(
     MEDIUM_PARAMETERS
     VIEW_PARAMETERS
     __global const float *opaque_depth,   // t at which each pixel's ray ends, top row first, if has_opaque_depth
@@ -35,17 +38,23 @@ __kernel void render_volume(
     PART_PARAMETERS
     __global float4 *image)               // premultiplied RGBA, top row first
 {
-    int2 pixel = block_pixel((uint)get_global_id(0), width);
+    const uint item = (uint)get_global_id(0) * LANES;
 #ifdef SAMPLED
-    pixel.y = pixel.y < rows ? first_row + pixel.y : height;
-    __global float4 *state = states + 2 * (size_t)get_global_id(0);
+    __global float4 *state = states + 2 * (size_t)item;
 #else
-    const int first_step = 0, steps = INT_MAX;
+    const int first_row = 0, rows = height, first_step = 0, steps = INT_MAX;
 #endif
-    const Ray ray = ray_of_pixel(pixel, width, height);
-    if (!ray.present)
+    const Rays rays = rays_of_block(item, width, height, first_row, rows);
+    if (!ANY(rays.present))
         return;
-    const float t_end = has_opaque_depth ? opaque_depth[ray.place] : INFINITY;
+    const Places places = {SELECT((Int)(-1), (height - 1 - first_row - rays.y) * width + rays.x, rays.present)};
+    Place *place = places.each;
+    Real t_end = INFINITY;
+    if (has_opaque_depth) {
+#define END(n) (place[n] < 0 ? 0.0f : opaque_depth[place[n]])
+        t_end = OF_LANES(Real, END);
+#undef END
+    }
 
     Seen seen = nothing_seen();
 #ifdef SAMPLED
@@ -55,37 +64,55 @@ __kernel void render_volume(
     }
 #endif
     March march;
-    if (begin_march(&march, forms, planes, ray.a, ray.b, sample_distance, unit_distance, t_end)) {
+    if (ANY(begin_march(&march, forms, planes, rays.a, rays.b, sample_distance, unit_distance, t_end))) {
         const Medium medium = MEDIUM;
 #ifdef CROPPED
-        const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, ray.a, ray.b, regions);
+        const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, rays.a, rays.b, regions);
 #endif
-        int k = first_step;
-        const int end = march.steps - first_step > steps ? first_step + steps : march.steps;
-        float front = step_face(&march, k);
-        while (k < end && seen.sums.w > transmittance_cutoff) {
-            const float back = step_face(&march, k + 1);
-            const int empty = empty_steps(&march, &medium, 1, k, end, 1, front, back);
-            k += empty;
-            if (empty > 0) {
-                front = step_face(&march, k);
-                continue;
-            }
-            float4 step = step_medium(&march, &medium, k, front, back);
+#if LANES > 1
+        // Rays that miss look at some place too, so that nothing that is added 0 times is NaN
+        march.t0 = SELECT((Real)(0.0f), march.t0, march.steps > 0);
+        march.t1 = SELECT((Real)(0.0f), march.t1, march.steps > 0);
+#endif
+        Int k = first_step;
+        const Int end = SELECT(march.steps, (Int)(first_step + steps), march.steps - first_step > steps);
+        bool look = true; // for empty space: not where something was seen in the turn before
+        for (;;) {
+            const Int going = (k < end) & (seen.sums.w > transmittance_cutoff);
+            if (!ANY(going))
+                break;
+            const Real front = step_face(&march, k), back = step_face(&march, k + 1);
+            const Int empty = look ? empty_steps(&march, &medium, going, k, end, 1, front, back) : (Int)(0);
+            const Int here = going & (empty == 0);
+            if (ANY(here)) {
+                Real4 step = step_medium(&march, &medium, k, front, back);
 #ifdef CROPPED
-            step.w *= kept_share(&kept, front, back);
+                step.w *= kept_share(&kept, front, back);
 #endif
 #ifdef OPACITY_MULTIPLIER
-            step.w *= opacity_multiplier;
+                step.w *= opacity_multiplier;
 #endif
-            composite_medium(&seen, step.w, step, true);
-            front = back;
-            ++k;
+                look = !ANY(here & (step.w > 0.0f));
+                composite_medium(&seen, step.w, step, here);
+            }
+            k += max(empty, 1);
         }
     }
 #ifdef SAMPLED
     state[0] = seen.sums;
     state[1] = seen.compensation;
 #endif
-    image[ray.place] = composited(&seen);
+#if LANES == 1
+    image[*place] = composited(&seen);
+#else
+    const Real4 rgba = transpose(composited(&seen));
+#define STORE(n, c, four)   \
+    if (place[n] >= 0)      \
+        image[place[n]] = rgba.c.four;
+#define STORE_ROW(g, four) STORE(4 * g, x, four) STORE(4 * g + 1, y, four) STORE(4 * g + 2, z, four) STORE(4 * g + 3, w, four)
+    STORE_ROW(0, s0123)
+    STORE_ROW(1, s4567)
+    STORE_ROW(2, s89ab)
+    STORE_ROW(3, scdef)
+#endif
 }

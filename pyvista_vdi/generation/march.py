@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device.work_order import GROUP, block_items
-from pyvista_vdi.generation.records import Records, Step
+from pyvista_vdi.device.steps import Step
+from pyvista_vdi.device.work_order import block_items
+from pyvista_vdi.generation.records import Records
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.volume.bricks import StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.march_step import march_step
 
-#: ``-D`` names of marches that follow rays in blocks; ``COMPENSATED=1`` changes no march.
-_IN_BLOCKS = {"VOXEL_T", "INDEX_T", "NEAREST", "BY_SCALAR", "SKIP_EMPTY", "MACROCELL_SHIFT"}
 #: Steps of a ray before the first look at the length of its record: few, so that rays which cannot
 #: keep every detail learn it soon.
 _FIRST_CHUNK_STEPS = 64
@@ -106,10 +106,9 @@ class March:
         step = _step_for(records, "longest_marches")
         with runtime.buffer((len(records.slices),), np.int32, "longest rays") as longest:
             runtime.fill(longest, np.int32(0))
-            runtime.launch(
-                step.kernel,
-                block_items(width, height) // step.rays,
-                GROUP // step.rays,
+            step.launch(
+                runtime,
+                block_items(width, height),
                 *records.march,
                 *(np.int32(n) for n in (width, height, records.slices.rows)),
                 longest,
@@ -119,9 +118,6 @@ class March:
 
 def _step_for(records: Records, name: str) -> Step:
     """Return a kernel that marches, one that follows blocks of rays where they can be."""
-    defines, path = records.of_medium, "generation/march_lists.cl"
-    known = {k: v for k, v in defines.items() if (k, v) != ("COMPENSATED", 1)}
-    by_scalar = "BY_SCALAR" in known and known["INDEX_T"] == "uint"
-    if records.runtime.is_cpu and by_scalar and known.keys() <= _IN_BLOCKS:
-        return Step.of(records.runtime, path, name, known, in_blocks=True)
-    return Step.of(records.runtime, path, name, defines)
+    # COMPENSATED=1 changes no march that records
+    defines = {k: v for k, v in records.of_medium.items() if (k, v) != ("COMPENSATED", 1)}
+    return march_step(records.runtime, "generation/march_lists.cl", name, defines)

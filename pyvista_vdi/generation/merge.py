@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pyvista_vdi.device.steps import Step
 from pyvista_vdi.generation.march import Chunk
-from pyvista_vdi.generation.records import Records, Step
+from pyvista_vdi.generation.records import Records
 from pyvista_vdi.generation.slices import Slice
 from pyvista_vdi.model.options import GenerationOptions
 

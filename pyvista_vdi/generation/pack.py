@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from pyvista_vdi.device.steps import Step
 from pyvista_vdi.generation.list_arrays import GrowingLists
-from pyvista_vdi.generation.records import Records, Step
+from pyvista_vdi.generation.records import Records
 from pyvista_vdi.generation.slices import Slice
 
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.device import Kernel, Runtime
+from pyvista_vdi.device import Runtime
 from pyvista_vdi.device.constants import RUN_WORDS
-from pyvista_vdi.device.programs import Define
 from pyvista_vdi.device.ray_forms import check_list_space
-from pyvista_vdi.device.work_order import BLOCK_RAYS, GROUP, block_items
+from pyvista_vdi.device.steps import Step
+from pyvista_vdi.device.work_order import block_items
 from pyvista_vdi.generation.slices import Slice, Slices
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import GenerationOptions
@@ -21,28 +19,6 @@ from pyvista_vdi.volume.classified_volume import DeviceVolume
 
 #: Merge error that no picture shows: a difference of a thousandth of full opacity over one voxel.
 _INDISTINGUISHABLE = 1e-6
-
-
-@dataclass(frozen=True)
-class Step:
-    """A kernel of generation, and how many rays a work-item of it follows: 1, or a block of 16."""
-
-    kernel: Kernel
-    rays: int = 1
-
-    @classmethod
-    def of(
-        cls,
-        runtime: Runtime,
-        path: str,
-        name: str,
-        defines: Mapping[str, Define],
-        *,
-        in_blocks: bool = False,
-    ) -> Step:
-        """Return the step of a kernel, whose work-items follow blocks of rays if ``in_blocks``."""
-        rays = BLOCK_RAYS if in_blocks else 1
-        return cls(runtime.kernel(path, name, {**defines, "LANES": rays}), rays)
 
 
 class Records:
@@ -102,8 +78,7 @@ class Records:
 
     def launch(self, step: Step, part: Slice, *arguments: Any) -> None:
         """Launch a step for the rays of a slice."""
-        items, rays = block_items(self.size[0], part.rows), step.rays
-        self.runtime.launch(step.kernel, items // rays, GROUP // rays, *arguments)
+        step.launch(self.runtime, block_items(self.size[0], part.rows), *arguments)
 
     def place(self, part: Slice) -> tuple[np.int32, ...]:
         """Return the arguments ``width`` to ``rows`` of the kernels that take a slice's rays."""

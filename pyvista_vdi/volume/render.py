@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.device import ray_forms as rays
-from pyvista_vdi.device.work_order import GROUP, block_items
+from pyvista_vdi.device.work_order import block_items
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import FrameRequest
@@ -19,6 +19,7 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.bricks import SAMPLE_BYTES, Room, StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.march_step import march_step
 
 #: Steps of a ray that are sampled at a time where the volume is on the device brick by brick.
 _PART_STEPS = 128
@@ -118,7 +119,7 @@ def raycast_medium(
     if options.opacity_multiplier != 1.0:
         defines["OPACITY_MULTIPLIER"] = 1
         multiplier = (np.float32(options.opacity_multiplier),)
-    kernel = runtime.kernel("volume/render_volume.cl", "render_volume", defines)
+    step = march_step(runtime, "volume/render_volume.cl", "render_volume", defines)
     medium_arguments = medium.medium_arguments(lit_from or camera)
     with ExitStack() as stack:
         keep = stack.enter_context
@@ -134,10 +135,9 @@ def raycast_medium(
         )
 
         def launch(items: int, sampled: Sequence[Any], part: Sequence[Any]) -> None:
-            runtime.launch(
-                kernel,
+            step.launch(
+                runtime,
                 items,
-                GROUP,
                 *medium_arguments,
                 *sampled,
                 *begin,

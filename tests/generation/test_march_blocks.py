@@ -1,4 +1,4 @@
-"""A CPU device marches nearest samples of integers in blocks of rays: the VDI is the same.
+"""A CPU device marches in blocks of rays: the VDI is the same.
 
 ``generation/march_lists.cl`` of 16 lanes against one, to the last bit.
 """
@@ -7,90 +7,49 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from march_ways import VIEWS, WINDOW, both_ways, transfer_for, volume_of
 
-from pyvista_vdi import Camera, TransferFunction, Volume
-from pyvista_vdi.device import Runtime
-from pyvista_vdi.device.work_order import BLOCK_RAYS, GROUP
-from pyvista_vdi.generation import march, slices
+from pyvista_vdi import Volume
+from pyvista_vdi.generation import slices
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.standard_cases import filling_camera
-
-WINDOW = (53, 39)  # no multiple of a block's edge
-CENTER = (24.5, 20.0, 23.0)
-
-
-def volume_of(dtype, spacing=(1, 1, 1)):
-    """Layers, noise, and a corner of nothing, where blocks are passed by."""
-    rng = np.random.default_rng(11)
-    z, y, x = np.mgrid[:47, :41, :50] / 40
-    field = 0.5 + 0.4 * np.sin(9 * x * y) * np.cos(5 * z) + 0.1 * rng.random(x.shape)
-    field[(x + y + z > 1.9) | (x < 0.2)] = 0
-    low, high = (-100, 100) if np.dtype(dtype).kind == "i" else (0, 200)
-    return Volume((low + (high - low) * field).astype(dtype), spacing)
-
-
-def transfer_for(volume):
-    rng = np.random.default_rng(12)
-    low, high = float(volume.array.min()), float(volume.array.max())
-    opacities = np.clip(np.linspace(-0.1, 0.7, 30), 0, 1)
-    opacities[-1] = 1.0  # the highest scalar is opaque
-    colors = rng.random((30, 3))
-    return TransferFunction(colors, opacities, (low, high), interpolation="nearest")
-
-
-VIEWS = {
-    "all of it": lambda volume: filling_camera(volume.bounds, WINDOW).azimuth(33),
-    "parallel": lambda volume: Camera(
-        (90, 60, 80), CENTER, (0, 1, 0), parallel_projection=True, parallel_scale=40
-    ),
-    "along an axis": lambda volume: Camera(
-        (*CENTER[:2], 90), CENTER, (0, 1, 0), parallel_projection=True
-    ),
-    "from inside": lambda volume: Camera(CENTER, (0, 0, 0), (0, 1, 0)),
-    "past it": lambda volume: Camera((0, 0, 120), (0, 0, 0), (0, 1, 0)),
-}
 
 
 @pytest.fixture
-def ways(monkeypatch, runtime):
-    """Make a VDI with each form of the march; how often each was launched, by its groups."""
-    if not runtime.is_cpu:
-        pytest.skip("only CPU devices march in blocks")
-    launches = {GROUP: 0, GROUP // BLOCK_RAYS: 0}
-    launch = Runtime.launch
+def check(monkeypatch, runtime):
+    """Make a VDI by both forms of the march, compare, and return it."""
 
-    def counted(self, kernel, size, group, *arguments, **options):
-        if kernel.name == "march_lists":
-            launches[group] += 1
-        launch(self, kernel, size, group, *arguments, **options)
+    def checked(volume, view, interpolation="nearest", **options):
+        arguments = (volume, VIEWS[view](volume), WINDOW, transfer_for(volume, interpolation))
+        found, expected, launches = both_ways(
+            monkeypatch,
+            runtime,
+            "march_lists",
+            lambda: generate_vdi(*arguments, device=runtime, **options),
+        )
+        assert found.equals(expected)
+        assert launches[0] == launches[1] > 0
+        return found
 
-    monkeypatch.setattr(Runtime, "launch", counted)
-
-    def both(volume, camera, **options):
-        arguments = (volume, camera, WINDOW, transfer_for(volume))
-        found = generate_vdi(*arguments, device=runtime, **options)
-        with monkeypatch.context() as patch:
-            patch.setattr(march, "_IN_BLOCKS", set())
-            expected = generate_vdi(*arguments, device=runtime, **options)
-        return found, expected
-
-    return both, launches
-
-
-def check(ways, volume, camera, **options):
-    both, launches = ways
-    found, expected = both(volume, camera, **options)
-    assert found.equals(expected)
-    assert launches[GROUP] == launches[GROUP // BLOCK_RAYS] > 0
-    return found
+    return checked
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.int8, np.uint16, np.int16])
 @pytest.mark.parametrize("view", VIEWS)
-def test_views_and_types(ways, dtype, view):
-    volume = volume_of(dtype)
-    vdi = check(ways, volume, VIEWS[view](volume))
+def test_views_and_types(check, dtype, view):
+    vdi = check(volume_of(dtype), view)
     assert vdi.n_supersegments > (100 if view == "past it" else 5000)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.float32])
+@pytest.mark.parametrize("step", [0.5, 1.0])
+def test_linear_samples(check, dtype, step):
+    vdi = check(volume_of(dtype), "all of it", "linear", sample_distance=step)
+    assert vdi.n_supersegments > 5000
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.int32])
+def test_nearest_samples_that_are_classified(check, dtype):
+    check(volume_of(dtype), "all of it")
 
 
 @pytest.mark.parametrize(
@@ -107,18 +66,14 @@ def test_views_and_types(ways, dtype, view):
     ],
     ids=str,
 )
-def test_options(ways, options):
-    volume = volume_of(np.uint8, spacing=(1, 0.8, 1.3))
-    check(ways, volume, VIEWS["all of it"](volume), **options)
+def test_options(check, options):
+    check(volume_of(np.uint8, spacing=(1, 0.8, 1.3)), "all of it", **options)
 
 
-def test_volumes_without_empty_blocks(ways):
-    array = volume_of(np.uint8).array
-    volume = Volume(np.maximum(array, 120))
-    check(ways, volume, VIEWS["all of it"](volume))
+def test_volumes_without_empty_blocks(check):
+    check(Volume(np.maximum(volume_of(np.uint8).array, 120)), "all of it")
 
 
-def test_a_slice_of_four_rows(ways, monkeypatch):
+def test_a_slice_of_four_rows(check, monkeypatch):
     monkeypatch.setattr(slices, "_SLICE_BYTES", 1)
-    volume = volume_of(np.uint8)
-    check(ways, volume, VIEWS["all of it"](volume))
+    check(volume_of(np.uint8), "all of it")

@@ -1,0 +1,72 @@
+"""Marches in blocks of rays against one ray in a work-item: small volumes, views, and both ways."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pyvista_vdi import Camera, TransferFunction, Volume
+from pyvista_vdi.device import Runtime
+from pyvista_vdi.device.work_order import BLOCK_RAYS, GROUP
+from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.volume import march_step
+
+WINDOW = (53, 39)  # no multiple of a block's edge
+CENTER = (24.5, 20.0, 23.0)
+
+VIEWS = {
+    "all of it": lambda volume: filling_camera(volume.bounds, WINDOW).azimuth(33),
+    "parallel": lambda volume: Camera(
+        (90, 60, 80), CENTER, (0, 1, 0), parallel_projection=True, parallel_scale=40
+    ),
+    "along an axis": lambda volume: Camera(
+        (*CENTER[:2], 90), CENTER, (0, 1, 0), parallel_projection=True
+    ),
+    "from inside": lambda volume: Camera(CENTER, (0, 0, 0), (0, 1, 0)),
+    "past it": lambda volume: Camera((0, 0, 120), (0, 0, 0), (0, 1, 0)),
+}
+
+
+def volume_of(dtype, spacing=(1, 1, 1)):
+    """Layers, noise, and a corner of nothing, where blocks are passed by."""
+    rng = np.random.default_rng(11)
+    z, y, x = np.mgrid[:47, :41, :50] / 40
+    field = 0.5 + 0.4 * np.sin(9 * x * y) * np.cos(5 * z) + 0.1 * rng.random(x.shape)
+    field[(x + y + z > 1.9) | (x < 0.2)] = 0
+    low, high = (-100, 100) if np.dtype(dtype).kind == "i" else (0, 200)
+    array = (low + (high - low) * field).astype(dtype)
+    if array.dtype.kind == "f":
+        array[20:24, 20:24, 20:24] = np.nan
+    return Volume(array, spacing)
+
+
+def transfer_for(volume, interpolation="nearest"):
+    """Random colours; the lowest scalars are transparent, the highest is opaque."""
+    rng = np.random.default_rng(12)
+    opacities = np.clip(np.linspace(-0.1, 0.7, 30), 0, 1)
+    opacities[-1] = 1.0
+    colors = rng.random((30, 3))
+    return TransferFunction(colors, opacities, volume.finite_range(), interpolation=interpolation)
+
+
+def both_ways(monkeypatch, runtime, name, make):
+    """Return what a call makes with blocks and without, and how often each was launched.
+
+    ``name`` is the kernel's.
+    """
+    if not runtime.is_cpu:
+        pytest.skip("only CPU devices march in blocks")
+    launches = {GROUP: 0, GROUP // BLOCK_RAYS: 0}
+    launch = Runtime.launch
+
+    def counted(self, kernel, size, group, *arguments, **options):
+        if kernel.name == name:
+            launches[group] += 1
+        launch(self, kernel, size, group, *arguments, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Runtime, "launch", counted)
+        found = make()
+        patch.setattr(march_step, "_IN_BLOCKS", {})
+        expected = make()
+    return found, expected, (launches[GROUP // BLOCK_RAYS], launches[GROUP])

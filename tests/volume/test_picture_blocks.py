@@ -1,0 +1,84 @@
+"""A CPU device draws volumes in blocks of rays: the picture is the same.
+
+``volume/render_volume.cl`` of 16 lanes against one, to the last bit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from march_ways import CENTER, VIEWS, WINDOW, both_ways, transfer_for, volume_of
+
+from pyvista_vdi import Volume, render_volume
+
+INTERPOLATIONS = ("nearest", "linear")
+
+
+@pytest.fixture
+def check(monkeypatch, runtime):
+    """Draw a volume by both forms of the march, and compare the bits."""
+
+    def checked(volume, view="all of it", interpolation="nearest", **options):
+        function = transfer_for(volume, interpolation)
+        found, expected, launches = both_ways(
+            monkeypatch,
+            runtime,
+            "render_volume",
+            lambda: render_volume(
+                volume,
+                VIEWS[view](volume),
+                WINDOW,
+                transfer_function=function,
+                device=runtime,
+                **options,
+            ),
+        )
+        assert launches == (1, 1)
+        assert found.tobytes() == expected.tobytes()
+        assert found[..., 3].max() > (0.1 if view == "past it" else 0.9)
+
+    return checked
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int8, np.uint16, np.int16, np.float32, np.float64])
+@pytest.mark.parametrize("interpolation", INTERPOLATIONS)
+def test_types(check, dtype, interpolation):
+    check(volume_of(dtype), interpolation=interpolation)
+
+
+@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("interpolation", INTERPOLATIONS)
+def test_views(check, view, interpolation):
+    check(volume_of(np.uint8), view, interpolation)
+
+
+def opaque_depth():
+    """Ends of rays before, in and behind the volume of the view of all of it."""
+    depth = np.random.default_rng(3).uniform(60, 160, WINDOW[::-1]).astype(np.float32)
+    depth[:5] = np.inf
+    return depth
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"sample_distance": 0.1},
+        {"sample_distance": 1.7},
+        {"sample_distance": 0.03},  # opacity is summed up from 0
+        {"early_termination": False},
+        {"skip_empty": False},
+        {"opacity_multiplier": 0.3},
+        {"clipping_planes": [(*CENTER, 1, 0.5, 0.2)]},
+        {"cropping": (10, 30, 10, 30, 10, 30)},
+        {"cropping": ((10, 30, 10, 30, 10, 30), "fence")},
+        {"opaque_depth": opaque_depth()},
+    ],
+    ids=lambda options: next(iter(options)),
+)
+@pytest.mark.parametrize("interpolation", INTERPOLATIONS)
+def test_options(check, options, interpolation):
+    check(volume_of(np.uint8, spacing=(1, 0.8, 1.3)), interpolation=interpolation, **options)
+
+
+def test_volumes_without_empty_blocks(check):
+    check(Volume(np.maximum(volume_of(np.uint8).array, 120)))
