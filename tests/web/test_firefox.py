@@ -1,0 +1,133 @@
+"""Pages from disk in a real Firefox, by WebDriver BiDi, which it speaks itself.
+
+``PYVISTA_VDI_FIREFOX`` names the executable where it is not in the path.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import os
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+import pyvista as pv
+from plugin_scenes import soft_ball
+from virtual_screen import virtual_screen
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.model.standard_cases import filling_camera
+
+aiohttp = pytest.importorskip("aiohttp")
+pytestmark = pytest.mark.slow
+
+SIZE = (161, 91)
+
+#: WebGL by software, in a container whose root has no sandbox.
+PREFERENCES = {"webgl.force-enabled": "true", "security.sandbox.content.level": "0"}
+
+SOFTWARE = {"LIBGL_ALWAYS_SOFTWARE": "1", "MOZ_X11_EGL": "1"}
+
+SHOT = f"""async () => {{
+  const viewer = document.querySelector("vdi-viewer");
+  await viewer.ready;
+  const {{ data }} = await viewer.screenshot({{ width: {SIZE[0]}, height: {SIZE[1]} }});
+  let text = "";
+  for (const byte of data) text += String.fromCharCode(byte);
+  return btoa(text);
+}}"""
+
+
+async def evaluated(port, url, script):
+    """Open a page, and call a function there; return its answer."""
+    async with aiohttp.ClientSession() as session:
+        for _ in range(600):
+            try:
+                socket = await session.ws_connect(f"ws://127.0.0.1:{port}/session", max_msg_size=0)
+                break
+            except aiohttp.ClientError:
+                await asyncio.sleep(0.1)
+        numbers = iter(range(1, 100))
+
+        async def call(method, **params):
+            number = next(numbers)
+            await socket.send_json({"id": number, "method": method, "params": params})
+            async for message in socket:
+                answer = message.json()
+                if answer.get("id") == number:
+                    assert answer["type"] == "success", answer
+                    return answer["result"]
+            raise AssertionError("Firefox has gone")
+
+        await call("session.new", capabilities={})
+        tree = await call("browsingContext.getTree")
+        context = tree["contexts"][0]["context"]
+        await call("browsingContext.navigate", context=context, url=url, wait="interactive")
+        answer = await call(
+            "script.callFunction",
+            functionDeclaration=script,
+            awaitPromise=True,
+            target={"context": context},
+        )
+        assert answer["type"] == "success", answer["exceptionDetails"]["text"]
+        return answer["result"]["value"]
+
+
+def picture_in_firefox(folder, page):
+    """The picture of a page's viewer, premultiplied, uint8 (H, W, 4)."""
+    named = os.environ.get("PYVISTA_VDI_FIREFOX")
+    executable = named or shutil.which("firefox-esr") or shutil.which("firefox")
+    if executable is None:
+        pytest.skip("no Firefox is in the path: install the system's package 'firefox-esr'")
+    profile = folder / "profile"
+    profile.mkdir()
+    (profile / "user.js").write_text(
+        "".join(f'user_pref("{name}", {value});\n' for name, value in PREFERENCES.items())
+    )
+    with virtual_screen() as display:  # headless it has no WebGL without a GPU
+        process = subprocess.Popen(
+            [executable, "--profile", profile, "--remote-debugging-port", "0"],
+            stderr=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            text=True,
+            env={**os.environ, "HOME": str(folder), "DISPLAY": display, **SOFTWARE},
+        )
+        try:
+            addresses = (re.search(r"ws://[^:]*:(\d+)", line) for line in process.stderr)
+            port = next(filter(None, addresses))[1]
+            text = asyncio.run(evaluated(port, page.as_uri(), SHOT))
+        finally:
+            process.terminate()
+            process.wait()
+            process.stderr.close()
+    return np.frombuffer(base64.b64decode(text), np.uint8).reshape(*SIZE[::-1], 4)
+
+
+def test_a_page_from_disk_is_drawn_as_render_draws_it(tmp_path, default_runtime):
+    volume = soft_ball()
+    camera = filling_camera(volume.bounds, SIZE)
+    vdi = pvdi.generate(volume, camera, SIZE, cmap="viridis", clim=(0, 1))
+    picture = picture_in_firefox(tmp_path, vdi.save(tmp_path / "ball.html"))
+    expected = pvdi.render(vdi.with_precision("8-byte"), camera, SIZE) * 255.0
+    assert expected.max() > 200
+    assert np.abs(picture - expected).max() <= 1  # 8 bits, and other roundings of float32
+
+
+@pytest.mark.gl
+def test_a_scene_is_drawn_as_vtk_draws_it(tmp_path):
+    """Opaque and translucent meshes and a line about a VDI."""
+    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
+    plotter.add_vdi(soft_ball(), cmap="viridis", opacity="linear", show_scalar_bar=False)
+    plotter.add_mesh(pv.Sphere(radius=0.4, center=(1.2, 0.9, 0.9)), color="tomato")
+    plotter.add_mesh(pv.Cube(center=(-1, 0.9, 0.9)), color="b", opacity=0.5)
+    plotter.add_mesh(pv.Line((-2, -1, 0), (2, 1, 1)), color="k", line_width=3)
+    plotter.export_html(tmp_path / "scene.html")
+    picture = picture_in_firefox(tmp_path, tmp_path / "scene.html").astype(float)
+    got = picture[..., :3] + 255 - picture[..., 3:]
+    expected = plotter.screenshot()[..., :3].astype(float)
+    plotter.close()
+    assert np.ptp(expected) > 200
+    assert np.abs(got - expected).mean() <= 1  # .4 seen, by silhouettes
