@@ -108,6 +108,7 @@ def meshes(plotter):
     torus["x"] = torus.points[:, 0]
     looks = {"scalars": "x", "cmap": "coolwarm", "show_scalar_bar": False}
     plotter.add_mesh(torus, **looks, smooth_shading=True, specular=1, specular_power=30)
+    plotter.add_box_axes()
 
 
 def in_parallel(plotter):
@@ -172,6 +173,7 @@ def translucent_and_textured(plotter):
     mapper.block_attr[1].color = "y"
     plotter.remove_all_lights()
     plotter.add_light(pv.Light(light_type="headlight"))
+    plotter.add_axes(viewport=(0, 0, 0.3, 0.4))
 
 
 def apart(plotter):
@@ -426,7 +428,6 @@ def test_what_is_not_shown_is_named_in_one_warning(plotter):
     actor.mapper.SetCropping(1)
     actor.mapper.SetCroppingRegionPlanes(-0.5, 0.5, -0.5, 0.5, -0.5, 0.5)
     plotter.add_point_labels([[0.0, 0.0, 0.0]], ["origin"], name="labels")
-    plotter.add_axes()
     plotter.add_mesh(pv.Sphere(), pbr=True, name="ball")
     plotter.show_grid()
     with pytest.warns(VDIWarning, match="shows the scene without") as warned:

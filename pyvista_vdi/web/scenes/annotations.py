@@ -47,7 +47,7 @@ def annotations_of(prop: Any, renderer: Any, left_out: list[str]) -> list[dict[s
     return None
 
 
-def _text(
+def described_text(
     text: str, place: Any, look: Any, renderer: Any, size: float | None = None, **changes: Any
 ) -> dict[str, Any]:
     """Describe a text; ``place`` in pixels from the lower left corner."""
@@ -79,7 +79,7 @@ def _text_actor(actor: Any, renderer: Any) -> dict[str, Any]:
     place = coordinate.GetComputedDoubleViewportValue(renderer)
     scaled = actor.GetTextScaleMode() != vtkTextActor.TEXT_SCALE_MODE_NONE
     look = actor.GetScaledTextProperty() if scaled else actor.GetTextProperty()
-    described = _text(actor.GetInput() or "", place, look, renderer)
+    described = described_text(actor.GetInput() or "", place, look, renderer)
     if coordinate.GetCoordinateSystem() == _WORLD:
         described["at"] = list(coordinate.GetComputedWorldValue(renderer))
     return described
@@ -98,7 +98,7 @@ def _corner_texts(annotation: Any, renderer: Any) -> Iterator[dict[str, Any]]:
                 edge * share + _FROM_EDGE * (share == 0) - _FROM_EDGE * (share == 1)
                 for edge, share in zip(extent, part, strict=True)
             ]
-            yield _text(
+            yield described_text(
                 text,
                 place,
                 look,
@@ -275,10 +275,10 @@ def _scalar_bar(bar: Any, renderer: Any, left_out: list[str]) -> Iterator[dict[s
                 place[1] += tick_thick
             across = ("right" if precede else "left") if upright else "center"
             vertical = "middle" if upright else ("top" if precede else "bottom")
-            yield _text(text, place, label_look, renderer, across=across, along=vertical)
+            yield described_text(text, place, label_look, renderer, across=across, along=vertical)
     if title:
         place = start + np.array([frame[0] / 2, title_low + title_size[1]])
-        yield _text(title, place, title_look, renderer, across="center", along="top")
+        yield described_text(title, place, title_look, renderer, across="center", along="top")
 
 
 def _labels(bar: Any, table: Any) -> Iterator[tuple[float, str]]:

@@ -88,9 +88,6 @@ def around(plotter: Any) -> list[str]:
     """Name what a plotter shows beside its active renderer's props."""
     renderer = plotter.renderer
     left_out = []
-    widget = getattr(renderer, "axes_widget", None)
-    if widget is not None and widget.GetEnabled():
-        left_out.append("the axes widget")
     others = [r for r in plotter.renderers if r is not renderer]
     if any(r.GetViewProps().GetNumberOfItems() for r in others):
         left_out.append("the other subplots")

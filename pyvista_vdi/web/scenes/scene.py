@@ -10,7 +10,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.vtkRenderingCore import vtkActor, vtkProp3D
+from vtkmodules.vtkRenderingAnnotation import vtkAnnotatedCubeActor, vtkAxesActor
+from vtkmodules.vtkRenderingCore import (
+    vtkActor,
+    vtkProp3D,
+    vtkPropAssembly,
+    vtkPropCollection,
+)
 
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.vdi import VDI
@@ -18,7 +24,7 @@ from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.web.camera import viewer_camera
 from pyvista_vdi.web.encode import encoded
 from pyvista_vdi.web.placing import cropped, look_of, planes_of, thinned
-from pyvista_vdi.web.scenes.annotations import annotations_of
+from pyvista_vdi.web.scenes.annotations import annotations_of, described_text
 from pyvista_vdi.web.scenes.meshes import shapes_of
 
 #: The numbers of a scene's arrays in JavaScript: their names there, by NumPy's.
@@ -137,12 +143,14 @@ def scene_of(renderer: Any, names: dict[str, Any] | None = None, *, camera: bool
     described = [{**more, "file": None} for _, more in bodies]
     for (vdi, _), entry in zip(bodies[1:], described[1:], strict=True):
         entry["file"] = packed.keep(np.frombuffer(encoded(vdi, coarse=True), np.uint8))
+    marker = _marker(renderer, packed.keep, texts, left_out)
     head = {
         "camera": _camera(renderer) if camera else None,
         "size": list(renderer.GetSize()),
         "bounds": _bounds(renderer),
         "lights": list(_lights(renderer)),
         "shapes": shapes,
+        "marker": marker,
         "texts": texts,
         "vdis": described,
     }
@@ -179,18 +187,76 @@ def _props(renderer: Any) -> Iterator[tuple[Any, NDArray[np.float64]]]:
     for prop in [props.GetItemAsObject(i) for i in range(props.GetNumberOfItems())]:
         if not prop.GetVisibility():
             continue
-        if not isinstance(prop, vtkProp3D) or prop.GetNumberOfPaths() <= 1:
-            matrix = prop.GetMatrix() if hasattr(prop, "GetMatrix") else None
-            yield prop, _array(matrix)
-            continue
-        paths = []
-        prop.InitPathTraversal()
-        while (path := prop.GetNextPath()) is not None:
-            nodes = [path.GetItemAsObject(k) for k in range(path.GetNumberOfItems())]
-            paths.append(([node.GetViewProp() for node in nodes], nodes[-1].GetMatrix()))
-        for parts, matrix in paths:
-            if all(part.GetVisibility() for part in parts):
-                yield parts[-1], _array(matrix)
+        yield from _paths(prop)
+
+
+def _paths(prop: Any) -> Iterator[tuple[Any, NDArray[np.float64]]]:
+    """Give a prop, or the visible parts of an assembly, and where it is."""
+    if not isinstance(prop, vtkProp3D) or prop.GetNumberOfPaths() <= 1:
+        yield prop, _array(prop.GetMatrix() if hasattr(prop, "GetMatrix") else None)
+        return
+    paths = []
+    prop.InitPathTraversal()
+    while (path := prop.GetNextPath()) is not None:
+        nodes = [path.GetItemAsObject(k) for k in range(path.GetNumberOfItems())]
+        paths.append(([node.GetViewProp() for node in nodes], nodes[-1].GetMatrix()))
+    for parts, matrix in paths:
+        if all(part.GetVisibility() for part in parts):
+            yield parts[-1], _array(matrix)
+
+
+def _marker(
+    renderer: Any, keep: Any, texts: list[dict[str, Any]], left_out: list[str]
+) -> dict[str, Any] | None:
+    """Describe the axes in a corner, which PyVista's renderers have, and add their letters."""
+    widget = getattr(renderer, "axes_widget", None)
+    if widget is None or not widget.GetEnabled() or renderer.GetRenderWindow() is None:
+        return None
+    marker = widget.GetOrientationMarker()
+    layers = renderer.GetRenderWindow().GetRenderers()
+    layers = [layers.GetItemAsObject(i) for i in range(layers.GetNumberOfItems())]
+    own = next((layer for layer in layers if layer.HasViewProp(marker)), None)
+    if own is None:
+        return None
+    missing: list[str] = []
+    shapes = [
+        shape
+        for actor, matrix in _parts_of_marker(marker)
+        if actor.GetVisibility() and isinstance(actor, vtkActor)
+        for shape in shapes_of(actor, matrix, keep, missing)
+    ]
+    left_out += [f"{what} (the axes widget)" for what in missing]
+    if isinstance(marker, vtkAxesActor) and marker.GetAxisLabels():
+        for axis in "XYZ":
+            caption = getattr(marker, f"Get{axis}AxisCaptionActor2D")()
+            look = caption.GetTextActor().GetScaledTextProperty()
+            text = described_text(caption.GetCaption(), (0, 0), look, own)
+            place = {"at": list(caption.GetAttachmentPoint()), "shift": [caption.GetPadding(), 2]}
+            texts.append({**text, **place, "marker": True, "across": "left", "along": "bottom"})
+    camera, low, high = own.GetActiveCamera(), *np.reshape(renderer.GetViewport(), (2, 2))
+    place = (np.reshape(own.GetViewport(), (2, 2)) - low) / (high - low)
+    return {
+        "place": place.ravel().tolist(),
+        "camera": {**viewer_camera(camera, own.GetSize()), "distance": camera.GetDistance()},
+        "bounds": _bounds(own),
+        "lights": list(_lights(own)),
+        "shapes": shapes,
+    }
+
+
+def _parts_of_marker(marker: Any) -> Iterator[tuple[Any, NDArray[np.float64]]]:
+    if isinstance(marker, vtkPropAssembly):
+        parts = marker.GetParts()
+        for part in [parts.GetItemAsObject(i) for i in range(parts.GetNumberOfItems())]:
+            yield from _parts_of_marker(part)
+    elif isinstance(marker, vtkAxesActor):
+        actors = vtkPropCollection()
+        marker.GetActors(actors)
+        for actor in [actors.GetItemAsObject(i) for i in range(actors.GetNumberOfItems())]:
+            yield actor, _array(actor.GetMatrix())
+    else:
+        whole = marker.GetAssembly() if isinstance(marker, vtkAnnotatedCubeActor) else marker
+        yield from _paths(whole)
 
 
 def _array(matrix: Any) -> NDArray[np.float64]:

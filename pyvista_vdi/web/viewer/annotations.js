@@ -12,8 +12,8 @@ const css = ([r, g, b, a = 1]) => `rgb(${100 * r}% ${100 * g}% ${100 * b}% / ${a
  * @param {CanvasRenderingContext2D} on A canvas of width x height pixels.
  * @param {object[]} items
  * @param {number[]} from Width and height, pixels, of the window that the items are of.
- * @param {function(number[]): number[]|null} project World to parts of the window, from the lower
- *   left corner; null for what is behind the eye.
+ * @param {function(object): number[]|null} project Where an item with a place in the world (`at`)
+ *   is: parts of the window, from the lower left corner; null for what is behind the eye.
  */
 export function annotate(on, items, from, project) {
   const { width, height } = on.canvas;
@@ -51,12 +51,13 @@ function drawBox(on, { place, color, colors, upright, outline, line }, width, he
 }
 
 function drawText(on, item, width, height, scale, project) {
-  const place = item.at ? project(item.at) : item.place;
+  const place = item.at ? project(item) : item.place;
   if (!place) return;
   const size = item.size * scale;
   const style = `${item.italic ? "italic " : ""}${item.bold ? "bold " : ""}`;
   on.font = `${style}${size}px ${FAMILIES[item.family] ?? FAMILIES.Arial}`;
-  on.translate(place[0] * width, (1 - place[1]) * height);
+  const [dx, dy] = item.shift ?? [0, 0];
+  on.translate(place[0] * width + dx * scale, (1 - place[1]) * height - dy * scale);
   on.rotate((-item.angle * Math.PI) / 180);
   on.textBaseline = "alphabetic";
   const lines = item.text.split("\n");

@@ -7,7 +7,8 @@
 // LIT          lights are looked at; HEADLIGHT: there is one, where the eye is
 // BACK         back sides have a material of their own
 // CLIPPED      by six planes at most
-// DEPTH        only view depth is written; LAYERS: translucent, for the sums of McGuire and Bavoil
+// DEPTH        only view depth is written; LAYERS: translucent, for the sums of McGuire and Bavoil;
+// BLENDED      translucent, over what has been drawn before
 
 /** Lights that are looked at. */
 export const MOST_LIGHTS = 8;
@@ -243,6 +244,8 @@ void main() {
 #ifdef LAYERS
   seen.rgb *= seen.a;
   sum = vec4(seen.a);
+#elif defined(BLENDED)
+  seen.rgb *= seen.a;
 #else
   seen.a = 1.0;
 #endif
@@ -270,3 +273,11 @@ void main() {
   ivec2 size = textureSize(picture, 0), at = ivec2(gl_FragCoord.xy);
   seen = texelFetch(picture, ivec2(at.x, size.y - 1 - at.y), 0);
 }`;
+
+/** Lays a picture of the same pixels over what is there, from a corner on. */
+export const COPY_SHADER = `#version 300 es
+precision highp float;
+uniform sampler2D picture;
+uniform ivec2 corner;
+out vec4 seen;
+void main() { seen = texelFetch(picture, ivec2(gl_FragCoord.xy) - corner, 0); }`;

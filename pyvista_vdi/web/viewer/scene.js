@@ -4,7 +4,7 @@ import { annotate } from "./annotations.js";
 import { cornersOf, difference, inner, layersOf } from "./layers.js";
 import { load } from "./loader.js";
 import {
-  LAYERS_SHADER, MOST_LIGHTS, PICTURE_SHADER, meshFragmentShader, meshVertexShader,
+  COPY_SHADER, LAYERS_SHADER, MOST_LIGHTS, PICTURE_SHADER, meshFragmentShader, meshVertexShader,
 } from "./mesh_shader.js";
 import { Raycaster, linked } from "./raycast.js";
 import { cameraAxes, halfExtent, isParallel } from "./rays.js";
@@ -23,6 +23,7 @@ export class Scene {
   #gl = null;
   #programs = new Map();
   #buffers = null;
+  #marker = null; // axes in a corner
   #drawn = null; // the view whose meshes they hold
   #shapes = [];
   #bodies = []; // VDIs; the first is the viewer's own
@@ -56,14 +57,20 @@ export class Scene {
       planes: planes.map((p) => ({ origin: p.slice(0, 3), normal: p.slice(3) })), matrix,
       prepared: null, raycaster: null,
     }));
-    this.#shapes = head.shapes.map((shape) => ({ ...shape, parts: partsOf(shape, arrays) }));
-    for (const shape of this.#shapes) {
+    const ready = (shape) => ({ ...shape, parts: partsOf(shape, arrays) });
+    this.#shapes = head.shapes.map(ready);
+    this.#marker = head.marker && { ...head.marker, shapes: head.marker.shapes.map(ready) };
+    for (const shape of this.#all()) {
       for (const map of [shape.table, shape.texture]) if (map) map.data = arrays[map.texels];
     }
     if (this.#gl) this.restore(this.#gl);
     this.changed();
     return head.vdis.map(({ file }, k) => file === null ? null
       : load(arrays[file], { onLevel: (prepared) => this.#take(k, prepared) }));
+  }
+
+  #all() {
+    return [...this.#shapes, ...(this.#marker?.shapes ?? [])];
   }
 
   #take(k, prepared) {
@@ -79,7 +86,7 @@ export class Scene {
     this.#programs.clear();
     this.#buffers = this.#drawn = null;
     this.#vertices = gl.createVertexArray();
-    if (this.#shapes.length && !gl.getExtension("EXT_color_buffer_float")) {
+    if (this.#all().length && !gl.getExtension("EXT_color_buffer_float")) {
       throw new Error("This browser's graphics cannot draw depths as numbers " +
         "(EXT_color_buffer_float), by which meshes hide a volume.");
     }
@@ -87,7 +94,7 @@ export class Scene {
       body.raycaster = new Raycaster(gl);
       if (body.prepared) body.raycaster.set(body.prepared);
     }
-    for (const shape of this.#shapes) {
+    for (const shape of this.#all()) {
       for (const part of shape.parts) part.drawn = uploaded(gl, part);
       for (const map of [shape.table, shape.texture]) if (map) map.drawn = mapTexture(gl, map);
     }
@@ -98,7 +105,7 @@ export class Scene {
     const gl = this.#gl;
     if (!gl) return;
     for (const { raycaster } of this.#bodies) raycaster?.dispose();
-    for (const shape of this.#shapes) {
+    for (const shape of this.#all()) {
       for (const { drawn } of shape.parts) {
         gl.deleteVertexArray(drawn?.array ?? null);
         drawn?.buffers.forEach((buffer) => gl.deleteBuffer(buffer));
@@ -124,7 +131,7 @@ export class Scene {
     const gl = this.#gl, { width, height } = view;
     if (!gl) return; // another scene has taken its place meanwhile
     let depthTexture = null;
-    if (this.#shapes.length) {
+    if (this.#all().length) {
       if (this.#drawn !== view) { // in the first band, and where another picture came between
         gl.disable(gl.SCISSOR_TEST);
         this.#drawShapes(target, view);
@@ -140,6 +147,11 @@ export class Scene {
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     this.#drawVDIs(raycaster, view, depthTexture);
+    if (this.#marker) {
+      const [left, bottom, wide, high] = partOf(this.#marker.place, view);
+      gl.viewport(left, bottom, wide, high);
+      this.#cover(COPY_SHADER, { picture: this.#buffers.marker.texture }, [left, bottom]);
+    }
     gl.disable(gl.BLEND);
   }
 
@@ -204,9 +216,35 @@ export class Scene {
       this.#cover(LAYERS_SHADER, { layers: buffers.layers.texture, sums: buffers.layers.sums });
     }
     gl.disable(gl.BLEND);
+    if (this.#marker) this.#drawMarker(view);
     gl.disable(gl.DEPTH_TEST);
     gl.disable(gl.CULL_FACE);
     gl.bindVertexArray(null);
+  }
+
+  // The axes in a corner, before all else, into a picture of their own.
+  #drawMarker(view) {
+    const gl = this.#gl, { markerSamples, marker } = this.#buffers;
+    const [, , width, height] = partOf(this.#marker.place, view);
+    const camera = markerCamera(this.#marker.camera, view.camera);
+    const seen = viewOf({ ...view, width, height, camera }, this.#marker);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, markerSamples.framebuffer);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthMask(true);
+    gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
+    gl.clearBufferfv(gl.DEPTH, 0, [1]);
+    gl.viewport(0, 0, width, height);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    for (const layered of [false, true]) {
+      if (layered) gl.enable(gl.BLEND);
+      for (const shape of this.#marker.shapes) {
+        if (shape.translucent === layered) this.#drawShape(shape, seen, layered ? ["BLENDED"] : []);
+      }
+    }
+    gl.disable(gl.BLEND);
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, markerSamples.framebuffer);
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, marker.framebuffer);
+    gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
   }
 
   #drawShape(shape, seen, pass) {
@@ -274,13 +312,12 @@ export class Scene {
     if (this.#annotated.get(canvas) === key) return;
     this.#annotated.set(canvas, key);
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = extent;
-    const axes = cameraAxes(camera), half = halfExtent(camera, extent);
-    const [cx, cy] = camera.window_center ?? [0, 0];
-    annotate(canvas.getContext("2d"), texts, size, (point) => {
-      const from = difference(point, camera.position);
-      const [x, y, z] = axes.map((axis) => inner(axis, from));
-      const w = isParallel(camera) ? 1 : z;
-      return w > 0 ? [(x / half[0] / w - cx + 1) / 2, (y / half[1] / w - cy + 1) / 2] : null;
+    annotate(canvas.getContext("2d"), texts, size, ({ at, marker }) => {
+      if (!marker) return projected(at, camera, extent);
+      const { place: [x0, y0, x1, y1], camera: own } = this.#marker;
+      const [x, y] = projected(at, markerCamera(own, camera),
+        [(x1 - x0) * width, (y1 - y0) * height]);
+      return [x0 + x * (x1 - x0), y0 + y * (y1 - y0)];
     });
   }
 
@@ -305,10 +342,11 @@ export class Scene {
     gl.deleteTexture(picture);
   }
 
-  #cover(fragment, textures) {
+  #cover(fragment, textures, corner = [0, 0]) {
     const gl = this.#gl;
     const { program, uniforms } = this.#program(VERTEX_SHADER, fragment);
     gl.useProgram(program);
+    gl.uniform2i(uniforms.corner, ...corner);
     Object.entries(textures).forEach(([name, texture], unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -349,18 +387,18 @@ export class Scene {
       }
       return id;
     };
-    const texture = (format) => {
+    const texture = (format, [wide, high] = [width, height]) => {
       const id = gl.createTexture();
       gl.bindTexture(gl.TEXTURE_2D, id);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
-      gl.texStorage2D(gl.TEXTURE_2D, 1, gl[format], width, height);
+      gl.texStorage2D(gl.TEXTURE_2D, 1, gl[format], wide, high);
       return id;
     };
-    const renderbuffer = (format, samples) => {
+    const renderbuffer = (format, samples, [wide, high] = [width, height]) => {
       const id = gl.createRenderbuffer();
       gl.bindRenderbuffer(gl.RENDERBUFFER, id);
-      gl.renderbufferStorageMultisample(gl.RENDERBUFFER, samples, gl[format], width, height);
+      gl.renderbufferStorageMultisample(gl.RENDERBUFFER, samples, gl[format], wide, high);
       return id;
     };
     gl.activeTexture(gl.TEXTURE0);
@@ -373,6 +411,15 @@ export class Scene {
     made.samples = { renderbuffers: many, framebuffer: framebuffer(
       ["COLOR_ATTACHMENT0", "buffer", many[0]], ["DEPTH_ATTACHMENT", "buffer", many[1]]) };
     made.color = { texture: color, framebuffer: framebuffer(["COLOR_ATTACHMENT0", "texture", color]) };
+    if (this.#marker) {
+      // Buffers of their own: ANGLE clears before it resolves what was drawn there earlier
+      const size = partOf(this.#marker.place, made).slice(2), picture = texture("RGBA8", size);
+      const own = ["RGBA8", "DEPTH_COMPONENT24"].map((f) => renderbuffer(f, samples, size));
+      made.markerSamples = { renderbuffers: own, framebuffer: framebuffer(
+        ["COLOR_ATTACHMENT0", "buffer", own[0]], ["DEPTH_ATTACHMENT", "buffer", own[1]]) };
+      made.marker = { texture: picture,
+        framebuffer: framebuffer(["COLOR_ATTACHMENT0", "texture", picture]) };
+    }
     if (withLayers) {
       const sums = texture("R16F"), layers = texture("RGBA16F");
       made.layers = { texture: layers, sums, framebuffer: framebuffer(
@@ -385,7 +432,7 @@ export class Scene {
 
   #free() {
     const gl = this.#gl;
-    for (const part of ["depth", "samples", "color", "layers"]) {
+    for (const part of ["depth", "samples", "color", "layers", "markerSamples", "marker"]) {
       const { framebuffer, texture, sums, renderbuffers = [] } = this.#buffers?.[part] ?? {};
       gl.deleteFramebuffer(framebuffer ?? null);
       gl.deleteTexture(texture ?? null);
@@ -566,6 +613,29 @@ function lightIn(light, camera, axes) {
   }
   return { color, position: ends[0], direction: normalized(difference(ends[1], ends[0])),
     shape: [Number(positional), cone, exponent, 0], fading: attenuation };
+}
+
+// Where a point of the world is seen: parts of the window; null if it is behind the eye.
+function projected(point, camera, extent) {
+  const from = difference(point, camera.position), half = halfExtent(camera, extent);
+  const [cx, cy] = camera.window_center ?? [0, 0];
+  const [x, y, z] = cameraAxes(camera).map((axis) => inner(axis, from));
+  const w = isParallel(camera) ? 1 : z;
+  return w > 0 ? [(x / half[0] / w - cx + 1) / 2, (y / half[1] / w - cy + 1) / 2] : null;
+}
+
+// The view of the axes in a corner: turned as the scene's is.
+function markerCamera({ distance, ...own }, camera) {
+  const [, up, forward] = cameraAxes(camera);
+  const position = own.focal_point.map((x, k) => x - distance * forward[k]);
+  return { ...own, position, view_up: up };
+}
+
+// A part of a picture in pixels: left, bottom, width, height.
+function partOf([x0, y0, x1, y1], { width, height }) {
+  const [left, bottom] = [Math.round(x0 * width), Math.round(y0 * height)];
+  return [left, bottom, Math.max(1, Math.round(x1 * width) - left),
+    Math.max(1, Math.round(y1 * height) - bottom)];
 }
 
 // From a shape's points, which are about its origin, to view coordinates.
