@@ -437,7 +437,6 @@ def test_what_is_not_shown_is_named_in_one_warning(plotter):
     for what in (
         "cropping",
         "labels",
-        "axes widget",
         "physically based shading (ball)",
         "CubeAxes",
     ):
