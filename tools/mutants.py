@@ -361,14 +361,18 @@ def tests_fail(mutant: Mutant | None, rooms: tuple[str, ...], options: argparse.
             environment["PYVISTA_VDI_TEST_DEVICES"] = options.device
         command = [sys.executable, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider"]
         command += ["-x"] if mutant is not None else []
-        done = subprocess.run(
-            [*command, "-m", TIERS[options.tier], *(f"tests/{room}" for room in rooms)],
-            cwd=name,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        try:
+            done = subprocess.run(
+                [*command, "-m", TIERS[options.tier], *(f"tests/{room}" for room in rooms)],
+                cwd=name,
+                env=environment,
+                capture_output=True,
+                text=True,
+                check=False,
+                timeout=None if mutant is None else options.patience,
+            )
+        except subprocess.TimeoutExpired:  # a kernel that never ends
+            return True
     if done.returncode > 1:  # interrupted, or not a test was run
         raise SystemExit(f"pytest ends with {done.returncode}:\n{done.stdout[-2000:]}{done.stderr}")
     if mutant is None and done.returncode:
@@ -384,6 +388,9 @@ def main() -> None:
     parser.add_argument("--tier", choices=TIERS, default="fast")
     parser.add_argument("--device", help="parts of devices' names, as PYVISTA_VDI_TEST_DEVICES")
     parser.add_argument("--only", action="append", help="mutants with this in their name or file")
+    parser.add_argument(
+        "--patience", type=float, default=1800, help="seconds after which a mutant hangs: killed"
+    )
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="at a time")
     options = parser.parse_args()
     chosen = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,11 +13,15 @@ from pyvista_vdi.cli.inputs import (
     measuring,
     output_files,
     read_volume,
+    require_new,
     say_written,
     volume_name,
 )
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.io import whole_file, write_png
 from pyvista_vdi.measure.compare import Settings, contact_sheet, measure, table
+from pyvista_vdi.measure.front import Plan, measure_front, summary
+from pyvista_vdi.measure.report import write_text
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 
@@ -25,7 +30,11 @@ _DEFAULT = "soft"
 
 
 def compare(options: argparse.Namespace) -> int:
-    """Compare a volume's pictures, and write what was found."""
+    """Compare a volume's pictures, or all volumes' fronts, and write what was found."""
+    if options.front:
+        return _front(options)
+    if options.quick or options.resume:
+        raise InvalidArgumentError("--quick and --resume are of --front: leave them out")
     if options.tf is None and options.cmap is None and options.opacity is None:
         options.tf = _DEFAULT
     arguments = classification(options)
@@ -58,4 +67,25 @@ def compare(options: argparse.Namespace) -> int:
         stream.write(json.dumps(report.to_dict(), indent=1).encode())
     print(table(report))
     say_written(Path(options.out) / path.name for path in files.values())
+    return 0
+
+
+def _front(options: argparse.Namespace) -> int:
+    """Measure fronts of time and accuracy."""
+    from pyvista_vdi import examples
+
+    files = output_files(options, "front", "json", "md")
+    require_new(files["json"], options)
+    more = {"window_size": options.size, "repeats": options.repeats}
+    plan = Plan.quick(**more) if options.quick else Plan(tuple(sorted(examples.VOLUMES)), **more)
+    with measuring("front", files["json"]) as bar:
+        found = measure_front(
+            plan, files["json"], resume=options.resume, device=options.device, progress=bar
+        )
+    lines = summary(found)
+    print("\n".join(lines))
+    for name, why in found.data["left_out"].items():
+        print(f"left out: {name} ({why})", file=sys.stderr)
+    write_text(files["md"], "\n".join([*lines, ""]))
+    say_written(files.values())
     return 0

@@ -230,6 +230,14 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
         choices=("auto", "never"),
         default="auto",
     )
+    declare.option(
+        group,
+        "--draw",
+        "what is raycast of a volume: vdi, volume, or auto (default): what is expected to give the "
+        "better picture within the frame rate",
+        choices=("auto", "vdi", "volume"),
+        default="auto",
+    )
     declare.switch(
         group,
         "--status",
@@ -265,7 +273,13 @@ def _add_serve(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_compare(parser: argparse.ArgumentParser) -> None:
-    declare.volume(parser)
+    front = (
+        "our ways to draw against VTK's, by time and SSIM, for every known volume at hand, "
+        "transfer function and view: hours"
+    )
+    declare.volume(parser, ("--front", front))
+    declare.switch(parser, "--quick", "of --front: 24 cases of the shipped volumes, minutes")
+    declare.switch(parser, "--resume", "of --front: go on with front.json where it was left")
     declare.option(parser, "--out", "where the files go", "FOLDER", default=".")
     declare.size(parser, WINDOW_SIZE)
     declare.angles(

@@ -89,6 +89,7 @@ def _show(
             shown,
             target_fps=options.target_fps,
             regenerate=options.regenerate,
+            draw=options.draw,
             status=options.status,
             device=options.device,
             **looks,

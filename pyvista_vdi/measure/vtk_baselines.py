@@ -27,40 +27,29 @@ _WINDOW_REMEDY = (
 )
 
 
-class VTKBaseline:
-    """One volume in one of VTK's mappers, "gpu" or "fixed_point", in an off-screen window.
+class OffScreenVolume:
+    """A ``vtkVolume``, or what is one, in an off-screen window, over black.
 
-    ``sample_distance`` is the length of a step along the ray, world units; VTK does not adjust it.
-    The framebuffer has eight bits per channel, so a picture is within half of 1/255 of what VTK
-    computed. Its rays start half a step from ours at most; at converged steps this is invisible.
     Without VTK or an off-screen window MissingDependencyError names the system packages.
+
+    Parameters
+    ----------
+    name : str
+        Who draws it, for messages.
+    actor : vtkVolume
+        With its mapper and property.
+    window_size : (int, int)
+        Pixels.
     """
 
-    def __init__(
-        self,
-        volume: Volume,
-        volume_property: Any,
-        window_size: tuple[int, int],
-        mapper: str,
-        sample_distance: float,
-    ) -> None:
-        if mapper not in MAPPERS:
-            raise InvalidArgumentError(f"mapper must be one of {MAPPERS}; got {mapper!r}")
-        core = _vtk("vtkRenderingCore")
-        from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
-
-        self.name = mapper
+    def __init__(self, name: str, actor: Any, window_size: tuple[int, int]) -> None:
+        self.name = name
         self._window = _off_screen_window(check_window_size(window_size))
-        self._renderer = core.vtkRenderer()
+        self._renderer = _vtk("vtkRenderingCore").vtkRenderer()
         self._renderer.SetBackground(0, 0, 0)
         self._window.AddRenderer(self._renderer)
-        self._mapper = _make_mapper(mapper)
-        self._mapper.SetInputData(volume_to_image(volume))
-        self.set_sample_distance(sample_distance)
-        self._volume = core.vtkVolume()
-        self._volume.SetMapper(self._mapper)
-        self._volume.SetProperty(volume_property)
-        self._renderer.AddVolume(self._volume)
+        self._volume = actor
+        self._renderer.AddVolume(actor)
 
     @property
     def renderer(self) -> Any:
@@ -75,10 +64,6 @@ class VTKBaseline:
         wanted = ("OpenGL renderer string", "OpenGL version string")
         found = [line.split(":", 1)[1].strip() for line in lines if line.startswith(wanted)]
         return ", ".join(found) or self._window.GetClassName()
-
-    def set_sample_distance(self, sample_distance: float) -> None:
-        """Set the length of a step along the ray, world units."""
-        self._mapper.SetSampleDistance(sample_distance)
 
     def render(self, camera: Camera) -> None:
         """Draw a frame and wait until it is finished; nothing is read back."""
@@ -100,7 +85,7 @@ class VTKBaseline:
         bottom_up = _vtk("util.numpy_support").vtk_to_numpy(pixels).reshape(height, width, 3)
         if not bottom_up.any():
             raise DeviceError(
-                f"VTK's {self.name} mapper drew nothing: every pixel is black; check that the "
+                f"{self.name} drew nothing: every pixel is black; check that the "
                 "transfer function is not transparent and that OpenGL works "
                 f"({self._window.GetClassName()})"
             )
@@ -117,6 +102,44 @@ class VTKBaseline:
         matrix.DeepCopy(camera.model_transform.ravel().tolist())
         self._volume.SetUserMatrix(matrix)
         self._renderer.ResetCameraClippingRange()
+
+
+class VTKBaseline(OffScreenVolume):
+    """One volume in one of VTK's mappers, "gpu" or "fixed_point", in an off-screen window.
+
+    ``sample_distance`` is the length of a step along the ray, world units; VTK does not adjust it.
+    The framebuffer has eight bits per channel, so a picture is within half of 1/255 of what VTK
+    computed. Its rays start half a step from ours at most; at converged steps this is invisible.
+    """
+
+    def __init__(
+        self,
+        volume: Volume,
+        volume_property: Any,
+        window_size: tuple[int, int],
+        mapper: str,
+        sample_distance: float,
+    ) -> None:
+        if mapper not in MAPPERS:
+            raise InvalidArgumentError(f"mapper must be one of {MAPPERS}; got {mapper!r}")
+        core = _vtk("vtkRenderingCore")
+        from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
+
+        self._mapper = _make_mapper(mapper)
+        self._mapper.SetInputData(volume_to_image(volume))
+        self.set_sample_distance(sample_distance)
+        actor = core.vtkVolume()
+        actor.SetMapper(self._mapper)
+        actor.SetProperty(volume_property)
+        super().__init__(f"VTK's {mapper} mapper", actor, window_size)
+
+    def set_sample_distance(self, sample_distance: float) -> None:
+        """Set the length of a step along the ray, world units."""
+        self._mapper.SetSampleDistance(sample_distance)
+
+    def set_image_sample_distance(self, distance: float) -> None:
+        """Cast a ray for every so many pixels along each edge."""
+        self._mapper.SetImageSampleDistance(distance)
 
 
 def aim(theirs: Any, camera: Camera) -> None:

@@ -28,6 +28,7 @@ from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.registration import Component
 from pyvista_vdi.plotting.volumes import as_image, held
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, refuse_settings
+from pyvista_vdi.quality.ways import checked_draw
 from pyvista_vdi.quality.when_anew import REGENERATE_BELOW, checked_bound
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
@@ -112,6 +113,7 @@ class AddVDI(Component):
         target_fps: float | None = 30.0,
         regenerate: Policy = "auto",
         regenerate_below: float = REGENERATE_BELOW,
+        draw: Literal["auto", "vdi", "volume"] = "auto",
         status: bool = False,
         device: Any = None,
         progress_bar: bool | Callable[[float], object] | None = None,
@@ -222,6 +224,13 @@ class AddVDI(Component):
             ``actor.regenerate()``. Changed data and transfer functions are always made anew.
         regenerate_below : float
             SSIM for ``"auto"``, 0 to 1; while the view moves, twice the error is borne.
+        draw : {"auto", "vdi", "volume"}
+            What is raycast where the volume is at hand. ``"auto"``: in windows on the screen, each
+            frame by what is expected to give the better picture within ``target_fps``, the VDI
+            near its generating view and the volume far from it; at rest by what is there sooner,
+            where the VDI does; elsewhere the VDI. ``"vdi"``: always the VDI. ``"volume"``: always
+            the volume, by :func:`pyvista_vdi.render_volume`'s kernel, right from every view.
+            ``actor.status.drawn`` says what was.
         status : bool
             Show ``actor.status`` in the upper left corner.
         device : str or int, optional
@@ -278,6 +287,7 @@ class AddVDI(Component):
             checked_rate("target_fps", target_fps)
         checked_policy(regenerate)
         checked_bound(regenerate_below)
+        checked_draw(draw)
         dial = Dial.of(quality, target_ssim, full_fps, max_bytes, target_angle)
         options = GenerationOptions(
             max_supersegments=max_supersegments,
@@ -325,6 +335,10 @@ class AddVDI(Component):
                     f"{', '.join(sorted(extra))} cannot be given with a VDI: its classification, "
                     "view and lists were fixed when it was generated; generate another from the "
                     "volume"
+                )
+            if draw == "volume":
+                raise UnsupportedError(
+                    "draw='volume' draws the volume, and this is a VDI without one: leave draw out"
                 )
             shown = volume if isinstance(volume, VDI) else vdi_from_image(volume)
             title = str(shown.metadata.get("scalars") or "Data")
@@ -378,6 +392,7 @@ class AddVDI(Component):
         if dial is not None and dial.ssim is not None:  # not above what the VDI is made for
             regenerate_below = min(regenerate_below, max(0.0, dial.ssim - _BELOW_GOAL))
         vdi_mapper.SetRegenerateBelow(regenerate_below)
+        vdi_mapper.SetDraw(draw)
         actor = PlotterVDIActor()
         if prop is not None:
             actor.prop = prop

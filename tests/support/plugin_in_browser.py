@@ -122,7 +122,7 @@ def scene(**options):
     """A plotter with a ball of two supersegments per list."""
     plotter = pv.Plotter(off_screen=True, window_size=WINDOW)
     volume = soft_ball()
-    actor = plotter.add_vdi(volume, max_supersegments=2, **{**LOOKS, **options})
+    actor = plotter.add_vdi(volume, max_supersegments=2, **{"draw": "vdi", **LOOKS, **options})
     actor.prop.interpolation_type = "linear"
     plotter.camera_position = ((6, 0, 0), (0, 0, 0), (0, 0, 1))
     return plotter, actor, volume

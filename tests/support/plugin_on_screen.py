@@ -55,7 +55,7 @@ class Hand:
 def scene(**options):
     """A plotter with a ball of two supersegments per list."""
     plotter = pv.Plotter(off_screen=False, window_size=(241, 203))
-    actor = plotter.add_vdi(soft_ball(), max_supersegments=2, **{**LOOKS, **options})
+    actor = plotter.add_vdi(soft_ball(), max_supersegments=2, **{"draw": "vdi", **LOOKS, **options})
     plotter.camera_position = ((6, 0, 0), (0, 0, 0), (0, 0, 1))
     return plotter, actor
 

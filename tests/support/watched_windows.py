@@ -78,7 +78,7 @@ def no_estimates(monkeypatch):
 
 def watched(plotter, volume=None, **options):
     """Add a ball to a plotter whose window counts as watched, and show it."""
-    options = {"regenerate": "never", **LOOKS, **options}
+    options = {"regenerate": "never", "draw": "vdi", **LOOKS, **options}
     actor = plotter.add_vdi(soft_ball() if volume is None else volume, **options)
     actor.mapper.SetInteractiveOffScreen(True)
     plotter.camera_position = ((6, 0, 0), (0, 0, 0), (0, 0, 1))  # Azimuth turns by its degrees

@@ -20,6 +20,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.ways import Way
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import WindowClock
@@ -112,6 +113,11 @@ class Frame:
         size = (width, height)
         return cls(size, (x, y), camera, to_view, projection[2:], renderer, actor, mapper, size)
 
+    @classmethod
+    def of(cls, camera: Camera, size: tuple[int, int]) -> Frame:
+        """Return a frame of no renderer, for what its view shows."""
+        return cls(size, (0, 0), camera, np.eye(4), np.eye(4)[2:], full_size=size)
+
     # -- whose ---------------------------------------------------------------------------------
 
     @property
@@ -160,6 +166,11 @@ class Frame:
     def preview(self) -> bool:
         """Whether the image is to have fewer pixels than the viewport."""
         return self.size != self.full_size
+
+    @property
+    def way(self) -> Way:
+        """What is raycast."""
+        return "vdi" if self.stand_in is None else "volume"
 
     @property
     def bounds(self) -> tuple[float, ...]:
@@ -240,6 +251,14 @@ class Frame:
             return None
         return np.stack([low, high])
 
+    def covered(self, bounds: tuple[float, ...]) -> float:
+        """Return how many of the image's pixels bounds may be seen in."""
+        rectangle = self.rectangle(bounds)
+        if rectangle is None:
+            return 0.0
+        low, high = np.clip(rectangle, 0, self.size)
+        return float(np.prod(high - low))
+
     # -- depth ---------------------------------------------------------------------------------
 
     def view_depth(self, z: NDArray[Any], *, background: bool = True) -> NDArray[Any]:
@@ -304,7 +323,8 @@ class Drawn:
     depth: Image | None = None  # where its rays ended
     number: int | None = None  # by which an upload is known
     joint: bool = False  # a part of a picture that other actors show the rest of
-    stand_in: bool = False  # of the volume, in place of a VDI
+    stand_in: bool = False  # of the volume, until there is a VDI
+    way: Way = "vdi"  # what was raycast
     pixels: Image | None = None
 
     @property

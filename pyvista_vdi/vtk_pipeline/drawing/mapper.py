@@ -17,6 +17,7 @@ from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.cropping import checked_opacity_multiplier
 from pyvista_vdi.model.render_options import checked_transmittance_cutoff
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.ways import checked_draw
 from pyvista_vdi.quality.when_anew import checked_bound
 from pyvista_vdi.raycasting.picking import checked_opacity
 from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
@@ -24,7 +25,10 @@ from pyvista_vdi.vtk_pipeline.filters.algorithm import DEVICE, accessors
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.interaction.regeneration import checked_policy
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import checked_rate
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import (
+    checked_image_distance,
+    checked_rate,
+)
 
 #: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.
 COARSEST = 4.0
@@ -47,7 +51,7 @@ class VDIMapperMethods:
         """Install proxy and observers; to be called once, from ``__init__``."""
         self._painter = Painter()
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
-        self.SetImageSampleDistance(1.0)
+        super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)
         super().SetInputDataObject(self._painter.proxy)  # type: ignore[misc]
         # Plain functions: they get the mapper from VTK and hold nothing
@@ -146,6 +150,42 @@ class VDIMapperMethods:
         """,
         "Return the light below which rays end.",
         checked_transmittance_cutoff,
+    )
+
+    SetDraw, GetDraw = accessors(
+        "Draw",
+        "painter.upkeep.draw",
+        "draw",
+        """Choose what is raycast where the volume is at hand.
+
+        Parameters
+        ----------
+        draw : {"auto", "vdi", "volume"}
+            ``"auto"`` (the default): in windows that somebody watches, each frame by what is
+            expected to give the better picture within the frame rate, and at rest by what is there
+            sooner; elsewhere the VDI. ``"vdi"``: always the VDI. ``"volume"``: always the volume,
+            by our volume raycaster; a VDI is made only when one is asked for. A volume that the
+            device holds brick by brick is drawn by its VDI, and so are several VDIs in a window.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is something else.
+        """,
+        "Return what is raycast where the volume is at hand.",
+        checked_draw,
+    )
+    SetImageSampleDistance, GetImageSampleDistance = accessors(
+        "ImageSampleDistance",
+        "painter.image_distance",
+        "distance",
+        """Cast a ray for every so many pixels along each edge; 1 by default.
+
+        The picture is interpolated linearly, as by VTK's mappers. Previews have fewer rays where
+        the frame rate asks for it. ``InvalidArgumentError`` is raised if it is not from 1 to 100.
+        """,
+        "Return for how many pixels along each edge a ray is cast.",
+        checked_image_distance,
     )
 
     # -- while a hand moves ----------------------------------------------------------------------

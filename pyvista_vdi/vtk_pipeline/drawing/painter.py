@@ -59,6 +59,7 @@ class Painter:
         self.transmittance_cutoff = TRANSMITTANCE_CUTOFF
         self.interaction = Interaction()
         self.texts = CornerTexts()
+        self.image_distance = 1.0
         self.selection = Selection()
         self.proxy = vtkImageData()  # whose box VTK draws in place of the VDI
         self.proxy.SetDimensions(2, 2, 2)
@@ -162,6 +163,8 @@ class Painter:
     def take_settings(self, other: Painter) -> None:
         """Take over how dense another draws, what it allows and when it regenerates."""
         self.opacity_multiplier = other.opacity_multiplier
+        self.image_distance = other.image_distance
+        self.upkeep.draw = other.upkeep.draw
         self.transmittance_cutoff = other.transmittance_cutoff
         vars(self.interaction).update(vars(other.interaction))
         mine, theirs = self.selection, other.selection
@@ -189,6 +192,7 @@ class Painter:
             generation=self._generation,
             vdi=vdi,
             stand_in=last.stand_in,
+            drawn=last.way,
         )
 
     # -- a frame ---------------------------------------------------------------------------------
@@ -277,6 +281,7 @@ class Painter:
         if part is not None:
             return part
         frame = replace(frame, depth=frame.clock.shared(OpaqueDepths).read([frame]))
+        frame = frame.coarser(self._size_at_rest(frame))
         drawn = self._kept(frame)
         if drawn is not None:
             return drawn  # however the frame is to be: where it is there, full costs nothing
@@ -338,14 +343,18 @@ class Painter:
         """Return the size of this frame's image: that of the viewport, or less."""
         width, height = frame.full_size
         floor = min(1.0, 1 / frame.mapper.GetMaximumImageSampleDistance() ** 2)
-        if frame.stand_in is None:
-            share = frame.clock.share(frame.renderer, self.interaction, width * height, floor)
+        if frame.stand_in is None or frame.stand_in.lasting:
+            pixels, way = width * height, frame.way
+            share = frame.clock.share(frame.renderer, self.interaction, pixels, floor, way)
         elif self._may_be_coarse(frame):
             rate = self.interaction.target or _STAND_IN_RATE
             share = max(frame.stand_in.share(rate, width * height), floor)
         else:
             share = 1.0
-        return reduced(frame.full_size, share)
+        return reduced(frame.full_size, min(share, 1 / self.image_distance**2))
+
+    def _size_at_rest(self, frame: Frame) -> tuple[int, int]:
+        return reduced(frame.full_size, 1 / self.image_distance**2)
 
     def _may_be_coarse(self, frame: Frame) -> bool:
         """Whether a stand-in, which is soon replaced, may be drawn with few rays."""
@@ -367,19 +376,28 @@ class Painter:
             frame.camera, frame.size, frame.options, frame.depth, self.device, out
         )
         if frame.stand_in is not None:
-            image = frame.stand_in.picture(request)
-            frame.stand_in.took(width * height, time.perf_counter() - before)
+            lasts = frame.stand_in.lasting and self.upkeep.draw == "volume"
+            image = frame.stand_in.picture(request, frame.view.camera if lasts else None)
         else:
             assert frame.vdi is not None
             image = render_vdi(frame.vdi, request)
-            frame.clock.drawn(frame.size, frame.full_size, time.perf_counter() - before)
+        seconds = time.perf_counter() - before
+        if frame.stand_in is not None:
+            frame.stand_in.took(width * height, seconds)
+        if frame.stand_in is None or frame.stand_in.lasting:
+            frame.clock.drawn(frame.size, frame.full_size, seconds, frame.way)
+        angle = (
+            0.0 if frame.vdi is None else angle_from_generating_view(frame.vdi, frame.view.camera)
+        )
+        self.upkeep.ways.took(frame.way, angle, frame.covered(frame.bounds), seconds)
         self._raycasts += 1
         drawn = Drawn(
             image,
             frame.full_size,
             frame.depth,
             self._raycasts,
-            stand_in=frame.stand_in is not None,
+            stand_in=frame.stand_in is not None and not frame.stand_in.lasting,
+            way=frame.way,
             pixels=pixels,
         )
         gone = self._images.keep(frame.key, drawn)

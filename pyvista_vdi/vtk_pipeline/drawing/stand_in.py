@@ -1,4 +1,4 @@
-"""The volume itself, drawn in place of a VDI of what has changed until that VDI has been made."""
+"""The volume itself, drawn in place of its VDI: until that is made, or because it is better."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import DeviceMemoryError
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.quality.frame_rate import FrameRateController
 from pyvista_vdi.volume.classified_volume import DeviceVolume
@@ -15,7 +16,7 @@ from pyvista_vdi.vtk_pipeline.filters.source import Request
 
 
 class StandIn:
-    """Volume and look of a request, raycast as generation samples them, in the coming VDI's light.
+    """Volume and look of a request, raycast as generation samples them, in the VDI's light.
 
     It is right from every view. The voxels go to the device once, for it and for the generation,
     and stay there when only the look changes.
@@ -26,6 +27,8 @@ class StandIn:
         What the VDI is being made of.
     rate : FrameRateController
         Knows what rays have cost before, and learns what these do.
+    lasting : bool
+        Whether it is drawn for its own sake, and not until a VDI has been made.
 
     Raises
     ------
@@ -34,8 +37,11 @@ class StandIn:
         for a person to wait for it.
     """
 
-    def __init__(self, request: Request, rate: FrameRateController) -> None:
+    def __init__(
+        self, request: Request, rate: FrameRateController, *, lasting: bool = False
+    ) -> None:
         self.request = request
+        self.lasting = lasting
         self._rate = rate
         volume, sampling = request.volume, request.options
         room = picture_room(
@@ -59,9 +65,12 @@ class StandIn:
         self._rate.target_fps = target
         return self._rate.choose(pixels) / pixels
 
-    def picture(self, frame: FrameRequest) -> NDArray[np.float32]:
-        """Return the picture, premultiplied RGBA, float32 (H, W, 4), top row first."""
-        return raycast_medium(self._medium, frame, lit_from=self.request.generating[0])
+    def picture(self, frame: FrameRequest, lit_from: Camera | None = None) -> NDArray[np.float32]:
+        """Return the picture, premultiplied RGBA, float32 (H, W, 4), top row first.
+
+        ``lit_from`` is the view whose light falls on it, in place of the VDI's.
+        """
+        return raycast_medium(self._medium, frame, lit_from=lit_from or self.request.generating[0])
 
     def took(self, pixels: int, seconds: float) -> None:
         """Note what a picture has taken."""

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import logging
+import time
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import Any, Literal
 
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import TRIAL_SIZE
-from pyvista_vdi.quality.frame_rate import FrameRateController
+from pyvista_vdi.quality.frame_rate import FLOOR, FrameRateController
 from pyvista_vdi.quality.view_error import angle_from_generating_view
+from pyvista_vdi.quality.ways import Ways
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
@@ -25,7 +27,7 @@ from pyvista_vdi.vtk_pipeline.interaction import browser
 from pyvista_vdi.vtk_pipeline.interaction.regeneration import Regeneration
 from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus, Warnings
 from pyvista_vdi.vtk_pipeline.interaction.ticker import LoopTicker, Ticker
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import Interaction, WindowClock
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import Interaction, WindowClock, reduced
 
 _log = logging.getLogger(__name__)
 
@@ -45,6 +47,9 @@ class Upkeep:
         self.input: Input | None = None
         self.automatic_view = True
         self.regeneration = Regeneration()
+        self.draw: Literal["auto", "vdi", "volume"] = "auto"
+        self.ways = Ways()
+        self._lasting: StandIn | None = None
         self._stand_in: StandIn | None = None
         self._stand_in_rate = FrameRateController()
         self._refused: Request | None = None  # of which there can be no stand-in
@@ -68,7 +73,7 @@ class Upkeep:
         self._failed_at = None
         self._said_far = False
         self.regeneration.cancel()
-        self._stand_in = self._refused = None
+        self._forget_volume()
         if source is not None:
             source.watch(changed)
 
@@ -89,7 +94,7 @@ class Upkeep:
         self.regeneration.close()
         self._preparation.clear()
         self._preparation.join()
-        self._stand_in = self._refused = None
+        self._forget_volume()
 
     # -- in a frame ------------------------------------------------------------------------------
 
@@ -111,6 +116,8 @@ class Upkeep:
             vdi = self._updated(source)
             self._mind_the_angle(vdi, frame.view)
             return vdi
+        if self.draw == "volume" and (volume := self._volume(source.source.MakeRequest())):
+            return volume
         # Once for both eyes of a stereo pair, and not between the tiles of a picture
         now = (frame.clock.number, id(frame.clock))
         decide, self._looked_at = frame.clock.whole_picture and now != self._looked_at, now
@@ -125,7 +132,7 @@ class Upkeep:
         if behind:
             if decide or self.regeneration.unseen(source.source, source.stamp()):
                 self._look(source, frame, ask)
-            return self._standing_in() or source.last()
+            return self._standing_in() or self._better(source, frame) or source.last()
         if one_view and decide and self._asked_for(ask):
             source.take_camera(frame.renderer, frame.model_transform)
             source.take_size(frame.renderer)
@@ -150,11 +157,50 @@ class Upkeep:
             return
 
         def draw_one(_runtime: Runtime, _report: Callable[[float], None]) -> bool:
-            trial = FrameRequest(made.screen.camera, (TRIAL_SIZE, TRIAL_SIZE))
-            StandIn(made, FrameRateController()).picture(trial)
+            camera, volume = made.screen.camera, StandIn(made, FrameRateController())
+            volume.picture(FrameRequest(camera, (TRIAL_SIZE, TRIAL_SIZE)))
+            if self.draw == "auto":
+                # What a ray costs, by a picture of as many as a preview has at least
+                trial = Frame.of(camera, reduced(made.screen.size, FLOOR))
+                began = time.perf_counter()
+                volume.picture(FrameRequest(camera, trial.size))
+                seconds = time.perf_counter() - began
+                self.ways.took("volume", 0.0, trial.covered(volume.bounds), seconds)
             return True
 
         self._preparation.put(Job(draw_one, made.device))
+
+    def _better(self, source: SourceInput, frame: Frame) -> StandIn | None:
+        """Return the volume where it is expected to give the better frame; None: the VDI does."""
+        vdi, made = source.last(), source.source.GetCurrentRequest()
+        if self.draw != "auto" or not frame.clock.single or vdi is None or made is None:
+            return None
+        window = frame.renderer.GetRenderWindow()
+        moves = self._interaction.wants_preview(window)
+        way = self.ways.choose(
+            angle_from_generating_view(vdi, frame.view.camera),
+            frame.covered(vdi.bounds),
+            1 / self._interaction.rate(window) if moves else None,
+            self.regeneration.ssim(vdi),
+            self.regeneration.bound,
+        )
+        return self._volume(made) if way == "volume" else None
+
+    def _volume(self, request: Request) -> StandIn | None:
+        """Return the volume of a request, to be drawn for its own sake; None if it cannot be."""
+        if self._lasting is not None and self._lasting.request.content != request.content:
+            self._lasting = None  # its buffers go before others are taken
+        if self._lasting is None and request is not self._refused:
+            try:
+                self._lasting = StandIn(request, self._stand_in_rate, lasting=True)
+            except VDIError as error:
+                self._refused = request
+                _log.debug("the volume cannot be drawn in place of its VDI", exc_info=error)
+        return self._lasting
+
+    def _forget_volume(self) -> None:
+        self._stand_in = self._lasting = self._refused = None
+        self.ways = Ways()
 
     def _standing_in(self) -> StandIn | None:
         """Return what is drawn while the VDI shows what is no longer so; None if it need not be."""

@@ -14,6 +14,7 @@ from vtkmodules.vtkRenderingAnnotation import vtkCornerAnnotation
 from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.dial import describe
+from pyvista_vdi.quality.ways import Way
 
 _log = logging.getLogger(__name__)
 
@@ -57,6 +58,8 @@ class VDIStatus:
         How many VDIs were shown so far, this one included.
     stand_in : bool
         Whether the volume itself was drawn, because the VDI shows what has changed since.
+    drawn : {"vdi", "volume"}
+        What was raycast: the VDI, or the volume itself, for whatever reason.
     vdi : VDI or None
         The one that is shown, or is to be replaced.
     """
@@ -71,6 +74,7 @@ class VDIStatus:
     generation: int
     vdi: VDI | None
     stand_in: bool = False
+    drawn: Way = "vdi"
 
     @property
     def share(self) -> float:
@@ -89,7 +93,7 @@ class VDIStatus:
         if self.mode == "none":
             parts = ["no VDI drawn yet"]
         else:
-            what = f"{self.mode}, the volume itself" if self.stand_in else self.mode
+            what = f"{self.mode}, the volume itself" if self.drawn == "volume" else self.mode
             parts = [f"{what}: {self.share:.0%} of {self.full_samples} pixels"]
         if self.fps is not None:
             parts.append(f"{self.fps:.3g} frames/s")

@@ -15,6 +15,7 @@ from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLGL2PSHelper
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.quality.frame_rate import FrameRateController
+from pyvista_vdi.quality.ways import Way
 from pyvista_vdi.vtk_pipeline.interaction import browser
 
 T = TypeVar("T")
@@ -33,6 +34,16 @@ def checked_rate(name: str, value: Any) -> float:
             f"{name} must be a number of frames per second, 0 or above; got {value!r}"
         )
     return rate
+
+
+def checked_image_distance(value: Any) -> float:
+    """Return for how many pixels along each edge a ray is cast; 1 to 100, as far as VTK goes."""
+    distance = as_float(value)
+    if isinstance(value, bool) or not 1 <= distance <= 100:
+        raise InvalidArgumentError(
+            f"the image sample distance must be a number from 1 to 100; got {value!r}"
+        )
+    return distance
 
 
 @dataclass
@@ -56,6 +67,10 @@ class Interaction:
     def _from_afar(self, window: Any) -> bool:
         return browser.watches(window) if self.off_screen is None else self.off_screen
 
+    def rate(self, window: Any) -> float:
+        """Return the frames per second that frames keep while a hand moves."""
+        return float(self.target or window.GetDesiredUpdateRate())
+
     def moving(self, window: Any) -> bool:
         """Whether a hand moves, by VTK's convention."""
         return bool(window.GetDesiredUpdateRate() >= self.update_rate)
@@ -76,6 +91,7 @@ class _Frame:
     pixels: int = 0  # that were raycast
     full_pixels: int = 0  # those of full images
     work: float = 0.0  # seconds that this took
+    way: Way = "vdi"  # what was raycast
 
 
 class WindowClock:
@@ -106,7 +122,8 @@ class WindowClock:
         self._shared: dict[type, Any] = {}
         self._watched: set[str] = set()
         self._known: list[vtkWeakReference] = []
-        self._controller: FrameRateController | None = None
+        self._controllers: dict[Way, FrameRateController] = {}
+        self._way: Way = "vdi"  # of the last frame
         self._floor = 0.0
         self._target = 0.0
         self._started: float | None = None
@@ -114,7 +131,7 @@ class WindowClock:
         self._previewed = False
         self._picture_wanted = False
         self._full_pixels_before = 0
-        self._resting: tuple[int, float, float] | None = None
+        self._resting: dict[Way, tuple[int, float, float]] = {}
         self._foreground = contextlib.ExitStack()  # from the frame's start to its end
         self._frame = _Frame()
         window.AddObserver("StartEvent", lambda *_: self._start())
@@ -151,9 +168,15 @@ class WindowClock:
     @property
     def fps(self) -> float | None:
         """Mean rate of the interaction's last frames; at rest what the last frame would allow."""
-        if self._interacting and self._controller is not None and self._controller.fps > 0:
-            return self._controller.fps
+        controller = self._controllers.get(self._way)
+        if self._interacting and controller is not None and controller.fps > 0:
+            return controller.fps
         return 1 / self.seconds if self.seconds else None
+
+    @property
+    def single(self) -> bool:
+        """Whether no other VDI is drawn in this window."""
+        return len(self._painters) <= 1
 
     @property
     def drawing(self) -> bool:
@@ -175,11 +198,13 @@ class WindowClock:
         window = self._window.Get()
         return window is None or tuple(window.GetTileScale()) == (1, 1)
 
-    def share(self, renderer: Any, interaction: Interaction, pixels: int, floor: float) -> float:
+    def share(
+        self, renderer: Any, interaction: Interaction, pixels: int, floor: float, way: Way = "vdi"
+    ) -> float:
         """Return the share of its pixels, 0 to 1, that a VDI is drawn with in this frame.
 
-        ``interaction`` is what its mapper allows, ``pixels`` those of the full image, and ``floor``
-        the least share.
+        ``interaction`` is what its mapper allows, ``pixels`` those of the full image, ``floor``
+        the least share, and ``way`` says whether its volume is drawn in its place.
         """
         window = self._window.Get()
         if not interaction.wants_preview(window):
@@ -189,17 +214,20 @@ class WindowClock:
             return 1.0
         frame = self._frame
         frame.interactive = True
-        target = interaction.target or window.GetDesiredUpdateRate()
+        target = interaction.rate(window)
         frame.target = max(frame.target, target)
         if frame.share is None:
             # The other VDIs of this frame are not known yet: count on those of the last
-            controller = self._tuned(max(target, self._target), floor)
+            controller = self._tuned(max(target, self._target), floor, way)
             full = max(self._full_pixels_before, pixels)
             frame.share = controller.choose(full) / full
         return max(frame.share, floor)
 
-    def drawn(self, size: tuple[int, int], full: tuple[int, int], seconds: float) -> None:
-        """Note a raycast of this frame: the image's size, the viewport's, and its time."""
+    def drawn(
+        self, size: tuple[int, int], full: tuple[int, int], seconds: float, way: Way = "vdi"
+    ) -> None:
+        """Note a raycast of this frame: the image's size, the viewport's, its time, and of what."""
+        self._frame.way = way
         self._frame.pixels += size[0] * size[1]
         self._frame.full_pixels += full[0] * full[1]
         self._frame.work += seconds
@@ -238,30 +266,33 @@ class WindowClock:
         moving = any(painter.interaction.moving(window) for painter in self._painters)
         if self._interacting and not frame.interactive and not moving:
             self._interacting = False
-            if self._controller is not None:
-                self._controller.rest()
+            for controller in self._controllers.values():
+                controller.rest()
 
     def _record(self, frame: _Frame, seconds: float) -> None:
         self.seconds = seconds
+        self._way = frame.way
         if not frame.interactive:
-            self._resting = (frame.pixels, frame.work, seconds)
+            self._resting[frame.way] = (frame.pixels, frame.work, seconds)
             return
-        assert self._controller is not None
         self._interacting = True
         self._target = frame.target
         self._full_pixels_before = frame.full_pixels
-        self._controller.record(frame.pixels, frame.work, seconds)
+        if frame.way in self._controllers:
+            self._controllers[frame.way].record(frame.pixels, frame.work, seconds)
 
-    def _tuned(self, target: float, floor: float) -> FrameRateController:
+    def _tuned(self, target: float, floor: float, way: Way) -> FrameRateController:
         """Return the window's controller, with this target and at most this floor."""
-        if self._controller is None or floor < self._floor:
-            self._controller = FrameRateController(target, floor=floor)
+        if floor < self._floor:
+            self._controllers.clear()
+        if way not in self._controllers:
+            controller = self._controllers[way] = FrameRateController(target, floor=floor)
             self._floor = floor
-            if self._resting is not None:
+            if way in self._resting:
                 # What the last full frame took, so that an interaction does not begin with another
-                self._controller.record(*self._resting)
-        self._controller.target_fps = target
-        return self._controller
+                controller.record(*self._resting[way])
+        self._controllers[way].target_fps = target
+        return self._controllers[way]
 
     # -- pictures --------------------------------------------------------------------------------
 

@@ -1,0 +1,92 @@
+"""The choice between VDI and volume, by what frames have taken before."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.quality.ways import Ways, checked_draw
+
+pytestmark = pytest.mark.fast
+
+PIXELS = 1e6
+TARGET = 1 / 30  # seconds
+#: Milliseconds of a frame: a VDI's at V_O, and a volume's from anywhere.
+VDI, VOLUME = 20.0, 200.0
+
+
+def used(vdi=VDI, volume=VOLUME):
+    ways = Ways()
+    ways.took("vdi", 0.0, PIXELS, vdi / 1e3)
+    ways.took("volume", 0.0, PIXELS, volume / 1e3)
+    return ways
+
+
+def test_the_vdi_until_both_are_known():
+    ways = Ways()
+    assert ways.choose(90.0, PIXELS, TARGET) == "vdi"
+    ways.took("volume", 0.0, PIXELS, 1e-3)
+    assert ways.choose(90.0, PIXELS, TARGET) == "vdi"
+    ways.took("vdi", 90.0, PIXELS, 1.0)
+    assert ways.choose(90.0, PIXELS, TARGET) == "volume"
+
+
+def test_near_v_o_the_vdi_and_far_from_it_the_volume():
+    ways = used()
+    assert ways.choose(0.0, PIXELS, TARGET) == "vdi"
+    assert ways.choose(60.0, PIXELS, TARGET) == "volume"
+    assert ways.choose(0.0, PIXELS, TARGET) == "vdi"
+
+
+def test_what_missing_pixels_lose_is_weighed_against_what_the_vdi_loses():
+    ways = used(vdi=1.0)  # 24 ms at 30 degrees: all pixels within the target
+    assert ways.choose(30.0, PIXELS, TARGET, ssim=0.99) == "vdi"
+    assert ways.choose(30.0, PIXELS, TARGET, ssim=0.90) == "volume"
+
+
+def test_both_too_slow_the_faster_is_drawn():
+    assert used(vdi=1e4, volume=1e5).choose(0.0, PIXELS, TARGET) == "vdi"
+    assert used(vdi=1e4, volume=1e5).choose(90.0, PIXELS, TARGET) == "volume"
+
+
+def test_at_rest_what_does_is_there_sooner():
+    assert used().choose(0.0, PIXELS, None, ssim=0.99, bound=0.95) == "vdi"
+    assert used().choose(60.0, PIXELS, None, ssim=0.99, bound=0.95) == "volume"
+    assert used().choose(0.0, PIXELS, None, ssim=0.90, bound=0.95) == "volume"
+
+
+def test_nothing_flickers_where_both_are_as_good():
+    """Frames take a fifth more or less than expected, by chance: at most one change."""
+    rng = np.random.default_rng(7)
+    ways, seen = used(), []
+    equal = next(a for a in range(91) if ways.choose(a, PIXELS, TARGET) == "volume")
+    ways = used()
+    true = {way: ways.seconds_per_pixel(way, equal) for way in ("vdi", "volume")}
+    for _ in range(300):
+        way = ways.choose(equal, PIXELS, TARGET)
+        seen.append(way)
+        each = true[way]
+        ways.took(way, equal, PIXELS, PIXELS * each * rng.uniform(0.83, 1.2))
+    assert sum(a != b for a, b in itertools.pairwise(seen)) <= 1
+
+
+def test_frames_correct_what_was_expected():
+    ways = used()
+    for _ in range(12):
+        ways.took("vdi", 30.0, PIXELS, 5e-3)
+    assert ways.seconds_per_pixel("vdi", 30.0) * PIXELS == pytest.approx(5e-3, rel=0.01)
+    # As measured where it was measured, and by the shape of the rise elsewhere
+    assert ways.seconds_per_pixel("vdi", 0.0) * PIXELS == pytest.approx(VDI / 1e3)
+    assert ways.seconds_per_pixel("vdi", 35.0) > ways.seconds_per_pixel("vdi", 30.0)
+    ways.took("vdi", 30.0, 0, 5.0)
+    ways.took("vdi", 30.0, PIXELS, 0.0)
+    assert ways.seconds_per_pixel("vdi", 30.0) * PIXELS == pytest.approx(5e-3, rel=0.01)
+
+
+@pytest.mark.parametrize("draw", ["VDI", None, 1])
+def test_other_words_are_refused(draw):
+    with pytest.raises(InvalidArgumentError, match="draw must be 'auto', 'vdi' or 'volume'"):
+        checked_draw(draw)
