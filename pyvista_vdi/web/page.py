@@ -10,6 +10,7 @@ import os
 import re
 import zipfile
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
@@ -61,17 +62,48 @@ p {{ font: 14px sans-serif; text-align: center; }}
 </style>
 </head>
 <body>
-<vdi-viewer background="{background}">
-<img alt="{title}" src="data:image/jpeg;base64,{still}">
-<noscript><p>Scripts are turned off: this is a still picture of what could be turned.</p></noscript>
-<script type="{kind}">{first}</script>
-{scene}<script>
-{script}</script>
-<script type="{kind}">{rest}</script>
-</vdi-viewer>
-</body>
+{views}</body>
 </html>
 """
+
+_VIEW = """\
+<vdi-viewer background="{background}"{attributes}>
+<img alt="{title}" src="data:image/jpeg;base64,{still}">
+{parts}</vdi-viewer>
+"""
+
+_NO_SCRIPT = (
+    "<noscript><p>Scripts are turned off: this is a still picture of what could be turned.</p>"
+    "</noscript>\n"
+)
+
+
+@dataclass
+class View:
+    """What a viewer in a page shows.
+
+    Attributes
+    ----------
+    vdi : VDI or None
+        As it is sent; ``None`` if all is in the scene.
+    background : str
+        As CSS has it.
+    still : numpy.ndarray
+        uint8 (H, W, 3), the picture where nothing can be turned.
+    still_size : (int, int)
+        Width and height that it is shown as, or smaller.
+    scene : bytes, optional
+        What is seen beside the VDI: see :mod:`pyvista_vdi.web.scenes.scene`.
+    attributes : dict of str to str
+        More attributes of the element.
+    """
+
+    vdi: VDI | None
+    background: str
+    still: NDArray[np.uint8]
+    still_size: Sequence[int]
+    scene: bytes | None = None
+    attributes: dict[str, str] = field(default_factory=dict)
 
 
 def page(
@@ -113,62 +145,61 @@ def page(
     sent = vdi.with_precision(precision or "8-byte")
     percents = " ".join(f"{100 * channel:g}%" for channel in background)
     still = over_background(_from_generating_view(vdi), background)
-    return assembled(
-        sent,
-        title=title,
-        background=f"rgb({percents})",
-        still=np.rint(still * 255).astype(np.uint8),
-        still_size=vdi.picture_size,
-        level=level,
-        progress=progress,
-    )
+    view = View(sent, f"rgb({percents})", np.rint(still * 255).astype(np.uint8), vdi.picture_size)
+    return assembled([view], title=title, level=level, progress=progress)
 
 
 def assembled(
-    vdi: VDI,
+    views: Sequence[View],
     *,
     title: str,
-    background: str,
-    still: NDArray[np.uint8],
-    still_size: Sequence[int],
-    scene: bytes | None = None,
     level: int | None = None,
     progress: Progress | None = None,
 ) -> bytes:
-    """Return a page of its parts.
+    """Return a page with one or several viewers.
 
     Parameters
     ----------
-    vdi : VDI
-        As it is sent.
+    views : sequence of View
+        What they show. :func:`read` gives the first one's VDI back.
     title : str
         Of the page.
-    background : str
-        As CSS has it.
-    still : numpy.ndarray
-        uint8 (H, W, 3), the picture where nothing can be turned.
-    still_size : (int, int)
-        Width and height that it is shown as, or smaller.
-    scene : bytes, optional
-        What is seen beside the VDI: see :mod:`pyvista_vdi.web.scenes.scene`.
     level, progress : optional
         As for :func:`page`.
     """
-    stream = io.BytesIO()
-    write_to(stream, vdi, DEFLATE, level, progress)
-    data = stream.getvalue()
-    cut = _end_of_coarse(stream)
+    title = html.escape(title)
+    has_scene = any(view.scene is not None for view in views)
+    parts = []
+    for number, view in enumerate(views):
+        first, rest = "", ""
+        if view.vdi is not None:
+            stream = io.BytesIO()
+            write_to(stream, view.vdi, DEFLATE, level, progress if number == 0 else None)
+            data = stream.getvalue()
+            cut = _end_of_coarse(stream)
+            of = f' data-of="{number}"' if number else ""  # read() looks for the first one's
+            first, rest = (
+                f'<script type="{DATA_TYPE}"{of}>{_text(part)}</script>\n'
+                for part in (data[:cut], data[cut:])
+            )
+        scene = "" if view.scene is None else _SCENE.format(_text(view.scene))
+        script = "" if number else f"<script>\n{viewer_script(scene=has_scene)}</script>\n"
+        named = {name: html.escape(value) for name, value in view.attributes.items()}
+        parts.append(
+            _VIEW.format(
+                title=title,
+                background=view.background,
+                attributes="".join(f' {name}="{value}"' for name, value in named.items()),
+                still=_text(_jpeg(view.still, view.still_size)),
+                parts=("" if number else _NO_SCRIPT) + first + scene + script + rest,
+            )
+        )
     text = _PAGE.format(
         version=__version__,
         policy=_POLICY,
-        title=html.escape(title),
-        background=background,
-        still=_text(_jpeg(still, still_size)),
-        kind=DATA_TYPE,
-        first=_text(data[:cut]),
-        scene="" if scene is None else _SCENE.format(_text(scene)),
-        script=viewer_script(scene=scene is not None),
-        rest=_text(data[cut:]),
+        title=title,
+        background=views[0].background,
+        views="".join(parts),
     )
     return text.encode()
 

@@ -390,6 +390,38 @@ def test_export_html_writes_a_page_that_shows_the_scene(plotter, from_disk, tmp_
     assert pvdi.read(path).equals(vdi.with_precision("8-byte"))
 
 
+def test_subplots_stand_beside_each_other_and_turn_together(from_disk, tmp_path):
+    plotter = pv.Plotter(off_screen=True, shape=(1, 2), window_size=SIZE)
+    # Larger than what is beside it: VTK clips both to the range of depths of the first
+    plotter.add_mesh(pv.Cube(x_length=4, y_length=4, z_length=4), color="r")
+    plotter.subplot(0, 1)
+    ball(plotter)
+    plotter.add_mesh(pv.Sphere(radius=0.3, center=(1, 1, 1)))
+    plotter.link_views()
+    plotter.export_html(tmp_path / "scene.html")
+    picture, vdi = plotter.screenshot()[..., :3].astype(float), plotter.volume.vdi
+    views = [renderer.GetSize() for renderer in plotter.renderers]
+    plotter.close()
+    page = from_disk(tmp_path / "scene.html")
+    page.evaluate(
+        """() => {
+          window.viewers = [...document.querySelectorAll("vdi-viewer")]
+            .sort((a, b) => a.offsetLeft - b.offsetLeft);
+          return Promise.all(viewers.map((viewer) => viewer.ready)).then(() => true);
+        }"""
+    )
+    for number, size in enumerate(views):
+        page.evaluate(f"window.viewer = viewers[{number}]")
+        got = shot(page, size)
+        got = got[..., :3] + 255 - got[..., 3:]
+        want = picture[:, : size[0]] if number == 0 else picture[:, -size[0] :]
+        assert np.ptp(want) > 100
+        assert np.abs(got - want).mean() < 2 * MEAN  # half of the pixels, and the line between them
+    page.evaluate("viewers[0].camera = {...viewers[0].camera, position: [1, 2, 9]}")
+    assert page.evaluate("viewers[1].camera.position") == [1, 2, 9]
+    assert pvdi.read(tmp_path / "scene.html").equals(vdi.with_precision("8-byte"))
+
+
 def test_a_lost_context_is_made_up_for(plotter, from_disk, tmp_path):
     meshes(plotter)
     plotter.export_html(tmp_path / "scene.html")

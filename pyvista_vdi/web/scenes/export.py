@@ -10,8 +10,8 @@ from typing import Any
 
 from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.io.whole_file import whole_file
-from pyvista_vdi.web.page import assembled
-from pyvista_vdi.web.scenes.scene import scene_of
+from pyvista_vdi.web.page import View, assembled
+from pyvista_vdi.web.scenes.scene import css, scene_of
 
 
 def export_html(plotter: Any, filename: str | os.PathLike[str] | None) -> io.StringIO | None:
@@ -20,7 +20,7 @@ def export_html(plotter: Any, filename: str | os.PathLike[str] | None) -> io.Str
     Parameters
     ----------
     plotter : pyvista.BasePlotter
-        Its active renderer is shown; it is drawn, and VDIs that are missing are made.
+        All of its renderers are shown; it is drawn, and VDIs that are missing are made.
     filename : path-like or None
         Where the page is written; ``.html`` is put in the place of another suffix.
 
@@ -40,22 +40,30 @@ def export_html(plotter: Any, filename: str | os.PathLike[str] | None) -> io.Str
         If the file cannot be written.
     """
     picture = drawn(plotter)
-    renderer = plotter.renderer
-    scene = scene_of(renderer, renderer.actors)
-    left_out = [*scene.left_out, *around(plotter)]
-    if left_out:
-        warnings.warn(
-            f"the page shows the scene without {', '.join(left_out)}", VDIWarning, stacklevel=3
+    left_out: list[str] = []
+    views = []
+    several = len(plotter.renderers) > 1
+    cameras = [renderer.GetActiveCamera() for renderer in plotter.renderers]
+    for renderer in plotter.renderers:
+        scene = scene_of(renderer, renderer.actors, needs_vdi=False)
+        left_out += scene.left_out
+        view = View(
+            None if scene.vdi is None else scene.vdi.with_precision("8-byte"),
+            scene.background,
+            part_of(picture, renderer),
+            renderer.GetSize(),
+            scene.data,
         )
+        if several:
+            view.attributes["style"] = _placed(renderer) + _border(plotter)
+            view.attributes["data-link"] = str(cameras.index(renderer.GetActiveCamera()))
+        views.append(view)
+    if left_out:
+        words = ", ".join(dict.fromkeys(left_out))
+        warnings.warn(f"the page shows the scene without {words}", VDIWarning, stacklevel=3)
     target = None if filename is None else Path(filename).with_suffix(".html")
-    page = assembled(
-        scene.vdi.with_precision("8-byte"),
-        title=plotter.title if target is None else target.stem,
-        background=scene.background,
-        still=picture,
-        still_size=renderer.GetSize(),
-        scene=scene.data,
-    )
+    views.sort(key=lambda view: view.vdi is None)  # the first can be read again
+    page = assembled(views, title=plotter.title if target is None else target.stem)
     if target is None:
         return io.StringIO(page.decode())
     with whole_file(target) as stream:
@@ -64,7 +72,7 @@ def export_html(plotter: Any, filename: str | os.PathLike[str] | None) -> io.Str
 
 
 def drawn(plotter: Any) -> Any:
-    """Draw a plotter, so that its VDIs are there; return the active renderer's picture.
+    """Draw a plotter, so that its VDIs are there; return its picture, uint8 (H, W, 3).
 
     A window that has not been shown is drawn off-screen.
     """
@@ -78,17 +86,35 @@ def drawn(plotter: Any) -> Any:
     picture = plotter.screenshot(return_img=True)
     if hidden:
         window.SetOffScreenRendering(0)
-    left, bottom, right, top = plotter.renderer.GetViewport()
+    return picture[..., :3]
+
+
+def part_of(picture: Any, renderer: Any) -> Any:
+    """Return the part of a window's picture that a renderer has drawn."""
+    left, bottom, right, top = renderer.GetViewport()
     height, width = picture.shape[:2]
     rows = slice(round(height * (1 - top)), round(height * (1 - bottom)))
-    return picture[rows, round(width * left) : round(width * right), :3]
+    return picture[rows, round(width * left) : round(width * right)]
+
+
+def _placed(renderer: Any) -> str:
+    """Return where a renderer is in its window, as CSS."""
+    left, bottom, right, top = (f"{100 * edge:g}%" for edge in renderer.GetViewport())
+    size = f"width: calc({right} - {left}); height: calc({top} - {bottom})"
+    return f"position: absolute; left: {left}; bottom: {bottom}; {size}"
+
+
+def _border(plotter: Any) -> str:
+    """Return the lines between subplots as CSS, where a plotter has some."""
+    overlay = getattr(plotter.renderers, "border_overlay_renderer", None)
+    framed = [r for r in (overlay, *plotter.renderers) if r is not None and r.has_border]
+    if not framed:
+        return ""
+    color = css(framed[0].border_color.float_rgb)
+    return f"; outline: {framed[0].border_width / 2:g}px solid {color}"
 
 
 def around(plotter: Any) -> list[str]:
-    """Name what a plotter shows beside its active renderer's props."""
-    renderer = plotter.renderer
-    left_out = []
-    others = [r for r in plotter.renderers if r is not renderer]
-    if any(r.GetViewProps().GetNumberOfItems() for r in others):
-        left_out.append("the other subplots")
-    return left_out
+    """Name what a plotter shows beside its active renderer."""
+    others = [r for r in plotter.renderers if r is not plotter.renderer]
+    return ["the other subplots"] * any(r.GetViewProps().GetNumberOfItems() for r in others)

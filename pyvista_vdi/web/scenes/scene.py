@@ -50,9 +50,9 @@ class Scene:
 
     Attributes
     ----------
-    vdi : VDI
-        The first one, as it is sent.
-    actor : VDIActor
+    vdi : VDI or None
+        The first one, if there is one.
+    actor : VDIActor or None
         Its actor.
     state : tuple
         Of :func:`state_of`.
@@ -64,7 +64,7 @@ class Scene:
         What is not shown, by name.
     """
 
-    vdi: VDI
+    vdi: VDI | None
     actor: Any
     state: Any
     data: bytes
@@ -98,7 +98,13 @@ class _Packed:
         return zlib.compress(len(text).to_bytes(4, "little") + text + b"".join(parts), 6)
 
 
-def scene_of(renderer: Any, names: dict[str, Any] | None = None, *, camera: bool = True) -> Scene:
+def scene_of(
+    renderer: Any,
+    names: dict[str, Any] | None = None,
+    *,
+    camera: bool = True,
+    needs_vdi: bool = True,
+) -> Scene:
     """Return what a renderer shows, for the viewer.
 
     Parameters
@@ -109,11 +115,13 @@ def scene_of(renderer: Any, names: dict[str, Any] | None = None, *, camera: bool
         What its props are called, for what is said of those that are left out.
     camera : bool
         Whether its view is that in which the viewer begins.
+    needs_vdi : bool
+        Whether a renderer without VDIs is refused.
 
     Raises
     ------
     UnsupportedError
-        If it shows no VDI.
+        If it shows no VDI and needs one.
     """
     called = {prop: name for name, prop in (names or {}).items() if "(Addr" not in name}
     packed, left_out = _Packed(), _environment(renderer)
@@ -138,7 +146,7 @@ def scene_of(renderer: Any, names: dict[str, Any] | None = None, *, camera: bool
         if not known:
             left_out.append(title)
         left_out += [f"{what} ({title})" for what in missing]
-    if not bodies:
+    if not bodies and needs_vdi:
         raise UnsupportedError("the renderer shows no VDI, so there is nothing for the viewer")
     described = [{**more, "file": None} for _, more in bodies]
     for (vdi, _), entry in zip(bodies[1:], described[1:], strict=True):
@@ -156,8 +164,8 @@ def scene_of(renderer: Any, names: dict[str, Any] | None = None, *, camera: bool
     }
     background = _background(renderer, left_out)
     return Scene(
-        vdi=bodies[0][0],
-        actor=actors[0],
+        vdi=bodies[0][0] if bodies else None,
+        actor=actors[0] if actors else None,
         state=state_of(renderer),
         data=packed.deflated(head),
         background=background,

@@ -204,6 +204,11 @@ export class VDIViewer extends HTMLElement {
     scene?.loaded.then(() => {
       if (isWanted() && scene.camera) this.camera = scene.camera;
     }, () => {});
+    scene?.whole.then(() => {
+      if (!isWanted() || this.#status.state !== "empty") return;
+      this.#tell({ state: "full", progress: 1 }); // there is no VDI of its own
+      this.invalidate(false);
+    }, () => {});
   }
 
   #takeScene(scene) {
@@ -222,9 +227,9 @@ export class VDIViewer extends HTMLElement {
     const { signal } = (this.#connected = new AbortController());
     if (!this.hasAttribute("aria-label")) canvas.setAttribute("aria-label", "volume, to be turned");
     // First: decoding goes on while the browser starts its graphics
-    if (this.#status.state === "empty" && !this.getAttribute("src")) {
-      const within = embedded(this);
-      if (within) this.load(within);
+    this.#loadEmbedded();
+    if (document.readyState === "loading") { // what is in it may come yet
+      document.addEventListener("DOMContentLoaded", () => this.#loadEmbedded(), { signal });
     }
     const gl = canvas.getContext("webgl2", { antialias: false, depth: false });
     if (!gl) {
@@ -255,6 +260,12 @@ export class VDIViewer extends HTMLElement {
     const sizes = new ResizeObserver(() => this.#resize());
     sizes.observe(this);
     signal.addEventListener("abort", () => sizes.disconnect());
+  }
+
+  #loadEmbedded() {
+    if (this.#status.state !== "empty" || this.getAttribute("src")) return;
+    const within = embedded(this);
+    if (within) this.load(within);
   }
 
   disconnectedCallback() {
@@ -308,7 +319,8 @@ export class VDIViewer extends HTMLElement {
   invalidate(moves = true) {
     if (moves) this.#moved = performance.now();
     this.#asked = true;
-    if (!this.#drawing && this.#raycaster && this.#prepared) {
+    const something = this.#prepared || this.#scene?.head;
+    if (!this.#drawing && this.#raycaster && something && this.#camera) {
       this.#drawing = true;
       requestAnimationFrame(() => this.#frames());
     }

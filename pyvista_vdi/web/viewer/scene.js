@@ -670,7 +670,23 @@ export function embeddedScene(viewer) {
   return new Scene(Uint8Array.from(atob(script.textContent), (c) => c.charCodeAt(0)));
 }
 
-for (const viewer of document.querySelectorAll("vdi-viewer")) {
-  const embedded_ = embeddedScene(viewer);
-  if (embedded_) viewer.scene = embedded_;
+// Views with the same link turn together, as those of a plotter do.
+function takeEmbedded() {
+  for (const viewer of document.querySelectorAll("vdi-viewer")) {
+    const scene = viewer.scene ? null : embeddedScene(viewer);
+    if (!scene) continue;
+    viewer.scene = scene;
+    const { link } = viewer.dataset;
+    if (link) {
+      viewer.addEventListener("camerachange", ({ detail }) => {
+        const text = JSON.stringify(detail.camera);
+        for (const other of document.querySelectorAll(`vdi-viewer[data-link="${link}"]`)) {
+          if (JSON.stringify(other.camera) !== text) other.camera = detail.camera;
+        }
+      });
+    }
+  }
 }
+
+takeEmbedded();
+document.addEventListener("DOMContentLoaded", takeEmbedded);
