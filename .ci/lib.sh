@@ -252,6 +252,11 @@ build_docs() {
     "$work/venv/bin/python" -m sphinx -W --keep-going -q -b html \
         "$work/source/docs" "$work/docs-html"
     log "built $(find "$work/docs-html" -name '*.html' | wc -l) pages without a warning"
+    # The VDIs on them turn in a browser
+    copy_tests
+    cd "$work/tests-only"
+    PYVISTA_VDI_SITE="$work/docs-html" "$work/venv/bin/python" -m pytest -p no:cacheprovider -q -n 0 \
+        -m "slow or not slow" tests/web/test_live_docs.py
 }
 
 # Python in the pages and in docstrings runs against the installed package.

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 from pyvista_vdi._version import __version__
+
+sys.path.insert(0, str(Path(__file__).parent))  # where live.py is
 
 project = "pyvista-vdi"
 author = "The pyvista-vdi developers"
@@ -10,6 +15,7 @@ copyright = f"2026, {author}"
 version = release = __version__
 
 extensions = [
+    "live",
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",
