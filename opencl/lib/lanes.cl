@@ -2,7 +2,7 @@
 //
 // -D LANES  1 (default): a work-item follows one ray, and what vectors there are is the compiler's business
 //           16: it follows that many together, in vectors that are written out
-// -D FUNCTIONS_BY_LANE  the driver's functions may round a vector otherwise than a number: it is not asked for them
+// -D VECTOR_FUNCTIONS  the driver's functions round a vector as they round a number, as Intel's do: they are asked for vectors
 //
 // A formula is written once, of Real, Int and Uint; only loads, stores and transposes differ (#if LANES == 1). Truth values are
 // Int: 1 in one lane, all bits in a vector. They are joined by &, | and !, never by ~, and are not counted with: COUNT is.
@@ -107,8 +107,8 @@ typedef union {
     int each[LANES];
 } Places;
 
-// A function of the driver's, of each lane: by itself, if a vector's is another one
-#if LANES == 1 || !defined(FUNCTIONS_BY_LANE)
+// A function of the driver's, of each lane: by itself, if a vector's may be another one
+#if LANES == 1 || defined(VECTOR_FUNCTIONS)
 #define FUNCTION_OF_LANES(name, of_number)          \
     inline Real name(Real x)                        \
     {                                               \

@@ -11,7 +11,7 @@
 // -D DOUBLE_FLOAT_RAYS   rays may enter the data so far from there that it is not enough for the positions of samples: six more
 //                  floats of each form are what float32 has rounded off the first six (docs/numerics.md)
 #include "lib/double_float.cl"
-#include "lib/lanes.cl"
+#include "lib/directions.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 #ifdef DOUBLE_FLOAT_RAYS
@@ -31,17 +31,11 @@ inline Real form_slope(__global const float *form, Real a, Real b)
     return form_value(form + 3, a, b);
 }
 
-// Model units per unit of t along a ray that is marched. `forms`: 3 index positions, then 3 model directions. By length() of
-// each lane, which drivers compute in ways of their own.
+// Model units per unit of t along a ray that is marched. `forms`: 3 index positions, then 3 model directions.
 inline Real march_speed(__global const float *forms, Real a, Real b)
 {
-    const Real x = form_slope(forms + 3 * FORM_SIZE, a, b);
-    const Real y = form_slope(forms + 4 * FORM_SIZE, a, b);
-    const Real z = form_slope(forms + 5 * FORM_SIZE, a, b);
-    const float *of_x = (const float *)&x, *of_y = (const float *)&y, *of_z = (const float *)&z;
-#define LENGTH(n) length((float3)(of_x[n], of_y[n], of_z[n]))
-    return OF_LANES(Real, LENGTH);
-#undef LENGTH
+    return length_of(REAL3(form_slope(forms + 3 * FORM_SIZE, a, b), form_slope(forms + 4 * FORM_SIZE, a, b),
+                           form_slope(forms + 5 * FORM_SIZE, a, b)));
 }
 
 // Clip [*t0, *t1] to where each of `count` forms is >= 0. Returns whether anything is left.

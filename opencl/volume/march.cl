@@ -6,7 +6,8 @@
 // -D BY_SCALAR     with NEAREST and voxels of integers: the table holds the medium of each scalar from `low` on, of which no
 //                  voxel is outside (volume/scalar_media.cl); otherwise it is classified at each sample
 // -D DOUBLE_FLOAT_RAYS   see lib/rays.cl: t counts from where the ray enters
-// -D LANES         see lib/lanes.cl; 16 with INDEX_T of uint, and without DOUBLE_FLOAT_RAYS, SAMPLED, RGBA and what is below
+// -D LANES         see lib/lanes.cl; 16 with INDEX_T of uint, and without DOUBLE_FLOAT_RAYS, SAMPLED, RGBA, OCCLUSION,
+//                  SHARP_HIGHLIGHTS
 #include "lib/rays.cl"
 #include "lib/transpose.cl"
 #include "lib/classification.cl"
@@ -180,17 +181,21 @@ inline Real4 medium_at(const Medium *medium, Real x, Real y, Real z, Real units)
         sample.w = SELECT((Real)(0.0f), step_optical_depth(sample.w, units), some);
 #endif
 #if defined(RGBA) || defined(SHADED) || defined(GRADIENT_OPACITY) || defined(OCCLUSION)
-    if (sample.w > 0.0f) {
+    const Int visible = sample.w > 0.0f;
+    if (ANY(visible)) {
 #ifdef RGBA
         sample.xyz = sample_color(medium->voxels, medium->size, x, y, z);
 #endif
 #if defined(SHADED) || defined(GRADIENT_OPACITY)
-        const float3 differences = scalar_differences(medium->voxels, medium->size, x, y, z);
+        const Real3 differences = scalar_differences(medium->voxels, medium->size, x, y, z);
 #ifdef GRADIENT_OPACITY
-        sample.w = scaled_optical_depth(sample.w, gradient_opacity(differences, medium->gradient));
+        const Real scaled = scaled_optical_depth(sample.w, gradient_opacity(differences, medium->gradient));
+        sample.w = SELECT(sample.w, scaled, visible);
 #endif
 #ifdef SHADED
-        sample.xyz = lit(sample.xyz, differences, x, y, z, medium->lighting);
+        const Real3 color = lit(REAL3(sample.x, sample.y, sample.z), differences, x, y, z, medium->lighting);
+        sample = REAL4(SELECT(sample.x, color.x, visible), SELECT(sample.y, color.y, visible),
+                       SELECT(sample.z, color.z, visible), sample.w);
 #endif
 #endif
 #ifdef OCCLUSION

@@ -8,6 +8,8 @@
 //
 // Without SHADED and GRADIENT_OPACITY nothing of this is compiled. Lights are in a frame of their own, "the lights'
 // frame", whose origin is the eye: the model frame's axes for a headlight, the view's otherwise.
+#include "lib/classification.cl"
+#include "lib/directions.cl"
 #include "volume/sampling.cl"
 #include "volume/occlusion.cl"
 #include "volume/samples.cl"
@@ -40,14 +42,13 @@
 
 #if defined(SHADED) || defined(GRADIENT_OPACITY)
 // Differences of the scalar between a voxel ahead and a voxel behind along each index axis; 0 where one is NaN.
-inline float3 scalar_differences(__global const VOXEL_T *voxels, int4 size, float x, float y, float z)
+inline Real3 scalar_differences(__global const VOXEL_T *voxels, int4 size, Real x, Real y, Real z)
 {
-    const float3 difference = (float3)(
-        sample_volume(voxels, size, x + 1.0f, y, z) - sample_volume(voxels, size, x - 1.0f, y, z),
-        sample_volume(voxels, size, x, y + 1.0f, z) - sample_volume(voxels, size, x, y - 1.0f, z),
-        sample_volume(voxels, size, x, y, z + 1.0f) - sample_volume(voxels, size, x, y, z - 1.0f));
-    return (float3)(isnan(difference.x) ? 0.0f : difference.x, isnan(difference.y) ? 0.0f : difference.y,
-                    isnan(difference.z) ? 0.0f : difference.z);
+    const Real along_x = sample_volume(voxels, size, x + 1.0f, y, z) - sample_volume(voxels, size, x - 1.0f, y, z);
+    const Real along_y = sample_volume(voxels, size, x, y + 1.0f, z) - sample_volume(voxels, size, x, y - 1.0f, z);
+    const Real along_z = sample_volume(voxels, size, x, y, z + 1.0f) - sample_volume(voxels, size, x, y, z - 1.0f);
+    return REAL3(SELECT(along_x, (Real)(0.0f), isnan(along_x)), SELECT(along_y, (Real)(0.0f), isnan(along_y)),
+                 SELECT(along_z, (Real)(0.0f), isnan(along_z)));
 }
 #endif
 
@@ -60,21 +61,30 @@ inline float3 scalar_differences(__global const VOXEL_T *voxels, int4 size, floa
 #define TABLE 6
 
 // Factor of the opacity where the scalar has these differences.
-inline float gradient_opacity(float3 differences, __global const float *gradient)
+inline Real gradient_opacity(Real3 differences, __global const float *gradient)
 {
-    const float3 along = differences * vload3(0, gradient + TO_TABLE);
+    const Real3 along = REAL3(differences.x * gradient[TO_TABLE], differences.y * gradient[TO_TABLE + 1],
+                              differences.z * gradient[TO_TABLE + 2]);
     const float last = gradient[TABLE_ENTRIES] - 1.0f;
-    const float x = clamp(fmin(length(along), gradient[LAST_POSITION]) + gradient[FIRST_POSITION], 0.0f, last);
-    const int i = min((int)x, max((int)last - 1, 0));
+    const Real x = clamp(fmin(length_of(along), gradient[LAST_POSITION]) + gradient[FIRST_POSITION], 0.0f, last);
+    const Int i = min(TO_INT(x), max((int)last - 1, 0));
     __global const float *table = gradient + TABLE;
-    return mix(table[i], table[min(i + 1, (int)last)], x - (float)i);
+    const Places here = {i}, next = {min(i + 1, (int)last)};
+    Place *at_here = here.each, *at_next = next.each;
+#define HERE(n) table[at_here[n]]
+#define NEXT(n) table[at_next[n]]
+    return mix(OF_LANES(Real, HERE), OF_LANES(Real, NEXT), x - TO_REAL(i));
+#undef HERE
+#undef NEXT
 }
+
+FUNCTION_OF_LANES(expm1_of, expm1)
 
 // Optical depth of a step whose opacity is multiplied by `factor`, 0 to 1: VTK multiplies what the step has, not its
 // extinction.
-inline float scaled_optical_depth(float tau, float factor)
+inline Real scaled_optical_depth(Real tau, Real factor)
 {
-    return factor < 1.0f ? -log1p(factor * expm1(-tau)) : tau;
+    return SELECT(tau, -log1p_of(factor * expm1_of(-tau)), factor < 1.0f);
 }
 #endif
 
@@ -101,94 +111,112 @@ inline float scaled_optical_depth(float tau, float factor)
 #define LIGHT_EXPONENT 20
 #define LIGHT_SIZE 21
 
-inline float3 unit_or_zero(float3 v)
+// The same for each component of a vector
+#define OF_AXES(OF_AXIS) REAL3(OF_AXIS(x, 0), OF_AXIS(y, 1), OF_AXIS(z, 2))
+
+inline Real3 unit_or_zero(Real3 v)
 {
-    const float size = length(v);
-    return size > 0.0f ? v / size : (float3)(0.0f);
+    const Real size = length_of(v);
+#define UNIT(c, n) SELECT((Real)(0.0f), v.c / size, size > 0.0f)
+    return OF_AXES(UNIT);
+#undef UNIT
 }
 
 // The power of a cosine, 0 < cosine. `lost`: 1 - cosine, which is right where the cosine has rounded it off.
-inline float highlight(float cosine, float lost, float power)
-{
 #ifdef SHARP_HIGHLIGHTS
-    return exp(power * log1p(-fmin(lost, 1.0f)));
+#define highlight(cosine, lost, power) exp((power) * log1p(-fmin(lost, 1.0f)))
 #else
-    return pow(cosine, power);
+#define highlight(cosine, lost, power) pow_of(cosine, power)
 #endif
-}
 
 // Colour that a sample sends to the eye. `differences`: see scalar_differences. `x`, `y`, `z`: its index position.
 // The normal points to where the scalar grows, so that it looks away from a light in front of a denser inside: vectors
 // towards lights and eye are taken the other way round throughout.
-inline float3 lit(float3 color, float3 differences, float x, float y, float z, __global const float *lighting)
+inline Real3 lit(Real3 color, Real3 differences, Real x, Real y, Real z, __global const float *lighting)
 {
-    const float3 normal = unit_or_zero((float3)(dot(vload3(0, lighting + NORMAL), differences),
-                                                dot(vload3(1, lighting + NORMAL), differences),
-                                                dot(vload3(2, lighting + NORMAL), differences)));
-    const float4 index = (float4)(x, y, z, 1.0f);
-    const float3 position = (float3)(dot(vload4(0, lighting + POSITION), index), dot(vload4(1, lighting + POSITION), index),
-                                     dot(vload4(2, lighting + POSITION), index));
-    const float3 view = unit_or_zero(position); // from the eye
+#define NORMAL_ALONG(c, n) dot_with(lighting + NORMAL + 3 * n, differences)
+    const Real3 normal = unit_or_zero(OF_AXES(NORMAL_ALONG));
+#undef NORMAL_ALONG
+#define POSITION_ALONG(c, n) affine_with(lighting + POSITION + 4 * n, x, y, z)
+    const Real3 position = OF_AXES(POSITION_ALONG);
+#undef POSITION_ALONG
+    const Real3 view = unit_or_zero(position); // from the eye
     const float power = lighting[SPECULAR_POWER];
     const bool two_sided = lighting[TWO_SIDED] != 0.0f;
 #ifdef HEADLIGHT
     __global const float *light = lighting + FIRST_LIGHT;
-    float facing = dot(normal, view);
-    const float reflected = fmax(2.0f * facing * facing - 1.0f, 0.0f); // cosine between the reflected ray and the eye's
+    Real facing = dot_of(normal, view);
+    const Real reflected = fmax(2.0f * facing * facing - 1.0f, 0.0f); // cosine between the reflected ray and the eye's
     if (two_sided)
         facing = fabs(facing);
-    float3 sum = lighting[AMBIENT] * color; // the light's own ambient colour has no part in it
-    if (facing > 0.0f) {
-        const float3 across = cross(normal, view); // as long as the sine of half the angle to the reflected ray
-        sum += facing * lighting[DIFFUSE] * vload3(0, light + LIGHT_DIFFUSE) * color +
-               highlight(reflected, 2.0f * dot(across, across), power) * lighting[SPECULAR] *
-                   vload3(0, light + LIGHT_SPECULAR);
-    }
+#ifdef SHARP_HIGHLIGHTS
+    const float3 across = cross(normal, view); // as long as the sine of half the angle to the reflected ray
+#endif
+    const Real specular = highlight(reflected, 2.0f * dot(across, across), power);
+    // The light's own ambient colour has no part in it
+#define LIT(c, n)                                                                                                          \
+    clamp(lighting[AMBIENT] * color.c +                                                                                    \
+              SELECT((Real)(0.0f),                                                                                         \
+                     facing * lighting[DIFFUSE] * light[LIGHT_DIFFUSE + n] * color.c +                                     \
+                         specular * lighting[SPECULAR] * light[LIGHT_SPECULAR + n],                                        \
+                     facing > 0.0f),                                                                                       \
+          0.0f, 1.0f)
 #else
-    float3 ambient = (float3)(0.0f), diffuse = (float3)(0.0f), specular = (float3)(0.0f);
+    float3 ambient = (float3)(0.0f);
+    Real3 diffuse = REAL3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f)), specular = diffuse;
     const int count = (int)lighting[LIGHT_COUNT];
     for (int k = 0; k < count; ++k) {
         __global const float *light = lighting + FIRST_LIGHT + k * LIGHT_SIZE;
-        float3 direction = vload3(0, light + LIGHT_DIRECTION);
-        float strength = 1.0f;
+#define SHINES(c, n) (Real)(light[LIGHT_DIRECTION + n])
+        Real3 direction = OF_AXES(SHINES);
+#undef SHINES
+        Real strength = 1.0f;
         bool positional = false;
 #ifdef POSITIONAL_LIGHTS
         positional = light[LIGHT_POSITIONAL] != 0.0f;
         if (positional) {
-            const float3 from_light = position - vload3(0, light + LIGHT_POSITION);
-            const float distance = length(from_light);
-            const float3 axis = direction;
+#define FROM_LIGHT(c, n) (position.c - light[LIGHT_POSITION + n])
+            const Real3 from_light = OF_AXES(FROM_LIGHT);
+#undef FROM_LIGHT
+            const Real distance = length_of(from_light);
+            const Real3 axis = direction;
             direction = unit_or_zero(from_light);
             strength = 1.0f / (light[LIGHT_ATTENUATION] + light[LIGHT_ATTENUATION + 1] * distance +
                                light[LIGHT_ATTENUATION + 2] * distance * distance);
             if (light[LIGHT_CONE] >= -1.0f) {
-                const float inside = dot(direction, axis);
-                strength *= inside >= light[LIGHT_CONE] ? pow(fmax(inside, 0.0f), light[LIGHT_EXPONENT]) : 0.0f;
+                const Real inside = dot_of(direction, axis);
+                strength *= SELECT((Real)(0.0f), pow_of(fmax(inside, 0.0f), light[LIGHT_EXPONENT]), inside >= light[LIGHT_CONE]);
             }
         }
 #endif
-        float facing = dot(normal, direction);
-        if (facing < 0.0f && two_sided)
-            facing = -facing;
-        if (facing > 0.0f) {
-            diffuse += strength * facing * vload3(0, light + LIGHT_DIFFUSE);
-            // VTK turns the cosine of a side that faces away, and not its normal: its highlights lie elsewhere
-            float3 mirrored = unit_or_zero(2.0f * facing * normal - direction);
-            float reflected = dot(view, mirrored);
-            if (reflected < 0.0f && two_sided && positional) {
-                reflected = -reflected;
-                mirrored = -mirrored;
-            }
-            const float3 chord = view - mirrored;
-            if (reflected > 0.0f)
-                specular += strength * highlight(reflected, 0.5f * dot(chord, chord), power) *
-                            vload3(0, light + LIGHT_SPECULAR);
-        }
+        Real facing = dot_of(normal, direction);
+        if (two_sided)
+            facing = SELECT(facing, -facing, facing < 0.0f);
+        const Int faces = facing > 0.0f;
+#define DIFFUSE_OF(c, n) SELECT(diffuse.c, diffuse.c + strength * facing * light[LIGHT_DIFFUSE + n], faces)
+        diffuse = OF_AXES(DIFFUSE_OF);
+#undef DIFFUSE_OF
+        // VTK turns the cosine of a side that faces away, and not its normal: its highlights lie elsewhere
+#define MIRRORED(c, n) (2.0f * facing * normal.c - direction.c)
+        const Real3 mirrored = unit_or_zero(OF_AXES(MIRRORED));
+#undef MIRRORED
+        Real reflected = dot_of(view, mirrored);
+        const Int turned = two_sided && positional ? reflected < 0.0f : (Int)(0);
+        reflected = SELECT(reflected, -reflected, turned);
+#ifdef SHARP_HIGHLIGHTS
+        const float3 chord = view - (turned ? -mirrored : mirrored);
+#endif
+        const Real shines = strength * highlight(reflected, 0.5f * dot(chord, chord), power);
+#define SPECULAR_OF(c, n) SELECT(specular.c, specular.c + shines * light[LIGHT_SPECULAR + n], faces & (reflected > 0.0f))
+        specular = OF_AXES(SPECULAR_OF);
+#undef SPECULAR_OF
         ambient += vload3(0, light + LIGHT_AMBIENT);
     }
     // The lights' ambient colours are not multiplied by the sample's: so does VTK
-    const float3 sum = lighting[AMBIENT] * ambient + lighting[DIFFUSE] * diffuse * color + lighting[SPECULAR] * specular;
+#define LIT(c, n) \
+    clamp(lighting[AMBIENT] * ambient.c + lighting[DIFFUSE] * diffuse.c * color.c + lighting[SPECULAR] * specular.c, 0.0f, 1.0f)
 #endif
-    return clamp(sum, 0.0f, 1.0f);
+    return OF_AXES(LIT);
+#undef LIT
 }
 #endif

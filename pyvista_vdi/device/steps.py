@@ -30,7 +30,11 @@ class Step:
     ) -> Step:
         """Return the step of a kernel, whose work-items follow blocks of rays if ``in_blocks``."""
         rays = BLOCK_RAYS if in_blocks else 1
-        return cls(runtime.kernel(path, name, {**defines, "LANES": rays}), rays)
+        defines = {**defines, "LANES": rays}
+        # PoCL rounds functions of a vector otherwise than of a number, in one of 10^5 values
+        if in_blocks and runtime.info.platform.startswith("Intel"):
+            defines["VECTOR_FUNCTIONS"] = 1
+        return cls(runtime.kernel(path, name, defines), rays)
 
     def launch(self, runtime: Runtime, rays: int, *arguments: Argument) -> None:
         """Launch it for so many rays, a multiple of a group's."""

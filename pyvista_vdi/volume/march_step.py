@@ -19,6 +19,10 @@ _IN_BLOCKS: Mapping[str, Define] = {
     "COMPENSATED": 1,
     "CROPPED": None,
     "OPACITY_MULTIPLIER": None,
+    "SHADED": None,
+    "HEADLIGHT": None,
+    "POSITIONAL_LIGHTS": None,
+    "GRADIENT_OPACITY": None,
 }
 
 
@@ -27,11 +31,7 @@ def march_step(runtime: Runtime, path: str, name: str, defines: Mapping[str, Def
 
     ``defines`` are those of the volume, the rays and the kernel. The bits are the same.
     """
-    if not runtime.is_cpu or not all(
+    in_blocks = runtime.is_cpu and all(
         key in _IN_BLOCKS and _IN_BLOCKS[key] in (None, value) for key, value in defines.items()
-    ):
-        return Step.of(runtime, path, name, defines)
-    if not runtime.info.platform.startswith("Intel"):
-        # Others round functions of a vector otherwise than of a number, in one of 10^5 values
-        defines = {**defines, "FUNCTIONS_BY_LANE": 1}
-    return Step.of(runtime, path, name, defines, in_blocks=True)
+    )
+    return Step.of(runtime, path, name, defines, in_blocks=in_blocks)

@@ -40,13 +40,14 @@ def volume_of(dtype, spacing=(1, 1, 1)):
     return Volume(array, spacing)
 
 
-def transfer_for(volume, interpolation="nearest"):
+def transfer_for(volume, interpolation="nearest", **options):
     """Random colours; the lowest scalars are transparent, the highest is opaque."""
     rng = np.random.default_rng(12)
     opacities = np.clip(np.linspace(-0.1, 0.7, 30), 0, 1)
     opacities[-1] = 1.0
     colors = rng.random((30, 3))
-    return TransferFunction(colors, opacities, volume.finite_range(), interpolation=interpolation)
+    scalars = volume.finite_range()
+    return TransferFunction(colors, opacities, scalars, interpolation=interpolation, **options)
 
 
 def both_ways(monkeypatch, runtime, name, make):
