@@ -28,6 +28,9 @@ pytestmark = pytest.mark.gl
 #: Odd, so that no ray runs along a border of lists.
 SIZE = (241, 135)
 
+#: The viewer on a page of which only pictures are taken.
+SMALL = (16, 9)
+
 #: Of 255. Measured: 0.03 to 0.2, by silhouettes, whose samples lie elsewhere in a pixel; 0.4 with a
 #: gradient, which VTK dithers.
 MEAN = 0.6
@@ -195,7 +198,7 @@ slow = pytest.mark.slow
 @pytest.mark.parametrize(
     "scene",
     [
-        in_parallel,
+        pytest.param(in_parallel, marks=slow),
         cells_lines_points,
         translucent_and_textured,
         pytest.param(meshes, marks=slow),
@@ -207,7 +210,7 @@ slow = pytest.mark.slow
 def test_a_scene_is_drawn_as_vtk_draws_it(scene, plotter, open_page):
     scene(plotter)
     plotter.show(auto_close=False)
-    page = open_page(SIZE)
+    page = open_page(SMALL)
     assert give(page, plotter).left_out == []
     # Lines are silhouettes all over
     more = {"mean": 2.5, "ssim": 0.97} if scene is cells_lines_points else {}
@@ -227,7 +230,7 @@ def test_opaque_things_hide_a_vdi_and_are_hidden_where_they_are(plotter, open_pa
     plotter.view_xy()
     plotter.set_background("k")
     plotter.show(auto_close=False)
-    page = open_page((81, 45))
+    page = open_page(SMALL)
     give(page, plotter)
     # Before the clipped front, behind it by 0.1, and behind all; then seen from there
     assert seen(page) == [True, False, False]
@@ -264,7 +267,7 @@ def test_vdis_that_overlap_are_mixed_as_by_render(open_page):
     plotter.camera.position, plotter.camera.focal_point = camera.position, camera.focal_point
     plotter.camera.up = camera.view_up
     plotter.show(auto_close=False)
-    page = open_page(size)
+    page = open_page(SMALL)
     give(page, plotter)
     plotter.close()
     picture = shot(page, size)
@@ -276,7 +279,7 @@ def test_vdis_that_overlap_are_mixed_as_by_render(open_page):
 
 
 def test_layers_have_an_order_wherever_the_eye_is(open_page):
-    page = open_page((16, 9))
+    page = open_page(SMALL)
     got = page.evaluate(
         """async () => {
           const { cornersOf, layersOf } = await import("./layers.js");
@@ -310,7 +313,7 @@ def test_layers_have_an_order_wherever_the_eye_is(open_page):
 # -- texts -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("vertical", [False, True])
+@pytest.mark.parametrize("vertical", [False, pytest.param(True, marks=slow)])
 def test_texts_and_scalar_bars_stand_where_vtk_has_them(vertical, plotter, open_page):
     """Fonts differ: compared are the boxes around what is written, and the bar's colours."""
     plotter.window_size = size = (480, 270)
@@ -320,7 +323,7 @@ def test_texts_and_scalar_bars_stand_where_vtk_has_them(vertical, plotter, open_
     plotter.add_text("A corner", position="upper_left", font_size=8, color="b")
     plotter.add_text("two\nlines", position=(300, 200), font_size=8, color="r")
     plotter.show(auto_close=False)
-    page = open_page(size)
+    page = open_page(SMALL)
     assert give(page, plotter).left_out == []
     picture = shot(page, size)
     got = picture[..., :3] + (255 - picture[..., 3:])
@@ -338,6 +341,33 @@ def test_texts_and_scalar_bars_stand_where_vtk_has_them(vertical, plotter, open_
             boxes.append((rows.min(), rows.max(), columns.min(), columns.max()))
         # Letters of another font are wider and higher by some pixels
         assert np.abs(np.subtract(*boxes)).max() <= 12, boxes
+
+
+def test_labels_stand_at_their_points_and_nearer_ones_before_others(plotter, open_page):
+    ball(plotter, opacity=[0, 0])
+    points = np.array([[0.8, 0, 0], [-0.8, 0, 0], [-0.8, 0, -0.5]])
+    plotter.add_point_labels(
+        points, ["right", "left", "behind it"], text_color="b", shape_color="r", bold=False,
+        show_points=False, always_visible=True, font_size=10,
+    )  # fmt: skip
+    plotter.view_xy()
+    plotter.show(auto_close=False)
+    page = open_page(SMALL)
+    assert give(page, plotter).left_out == []
+    for angle in (0, 180):
+        page.evaluate(
+            """(sign) => {
+              const { position: [x, y, z], ...more } = viewer.camera;
+              viewer.camera = { ...more, position: [x, y, sign * Math.abs(z)] };
+            }""",
+            1 if angle == 0 else -1,
+        )
+        picture = shot(page)
+        red = picture[..., 0] - picture[..., 2] > 150
+        left, right = red[:, : SIZE[0] // 2].sum(), red[:, SIZE[0] // 2 :].sum()
+        assert min(left, right) > 40
+        # From behind the longer label is before the shorter, and to the right
+        assert (right > 1.5 * left) == (angle == 180)
 
 
 # -- the page --------------------------------------------------------------------------------------
@@ -390,6 +420,7 @@ def test_export_html_writes_a_page_that_shows_the_scene(plotter, from_disk, tmp_
     assert pvdi.read(path).equals(vdi.with_precision("8-byte"))
 
 
+@slow
 def test_subplots_stand_beside_each_other_and_turn_together(from_disk, tmp_path):
     plotter = pv.Plotter(off_screen=True, shape=(1, 2), window_size=SIZE)
     # Larger than what is beside it: VTK clips both to the range of depths of the first
@@ -422,6 +453,7 @@ def test_subplots_stand_beside_each_other_and_turn_together(from_disk, tmp_path)
     assert pvdi.read(tmp_path / "scene.html").equals(vdi.with_precision("8-byte"))
 
 
+@slow
 def test_a_lost_context_is_made_up_for(plotter, from_disk, tmp_path):
     meshes(plotter)
     plotter.export_html(tmp_path / "scene.html")
@@ -459,7 +491,6 @@ def test_what_is_not_shown_is_named_in_one_warning(plotter):
     actor = ball(plotter)
     actor.mapper.SetCropping(1)
     actor.mapper.SetCroppingRegionPlanes(-0.5, 0.5, -0.5, 0.5, -0.5, 0.5)
-    plotter.add_point_labels([[0.0, 0.0, 0.0]], ["origin"], name="labels")
     plotter.add_mesh(pv.Sphere(), pbr=True, name="ball")
     plotter.show_grid()
     with pytest.warns(VDIWarning, match="shows the scene without") as warned:
@@ -468,7 +499,6 @@ def test_what_is_not_shown_is_named_in_one_warning(plotter):
     words = str(warned[0].message)
     for what in (
         "cropping",
-        "labels",
         "physically based shading (ball)",
         "CubeAxes",
     ):

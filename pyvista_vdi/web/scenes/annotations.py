@@ -12,7 +12,14 @@ from typing import Any
 
 import numpy as np
 from vtkmodules.vtkRenderingAnnotation import vtkCornerAnnotation, vtkScalarBarActor
-from vtkmodules.vtkRenderingCore import vtkTextActor, vtkTextMapper, vtkTextProperty
+from vtkmodules.vtkRenderingCore import (
+    vtkActor2D,
+    vtkSelectVisiblePoints,
+    vtkTextActor,
+    vtkTextMapper,
+    vtkTextProperty,
+)
+from vtkmodules.vtkRenderingLabel import vtkLabelPlacementMapper, vtkPointSetToLabelHierarchy
 
 _HORIZONTAL = ("left", "center", "right")  # vtkTextProperty's justifications
 _VERTICAL = ("bottom", "middle", "top")
@@ -44,6 +51,8 @@ def annotations_of(prop: Any, renderer: Any, left_out: list[str]) -> list[dict[s
         return list(_corner_texts(prop, renderer))
     if isinstance(prop, vtkTextActor):
         return [_text_actor(prop, renderer)]
+    if isinstance(prop, vtkActor2D) and isinstance(prop.GetMapper(), vtkLabelPlacementMapper):
+        return list(_labels_of_points(prop.GetMapper(), renderer))
     return None
 
 
@@ -83,6 +92,27 @@ def _text_actor(actor: Any, renderer: Any) -> dict[str, Any]:
     if coordinate.GetCoordinateSystem() == _WORLD:
         described["at"] = list(coordinate.GetComputedWorldValue(renderer))
     return described
+
+
+def _labels_of_points(mapper: Any, renderer: Any) -> Iterator[dict[str, Any]]:
+    """Give the labels at points; the viewer leaves out those that overlap nearer ones."""
+    hierarchy = mapper.GetInputAlgorithm(0, 0)
+    if not isinstance(hierarchy, vtkPointSetToLabelHierarchy):
+        return
+    above = hierarchy.GetInputAlgorithm(0, 0)
+    if isinstance(above, vtkSelectVisiblePoints):  # of one view
+        points = above.GetInputDataObject(0, 0)
+    else:
+        points = hierarchy.GetInputDataObject(0, 0)
+    texts = points.GetPointData().GetAbstractArray(hierarchy.GetLabelArrayName())
+    look, more = hierarchy.GetTextProperty(), {}
+    if mapper.GetShape() != vtkLabelPlacementMapper.NONE:
+        more["round"] = mapper.GetShape() == vtkLabelPlacementMapper.ROUNDED_RECT
+        more["background"] = [*mapper.GetBackgroundColor(), mapper.GetBackgroundOpacity()]
+    for k in range(0 if texts is None else texts.GetNumberOfValues()):
+        text = texts.GetVariantValue(k).ToString()
+        at = {"at": list(points.GetPoint(k)), "alone": True, "margin": mapper.GetMargin()}
+        yield described_text(text, (0, 0), look, renderer, **at, **more)
 
 
 def _corner_texts(annotation: Any, renderer: Any) -> Iterator[dict[str, Any]]:

@@ -141,7 +141,8 @@ def scene_of(
         else:
             described = annotations_of(prop, renderer, missing)
             known = described is not None
-            texts += described or []
+            group = len(texts)
+            texts += [{**t, "alone": group + 1} if "alone" in t else t for t in described or []]
         title = called.get(prop, type(prop).__name__)
         if not known:
             left_out.append(title)

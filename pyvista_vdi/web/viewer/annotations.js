@@ -13,16 +13,21 @@ const css = ([r, g, b, a = 1]) => `rgb(${100 * r}% ${100 * g}% ${100 * b}% / ${a
  * @param {object[]} items
  * @param {number[]} from Width and height, pixels, of the window that the items are of.
  * @param {function(object): number[]|null} project Where an item with a place in the world (`at`)
- *   is: parts of the window, from the lower left corner; null for what is behind the eye.
+ *   is: parts of the window, from the lower left corner, and its depth; null for what is behind the
+ *   eye.
  */
 export function annotate(on, items, from, project) {
   const { width, height } = on.canvas;
   on.clearRect(0, 0, width, height);
   const scale = Math.min(width / from[0], height / from[1]);
-  for (const item of items) {
+  const placed = items.map((item) => ({ item, place: item.at ? project(item) : item.place }));
+  const depth = ({ item, place }) => (item.alone && place ? place[2] : 0);
+  const taken = []; // by labels of a group: what a nearer one overlaps is not written
+  for (const { item, place } of placed.sort((a, b) => depth(a) - depth(b))) {
+    if (!place) continue;
     on.save();
     if (item.kind === "box") drawBox(on, item, width, height, scale);
-    else drawText(on, item, width, height, scale, project);
+    else drawText(on, item, place, width, height, scale, taken);
     on.restore();
   }
 }
@@ -50,9 +55,7 @@ function drawBox(on, { place, color, colors, upright, outline, line }, width, he
   }
 }
 
-function drawText(on, item, width, height, scale, project) {
-  const place = item.at ? project(item) : item.place;
-  if (!place) return;
+function drawText(on, item, place, width, height, scale, taken) {
   const size = item.size * scale;
   const style = `${item.italic ? "italic " : ""}${item.bold ? "bold " : ""}`;
   on.font = `${style}${size}px ${FAMILIES[item.family] ?? FAMILIES.Arial}`;
@@ -69,11 +72,20 @@ function drawText(on, item, width, height, scale, project) {
   const top = { top: 0, middle: -high / 2, bottom: -high }[item.along];
   const wide = Math.max(...lines.map((line) => on.measureText(line).width));
   const left = { left: 0, center: -wide / 2, right: -wide }[item.across];
-  const margin = 2 * scale;
+  const margin = (item.margin ?? 2) * scale;
   const around = [left - margin, top - margin, wide + 2 * margin, high + 2 * margin];
+  if (item.alone) {
+    const [x, y] = [place[0] * width + around[0], (1 - place[1]) * height + around[1]];
+    const box = [x, y, x + around[2], y + around[3]];
+    const beside = taken[item.alone] ??= [];
+    if (beside.some((b) => b[0] < box[2] && box[0] < b[2] && b[1] < box[3] && box[1] < b[3])) return;
+    beside.push(box);
+  }
   if (item.background) {
     on.fillStyle = css(item.background);
-    on.fillRect(...around);
+    on.beginPath();
+    on.roundRect(...around, item.round ? margin : 0);
+    on.fill();
   }
   if (item.frame) {
     on.strokeStyle = css(item.frame);

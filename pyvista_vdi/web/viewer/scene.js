@@ -615,13 +615,13 @@ function lightIn(light, camera, axes) {
     shape: [Number(positional), cone, exponent, 0], fading: attenuation };
 }
 
-// Where a point of the world is seen: parts of the window; null if it is behind the eye.
+// Where a point of the world is seen: parts of the window, and depth; null if behind the eye.
 function projected(point, camera, extent) {
   const from = difference(point, camera.position), half = halfExtent(camera, extent);
   const [cx, cy] = camera.window_center ?? [0, 0];
   const [x, y, z] = cameraAxes(camera).map((axis) => inner(axis, from));
   const w = isParallel(camera) ? 1 : z;
-  return w > 0 ? [(x / half[0] / w - cx + 1) / 2, (y / half[1] / w - cy + 1) / 2] : null;
+  return w > 0 ? [(x / half[0] / w - cx + 1) / 2, (y / half[1] / w - cy + 1) / 2, z] : null;
 }
 
 // The view of the axes in a corner: turned as the scene's is.
