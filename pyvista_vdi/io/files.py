@@ -167,8 +167,7 @@ def is_vdi_file(path: str | os.PathLike[str]) -> bool:
     Returns
     -------
     bool
-        For ``.vti`` and ``.html``, whether a VDI is in it; for unknown names, whether it begins
-        as ours.
+        For ``.vti``, whether a VDI is in it; for unknown names, whether it begins as ours.
 
     Raises
     ------
@@ -177,8 +176,6 @@ def is_vdi_file(path: str | os.PathLike[str]) -> bool:
     """
     if _is_vti(path):
         return _vti().holds_vdi(path)  # type: ignore[no-any-return]
-    if _is_html(path):
-        return provider("html_files").holds_vdi(path)  # type: ignore[no-any-return]
     if Path(path).suffix.lower() in SUFFIXES:
         return True
     return os.path.isfile(path) and reader.begins_as_vdi(path)  # noqa: PTH113 - too long a name, too

@@ -21,7 +21,7 @@ from pyvista_vdi.plotting.dicom import Slice, read_slice, require_uncompressed, 
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
 
 #: Names of files that hold VDIs, not volumes.
-_VDI_SUFFIXES = (".vdi", ".exr")
+_VDI_SUFFIXES = (".vdi", ".exr", ".html")
 
 #: Bytes of a MetaImage's header, at most: some twenty lines of text.
 _MAX_META_HEADER = 1 << 16

@@ -26,7 +26,8 @@ MAX_PICTURE_EDGE = 8192
 MAX_PLANES = 6
 #: Most opacities of a mapping that is given by numbers.
 MAX_OPACITIES = 64
-#: Numbers are no larger than this: forms of rays are products of a few of them.
+#: Numbers are no larger than this, and lenses no smaller than its inverse: forms of rays are
+#: products of a few of them.
 _LARGEST = 1e12
 
 
@@ -122,7 +123,9 @@ def _view(message: dict[str, Any], wish: Wish, offer: Offer) -> Wish:
     _only(state, {"position", "focal_point", "view_up"}, {"view_angle", "parallel_scale"})
     vectors = {n: _vector(n, state, 3) for n in ("position", "focal_point", "view_up")}
     lens: dict[str, Any] = {
-        n: _number(n, state[n]) for n in ("view_angle", "parallel_scale") if n in state
+        n: _number(n, state[n], 1 / _LARGEST)
+        for n in ("view_angle", "parallel_scale")
+        if n in state
     }
     try:
         camera = Camera(**vectors, **lens, parallel_projection="parallel_scale" in lens)

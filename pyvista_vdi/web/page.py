@@ -39,7 +39,8 @@ _SCENE = '<script type="application/vdi-scene+base64">{}</script>\n'
 #: Longest edge of the still picture, pixels, and the quality of its JPEG.
 _STILL_EDGE, _STILL_QUALITY = 480, 75
 
-_DATA = re.compile(rb'<script type="%b">([^<]*)</script>' % re.escape(DATA_TYPE).encode())
+# To its end, or to that of a file that was cut
+_DATA = re.compile(rb'<script type="%b">([^<]*)' % re.escape(DATA_TYPE).encode())
 
 # Nothing is loaded, from nowhere: what the page needs is in it.
 _POLICY = "default-src 'unsafe-inline' 'unsafe-eval' data: blob:"
@@ -242,14 +243,6 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> V
 def read_info(path: str | os.PathLike[str]) -> FileInfo:
     """Read what a page's VDI says about itself: see :func:`pyvista_vdi.io.read_info`."""
     return reader.read_info(path, stream=_data(path))
-
-
-def holds_vdi(path: str | os.PathLike[str]) -> bool:
-    """Whether a page has a VDI in it; False where there is no such file."""
-    try:
-        return _DATA.search(Path(path).read_bytes()) is not None
-    except OSError:
-        return False
 
 
 def _data(path: str | os.PathLike[str]) -> BinaryIO:

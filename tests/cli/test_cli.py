@@ -45,7 +45,7 @@ def _no_debug(monkeypatch):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder with a volume, a transfer function, a camera and a VDI."""
+    """A folder with a volume, a transfer function, a camera, a VDI, a page of it, and rubbish."""
     path = tmp_path_factory.mktemp("cli")
     import nrrd
 
@@ -67,6 +67,9 @@ def folder(tmp_path_factory):
         metadata={"criterion": "none"},
     )
     vdi.save(path / "a.vdi")
+    page = vdi.save(path / "a.html").read_bytes()
+    (path / "cut.html").write_bytes(page[: page.rindex(b"</script>") - 101])
+    (path / "no.html").write_text("<!doctype html><p>A page of others")
     (path / "no.vdi").write_bytes((path / "v.nrrd").read_bytes())
     return path
 
@@ -206,6 +209,12 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
         ),
         (["compare", "v.nrrd", "--out", "v.nrrd"], "the folder v.nrrd cannot be made"),
         (["info", "x" * 300], "x does not exist: check the volume's path"),
+        (["info", "none.html"], "none.html cannot be read: No such file"),
+        (["info", "no.html"], "no.html is not a page with a VDI: .* written by VDI.save"),
+        (["view", "no.html", "--screenshot", "b.png"], "no.html is not a page with a VDI"),
+        (["view", "cut.html", "--screenshot", "b.png"], "cut.html is damaged: .*copy it from its"),
+        (["render", "cut.html", "-o", "b.png"], "cut.html is damaged"),
+        (["info", "a.html", "--spacing", "1", "1", "2"], "a.html is a VDI: --spacing is for vol"),
     ],
 )
 def test_mistakes_that_the_work_finds(arguments, message, folder, capsys, monkeypatch):
@@ -225,6 +234,7 @@ def test_mistakes_that_the_work_finds(arguments, message, folder, capsys, monkey
         (["x" * 300], "x does not exist: check the volume's path"),
         (["x" * 300 + "_4x4x4_uint8.raw"], "raw does not exist: check the volume's path"),
         (["a.vdi"], "a.vdi is a VDI, not a volume"),
+        (["a.html"], "a.html is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"),
         (["camera.json"], "camera.json cannot be read as a volume"),
         (["v.nrrd", "--scalars", "density"], "no array 'density'"),
         (["v.nrrd", "--cmap", "viridys"], "cmap='viridys' .*did you mean 'viridis'"),
@@ -371,6 +381,27 @@ def test_view_of_a_volume(folder, capsys, default_runtime, tmp_path):
     below = one.reshape(30, 40, -1)[12:]  # scalar bars may differ in what they are told
     assert np.abs(below - other.reshape(30, 40, -1)[12:]).max() <= 1
     assert np.ptp(below) > 50
+
+
+def test_a_page_is_taken_as_a_vdi_is(folder, capsys, default_runtime, tmp_path):
+    """What verbs do with x.html is what they do with the .vdi that it holds."""
+    page, file = folder / "a.html", tmp_path / "a.vdi"
+    assert run(capsys, "convert", page, "-o", file)[0] == 0
+    assert io.read(file).equals(io.read(page))
+    again = tmp_path / "again.html"
+    assert run(capsys, "convert", file, "-o", again)[0] == 0
+    assert io.read(again).equals(io.read(page))
+    for verb, option in (("render", "-o"), ("view", "--screenshot")):
+        if verb == "view":
+            pytest.importorskip("pyvista")
+        pictures = [tmp_path / f"{verb}-{kind}.png" for kind in ("page", "file")]
+        for source, picture in zip((page, file), pictures, strict=True):
+            assert run(capsys, verb, source, option, picture)[0] == 0
+        assert pictures[0].read_bytes() == pictures[1].read_bytes()
+    about = [json.loads(run(capsys, "info", name, "--json")[1]) for name in (page, file)]
+    own = ("path", "file_bytes")
+    one, other = ({k: v for k, v in state.items() if k not in own} for state in about)
+    assert one == {**other, "codec": "deflate", "format_version": 4}
 
 
 def test_info_as_json(folder, capsys):

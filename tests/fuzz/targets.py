@@ -10,6 +10,7 @@ A target is one function, and they draw from each other's: hence one file of mor
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import hashlib
 import io as text_io
@@ -35,6 +36,10 @@ from pyvista_vdi import VDI, Camera, TransferFunction, Volume, cli, io
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import VDIError, VDIWarning
 from pyvista_vdi.model import host_memory
+from pyvista_vdi.model.view import View
+from pyvista_vdi.web import messages
+from pyvista_vdi.web.page import _DATA
+from pyvista_vdi.web.page import page as page_of
 
 #: Bytes that a byte of a file may become (docs/robustness.md): a block of 128 KiB from 4 bytes is
 #: Zstandard's best, and an array is held twice while it is decoded, a third time as the VDI's.
@@ -178,6 +183,41 @@ def exr_patches(data: bytes) -> None:
     for _ in range(choices.integer(1, 3)):
         base = choices.patched(base)
     _read_all("patches.exr", base, EXR_RATIO)
+
+
+def html_bytes(data: bytes) -> None:
+    """Any bytes as a page."""
+    _read_all("bytes.html", data, VDI_RATIO)
+
+
+@cache
+def _page(index: int, precision: str) -> bytes:
+    return page_of(base_vdi(index), precision=precision)
+
+
+def html_patches(data: bytes) -> None:
+    """A page of ours that is broken, in the text or in the ``.vdi`` that the text holds."""
+    choices = Choices(data)
+    page = _page(choices.integer(0, 7), choices.pick(("8-byte", "16-byte", "exact")))
+    for _ in range(choices.integer(1, 3)):
+        parts = list(_DATA.finditer(page))
+        kind = choices.integer(0, 3)
+        if kind == 0 or not parts:
+            page = choices.patched(page)
+        elif kind == 1:
+            begin, end = choices.pick(parts).span(1)  # base64 is most of a page, but not all
+            page = page[:begin] + choices.patched(page[begin:end]) + page[end:]
+        elif kind == 2:
+            begin, end = choices.pick(parts).span(1)
+            with contextlib.suppress(ValueError):  # broken before
+                held = choices.patched(base64.b64decode(page[begin:end]))
+                page = page[:begin] + base64.b64encode(held) + page[end:]
+        else:
+            begin, end = choices.pick(parts).span()
+            place = choices.integer(0, len(page))
+            piece = page[begin:end] + b"</script>"
+            page = choices.pick((page[:begin] + page[end:], page[:place] + piece + page[place:]))
+    _read_all("patches.html", page, VDI_RATIO)
 
 
 # -- the validator, and the VTK form ---------------------------------------------------------------
@@ -680,6 +720,72 @@ class _Session:
         pvdi.estimate(self.volume, self.size(), max_supersegments=limit)
 
 
+# -- what clients of a server say ------------------------------------------------------------------
+
+_VIEW = {
+    "type": "view",
+    "camera": {
+        "position": [0, -5, 0],
+        "focal_point": [0, 0, 0],
+        "view_up": [0, 0, 1],
+        "view_angle": 30,
+    },
+    "size": [64, 48],
+    "moving": True,
+}
+_SAID = (
+    _VIEW,
+    {**_VIEW, "camera": {**_VIEW["camera"], "parallel_scale": 2.0}},
+    {"type": "look", "cmap": "bone", "opacity": [0, 0.5, 1], "clim": [0, 1]},
+    {"type": "look", "opacity": "linear"},
+    {"type": "clip", "planes": [[0, 0, 0, 1, 0, 0], [0, 0, 0, 0, 1, 0]]},
+    {"type": "time", "step": 1},
+)
+_OFFERS = (messages.Offer(2, ("bone", "hot"), ("linear",)), messages.Offer())
+
+
+def served_messages(data: bytes) -> None:
+    """What a client may say to a server: taken, and then within bounds, or refused by name."""
+    choices = Choices(data)
+    offer, wish = choices.pick(_OFFERS), messages.Wish()
+    for _ in range(choices.integer(1, 6)):
+        said = choices.pick(_SAID)
+        for _ in range(choices.integer(0, 3)):
+            said = choices.edited(said)
+        text = json.dumps(said)
+        if choices.chance(3):
+            text = choices.patched(text.encode()).decode("utf-8", "replace")
+        with contextlib.suppress(messages.BadMessageError):
+            wish = messages.wish_after(text, wish, offer)
+        _check_wish(wish, offer)
+
+
+def _check_wish(wish: messages.Wish, offer: messages.Offer) -> None:
+    assert isinstance(wish.moving, bool)
+    assert type(wish.step) is int
+    assert 0 <= wish.step < offer.steps
+    assert len(wish.planes) <= messages.MAX_PLANES
+    assert all(len(plane) == 6 and np.isfinite(plane).all() for plane in wish.planes)
+    look = wish.look
+    assert look.cmap is None or look.cmap in offer.cmaps
+    if isinstance(look.opacity, tuple):
+        assert offer.cmaps
+        assert 2 <= len(look.opacity) <= messages.MAX_OPACITIES
+        assert all(0 <= value <= 1 for value in look.opacity)
+    else:
+        assert look.opacity is None or look.opacity in offer.opacities
+    assert look.clim is None or -np.inf < look.clim[0] < look.clim[1] < np.inf
+    hash(wish)  # what is made is looked up by it
+    if wish.view is not None:
+        assert all(1 <= edge <= messages.MAX_PICTURE_EDGE for edge in wish.view.size)
+        # What sessions ask of every view
+        apart = wish.view.distance(View(Camera((0, -5, 0), (0, 0, 0), (0, 0, 1)), (64, 48)), _BOX)
+        assert apart >= 0
+
+
+_BOX = (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
+
+
 def public_functions(data: bytes) -> None:
     """The public functions in any order, with arguments that make sense, or do not."""
     with limited():
@@ -691,6 +797,7 @@ TARGETS: dict[str, Callable[[bytes], None]] = {
     target.__name__: target
     for target in (
         *(vdi_bytes, vdi_members, exr_bytes, exr_patches),
+        *(html_bytes, html_patches, served_messages),
         *(validator, vtk_form, command_line, public_functions),
     )
 }

@@ -51,7 +51,7 @@ def test_the_name_is_the_title(page):
 def test_a_foreign_page(tmp_path):
     path = tmp_path / "a.html"
     path.write_text("<!doctype html><p>hello")
-    assert not io.is_vdi_file(path)
+    assert io.is_vdi_file(path)  # by its name: no volume has it, and the sentence is a page's
     for read in (pvdi.read, io.read_info):
         with pytest.raises(VDIFileError, match=r"a\.html is not a page with a VDI: it has no"):
             read(path)
