@@ -386,9 +386,9 @@ class Painter:
             frame.stand_in.took(width * height, seconds)
         if frame.stand_in is None or frame.stand_in.lasting:
             frame.clock.drawn(frame.size, frame.full_size, seconds, frame.way)
-        angle = (
-            0.0 if frame.vdi is None else angle_from_generating_view(frame.vdi, frame.view.camera)
-        )
+        angle = 0.0
+        if frame.vdi is not None and self._scene is not None:
+            angle = angle_from_generating_view(frame.vdi, self._scene[0])
         self.upkeep.ways.took(frame.way, angle, frame.covered(frame.bounds), seconds)
         self._raycasts += 1
         drawn = Drawn(
