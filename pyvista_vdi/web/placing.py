@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.vdi import VDI
 
 #: Largest departure of a rotation from one, by rounding of its matrix.
@@ -65,11 +64,6 @@ def planes_of(actor: Any) -> list[list[float]]:
     planes = actor.GetMapper().GetClippingPlanes()
     items = [planes.GetItem(i) for i in range(0 if planes is None else planes.GetNumberOfItems())]
     return [[*plane.GetOrigin(), *plane.GetNormal()] for plane in items]
-
-
-def cropped(actor: Any) -> bool:
-    """Whether an actor's mapper crops its VDI."""
-    return Cropping.from_any(actor.GetMapper()) is not None
 
 
 def _motion(actor: Any) -> Any:

@@ -308,6 +308,7 @@ def test_what_the_viewer_leaves_out_is_named(plotter):
     plotter.screenshot()
     actor.mapper.SetCropping(True)
     actor.mapper.SetCroppingRegionPlanes(0, 1, 0, 1, 0, 1)
+    actor.mapper.SetCroppingRegionFlagsToCross()
     plotter.show_grid()
     with pytest.warns(UserWarning, match=r"without cropping \(\w+\), CubeAxes.*: see all by"):
         show_plotter(plotter)

@@ -149,6 +149,8 @@ def clipped_and_moved(plotter):
     plane.SetOrigin(0, 0, 0.1)
     plane.SetNormal(0.3, 0, -1)
     actor.mapper.AddClippingPlane(plane)
+    actor.mapper.SetCropping(True)
+    actor.mapper.SetCroppingRegionPlanes(-0.5, 2, -0.4, 0.6, -2, 2)
     sphere = plotter.add_mesh(pv.Sphere(radius=0.8), color="g")
     sphere.mapper.AddClippingPlane(plane)
     plotter.show(auto_close=False)
@@ -453,6 +455,44 @@ def test_subplots_stand_beside_each_other_and_turn_together(from_disk, tmp_path)
     assert pvdi.read(tmp_path / "scene.html").equals(vdi.with_precision("8-byte"))
 
 
+COUNTING = """
+window.alive = 0;
+const kinds = ["Texture", "Framebuffer", "Renderbuffer", "Buffer", "VertexArray", "Program"];
+for (const kind of kinds) {
+  const { prototype } = WebGL2RenderingContext;
+  const [create, remove] = [prototype[`create${kind}`], prototype[`delete${kind}`]];
+  prototype[`create${kind}`] = function () { ++window.alive; return create.call(this); };
+  prototype[`delete${kind}`] = function (it) { if (it) --window.alive; remove.call(this, it); };
+}
+"""
+
+
+@slow
+def test_scenes_that_follow_each_other_leave_nothing_behind(plotter, open_page):
+    translucent_and_textured(plotter)
+    ball(plotter, at=(1, 0, 0))
+    plotter.show(auto_close=False)
+    page = open_page(SMALL, before=COUNTING)
+    scene = give(page, plotter)
+    page.evaluate(
+        "(text) => { window.packed = bytesOf(text); }", base64.b64encode(scene.data).decode()
+    )
+    alive = page.evaluate(
+        """async () => {
+          const { Scene } = await import("./scene.js"), alive = [];
+          for (let k = 0; k < 4; ++k) {
+            const next = new Scene(packed);
+            viewer.scene = next;
+            await next.whole;
+            await viewer.screenshot({ width: 32, height: 18 });
+            alive.push(window.alive);
+          }
+          return alive;
+        }"""
+    )
+    assert len(set(alive[1:])) == 1, alive
+
+
 @slow
 def test_a_lost_context_is_made_up_for(plotter, from_disk, tmp_path):
     meshes(plotter)
@@ -491,6 +531,7 @@ def test_what_is_not_shown_is_named_in_one_warning(plotter):
     actor = ball(plotter)
     actor.mapper.SetCropping(1)
     actor.mapper.SetCroppingRegionPlanes(-0.5, 0.5, -0.5, 0.5, -0.5, 0.5)
+    actor.mapper.SetCroppingRegionFlagsToCross()
     plotter.add_mesh(pv.Sphere(), pbr=True, name="ball")
     plotter.show_grid()
     with pytest.warns(VDIWarning, match="shows the scene without") as warned:

@@ -19,11 +19,12 @@ from vtkmodules.vtkRenderingCore import (
 )
 
 from pyvista_vdi.errors import UnsupportedError
+from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.web.camera import viewer_camera
 from pyvista_vdi.web.encode import encoded
-from pyvista_vdi.web.placing import cropped, look_of, planes_of, thinned
+from pyvista_vdi.web.placing import look_of, planes_of, thinned
 from pyvista_vdi.web.scenes.annotations import annotations_of, described_text
 from pyvista_vdi.web.scenes.meshes import shapes_of
 
@@ -34,6 +35,9 @@ _KINDS = {
     "uint8": "Uint8Array",
     "uint32": "Uint32Array",
 }
+
+#: Planes that the viewer clips a VDI to; two more bound a slab of it.
+_MOST_PLANES = 6
 
 #: vtkLight's types.
 _LIGHTS = {1: "head", 2: "camera", 3: "scene"}
@@ -183,6 +187,7 @@ def state_of(renderer: Any) -> tuple[Any, ...]:
         if isinstance(prop, VDIActorMethods):
             # The mapper is modified in each frame
             state += [*look_of(prop), *map(tuple, planes_of(prop))]
+            state.append(Cropping.from_any(prop.GetMapper()))
         else:
             state.append(prop.GetRedrawMTime())
         states.append(tuple(state))
@@ -283,10 +288,37 @@ def _is_plain(prop: Any) -> bool:
 
 
 def _body(actor: Any, matrix: Any, missing: list[str]) -> tuple[VDI, dict[str, Any]]:
-    if cropped(actor):
-        missing.append("cropping")
+    planes = planes_of(actor)
+    cropping = Cropping.from_any(actor.GetMapper())
+    if cropping is not None:
+        sides = _sides(cropping, actor.vdi.bounds, matrix)
+        if sides is None or len(planes) + len(sides) > _MOST_PLANES:
+            missing.append("cropping")
+        else:
+            planes += sides
+    if len(planes) > _MOST_PLANES:
+        missing.append(f"{len(planes) - _MOST_PLANES} of its clipping planes")
     vdi = thinned(actor.vdi, actor.opacity_multiplier)
-    return vdi, {"planes": planes_of(actor), "matrix": matrix.tolist()}
+    return vdi, {"planes": planes[:_MOST_PLANES], "matrix": matrix.tolist()}
+
+
+def _sides(
+    cropping: Cropping, bounds: Sequence[float], matrix: NDArray[np.float64]
+) -> list[list[float]] | None:
+    """Return the planes of a box that is cropped to, world; ``None`` if it is another shape."""
+    regions = [(i, j, k) for k in range(3) for j in range(3) for i in range(3)]
+    if not all(cropping.keeps(*region) == (region == (1, 1, 1)) for region in regions):
+        return None
+    sides = []
+    for number, (place, edge) in enumerate(zip(cropping.planes, bounds, strict=True)):
+        axis, sense = number // 2, 1 - 2 * (number % 2)
+        if sense * (place - edge) <= 0:  # outside of what there is
+            continue
+        point = np.append(np.zeros(3), 1.0)
+        point[axis] = place
+        normal = sense * np.linalg.inv(matrix[:3, :3])[axis]
+        sides.append([*(matrix @ point)[:3].tolist(), *normal.tolist()])
+    return sides
 
 
 def _camera(renderer: Any) -> dict[str, Any]:

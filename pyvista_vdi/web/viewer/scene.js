@@ -21,7 +21,7 @@ const normalized = (a) => a.map((x) => x / (Math.hypot(...a) || 1));
 /** A scene: `viewer.scene = new Scene(bytes)`. */
 export class Scene {
   #gl = null;
-  #programs = new Map();
+  #programs = null;
   #buffers = null;
   #marker = null; // axes in a corner
   #drawn = null; // the view whose meshes they hold
@@ -83,8 +83,9 @@ export class Scene {
   /** Take the graphics that there is, at first and after it was lost. */
   restore(gl) {
     this.#gl = gl;
-    this.#programs.clear();
+    this.#programs = programsOf(gl);
     this.#buffers = this.#drawn = null;
+    gl.deleteVertexArray(this.#vertices);
     this.#vertices = gl.createVertexArray();
     if (this.#all().length && !gl.getExtension("EXT_color_buffer_float")) {
       throw new Error("This browser's graphics cannot draw depths as numbers " +
@@ -113,8 +114,6 @@ export class Scene {
       for (const map of [shape.table, shape.texture]) gl.deleteTexture(map?.drawn ?? null);
     }
     this.#free();
-    this.#programs.forEach(({ program }) => gl.deleteProgram(program));
-    this.#programs.clear();
     gl.deleteVertexArray(this.#vertices);
     this.#gl = null;
   }
@@ -444,6 +443,15 @@ export class Scene {
 }
 
 const matrixOf = ({ matrix }) => matrix;
+
+const compiled = new WeakMap(); // programs by graphics: scenes that follow each other share them
+
+function programsOf(gl) {
+  const known = compiled.get(gl)?.values().next().value;
+  // Those of a context that was lost are gone
+  if (!known || !gl.isProgram(known.program)) compiled.set(gl, new Map());
+  return compiled.get(gl);
+}
 
 // -- from bytes to arrays ------------------------------------------------------------------------
 
