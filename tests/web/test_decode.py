@@ -11,10 +11,10 @@ from io import BytesIO
 import numpy as np
 import pytest
 from browsers import PAGE, SITE, Page
+from rewriting import described, rewritten
 from strategies import random_vdi
 
 from pyvista_vdi import io
-from pyvista_vdi.io.vdi_file.layout import INDEX_DTYPE
 from pyvista_vdi.model.coarser import coarser
 
 #: Decodes files in the page: their arrays as base64, or the sentence.
@@ -56,28 +56,6 @@ def decoded(page, data):
 
 def vdi_bytes(vdi, tmp_path, **options):
     return vdi.save(tmp_path / "a.vdi", **options).read_bytes()
-
-
-def rewritten(data, edit, arrays=None):
-    """Return an archive with members changed; its checksums fit, where arrays have one chunk."""
-    with zipfile.ZipFile(BytesIO(data)) as archive:
-        members = {info.filename: archive.read(info) for info in archive.infolist()}
-    edit(members)
-    if arrays:
-        rows = [(len(members[name]), zlib.crc32(members[name])) for name in arrays]
-        members["chunks"] = np.array(rows, INDEX_DTYPE).tobytes()
-    stream = BytesIO()
-    with zipfile.ZipFile(stream, "w") as archive:
-        for name, content in members.items():
-            archive.writestr(zipfile.ZipInfo(name), content)
-    return stream.getvalue()
-
-
-def described(data, **changes):
-    def edit(members):
-        members["vdi.json"] = json.dumps({**json.loads(members["vdi.json"]), **changes}).encode()
-
-    return rewritten(data, edit)
 
 
 def large_vdi():

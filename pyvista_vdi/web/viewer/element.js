@@ -265,7 +265,7 @@ export class VDIViewer extends HTMLElement {
   #loadEmbedded() {
     if (this.#status.state !== "empty" || this.getAttribute("src")) return;
     const within = embedded(this);
-    if (within) this.load(within);
+    if (within) this.load(within).catch(() => {});
   }
 
   disconnectedCallback() {
@@ -280,7 +280,8 @@ export class VDIViewer extends HTMLElement {
   }
 
   attributeChangedCallback(name, before, value) {
-    if (name === "src" && value) this.load(new URL(value, document.baseURI));
+    // What goes wrong is said by the error event, on the page and by ready: nobody awaits this
+    if (name === "src" && value) this.load(value).catch(() => {});
     if (name === "background") this.style.background = value ?? "";
     if (name === "still" && value) this.#parts.img.src = value;
   }
