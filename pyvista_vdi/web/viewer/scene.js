@@ -219,6 +219,7 @@ export class Scene {
     gl.disable(gl.DEPTH_TEST);
     gl.disable(gl.CULL_FACE);
     gl.bindVertexArray(null);
+    gl.activeTexture(gl.TEXTURE0);
   }
 
   // The axes in a corner, before all else, into a picture of their own.
