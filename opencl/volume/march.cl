@@ -84,6 +84,11 @@ inline Int begin_march(March *march, __global const float *forms, int planes, Re
     march->per_step = 1.0f / march->step;
     march->units = speed / unit_distance;
     march->steps = SELECT((Int)(0), TO_INT(ceil((march->t1 - march->t0) / march->step)), meets);
+#if LANES > 1
+    // Rays that miss look at some place too, so that nothing that is added 0 times is NaN
+    march->t0 = SELECT((Real)(0.0f), march->t0, meets);
+    march->t1 = SELECT((Real)(0.0f), march->t1, meets);
+#endif
     return meets;
 }
 

@@ -8,6 +8,7 @@
 // -D LANES: see volume/march.cl
 // -D SAMPLED: see volume/samples.cl; some steps of some rows at a time then, as they are sampled
 #include "volume/cropped_march.cl"
+#include "volume/picture.cl"
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -30,8 +31,7 @@
 KERNEL_OF_LANES void render_volume(
     MEDIUM_PARAMETERS
     VIEW_PARAMETERS
-    __global const float *opaque_depth,   // t at which each pixel's ray ends, top row first, if has_opaque_depth
-    int has_opaque_depth,
+    OPAQUE_DEPTH_PARAMETERS
     float transmittance_cutoff,           // the ray ends where no more than this is left; negative: never
     CROPPING_PARAMETER                    // regions that are kept; their planes are forms behind the others
     MULTIPLIER_PARAMETER
@@ -47,14 +47,8 @@ KERNEL_OF_LANES void render_volume(
     const Rays rays = rays_of_block(item, width, height, first_row, rows);
     if (!ANY(rays.present))
         return;
-    const Places places = {SELECT((Int)(-1), (height - 1 - first_row - rays.y) * width + rays.x, rays.present)};
-    Place *place = places.each;
-    Real t_end = INFINITY;
-    if (has_opaque_depth) {
-#define END(n) (place[n] < 0 ? 0.0f : opaque_depth[place[n]])
-        t_end = OF_LANES(Real, END);
-#undef END
-    }
+    const Places places = places_in_picture(&rays, width, height, first_row);
+    const Real t_end = opaque_ends(&places, opaque_depth, has_opaque_depth);
 
     Seen seen = nothing_seen();
 #ifdef SAMPLED
@@ -68,11 +62,6 @@ KERNEL_OF_LANES void render_volume(
         const Medium medium = MEDIUM;
 #ifdef CROPPED
         const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, rays.a, rays.b, regions);
-#endif
-#if LANES > 1
-        // Rays that miss look at some place too, so that nothing that is added 0 times is NaN
-        march.t0 = SELECT((Real)(0.0f), march.t0, march.steps > 0);
-        march.t1 = SELECT((Real)(0.0f), march.t1, march.steps > 0);
 #endif
         Int k = first_step;
         const Int end = SELECT(march.steps, (Int)(first_step + steps), march.steps - first_step > steps);
@@ -102,17 +91,5 @@ KERNEL_OF_LANES void render_volume(
     state[0] = seen.sums;
     state[1] = seen.compensation;
 #endif
-#if LANES == 1
-    image[*place] = composited(&seen);
-#else
-    const Real4 rgba = transpose(composited(&seen));
-#define STORE(n, c, four)   \
-    if (place[n] >= 0)      \
-        image[place[n]] = rgba.c.four;
-#define STORE_ROW(g, four) STORE(4 * g, x, four) STORE(4 * g + 1, y, four) STORE(4 * g + 2, z, four) STORE(4 * g + 3, w, four)
-    STORE_ROW(0, s0123)
-    STORE_ROW(1, s4567)
-    STORE_ROW(2, s89ab)
-    STORE_ROW(3, scdef)
-#endif
+    store_colors(image, &places, composited(&seen));
 }

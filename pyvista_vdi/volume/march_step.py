@@ -23,6 +23,10 @@ _IN_BLOCKS: Mapping[str, Define] = {
     "HEADLIGHT": None,
     "POSITIONAL_LIGHTS": None,
     "GRADIENT_OPACITY": None,
+    "MAXIMUM": None,
+    "MINIMUM": None,
+    "AVERAGE": None,
+    "ADDITIVE": None,
 }
 
 

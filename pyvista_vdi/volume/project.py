@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.device.work_order import GROUP, block_items
+from pyvista_vdi.device.work_order import block_items
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.march_step import march_step
 from pyvista_vdi.volume.render import ClippedRays
 
 
@@ -45,10 +46,9 @@ def project_volume(
         ) as depth,
         runtime.result((height, width, 4), name="image") as image,
     ):
-        runtime.launch(
-            runtime.kernel("volume/project.cl", "project", defines),
+        march_step(runtime, "volume/project.cl", "project", defines).launch(
+            runtime,
             block_items(width, height),
-            GROUP,
             *medium.medium_arguments(request.camera),
             forms,
             np.int32(clipped.planes),
