@@ -4,16 +4,19 @@ Both go over a line of so many Mbit/s and so much latency (a round trip). VDIs: 
 client that says the views of the path in real time and notes when each VDI has come, through a
 proxy that is as slow as the line (tests/support/slow_line.py). What is on the screen at a moment is
 the VDI that is there, seen from the view of that moment; drawing is the page's own and costs the
-line nothing. Images: in simulated time and in their favour. The server renders in no time whatever
-it last heard of the view, at most so many a second and as soon as the line is free; qualities are
-those of trame's remote view, 60 in motion and 98 at rest. What is on the screen is the last image
-that has come. Both are held against the volume's picture from the view of the moment.
+line nothing: how soon a frame follows its view is timed in a real Chromium, where there is one
+(software WebGL), over lines of several latencies. Images: in simulated time and in their favour.
+The server renders in no time whatever it last heard of the view, at most so many a second and as
+soon as the line is free; qualities are those of trame's remote view, 60 in motion and 98 at rest.
+What is on the screen is the last image that has come. Both are held against the volume's picture
+from the view of the moment.
 """
 
 from __future__ import annotations
 
 import asyncio
 import io
+import shutil
 import sys
 import tempfile
 import time
@@ -26,6 +29,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+from browsers import FLAGS, LONG, NAMES
 from slow_line import SlowLine
 from web_client import WebClient
 
@@ -64,6 +68,23 @@ PATH = (
 QUALITIES = (60, 98)
 
 
+#: Milliseconds from a change of the page's camera to the frame that shows it, forty times.
+TURN = """async () => {
+  const times = [];
+  for (let k = 0; k < 40; ++k) {
+    const { position: [x, y, z], ...rest } = viewer.camera;
+    const drawn = new Promise((resolve) => {
+      viewer.addEventListener("framedrawn", resolve, { once: true });
+    });
+    const began = performance.now();
+    viewer.camera = { ...rest, position: [x * 0.999 + y * 0.01, y, z] };
+    await drawn;
+    times.push(performance.now() - began);
+  }
+  return times;
+}"""
+
+
 class Path60:
     """The views of the minute, or of its first seconds."""
 
@@ -89,7 +110,7 @@ async def served(
     """Go along the path as a page does; return what came when."""
     one_way = options.latency / 2000
     line = SlowLine(server.port, rate=options.rate * 1e6 / 8, latency=one_way)
-    came: list[tuple[float, str, bytes]] = []
+    came: list[tuple[float, str, bytes, float]] = []
     delays = []
     with tempfile.TemporaryDirectory() as folder:
         async with line, WebClient(server, Path(folder), port=line.port) as client:
@@ -106,7 +127,7 @@ async def served(
                         asked = now - 2 * one_way
                     elif isinstance(found, bytes) and client.is_whole:
                         level = client.head["level"]
-                        came.append((now, level, b"".join(client.parts)))
+                        came.append((now, level, b"".join(client.parts), asked))
                         if level == "coarse":
                             delays.append(now - asked)
 
@@ -125,10 +146,10 @@ async def served(
 
 def images(
     draw: Any, path: Path60, seconds: float, options: Any
-) -> tuple[list[tuple[float, NDArray[np.uint8]]], int]:
-    """Return when each image is on the screen, and the bytes of all."""
+) -> tuple[list[tuple[float, NDArray[np.uint8]]], int, list[float]]:
+    """Return when each image is on the screen, the bytes of all, and the waits of each motion."""
     one_way, rate = options.latency / 2000, options.rate * 1e6 / 8
-    shown, total, now, last = [], 0, one_way, None
+    shown, total, now, last, waits = [], 0, one_way, None, []
     while now < seconds:
         heard = now - one_way
         view, still = path.at(heard), path.rests(heard)
@@ -138,11 +159,49 @@ def images(
             Image.fromarray(_bytes(draw(view))).save(stream, "JPEG", quality=QUALITIES[still])
             sent = now + len(stream.getvalue()) / rate
             shown.append((sent + one_way, np.asarray(Image.open(stream))))
+            waits.append(sent + one_way - heard)
             total += len(stream.getvalue())
             now = max(sent, now + 1 / options.fps)
         else:
             now += 1 / options.fps
-    return shown, total
+    return shown, total, waits
+
+
+def motion_to_picture(server: web.Server, size: tuple[int, int], options: Any) -> list[Any]:
+    """Time frames of a page in Chromium from the camera's change on, over lines of three latencies.
+
+    Returns
+    -------
+    list of [float, float]
+        Latency (round trip, ms) and the median time (ms); empty where there is no Chromium.
+    """
+    executable = next(filter(None, map(shutil.which, NAMES)), None)
+    if executable is None:
+        return []
+    return asyncio.run(_frames(server, size, options, executable))
+
+
+async def _frames(
+    server: web.Server, size: tuple[int, int], options: Any, executable: str
+) -> list[Any]:
+    from playwright.async_api import async_playwright
+
+    found = []
+    async with async_playwright() as playwright:
+        browser = await playwright.chromium.launch(executable_path=executable, args=list(FLAGS))
+        for latency in (0.0, options.latency, 4 * options.latency):
+            line = SlowLine(server.port, rate=options.rate * 1e6 / 8, latency=latency / 2000)
+            async with line:
+                page = await browser.new_page(viewport={"width": size[0], "height": size[1]})
+                page.set_default_timeout(LONG)
+                await page.goto(server.url.replace(f":{server.port}", f":{line.port}"))
+                while not await page.evaluate("window.remote?.received.full === 1"):
+                    await asyncio.sleep(0.05)
+                times = await page.evaluate(TURN)
+                found.append([latency, float(np.median(times))])
+                await page.close()
+        await browser.close()
+    return found
 
 
 def _bytes(rgba: NDArray[np.float32]) -> NDArray[np.uint8]:
@@ -189,12 +248,22 @@ def main() -> None:
             # What is compiled and uploaded once is no part of the minute
             asyncio.run(served(server, path, size, 3.0, options))
             by_vdi = asyncio.run(served(server, path, size, options.seconds, options))
-        by_image, image_bytes = images(draw, path, options.seconds, options)
+            frames = motion_to_picture(server, size, options)
+        by_image, image_bytes, waits = images(draw, path, options.seconds, options)
         with tempfile.TemporaryDirectory() as folder:
             vdis = []
-            for k, (second, _, file) in enumerate(by_vdi["came"]):
+            for k, (second, _, file, _) in enumerate(by_vdi["came"]):
                 (target := Path(folder) / f"{k}.vdi").write_bytes(file)
                 vdis.append((second, target))
+            # What a coarse one shows of the view that it was asked for, and of that when it comes
+            coarse = []
+            for (second, level, _, asked), (_, target) in zip(by_vdi["came"], vdis, strict=True):
+                if level == "coarse":
+                    vdi = pvdi.read(target)
+                    views = path.at(asked), path.at(second)
+                    pictures = (pvdi.render(vdi, v, size, device=options.device) for v in views)
+                    pairs = zip(pictures, views, strict=True)
+                    coarse.append([_ssim(_bytes(p), _bytes(draw(v))) for p, v in pairs])
             moments = []
             for second in np.arange(2.25, options.seconds, options.every):
                 view = path.at(second)
@@ -209,8 +278,11 @@ def main() -> None:
             {
                 "volume": name,
                 "bytes": [by_vdi["bytes"], image_bytes],
-                "vdis": [level for _, level, _ in by_vdi["came"]],
+                "vdis": [level for _, level, _, _ in by_vdi["came"]],
                 "delays": by_vdi["delays"],
+                "coarse": coarse,
+                "frames": frames,
+                "waits": waits,
                 "moments": moments,
             }
         )
@@ -221,11 +293,21 @@ def main() -> None:
 
 def report(result: dict[str, Any]) -> None:
     """Print what was found for a volume."""
+    asked, then = (
+        (np.median(column), min(column)) for column in zip(*result["coarse"], strict=True)
+    )
     print(
         f"{result['volume']}: {len(result['vdis'])} VDIs, "
         f"{result['vdis'].count('full')} of them full; coarse ones on the screen after "
-        f"{np.median(result['delays']):.2f} s (median), {max(result['delays']):.2f} s (worst)"
+        f"{np.median(result['delays']):.2f} s (median), {max(result['delays']):.2f} s (worst), "
+        f"SSIM of the view asked for {asked[0]:.3f} (median), {asked[1]:.3f} (worst), "
+        f"of the view then {then[0]:.3f}, {then[1]:.3f}"
     )
+    for latency, time_ms in result["frames"]:
+        print(
+            f"motion to picture in Chromium, {latency:g} ms of latency: {time_ms:.0f} ms (median)"
+        )
+    print(f"motion to picture of JPEG images: {1e3 * np.median(result['waits']):.0f} ms (median)")
     rows = []
     for k, name in enumerate(("served VDIs", "JPEG images")):
         ssim = {rest: [m[2 + k] for m in result["moments"] if m[1] == rest] for rest in (0, 1)}
