@@ -187,7 +187,7 @@ def state_of(renderer: Any) -> tuple[Any, ...]:
         if isinstance(prop, VDIActorMethods):
             # The mapper is modified in each frame
             state += [*look_of(prop), *map(tuple, planes_of(prop))]
-            state.append(Cropping.from_any(prop.GetMapper()))
+            state.append(Cropping.from_any(prop.GetMapper()))  # type: ignore[attr-defined]
         else:
             state.append(prop.GetRedrawMTime())
         states.append(tuple(state))
