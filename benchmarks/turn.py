@@ -1,7 +1,7 @@
 """A path once around volumes at a frame rate: SSIM of what was shown, and how late, VTK's and ours.
 
 Every frame is drawn as while a hand moves and held against the own full picture of its view: that
-of `render_volume` for ours, that of the same mapper for VTK's, which chooses its image sample distance
+of `render_volume` for ours, that of the same mapper for VTK's, which sets its image sample distance
 by itself (`AutoAdjustSampleDistances`). A frame is late that takes over 1.2 periods of the rate.
 """
 
