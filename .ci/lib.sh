@@ -249,6 +249,7 @@ check_types() {
 }
 
 build_docs() {
+    cd "$work" # not a checkout, whose package Python would find before the installed one
     "$work/venv/bin/python" -m sphinx -W --keep-going -q -b html \
         "$work/source/docs" "$work/docs-html"
     log "built $(find "$work/docs-html" -name '*.html' | wc -l) pages without a warning"

@@ -81,6 +81,7 @@ def main() -> None:
         show_scalar_bar=False,
         target_fps=60,
         regenerate=lambda status: status.angle > 30,
+        draw="vdi",  # never the volume, so that one VDI is seen to follow the other
     )
     text = actor.show_status(plotter)  # status=True, but for the size of its letters
     text.SetMaximumFontSize(11)

@@ -28,14 +28,12 @@ SIZE = (45, 37)
 
 #: Modules that launch kernels by groups of :data:`pyvista_vdi.device.work_order.GROUP`.
 LAUNCHING = (
+    "device.steps",
     "device.work_order",
-    "generation.march",
-    "generation.records",
     "raycasting.occupancy",
     "raycasting.prepared",
     "raycasting.strategies",
     "volume.classified_volume",
-    "volume.render",
     "volume.upload",
 )
 

@@ -49,7 +49,8 @@ def site(tmp_path_factory, default_runtime):
     return folder
 
 
-@pytest.mark.parametrize("name", ["index", pytest.param("gallery", marks=pytest.mark.slow)])
+@pytest.mark.slow  # .ci/run has it of the built site
+@pytest.mark.parametrize("name", ["index", "gallery"])
 def test_vdis_turn_on_the_page(site, chromium, name):
     context = chromium.new_context(viewport={"width": 1280, "height": 800})
     try:

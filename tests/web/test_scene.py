@@ -253,6 +253,7 @@ def seen(page):
     return [bool(strength > 250) for strength in strengths]
 
 
+@pytest.mark.slow
 def test_vdis_that_overlap_are_mixed_as_by_render(open_page):
     size = (81, 45)
     volumes = [soft_ball(12), soft_ball(12)]
