@@ -3,7 +3,8 @@
 Both go over a line of so many Mbit/s and so much latency (a round trip). VDIs: a real server, a
 client that says the views of the path in real time and notes when each VDI has come, through a
 proxy that is as slow as the line (tests/support/slow_line.py). What is on the screen at a moment is
-the VDI that is there, seen from the view of that moment; drawing is the page's own and costs the
+the volume's picture of that view, where it rests and that has come, else the VDI that is there,
+seen from the view of that moment; drawing is the page's own and costs the
 line nothing: how soon a frame follows its view is timed in a real Chromium, where there is one
 (software WebGL), over lines of several latencies. Images: in simulated time and in their favour.
 The server renders in no time whatever it last heard of the view, at most so many a second and as
@@ -111,6 +112,8 @@ async def served(
     one_way = options.latency / 2000
     line = SlowLine(server.port, rate=options.rate * 1e6 / 8, latency=one_way)
     came: list[tuple[float, str, bytes, float]] = []
+    pictures: list[tuple[float, int, bytes]] = []
+    wishes: list[tuple[float, Camera]] = []
     delays = []
     with tempfile.TemporaryDirectory() as folder:
         async with line, WebClient(server, Path(folder), port=line.port) as client:
@@ -123,7 +126,9 @@ async def served(
                     now = time.perf_counter() - began
                     if isinstance(found, int):
                         return
-                    if isinstance(found, dict) and found.get("doing") == "vdi":
+                    if isinstance(found, tuple):
+                        pictures.append((now, found[0]["said"], found[1]))
+                    elif isinstance(found, dict) and found.get("doing") == "vdi":
                         asked = now - 2 * one_way
                     elif isinstance(found, bytes) and client.is_whole:
                         level = client.head["level"]
@@ -137,11 +142,30 @@ async def served(
                 view, moving = path.at(now), not path.rests(now)
                 if (view, moving) != said:
                     await client.look_from(view, size, moving=moving)
+                    wishes.append((now, view))
                     said = view, moving
                 await asyncio.sleep(0.05)
             hearing.cancel()
             down = line.down
-    return {"came": came, "bytes": down, "delays": delays}
+    return {
+        "came": came,
+        "pictures": pictures,
+        "wishes": wishes,
+        "bytes": down,
+        "delays": delays,
+    }
+
+
+def picture_at(found: dict[str, Any], path: Path60, second: float) -> NDArray[np.uint8] | None:
+    """Return the volume's picture that lies over the VDI at a moment, if one does."""
+    said = [k for k, (when, _) in enumerate(found["wishes"], 1) if when <= second]
+    if not said or found["wishes"][said[-1] - 1][1] != path.at(second):
+        return None
+    for when, of, file in found["pictures"]:
+        if of == said[-1] and when <= second:
+            rgba = np.asarray(Image.open(io.BytesIO(file)).convert("RGBA")) / 255.0
+            return np.rint(rgba[..., :3] * rgba[..., 3:] * 255).astype(np.uint8)
+    return None
 
 
 def images(
@@ -271,13 +295,21 @@ def main() -> None:
                 vdi, image = _at(vdis, second), _at(by_image, second)
                 if vdi is None or image is None:
                     continue
-                picture = pvdi.render(pvdi.read(vdi[1]), view, size, device=options.device)
-                pair = _ssim(_bytes(picture), truth), _ssim(image[1], truth)
+                shown = picture_at(by_vdi, path, second)
+                if shown is None:
+                    vdi = pvdi.read(vdi[1])
+                    shown = _bytes(pvdi.render(vdi, view, size, device=options.device))
+                pair = _ssim(shown, truth), _ssim(image[1], truth)
                 moments.append((float(second), path.rests(second), *pair))
         results.append(
             {
                 "volume": name,
                 "bytes": [by_vdi["bytes"], image_bytes],
+                "bytes_of_pictures": sum(len(file) for *_, file in by_vdi["pictures"]),
+                "bytes_of_levels": {
+                    level: sum(len(file) for _, of, file, _ in by_vdi["came"] if of == level)
+                    for level in ("coarse", "full")
+                },
                 "vdis": [level for _, level, _, _ in by_vdi["came"]],
                 "delays": by_vdi["delays"],
                 "coarse": coarse,
@@ -298,7 +330,8 @@ def report(result: dict[str, Any]) -> None:
     )
     print(
         f"{result['volume']}: {len(result['vdis'])} VDIs, "
-        f"{result['vdis'].count('full')} of them full; coarse ones on the screen after "
+        f"{result['vdis'].count('full')} of them full, {result['bytes_of_levels']} bytes, pictures "
+        f"{result['bytes_of_pictures']} bytes; coarse ones on the screen after "
         f"{np.median(result['delays']):.2f} s (median), {max(result['delays']):.2f} s (worst), "
         f"SSIM of the view asked for {asked[0]:.3f} (median), {asked[1]:.3f} (worst), "
         f"of the view then {then[0]:.3f}, {then[1]:.3f}"

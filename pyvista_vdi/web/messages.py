@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -60,6 +60,8 @@ class Wish:
         Of the time steps.
     planes : tuple of tuple of float
         Clipping planes: origin and normal of each, world coordinates.
+    said : int
+        How many messages the client had said by then. Equal wishes may differ in it.
     """
 
     view: View | None = None
@@ -67,6 +69,7 @@ class Wish:
     look: Look = Look()
     step: int = 0
     planes: tuple[tuple[float, ...], ...] = ()
+    said: int = field(default=0, compare=False)
 
     @property
     def content(self) -> tuple[Look, int]:
@@ -109,7 +112,7 @@ def wish_after(text: str, wish: Wish, offer: Offer) -> Wish:
     read = _READERS.get(kind) if isinstance(kind, str) else None
     if read is None:
         raise BadMessageError(f"type must be one of {', '.join(_READERS)}; got {kind!r:.40}")
-    return read(message, wish, offer)
+    return replace(read(message, wish, offer), said=wish.said + 1)
 
 
 def _view(message: dict[str, Any], wish: Wish, offer: Offer) -> Wish:

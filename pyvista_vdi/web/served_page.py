@@ -17,7 +17,8 @@ vdi-viewer {{ flex: 1; min-height: 0; }}
 form {{ display: flex; flex-wrap: wrap; gap: 4px 16px; padding: 6px 10px; align-items: center; }}
 label {{ display: flex; gap: 6px; align-items: center; }}
 input[type="number"] {{ width: 6em; }}
-output {{ margin-left: auto; }}
+/* As large whatever it says: the viewer's size is the view that is asked for. */
+output {{ margin-left: auto; width: 14em; height: 1.5em; overflow: auto; text-align: right; }}
 </style>
 <body>
 <vdi-viewer id="viewer"></vdi-viewer>

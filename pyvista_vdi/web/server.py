@@ -294,9 +294,18 @@ class Server:
             while client.notes:
                 _, note = client.notes.popitem()
                 await put(json.dumps(note))
+            await self._send_picture(client, put)
             file = client.next_file()
             if file is not None:
                 await self._send_file(client, put, *file)
+
+    async def _send_picture(self, client: Client, put: _Put) -> None:
+        picture = client.next_picture()
+        if picture is not None:
+            wish, file = picture
+            await put(json.dumps({"type": "picture", "said": wish.said, "bytes": len(file)}))
+            if file:
+                await put(file)
 
     async def _send_file(self, client: Client, put: _Put, made: Made, file: bytes) -> None:
         head = {
@@ -311,6 +320,7 @@ class Server:
             if client.is_outdone(made):
                 client.given_up(made)
                 return
+            await self._send_picture(client, put)
             await put(file[first : first + CHUNK])
         client.sent(made)
 

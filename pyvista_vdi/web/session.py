@@ -1,8 +1,9 @@
 """A client of a server: what it wishes, what it has been sent, and what is to be done next.
 
-All methods run in the thread of the event loop; the *stages*, an estimate or one VDI, run in the
-server's few threads. A client has at most one stage in them, so that threads take clients in turn:
-each one stage, then the next client's. The latest wish is read when a stage begins.
+All methods run in the thread of the event loop; the *stages*, an estimate, a picture or one VDI,
+run in the server's few threads. A client has at most one stage in them, so that threads take
+clients in turn: each one stage, then the next client's. The latest wish is read when a stage
+begins.
 """
 
 from __future__ import annotations
@@ -23,6 +24,10 @@ from pyvista_vdi.web.source import Made, Source
 #: coarse one is what a view in motion needs. Coarse ones are never given up for another wish, so
 #: that however fast wishes follow each other, there are pictures.
 _FULL_OUT_OF_DATE = 0.1
+
+#: Seconds for which a view must have rested before its full VDI is made. The volume's picture shows
+#: it meanwhile; the full VDI, five to ten times a coarse one's bytes, is for turns from there.
+SETTLED = 5.0
 
 
 class Client:
@@ -53,6 +58,8 @@ class Client:
     def __init__(self, source: Source, threads: Executor, below: float) -> None:
         self.wish = Wish()
         self.waiting: tuple[Made, bytes] | None = None
+        self._picture: tuple[Wish, bytes] | None = None
+        self._pictured = 0  # Wish.said of what a picture was made of last
         self.notes: dict[str, dict[str, Any]] = {}
         self.news = asyncio.Event()
         self.left = asyncio.Event()
@@ -68,12 +75,19 @@ class Client:
         self._begun_for = Wish()
         self._cancelled = threading.Event()
         self._failed: Wish | None = None
+        self._settled = False
+        self._settling: asyncio.TimerHandle | None = None
 
     def hear(self, wish: Wish) -> None:
         """Take note of what the client wants now."""
         self.wish = wish
+        self._stop_settling()
+        if not wish.moving:
+            self._settling = asyncio.get_running_loop().call_later(SETTLED, self._settle)
         if self._stage == "full" and self.is_out_of_date(self._begun_for):
             self._cancelled.set()
+        if self._stage == "picture":
+            self._cancelled.set()  # it is of one view
         self._woken.set()
 
     def next_file(self) -> tuple[Made, bytes] | None:
@@ -82,6 +96,14 @@ class Client:
         if waiting is not None:
             self._woken.set()
         return waiting
+
+    def next_picture(self) -> tuple[Wish, bytes] | None:
+        """Return the volume's picture that is to be sent now, once, if it still is what is seen."""
+        picture, self._picture = self._picture, None
+        if picture is None:
+            return None
+        self._woken.set()
+        return picture if picture[0].said == self.wish.said else None
 
     def sent(self, made: Made) -> None:
         """Take note that the client has a VDI."""
@@ -108,8 +130,18 @@ class Client:
         """Whether a full VDI for a former wish is not worth making."""
         return wish.content != self.wish.content or self._apart(wish) > _FULL_OUT_OF_DATE
 
+    def _settle(self) -> None:
+        self._settled = True
+        self._woken.set()
+
+    def _stop_settling(self) -> None:
+        self._settled = False
+        if self._settling is not None:
+            self._settling.cancel()
+
     def close(self) -> None:
         """Give up what is being made."""
+        self._stop_settling()
         self._cancelled.set()
         for made in (self._made, self._shown):
             self._source.forget(made)
@@ -124,13 +156,17 @@ class Client:
             self._tell_doing(None)
 
     def _next_stage(self) -> str:
-        """Return ``"estimate"``, ``"coarse"`` or ``"full"``, or nothing."""
+        """Return ``"picture"``, ``"estimate"``, ``"first"`` or ``"full"``, or nothing."""
         wish, made = self.wish, self._made
-        if wish.view is None or self.waiting is not None or self._failed == wish:
+        if wish.view is None or self._failed == wish:
+            return ""
+        if not wish.moving and self._pictured != wish.said and self._picture is None:
+            return "picture"  # before all: it is what the view looks like, and takes least bytes
+        if self.waiting is not None:
             return ""
         if made is None or made.wish.content != wish.content:
             return "first"
-        rest = "full" if made.level == "coarse" and not wish.moving else ""
+        rest = "full" if made.level == "coarse" and self._settled else ""
         if self._apart(made.wish) <= AT_HOME:
             return rest
         judged = self._judged
@@ -152,11 +188,14 @@ class Client:
     async def _do(self, stage: str) -> None:
         self._stage, self._begun_for = stage, self.wish
         self._cancelled = threading.Event()
-        self._tell_doing("estimate" if stage == "estimate" else "vdi")
-        work: Callable[..., Any] = self._estimate if stage == "estimate" else self._make
+        works: dict[str, Callable[..., Any]] = {
+            "estimate": self._estimate,
+            "picture": self._make_picture,
+        }
+        self._tell_doing(stage if stage in works else "vdi")
         try:
             done = await asyncio.get_running_loop().run_in_executor(
-                self._threads, work, stage, self._cancelled
+                self._threads, works.get(stage, self._make), stage, self._cancelled
             )
         except Cancelled:
             return
@@ -168,6 +207,10 @@ class Client:
             self._stage = ""
         if stage == "estimate":
             self._judged = done
+            return
+        if stage == "picture":
+            self._picture, self._pictured = done, done[0].said
+            self.news.set()
             return
         made, file = done
         self._made, self._judged = made, None
@@ -190,6 +233,10 @@ class Client:
         wish, made = self.wish, self._made
         assert made is not None
         return made, wish, self._source.estimate(made, wish, cancelled.is_set)
+
+    def _make_picture(self, _: str, cancelled: threading.Event) -> tuple[Wish, bytes]:
+        wish = self._begun_for = self.wish
+        return wish, self._source.picture(wish, cancelled.is_set)
 
     def _make(self, stage: str, cancelled: threading.Event) -> tuple[Made, bytes]:
         wish = self._begun_for = self.wish

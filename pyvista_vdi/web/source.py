@@ -9,7 +9,7 @@ import math
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from typing import Any, TypeVar
 
@@ -20,21 +20,25 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.coverage import bounds_corners, view_in_sight
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
+from pyvista_vdi.volume.render import raycast_volume
 from pyvista_vdi.web.messages import Offer, Wish
+from pyvista_vdi.web.still import webp
 
 _T = TypeVar("_T")
 
-#: Lists of a coarse VDI at most: 320 x 180. With 8 supersegments at most, 8-byte and deflated, a
-#: quarter of 640 x 360 lists of the brain is 0.4 MB: 0.15 s at 20 Mbit/s, of SSIM .967.
-COARSE_LISTS = 320 * 180
+#: Lists of a coarse VDI at most, 352 x 198, and its longest. docs/decisions/web.md, "Served": fewer
+#: lists show, longer ones hardly do, for twice the bytes.
+COARSE_LISTS = 352 * 198
+COARSE_LONGEST = 3
 #: A coarse VDI has at most this share of the lists of the full one; where that would leave fewer
 #: than the second number, the full one is made at once.
-_COARSE_SHARE = 0.25
+_COARSE_SHARE = 0.3
 _FEWEST_LISTS = 2048
 #: Volumes, and looks of them with what estimates need, that are kept on host and device.
 _VOLUMES = 2
@@ -191,8 +195,10 @@ class Source:
             If it cannot be made.
         """
         assert wish.view is not None
-        seen = self._in_sight(wish, self._lists)
+        seen, options = self._in_sight(wish, self._lists), self._options
         if seen is not None and level == "coarse":
+            longest = min(COARSE_LONGEST, options.max_supersegments)
+            options = replace(options, max_supersegments=longest)
             seen = self._in_sight(wish, min(COARSE_LISTS, int(math.prod(seen[1]) * _COARSE_SHARE)))
         if seen is None:
             return Made(wish, wish.view, "full", (0, 0)), None
@@ -200,10 +206,35 @@ class Source:
         # Before the device is held: these wait for each other
         volume, look = self.volume(wish.step), self.transfer_function(wish)
         with self.runtime.background(cancelled):
-            vdi = generate_vdi(volume, camera, size, look, self._options, device=self.runtime)
+            vdi = generate_vdi(volume, camera, size, look, options, device=self.runtime)
         made = Made(wish, wish.view, level, vdi.window_size)
         self._keep(made, vdi)
         return made, vdi
+
+    def picture(self, wish: Wish, cancelled: Callable[[], bool]) -> bytes:
+        """Return the volume's own picture of a view, as an image file; none where it is not seen.
+
+        It has the view's pixels, or fewer: no more of the volume than the most lists of a VDI.
+
+        Raises
+        ------
+        Cancelled
+            When ``cancelled`` says so.
+        VDIError
+            If it cannot be made.
+        """
+        assert wish.view is not None
+        seen = self._in_sight(wish, math.prod(wish.view.size))
+        if seen is None:
+            return b""
+        share = min(1.0, math.sqrt(self._lists / math.prod(seen[1])))
+        width, height = (max(1, round(edge * share)) for edge in wish.view.size)
+        volume, look = self.volume(wish.step), self.transfer_function(wish)
+        shown = RenderOptions(clipping_planes=wish.planes or None)
+        request = FrameRequest(wish.view.camera, (width, height), shown, None, self.runtime)
+        with self.runtime.background(cancelled):
+            image = raycast_volume(volume, look, request, self._options)
+        return webp(image)
 
     def estimate(self, made: Made, wish: Wish, cancelled: Callable[[], bool]) -> float:
         """Return the SSIM that a client's picture is estimated to have; 0 if that is not known."""

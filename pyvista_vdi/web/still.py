@@ -1,4 +1,4 @@
-"""The picture of a VDI that stands where no viewer can."""
+"""Pictures that stand where no viewer can, or does not turn: stills."""
 
 from __future__ import annotations
 
@@ -16,6 +16,9 @@ from pyvista_vdi.io import to_bytes
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.web.camera import camera_of, viewer_camera
 
+#: How long a WebP file is packed, 0 to 100 and 0 to 6: by (0, 0) 1.2 to 2.6 times as long in a half
+#: to a tenth of the time, by (20, 2) a hundredth shorter.
+_EFFORT = {"quality": 0, "method": 1}
 #: Longest edge of a picture that is kept in a saved notebook, pixels.
 _EDGE = 800
 
@@ -72,3 +75,12 @@ def png(pixels: NDArray[np.uint8]) -> str:
     stream = io.BytesIO()
     Image.fromarray(pixels).save(stream, format="png")
     return b64encode(stream.getvalue()).decode()
+
+
+def webp(image: NDArray[np.float32]) -> bytes:
+    """Return a picture, premultiplied RGBA, float32 (H, W, 4), as a lossless WebP file: 8 bits."""
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(to_bytes(image)).save(stream, format="webp", lossless=True, **_EFFORT)
+    return stream.getvalue()

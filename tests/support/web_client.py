@@ -25,6 +25,8 @@ class WebClient:
         self._folder, self._headers = folder, headers
         self.messages = []
         self.head, self.parts = None, []  # of the VDI that comes, or came last
+        self.said = 0  # messages
+        self._picture = None  # head of the picture that the next bytes are
 
     async def __aenter__(self):
         self._session = aiohttp.ClientSession()
@@ -46,6 +48,7 @@ class WebClient:
         await self._session.close()
 
     async def say(self, kind, **entries):
+        self.said += 1
         await self.socket.send_str(json.dumps({"type": kind, **entries}))
 
     async def look_from(self, camera, size, *, moving=False):
@@ -55,13 +58,21 @@ class WebClient:
         await self.say("view", camera=state, size=size, moving=moving)
 
     async def receive(self):
-        """Return the next message: a dictionary, bytes, or the end's code."""
+        """Return the next message: a dictionary, bytes, or the end's code.
+
+        A picture is its head and its bytes, as one.
+        """
         message = await asyncio.wait_for(self.socket.receive(), PATIENCE)
         if message.type is aiohttp.WSMsgType.TEXT:
             self.messages.append(json.loads(message.data))
             if self.messages[-1]["type"] == "vdi":
                 self.head, self.parts = self.messages[-1], []
+            if self.messages[-1]["type"] == "picture" and self.messages[-1]["bytes"]:
+                self._picture = self.messages[-1]
             return self.messages[-1]
+        if message.type is aiohttp.WSMsgType.BINARY and self._picture is not None:
+            head, self._picture = self._picture, None
+            return head, message.data
         if message.type is aiohttp.WSMsgType.BINARY:
             self.parts.append(message.data)
             return message.data
@@ -87,6 +98,14 @@ class WebClient:
             assert not isinstance(found, int), f"the server has ended the connection: {found}"
             if isinstance(found, bytes) and self.is_whole:
                 return self.head, b"".join(self.parts)
+
+    async def picture(self):
+        """Return the head and the image file of the next picture of a view at rest."""
+        while True:
+            found = await self.receive()
+            assert not isinstance(found, int), f"the server has ended the connection: {found}"
+            if isinstance(found, tuple):
+                return found
 
     async def vdi(self, level=None):
         """Return the next VDI (of a level) as it was read from its file."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import base64
+import io
 import re
 import urllib.request
 
 import numpy as np
 import pytest
 from browsers import LONG
+from PIL import Image
 from web_client import soft_ball
 
 import pyvista_vdi as pvdi
@@ -21,6 +23,8 @@ def _checkered(ball):
     values[np.indices(values.shape).sum(axis=0) % 2 == 1] //= 8
     return pvdi.Volume(values, ball.spacing, ball.origin)
 
+
+pytestmark = pytest.mark.usefixtures("settled_at_once")
 
 BALL = _checkered(soft_ball(16))
 LOOK = {"clim": (0, 255), "opacity": "linear", "cmap": "bone"}
@@ -95,6 +99,22 @@ def test_a_page_is_sent_what_its_view_needs(page):
     page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 4 }")
     _wait(page, "remote.received.full === 2")
     assert _ssim_of(page) > ENOUGH
+
+
+def test_a_view_at_rest_is_the_volumes_own_picture(page):
+    over = """viewer.shadowRoot.querySelector("img.over")"""
+    page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 9 }")
+    _wait(page, f"remote.received.full >= 1 && !{over}.hidden")
+    file = page.locator("vdi-viewer").screenshot()
+    shown = np.asarray(Image.open(io.BytesIO(file)).convert("RGB"), np.int16)
+    state = page.evaluate("viewer.camera")
+    names = ("position", "focal_point", "view_up", "view_angle")
+    camera = pvdi.Camera(**{name: state[name] for name in names})
+    truth = pvdi.render_volume(BALL, camera, shown.shape[1::-1], **LOOK)[..., :3] * 255
+    # Straight colour and opacity are rounded to eight bits, and so is their product
+    assert np.abs(shown - truth).max() <= 2
+    page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 10 }")
+    assert page.evaluate(f"{over}.hidden")
 
 
 @pytest.mark.slow

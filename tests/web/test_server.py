@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import io
 import json
 import math
 import os
@@ -17,6 +18,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from PIL import Image
 from slow_line import SlowLine
 from web_client import PATIENCE, WebClient, soft_ball
 
@@ -26,10 +28,12 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.web import messages
+from pyvista_vdi.web import messages, session
 from pyvista_vdi.web import server as web_server
 from pyvista_vdi.web.server import Server
 from pyvista_vdi.web.source import Source
+
+pytestmark = pytest.mark.usefixtures("settled_at_once")
 
 SIZE = (160, 120)
 HIGH, LOW = soft_ball(), soft_ball(scale=0.5)
@@ -72,12 +76,69 @@ def test_a_view_gets_a_coarse_vdi_and_then_a_full_one(talk):
     (coarse, full), said = talk(story)
     assert [m["level"] for m in said if m["type"] == "vdi"] == ["coarse", "full"]
     truth = pvdi.render_volume(HIGH, CAMERA, SIZE, **LOOK)
-    # A quarter of the lists; the ball is smooth, so that even they show it
-    assert math.prod(coarse.window_size) <= math.prod(full.window_size) / 4
+    # The ball is smooth, so that even these show it
+    assert math.prod(coarse.window_size) < math.prod(full.window_size) / 3
+    assert coarse.counts.max() <= 3
     assert _ssim(pvdi.render(coarse, CAMERA, SIZE), truth) > 0.93
     assert _ssim(pvdi.render(full, CAMERA, SIZE), truth) > 0.99
     assert full.precision == "8-byte"
     assert full.metadata == {}
+
+
+def _decoded(file):
+    """Return an image file as a premultiplied picture."""
+    pixels = np.asarray(Image.open(io.BytesIO(file)).convert("RGBA"), np.float32) / 255
+    pixels[..., :3] *= pixels[..., 3:]
+    return pixels
+
+
+def test_a_view_at_rest_gets_the_volumes_own_picture_first(talk):
+    plane = (0, 0, 0, 1, 0, 0)
+
+    async def story(client, _):
+        await client.look_from(CAMERA, SIZE, moving=True)
+        await client.vdi()
+        await client.look_from(CAMERA, SIZE)
+        first = await client.picture()
+        assert first[0]["said"] == client.said == 2
+        await client.vdi("full")
+        await client.say("clip", planes=[plane])
+        clipped = await client.picture()
+        await client.say("clip", planes=[])
+        await client.say("time", step=1)
+        other = await client.picture()
+        while other[0]["said"] != client.said:
+            other = await client.picture()
+        await client.look_from(CAMERA.replace(focal_point=(9, 0, 0)), SIZE)
+        empty = await client.message("picture")
+        return [first, clipped, other], empty, client.messages
+
+    pictures, empty, said = talk(story)
+    assert [m["type"] for m in said if m["type"] in ("picture", "vdi")][:2] == ["vdi", "picture"]
+    assert empty["bytes"] == 0
+    arguments = ({}, {"clipping_planes": [plane]}, {})
+    for (head, file), volume, more in zip(pictures, (HIGH, HIGH, LOW), arguments, strict=True):
+        truth = pvdi.render_volume(volume, CAMERA, SIZE, **LOOK, **more)
+        assert head["bytes"] == len(file)
+        # Eight bits of straight colour and of opacity: half a step of each
+        assert np.abs(_decoded(file) - truth).max() <= 1.01 / 255
+
+
+def test_a_full_vdi_follows_where_a_view_settles(talk, monkeypatch):
+    async def story(client, _):
+        with monkeypatch.context() as patch:
+            patch.setattr(session, "SETTLED", 3600.0)
+            await client.look_from(CAMERA, SIZE)
+            await client.vdi()
+            await client.say("clip", planes=[])
+            await client.picture()
+            before = [m["level"] for m in client.messages if m["type"] == "vdi"]
+            patch.setattr(session, "SETTLED", 0.1)
+            await client.look_from(CAMERA, SIZE)
+            await client.vdi("full")
+            return before
+
+    assert talk(story) == ["coarse"]
 
 
 def test_only_lists_in_view_are_sent(talk):

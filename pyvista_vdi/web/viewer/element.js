@@ -13,7 +13,7 @@ const STYLE = `
 canvas, img { position: absolute; width: 100%; height: 100%; inset: 0; }
 canvas { touch-action: none; outline-offset: -2px; }
 .over { pointer-events: none; }
-img { object-fit: contain; }
+.without { object-fit: contain; }
 p { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.5em 1em; font: 14px sans-serif;
   color: white; background: #000a; }
 progress { position: absolute; inset: auto 0 0 0; width: 100%; height: 3px; border: 0; }
@@ -42,14 +42,17 @@ export class VDIViewer extends HTMLElement {
   #asked = false;
   #scene = null; // what is drawn
   #coming = null; // what will be, as soon as it can
+  #still = null; // URL of the picture that is laid over it
 
   constructor() {
     super();
     const root = this.attachShadow({ mode: "open" });
-    root.innerHTML = `<style>${STYLE}</style><img hidden alt=""><canvas tabindex="0" role="img">` +
-      `</canvas><canvas class="over" hidden></canvas><slot hidden></slot><progress max="1" hidden></progress><p role="alert" hidden></p>`;
+    root.innerHTML = `<style>${STYLE}</style><img class="without" hidden alt="">` +
+      `<canvas tabindex="0" role="img"></canvas><img class="over" hidden alt="">` +
+      `<canvas class="over" hidden></canvas><slot hidden></slot><progress max="1" hidden></progress><p role="alert" hidden></p>`;
     for (const name of ["img", "canvas", "progress", "p"]) this.#parts[name] = root.querySelector(name);
-    this.#parts.over = root.querySelector(".over");
+    this.#parts.over = root.querySelector("canvas.over");
+    this.#parts.laid = root.querySelector("img.over");
     this.#ready.promise.catch(() => {}); // who awaits it is told; nobody need
   }
 
@@ -67,6 +70,7 @@ export class VDIViewer extends HTMLElement {
 
   set camera(camera) {
     this.#camera = checkedCamera(camera);
+    this.showStill(null);
     this.#announceCamera();
     this.invalidate();
   }
@@ -92,6 +96,7 @@ export class VDIViewer extends HTMLElement {
 
   set clippingPlanes(planes) {
     this.#planes = [...planes].map(({ origin, normal }) => ({ origin: [...origin], normal: [...normal] }));
+    this.showStill(null);
     this.invalidate();
   }
 
@@ -162,6 +167,26 @@ export class VDIViewer extends HTMLElement {
   /** Show the bytes of a .vdi file; what is there stays until they are decoded. */
   showBytes(bytes) {
     return this.load(bytes);
+  }
+
+  /**
+   * Show a picture of the present view in place of what is drawn, until the view changes.
+   *
+   * @param {Blob|null} file An image of the whole window, transparent where nothing is.
+   */
+  async showStill(file) {
+    const { laid, canvas } = this.#parts;
+    const url = (this.#still = file && URL.createObjectURL(file));
+    const lay = (there) => {
+      laid.hidden = !there;
+      canvas.style.opacity = there ? 0 : ""; // not hidden: it is what is turned
+    };
+    lay(false);
+    if (!url) return;
+    laid.src = url;
+    await laid.decode().catch(() => {}); // a broken one has no width
+    if (this.#still === url) lay(laid.naturalWidth > 0);
+    URL.revokeObjectURL(url);
   }
 
   /** Show what prepare.js has made of a VDI: swapped whole. */
@@ -310,6 +335,7 @@ export class VDIViewer extends HTMLElement {
     const size = [this.clientWidth, this.clientHeight].map((edge) => Math.max(1, Math.round(edge * density)));
     if (canvas.width === size[0] && canvas.height === size[1]) return;
     [canvas.width, canvas.height] = size;
+    this.showStill(null);
     this.#moved = performance.now(); // the first picture of a new size is a quick one
     this.invalidate(false);
   }

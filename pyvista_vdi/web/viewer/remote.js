@@ -2,6 +2,7 @@
 //
 // The viewer draws what it has. Its view is told to the server, which sends another VDI when it
 // finds that the picture is too far from the volume's: a coarse one first. Each is swapped whole.
+// Where the view rests, the volume's own picture of it is laid over the VDI until it moves again.
 
 /** Milliseconds between two messages of a moving view, and without one after which it rests. */
 const VIEW_PERIOD = 50;
@@ -29,7 +30,7 @@ export class RemoteVDI extends EventTarget {
     this.viewer = viewer;
     this.url = url;
     this.hello = null;
-    this.received = { coarse: 0, full: 0, bytes: 0 };
+    this.received = { coarse: 0, full: 0, pictures: 0, bytes: 0 };
     this._said = new Map(); // the last message of each kind, said again to a new connection
     this._retry = FIRST_RETRY;
     this._showing = null;
@@ -76,8 +77,11 @@ export class RemoteVDI extends EventTarget {
     socket.binaryType = "arraybuffer";
     this._socket = socket;
     this._incoming = null;
+    this._picture = null; // the next binary message is this picture
+    this._messages = 0; // that were said on this connection
     socket.onmessage = ({ data }) => {
       if (typeof data === "string") this._hear(JSON.parse(data));
+      else if (this._picture !== null) this._takePicture(data);
       else this._take(new Uint8Array(data));
     };
     socket.onclose = ({ code, reason }) => {
@@ -97,18 +101,30 @@ export class RemoteVDI extends EventTarget {
       this.hello = message;
       this._retry = FIRST_RETRY;
       if (first) this.viewer.camera = message.camera;
-      this._said.forEach((said) => this._socket.send(JSON.stringify(said)));
+      this._said.forEach((said) => this._send(said));
       this._sendView(false);
       this._status(null, "");
       this.dispatchEvent(new CustomEvent("hello", { detail: message }));
     } else if (message.type === "vdi") {
       // One that has not come whole is given up by the server
       this._incoming = { ...message, file: new Uint8Array(message.bytes), filled: 0 };
+    } else if (message.type === "picture") {
+      if (message.bytes > 0) this._picture = message;
     } else if (message.type === "status") {
       this._status(message.doing, "");
     } else if (message.type === "error") {
       this._status(null, message.message);
     }
+  }
+
+  /** Lay a picture over the view that it is of, if that still is what is looked at. */
+  _takePicture(file) {
+    const isLatest = this._picture.said === this._messages && this._timer === 0;
+    this._picture = null;
+    this.received.bytes += file.byteLength;
+    if (!isLatest) return;
+    this.received.pictures += 1;
+    this.viewer.showStill(new Blob([file]));
   }
 
   _take(part) {
@@ -159,16 +175,24 @@ export class RemoteVDI extends EventTarget {
     const { position, focal_point, view_up, view_angle, parallel_scale } = viewer.camera;
     const lens = parallel_scale === undefined ? { view_angle } : { parallel_scale };
     const camera = { position, focal_point, view_up, ...lens };
-    if (!moving) clearTimeout(this._restTimer);
+    if (!moving) {
+      clearTimeout(this._restTimer);
+      clearTimeout(this._timer);
+      this._timer = 0;
+    }
     this._viewSentAt = performance.now();
-    this._socket.send(JSON.stringify({ type: "view", camera, size, moving }));
+    this._send({ type: "view", camera, size, moving });
+  }
+
+  _send(message) {
+    this._messages += 1;
+    this._socket.send(JSON.stringify(message));
   }
 
   _say(message) {
     this._said.set(message.type, message);
-    if (this.hello !== null && this._socket.readyState === WebSocket.OPEN) {
-      this._socket.send(JSON.stringify(message));
-    }
+    this.viewer.showStill(null);
+    if (this.hello !== null && this._socket.readyState === WebSocket.OPEN) this._send(message);
   }
 
   _status(doing, text) {
@@ -250,7 +274,7 @@ export function connectPage(viewer, panel, line) {
   remote.addEventListener("hello", ({ detail }) => fillPanel(panel, remote, detail), {
     once: true,
   });
-  const words = { estimate: "looking", vdi: "making a VDI of this view" };
+  const words = { picture: "drawing", estimate: "looking", vdi: "making a VDI of this view" };
   remote.addEventListener("status", ({ detail }) => {
     line.textContent = detail.text || words[detail.doing] || "";
   });
