@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from pyvista_vdi.model.vdi import VDI
     from pyvista_vdi.model.volume import Volume
     from pyvista_vdi.raycasting.picking import Pick
+    from pyvista_vdi.series.generate import generate_series
+    from pyvista_vdi.series.series import VDISeries
     from pyvista_vdi.vtk_pipeline import VDIActor, VDIMapper, VDISource
 
 #: Where each public name lives; loaded when it is first used (PEP 562).
@@ -46,12 +48,14 @@ _HOMES = {
     "VDI": "model.vdi",
     "VDIActor": "vtk_pipeline",
     "VDIMapper": "vtk_pipeline",
+    "VDISeries": "series.series",
     "VDISource": "vtk_pipeline",
     "Volume": "model.volume",
     "compare_images": "model.metrics",
     "describe_devices": "device",
     "estimate": "api",
     "generate": "api",
+    "generate_series": "series.generate",
     "list_devices": "device",
     "pick": "api",
     "read": "api",

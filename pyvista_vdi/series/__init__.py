@@ -1,0 +1,1 @@
+"""Series of VDIs: one scene at several times, in memory and in ``.vdis`` files."""

@@ -1,0 +1,174 @@
+"""The series of VDIs: one for each time step."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from typing import Any, overload
+
+import numpy as np
+
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.vdi import VDI
+
+
+class VDISeries(Sequence[VDI]):
+    """The VDIs of one scene at several times: a sequence of :class:`VDI`.
+
+    Made by :func:`pyvista_vdi.generate_series`, by :func:`pyvista_vdi.read` from a ``.vdis`` file,
+    whose steps are decoded when they are asked for, or by :meth:`of` from VDIs at hand. It can be
+    read from several threads at once.
+
+    Parameters
+    ----------
+    steps : sequence of VDI
+        One per time; at least one.
+    times : sequence of float
+        Ascending, of any unit.
+    volumes : sequence, optional
+        What the steps were made from, where that is still at hand; one per time.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If there is no step, or times are not as many, or do not ascend.
+
+    Attributes
+    ----------
+    times : tuple of float
+        The steps' times.
+    volumes : sequence or None
+        As above.
+    """
+
+    def __init__(
+        self,
+        steps: Sequence[VDI],
+        times: Sequence[float],
+        volumes: Sequence[Any] | None = None,
+    ) -> None:
+        self.times = checked_times(times)
+        if not len(steps) == len(self.times) > 0:
+            raise InvalidArgumentError(
+                f"a series has a time for each step, and at least one; got {len(steps)} steps "
+                f"and {len(self.times)} times"
+            )
+        self.volumes = volumes
+        self._steps = steps
+
+    @classmethod
+    def of(cls, vdis: Iterable[VDI], times: Iterable[float] | None = None) -> VDISeries:
+        """Return a series of VDIs in memory.
+
+        Parameters
+        ----------
+        vdis : iterable of VDI
+            One per time, or their VTK form.
+        times : iterable of float, optional
+            Ascending; 0, 1, 2 … by default.
+
+        Raises
+        ------
+        InvalidArgumentError
+            See :class:`VDISeries`.
+        InvalidVDIError
+            If one is no VDI.
+        """
+        if isinstance(vdis, VDI):
+            raise InvalidVDIError("a series is made of several VDIs: pass them in a list")
+        steps = tuple(as_vdi(vdi) for vdi in vdis)
+        return cls(steps, tuple(range(len(steps))) if times is None else tuple(times))
+
+    @property
+    def camera(self) -> Camera:
+        """The generating view V_O of the first step."""
+        return self[0].camera
+
+    @property
+    def window_size(self) -> tuple[int, int]:
+        """W and H of the first step: lists along each edge of the viewport."""
+        return self[0].window_size
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float, float, float]:
+        """The first step's bounds in the model frame."""
+        return self[0].bounds
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @overload
+    def __getitem__(self, index: int) -> VDI: ...
+    @overload
+    def __getitem__(self, index: slice) -> VDISeries: ...
+    def __getitem__(self, index: int | slice) -> VDI | VDISeries:
+        if isinstance(index, slice):
+            chosen = range(len(self))[index]
+            volumes = None if self.volumes is None else _Chosen(self.volumes, chosen)
+            return VDISeries(_Chosen(self._steps, chosen), self.times[index], volumes)
+        return self._steps[range(len(self))[index]]
+
+    def __iter__(self) -> Iterator[VDI]:
+        return (self[i] for i in range(len(self)))
+
+    def nearest(self, time: float) -> int:
+        """Return the index of the step whose time is nearest; of two, the earlier.
+
+        Parameters
+        ----------
+        time : float
+            Any time; beyond the ends the first or the last step is nearest.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is no number.
+        """
+        time = _checked_time(time)
+        after = bisect_left(self.times, time)
+        candidates = [i for i in (after - 1, after) if 0 <= i < len(self)]
+        return min(candidates, key=lambda i: abs(self.times[i] - time))
+
+    def __repr__(self) -> str:
+        width, height = self.window_size
+        return (
+            f"VDISeries({len(self)} steps, times {self.times[0]:g} to {self.times[-1]:g}, "
+            f"{width} x {height} lists)"
+        )
+
+
+class _Chosen(Sequence[Any]):
+    """Some elements of a sequence, taken when they are asked for."""
+
+    def __init__(self, whole: Sequence[Any], chosen: range) -> None:
+        self._whole, self._chosen = whole, chosen
+
+    def __len__(self) -> int:
+        return len(self._chosen)
+
+    def __getitem__(self, index: Any) -> Any:
+        chosen = self._chosen[index]
+        return _Chosen(self._whole, chosen) if isinstance(index, slice) else self._whole[chosen]
+
+
+def checked_times(times: Iterable[float]) -> tuple[float, ...]:
+    """Return times as floats, or raise InvalidArgumentError where they do not ascend."""
+    checked = tuple(_checked_time(time) for time in times)
+    for before, after in pairwise(checked):
+        if not before < after:
+            raise InvalidArgumentError(f"times must ascend; got {before} and then {after}")
+    return checked
+
+
+def _checked_time(time: Any) -> float:
+    try:
+        value = float(np.asarray(time).reshape(()))
+    except (TypeError, ValueError, OverflowError):
+        value = math.nan
+    if not math.isfinite(value):
+        raise InvalidArgumentError(f"a time must be a finite number; got {time!r}")
+    return value

@@ -1,0 +1,157 @@
+"""Series in memory: sequence, times, slices, and what generates them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import Cancelled, InvalidArgumentError, InvalidVDIError
+from pyvista_vdi.model.standard_cases import filling_camera
+
+SIZE = (20, 12)
+SPACING = (1.0, 1.0, 0.5)
+
+
+def _steps(n=4):
+    z, y, x = np.mgrid[:9, :8, :7]
+    return [(x * y + z + 3 * k).astype(np.float32) for k in range(n)]
+
+
+def _table():
+    shades = np.linspace(0, 1, 16)
+    colors = np.stack([shades, shades**2, 1 - shades], axis=1)
+    return pvdi.TransferFunction(colors, shades * 0.7, (0.0, 60.0))
+
+
+@pytest.fixture(scope="module")
+def volumes():
+    return [pvdi.Volume(step, SPACING) for step in _steps()]
+
+
+@pytest.fixture(scope="module")
+def camera(volumes):
+    return filling_camera(volumes[0].bounds, SIZE)
+
+
+@pytest.fixture(scope="module")
+def series(volumes, camera, default_runtime):
+    return pvdi.generate_series(
+        volumes, camera, SIZE, (0.5, 1.0, 2.0, 4.0), transfer_function=_table()
+    )
+
+
+def test_a_step_is_what_generate_makes_of_its_volume(series, volumes, camera):
+    assert isinstance(series, pvdi.VDISeries)
+    assert (len(series), series.times) == (4, (0.5, 1.0, 2.0, 4.0))
+    assert (series.camera, series.window_size) == (camera, SIZE)
+    assert series.bounds == series[0].bounds
+    for vdi, volume in zip(series, volumes, strict=True):
+        alone = pvdi.generate(volume, camera, SIZE, transfer_function=_table(), precision="8-byte")
+        assert vdi.equals(alone)
+        assert vdi.precision == "8-byte"
+    assert not series[0].equals(series[1])
+    assert "4 steps" in repr(series)
+
+
+def test_slices_are_series_and_negative_indices_count_from_the_end(series, volumes):
+    assert series[-1] is series[3]
+    part = series[1::2]
+    assert isinstance(part, pvdi.VDISeries)
+    assert part.times == (1.0, 4.0)
+    assert part[1] is series[3]
+    assert part.volumes[1] is volumes[3]
+    with pytest.raises(IndexError):
+        series[4]
+
+
+def test_nearest_is_the_step_nearest_in_time(series):
+    times = np.linspace(-1, 6, 57)
+    expected = [int(np.argmin(np.abs(np.array(series.times) - time))) for time in times]
+    assert [series.nearest(time) for time in times] == expected
+    assert series.nearest(1.5) == 1  # of two, the earlier
+    with pytest.raises(InvalidArgumentError, match="finite"):
+        series.nearest(float("nan"))
+
+
+def test_volumes_in_many_shapes_are_the_same_series(series, volumes, camera):
+    looks = {"transfer_function": _table()}
+    stack = np.stack(_steps())
+    called = []
+    shapes = {
+        "iterator": (iter(volumes), {}),
+        "function": (lambda i: called.append(i) or volumes[i], {"times": series.times}),
+        "array": (stack, {"spacing": SPACING}),
+    }
+    for name, (steps, more) in shapes.items():
+        other = pvdi.generate_series(steps, camera, SIZE, **more, **looks)
+        assert all(a.equals(b) for a, b in zip(other, series, strict=True)), name
+        assert (other.volumes is None) == (name == "iterator")
+    assert called == [0, 1, 2, 3]
+
+
+def test_colours_stand_for_the_same_values_in_all_steps(volumes, camera, default_runtime):
+    pytest.importorskip("pyvista")
+    series = pvdi.generate_series(volumes[:2], camera, SIZE, cmap="bone", opacity="linear")
+    clim = volumes[0].finite_range()
+    alone = pvdi.generate(
+        volumes[1], camera, SIZE, cmap="bone", opacity="linear", clim=clim, precision="8-byte"
+    )
+    assert series[1].equals(alone)
+
+
+def test_a_dial_chooses_once(volumes, default_runtime):
+    camera = filling_camera(volumes[0].bounds, (32, 24))
+    series = pvdi.generate_series(
+        volumes[:3], camera, (32, 24), quality="fast", transfer_function=_table()
+    )
+    assert len({vdi.window_size for vdi in series}) == 1
+    assert {vdi.picture_size for vdi in series} == {(32, 24)}
+
+
+def test_progress_is_that_of_the_whole_series(volumes, camera, default_runtime):
+    heard = []
+    pvdi.generate_series(volumes, camera, SIZE, transfer_function=_table(), progress=heard.append)
+    assert heard == sorted(heard)
+    assert heard[-1] == 1
+    with pytest.raises(Cancelled):
+        pvdi.generate_series(
+            volumes, camera, SIZE, transfer_function=_table(), progress=lambda f: f < 0.5
+        )
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        ({"times": (0, 1, 1, 2)}, "ascend"),
+        ({"times": (0, 1, 2)}, "4 steps and 3 times"),
+        ({"times": (0, 1, 2, float("inf"))}, "finite"),
+        ({"volumes": []}, "no step"),
+        ({"volumes": 3}, "iterable"),
+        ({"volumes": lambda i: i}, "pass times"),
+    ],
+)
+def test_what_cannot_be_a_series_is_refused(change, what, volumes, camera):
+    arguments = {"volumes": volumes, "camera": camera, "window_size": SIZE, **change}
+    with pytest.raises(InvalidArgumentError, match=what):
+        pvdi.generate_series(**arguments, transfer_function=_table())
+
+
+def test_refusals_name_the_function_and_the_remedy(volumes, camera):
+    with pytest.raises(InvalidArgumentError, match="call generate"):
+        pvdi.generate_series(volumes[0], camera, SIZE)
+    with pytest.raises(TypeError, match="generate_series.*'cmap'"):
+        pvdi.generate_series(volumes, camera, SIZE, colormap="bone")
+
+
+def test_series_of_vdis_at_hand(series):
+    again = pvdi.VDISeries.of(list(series))
+    assert again.times == (0.0, 1.0, 2.0, 3.0)
+    assert again[2] is series[2]
+    assert again.volumes is None
+    with pytest.raises(InvalidArgumentError, match="at least one"):
+        pvdi.VDISeries.of([])
+    with pytest.raises(InvalidVDIError, match="in a list"):
+        pvdi.VDISeries.of(series[0])
+    with pytest.raises(InvalidArgumentError, match="4 steps and 1 times"):
+        pvdi.VDISeries.of(series, [3])
