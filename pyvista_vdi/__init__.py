@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from pyvista_vdi.raycasting.picking import Pick
     from pyvista_vdi.series.generate import generate_series
     from pyvista_vdi.series.series import VDISeries
+    from pyvista_vdi.series.writer import SeriesWriter
     from pyvista_vdi.vtk_pipeline import VDIActor, VDIMapper, VDISource
 
 #: Where each public name lives; loaded when it is first used (PEP 562).
@@ -43,6 +44,7 @@ _HOMES = {
     "Light": "model.lighting",
     "Lights": "model.lighting",
     "Pick": "raycasting.picking",
+    "SeriesWriter": "series.writer",
     "Shading": "model.lighting",
     "TransferFunction": "model.transfer_function",
     "VDI": "model.vdi",
@@ -81,6 +83,7 @@ providers.provide(
     vdi_from_image="pyvista_vdi.vtk_pipeline:vdi_from_image",
     volume_from_vtk="pyvista_vdi.vtk_pipeline:volume_from_vtk",
     vti_files="pyvista_vdi.vtk_pipeline.filters.vti",
+    write_series="pyvista_vdi.series.writer:write",
     write_vdi="pyvista_vdi.io:write",
 )
 

@@ -520,14 +520,17 @@ def render_volume(
     return raycast_volume(volume, transfer_function, request, sampling)
 
 
-def read(path: str | os.PathLike[str], **options: Any) -> VDI:
+def read(path: str | os.PathLike[str], **options: Any) -> Any:
     """Read a VDI from a file that :meth:`VDI.save` or VTK wrote, or any deep OpenEXR image.
+
+    Or a series of them.
 
     Parameters
     ----------
     path : path-like
         A ``.vdi`` file, an OpenEXR deep image, whose name ends in ``.exr``, or a VDI's VTK form
-        in one of VTK's image files, ``.vti``, or a page with a VDI in it, ``.html``.
+        in one of VTK's image files, ``.vti``, or a page with a VDI in it, ``.html``. Or the series
+        in a ``.vdis`` file, whose steps are read when they are asked for.
     **options
         For ``.exr`` files of other programs: ``camera``, the view that the image shows, where
         the file does not say it; ``thickness``, world units, given to samples that have none
@@ -536,7 +539,7 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
 
     Returns
     -------
-    VDI
+    VDI or VDISeries
         The same to the last bit if this package wrote the file; what is lost with other programs'
         files is said in the documentation of files.
 
@@ -554,7 +557,10 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI:
         If an ``.exr`` file of ours was changed by another program, or has colours outside 0 to 1.
     """
     from pyvista_vdi.io import read as read_file
+    from pyvista_vdi.series import reader
 
+    if reader.is_series_file(path):
+        return reader.read(path, **options)
     return read_file(path, **options)
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
+from pathlib import Path
 from typing import Any, overload
 
 import numpy as np
@@ -13,6 +15,7 @@ import numpy as np
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 
 
@@ -59,6 +62,8 @@ class VDISeries(Sequence[VDI]):
             )
         self.volumes = volumes
         self._steps = steps
+        #: What knows the view without decoding a step
+        self._first: Any = steps if hasattr(type(steps), "window_size") else None
 
     @classmethod
     def of(cls, vdis: Iterable[VDI], times: Iterable[float] | None = None) -> VDISeries:
@@ -86,17 +91,17 @@ class VDISeries(Sequence[VDI]):
     @property
     def camera(self) -> Camera:
         """The generating view V_O of the first step."""
-        return self[0].camera
+        return (self._first or self[0]).camera  # type: ignore[no-any-return]
 
     @property
     def window_size(self) -> tuple[int, int]:
         """W and H of the first step: lists along each edge of the viewport."""
-        return self[0].window_size
+        return (self._first or self[0]).window_size  # type: ignore[no-any-return]
 
     @property
     def bounds(self) -> tuple[float, float, float, float, float, float]:
         """The first step's bounds in the model frame."""
-        return self[0].bounds
+        return (self._first or self[0]).bounds  # type: ignore[no-any-return]
 
     def __len__(self) -> int:
         return len(self.times)
@@ -128,10 +133,36 @@ class VDISeries(Sequence[VDI]):
         InvalidArgumentError
             If it is no number.
         """
-        time = _checked_time(time)
+        time = checked_time(time)
         after = bisect_left(self.times, time)
         candidates = [i for i in (after - 1, after) if 0 <= i < len(self)]
         return min(candidates, key=lambda i: abs(self.times[i] - time))
+
+    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a ``.vdis`` file, which :func:`pyvista_vdi.read` opens; it appears whole or not.
+
+        Parameters
+        ----------
+        path : path-like
+            The target; its name ends in ``.vdis``.
+        **options
+            ``precision``, by default the first step's; ``tolerance``, ``key_every``,
+            ``compression`` and ``level`` as for :class:`pyvista_vdi.SeriesWriter`; and
+            ``progress``, called with the finished fraction.
+
+        Returns
+        -------
+        pathlib.Path
+            The file.
+
+        Raises
+        ------
+        VDIFileError
+            If the target cannot be written.
+        InvalidArgumentError
+            If an option is out of its range.
+        """
+        return provider("write_series")(self, self.times, path, **options)  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         width, height = self.window_size
@@ -157,14 +188,15 @@ class _Chosen(Sequence[Any]):
 
 def checked_times(times: Iterable[float]) -> tuple[float, ...]:
     """Return times as floats, or raise InvalidArgumentError where they do not ascend."""
-    checked = tuple(_checked_time(time) for time in times)
+    checked = tuple(checked_time(time) for time in times)
     for before, after in pairwise(checked):
         if not before < after:
             raise InvalidArgumentError(f"times must ascend; got {before} and then {after}")
     return checked
 
 
-def _checked_time(time: Any) -> float:
+def checked_time(time: Any) -> float:
+    """Return a time as a float, or raise InvalidArgumentError where it is no finite number."""
     try:
         value = float(np.asarray(time).reshape(()))
     except (TypeError, ValueError, OverflowError):

@@ -1,0 +1,565 @@
+"""Reads .vdis files, step by step, trusting nothing that they say before it is checked."""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings
+import weakref
+import zlib
+from bisect import bisect_left
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from threading import Lock
+from typing import Any, BinaryIO, Generic, NoReturn, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi._version import __version__
+from pyvista_vdi.errors import InvalidVDIError, VDIError, VDIFileError, VDIWarning
+from pyvista_vdi.io.progress import Pieces, Progress
+from pyvista_vdi.io.vdi_file import reader as vdi_reader
+from pyvista_vdi.io.vdi_file.chunks import CODECS, DamagedChunkError
+from pyvista_vdi.io.vdi_file.description import from_json, number
+from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.packing import check_precision
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.series import layout
+from pyvista_vdi.series.codes import ENTRIES, Samples, Tables
+from pyvista_vdi.series.differences import Stepped, decoded
+from pyvista_vdi.series.layout import FrameHeader
+from pyvista_vdi.series.series import VDISeries
+
+_REMEDY = "copy it from its source again, or generate the series anew"
+
+#: Decoded steps that are kept: those that others are made from, and those that were asked for.
+_KEPT_STEPS, _KEPT_VDIS = 3, 4
+
+#: Bytes that are searched at a time.
+_WINDOW = 1 << 20
+
+#: What arrays that contradict each other may raise on their way, beside errors of our own.
+_CONTRADICTIONS = (
+    ArithmeticError,
+    DamagedChunkError,
+    IndexError,
+    InvalidVDIError,
+    KeyError,
+    TypeError,
+    ValueError,
+)
+
+
+@dataclass(frozen=True)
+class SeriesInfo:
+    """What a .vdis file says about itself.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        The file.
+    format_version : int
+        Version of the format.
+    written_by : str
+        Program and version.
+    camera : Camera
+        The first step's generating view V_O.
+    window_size : (int, int)
+        The first step's lists along each edge of the viewport.
+    bounds : tuple of float
+        The first step's, in the model frame.
+    metadata : dict
+        What made the first step.
+    times : tuple of float
+        Of the steps.
+    step_bytes : tuple of int
+        What each step takes.
+    keys : tuple of int
+        Steps that need no other.
+    precision, codec : str
+        As written.
+    tolerance : float
+        As written.
+    closed : bool
+        Whether the writer came to its end: otherwise it is still at work, or was killed.
+    file_bytes : int
+        Size of the file.
+    """
+
+    path: Path
+    format_version: int
+    written_by: str
+    camera: Camera
+    window_size: tuple[int, int]
+    bounds: tuple[float, ...]
+    metadata: dict[str, Any]
+    times: tuple[float, ...]
+    step_bytes: tuple[int, ...]
+    keys: tuple[int, ...]
+    precision: str
+    codec: str
+    tolerance: float
+    closed: bool
+    file_bytes: int
+
+
+_Value = TypeVar("_Value")
+
+
+class _Recent(Generic[_Value]):
+    """The values that were used last; from any thread."""
+
+    def __init__(self, most: int) -> None:
+        self._most, self._values, self._lock = most, OrderedDict[int, _Value](), Lock()
+
+    def get(self, key: int) -> _Value | None:
+        """Return a value, which is the last used then, or None."""
+        with self._lock:
+            if key in self._values:
+                self._values.move_to_end(key)
+            return self._values.get(key)
+
+    def put(self, key: int, value: _Value) -> _Value:
+        """Remember a value and return it."""
+        with self._lock:
+            self._values[key] = value
+            self._values.move_to_end(key)
+            while len(self._values) > self._most:
+                self._values.popitem(last=False)
+        return value
+
+
+class StepsReader(Sequence[VDI]):
+    """The steps of a .vdis file: read and decoded when they are asked for, from any thread.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Raises
+    ------
+    VDIFileError
+        If the file is absent, foreign, of a newer version or damaged, or has no finished step.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        try:
+            self._path = Path(path)
+            self._stream: BinaryIO = self._path.open("rb")
+        except (OSError, ValueError, TypeError) as error:
+            raise VDIFileError(
+                f"{path!s} cannot be read: {getattr(error, 'strerror', None) or error}"
+            ) from error
+        weakref.finalize(self, self._stream.close)
+        self._lock = Lock()
+        self._steps = _Recent[Stepped](_KEPT_STEPS)
+        self._vdis = _Recent[VDI](_KEPT_VDIS)
+        self._descriptions: dict[int, dict[str, Any]] = {}
+        #: How many steps have been decoded so far.
+        self.n_decoded = 0
+        try:
+            self._file_bytes = self._stream.seek(0, os.SEEK_END)
+            self._head, begin = self._read_head()
+            self._codec = str(self._head["codec"])
+            frames = self._indexed(begin)
+            self.closed = frames is not None
+            self._frames = self._found(begin) if frames is None else frames
+            #: Steps that others are written by; no other one is worth keeping
+            self._needed = {header.by for _, header in self._frames}
+            if not self._frames:
+                raise VDIFileError(
+                    f"{self._path} has no finished step: it was cut off, or none is written yet"
+                )
+        except OSError as error:
+            self._stream.close()
+            raise VDIFileError(f"{path!s} cannot be read: {error.strerror}") from error
+        except BaseException:
+            self._stream.close()
+            raise
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """The steps' times."""
+        return tuple(header.time for _, header in self._frames)
+
+    @property
+    def camera(self) -> Camera:
+        """The first step's."""
+        return self.info().camera
+
+    @property
+    def window_size(self) -> tuple[int, int]:
+        """The first step's."""
+        return self.info().window_size
+
+    @property
+    def bounds(self) -> tuple[float, ...]:
+        """The first step's."""
+        return self.info().bounds
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, slice):
+            return [self[i] for i in range(len(self))[index]]
+        i = range(len(self))[index]
+        known = self._vdis.get(i)
+        return self._vdis.put(i, self._decoded(i)) if known is None else known
+
+    def info(self) -> SeriesInfo:
+        """Return what the file says about itself, without the steps' arrays."""
+        camera, window_size, bounds, metadata = self._checked(0, self._described(0))
+        return SeriesInfo(
+            path=self._path,
+            format_version=self._version,
+            written_by=str(self._head.get("written_by", "")),
+            camera=camera,
+            window_size=window_size,
+            bounds=bounds,
+            metadata=metadata,
+            times=self.times,
+            step_bytes=tuple(layout.HEADER_BYTES + h.n_bytes for _, h in self._frames),
+            keys=tuple(i for i, (_, h) in enumerate(self._frames) if h.by < 0),
+            precision=str(self._head["precision"]),
+            codec=self._codec,
+            tolerance=float(self._head["tolerance"]),
+            closed=self.closed,
+            file_bytes=self._file_bytes,
+        )
+
+    # -- the file --------------------------------------------------------------------------------
+
+    def _read_head(self) -> tuple[dict[str, Any], int]:
+        head = self._bytes_at(0, len(layout.MAGIC) + layout.HEAD.size)
+        if not head or not layout.MAGIC.startswith(head[: len(layout.MAGIC)]):
+            raise VDIFileError(
+                f"{self._path} is not a series of VDIs: it begins with {head[:8]!r}; such a file "
+                "is written by VDISeries.save(), SeriesWriter or 'pyvista-vdi series'"
+            )
+        if len(head) < len(layout.MAGIC) + layout.HEAD.size:
+            self._refuse("it ends within its head")
+        version, n_text, checksum = layout.HEAD.unpack(head[len(layout.MAGIC) :])
+        if version > layout.FORMAT_VERSION:
+            raise VDIFileError(
+                f"{self._path} is of format version {version}; this is pyvista-vdi {__version__}, "
+                f"which reads up to version {layout.FORMAT_VERSION}: "
+                "upgrade by pip install -U pyvista-vdi"
+            )
+        text = self._bytes_at(len(head), n_text if n_text <= MAX_DESCRIPTION_BYTES else 0)
+        begun = zlib.crc32(head[len(layout.MAGIC) : -4])
+        if version < 1 or len(text) != n_text or zlib.crc32(text, begun) != checksum:
+            self._refuse("its head is not what was written")
+        self._version = int(version)
+        try:
+            found = from_json(text)
+            check_precision(found["precision"])
+            if not 0 <= number(found["tolerance"]) < 1 or found["codec"] not in (*CODECS, "none"):
+                self._refuse("its head names what no series has")
+        except VDIFileError:
+            raise
+        except (VDIError, KeyError, TypeError, ValueError, RecursionError) as error:
+            self._refuse(f"its head is incomplete or wrong: {error!r}")
+        return found, len(head) + n_text
+
+    def _indexed(self, begin: int) -> list[tuple[int, FrameHeader]] | None:
+        """Return the frames that the index names; None where there is none, or it is damaged."""
+        size = layout.TRAILER.size
+        data = self._bytes_at(max(0, self._file_bytes - size), size)
+        if len(data) < size:
+            return None
+        at, magic = layout.TRAILER.unpack(data)
+        if magic != layout.TRAILER_MAGIC or not begin <= at <= self._file_bytes - size:
+            return None
+        header = FrameHeader.of_bytes(self._bytes_at(at, layout.HEADER_BYTES))
+        if header is None or header.what != layout.INDEX:
+            return None
+        entry = layout.ENTRY.size + layout.HEADER_BYTES
+        content_at = at + layout.HEADER_BYTES
+        if (
+            header.n_bytes != header.number * entry
+            or content_at + header.n_bytes > self._file_bytes
+        ):
+            return None
+        content = self._bytes_at(content_at, header.n_bytes)
+        if zlib.crc32(content) != header.checksum:
+            return None
+        frames: list[tuple[int, FrameHeader]] = []
+        last = begin
+        for k in range(header.number):
+            (place,) = layout.ENTRY.unpack_from(content, k * entry)
+            step = FrameHeader.of_bytes(content[k * entry + layout.ENTRY.size : (k + 1) * entry])
+            if step is None or place != last or not self._follows(step, frames):
+                return None
+            last = place + layout.HEADER_BYTES + step.n_bytes
+            frames.append((int(place), step))
+        return frames if last == at else None
+
+    def _found(self, begin: int) -> list[tuple[int, FrameHeader]]:
+        """Return the frames that are there whole, found one behind the other."""
+        frames: list[tuple[int, FrameHeader]] = []
+        place: int | None = begin
+        while place is not None:
+            header = FrameHeader.of_bytes(self._bytes_at(place, layout.HEADER_BYTES))
+            if header is None or not self._follows(header, frames):
+                place = self._next(place + 1, frames)
+                continue
+            end = place + layout.HEADER_BYTES + header.n_bytes
+            if end > self._file_bytes:
+                break  # still being written, or cut off
+            frames.append((place, header))
+            place = end
+        numbers = [header.number for _, header in frames]
+        lost = sorted(set(range(numbers[-1] + 1)) - set(numbers)) if numbers else []
+        if lost:
+            warnings.warn(
+                f"{self._path} is damaged: steps {', '.join(map(str, lost))} cannot be found, "
+                f"{len(frames)} others are read; {_REMEDY}",
+                VDIWarning,
+                stacklevel=4,
+            )
+        return frames
+
+    def _next(self, place: int, frames: list[tuple[int, FrameHeader]]) -> int | None:
+        """Return where the next header is that may follow, behind one that is damaged."""
+        overlap = layout.HEADER_BYTES - 1
+        while place < self._file_bytes:
+            window = self._bytes_at(place, _WINDOW + overlap)
+            found = window.find(layout.STEP)
+            while found >= 0:
+                header = FrameHeader.of_bytes(window[found : found + layout.HEADER_BYTES])
+                if header is not None and self._follows(header, frames):
+                    return place + found
+                found = window.find(layout.STEP, found + 1)
+            place += _WINDOW
+        return None
+
+    @staticmethod
+    def _follows(header: FrameHeader, frames: list[tuple[int, FrameHeader]]) -> bool:
+        """Whether a header is one of a step behind these."""
+        before = frames[-1][1] if frames else None
+        return (
+            header.what == layout.STEP
+            and header.kind in (layout.VDI_FILE, layout.LISTS, layout.AGAIN)
+            and -1 <= header.by < header.number
+            and (header.by < 0) <= (header.kind != layout.AGAIN)
+            and (header.by >= 0) <= (header.kind != layout.VDI_FILE)
+            and math.isfinite(header.time)
+            and (before is None or (before.number < header.number and before.time < header.time))
+        )
+
+    def _bytes_at(self, place: int, n: int) -> bytes:
+        with self._lock:
+            self._stream.seek(place)
+            return self._stream.read(n)
+
+    def _content(self, i: int) -> memoryview:
+        place, header = self._frames[i]
+        data = self._bytes_at(place + layout.HEADER_BYTES, header.n_bytes)
+        if len(data) != header.n_bytes or zlib.crc32(data) != header.checksum:
+            self._refuse(f"step {header.number} is not what was written: its checksum differs")
+        return memoryview(data)
+
+    def _refuse(self, why: str) -> NoReturn:
+        raise VDIFileError(f"{self._path} is damaged: {why}; {_REMEDY}")
+
+    # -- steps -----------------------------------------------------------------------------------
+
+    def _decoded(self, i: int) -> VDI:
+        """Return a step, the steps that it is written by decoded where they are not at hand."""
+        header = self._frames[i][1]
+        try:
+            _, data = self._text(i)
+            source = i
+            while self._frames[source][1].kind == layout.AGAIN:
+                source = self._place_of(self._frames[source][1].by, header.number)
+            camera, window_size, bounds, metadata = self._checked(i, self._described(i))
+            origin = number(self._described(i)["depth_origin"])
+            if self._frames[source][1].kind == layout.VDI_FILE:
+                vdi = self._vdi_in(source, data if source == i else self._content(source))
+                if source == i:
+                    return vdi
+                media = {n: getattr(vdi, n) for n in ("front", "back", "color", "optical_depth")}
+                offsets, packing = vdi.offsets, vdi.packing
+            else:
+                step = self._step(source)
+                offsets, packing = step.codes.packed()
+                media = packing.media(step.codes.counts)
+            vdi = VDI(
+                camera,
+                window_size,
+                offsets,
+                **media,
+                bounds=bounds,
+                depth_origin=origin,
+                metadata=metadata,
+            )
+            vdi.packing = packing
+            return vdi
+        except VDIFileError:
+            raise
+        except (*_CONTRADICTIONS, VDIError) as error:
+            self._refuse(f"step {header.number} holds no valid VDI: {error}")
+
+    def _vdi_in(self, i: int, data: memoryview) -> VDI:
+        """Return the VDI of a frame that holds a whole file."""
+        content = layout.read_arrays(data, "none")["vdi"]
+        self.n_decoded += 1
+        return vdi_reader.read(self._path, stream=BytesIO(content.tobytes()))
+
+    def _step(self, i: int) -> Stepped:
+        """Return a decoded step of lists: the ones that it needs first."""
+        needed = [i]
+        while (known := self._steps.get(needed[-1])) is None:
+            by = self._frames[needed[-1]][1].by
+            if by < 0:
+                break
+            needed.append(self._place_of(by, self._frames[i][1].number))
+        if known is not None:
+            needed.pop()
+        for k in reversed(needed):
+            known = self._step_by(k, known)
+            if self._frames[k][1].number in self._needed:
+                self._steps.put(k, known)
+        assert known is not None
+        return known
+
+    def _step_by(self, i: int, before: Stepped | None) -> Stepped:
+        header, data = self._frames[i][1], self._content(i)
+        if header.kind != layout.LISTS:
+            raise InvalidVDIError(f"step {header.number} is none that others are written by")
+        text, arrays = layout.read_text(data)[0], layout.read_arrays(data, self._codec)
+        window_size = self._checked(i, self._described(i))[1]
+        if before is None:
+            samples, tables = _samples(text["samples"]), _tables(arrays)
+        else:
+            samples, tables = before.samples, before.tables
+            if before.window_size != window_size:
+                raise InvalidVDIError("it is written by a step of another window")
+        self.n_decoded += 1
+        return decoded(arrays, number(text["step"]), samples, tables, window_size, before)
+
+    def _place_of(self, step: int, needed_by: int) -> int:
+        """Return where a step's frame stands among those that were found."""
+        numbers = [header.number for _, header in self._frames]
+        k = bisect_left(numbers, step)
+        if k == len(numbers) or numbers[k] != step:
+            self._refuse(f"step {needed_by} is written by step {step}, which cannot be found")
+        return k
+
+    def _text(self, i: int) -> tuple[dict[str, Any], memoryview]:
+        data = self._content(i)
+        return layout.read_text(data)[0], data
+
+    def _described(self, i: int) -> dict[str, Any]:
+        """Return a step's description: its own, or that of the step that it is written by."""
+        passed = []
+        while i not in self._descriptions:
+            passed.append(i)
+            header = self._frames[i][1]
+            try:
+                text, data = self._text(i)
+                if header.kind == layout.VDI_FILE:
+                    text["description"] = self._of_file(data)
+            except (DamagedChunkError, ValueError, KeyError) as error:
+                if isinstance(error, VDIFileError):
+                    raise
+                self._refuse(f"step {header.number}: {error}")
+            found = text.get("description")
+            if found is not None:
+                if not isinstance(found, dict):
+                    self._refuse(f"step {header.number} is not described")
+                self._descriptions[i] = found
+            elif header.by < 0:
+                self._refuse(f"step {header.number} is not described")
+            else:
+                i = self._place_of(header.by, header.number)
+        found = self._descriptions[i]
+        for k in passed:
+            self._descriptions[k] = found
+        return found
+
+    def _of_file(self, data: memoryview) -> dict[str, Any]:
+        """Return the description of a frame that holds a whole file."""
+        content = layout.read_arrays(data, "none")["vdi"]
+        info = vdi_reader.read_info(self._path, stream=BytesIO(content.tobytes()))
+        return {
+            "window_size": info.window_size,
+            "camera": info.camera.to_dict(),
+            "bounds": info.bounds,
+            "depth_origin": info.depth_origin,
+            "metadata": info.metadata,
+        }
+
+    def _checked(
+        self, i: int, found: dict[str, Any]
+    ) -> tuple[Camera, tuple[int, int], tuple[float, ...], dict[str, Any]]:
+        """Return camera, window, bounds and metadata of a description."""
+        try:
+            if not isinstance(found["metadata"], dict):
+                raise TypeError("metadata are a dictionary")
+            return (
+                Camera.from_dict(found["camera"]),
+                check_window_size(found["window_size"]),
+                tuple(number(bound) for bound in found["bounds"]),
+                found["metadata"],
+            )
+        except (VDIError, KeyError, TypeError, ValueError, OverflowError) as error:
+            self._refuse(f"step {self._frames[i][1].number} is described wrongly: {error!r}")
+
+
+def _samples(found: Any) -> Samples | None:
+    """Return the samples that a step names."""
+    if found is None:
+        return None
+    coefficients = tuple(number(value) for value in found)
+    if len(coefficients) != 9 or not all(map(math.isfinite, coefficients)):
+        raise InvalidVDIError("its samples are not nine finite numbers")
+    return Samples(coefficients)
+
+
+def _tables(arrays: dict[str, NDArray[Any]]) -> Tables:
+    """Return the tables in a step's arrays."""
+    colors, extinctions = arrays["colors"], arrays["extinctions"]
+    if colors.dtype != np.uint8 or colors.size != 3 * ENTRIES or len(extinctions) != ENTRIES:
+        raise InvalidVDIError("its tables have another size")
+    extinctions = extinctions.astype(np.float32)
+    if not (np.isfinite(extinctions).all() and (extinctions >= 0).all()):
+        raise InvalidVDIError("its extinctions are not finite")
+    return Tables(colors.reshape(-1, 3), extinctions)
+
+
+def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISeries:
+    """Read a series from a .vdis file; steps are decoded when they are asked for.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    progress : callable, optional
+        Called with 1: opening reads no step.
+
+    Raises
+    ------
+    VDIFileError
+        If the file is absent, foreign, of a newer version or damaged, or has no finished step.
+    """
+    steps = StepsReader(path)
+    Pieces(progress, 1)()
+    return VDISeries(steps, steps.times)
+
+
+def read_info(path: str | os.PathLike[str]) -> SeriesInfo:
+    """Read what a .vdis file says about itself, without its steps: errors as for :func:`read`."""
+    return StepsReader(path).info()
+
+
+def is_series_file(path: Any) -> bool:
+    """Whether a file is read as a series: by its name."""
+    return str(path).lower().endswith(layout.SUFFIX)

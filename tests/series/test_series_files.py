@@ -1,0 +1,414 @@
+"""``.vdis`` files: what is written is read, whatever becomes of writer and file."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, VDIWarning
+from pyvista_vdi.series import layout, reader, writer
+from pyvista_vdi.series.series import VDISeries
+
+SIZE = (24, 14)
+ARRAYS = ("offsets", "front", "back", "color", "optical_depth")
+
+
+def _vdi(seed=0, *, size=SIZE, metadata=None, step=0.0, still=0.5, palette=True):
+    """A VDI of lists whose faces lie at samples, some of them the same for every ``step``."""
+    fixed, random = np.random.default_rng(seed), np.random.default_rng([seed, int(step * 97)])
+    camera = pvdi.Camera((0, 0, 50), (0, 0, 0), (0, 1, 0))
+    n_lists = size[0] * size[1]
+    table = np.linspace(0, 1, 256)[:, np.newaxis] * (1.0, 0.5, 0.25)
+    fronts, backs, entries, counts = [], [], [], []
+    moves = fixed.random(n_lists) > still
+    for i in range(n_lists):
+        generator = random if moves[i] else np.random.default_rng([seed, i])
+        n = int(generator.integers(0, 9))
+        faces = np.sort(generator.choice(80, n + 1, replace=False)) * 0.25 + 40.0 + i * 0.01
+        fronts.append(faces[:-1])
+        backs.append(faces[1:])
+        entries.append(generator.integers(0, 256, n))
+        counts.append(n)
+    entries = np.concatenate(entries)
+    front, back = np.concatenate(fronts), np.concatenate(backs)
+    colors = table[entries] if palette else np.random.default_rng(1).random((len(entries), 3))
+    known = {"transfer_function": {"colors": table.tolist()}, "sample_distance": 0.25}
+    return pvdi.VDI(
+        camera,
+        size,
+        np.concatenate([[0], np.cumsum(counts)]),
+        front,
+        back,
+        colors,
+        (back - front) * (0.01 + entries / 256),
+        (-10, 10, -10, 10, -10, 10),
+        metadata=known if metadata is None else metadata,
+    )
+
+
+def _same(one, other):
+    return one.equals(other) and one.precision == other.precision and one.metadata == other.metadata
+
+
+@pytest.fixture(scope="module")
+def steps():
+    return [_vdi(step=k // 2).with_precision("8-byte") for k in range(24)]
+
+
+@pytest.fixture(scope="module")
+def saved(steps, tmp_path_factory):
+    path = tmp_path_factory.mktemp("series") / "a.vdis"
+    VDISeries.of(steps, np.arange(24) * 0.5).save(path)
+    return path
+
+
+def _damaged(path, change):
+    data = bytearray(path.read_bytes())
+    change(data)
+    other = path.with_name("damaged.vdis")
+    other.write_bytes(data)
+    return other
+
+
+# -- what is written is read ----------------------------------------------------------------------
+
+
+def test_every_step_is_read_to_the_last_bit(steps, saved):
+    series = pvdi.read(saved)
+    assert isinstance(series, VDISeries)
+    assert series.times == tuple(np.arange(24) * 0.5)
+    assert (series.camera, series.window_size) == (steps[0].camera, SIZE)
+    assert series.bounds == steps[0].bounds
+    for read, vdi in zip(series, steps, strict=True):
+        assert _same(read, vdi)
+        assert np.array_equal(read.packing.words, vdi.packing.words)
+    assert _same(series[5:7][1], steps[6])
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", "deflate", "none"])
+@pytest.mark.parametrize("precision", ["8-byte", "16-byte", "exact"])
+def test_precisions_and_compressions(precision, compression, tmp_path):
+    steps = [_vdi(step=k // 2) for k in range(4)]
+    path = VDISeries.of(steps).save(
+        tmp_path / "a.vdis", precision=precision, compression=compression
+    )
+    series = pvdi.read(path)
+    for read, vdi in zip(series, steps, strict=True):
+        assert _same(read, vdi.with_precision(precision))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"metadata": {}},  # nothing is known of samples or colours
+        {"metadata": {"sample_distance": 1e-9}},
+        {"metadata": {"sample_distance": 1e9}},
+        {"metadata": {"sample_distance": "1", "transfer_function": {"colors": "no"}}},
+        {"palette": False},
+        {"still": 1.0},
+        {"still": 0.0},
+        {"size": (1, 1)},
+    ],
+)
+def test_guesses_that_are_wrong_cost_bytes_and_no_more(changes, tmp_path):
+    steps = [_vdi(step=k, **changes).with_precision("8-byte") for k in range(4)]
+    series = pvdi.read(VDISeries.of(steps).save(tmp_path / "a.vdis", key_every=8))
+    assert all(_same(read, vdi) for read, vdi in zip(series, steps, strict=True))
+
+
+def test_views_windows_and_metadata_may_change_from_step_to_step(tmp_path):
+    first = _vdi()
+    camera = pvdi.Camera((0, 1, 50), (0, 0, 0), (0, 1, 0))
+    arrays = {name: getattr(first, name) for name in ARRAYS}
+    moved = pvdi.VDI(camera, SIZE, **arrays, bounds=first.bounds, metadata={"moved": [1.5]})
+    empty = pvdi.VDI(camera, (3, 2), np.zeros(7, int), [], [], np.empty((0, 3)), [], first.bounds)
+    told = pvdi.VDI(first.camera, SIZE, **arrays, bounds=first.bounds, metadata={"told": True})
+    steps = [v.with_precision("8-byte") for v in (first, moved, empty, empty, first, told, told)]
+    series = pvdi.read(VDISeries.of(steps).save(tmp_path / "a.vdis"))
+    assert all(_same(read, vdi) for read, vdi in zip(series, steps, strict=True))
+
+
+def test_depths_of_another_grid(tmp_path):
+    near = _vdi()
+    arrays = {name: getattr(near, name) for name in ARRAYS}
+    arrays.update(front=near.front * 4, back=near.back * 4)
+    far = pvdi.VDI(near.camera, SIZE, **arrays, bounds=near.bounds, metadata=near.metadata)
+    steps = [v.with_precision("8-byte") for v in (near, far, near)]
+    assert steps[0].packing.step != steps[1].packing.step
+    series = pvdi.read(VDISeries.of(steps).save(tmp_path / "a.vdis"))
+    assert all(_same(read, vdi) for read, vdi in zip(series, steps, strict=True))
+
+
+# -- bytes and seeks -------------------------------------------------------------------------------
+
+
+def _single_bytes(steps, folder):
+    path = folder / "single.vdi"
+    return [step.save(path, compression="zstd").stat().st_size for step in steps]
+
+
+def test_a_still_scene_costs_next_to_nothing(tmp_path):
+    still = _vdi(size=(64, 36)).with_precision("8-byte")
+    path = VDISeries.of([still] * 100).save(tmp_path / "a.vdis")
+    assert path.stat().st_size <= 0.05 * sum(_single_bytes([still] * 100, tmp_path))
+    steps = reader.StepsReader(path)
+    assert steps[73].equals(still)
+    assert steps.n_decoded == 1
+
+
+def test_noise_costs_no_more_than_single_files(tmp_path):
+    steps = []
+    for k in range(6):
+        random = np.random.default_rng(k)
+        n = 64 * 36 * 5
+        faces = np.sort(random.random((64 * 36, 10)), axis=1).reshape(-1, 2) + 1
+        steps.append(
+            pvdi.VDI(
+                pvdi.Camera((0, 0, 5), (0, 0, 0), (0, 1, 0)),
+                (64, 36),
+                np.arange(64 * 36 + 1) * 5,
+                faces[:, 0],
+                faces[:, 1],
+                random.random((n, 3)),
+                random.random(n),
+                (-1, 1, -1, 1, -1, 1),
+            ).with_precision("8-byte")
+        )
+    path = VDISeries.of(steps).save(tmp_path / "a.vdis")
+    assert path.stat().st_size <= 1.02 * sum(_single_bytes(steps, tmp_path))
+    assert all(_same(read, vdi) for read, vdi in zip(pvdi.read(path), steps, strict=True))
+
+
+def test_a_seek_decodes_three_steps_at_most(tmp_path):
+    steps = [_vdi(step=k).with_precision("8-byte") for k in range(20)]
+    path = VDISeries.of(steps).save(tmp_path / "a.vdis")
+    for i in range(20):
+        fresh = reader.StepsReader(path)
+        assert fresh[i].equals(steps[i])
+        assert 1 <= fresh.n_decoded <= writer.MOST_DECODED
+    walk = reader.StepsReader(path)
+    for i in range(20):
+        assert walk[i].equals(steps[i])
+    assert walk.n_decoded <= 20  # one after the other, each is decoded once
+    assert max(np.diff([*reader.read_info(path).keys, 20])) <= writer.KEY_EVERY
+
+
+def test_a_tolerance_is_kept(tmp_path):
+    tolerance = 0.03
+    steps = [_vdi(step=k, size=(48, 27)).with_precision("8-byte") for k in range(6)]
+    exact = VDISeries.of(steps).save(tmp_path / "a.vdis")
+    path = VDISeries.of(steps).save(tmp_path / "b.vdis", tolerance=tolerance)
+    assert path.stat().st_size < exact.stat().st_size
+    assert reader.read_info(path).tolerance == tolerance
+    for read, vdi in zip(pvdi.read(path), steps, strict=True):
+        for name in ("offsets", "front", "back"):
+            assert np.array_equal(getattr(read, name), getattr(vdi, name))
+        for length in (1, 4):
+            opacity, written = (-np.expm1(-length * v.optical_depth) for v in (vdi, read))
+            assert np.abs(opacity - written).max() <= tolerance + 1e-6
+        lost = np.abs(read.color - vdi.color).max(axis=1) * -np.expm1(-4 * vdi.optical_depth)
+        assert lost.max() <= tolerance + 1e-6
+
+
+def test_many_threads_read_at_once(steps, saved):
+    series, wrong = pvdi.read(saved), []
+
+    def look(seed):
+        for i in np.random.default_rng(seed).integers(0, len(steps), 12).tolist():
+            if not series[i].equals(steps[i]):
+                wrong.append(i)
+
+    threads = [threading.Thread(target=look, args=(seed,)) for seed in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+# -- while it is written, and afterwards -----------------------------------------------------------
+
+
+def test_what_was_appended_is_readable_at_once(steps, tmp_path):
+    path = tmp_path / "a.vdis"
+    with pvdi.SeriesWriter(path) as out:
+        with pytest.raises(VDIFileError, match="no finished step"):
+            pvdi.read(path)
+        for k, vdi in enumerate(steps[:5]):
+            out.append(vdi, 10.0 + k)
+            series = pvdi.read(path)
+            assert (len(out), len(series)) == (k + 1, k + 1)
+            assert not reader.read_info(path).closed
+            assert all(_same(read, step) for read, step in zip(series, steps, strict=False))
+        with pytest.raises(InvalidArgumentError, match="ascend"):
+            out.append(steps[0], 14.0)
+        with pytest.raises(InvalidArgumentError, match="camera and window_size"):
+            out.append(object(), 15.0)
+    assert reader.read_info(path).closed
+    assert pvdi.read(path).times == (10.0, 11.0, 12.0, 13.0, 14.0)
+    with pytest.raises(VDIFileError, match="closed"):
+        out.append(steps[0])
+
+
+def test_a_writer_takes_volumes(tmp_path, default_runtime):
+    from pyvista_vdi.model.standard_cases import filling_camera
+
+    z, y, x = np.mgrid[:9, :8, :7]
+    volumes = [pvdi.Volume((x * y + z + k).astype(np.float32)) for k in range(3)]
+    camera = filling_camera(volumes[0].bounds, SIZE)
+    shades = np.linspace(0, 1, 16)
+    table = pvdi.TransferFunction(np.stack([shades] * 3, axis=1), shades * 0.7, (0.0, 60.0))
+    path = tmp_path / "a.vdis"
+    with pvdi.SeriesWriter(path, camera, SIZE, transfer_function=table) as out:
+        for volume in volumes:
+            out.append(volume)
+    made = pvdi.generate_series(volumes, camera, SIZE, transfer_function=table)
+    assert all(_same(a, b) for a, b in zip(pvdi.read(path), made, strict=True))
+
+
+def test_every_cut_leaves_the_finished_steps(steps, tmp_path):
+    path = tmp_path / "a.vdis"
+    small = [_vdi(step=k, size=(6, 4)).with_precision("8-byte") for k in range(5)]
+    VDISeries.of(small).save(path)
+    data = path.read_bytes()
+    ends = [
+        place + layout.HEADER_BYTES + h.n_bytes for place, h in reader.StepsReader(path)._frames
+    ]
+    cut = tmp_path / "cut.vdis"
+    for n in [*range(60), *range(60, len(data), 97), *ends, len(data) - 1]:
+        cut.write_bytes(data[:n])
+        finished = sum(end <= n for end in ends)
+        if finished == 0:
+            with pytest.raises(VDIFileError):
+                pvdi.read(cut)
+            continue
+        series = pvdi.read(cut)
+        assert len(series) == finished
+        assert series[finished - 1].equals(small[finished - 1])
+
+
+def test_flipped_bytes_are_noticed_and_cost_no_other_step(tmp_path):
+    path = tmp_path / "a.vdis"
+    small = [_vdi(step=k, size=(6, 4)).with_precision("8-byte") for k in range(5)]
+    VDISeries.of(small).save(path, key_every=1)
+    data = path.read_bytes()
+    random = np.random.default_rng(0)
+    head = reader.StepsReader(path)._frames[0][0]
+    for place in random.integers(0, len(data), 150).tolist():
+        flipped = _damaged(path, lambda d, at=place: d.__setitem__(at, d[at] ^ 0x10))
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", VDIWarning)
+                series = pvdi.read(flipped)
+        except VDIFileError:
+            assert place < head  # the head alone makes a file unreadable
+            continue
+        right = 0
+        for i, at in enumerate(series.times):
+            try:
+                assert series[i].equals(small[int(at)])
+                right += 1
+            except VDIFileError as error:
+                assert "checksum" in str(error)  # noqa: PT017 - most steps raise nothing
+        assert right >= len(small) - 1
+
+
+def test_a_step_without_its_header_is_told(tmp_path):
+    path = tmp_path / "a.vdis"
+    small = [_vdi(step=k, size=(6, 4)).with_precision("8-byte") for k in range(4)]
+    with pvdi.SeriesWriter(path, key_every=1) as out:
+        for vdi in small:
+            out.append(vdi)
+        place = reader.StepsReader(path)._frames[1][0]
+        cut = tmp_path / "damaged.vdis"
+        cut.write_bytes(path.read_bytes())
+    data = bytearray(cut.read_bytes())
+    data[place + 9] ^= 1
+    cut.write_bytes(data)
+    with pytest.warns(VDIWarning, match="steps 1 cannot be found, 3 others"):
+        series = pvdi.read(cut)
+    assert series.times == (0.0, 2.0, 3.0)
+    assert series[1].equals(small[2])
+
+
+def test_foreign_and_newer_files_are_named(tmp_path, saved):
+    foreign = tmp_path / "a.vdis"
+    foreign.write_bytes(b"PK\x03\x04 nothing of ours")
+    with pytest.raises(VDIFileError, match="not a series"):
+        pvdi.read(foreign)
+    with pytest.raises(VDIFileError, match="cannot be read"):
+        pvdi.read(tmp_path / "absent.vdis")
+    newer = _damaged(saved, lambda d: d.__setitem__(8, 99))
+    with pytest.raises(VDIFileError, match="version 99.*upgrade"):
+        pvdi.read(newer)
+    foreign.write_bytes(b"")
+    with pytest.raises(VDIFileError):
+        pvdi.read(foreign)
+
+
+@pytest.mark.parametrize(
+    ("options", "what"),
+    [
+        ({"tolerance": -1}, "tolerance"),
+        ({"tolerance": 0.1, "precision": "exact"}, "8-byte"),
+        ({"key_every": 0}, "key_every"),
+        ({"compression": "rar"}, "compression"),
+        ({"level": 10}, "level"),
+        ({"precision": "half"}, "precision"),
+    ],
+)
+def test_options_out_of_range(options, what, steps, tmp_path):
+    with pytest.raises(InvalidArgumentError, match=what):
+        VDISeries.of(steps[:1]).save(tmp_path / "a.vdis", **options)
+    with pytest.raises(InvalidArgumentError, match=what):
+        pvdi.SeriesWriter(tmp_path / "a.vdis", **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_names_must_end_in_vdis(steps, tmp_path):
+    with pytest.raises(VDIFileError, match=r"\.vdis"):
+        VDISeries.of(steps[:1]).save(tmp_path / "a.vdi")
+    with pytest.raises(VDIFileError, match=r"\.vdis"):
+        pvdi.SeriesWriter(tmp_path / "a.vdi")
+
+
+_KILLED = """
+import sys
+sys.path[:0] = {folders!r}
+import pyvista_vdi as pvdi
+from test_series_files import _vdi
+steps = [_vdi(step=k, size=(12, 8)).with_precision("8-byte") for k in range(8)]
+with pvdi.SeriesWriter({path!r}) as out:
+    print("begun", flush=True)
+    for k in range(100000):
+        out.append(steps[k % 8])
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL on this system")
+def test_a_killed_writer_leaves_its_finished_steps(tmp_path):
+    random = np.random.default_rng(0)
+    steps = [_vdi(step=k, size=(12, 8)).with_precision("8-byte") for k in range(8)]
+    for k in range(int(os.environ.get("PYVISTA_VDI_KILLS", "3"))):
+        path = tmp_path / f"{k}.vdis"
+        code = _KILLED.format(folders=[str(Path(__file__).parent)], path=str(path))
+        with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as process:
+            process.stdout.readline()
+            while path.stat().st_size < 20_000 and process.poll() is None:
+                time.sleep(0.001)
+            time.sleep(random.random() * 0.05)
+            process.kill()
+        series = pvdi.read(path)
+        assert len(series) > 1
+        for i in [*random.integers(0, len(series), 6).tolist(), len(series) - 1]:
+            assert series[i].equals(steps[i % 8])
