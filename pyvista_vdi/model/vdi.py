@@ -199,6 +199,15 @@ class VDI:
         vdi.packing = packing
         return vdi
 
+    # -- fewer lists -----------------------------------------------------------------------------
+
+    def thinned(self, along_x: int = 1, along_y: int = 1) -> VDI:
+        """Return a VDI of every k-th list along the window's width and height.
+
+        See :func:`pyvista_vdi.model.thinned.thinned`.
+        """
+        return provider("thinned")(self, along_x, along_y)  # type: ignore[no-any-return]
+
     # -- files -----------------------------------------------------------------------------------
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:

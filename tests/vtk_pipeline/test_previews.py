@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import pyvista as pv
@@ -306,12 +308,17 @@ def test_several_vdis_and_two_eyes_share_a_frame(plotter, coarsest):
     assert 0 < np.abs(full - preview).mean() < 2
 
 
-def test_samples_follow_the_time_that_frames_take(plotter, monkeypatch):
-    """With a clock that counts a microsecond per ray, 100 frames a second leave 10 000 rays."""
+@pytest.fixture
+def counted(monkeypatch):
+    """A clock that counts a microsecond per ray, half of that with half the lists.
+
+    It keeps the windows of the VDIs that were raycast.
+    """
     from pyvista_vdi.vtk_pipeline.interaction import window_clock as interaction
 
     class Clock:
-        now = 0.0
+        def __init__(self):
+            self.now, self.windows = 0.0, []
 
         def perf_counter(self):
             return self.now
@@ -320,18 +327,53 @@ def test_samples_follow_the_time_that_frames_take(plotter, monkeypatch):
     render_vdi = painter_module.render_vdi
 
     def timed(vdi, request):
-        clock.now += 1e-6 * request.size[0] * request.size[1]
+        clock.windows.append(vdi.window_size)
+        lists = math.prod(vdi.window_size) / max(map(math.prod, clock.windows))
+        clock.now += 1e-6 * request.size[0] * request.size[1] * lists
         return render_vdi(vdi, request)
 
     monkeypatch.setattr(painter_module, "render_vdi", timed)
     for module in (interaction, painter_module, regeneration):
         monkeypatch.setattr(module, "time", clock)
-    actor = watched(plotter, target_fps=100.0)
+    return clock
+
+
+def test_samples_follow_the_time_that_frames_take(plotter, counted):
+    """60 frames a second leave 16 667 rays."""
+    actor = watched(plotter, target_fps=60.0)
     for _ in range(8):
         plotter.camera.Azimuth(3)
         frame(plotter, MOVING)
     # the controller's threshold is a tenth, and the edges are rounded to whole pixels
-    assert actor.status.samples == pytest.approx(10_000, rel=0.12)
-    assert actor.status.fps == pytest.approx(100, rel=0.12)
+    assert actor.status.samples == pytest.approx(16_667, rel=0.12)
+    assert actor.status.fps == pytest.approx(60, rel=0.12)
     frame(plotter)
     assert actor.status.fps == pytest.approx(1e6 / (WINDOW[0] * WINDOW[1]))
+    assert len(set(counted.windows)) == 1
+
+
+def test_few_pixels_from_the_side_take_few_lists(plotter, counted):
+    """Where less than a quarter of the pixels is left, half the lists bring twice as many."""
+    actor = watched(plotter, target_fps=100.0)
+    plotter.camera.Azimuth(30)
+    whole = frame(plotter)
+    full = counted.windows[-1]
+    worker = actor.mapper.painter._few_lists._worker
+    for _ in range(20):
+        plotter.camera.Azimuth(1e-3)
+        frame(plotter, MOVING)
+        worker.join()
+    assert counted.windows[-1] == (-(-full[0] // 2), full[1])
+    assert actor.status.mode == "preview"
+    assert actor.status.samples == pytest.approx(20_000, rel=0.12)
+    assert actor.status.fps == pytest.approx(100, rel=0.12)
+    shown = frame(plotter, MOVING)
+    assert np.abs(shown.astype(int) - whole).mean() < 2
+    plotter.camera.Azimuth(-20e-3)
+    again = frame(plotter)
+    assert counted.windows[-1] == full
+    assert actor.status.mode == "full"
+    assert np.abs(again.astype(int) - whole).max() <= 1
+    plotter.camera.Azimuth(-30)  # near V_O all lists are taken, however few the pixels are
+    frame(plotter, MOVING)
+    assert counted.windows[-1] == full

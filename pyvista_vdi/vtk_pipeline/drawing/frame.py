@@ -23,7 +23,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.ways import Way
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import WindowClock
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import Cost, WindowClock
 
 T = TypeVar("T")
 
@@ -73,6 +73,8 @@ class Frame:
         What is seen: see :meth:`showing`.
     stand_in : StandIn or None
         What is seen in place of a VDI that is to come.
+    few_lists : VDI or None
+        What is raycast in place of the VDI in a preview: every second of its lists.
     options : RenderOptions
         How it looks; clipping planes are in the camera's world.
     depth : numpy.ndarray or None
@@ -90,6 +92,7 @@ class Frame:
     full_size: tuple[int, int] = (0, 0)
     vdi: VDI | None = None
     stand_in: StandIn | None = None
+    few_lists: VDI | None = None
     options: RenderOptions = field(default_factory=RenderOptions)
     depth: Image | None = None
 
@@ -160,7 +163,7 @@ class Frame:
     @property
     def key(self) -> Any:
         """What its image is known by, but for the depth; the quality is in it as the two sizes."""
-        return (self.camera, self.size, self.full_size, self.options)
+        return (self.camera, self.size, self.full_size, self.options, self.few_lists is None)
 
     @property
     def preview(self) -> bool:
@@ -171,6 +174,11 @@ class Frame:
     def way(self) -> Way:
         """What is raycast."""
         return "vdi" if self.stand_in is None else "volume"
+
+    @property
+    def cost(self) -> Cost:
+        """What tells how much a ray takes."""
+        return self.way if self.few_lists is None else "few lists"
 
     @property
     def bounds(self) -> tuple[float, ...]:

@@ -22,6 +22,7 @@ from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.drawing import passes
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
+from pyvista_vdi.vtk_pipeline.drawing.few_lists import FewLists
 from pyvista_vdi.vtk_pipeline.drawing.frame import (
     Drawn,
     Frame,
@@ -71,6 +72,7 @@ class Painter:
         self._observed: set[str] = set()
         self._texture = ImageTexture()
         self._no_depth = NoDepth()
+        self._few_lists = FewLists()
         self._drawn: Any = weakref.ref(self)  # what the images are of that are kept: of none yet
         self._counted: Any = self._drawn  # the VDI that was shown last
         self._generation = 0
@@ -154,6 +156,7 @@ class Painter:
     def release(self) -> None:
         """Free the texture and the images kept, and end what goes on; a frame begins anew."""
         self.upkeep.close()
+        self._few_lists.clear()
         self._texture.release()
         self._no_depth.release()
         self.selection.release()
@@ -285,7 +288,7 @@ class Painter:
         drawn = self._kept(frame)
         if drawn is not None:
             return drawn  # however the frame is to be: where it is there, full costs nothing
-        frame = frame.coarser(self.preview_size(frame))
+        frame = self._preview(frame)
         return (self._kept(frame) if frame.preview else None) or self._raycast(frame)
 
     def _frame(self, mapper: Any, renderer: Any) -> Frame | None:
@@ -339,13 +342,22 @@ class Painter:
             self.selection.show(actor, renderer, None, self.device)
         self._no_depth.show(renderer.GetRenderWindow(), mapper)
 
+    def _preview(self, frame: Frame) -> Frame:
+        """Return the frame as it is drawn now: with all pixels, or with fewer, of fewer lists."""
+        few = frame
+        if frame.vdi is not None and frame.clock.few_lists(self.interaction):
+            lists = self._few_lists.get(frame.vdi, frame.view.camera, self.device)
+            few = replace(frame, few_lists=lists)
+        size = self.preview_size(few)
+        return (frame if size == frame.full_size else few).coarser(size)
+
     def preview_size(self, frame: Frame) -> tuple[int, int]:
         """Return the size of this frame's image: that of the viewport, or less."""
         width, height = frame.full_size
         floor = min(1.0, 1 / frame.mapper.GetMaximumImageSampleDistance() ** 2)
         if frame.stand_in is None or frame.stand_in.lasting:
-            pixels, way = width * height, frame.way
-            share = frame.clock.share(frame.renderer, self.interaction, pixels, floor, way)
+            pixels, cost = width * height, frame.cost
+            share = frame.clock.share(frame.renderer, self.interaction, pixels, floor, cost)
         elif self._may_be_coarse(frame):
             rate = self.interaction.target or _STAND_IN_RATE
             share = max(frame.stand_in.share(rate, width * height), floor)
@@ -380,16 +392,17 @@ class Painter:
             image = frame.stand_in.picture(request, frame.view.camera if lasts else None)
         else:
             assert frame.vdi is not None
-            image = render_vdi(frame.vdi, request)
+            image = render_vdi(frame.few_lists or frame.vdi, request)
         seconds = time.perf_counter() - before
         if frame.stand_in is not None:
             frame.stand_in.took(width * height, seconds)
         if frame.stand_in is None or frame.stand_in.lasting:
-            frame.clock.drawn(frame.size, frame.full_size, seconds, frame.way)
+            frame.clock.drawn(frame.size, frame.full_size, seconds, frame.cost)
         angle = 0.0
         if frame.vdi is not None and self._scene is not None:
             angle = angle_from_generating_view(frame.vdi, self._scene[0])
-        self.upkeep.ways.took(frame.way, angle, frame.covered(frame.bounds), seconds)
+        if frame.few_lists is None:
+            self.upkeep.ways.took(frame.way, angle, frame.covered(frame.bounds), seconds)
         self._raycasts += 1
         drawn = Drawn(
             image,

@@ -7,7 +7,7 @@ import math
 import time
 import weakref
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLGL2PSHelper
@@ -19,6 +19,14 @@ from pyvista_vdi.quality.ways import Way
 from pyvista_vdi.vtk_pipeline.interaction import browser
 
 T = TypeVar("T")
+
+#: What a ray's cost is known by: the way, or a VDI of every second list.
+Cost = Way | Literal["few lists"]
+
+#: Shares of the pixels below which previews take every second list, and above which all again.
+#: docs/decisions/any_view.md: at a quarter of the pixels half the lists lose .0024 of SSIM and half
+#: the time; twice as many pixels with half the lists lose what half the pixels with all do.
+_FEW_BELOW, _FEW_ABOVE = 0.25, 0.65
 
 #: Cameras remembered per window; more than any scene has viewports that are turned in turn.
 _KNOWN_CAMERAS = 16
@@ -91,7 +99,7 @@ class _Frame:
     pixels: int = 0  # that were raycast
     full_pixels: int = 0  # those of full images
     work: float = 0.0  # seconds that this took
-    way: Way = "vdi"  # what was raycast
+    cost: Cost = "vdi"  # what was raycast
 
 
 class WindowClock:
@@ -122,8 +130,9 @@ class WindowClock:
         self._shared: dict[type, Any] = {}
         self._watched: set[str] = set()
         self._known: list[vtkWeakReference] = []
-        self._controllers: dict[Way, FrameRateController] = {}
-        self._way: Way = "vdi"  # of the last frame
+        self._controllers: dict[Cost, FrameRateController] = {}
+        self._cost: Cost = "vdi"  # of the last frame
+        self._few_lists = False  # whether previews had better have fewer lists
         self._floor = 0.0
         self._target = 0.0
         self._started: float | None = None
@@ -131,7 +140,7 @@ class WindowClock:
         self._previewed = False
         self._picture_wanted = False
         self._full_pixels_before = 0
-        self._resting: dict[Way, tuple[int, float, float]] = {}
+        self._resting: dict[Cost, tuple[int, float, float]] = {}
         self._foreground = contextlib.ExitStack()  # from the frame's start to its end
         self._frame = _Frame()
         window.AddObserver("StartEvent", lambda *_: self._start())
@@ -168,7 +177,7 @@ class WindowClock:
     @property
     def fps(self) -> float | None:
         """Mean rate of the interaction's last frames; at rest what the last frame would allow."""
-        controller = self._controllers.get(self._way)
+        controller = self._controllers.get(self._cost)
         if self._interacting and controller is not None and controller.fps > 0:
             return controller.fps
         return 1 / self.seconds if self.seconds else None
@@ -199,12 +208,12 @@ class WindowClock:
         return window is None or tuple(window.GetTileScale()) == (1, 1)
 
     def share(
-        self, renderer: Any, interaction: Interaction, pixels: int, floor: float, way: Way = "vdi"
+        self, renderer: Any, interaction: Interaction, pixels: int, floor: float, cost: Cost = "vdi"
     ) -> float:
         """Return the share of its pixels, 0 to 1, that a VDI is drawn with in this frame.
 
         ``interaction`` is what its mapper allows, ``pixels`` those of the full image, ``floor``
-        the least share, and ``way`` says whether its volume is drawn in its place.
+        the least share, and ``cost`` says what is drawn.
         """
         window = self._window.Get()
         if not interaction.wants_preview(window):
@@ -218,16 +227,21 @@ class WindowClock:
         frame.target = max(frame.target, target)
         if frame.share is None:
             # The other VDIs of this frame are not known yet: count on those of the last
-            controller = self._tuned(max(target, self._target), floor, way)
+            controller = self._tuned(max(target, self._target), floor, cost)
             full = max(self._full_pixels_before, pixels)
             frame.share = controller.choose(full) / full
         return max(frame.share, floor)
 
+    def few_lists(self, interaction: Interaction) -> bool:
+        """Whether a preview of this frame had better be drawn with fewer lists."""
+        preview = self._few_lists and interaction.wants_preview(self._window.Get())
+        return preview and self.single
+
     def drawn(
-        self, size: tuple[int, int], full: tuple[int, int], seconds: float, way: Way = "vdi"
+        self, size: tuple[int, int], full: tuple[int, int], seconds: float, cost: Cost = "vdi"
     ) -> None:
         """Note a raycast of this frame: the image's size, the viewport's, its time, and of what."""
-        self._frame.way = way
+        self._frame.cost = cost
         self._frame.pixels += size[0] * size[1]
         self._frame.full_pixels += full[0] * full[1]
         self._frame.work += seconds
@@ -271,28 +285,34 @@ class WindowClock:
 
     def _record(self, frame: _Frame, seconds: float) -> None:
         self.seconds = seconds
-        self._way = frame.way
+        self._cost = frame.cost
         if not frame.interactive:
-            self._resting[frame.way] = (frame.pixels, frame.work, seconds)
+            self._resting[frame.cost] = (frame.pixels, frame.work, seconds)
             return
         self._interacting = True
         self._target = frame.target
         self._full_pixels_before = frame.full_pixels
-        if frame.way in self._controllers:
-            self._controllers[frame.way].record(frame.pixels, frame.work, seconds)
+        if frame.cost in self._controllers:
+            self._controllers[frame.cost].record(frame.pixels, frame.work, seconds)
+        if frame.cost == "vdi":
+            # Before others have told, half the lists are expected to take half the time
+            self._resting["few lists"] = (frame.pixels, frame.work / 2, seconds - frame.work / 2)
+        if frame.cost != "volume" and frame.share is not None:
+            bound = _FEW_ABOVE if frame.cost == "few lists" else _FEW_BELOW
+            self._few_lists = frame.share < bound
 
-    def _tuned(self, target: float, floor: float, way: Way) -> FrameRateController:
+    def _tuned(self, target: float, floor: float, cost: Cost) -> FrameRateController:
         """Return the window's controller, with this target and at most this floor."""
         if floor < self._floor:
             self._controllers.clear()
-        if way not in self._controllers:
-            controller = self._controllers[way] = FrameRateController(target, floor=floor)
+        if cost not in self._controllers:
+            controller = self._controllers[cost] = FrameRateController(target, floor=floor)
             self._floor = floor
-            if way in self._resting:
+            if cost in self._resting:
                 # What the last full frame took, so that an interaction does not begin with another
-                controller.record(*self._resting[way])
-        self._controllers[way].target_fps = target
-        return self._controllers[way]
+                controller.record(*self._resting[cost])
+        self._controllers[cost].target_fps = target
+        return self._controllers[cost]
 
     # -- pictures --------------------------------------------------------------------------------
 
