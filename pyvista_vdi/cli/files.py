@@ -7,7 +7,7 @@ import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from pyvista_vdi.cli.text import mebibytes, printable
+from pyvista_vdi.cli.text import mebibytes, plain_number, table, vector
 
 if TYPE_CHECKING:
     from pyvista_vdi.io import FileInfo
@@ -28,9 +28,13 @@ def devices(options: argparse.Namespace) -> int:
 
 def info(options: argparse.Namespace) -> int:
     """Print what a file says about itself: a VDI, or a volume."""
-    from pyvista_vdi.cli.inputs import is_volume, read_volume, volume_name
+    from pyvista_vdi.cli.inputs import is_series, is_volume, read_volume, volume_name
     from pyvista_vdi.io import read_info
 
+    if is_series(options):
+        from pyvista_vdi.cli import series
+
+        return series.info(options)
     if is_volume(options):
         rows = _of_volume(read_volume(options))
         source = options.file or volume_name(options)
@@ -45,9 +49,20 @@ def info(options: argparse.Namespace) -> int:
 def convert(options: argparse.Namespace) -> int:
     """Read a VDI and write it in the format of another name."""
     from pyvista_vdi.api import read
-    from pyvista_vdi.cli.inputs import file_options, given_camera, measuring, part, say_vdi
+    from pyvista_vdi.cli.inputs import (
+        file_options,
+        given_camera,
+        is_series,
+        measuring,
+        part,
+        say_vdi,
+    )
     from pyvista_vdi.io import checked_target
 
+    if is_series(options):
+        from pyvista_vdi.cli import series
+
+        return series.convert(options, series.file_arguments(options))
     target = checked_target(options.output)
     file_arguments = file_options(options)
     foreign = {
@@ -82,16 +97,16 @@ def _volume_text(source: str, about: dict[str, Any]) -> str:
     """Return what is known of a volume; lengths are model units, those of its file."""
     turned = about["direction"] != [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     axes = zip(*about["direction"], strict=True)
-    return _table(
+    return table(
         {
             "volume": source,
             "points": " x ".join(str(n) for n in about["dimensions"]),
             "scalars": f"{about['scalars']}, {about['type']}, "
             f"{about['range'][0]:g} to {about['range'][1]:g}",
-            "spacing": _vector(about["spacing"]),
-            "origin": _vector(about["origin"]),
-            **({"axes": ", ".join(_vector(axis) for axis in axes)} if turned else {}),
-            "bounds": _vector(about["bounds"]),
+            "spacing": vector(about["spacing"]),
+            "origin": vector(about["origin"]),
+            **({"axes": ", ".join(vector(axis) for axis in axes)} if turned else {}),
+            "bounds": vector(about["bounds"]),
             "in memory": mebibytes(about["memory_bytes"]),
         }
     )
@@ -113,26 +128,13 @@ def _text(about: FileInfo) -> str:
         f"{about.n_supersegments / (width * height):.2f} per list",
         "precision": about.precision,
         "in memory": mebibytes(about.memory_bytes),
-        "eye": _vector(view.position),
-        "looking at": f"{_vector(view.focal_point)}, up {_vector(view.view_up)}, {lens}",
-        "bounds": _vector(about.bounds),
-        "depth origin": _number(about.depth_origin),
+        "eye": vector(view.position),
+        "looking at": f"{vector(view.focal_point)}, up {vector(view.view_up)}, {lens}",
+        "bounds": vector(about.bounds),
+        "depth origin": plain_number(about.depth_origin),
         **{name: _short(value) for name, value in about.metadata.items()},
     }
-    return _table(rows)
-
-
-def _table(rows: dict[str, str]) -> str:
-    column = max(len(name) for name in rows)
-    return "\n".join(printable(f"{name:<{column}}  {value}") for name, value in rows.items())
-
-
-def _vector(values: Any) -> str:
-    return f"({', '.join(map(_number, values))})"
-
-
-def _number(value: float) -> str:
-    return f"{value + 0.0:g}"  # no zero has a sign
+    return table(rows)
 
 
 def _short(value: Any, longest: int = 100) -> str:

@@ -63,6 +63,13 @@ def read_volume(options: argparse.Namespace) -> Volume:
     )
 
 
+def is_series(options: argparse.Namespace) -> bool:
+    """Whether FILE names a series of VDIs."""
+    from pyvista_vdi.series.reader import is_series_file
+
+    return options.file is not None and is_series_file(options.file)
+
+
 def is_volume(options: argparse.Namespace) -> bool:
     """Whether FILE or ``--example`` names a volume, and no VDI."""
     if options.example is not None or not is_vdi_file(options.file):

@@ -272,6 +272,40 @@ def _add_serve(parser: argparse.ArgumentParser) -> None:
     declare.device(parser)
 
 
+def _add_series(parser: argparse.ArgumentParser) -> None:
+    text = f"VDIs, or other series, .vdis; or volumes, each {declare.VOLUME_FILE}"
+    declare.option(parser, "files", text, "FILE", nargs="+")
+    declare.output(parser, ".vdis to write")
+    times = "of the files, ascending (default: 0,1,2,...)"
+    declare.option(parser, "--times", times, "A,B,...", declare.parse_numbers)
+    group = parser.add_argument_group("file")
+    text = (
+        "what colours times opacity, and opacities, of a supersegment may differ by, 0 to 1, where "
+        "that saves bytes (default: 0, every bit is kept)"
+    )
+    declare.option(group, "--tolerance", text, "T", float, default=0.0)
+    text = "most steps from one that needs no other to the next (default: 16)"
+    declare.option(group, "--key-every", text, "N", declare.parse_count, default=16)
+    text = "of the supersegments (default: 8-byte, the only one that is written by differences)"
+    declare.option(group, "--precision", text, choices=PRECISIONS)
+    text = "zstd (default), lz4, deflate or none"
+    declare.option(group, "--compression", text, choices=("zstd", "lz4", "deflate", "none"))
+    declare.option(group, "--level", "1 (fast) to 9 (small)", "N", int)
+    group = parser.add_argument_group("volumes", "What VDIs are made of them; not for VDIs.")
+    xyz = ("X", "Y", "Z")
+    declare.option(
+        group, "--spacing", "between voxels, in place of the files'", xyz, float, nargs=3
+    )
+    declare.option(group, "--origin", "of the first voxel, likewise", xyz, float, nargs=3)
+    declare.size(group, WINDOW_SIZE)
+    declare.longest(group, "longest list (default: 20)")
+    declare.step(group, "step along the ray, model units (default: half the smallest spacing)")
+    declare.memory_limit(group)
+    declare.camera(parser, "the view that the first volume fills")
+    declare.classification(parser)
+    declare.device(parser)
+
+
 def _add_compare(parser: argparse.ArgumentParser) -> None:
     front = (
         "our ways to draw against VTK's, by time and SSIM, for every known volume at hand, "
@@ -447,9 +481,15 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "convert": (
         "files",
-        "write a VDI in another format: .vdi, OpenEXR deep image, VTK's .vti, or a page, .html",
+        "write a VDI, or each step of a series, as .vdi, OpenEXR deep image, .vti or a page, .html",
         "pyvista-vdi convert knee.vdi -o knee.exr",
         _add_convert,
+    ),
+    "series": (
+        "series",
+        "write VDIs, or those of volumes, that are time steps to one file",
+        "pyvista-vdi series density_*.nrrd -o run.vdis --cmap bone --clim 0 255",
+        _add_series,
     ),
     "paraview": (
         "paraview",

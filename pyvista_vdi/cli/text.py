@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 
 def printable(text: object) -> str:
     """Return a text whose every character can be shown: names and files may hold any.
@@ -17,3 +19,19 @@ def printable(text: object) -> str:
 def mebibytes(n: int) -> str:
     """Return bytes in MiB."""
     return f"{n / 2**20:.1f} MiB"
+
+
+def table(rows: dict[str, str]) -> str:
+    """Return names and what they stand for in two columns."""
+    column = max(len(name) for name in rows)
+    return "\n".join(printable(f"{name:<{column}}  {value}") for name, value in rows.items())
+
+
+def vector(values: Any) -> str:
+    """Return numbers in brackets."""
+    return f"({', '.join(map(plain_number, values))})"
+
+
+def plain_number(value: float) -> str:
+    """Return a number as people write it."""
+    return f"{value + 0.0:g}"  # no zero has a sign

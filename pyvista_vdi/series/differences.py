@@ -194,6 +194,8 @@ def decoded(
         If no step gives such arrays; what is returned is still to be checked.
     """
     n_lists = window_size[0] * window_size[1]
+    kinds = {array.dtype.kind for name, array in arrays.items() if name != "extinctions"}
+    _require(kinds == {"u"}, "all arrays")
     how_and_end = arrays["how"]
     how = how_and_end & _HOW
     _require(len(how) == n_lists and (before is not None or not how.any()), "how lists are written")

@@ -74,9 +74,9 @@ def generate_series(
     Returns
     -------
     VDISeries
-        In memory. Its ``volumes`` are the steps' volumes where they can be had again: where
-        ``volumes`` is a sequence, a function or a source. To write a series that need not fit in
-        memory, see :class:`pyvista_vdi.SeriesWriter`.
+        In memory. Its ``volumes`` are the steps' as :class:`Volume` where they can be had again:
+        where ``volumes`` is a sequence, a function or a source. To write a series that need not
+        fit in memory, see :class:`pyvista_vdi.SeriesWriter`.
 
     Raises
     ------
@@ -107,7 +107,9 @@ def generate_series(
             raise InvalidArgumentError(f"there are more steps than the {len(vdis)} times")
         vdis.append(make(volume, _part(progress, len(vdis), total)))
         warn_missed(vdis[-1], stacklevel=2)
-    again: Any = steps if isinstance(steps, Sized) and hasattr(steps, "__getitem__") else None
+    again: Sequence[Volume] | None = None
+    if isinstance(steps, Sized) and hasattr(steps, "__getitem__"):
+        again = _Called(lambda i: make.volume(steps[i]), len(vdis))
     if not vdis:
         raise InvalidArgumentError("there is no step: pass at least one volume")
     return VDISeries(vdis, range(len(vdis)) if known_times is None else known_times, again)

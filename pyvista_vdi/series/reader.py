@@ -443,7 +443,8 @@ class StepsReader(Sequence[VDI]):
             if before.window_size != window_size:
                 raise InvalidVDIError("it is written by a step of another window")
         self.n_decoded += 1
-        return decoded(arrays, number(text["step"]), samples, tables, window_size, before)
+        with np.errstate(all="ignore"):  # what overflows is found out when the codes are checked
+            return decoded(arrays, number(text["step"]), samples, tables, window_size, before)
 
     def _place_of(self, step: int, needed_by: int) -> int:
         """Return where a step's frame stands among those that were found."""

@@ -34,6 +34,7 @@ VERBS = (
     "benchmark",
     "tradeoff",
     "convert",
+    "series",
     "paraview",
 )
 

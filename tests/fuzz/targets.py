@@ -21,7 +21,8 @@ import tempfile
 import tracemalloc
 import warnings
 import zipfile
-from collections.abc import Callable, Iterator
+import zlib
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -37,6 +38,8 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import VDIError, VDIWarning
 from pyvista_vdi.model import host_memory
 from pyvista_vdi.model.view import View
+from pyvista_vdi.series import layout
+from pyvista_vdi.series import reader as series_reader
 from pyvista_vdi.web import messages
 from pyvista_vdi.web.page import _DATA
 from pyvista_vdi.web.page import page as page_of
@@ -46,6 +49,9 @@ from pyvista_vdi.web.page import page as page_of
 VDI_RATIO = 3 * 2**15
 #: The same of an OpenEXR file: deflate's best is 1032, and up to 16 bytes are made of 4.
 EXR_RATIO = 16 * 1032
+#: Of a series: a supersegment takes nine bytes before they are compressed, and while it is decoded
+#: some forty numbers of 8 bytes; and a few steps are kept.
+VDIS_RATIO = 64 * 2**15
 #: Bytes that reading takes for itself, whatever the file.
 OWN_BYTES = 8 * 2**20
 
@@ -97,7 +103,13 @@ def limited(device_bytes: int = DEVICE_BYTES) -> Iterator[None]:
 # -- files -----------------------------------------------------------------------------------------
 
 
-def _read_all(name: str, content: bytes, ratio: int) -> None:
+def _read_all(
+    name: str,
+    content: bytes,
+    ratio: int,
+    about: Callable[[Path], Any] = io.read_info,
+    vdis: Callable[[Path], Iterable[VDI]] = lambda path: [io.read(path)],
+) -> None:
     """Read content as a file of that name, within the memory that it could hold."""
     folder = work_folder()
     path = folder / name
@@ -110,10 +122,10 @@ def _read_all(name: str, content: bytes, ratio: int) -> None:
         tracemalloc.reset_peak()
         start = tracemalloc.get_traced_memory()[0]
         with only_our_errors():
-            io.read_info(path)
+            about(path)
         with only_our_errors():
-            vdi = io.read(path)
-            _check_valid(vdi)
+            for vdi in vdis(path):
+                _check_valid(vdi)
         peak = tracemalloc.get_traced_memory()[1] - start
     finally:
         if not tracing:
@@ -160,6 +172,81 @@ def vdi_members(data: bytes) -> None:
             archive.writestr(zipfile.ZipInfo(name), content)
     content = buffer.getvalue()
     _read_all("members.vdi", choices.patched(content) if choices.chance(8) else content, VDI_RATIO)
+
+
+def _steps_of(path: Path) -> Iterator[VDI]:
+    """The steps of a series that can be read; the first ones, where it has many."""
+    steps = series_reader.StepsReader(path)
+    for i in range(min(len(steps), 6)):
+        with contextlib.suppress(VDIError):
+            yield steps[i]
+
+
+def vdis_bytes(data: bytes) -> None:
+    """Any bytes as a ``.vdis`` file."""
+    _read_all("bytes.vdis", data, VDIS_RATIO, series_reader.read_info, _steps_of)
+
+
+@cache
+def _series_parts(index: int, compression: str, tolerance: float) -> tuple[bytes, list[Any]]:
+    """A small series' head, and each frame's header, text, arrays."""
+    first, kept = base_vdi(index), {}
+    rng = np.random.default_rng(index)
+    for name in ("color", "optical_depth"):
+        kept[name] = getattr(first, name) * rng.random(getattr(first, name).shape)
+    arrays = {**_arrays(first), **kept}
+    second = VDI(
+        first.camera,
+        first.window_size,
+        **arrays,
+        bounds=first.bounds,
+        depth_origin=first.depth_origin,
+        metadata={"sample_distance": 0.5},
+    )
+    steps = [step.with_precision("8-byte") for step in (first, second, second, first)]
+    path = work_folder() / "base.vdis"
+    pvdi.VDISeries.of(steps).save(path, compression=compression, tolerance=tolerance)
+    content = path.read_bytes()
+    frames, reader = [], series_reader.StepsReader(path)
+    for place, header in reader._frames:
+        data = memoryview(content)[place + layout.HEADER_BYTES :][: header.n_bytes]
+        codec = "none" if header.kind == layout.VDI_FILE else compression
+        frames.append((header, layout.read_text(data)[0], layout.read_arrays(data, codec)))
+    path.unlink()
+    return content[: reader._frames[0][0]], frames
+
+
+def vdis_frames(data: bytes) -> None:
+    """A ``.vdis`` file whose frames were changed, with checksums that fit."""
+    choices = Choices(data)
+    compression = choices.pick(COMPRESSIONS)
+    head, frames = _series_parts(
+        choices.integer(0, 7), compression, choices.pick((0.0, 0.05, 0.05))
+    )
+    content = head
+    for header, text, arrays in frames:
+        text = {name: value for name, value in text.items() if name != "arrays"}
+        arrays = dict(arrays)
+        if choices.chance(3):
+            edited = choices.edited(text)
+            text = edited if isinstance(edited, dict) else {}
+        for _ in range(choices.integer(0, 3)):
+            if arrays:
+                name = choices.pick(sorted(arrays))
+                array = arrays[name]
+                patched = choices.patched(array.tobytes())
+                kind = choices.pick((array.dtype.str, "|u1", "<u2", "<u4", "<u8", "<f4"))
+                whole = len(patched) // np.dtype(kind).itemsize * np.dtype(kind).itemsize
+                arrays[name] = np.frombuffer(patched[:whole], kind)
+        codec = "none" if header.kind == layout.VDI_FILE else compression
+        with contextlib.suppress(VDIError):  # what JSON does not hold
+            frame = layout.Content(text, arrays).to_bytes(codec, 1)
+            header = header._replace(n_bytes=len(frame), checksum=zlib.crc32(frame))
+            if choices.chance(6):
+                header = header._replace(by=choices.integer(-1, 4), kind=choices.integer(0, 3))
+            content += header.to_bytes() + frame
+    content = choices.patched(content) if choices.chance(8) else content
+    _read_all("frames.vdis", content, VDIS_RATIO, series_reader.read_info, _steps_of)
 
 
 def exr_bytes(data: bytes) -> None:
@@ -797,6 +884,7 @@ TARGETS: dict[str, Callable[[bytes], None]] = {
     target.__name__: target
     for target in (
         *(vdi_bytes, vdi_members, exr_bytes, exr_patches),
+        *(vdis_bytes, vdis_frames),
         *(html_bytes, html_patches, served_messages),
         *(validator, vtk_form, command_line, public_functions),
     )

@@ -24,6 +24,8 @@ EXAMPLES = {
     "vdi_members": 200,
     "exr_bytes": 100,
     "exr_patches": 200,
+    "vdis_bytes": 100,
+    "vdis_frames": 40,
     "html_bytes": 50,
     "html_patches": 150,
     "served_messages": 400,

@@ -87,7 +87,10 @@ def test_volumes_in_many_shapes_are_the_same_series(series, volumes, camera):
         other = pvdi.generate_series(steps, camera, SIZE, **more, **looks)
         assert all(a.equals(b) for a, b in zip(other, series, strict=True)), name
         assert (other.volumes is None) == (name == "iterator")
-    assert called == [0, 1, 2, 3]
+        if other.volumes is not None:
+            assert np.array_equal(other.volumes[2].array, volumes[2].array)
+            assert other.volumes[2].spacing == SPACING
+    assert called == [0, 1, 2, 3, 2, 2]
 
 
 def test_colours_stand_for_the_same_values_in_all_steps(volumes, camera, default_runtime):

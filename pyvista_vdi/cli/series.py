@@ -1,0 +1,158 @@
+"""The verb ``series``, and what ``info`` and ``convert`` do with files of series."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from pyvista_vdi.cli.inputs import classification, measuring, part, read_volume, say_written
+from pyvista_vdi.cli.text import mebibytes, printable, table, vector
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.io import check_write_options, checked_target
+from pyvista_vdi.io import read as read_vdi
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.series import reader
+from pyvista_vdi.series.series import VDISeries
+from pyvista_vdi.series.writer import SeriesWriter
+
+#: Options of the file, which are arguments of the same name.
+_OF_THE_FILE = ("precision", "compression", "level")
+
+
+def series(options: argparse.Namespace) -> int:
+    """Write a series of the files that are named: VDIs, series of them, or volumes."""
+    kinds = [_kind(file) for file in options.files]
+    if len(set(kinds)) > 1:
+        raise InvalidArgumentError("the files are VDIs or volumes, and not some of each")
+    times = options.times
+    if times is not None and (kinds[0] == "series" or len(times) != len(options.files)):
+        raise InvalidArgumentError(
+            f"--times gives a time to each file: there are {len(options.files)} files and "
+            f"{len(times)} times"
+            if kinds[0] != "series"
+            else "the series have their own times: leave out --times"
+        )
+    arguments = file_arguments(options)
+    arguments |= {"tolerance": options.tolerance, "key_every": options.key_every}
+    steps = _vdis(options.files) if kinds[0] != "volume" else None
+    looks = classification(options)
+    Classification(looks, "series")  # refused before a volume is read
+    with measuring("writing a series") as bar:
+        if steps is not None:
+            with SeriesWriter(options.output, **arguments) as out:
+                for i, (time, vdi) in enumerate(steps):
+                    out.append(vdi, time if times is None else times[i])
+                    bar((i + 1) / max(i + 2, len(options.files)))
+        else:
+            _write_volumes(options, looks, arguments, bar)
+    about = reader.read_info(options.output)
+    print(f"{printable(options.output)}: {len(about.times)} steps, {mebibytes(about.file_bytes)}")
+    return 0
+
+
+def _write_volumes(
+    options: argparse.Namespace, looks: dict[str, Any], arguments: dict[str, Any], bar: Any
+) -> None:
+    from pyvista_vdi.cli.generate import generating_view
+
+    out: SeriesWriter | None = None
+    try:
+        for i, file in enumerate(options.files):
+            volume = read_volume(
+                argparse.Namespace(**{**vars(options), "file": file, "example": None})
+            )
+            if out is None:
+                out = SeriesWriter(
+                    options.output,
+                    generating_view(options, volume),
+                    options.size,
+                    max_supersegments=options.max_supersegments,
+                    sample_distance=options.sample_distance,
+                    memory_limit=options.memory_limit,
+                    device=options.device,
+                    **arguments,
+                    **looks,
+                )
+            out.append(volume, None if options.times is None else options.times[i])
+            bar((i + 1) / len(options.files))
+    finally:
+        if out is not None:
+            out.close()
+
+
+def _kind(file: str) -> str:
+    from pyvista_vdi.io import is_vdi_file
+
+    if reader.is_series_file(file):
+        return "series"
+    return "VDI" if is_vdi_file(file) else "volume"
+
+
+def _vdis(files: Sequence[str]) -> Iterator[tuple[float | None, VDI]]:
+    """Yield the times, where the files have any, and the VDIs of all files."""
+    for file in files:
+        if reader.is_series_file(file):
+            steps = reader.read(file)
+            yield from zip(steps.times, steps, strict=True)
+        else:
+            yield None, read_vdi(file)
+
+
+def info(options: argparse.Namespace) -> int:
+    """Print what a file of a series says about itself."""
+    about = reader.read_info(options.file)
+    if options.json:
+        state = {**vars(about), "path": str(about.path), "camera": about.camera.to_dict()}
+        print(json.dumps(state, indent=1))
+        return 0
+    width, height = about.window_size
+    state_of = "" if about.closed else ", not closed: still being written, or cut off"
+    print(
+        table(
+            {
+                "file": f"{about.path}, {mebibytes(about.file_bytes)}, {about.codec}{state_of}",
+                "written by": f"{about.written_by}, format version {about.format_version}",
+                "steps": f"{len(about.times)}, times {about.times[0]:g} to {about.times[-1]:g}",
+                "keys": f"{len(about.keys)} steps need no other",
+                "bytes a step": f"{min(about.step_bytes)} to {max(about.step_bytes)}",
+                "precision": about.precision
+                + (f", within a tolerance of {about.tolerance:g}" if about.tolerance else ""),
+                "lists": f"{width} x {height}",
+                "eye": vector(about.camera.position),
+                "bounds": vector(about.bounds),
+            }
+        )
+    )
+    return 0
+
+
+def file_arguments(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the options of the file that were given."""
+    return {n: getattr(options, n) for n in _OF_THE_FILE if getattr(options, n) is not None}
+
+
+def convert(options: argparse.Namespace, arguments: dict[str, Any]) -> int:
+    """Write each step of a series to a file of its own, or the series anew."""
+    steps: VDISeries = reader.read(options.file)
+    target = Path(options.output)
+    if reader.is_series_file(target):
+        with measuring("converting") as bar:
+            steps.save(target, progress=part(bar, 0.0, 1.0, "writing"), **arguments)
+        say_written([target])
+        return 0
+    digits = max(4, len(str(len(steps) - 1)))
+    files = [
+        target.with_name(f"{target.stem}_{i:0{digits}}{target.suffix}") for i in range(len(steps))
+    ]
+    checked_target(files[0])
+    check_write_options(files[0], arguments)
+    with measuring("converting") as bar:
+        for i, file in enumerate(files):
+            steps[i].save(file, **arguments)
+            bar((i + 1) / len(files))
+    print(f"Written: {printable(files[0])} to {printable(files[-1].name)}, {len(files)} files")
+    return 0

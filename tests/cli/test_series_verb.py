@@ -1,0 +1,89 @@
+"""The verb ``series``, and ``info`` and ``convert`` of what it writes."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import cli
+
+
+def run(capsys, *arguments, status=0):
+    """Run the command and return what it prints, or says where it fails."""
+    assert cli.main([str(argument) for argument in arguments]) == status
+    out, error = capsys.readouterr()
+    return out if status == 0 else error
+
+
+@pytest.fixture(scope="module")
+def volumes(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("volumes")
+    z, y, x = np.mgrid[:8, :9, :10]
+    for k in range(3):
+        np.save(folder / f"step_{k}.npy", (x + y * z + 5 * k).astype(np.uint8))
+    return sorted(folder.glob("*.npy"))
+
+
+@pytest.fixture(scope="module")
+def series(volumes, tmp_path_factory, default_runtime):
+    pytest.importorskip("pyvista")
+    path = tmp_path_factory.mktemp("series") / "run.vdis"
+    looks = ("--size", "24x16", "--cmap", "bone", "--clim", "0", "80", "--spacing", "1", "1", "2")
+    arguments = ["series", *volumes, "-o", path, "--times", "0,0.5,2", *looks]
+    assert cli.main([str(argument) for argument in arguments]) == 0
+    return path
+
+
+def test_volumes_become_a_series(series, volumes):
+    steps = pvdi.read(series)
+    assert steps.times == (0.0, 0.5, 2.0)
+    volume = pvdi.Volume(np.load(volumes[2]), (1, 1, 2))
+    alone = pvdi.generate(
+        volume, steps.camera, (24, 16), cmap="bone", clim=(0, 80), precision="8-byte"
+    )
+    assert steps[2].equals(alone)
+
+
+def test_info(series, capsys):
+    out = run(capsys, "info", series)
+    assert "3, times 0 to 2" in out
+    assert "24 x 16" in out
+    state = json.loads(run(capsys, "info", series, "--json"))
+    assert state["times"] == [0.0, 0.5, 2.0]
+    assert state["closed"]
+
+
+def test_to_single_files_and_back(series, capsys, tmp_path):
+    assert "3 files" in run(capsys, "convert", series, "-o", tmp_path / "a.vdi")
+    files = sorted(tmp_path.glob("a_*.vdi"))
+    assert [file.name for file in files] == ["a_0000.vdi", "a_0001.vdi", "a_0002.vdi"]
+    back = tmp_path / "back.vdis"
+    run(capsys, "series", *files, "-o", back, "--times", "0,0.5,2")
+    steps = pvdi.read(series)
+    assert all(a.equals(b) for a, b in zip(pvdi.read(back), steps, strict=True))
+    again = tmp_path / "again.vdis"
+    run(capsys, "convert", back, "-o", again, "--compression", "lz4")
+    assert pvdi.read(again)[2].equals(steps[2])
+    twice = tmp_path / "one.vdis"
+    run(capsys, "series", series, "-o", twice, "--tolerance", "0.05")
+    assert pvdi.read(twice).times == steps.times
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("{0}", "{series}", "-o", "x.vdis"), "not some of each"),
+        (("{0}", "{1}", "-o", "x.vdis", "--times", "1"), "2 files and 1 times"),
+        (("{series}", "-o", "x.vdis", "--times", "1"), "own times"),
+        (("{0}", "-o", "x.vdi"), ".vdis"),
+        (("{0}", "-o", "x.vdis", "--tolerance", "2"), "tolerance"),
+    ],
+)
+def test_mistakes(arguments, message, series, volumes, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = [a.format(*volumes, series=series) for a in arguments]
+    assert message in run(capsys, "series", *names, status=1)
+    assert not list(tmp_path.iterdir())
