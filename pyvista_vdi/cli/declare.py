@@ -16,7 +16,7 @@ from pyvista_vdi.quality.dial import QUALITIES, TARGET_ANGLE
 #: Where options go: a verb's parser, or a group of it.
 Options = argparse._ActionsContainer
 
-VDI_FILE = "a .vdi file, an .exr deep image, a VDI as .vti, or a page of one, .html"
+VDI_FILE = "a .vdi file, a series, .vdis, an .exr deep image, a VDI as .vti, or a page, .html"
 
 VOLUME_FILE = (
     "a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), .npy, a raw file "
@@ -191,6 +191,13 @@ def size(options: Options, default: tuple[int, int] | None) -> None:
     shown = "the VDI's" if default is None else f"{default[0]}x{default[1]}"
     text = f"window size in pixels (default: {shown})"
     option(options, "--size", text, "WxH", parse_size, default=default)
+
+
+def time(options: Options) -> None:
+    """Add which step of a series to show."""
+    option(
+        options, "--time", "of a series, the step nearest in time (default: the first)", "T", float
+    )
 
 
 def angles(options: Options, text: str, default: tuple[float, ...] | None = None) -> None:

@@ -211,6 +211,7 @@ def _add_render(parser: argparse.ArgumentParser) -> None:
         "LIGHT",
         float,
     )
+    declare.time(parser)
     declare.camera(parser, "the VDI's generating view")
     declare.device(parser)
 
@@ -219,6 +220,11 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
     declare.vdi_or_volume(parser)
     declare.size(parser, None)
     declare.option(parser, "--screenshot", "write this .png, open no window", "FILE")
+    group = parser.add_argument_group("series", "The space bar plays and pauses, a slider seeks.")
+    declare.switch(group, "--play", "begin to play at once")
+    text = "steps per second; what is not ready when its time comes is left out (default: 24)"
+    declare.option(group, "--rate", text, "RATE", float)
+    declare.time(group)
     group = parser.add_argument_group("while the view moves")
     rate = "frames per second to keep, by fewer pixels; 0: every frame is full (default: 30)"
     declare.option(group, "--target-fps", rate, "RATE", declare.parse_rate, default=30.0)

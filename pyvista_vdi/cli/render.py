@@ -21,6 +21,8 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.imports import import_pyvista
 from pyvista_vdi.plotting.screen import why_no_window
+from pyvista_vdi.series.player import RATE
+from pyvista_vdi.series.series import VDISeries
 
 
 def render(options: argparse.Namespace) -> int:
@@ -29,7 +31,8 @@ def render(options: argparse.Namespace) -> int:
     vdis, share = [], 0.5 / len(options.files)
     with measuring("rendering") as bar:
         for k, file in enumerate(options.files):
-            vdis.append(read(file, progress=part(bar, k * share, (k + 1) * share, "reading")))
+            found = read(file, progress=part(bar, k * share, (k + 1) * share, "reading"))
+            vdis.append(_at(found, options.time))
         bar(0.5, "drawing")
         first = vdis[0]
         view = camera(options, first.camera)
@@ -58,26 +61,42 @@ def view(options: argparse.Namespace) -> int:
     if is_volume(options):
         looks = classification(options)
         volume = read_volume(options)
+        _refuse_times(volume, options)
         size = options.size or WINDOW_SIZE
         _show(volume, filling_camera(volume.bounds, size), size, looks, options, screenshot)
     else:
-        vdi = read(options.file)
+        shown = read(options.file)
+        _refuse_times(shown, options)
+        vdi = _at(shown, options.time)
         size = options.size or vdi.picture_size
-        _show(vdi, vdi.camera, size, classification(options), options, screenshot)
+        _show(shown, vdi.camera, size, classification(options), options, screenshot)
     if screenshot is not None:
         print(f"{printable(options.screenshot)}: written")
     return 0
 
 
+def _at(found: VDI | VDISeries, time: float | None) -> VDI:
+    """Return a VDI, or of a series the step nearest in time, by default the first."""
+    if isinstance(found, VDISeries):
+        return found[0 if time is None else found.nearest(time)]
+    return found
+
+
+def _refuse_times(shown: VDI | VDISeries | Volume, options: argparse.Namespace) -> None:
+    if not isinstance(shown, VDISeries) and (options.play or options.time is not None):
+        name = "play" if options.play else "time"
+        raise UnsupportedError(f"--{name} is for series, .vdis: leave it out")
+
+
 def _show(
-    shown: VDI | Volume,
+    shown: VDI | VDISeries | Volume,
     camera: Camera,
     size: tuple[int, int],
     looks: dict[str, Any],
     options: argparse.Namespace,
     screenshot: str | None,
 ) -> None:
-    """Open a plotter that shows a VDI, or a volume, from a view, or write what it shows.
+    """Open a plotter that shows a VDI, a series or a volume from a view, or write what it shows.
 
     No file is written where the picture cannot be drawn or is interrupted.
     """
@@ -94,6 +113,8 @@ def _show(
             device=options.device,
             **looks,
         )
+        if isinstance(shown, VDISeries):
+            _begin(actor, plotter, options, slider=screenshot is None)
         aim(plotter.camera, camera)
         plotter.camera_set = True
         plotter.renderer.reset_camera_clipping_range()
@@ -109,3 +130,25 @@ def _show(
         write_png(np.asarray(picture), screenshot)
     finally:
         plotter.close()
+
+
+def _begin(actor: Any, plotter: Any, options: argparse.Namespace, *, slider: bool) -> None:
+    """Show the step that is asked for, and in a window its slider; the space bar plays."""
+    if options.time is not None:
+        actor.time = options.time
+    if not slider:
+        return
+    if len(actor.series) > 1:
+        actor.add_time_slider(plotter)
+
+    rate = RATE if options.rate is None else options.rate
+
+    def play_or_pause() -> None:
+        if actor.playing:
+            actor.pause()
+        else:
+            actor.play(rate)
+
+    plotter.add_key_event("space", play_or_pause)
+    if options.play:
+        actor.play(rate)

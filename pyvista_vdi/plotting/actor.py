@@ -7,7 +7,9 @@ from typing import Any
 import pyvista as pv
 from pyvista.plotting.mapper import OpenGLGPUVolumeRayCastMapper
 from pyvista.plotting.volume import Volume
+from vtkmodules.vtkCommonCore import vtkWeakReference
 
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 
@@ -103,6 +105,52 @@ class PlotterVDIActor(VDIActorMethods, Volume):
             if mine is not shown:
                 mapper.painter.set_input(mine)
         super().SetProperty(prop)
+
+    def add_time_slider(self, plotter: Any, **options: Any) -> Any:
+        """Show a slider that sets :attr:`time`, and that follows it while the series plays.
+
+        Parameters
+        ----------
+        plotter : pyvista.Plotter
+            Which shows this actor.
+        **options
+            Those of ``plotter.add_slider_widget``: ``title``, ``pointa``, ``pointb``, ``style`` ...
+
+        Returns
+        -------
+        vtkSliderWidget
+            PyVista's widget; ``plotter.clear_slider_widgets()`` takes it away.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If no series is shown, or it has one step.
+        """
+        first, last = self._player().series.times[0], self._player().series.times[-1]
+        if first == last:
+            raise InvalidArgumentError("this series has one step: there is no time to choose")
+        actor, bar = vtkWeakReference(), vtkWeakReference()
+        actor.Set(self)
+
+        def chosen(time: float) -> None:
+            shown = actor.Get()
+            if shown is not None:
+                shown.time = time
+
+        slider = plotter.add_slider_widget(
+            chosen,
+            (first, last),
+            **{"value": self.time, "title": "time", "interaction_event": "always", **options},
+        )
+        bar.Set(slider.GetRepresentation())
+
+        def follow(*_: Any) -> None:
+            shown, representation = actor.Get(), bar.Get()
+            if shown is not None and representation is not None and shown.playing:
+                representation.SetValue(shown.time)
+
+        plotter.renderer.AddObserver("StartEvent", follow)
+        return slider
 
     def copy(self, deep: bool = True) -> PlotterVDIActor:
         """Return another actor that shows the same VDI, with a mapper of its own.

@@ -112,7 +112,9 @@ def generate_series(
         again = _Called(lambda i: make.volume(steps[i]), len(vdis))
     if not vdis:
         raise InvalidArgumentError("there is no step: pass at least one volume")
-    return VDISeries(vdis, range(len(vdis)) if known_times is None else known_times, again)
+    series = VDISeries(vdis, range(len(vdis)) if known_times is None else known_times, again)
+    series._maker = make
+    return series
 
 
 class StepMaker:
@@ -155,7 +157,14 @@ class StepMaker:
         self._table: TransferFunction | None = None
         self._chosen: dict[str, Any] = {}
 
-    def __call__(self, volume: Any, progress: Progress | None = None) -> VDI:
+    def __call__(
+        self,
+        volume: Any,
+        progress: Progress | None = None,
+        *,
+        camera: Any = None,
+        window_size: Sequence[int] | None = None,
+    ) -> VDI:
         """Return a step's VDI.
 
         Parameters
@@ -164,14 +173,16 @@ class StepMaker:
             See :func:`generate_series`.
         progress : callable, optional
             As for :func:`pyvista_vdi.generate`.
+        camera, window_size : optional
+            In place of the series' own.
         """
         volume = self.volume(volume)
         if self._table is None:
             self._table = self._looks.transfer_function(volume)
         vdi = generate_by_dial(
             volume,
-            self._camera,
-            self._size,
+            self._camera if camera is None else Camera.from_any(camera),
+            self._size if window_size is None else check_window_size(window_size),
             self._table,
             self._dial,
             self._options,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, overload
@@ -62,6 +62,7 @@ class VDISeries(Sequence[VDI]):
             )
         self.volumes = volumes
         self._steps = steps
+        self._maker: Callable[..., VDI] | None = None  # of a step's volume, for another view
         #: What knows the view without decoding a step
         self._first: Any = steps if hasattr(type(steps), "window_size") else None
 
@@ -114,7 +115,9 @@ class VDISeries(Sequence[VDI]):
         if isinstance(index, slice):
             chosen = range(len(self))[index]
             volumes = None if self.volumes is None else _Chosen(self.volumes, chosen)
-            return VDISeries(_Chosen(self._steps, chosen), self.times[index], volumes)
+            part = VDISeries(_Chosen(self._steps, chosen), self.times[index], volumes)
+            part._maker = self._maker
+            return part
         return self._steps[range(len(self))[index]]
 
     def __iter__(self) -> Iterator[VDI]:
@@ -137,6 +140,36 @@ class VDISeries(Sequence[VDI]):
         after = bisect_left(self.times, time)
         candidates = [i for i in (after - 1, after) if 0 <= i < len(self)]
         return min(candidates, key=lambda i: abs(self.times[i] - time))
+
+    def generate(
+        self, step: int, camera: Any = None, window_size: Sequence[int] | None = None
+    ) -> VDI:
+        """Return a step's VDI for another view, made as that of the series was.
+
+        Parameters
+        ----------
+        step : int
+            Its index.
+        camera : Camera or vtkCamera or pyvista.Camera, optional
+            The generating view; the series' by default.
+        window_size : (int, int), optional
+            Lists along each edge; those of the series by default.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If the volumes are not at hand: of files they are not.
+
+        See Also
+        --------
+        pyvista_vdi.generate : has the other errors.
+        """
+        if self.volumes is None or self._maker is None:
+            raise InvalidArgumentError(
+                "the volumes of this series are not at hand: make it by generate_series from a "
+                "sequence or a function, or generate a VDI of the step's volume"
+            )
+        return self._maker(self.volumes[step], camera=camera, window_size=window_size)
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write a ``.vdis`` file, which :func:`pyvista_vdi.read` opens; it appears whole or not.

@@ -87,3 +87,29 @@ def test_mistakes(arguments, message, series, volumes, capsys, tmp_path, monkeyp
     names = [a.format(*volumes, series=series) for a in arguments]
     assert message in run(capsys, "series", *names, status=1)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_step_is_shown_by_its_time(series, capsys, tmp_path):
+    pv = pytest.importorskip("pyvista")
+    steps = pvdi.read(series)
+    for k, time in enumerate(("0.1", "0.4", "9")):
+        drawn, single = tmp_path / f"{k}.png", tmp_path / f"{k}s.png"
+        steps[k].save(tmp_path / "step.vdi")
+        run(capsys, "render", series, "-o", drawn, "--time", time)
+        run(capsys, "render", tmp_path / "step.vdi", "-o", single)
+        assert drawn.read_bytes() == single.read_bytes()
+        run(capsys, "view", series, "--screenshot", drawn, "--time", time, "--size", "80x60")
+        run(capsys, "view", tmp_path / "step.vdi", "--screenshot", single, "--size", "80x60")
+        one, other = (pv.read(name).active_scalars for name in (drawn, single))
+        assert np.array_equal(one, other)
+
+
+def test_times_of_what_has_none(series, volumes, capsys, tmp_path):
+    pytest.importorskip("pyvista")
+    pvdi.read(series)[0].save(tmp_path / "step.vdi")
+    for file in (tmp_path / "step.vdi", volumes[0]):
+        for option in (["--play"], ["--time", "1"]):
+            target = tmp_path / "p.png"
+            error = run(capsys, "view", file, "--screenshot", target, *option, status=1)
+            assert f"{option[0]} is for series" in error
+            assert not target.exists()

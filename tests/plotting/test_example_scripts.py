@@ -28,6 +28,7 @@ ARGUMENTS = {
     "picking.py": ["picture.png"],
     "pipeline.py": ["picture.png"],
     "plotter.py": [],
+    "series.py": [],
     "tradeoff.py": [],
     "web_page.py": ["page.html"],
     "web_scene.py": ["scene.html"],
@@ -56,7 +57,7 @@ def run_example(name, folder):
     )
     assert done.returncode == 0, done.stderr
     assert "VDIWarning" not in done.stderr
-    suffix = ".gif" if name == "interactive.py" else ".png"
+    suffix = ".gif" if name in ("interactive.py", "series.py") else ".png"
     suffix = Path(arguments[0]).suffix if arguments else suffix
     target = folder / (arguments[0] if arguments else Path(name).with_suffix(suffix))
     assert list(folder.glob(f"*{suffix}")) == [target]

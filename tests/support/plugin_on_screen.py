@@ -22,6 +22,7 @@ from vtkmodules.util.misc import calldata_type
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import VTK_INT, vtkUnsignedCharArray
 
+import pyvista_vdi as pvdi
 from pyvista_vdi.quality.frame_rate import FrameRateController
 
 LONG = 250.0
@@ -58,6 +59,13 @@ def scene(**options):
     actor = plotter.add_vdi(soft_ball(), max_supersegments=2, **{"draw": "vdi", **LOOKS, **options})
     plotter.camera_position = ((6, 0, 0), (0, 0, 0), (0, 0, 1))
     return plotter, actor
+
+
+def vdi_from(volume):
+    """A small VDI of a ball."""
+    camera = pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1))
+    looks = {name: value for name, value in LOOKS.items() if name != "show_scalar_bar"}
+    return pvdi.generate(volume, camera, (60, 50), **looks)
 
 
 def wait(plotter, happened):
@@ -228,7 +236,30 @@ def a_movie_has_every_step():
     assert all(np.abs(b - a).max() > 4 for a, b in pairwise(pictures))
 
 
+def a_series_plays_by_itself_and_goes_on_after_a_turn():
+    """Steps follow each other without a frame being asked for, before and after a hand turns."""
+    vdis = [vdi_from(soft_ball(12 + k)) for k in range(3)]
+    plotter = pv.Plotter(off_screen=False, window_size=(241, 203))
+    actor = plotter.add_vdi(pvdi.VDISeries.of(vdis), show_scalar_bar=False, regenerate="never")
+    actor.play(rate=30)
+    plotter.show(interactive_update=True, auto_close=False)
+    seen = {}
+    wait(plotter, lambda: seen.setdefault(actor.step) or len(seen) == 3)
+    hand = Hand(plotter)
+    hand.press(100, 100)
+    assert not actor.mapper.painter.upkeep._ticker.running
+    for x in (105, 110, 115):
+        hand.move(x, 100)
+    hand.release(115, 100)
+    seen.clear()
+    wait(plotter, lambda: seen.setdefault(actor.step) or len(seen) == 3)
+    actor.pause()
+    wait(plotter, lambda: not actor.mapper.painter.upkeep._ticker.running)
+    plotter.close()
+
+
 CASES = (
+    a_series_plays_by_itself_and_goes_on_after_a_turn,
     every_change_is_shown,
     a_movie_has_every_step,
     previews_and_screenshots,

@@ -7,16 +7,19 @@ from typing import Any
 from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
+from pyvista_vdi.series.player import Player
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
+from pyvista_vdi.vtk_pipeline.drawing.playing import PlayingMethods
 from pyvista_vdi.vtk_pipeline.drawing.shader import show_image
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 
 
-class VDIActorMethods:
+class VDIActorMethods(PlayingMethods):
     """What makes a volume show a VDI; mixed into VTK's and into PyVista's."""
 
     def _become_vdi_actor(self: Any) -> None:
@@ -157,7 +160,7 @@ class VDIActorMethods:
         return mapper.painter.selection.pick(self, there[0], x, y) if there else None
 
     def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
-        """Generate the VDI anew, now.
+        """Generate the VDI anew, now; of a series, the step that is shown.
 
         Parameters
         ----------
@@ -181,6 +184,9 @@ class VDIActorMethods:
         """
         mapper = self.GetMapper()
         source = None if mapper is None else mapper.GetSource()
+        player = None if mapper is None else mapper.painter.upkeep.player
+        if player is not None:
+            return self._step_anew(player, camera, window_size)  # type: ignore[no-any-return]
         if source is None:
             raise InvalidArgumentError(
                 "this actor shows a VDI without its volume, which cannot be generated anew: add "
@@ -198,6 +204,20 @@ class VDIActorMethods:
         elif renderer is not None and min(renderer.GetSize()) > 0:
             shown.take_size(renderer)
         return source.GetVDI()  # type: ignore[no-any-return]
+
+    def _step_anew(self: Any, player: Player, camera: Any, window_size: Any) -> VDI:
+        """Have the step that is shown made for another view, and show that as long as it is."""
+        renderer = self.GetMapper().painter.renderer()
+        if camera is None and renderer is not None:
+            camera = renderer.GetActiveCamera()
+        if window_size is None and renderer is not None and min(renderer.GetSize()) > 0:
+            window_size = renderer.GetSize()
+        if camera is not None:
+            camera = Camera.from_any(camera, model_transform=as_array(self.GetMatrix()))
+        vdi = player.series.generate(player.step, camera, window_size)
+        player.replace(vdi)
+        self.GetMapper().Modified()
+        return vdi
 
 
 class VDIActor(VDIActorMethods, vtkVolume):

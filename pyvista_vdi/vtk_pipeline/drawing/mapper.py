@@ -13,13 +13,14 @@ from typing import Any, NoReturn
 
 from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 
-from pyvista_vdi.errors import UnsupportedError
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.cropping import checked_opacity_multiplier
 from pyvista_vdi.model.render_options import checked_transmittance_cutoff
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.ways import checked_draw
 from pyvista_vdi.quality.when_anew import checked_bound
 from pyvista_vdi.raycasting.picking import checked_opacity
+from pyvista_vdi.series.series import VDISeries
 from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
 from pyvista_vdi.vtk_pipeline.filters.algorithm import DEVICE, accessors
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
@@ -97,6 +98,26 @@ class VDIMapperMethods:
     def SetVDI(self, vdi: VDI) -> None:
         """Draw this VDI."""
         self._set_input(input_of(vdi))
+
+    def SetSeries(self, series: VDISeries) -> None:
+        """Draw a step of this series, the first one at first: see :attr:`VDIActor.time`.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is none.
+        """
+        if not isinstance(series, VDISeries):
+            raise InvalidArgumentError(
+                f"SetSeries takes a VDISeries; got {type(series).__name__}: VDISeries.of makes one "
+                "of several VDIs"
+            )
+        self._set_input(input_of(series))
+
+    def GetSeries(self) -> VDISeries | None:
+        """Return the series of which a step is drawn; ``None`` where there is none."""
+        player = self.painter.upkeep.player
+        return None if player is None else player.series
 
     def GetVDI(self) -> VDI | None:
         """Return the VDI that was drawn last, or would be drawn; ``None`` before the first."""

@@ -196,6 +196,7 @@ class Painter:
             vdi=vdi,
             stand_in=last.stand_in,
             drawn=last.way,
+            time=None if self.upkeep.player is None else self.upkeep.player.time,
         )
 
     # -- a frame ---------------------------------------------------------------------------------

@@ -18,15 +18,16 @@ from pyvista_vdi.quality.frame_rate import FLOOR, FrameRateController
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.quality.ways import Ways
 from pyvista_vdi.quality.worker import Job, Worker
+from pyvista_vdi.series.player import Player
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SeriesInput, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.interaction import browser
 from pyvista_vdi.vtk_pipeline.interaction.regeneration import Regeneration
 from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus, Warnings
-from pyvista_vdi.vtk_pipeline.interaction.ticker import LoopTicker, Ticker
+from pyvista_vdi.vtk_pipeline.interaction.ticker import PERIOD, LoopTicker, Ticker, period_of
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import Interaction, WindowClock, reduced
 
 _log = logging.getLogger(__name__)
@@ -69,6 +70,7 @@ class Upkeep:
         """Keep another input; ``changed`` is called when its bounds may be others."""
         if self.input is not None:
             self.input.watch(None)
+            self.input.rest()
         self.input = source
         self._failed_at = None
         self._said_far = False
@@ -82,6 +84,16 @@ class Upkeep:
         """The VDI made last."""
         return None if self.input is None else self.input.last()
 
+    @property
+    def player(self) -> Player | None:
+        """What shows one step of a series after the other, where a series is shown."""
+        return self.input.player if isinstance(self.input, SeriesInput) else None
+
+    @property
+    def _busy(self) -> bool:
+        """Whether something goes on that the event loop has to look at."""
+        return self.regeneration.busy or (self.player is not None and self.player.playing)
+
     def retry(self) -> None:
         """Try again what failed before, and give up what is being made in the background."""
         self.regeneration.cancel()
@@ -91,6 +103,8 @@ class Upkeep:
     def close(self) -> None:
         """End what goes on; the next frame may begin anew."""
         self._stop_ticking()
+        if self.input is not None:
+            self.input.rest()
         self.regeneration.close()
         self._preparation.clear()
         self._preparation.join()
@@ -113,6 +127,8 @@ class Upkeep:
         if self.automatic_view:
             source.set_view_if_missing(frame.renderer, frame.model_transform)
         if not isinstance(source, SourceInput):
+            if isinstance(source, SeriesInput):
+                source.player.device = frame.painter.device
             vdi = self._updated(source)
             self._mind_the_angle(vdi, frame.view)
             return vdi
@@ -142,10 +158,12 @@ class Upkeep:
 
     def tick(self, window: Any) -> None:
         """Have the event loop look at what goes on, if something does and no hand moves."""
-        if self.regeneration.busy and not self._interaction.moving(window):
+        if self._busy and not self._interaction.moving(window):
+            player = self.player
+            period = PERIOD if player is None else period_of(player.rate)
             if browser.watches(window):
-                self._loop_ticker.start()
-            self._ticker.start(window.GetInteractor())
+                self._loop_ticker.start(period)
+            self._ticker.start(window.GetInteractor(), period)
 
     def _stop_ticking(self) -> None:
         self._ticker.stop()
@@ -271,10 +289,16 @@ class Upkeep:
         served = stored if isinstance(stored, int | float) else _VIEW_CONE
         if angle > served:
             self._said_far = True
+            volumes = None if self.player is None else self.player.series.volumes
+            why = (
+                "without its volume it cannot be made anew, and shows less"
+                if volumes is None
+                else "unless actor.regenerate() makes this step anew, it shows less"
+            )
             self._warnings.warn(
                 f"the view is {angle:.0f} degrees from the VDI's generating view, which was to "
-                f"serve {served:.0f}: without its volume it cannot be made anew, and shows less "
-                "and less of what was hidden; regenerate='never' takes this as it is"
+                f"serve {served:.0f}: {why} and less of what was hidden; regenerate='never' takes "
+                "this as it is"
             )
 
     # -- between frames --------------------------------------------------------------------------
@@ -282,6 +306,8 @@ class Upkeep:
     def collect(self) -> bool:
         """Take what was made in the background; whether there is another VDI to be drawn."""
         try:
+            if self.player is not None:
+                return self.player.advance()
             return self.regeneration.collect()
         except Exception as error:
             self._complain(error)
@@ -293,12 +319,15 @@ class Upkeep:
         if clock is None or clock.drawing:
             return
         swapped = self.collect()
-        if not self.regeneration.busy:
+        if not self._busy:
             self._stop_ticking()
         if swapped or self._texts.are_behind(self.regeneration.progress):
             clock.render()
 
     def _complain(self, error: Exception) -> None:
+        if self.player is not None:
+            self._warnings.warn(f"a step is left out: {type(error).__name__}: {error}", error)
+            return
         self._warnings.warn(
             f"the VDI cannot be made anew: {type(error).__name__}: {error}; what was shown stays, "
             "and actor.regenerate() tries again",

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.series.player import Player
+from pyvista_vdi.series.series import VDISeries
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 
@@ -46,6 +48,40 @@ class Input:
 
     def watch(self, changed: Callable[..., Any] | None) -> None:
         """Have this called when the bounds may have changed; ``None`` ends it."""
+
+    def rest(self) -> None:
+        """End what goes on behind the frames, which may begin anew."""
+
+
+class SeriesInput(Input):
+    """The step of a series that a player shows."""
+
+    def __init__(self, player: Player) -> None:
+        super().__init__()
+        self.player = player
+
+    def vdi(self) -> VDI | None:
+        """Return the step's VDI, decoded now if it is not ready."""
+        self._vdi = self.player.vdi
+        return self._vdi
+
+    def bounds(self) -> tuple[float, ...] | None:
+        """Return the bounds of the step that was shown last, or of the first."""
+        return self.player.series.bounds if self._vdi is None else self._vdi.bounds
+
+    def stamp(self) -> Any:
+        """Return the step."""
+        return self.player.step
+
+    def shared(self) -> Input:
+        """Return an input that shows the same step, and plays by itself."""
+        other = Player(self.player.series)
+        other.step = self.player.step
+        return SeriesInput(other)
+
+    def rest(self) -> None:
+        """Pause, and leave no thread."""
+        self.player.close()
 
 
 class SourceInput(Input):
@@ -177,9 +213,11 @@ class ImageInput(Input):
 
 
 def input_of(data: Any) -> Input:
-    """Return what to draw for a VDI, its canonical image, or a :class:`VDISource`."""
+    """Return what to draw for a VDI, a series, a canonical image, or a :class:`VDISource`."""
     if isinstance(data, VDI):
         return Input(data)
+    if isinstance(data, VDISeries):
+        return SeriesInput(Player(data))
     if isinstance(data, VDISource):
         return SourceInput(data)
     if is_vdi_image(data):
@@ -187,7 +225,7 @@ def input_of(data: Any) -> Input:
         image.vdi()  # refuse a damaged one now
         return image
     raise InvalidVDIError(
-        f"a VDIMapper draws a VDI, its canonical image or a VDISource's output; got "
+        f"a VDIMapper draws a VDI, its canonical image, a series or a VDISource's output; got "
         f"{type(data).__name__}: put a VDISource between a volume and the mapper"
     )
 

@@ -62,6 +62,8 @@ class VDIStatus:
         What was raycast: the VDI, or the volume itself, for whatever reason.
     vdi : VDI or None
         The one that is shown, or is to be replaced.
+    time : float or None
+        That of the step of a series; ``None`` where no series is shown.
     """
 
     mode: Literal["none", "full", "preview"]
@@ -75,6 +77,7 @@ class VDIStatus:
     vdi: VDI | None
     stand_in: bool = False
     drawn: Way = "vdi"
+    time: float | None = None
 
     @property
     def share(self) -> float:
@@ -101,7 +104,9 @@ class VDIStatus:
             parts.append(f"{self.angle:.0f}° from the generating view")
         if self.ssim is not None:
             parts.append(f"SSIM about {self.ssim:.3f}")
-        if self.generation:
+        if self.time is not None:
+            parts.append(f"time {self.time:g}")
+        elif self.generation:
             parts.append(f"VDI no. {self.generation}")
         chosen = None if self.vdi is None else describe(self.vdi.metadata)
         if chosen is not None:

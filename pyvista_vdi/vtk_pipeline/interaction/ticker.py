@@ -16,6 +16,14 @@ PERIOD = 50
 #: Before other observers, whose default priority is 0: see below.
 _PRIORITY = 1.0
 
+#: Least milliseconds between two looks: timers of some systems are no finer.
+_SHORTEST = 5
+
+
+def period_of(rate: float) -> int:
+    """Return the milliseconds by which what changes so often in a second is followed."""
+    return int(min(max(_SHORTEST, 500 / rate), PERIOD))
+
 
 class Ticker:
     """Calls something again and again from the event loop, while it runs and no hand moves.
@@ -41,6 +49,7 @@ class Ticker:
         self._tick = weakref.WeakMethod(tick)
         self._interactor = vtkWeakReference()
         self._timer = 0
+        self._period = PERIOD
         self._observers: tuple[int, ...] = ()
 
     @property
@@ -48,15 +57,16 @@ class Ticker:
         """Whether it ticks."""
         return self._timer > 0
 
-    def start(self, interactor: Any) -> None:
-        """Tick, if it does not already, in this interactor."""
+    def start(self, interactor: Any, period: int = PERIOD) -> None:
+        """Tick every so many milliseconds, if it does not already, in this interactor."""
         if interactor is not self._interactor.Get() or interactor is None:
             self.stop()
-        if interactor is None or self.running:
+        if interactor is None or (self.running and period == self._period):
             return
         if not self._observers:
             self._observe(interactor)
-        self._timer = interactor.CreateRepeatingTimer(PERIOD)
+        self.pause()
+        self._timer, self._period = interactor.CreateRepeatingTimer(period), period
 
     def pause(self) -> None:
         """Take the timer away."""
@@ -117,16 +127,18 @@ class LoopTicker:
         self._tick = weakref.WeakMethod(tick)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._handle: asyncio.TimerHandle | None = None
+        self._period = PERIOD
 
-    def start(self) -> None:
-        """Tick, if it does not already, in the loop that runs in this thread, if one does."""
+    def start(self, period: int = PERIOD) -> None:
+        """Tick every so many milliseconds in the loop that runs in this thread, if one does."""
+        self._period = period
         try:
             loop = asyncio.get_running_loop()
         except RuntimeError:
             return
         if self._handle is None or loop is not self._loop:
             self.stop()
-            self._loop, self._handle = loop, loop.call_later(PERIOD / 1000, self._on_timer)
+            self._loop, self._handle = loop, loop.call_later(period / 1000, self._on_timer)
 
     def stop(self) -> None:
         """End: nothing is left in the loop."""
@@ -138,5 +150,5 @@ class LoopTicker:
         self._handle = None
         tick = self._tick()
         if tick is not None:
-            self.start()
+            self.start(self._period)
             tick()

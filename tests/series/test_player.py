@@ -1,0 +1,229 @@
+"""A series that plays: which step is shown when, by a clock that stands still between looks."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.series.player import Player
+
+#: Seconds after which something that should have happened has not.
+LONG = 600.0
+N = 8
+
+
+def _vdi(k):
+    camera = pvdi.Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))
+    color = [[k / N, 0.5, 0.0]]
+    return pvdi.VDI(camera, (1, 1), [0, 1], [4.0], [6.0], color, [2.0], (-1, 1, -1, 1, -1, 1))
+
+
+class Clock:
+    """Seconds that pass when the test says so."""
+
+    now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+class Steps(Sequence):
+    """Steps that count how often they are decoded, take their time, or are damaged."""
+
+    def __init__(self, clock):
+        self.vdis = [_vdi(k) for k in range(N)]
+        self.asked = []
+        self.seconds, self.damaged, self._clock = 0.0, (), clock
+
+    def __len__(self):
+        return N
+
+    def __getitem__(self, k):
+        self.asked.append(k)
+        self._clock.now += self.seconds
+        if k in self.damaged:
+            raise VDIFileError(f"step {k} is damaged")
+        return self.vdis[k]
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def steps(clock):
+    return Steps(clock)
+
+
+@pytest.fixture
+def player(steps, clock, default_runtime):
+    player = Player(pvdi.VDISeries(steps, np.arange(N) * 0.5), clock)
+    yield player
+    player.close()
+
+
+def _until(happened):
+    end = time.monotonic() + LONG
+    while not happened():
+        assert time.monotonic() < end, "it has not happened"
+        time.sleep(0.001)
+
+
+def _settled(player):
+    """Wait until the thread has decoded all that it wants now."""
+    _until(lambda: not player._worker.running)
+
+
+def test_a_step_is_shown_by_its_index_or_by_its_time(player, steps):
+    assert (player.step, player.time, player.vdi) == (0, 0.0, steps.vdis[0])
+    player.step = -1
+    assert (player.step, player.time, player.vdi) == (N - 1, 3.5, steps.vdis[-1])
+    player.time = 1.1
+    assert (player.step, player.vdi) == (2, steps.vdis[2])
+    player.step = np.int64(3)
+    assert player.step == 3
+    assert not player.advance()
+    assert not player.playing
+
+
+@pytest.mark.parametrize("step", [N, -N - 1, 1.5, "first", None])
+def test_steps_that_there_are_not(player, step):
+    with pytest.raises(InvalidArgumentError, match=f"from 0 to {N - 1}"):
+        player.step = step
+
+
+@pytest.mark.parametrize("rate", [0, -1, float("nan"), float("inf"), "fast", True])
+def test_rates_that_are_none(player, rate):
+    with pytest.raises(InvalidArgumentError, match="rate"):
+        player.play(rate)
+    assert not player.playing
+
+
+def test_every_step_is_shown_when_it_is_due(player, steps, clock):
+    player.play(rate=10)
+    player.advance()
+    shown = []
+    for _ in range(2 * N):
+        _settled(player)
+        assert not player.advance()  # not yet
+        _settled(player)
+        clock.now += 0.1001
+        assert player.advance()
+        shown.append(player.step)
+        assert player.vdi is steps.vdis[player.step]
+    assert shown == [(1 + k) % N for k in range(2 * N)]
+    assert player.dropped == 0
+
+
+def test_steps_are_left_out_where_frames_take_longer(player, clock):
+    player.play(rate=10)
+    player.advance()
+    _settled(player)
+    clock.now += 0.31
+    assert player.advance()
+    assert (player.step, player.dropped) == (3, 2)
+
+
+def test_what_is_decoded_slowly_is_shown_in_its_time(player, steps, clock):
+    steps.seconds = 0.25  # two and a half steps
+    player.play(rate=10)
+    began = clock.now
+    late = []
+    for _ in range(12):
+        player.advance()
+        _settled(player)
+        clock.now += 0.0001
+        if player.advance():
+            place = player._place
+            late.append((clock.now - began) * 10 - place)
+    # The first is decoded before it is known what one takes; then a step is shown while it is due,
+    # which is for one step's time, and the look comes .001 of it later
+    assert len(late) > 3
+    assert max(late[1:]) < 1.001
+    assert player.dropped > 0
+
+
+def test_without_a_loop_the_last_step_is_the_end(player, clock):
+    player.step = N - 3
+    player.play(rate=10, loop=False)
+    player.advance()
+    for _ in range(10):
+        _settled(player)
+        clock.now += 0.1
+        player.advance()
+    assert (player.step, player.playing) == (N - 1, False)
+    player.play(rate=10, loop=False)  # anew
+    assert (player.step, player.playing) == (0, True)
+
+
+def test_a_seek_goes_on_playing_from_there(player, clock):
+    player.play(rate=10)
+    player.advance()
+    clock.now += 0.1
+    player.step = 5
+    assert player.playing
+    player.advance()
+    _settled(player)
+    clock.now += 0.1001
+    assert player.advance()
+    assert player.step == 6
+
+
+def test_a_damaged_step_is_told_once_and_left_out(player, steps, clock):
+    steps.damaged = (2,)
+    player.play(rate=10)
+    player.advance()
+    told, shown = [], []
+    for _ in range(2 * N):
+        _settled(player)
+        clock.now += 0.1001
+        try:
+            if player.advance():
+                shown.append(player.step)
+        except VDIFileError as error:
+            told.append(str(error))
+            shown.append(player.step)
+    assert told == ["step 2 is damaged"]
+    assert 2 not in shown
+    assert {1, 3, 4, 5, 6, 7, 0} <= set(shown)
+    player.step = 2
+    with pytest.raises(VDIFileError, match="step 2"):
+        _ = player.vdi
+
+
+def test_few_steps_are_held_and_each_is_decoded_once(player, steps, clock):
+    player.play(rate=10)
+    player.advance()
+    for _ in range(N - 1):
+        _settled(player)
+        clock.now += 0.1001
+        player.advance()
+        assert len(player._ready) <= 6
+    assert steps.asked[: N - 1] == list(range(1, N))
+
+
+def test_nobody_looks_and_nothing_goes_on(player, steps, clock):
+    steps.seconds = 1.0
+    player.play(rate=10)
+    player.advance()
+    _settled(player)
+    assert len(steps.asked) <= 3
+    player.close()
+    assert not [t for t in threading.enumerate() if t.name == "pyvista-vdi series"]
+
+
+def test_another_vdi_of_the_step(player, steps):
+    other = _vdi(3)
+    player.replace(other)
+    assert player.vdi is other
+    player.step = 4
+    assert player.vdi is steps.vdis[4]
+    player.step = 0
+    assert player.vdi is steps.vdis[0]
