@@ -44,7 +44,8 @@ def main() -> None:
 
     file = made.save(target.with_suffix(".vdis"))
     memory = sum(step.n_supersegments * 8 for step in made)
-    print(f"{file.name}: {file.stat().st_size / 2**20:.1f} MiB for {memory / 2**20:.1f} MiB of VDIs")
+    on_disk = file.stat().st_size
+    print(f"{file.name}: {on_disk / 2**20:.1f} MiB for {memory / 2**20:.1f} MiB of VDIs")
     series = pvdi.read(file)  # by anybody: the volumes are not needed any more
 
     plotter = pv.Plotter(off_screen=off_screen, window_size=SIZE)

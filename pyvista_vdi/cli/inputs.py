@@ -71,8 +71,8 @@ def is_series(options: argparse.Namespace) -> bool:
 
 
 def is_volume(options: argparse.Namespace) -> bool:
-    """Whether FILE or ``--example`` names a volume, and no VDI."""
-    if options.example is not None or not is_vdi_file(options.file):
+    """Whether FILE or ``--example`` names a volume, and neither a VDI nor a series."""
+    if options.example is not None or not (is_vdi_file(options.file) or is_series(options)):
         return True
     given = [n for n in _OF_A_VOLUME if getattr(options, n) is not None]
     if given:

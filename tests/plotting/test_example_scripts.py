@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -101,6 +102,20 @@ def test_interactive_example_writes_an_animation_with_a_new_vdi(tmp_path):
         animation.seek(animation.n_frames - 1)
         last = np.asarray(animation.convert("RGB")).astype(int)
     assert np.abs(last - first)[100:].mean() > 5, "nothing has turned"
+
+
+def test_series_example_writes_a_movie_of_its_steps(tmp_path):
+    said, target = run_example("series.py", tmp_path)
+    sizes = re.search(r"series\.vdis: ([\d.]+) MiB for ([\d.]+) MiB", said)
+    assert sizes is not None, said
+    assert float(sizes[1]) < 0.3 * float(sizes[2])
+    with Image.open(target) as movie:
+        assert (movie.size, movie.n_frames) == ((480, 360), 16)
+        dark = []
+        for k in (0, 5, 10, 15):
+            movie.seek(k)
+            dark.append((np.asarray(movie.convert("L")) < 128).mean())
+    assert all(later > 1.2 * before for before, later in pairwise(dark[:3])), "it has not risen"
 
 
 def test_tradeoff_example_draws_its_three_fronts(tmp_path):

@@ -103,6 +103,7 @@ def test_a_page_is_sent_what_its_view_needs(page):
 
 def test_a_view_at_rest_is_the_volumes_own_picture(page):
     over = """viewer.shadowRoot.querySelector("img.over")"""
+    _wait(page, "viewer.camera !== null && remote.received.full >= 1")
     page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 9 }")
     _wait(page, f"remote.received.full >= 1 && !{over}.hidden")
     file = page.locator("vdi-viewer").screenshot()
