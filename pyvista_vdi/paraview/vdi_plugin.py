@@ -563,22 +563,22 @@ class VDIReader(vtk_pipeline.VDIReader):
 
     def __init__(self) -> None:
         super().__init__()
-        self._series: list[str] = []
+        self._files: list[str] = []
 
     def AddFileName(self, path: str) -> None:
         """Append a file, the next time step."""
-        self._series.append(path)
-        self.SetFileName(self._series[0])
+        self._files.append(path)
+        self.SetFileName(self._files[0])
         self.Modified()
 
     def ClearFileNames(self) -> None:
         """Begin anew."""
-        self._series.clear()
+        self._files.clear()
         self.SetFileName(None)
 
     def GetTimestepValues(self) -> list[float] | None:
         """Return the time of each file, its place in the series; ``None`` for one file."""
-        return [float(i) for i in range(len(self._series))] if len(self._series) > 1 else None
+        return [float(i) for i in range(len(self._files))] if len(self._files) > 1 else None
 
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the extent and the times."""
@@ -596,10 +596,10 @@ class VDIReader(vtk_pipeline.VDIReader):
         key = vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
         information = outputs.GetInformationObject(0)
         time = information.Get(key) if information.Has(key) else 0.0
-        if self._series:  # the last file that is not after the time
-            self._path = self._series[min(max(int(time), 0), len(self._series) - 1)]
+        if self._files:  # the last file that is not after the time
+            self._path = self._files[min(max(int(time), 0), len(self._files) - 1)]
         super()._execute(inputs, outputs)
-        if len(self._series) > 1:
+        if len(self._files) > 1:
             image = vtkImageData.GetData(outputs, 0)
             image.GetInformation().Set(vtkDataObject.DATA_TIME_STEP(), time)
 

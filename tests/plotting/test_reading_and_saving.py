@@ -11,6 +11,7 @@ from strategies import random_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIFileError
+from pyvista_vdi.plotting.reader import SeriesReader
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image, vdi_to_image
 
 
@@ -67,12 +68,13 @@ def test_a_file_that_is_no_deep_image_is_refused(tmp_path):
 
 
 def test_nothing_of_pyvista_is_shadowed():
-    ours = {"exr": ".exr", "vdi": ".vdi"}.values()
-    for registered in (pv.registered_readers(), pv.registered_writers()):
+    written = {".exr", ".vdi"}
+    ours = {*written, ".vdis"}
+    for registered, theirs in ((pv.registered_readers(), ours), (pv.registered_writers(), written)):
         found = {each.extension for each in registered if "pyvista_vdi" in each.source}
-        assert found == set(ours)
-    assert not set(ours) & set(pv.ImageData._WRITERS)
-    assert not set(ours) & set(pv.core.utilities.reader.CLASS_READERS)
+        assert found == theirs
+    assert not ours & set(pv.ImageData._WRITERS)
+    assert not ours & set(pv.core.utilities.reader.CLASS_READERS)
 
 
 def test_an_image_that_was_read_is_drawn(vdi, tmp_path):
@@ -82,3 +84,53 @@ def test_an_image_that_was_read_is_drawn(vdi, tmp_path):
     actor = plotter.add_vdi(pv.read(tmp_path / "a.exr"))
     assert actor.vdi.equals(vdi)
     plotter.close()
+
+
+# -- series ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def series(tmp_path):
+    vdis = [random_vdi(np.random.default_rng(seed)) for seed in range(3)]
+    return pvdi.read(pvdi.VDISeries.of(vdis, (0.5, 1.0, 4.0)).save(tmp_path / "a.vdis"))
+
+
+def test_read_gives_the_first_step_of_a_series(series, tmp_path):
+    image = pv.read(tmp_path / "a.vdis")
+    assert isinstance(image, pv.ImageData)
+    assert vdi_from_image(image).equals(series[0])
+
+
+def reader_of(path):
+    return pv.get_reader(path) if pv.version_info >= (0, 49) else SeriesReader(path)
+
+
+def test_a_series_has_a_reader_with_times(series, tmp_path):
+    reader = reader_of(tmp_path / "a.vdis")
+    assert isinstance(reader, pv.TimeReader)
+    assert reader.number_time_points == 3
+    assert reader.time_values == [0.5, 1.0, 4.0]
+    assert reader.time_point_value(1) == 1.0
+    assert reader.active_time_value == 0.5
+    for value, step in ((3.0, 2), (0.9, 1), (0.5, 0)):
+        reader.set_active_time_value(value)
+        assert reader.active_time_value == series.times[step]
+        assert vdi_from_image(reader.read()).equals(series[step])
+    images = []
+    for point in range(3):
+        reader.set_active_time_point(point)
+        assert reader.active_time_value == series.times[point]
+        images.append(reader.read())
+    # What was read stays what it is
+    assert all(vdi_from_image(image).equals(series[i]) for i, image in enumerate(images))
+
+
+def test_what_is_no_series_is_refused(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        pv.read(tmp_path / "absent.vdis")
+    (tmp_path / "a.vdis").write_bytes(b"something else")
+    reader = reader_of(tmp_path / "a.vdis")
+    with pytest.raises(VDIFileError, match="is not a series of VDIs"):
+        reader.read()
+    with pytest.raises(VDIFileError, match="is not a series of VDIs"):
+        _ = reader.time_values

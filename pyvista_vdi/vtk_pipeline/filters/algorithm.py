@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from inspect import Parameter, Signature
 from operator import attrgetter
 from typing import Any
@@ -13,6 +13,10 @@ from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
 from pyvista_vdi.errors import Cancelled
+
+TIME_STEPS = vtkStreamingDemandDrivenPipeline.TIME_STEPS()
+TIME_RANGE = vtkStreamingDemandDrivenPipeline.TIME_RANGE()
+UPDATE_TIME_STEP = vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
 
 #: Docstrings of ``SetDevice`` and ``GetDevice``.
 DEVICE = (
@@ -39,6 +43,16 @@ class Algorithm(VTKPythonAlgorithmBase):
     def Update(self, *args: Any) -> None:
         """Bring the output up to date, and raise what went wrong."""
         self._update(*args)
+
+    def UpdateTimeStep(self, time: float, *args: Any) -> None:
+        """Bring the output up to date as of a time, and raise what went wrong.
+
+        The time stays asked for until another one is. Pieces and ghosts, which VTK's method takes
+        as well, make no difference: images come whole.
+        """
+        self.UpdateInformation()
+        self.GetOutputInformation(0).Set(UPDATE_TIME_STEP, float(time))
+        self.Update()
 
     def _update(self, *args: Any) -> bool:
         """Do so, and return whether what is before this algorithm went well."""
@@ -177,6 +191,27 @@ def announce(
     information.Set(vtkImageData.SPACING(), (1.0, 1.0, 1.0), 3)
     information.Set(vtkImageData.ORIGIN(), (0.0, 0.0, 0.0), 3)
     vtkDataObject.SetPointDataActiveScalarInfo(information, *scalars)
+
+
+def announce_times(outputs: Any, times: Sequence[float]) -> None:
+    """Tell the pipeline the times of the steps; that there are none, if so."""
+    information = outputs.GetInformationObject(0)
+    if times:
+        information.Set(TIME_STEPS, times, len(times))
+        information.Set(TIME_RANGE, (times[0], times[-1]), 2)
+    else:
+        information.Remove(TIME_STEPS)
+        information.Remove(TIME_RANGE)
+
+
+def announced_times(information: Any) -> tuple[float, ...]:
+    """Return the times of the steps that a port announces."""
+    return tuple(information.Get(TIME_STEPS) or ()) if information.Has(TIME_STEPS) else ()
+
+
+def wanted_time(information: Any) -> float | None:
+    """Return the time that is asked of a port; ``None`` if none is."""
+    return information.Get(UPDATE_TIME_STEP) if information.Has(UPDATE_TIME_STEP) else None
 
 
 def ask_for_all(inputs: Any) -> None:

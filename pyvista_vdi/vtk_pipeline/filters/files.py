@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
-from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.io import checked_target, read, read_info
 from pyvista_vdi.model.vdi import picture_size
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, accessors, announce
+from pyvista_vdi.series.reader import StepsReader, is_series_file
+from pyvista_vdi.series.reader import read as read_series
+from pyvista_vdi.series.series import VDISeries
+from pyvista_vdi.vtk_pipeline.filters.algorithm import (
+    Algorithm,
+    accessors,
+    announce,
+    announce_times,
+    ask_for_all,
+    wanted_time,
+)
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image
 
 
@@ -19,39 +31,96 @@ def _as_path(path: str | os.PathLike[str] | None) -> str | None:
 
 
 class VDIReader(Algorithm):
-    """Read a VDI from a ``.vdi`` file or an OpenEXR deep image.
+    """Read a VDI from a ``.vdi`` file or an OpenEXR deep image, or the steps of a ``.vdis`` file.
 
     Out comes the VDI in its canonical VTK form, see
-    :func:`~pyvista_vdi.vtk_pipeline.filters.convert.vdi_to_image`.
+    :func:`~pyvista_vdi.vtk_pipeline.filters.convert.vdi_to_image`. Of a series the times are
+    announced (``TIME_STEPS``, ``TIME_RANGE``), and out comes the step nearest to the time that is
+    asked for (``UPDATE_TIME_STEP``), the first one where none is; its own time is the output's
+    ``DATA_TIME_STEP``.
 
     Notes
     -----
     Python's ``Update`` raises what went wrong; an update that VTK asks for writes it to VTK's
-    output window and gives an empty image.
+    output window and gives an empty image. Python's ``Update``, ``UpdateTimeStep`` and
+    ``UpdateInformation`` look whether the file is another by now, as a series is that grows.
     """
 
     def __init__(self) -> None:
         super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkImageData")
         self._path: str | None = None
+        self._series: VDISeries | None = None
+        self._seen: Any = None
 
     SetFileName, GetFileName = accessors(
         "FileName", "_path", "path", "Set the file.", "Return the file.", _as_path
     )
 
+    def GetSeries(self) -> VDISeries:
+        """Return the series of a ``.vdis`` file, with the steps that are finished by now.
+
+        Raises
+        ------
+        VDIFileError
+            If the file is no readable series.
+        """
+        self.UpdateInformation()
+        return read_series(self._path or "") if self._series is None else self._series
+
+    def Update(self, *args: Any) -> None:
+        """Bring the output up to date, and raise what went wrong."""
+        self._look_at_file()
+        super().Update(*args)
+
+    def UpdateInformation(self) -> None:
+        """Bring up to date what is announced."""
+        self._look_at_file()
+        super().UpdateInformation()
+
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Announce the output's extent: one point per list; reads the file's description only."""
-        try:
-            about = read_info(self._path) if self._path else None
-        except (VDIError, OSError):  # RequestData says it
-            about = None
+        """Announce times, and the extent: one point per list; reads the file's description only."""
+        about: Any = None
+        self._series = None
+        with suppress(VDIError, OSError):  # RequestData says it
+            if is_series_file(self._path):
+                steps = StepsReader(self._path or "")
+                about, self._series = steps.info(), VDISeries(steps, steps.times)
+            elif self._path:
+                about = read_info(self._path)
         self.picture_size = picture_size(about.window_size, about.metadata) if about else None
         announce(outputs, about.window_size if about else (1, 1))
+        announce_times(outputs, self._series.times if self._series else ())
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
         if self._path is None:
             raise InvalidArgumentError("VDIReader has no file name: call SetFileName(path)")
-        vtkImageData.GetData(outputs, 0).ShallowCopy(vdi_to_image(read(self._path)))
+        image = vtkImageData.GetData(outputs, 0)
+        if not is_series_file(self._path):
+            image.ShallowCopy(vdi_to_image(read(self._path)))
+            return
+        # What is wrong with it is raised by opening it again
+        series = read_series(self._path) if self._series is None else self._series
+        time = wanted_time(outputs.GetInformationObject(0))
+        step = 0 if time is None else series.nearest(time)
+        vdi = series[step]
+        announce(outputs, vdi.window_size)
+        ask_for_all([outputs])
+        image.ShallowCopy(vdi_to_image(vdi))
+        image.GetInformation().Set(vtkDataObject.DATA_TIME_STEP(), series.times[step])
+
+    def _look_at_file(self) -> None:
+        """Be out of date if the file is another by now."""
+        if self._path is None:
+            return
+        try:
+            found = Path(self._path).stat()
+            seen = (self._path, found.st_ino, found.st_size, found.st_mtime_ns)
+        except (OSError, ValueError):
+            seen = None
+        if seen != self._seen:
+            self._seen = seen
+            self.Modified()
 
 
 class VDIWriter(Algorithm):
