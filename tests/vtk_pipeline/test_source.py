@@ -314,7 +314,7 @@ def test_a_mapper_keeps_what_it_is_connected_to(tmp_path):
 
     mapper = connected()
     gc.collect()
-    assert mapper.painter.input.stamp() > 0
+    assert mapper.painter.input.stamp()[0] > 0
     assert mapper.GetVDI().n_supersegments > 500
 
 

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import pyvista as pv
+from plugin_scenes import soft_ball
 from strategies import random_vdi
-from vtkmodules.vtkCommonDataModel import vtkDataObject
+from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
+from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
-from vtkmodules.vtkImagingCore import vtkExtractVOI
+from vtkmodules.vtkFiltersGeneral import vtkMultiBlockDataGroupFilter
+from vtkmodules.vtkFiltersHybrid import vtkTemporalInterpolator
+from vtkmodules.vtkImagingCore import vtkExtractVOI, vtkRTAnalyticSource
+from vtkmodules.vtkRenderingCore import vtkVolumeProperty
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
 from pyvista_vdi.vtk_pipeline import VDIReader, VDIToImage, vdi_from_image
+from pyvista_vdi.vtk_pipeline.filters.inputs import SourceInput
+from pyvista_vdi.vtk_pipeline.filters.temporal import temporal_volumes
 
 TIMES = (0.5, 1.0, 4.0)
 #: Times that are asked for, and the step that is nearest to each; of two, the earlier.
@@ -139,3 +147,217 @@ def test_what_is_wrong_with_a_series_is_said(path):
         reader.UpdateTimeStep(float("nan"))
     reader.UpdateTimeStep(4.0)
     assert time_of(reader.GetOutputDataObject(0)) == 4.0
+
+
+# -- volumes ---------------------------------------------------------------------------------------
+
+SIZE = (24, 18)
+
+
+class Moving(VTKPythonAlgorithmBase):
+    """A ball that moves and fades; ``read`` lists the steps that it has given."""
+
+    def __init__(self, balls=None):
+        super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkImageData")
+        self.balls = [ball_at(step) for step in range(3)] if balls is None else balls
+        self.read = []
+
+    def RequestInformation(self, request, inputs, outputs):
+        information, keys = outputs.GetInformationObject(0), vtkStreamingDemandDrivenPipeline
+        information.Set(keys.WHOLE_EXTENT(), self.balls[0].GetExtent(), 6)
+        information.Set(keys.TIME_STEPS(), TIMES, len(TIMES))
+        information.Set(keys.TIME_RANGE(), (TIMES[0], TIMES[-1]), 2)
+        return 1
+
+    def RequestData(self, request, inputs, outputs):
+        information = outputs.GetInformationObject(0)
+        key = vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
+        wanted = information.Get(key) if information.Has(key) else 0.0
+        step = int(np.argmin(np.abs(np.array(TIMES) - wanted)))
+        self.read.append(step)
+        image = vtkImageData.GetData(outputs, 0)
+        image.ShallowCopy(self.balls[step])
+        image.GetInformation().Set(vtkDataObject.DATA_TIME_STEP(), TIMES[step])
+        return 1
+
+
+def ball_at(step):
+    ball = soft_ball(8)
+    ball["v"] = ball["v"] * (1 - 0.3 * step)
+    ball.origin = (-1 + 0.25 * step, -1, -1)
+    return ball
+
+
+def some_property():
+    prop = vtkVolumeProperty()
+    prop.GetRGBTransferFunction().AddRGBPoint(0, 0, 0.2, 1)
+    prop.GetRGBTransferFunction().AddRGBPoint(255, 1, 0.5, 0)
+    prop.GetScalarOpacity().AddPoint(0, 0)
+    prop.GetScalarOpacity().AddPoint(255, 0.8)
+    prop.SetScalarOpacityUnitDistance(0.3)
+    prop.SetInterpolationTypeToLinear()
+    return prop
+
+
+def some_camera():
+    return pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1), view_angle=25)
+
+
+def source_of(producer):
+    source = pvdi.VDISource()
+    source.SetInputConnection(producer.GetOutputPort())
+    source.SetVolumeProperty(some_property())
+    source.SetCamera(some_camera())
+    source.SetWindowSize(*SIZE)
+    return source
+
+
+@pytest.fixture(scope="module")
+def vdis(default_runtime):
+    """What generate makes of each step."""
+    made = [
+        pvdi.generate(ball_at(step), some_camera(), SIZE, volume_property=some_property())
+        for step in range(3)
+    ]
+    assert made[0].n_supersegments > 200
+    assert not made[0].equals(made[1])
+    assert not made[1].equals(made[2])
+    return made
+
+
+def test_a_source_makes_a_vdi_of_the_time_that_is_asked_for(vdis):
+    producer = Moving()
+    source = source_of(producer)
+    assert announced(source) == (TIMES, (0.5, 4.0))
+    for time, step in ASKED:
+        source.UpdateTimeStep(time)
+        vdi = source.GetVDI()
+        assert vdi.equals(vdis[step])
+        assert time_of(source.GetOutputDataObject(0)) == TIMES[step]
+        source.UpdateTimeStep(TIMES[step])
+        assert source.GetVDI() is vdi  # of the same step none is made again
+
+
+def test_a_source_behind_what_interpolates_in_time(default_runtime):
+    """VTK's filter asks for the two steps around the time; its image is what the VDI is made of."""
+    balls = [ball_at(0), ball_at(0), ball_at(0)]
+    balls[1]["v"] = balls[0]["v"] / 3
+    producer, between = Moving(balls), vtkTemporalInterpolator()
+    between.SetInputConnection(producer.GetOutputPort())
+    source = source_of(between)
+    source.UpdateTimeStep(0.75)
+    half = ball_at(0)
+    half["v"] = (balls[0]["v"] + balls[1]["v"]) / 2
+    np.testing.assert_allclose(source.GetVolume().array.ravel(), half["v"], rtol=1e-12)
+    expected = pvdi.generate(half, some_camera(), SIZE, volume_property=some_property())
+    assert source.GetVDI().equals(expected)
+
+
+def test_each_source_keeps_its_time_whatever_others_ask_for(vdis):
+    producer = Moving()
+    early, late = source_of(producer), source_of(producer)
+    early.UpdateTimeStep(0.5)
+    late.UpdateTimeStep(4.0)
+    for source, step in ((early, 0), (late, 2), (early, 0)):
+        assert source.GetVolume().origin == ball_at(step).origin
+        assert source.MakeRequest().volume.origin == ball_at(step).origin
+        assert SourceInput(source).vdi().equals(vdis[step])
+    # Without a time of its own a source takes what there is
+    third = source_of(producer)
+    producer.UpdateTimeStep(1.0)
+    assert third.GetVDI().equals(vdis[1])
+
+
+def test_extents_follow_a_volume_that_grows(default_runtime):
+    """With the volume's bounds covered, the lists are more as the volume is larger."""
+    balls = [ball_at(0) for _ in TIMES]
+    for step, ball in enumerate(balls):
+        ball.spacing = tuple(np.array(ball.spacing) * (1 + 0.2 * step))
+    producer, voi = Moving(balls), vtkExtractVOI()
+    source = source_of(producer)
+    source.SetCoverage("bounds")
+    voi.SetInputConnection(source.GetOutputPort())
+    seen = []
+    for time in TIMES:
+        source.UpdateTimeStep(time)
+        width, height = source.GetVDI().window_size
+        voi.SetVOI(0, width - 1, 0, height - 1, 0, 0)
+        voi.UpdateTimeStep(time)
+        assert voi.GetOutput().GetDimensions() == (width, height, 1)
+        seen.append(width)
+    assert seen[0] < seen[1] < seen[2]
+
+
+@pytest.mark.gl
+def test_a_mapper_draws_the_time_that_is_asked_of_the_source_or_before_it(vdis):
+    producer = Moving()
+    source, mapper, actor = source_of(producer), pvdi.VDIMapper(), pvdi.VDIActor()
+    mapper.SetInputConnection(source.GetOutputPort())
+    actor.SetMapper(mapper)
+    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
+    plotter.renderer.AddVolume(actor)
+    plotter.show(auto_close=False)
+    for asked in (producer, source):
+        for time, step in ASKED[:3]:
+            asked.UpdateTimeStep(time)
+            plotter.render()
+            assert mapper.GetVDI().equals(vdis[step])
+    plotter.close()
+
+
+# -- sources for generate_series -------------------------------------------------------------------
+
+
+def test_a_series_of_a_source_with_times(vdis):
+    """Each step is read when its turn comes, and again when it is asked for again."""
+    producer = Moving()
+    prop = some_property()
+    series = pvdi.generate_series(
+        producer, some_camera(), SIZE, volume_property=prop, precision="exact"
+    )
+    assert producer.read == [0, 1, 2]
+    assert series.times == TIMES
+    for step in range(3):
+        assert series[step].equals(vdis[step])
+    assert producer.read == [0, 1, 2]
+    first, last = series.volumes[0], series.volumes[-1]
+    assert producer.read == [0, 1, 2, 0, 2]
+    for volume, step in ((first, 0), (last, 2)):
+        assert volume.origin == ball_at(step).origin
+        np.testing.assert_array_equal(volume.array.ravel(), ball_at(step)["v"])
+
+
+def test_a_series_of_pyvistas_readers(vdis, tmp_path):
+    """A .pvd file: each step is a composite data set of one block."""
+    entries = []
+    for step, time in enumerate(TIMES):
+        ball_at(step).save(tmp_path / f"{step}.vti")
+        entries.append(f'<DataSet timestep="{time}" part="0" file="{step}.vti"/>')
+    (tmp_path / "a.pvd").write_text(
+        '<?xml version="1.0"?><VTKFile type="Collection" version="0.1"><Collection>'
+        f"{''.join(entries)}</Collection></VTKFile>"
+    )
+    series = pvdi.generate_series(
+        pv.get_reader(tmp_path / "a.pvd"),
+        some_camera(),
+        SIZE,
+        volume_property=some_property(),
+        precision="exact",
+    )
+    assert series.times == TIMES
+    assert all(series[step].equals(vdis[step]) for step in range(3))
+    assert series.volumes[1].origin == ball_at(1).origin
+
+
+def test_what_cannot_be_a_series_is_refused():
+    with pytest.raises(InvalidArgumentError, match="vtkRTAnalyticSource announces no time steps"):
+        pvdi.generate_series(vtkRTAnalyticSource(), some_camera(), SIZE)
+    two_blocks = Moving()
+    blocks, times = temporal_volumes(two_blocks)
+    assert (len(blocks), times) == (3, TIMES)
+    assert two_blocks.read == []
+    group = vtkMultiBlockDataGroupFilter()
+    group.AddInputConnection(two_blocks.GetOutputPort())
+    group.AddInputConnection(two_blocks.GetOutputPort())
+    with pytest.raises(UnsupportedError, match="MultiBlock"):
+        pvdi.generate_series(group, some_camera(), SIZE)

@@ -13,6 +13,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.series.player import Player
 from pyvista_vdi.series.series import VDISeries
+from pyvista_vdi.vtk_pipeline.filters.algorithm import wanted_time
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 
@@ -137,7 +138,7 @@ class SourceInput(Input):
     def stamp(self) -> Any:
         """Return the newest time stamp of all that it depends on."""
         if self.source.GetNumberOfInputConnections(0) > 0:
-            self.source.GetInputAlgorithm(0, 0).Update()
+            self.source.UpdateInput()
         self.source.CheckLights()
         stamps = [self.source.GetMTime()]
         data = self.source.GetInputDataObject(0, 0)
@@ -208,7 +209,8 @@ class ImageInput(Input):
         """Return the newest time stamp of all that it depends on."""
         if self._port is not None:
             self._producer.UpdateInformation()
-            return self._producer.GetMTime()
+            time = wanted_time(self._producer.GetOutputInformation(self._port.GetIndex()))
+            return self._producer.GetMTime(), time
         return self._image.GetMTime()
 
 

@@ -28,8 +28,10 @@ from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import Dial, warn_missed
 from pyvista_vdi.quality.probe import generate_by_dial
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
+    UPDATE_TIME_STEP,
     announce,
     ask_for_all,
+    wanted_time,
     whole_extent,
 )
 from pyvista_vdi.vtk_pipeline.filters.convert import (
@@ -79,7 +81,8 @@ class VDISource(SourceSettings):
     :func:`~pyvista_vdi.vtk_pipeline.filters.convert.vdi_to_image`), or as an object from
     :meth:`GetVDI`.
     It executes again only if the volume, the volume property or a setting has changed since; its
-    ``GetMTime()`` tells of the last two.
+    ``GetMTime()`` tells of the last two. Behind a source with time steps it makes a VDI of each
+    step that it is asked for (``UpdateTimeStep``), and keeps the last one.
 
     Notes
     -----
@@ -110,6 +113,7 @@ class VDISource(SourceSettings):
     def Update(self, *args: Any) -> Any:
         """Bring the output up to date, and raise what went wrong."""
         self.CheckLights()
+        self._check_input()
         if not self._update(*args):
             raise InvalidVolumeError(
                 "what is before VDISource failed: VTK's output window says why"
@@ -122,6 +126,22 @@ class VDISource(SourceSettings):
         made = self._request
         lit = made is not None and made.transfer_function.shading is not None
         if made is not None and lit and made.options.lights != self.GetLights():
+            self.Modified()
+
+    def _check_input(self) -> None:
+        """Be out of date if somebody has brought the input to another time, and this asks for none.
+
+        VTK's filters look at the data of their input only when they have reason to execute.
+        """
+        if self._request is None or self.GetNumberOfInputConnections(0) == 0:
+            return
+        data = self.GetInputDataObject(0, 0)
+        if (
+            wanted_time(self.GetOutputInformation(0)) is None
+            and isinstance(data, vtkImageData)
+            and data.GetNumberOfPoints() > 0
+            and self._read(data) is not self._request.volume
+        ):
             self.Modified()
 
     def GetVDI(self) -> VDI:
@@ -152,7 +172,7 @@ class VDISource(SourceSettings):
         This brings the pipeline before the source up to date, and generates nothing; it raises what
         :meth:`GetVDI` would raise before it generates.
         """
-        data = self._input()
+        data = self.UpdateInput()
         return self._make_request(
             data,
             self.GetCamera() if view is None else view.camera,
@@ -170,7 +190,7 @@ class VDISource(SourceSettings):
 
     def GetVolume(self) -> Volume:
         """Return the volume at the input, read again only if it has changed; raises if none is."""
-        return self._read(self._input())
+        return self._read(self.UpdateInput())
 
     def Copy(self) -> VDISource:
         """Return another source with this one's input, settings and VDI.
@@ -184,10 +204,19 @@ class VDISource(SourceSettings):
         other._vdi, other._request = self._vdi, self._request
         return other
 
-    def _input(self) -> Any:
-        """Return the data at the input, brought up to date."""
+    def UpdateInput(self) -> Any:
+        """Return the data at the input, up to date and as of the time that is asked of the source.
+
+        Raises
+        ------
+        InvalidVolumeError
+            If there is no input.
+        """
         if self.GetNumberOfInputConnections(0) == 0:
             raise InvalidVolumeError(_NO_INPUT)
+        time = wanted_time(self.GetOutputInformation(0))
+        if time is not None:  # else what others asked for is as good
+            self.GetInputInformation(0, 0).Set(UPDATE_TIME_STEP, time)
         self.GetInputAlgorithm(0, 0).Update()
         return self.GetInputDataObject(0, 0)
 
@@ -238,9 +267,9 @@ class VDISource(SourceSettings):
             self._request = request
             warn_missed(self._vdi, stacklevel=2)
         vtkImageData.GetData(outputs, 0).ShallowCopy(vdi_to_image(self._vdi))
-        if self._dial is not None:
-            announce(outputs, self._vdi.window_size)  # which it has chosen only now
-            ask_for_all([outputs])
+        # A dial has chosen it only now, and a volume's bounds may change with time
+        announce(outputs, self._vdi.window_size)
+        ask_for_all([outputs])
 
     def _make_request(
         self,

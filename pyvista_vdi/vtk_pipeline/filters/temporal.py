@@ -1,0 +1,83 @@
+"""Volumes that change in time, from VTK's and PyVista's sources: read when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from threading import Lock
+from typing import Any
+
+from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.vtk_pipeline.filters.algorithm import announced_times
+
+
+def temporal_volumes(source: Any) -> tuple[Sequence[Any], tuple[float, ...]]:
+    """Return the steps of a source as a sequence of VTK's data, and their times.
+
+    Parameters
+    ----------
+    source : vtkAlgorithm or pyvista.TimeReader
+        What announces times (``TIME_STEPS``), or is a reader of PyVista with ``time_values``.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If it has no times.
+    """
+    read: Callable[[int], Any]
+    if hasattr(source, "time_values"):
+        times, read = tuple(source.time_values), partial(_read_point, source)
+    else:
+        source.UpdateInformation()
+        times = announced_times(source.GetOutputInformation(0))
+        read = partial(_update_to, source, times)
+    if not times:
+        raise InvalidArgumentError(
+            f"{type(source).__name__} announces no time steps: pass its output to generate, or the "
+            "volumes of a series in a list"
+        )
+    return _Steps(read, len(times)), times
+
+
+class _Steps(Sequence[Any]):
+    """The data of each step; from one thread at a time, since there is one source."""
+
+    def __init__(self, read: Callable[[int], Any], n: int) -> None:
+        self._read, self._n = read, n
+        self._lock = Lock()
+
+    def __len__(self) -> int:
+        return self._n
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, slice):
+            return [self[i] for i in range(self._n)[index]]
+        with self._lock:
+            return _only_block(self._read(range(self._n)[index]))
+
+
+def _read_point(reader: Any, i: int) -> Any:
+    reader.set_active_time_point(i)
+    return reader.read()
+
+
+def _update_to(algorithm: Any, times: Sequence[float], i: int) -> Any:
+    algorithm.UpdateTimeStep(times[i])
+    data = algorithm.GetOutputDataObject(0)
+    step = data.NewInstance()
+    step.ShallowCopy(data)  # the output is another one at another time
+    return step
+
+
+def _only_block(data: Any) -> Any:
+    """Return the only block of a composite data set, as files with times often have; else it."""
+    if not isinstance(data, vtkCompositeDataSet):
+        return data
+    blocks, iterator = [], data.NewIterator()
+    iterator.InitTraversal()
+    while not iterator.IsDoneWithTraversal():
+        blocks.append(iterator.GetCurrentDataObject())
+        iterator.GoToNextItem()
+    return blocks[0] if len(blocks) == 1 else data
