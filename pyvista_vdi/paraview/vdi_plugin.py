@@ -1,4 +1,4 @@
-"""ParaView's plugin: VDI Source, VDI To Image, VDI In Scene, a reader and a writer.
+"""ParaView's plugin: VDI Source, VDI To Image, VDI In Scene, two readers and a writer.
 
 ParaView loads this file by its path (``pyvista-vdi paraview`` prints it): Tools > Manage
 Plugins, ``paraview.simple.LoadPlugin`` or ``PV_PLUGIN_PATH``. Nothing else imports it. It declares
@@ -21,7 +21,6 @@ from vtkmodules.vtkCommonDataModel import (
     vtkPiecewiseFunction,
     vtkPolyData,
 )
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkFiltersSources import vtkOutlineSource
 from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
 
@@ -37,7 +36,7 @@ except ImportError as error:
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, watch
+from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce_times, wanted_time, watch
 from pyvista_vdi.vtk_pipeline.filters.convert import (
     require_image,
     scalars_of,
@@ -198,6 +197,15 @@ _SOURCE_XML = f"""
   <Documentation>view: the VDI covers the window. bounds: the whole volume, whatever part of it the
   window shows.</Documentation>
 </StringVectorProperty>
+"""
+
+
+#: The times that an algorithm announces, for ParaView's animation.
+_TIMES_XML = """
+<DoubleVectorProperty name="TimestepValues" repeatable="1" information_only="1"
+                      si_class="vtkSITimeStepsProperty">
+  <TimeStepsInformationHelper />
+</DoubleVectorProperty>
 """
 
 
@@ -552,11 +560,8 @@ def _enter(view: Any, actor: Any, algorithm: VDIInScene) -> None:
          <FileListDomain name="files" />
          <Hints><FileChooser extensions="vdi exr" file_description="Volumetric Depth Image" />
          </Hints>
-       </StringVectorProperty>
-       <DoubleVectorProperty name="TimestepValues" command="GetTimestepValues" repeatable="1"
-                             information_only="1" si_class="vtkSITimeStepsProperty">
-         <TimeStepsInformationHelper />
-       </DoubleVectorProperty>"""
+       </StringVectorProperty>"""
+    + _TIMES_XML
 )
 class VDIReader(vtk_pipeline.VDIReader):
     """VDIs from files, one per time step: :class:`pyvista_vdi.vtk_pipeline.VDIReader`."""
@@ -576,32 +581,41 @@ class VDIReader(vtk_pipeline.VDIReader):
         self._files.clear()
         self.SetFileName(None)
 
-    def GetTimestepValues(self) -> list[float] | None:
-        """Return the time of each file, its place in the series; ``None`` for one file."""
-        return [float(i) for i in range(len(self._files))] if len(self._files) > 1 else None
-
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Announce the extent and the times."""
-        pipeline = vtkStreamingDemandDrivenPipeline
-        information, times = outputs.GetInformationObject(0), self.GetTimestepValues()
-        if times is None:
-            information.Remove(pipeline.TIME_STEPS())
-            information.Remove(pipeline.TIME_RANGE())
-        else:
-            information.Set(pipeline.TIME_STEPS(), times, len(times))
-            information.Set(pipeline.TIME_RANGE(), [times[0], times[-1]], 2)
-        return int(super().RequestInformation(request, inputs, outputs))
+        """Announce the extent, and the time of each file: its place among them."""
+        done = super().RequestInformation(request, inputs, outputs)
+        if len(self._files) > 1:
+            announce_times(outputs, [float(i) for i in range(len(self._files))])
+        return done
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
-        key = vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
-        information = outputs.GetInformationObject(0)
-        time = information.Get(key) if information.Has(key) else 0.0
+        time = wanted_time(outputs.GetInformationObject(0)) or 0.0
         if self._files:  # the last file that is not after the time
             self._path = self._files[min(max(int(time), 0), len(self._files) - 1)]
         super()._execute(inputs, outputs)
         if len(self._files) > 1:
             image = vtkImageData.GetData(outputs, 0)
             image.GetInformation().Set(vtkDataObject.DATA_TIME_STEP(), time)
+
+
+@smproxy.reader(
+    name="VDISeriesReader",
+    label="VDI Series Reader",
+    extensions="vdis",
+    file_description="Series of Volumetric Depth Images",
+    support_reload=False,
+)
+@smhint.xml('<ReloadFiles property="Refresh" />')
+@smproperty.xml(
+    """<StringVectorProperty name="FileName" command="SetFileName" number_of_elements="1"
+                             animateable="0" panel_visibility="never">
+         <FileListDomain name="files" />
+       </StringVectorProperty>
+       <Property name="Refresh" command="Modified" panel_visibility="never" />"""
+    + _TIMES_XML
+)
+class VDISeriesReader(vtk_pipeline.VDIReader):
+    """The steps of a series, from one file: :class:`pyvista_vdi.vtk_pipeline.VDIReader`."""
 
 
 @smproxy.writer(

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from paraview import simple, smstate
 from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonDataModel import vtkDataObject
 
 import pyvista_vdi
 from pyvista_vdi.vtk_pipeline import vdi_from_image
@@ -278,6 +279,63 @@ def series(folder):
     one = simple.OpenDataFile(str(folder / "x_1.vdi"))
     found["times of one"] = list(one.TimestepValues)
     (folder / "series.json").write_text(json.dumps(found))
+
+
+def animation(folder):
+    """Play a series among the objects of a view, and as a picture; then one that grows."""
+    reader = simple.OpenDataFile(str(folder / "ball.vdis"))
+    picture = simple.VDIToImage(Input=reader, Azimuth=20)
+    view = black_view(SIZE)
+    outline = simple.Show(simple.VDIInScene(Input=reader), view)
+    outline.Opacity = 0
+    camera = json.loads((folder / "camera.json").read_text())
+    view.CameraPosition = camera["position"]
+    view.CameraFocalPoint = camera["focal_point"]
+    view.CameraViewUp = camera["view_up"]
+    view.CameraViewAngle = camera["view_angle"]
+    scene = simple.GetAnimationScene()
+    scene.UpdateAnimationUsingDataTimeSteps()
+    found = {
+        "reader": reader.SMProxy.GetXMLName(),
+        "times": list(reader.TimestepValues),
+        "scene": list(scene.TimeKeeper.TimestepValues),
+        "shown": [],
+    }
+    simple.SaveAnimation(str(folder / "played.png"), view, ImageResolution=SIZE)
+    for i, time in enumerate(json.loads((folder / "times.json").read_text())):
+        scene.AnimationTime = time
+        simple.SaveScreenshot(str(folder / f"scene_{i}.png"), view, ImageResolution=SIZE)
+        picture.UpdatePipeline(time)
+        save_pixels(picture, folder / f"picture_{i}.npy")
+        data = reader.GetClientSideObject().GetOutputDataObject(0).GetInformation()
+        found["shown"].append(data.Get(vtkDataObject.DATA_TIME_STEP()))
+    (folder / "more.vdis").replace(folder / "ball.vdis")
+    simple.ReloadFiles(reader)
+    found["reloaded"] = list(reader.TimestepValues)
+    (folder / "animation.json").write_text(json.dumps(found))
+
+
+def temporal(folder):
+    """Make VDIs of a volume in several files, a time step each, as the animation goes."""
+    volume = simple.OpenDataFile([str(folder / f"ball_{step}.vti") for step in range(3)])
+    source = simple.VDISource(Input=volume, WindowSize=SIZE, ScalarOpacityUnitDistance=0.2)
+    source.ColorFunction = simple.GetColorTransferFunction("v")
+    source.OpacityFunction = simple.GetOpacityTransferFunction("v")
+    source.ColorFunction.RGBPoints = [0.0, 0.0, 0.2, 1.0, 255.0, 1.0, 0.5, 0.0]
+    source.ColorFunction.ColorSpace = "RGB"
+    source.OpacityFunction.Points = [0.0, 0.0, 0.5, 0.0, 255.0, 0.8, 0.5, 0.0]
+    view = black_view(SIZE)
+    view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = (5, 4, 3), (0, 0, 0), (0, 0, 1)
+    simple.SetActiveView(view)
+    source.SMProxy.InvokeCommand("TakeActiveView")
+    simple.Show(simple.VDIInScene(Input=source), view).Opacity = 0
+    scene = simple.GetAnimationScene()
+    scene.UpdateAnimationUsingDataTimeSteps()
+    (folder / "times.json").write_text(json.dumps(list(scene.TimeKeeper.TimestepValues)))
+    for time in (2, 0, 1):
+        scene.AnimationTime = time
+        simple.SaveScreenshot(str(folder / f"scene_{time}.png"), view, ImageResolution=SIZE)
+        simple.SaveData(str(folder / f"made_{time}.vdi"), source)
 
 
 def mistakes(folder):

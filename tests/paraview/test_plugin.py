@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from plugin_scenes import soft_ball
 from virtual_screen import virtual_screen
 from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
 from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
@@ -37,6 +38,9 @@ REQUIRED = os.environ.get("PYVISTA_VDI_REQUIRE_PARAVIEW") == "1"
 #: side of a border is another one; 0.1 % of the pixels may be.
 ROUNDING = 1e-5
 SHARE_OF_BORDER_PIXELS = 1e-3
+
+#: Of the views in which series are shown.
+SCREEN = (240, 180)
 
 #: An opacity and a colour in eight bits each, their product in eight bits: 1.5 / 255 at most.
 BLENDED = 2 / 255
@@ -255,6 +259,81 @@ def test_a_series_is_one_source_with_time_steps(paraview, tmp_path, default_runt
         expected = pvdi.render(vdi, vdi.camera.azimuth(30))
         apart = np.abs(pixels(tmp_path / f"step_{step}.npy", (60, 40)) - expected).max(axis=2)
         assert (apart > ROUNDING).mean() <= SHARE_OF_BORDER_PIXELS
+
+
+def ball_at(step):
+    """A soft ball that moves along x and fades."""
+    ball = soft_ball(12)
+    ball["v"] = ball["v"] * (1 - 0.2 * step)
+    ball.origin = (-1 + 0.4 * step, -1, -1)
+    return ball
+
+
+def ramp():
+    color, opacity, prop = vtkColorTransferFunction(), vtkPiecewiseFunction(), vtkVolumeProperty()
+    color.AddRGBPoint(0, 0, 0.2, 1)
+    color.AddRGBPoint(255, 1, 0.5, 0)
+    opacity.AddPoint(0, 0)
+    opacity.AddPoint(255, 0.8)
+    prop.SetColor(color)
+    prop.SetScalarOpacity(opacity)
+    prop.SetScalarOpacityUnitDistance(0.2)
+    prop.SetInterpolationTypeToLinear()
+    return prop
+
+
+def assert_alike(found, expected):
+    """Two pictures over black, border pixels and the rounding to bytes apart."""
+    assert expected.max() > 0.2
+    apart = np.abs(found - expected).max(axis=2)
+    assert (apart > BLENDED).mean() <= SHARE_OF_BORDER_PIXELS, apart.max()
+
+
+def test_a_series_plays_with_paraviews_animation(paraview, tmp_path, default_runtime):
+    """In a scene, as a picture and in a saved animation: the step nearest to the time."""
+    times, camera = (0.5, 1.0, 4.0), filling_camera(ball_at(0).bounds, SCREEN)
+    look = {"volume_property": ramp(), "window_size": SCREEN}
+    pvdi.generate_series([ball_at(i) for i in range(4)], camera, times=(*times, 5.0), **look).save(
+        tmp_path / "more.vdis"
+    )
+    series = pvdi.read(tmp_path / "more.vdis")[:3]
+    series.save(tmp_path / "ball.vdis")
+    seen_from = camera.azimuth(10)
+    (tmp_path / "camera.json").write_text(json.dumps(seen_from.to_dict()))
+    asked = {4.0: 2, 0.5: 0, 2.4: 1, 2.7: 2, 1.0: 1}
+    (tmp_path / "times.json").write_text(json.dumps(list(asked)))
+    assert paraview("animation", tmp_path).strip() == ""
+    found = json.loads((tmp_path / "animation.json").read_text())
+    assert found["reader"] == "VDISeriesReader"
+    assert found["times"] == found["scene"] == list(times)
+    assert found["shown"] == [times[step] for step in asked.values()]
+    assert found["reloaded"] == [*times, 5.0]
+    expected = [over_black(pvdi.render(vdi, seen_from, SCREEN)) for vdi in series]
+    for i, step in enumerate(asked.values()):
+        assert_alike(screenshot(tmp_path / f"scene_{i}.png"), expected[step])
+        turned = pvdi.render(series[step], camera.azimuth(20), SCREEN)
+        apart = np.abs(pixels(tmp_path / f"picture_{i}.npy", SCREEN) - turned).max(axis=2)
+        assert (apart > ROUNDING).mean() <= SHARE_OF_BORDER_PIXELS
+    played = sorted(tmp_path.glob("played*.png"))
+    assert len(played) == 3
+    for path, picture in zip(played, expected, strict=True):
+        assert_alike(screenshot(path), picture)
+
+
+def test_vdis_are_made_of_the_time_that_paraview_shows(paraview, tmp_path, default_runtime):
+    balls = [ball_at(step) for step in range(3)]
+    for step, ball in enumerate(balls):
+        ball.origin = balls[0].origin  # ParaView takes it from the first file
+        ball.save(tmp_path / f"ball_{step}.vti")
+    assert paraview("temporal", tmp_path).strip() == ""
+    assert json.loads((tmp_path / "times.json").read_text()) == [0, 1, 2]
+    for step in range(3):
+        made = pvdi.read(tmp_path / f"made_{step}.vdi")
+        expected = pvdi.generate(balls[step], made.camera, SCREEN, volume_property=ramp())
+        np.testing.assert_array_equal(made.offsets, expected.offsets)
+        np.testing.assert_allclose(made.optical_depth, expected.optical_depth, atol=1e-4)
+        picture = over_black(pvdi.render(expected, made.camera, SCREEN))
+        assert_alike(screenshot(tmp_path / f"scene_{step}.png"), picture)
 
 
 def test_mistakes_are_said_and_nothing_breaks(paraview, tmp_path):
