@@ -2,6 +2,7 @@
 // its occupied slabs as one 64-bit mask, which answers a ray's whole crossing of the stack with one load.
 //
 // -D OFFSET_T   type of an offset into the supersegments: uint or ulong
+// -D PACKED=8   faces are codes of depth, see model/packing.py
 #include "raycasting/stacks.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -9,8 +10,15 @@
 // `occupied_slabs` sums up. Counts are sums of whole numbers, so that their order changes nothing.
 __kernel void count_supersegments(
     __global const OFFSET_T *offsets, // width * height + 1
+#ifdef PACKED
+    __global const int *origins,      // of the lists' depths, steps
+    __global const ushort *strides,   // steps per code
+    __global const uint2 *words,
+    float step,                       // of depth, world units
+#else
     __global const float *fronts,     // view depth less depth_origin
     __global const float *backs,
+#endif
     int width, int height,            // lists
     int stacks_wide,
     float first_depth,                // where slab 0 begins, view depth less depth_origin
@@ -25,8 +33,15 @@ __kernel void count_supersegments(
     const size_t j = (list / (size_t)width) >> STACK_SHIFT;
     __global uint *cells = changes + (j * (size_t)stacks_wide + i) * SLABS;
     for (OFFSET_T k = offsets[list]; k < offsets[list + 1]; ++k) {
-        const int first = slab_of(fronts[k] - margin, first_depth, slabs_per_depth);
-        const int last = slab_of(backs[k] + margin, first_depth, slabs_per_depth);
+#ifdef PACKED
+        const int origin = origins[list], stride = strides[list];
+        const float front = (float)(origin + (int)(words[k].x & DEPTH_CODES) * stride) * step;
+        const float back = (float)(origin + (int)(words[k].x >> 14 & DEPTH_CODES) * stride) * step;
+#else
+        const float front = fronts[k], back = backs[k];
+#endif
+        const int first = slab_of(front - margin, first_depth, slabs_per_depth);
+        const int last = slab_of(back + margin, first_depth, slabs_per_depth);
         atomic_inc(cells + first);
         if (last + 1 < SLABS)
             atomic_dec(cells + last + 1);

@@ -140,16 +140,28 @@ class Packed8:
         media = {name: aligned_empty(n, np.float32) for name in ("front", "back", "optical_depth")}
         media["color"] = aligned_empty((n, 3), np.float32)
         for lists, part in _pieces(counts):
-            origins = np.repeat(self.origins[lists], counts[lists])
-            strides = np.repeat(self.strides[lists].astype(np.int32), counts[lists])
-            faces = self.depth_codes(part.start, part.stop)
-            for name, codes in zip(("front", "back"), faces, strict=True):
-                whole = (origins + codes.view(np.int32) * strides).astype(np.float32)
-                media[name][part] = whole * np.float32(self.step)
-            tau = self.tau_codes(part.start, part.stop)
+            own = np.repeat(np.arange(lists.start, lists.stop), counts[lists])
+            for name, values in self.media_at(part, own, *media).items():
+                media[name][part] = values
+        return media
+
+    def media_at(
+        self, rows: slice | NDArray[np.int64], lists: NDArray[np.int64], *names: str
+    ) -> dict[str, NDArray[np.float32]]:
+        """Return the named ones of some supersegments, in these lists."""
+        low, high = self.words[rows, 0], self.words[rows, 1]
+        media = {}
+        if "color" in names:
+            media["color"] = unpacked_color(high, _COLOR_8)
+        for name, first_bit in (("front", 0), ("back", 14)):
+            if name in names:
+                codes = (low >> np.uint32(first_bit) & np.uint32(DEPTH_CODES)).view(np.int32)
+                whole = self.origins[lists] + codes * self.strides[lists].astype(np.int32)
+                media[name] = whole.astype(np.float32) * np.float32(self.step)
+        if "optical_depth" in names:
+            tau = low >> np.uint32(28) | (high & np.uint32(0xFF)) << np.uint32(4)
             bits = np.where(tau > 0, tau + np.uint32(TAU_BASE - 1) << np.uint32(16), 0)
-            media["optical_depth"][part] = bits.astype(np.uint32).view(np.float32)
-            media["color"][part] = unpacked_color(self.words[part, 1], _COLOR_8)
+            media["optical_depth"] = bits.astype(np.uint32).view(np.float32)
         return media
 
     @classmethod
@@ -379,7 +391,7 @@ def packed_8(
     if (offsets[1:] < offsets[:-1]).any():
         raise InvalidVDIError("offsets must not decrease")
     counts = np.diff(offsets).astype(np.int64)
-    _check_grid(step, stored["origin"], stored["stride"], counts)
+    check_grid(step, stored["origin"], stored["stride"], counts)
     gaps, thicknesses = stored["front"].astype(np.int64), stored["back"].astype(np.int64)
     tau = stored["optical_depth"].astype(np.uint32)
     # Codes begin anew with every list and every chunk
@@ -406,9 +418,10 @@ def packed_8(
     )
 
 
-def _check_grid(
-    step: float, origins: NDArray[Any], strides: NDArray[Any], counts: NDArray[np.int64]
+def check_grid(
+    step: float, origins: NDArray[Any], strides: NDArray[Any], counts: NDArray[Any]
 ) -> None:
+    """Raise InvalidVDIError where lists' depths are on no grid that packing makes."""
     mantissa, exponent = math.frexp(step)
     if not (mantissa == 0.5 and _LEAST_STEP_EXPONENT < exponent <= 105):
         raise InvalidVDIError(f"the step of depths must be a power of two; got {step}")

@@ -12,11 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.packing import Packing, check_precision, packing_of
+from pyvista_vdi.model.packing import Packed8, Packing, check_precision, packing_of
 from pyvista_vdi.model.providers import provider
 
 if TYPE_CHECKING:
     import os
+
+
+#: The arrays of supersegments.
+_MEDIA = ("front", "back", "color", "optical_depth")
 
 
 class VDI:
@@ -96,12 +100,57 @@ class VDI:
         self._check_lists()
         self._check_media()
 
+    @classmethod
+    def _of_packing(
+        cls,
+        camera: Camera,
+        window_size: tuple[int, int],
+        offsets: NDArray[np.uint64],
+        packing: Packed8,
+        bounds: ArrayLike,
+        *,
+        depth_origin: float,
+        metadata: Mapping[str, Any],
+    ) -> VDI:
+        """Return a VDI of 8-byte supersegments that are valid; arrays are made when asked for."""
+        vdi = cls.__new__(cls)
+        vdi.camera, vdi.window_size = camera, window_size
+        vdi.depth_origin = _checked_depth_origin(depth_origin)
+        vdi.metadata = _checked_metadata(metadata)
+        vdi.offsets = _array("offsets", offsets, np.uint64, ())
+        vdi.bounds = _checked_bounds(bounds)
+        vdi.packing = packing
+        occupied = np.flatnonzero(vdi.counts)
+        if occupied.size and not camera.parallel_projection:
+            first = packing.media_at(offsets.view(np.int64)[occupied], occupied, "front")["front"]
+            if not first.min() >= np.float64(-vdi.depth_origin):
+                vdi._check_media()  # says which
+        return vdi
+
+    def __getattr__(self, name: str) -> Any:
+        """Make the arrays of a packed VDI."""
+        if name not in _MEDIA or "packing" not in vars(self):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        assert isinstance(self.packing, Packed8)
+        for array, values in self.packing.media(self.counts.reshape(-1)).items():
+            values.setflags(write=False)
+            setattr(self, array, values)
+        return vars(self)[name]
+
+    def _media_at(
+        self, rows: NDArray[np.int64], lists: NDArray[np.int64], *names: str
+    ) -> Mapping[str, NDArray[np.float32]]:
+        """Return the named arrays' values for some supersegments, in these lists."""
+        if "front" not in vars(self) and isinstance(self.packing, Packed8):
+            return self.packing.media_at(rows, lists, *names)
+        return {name: getattr(self, name)[rows] for name in names}
+
     # -- what is in it ---------------------------------------------------------------------------
 
     @property
     def n_supersegments(self) -> int:
         """Number of supersegments in all lists."""
-        return len(self.front)
+        return int(self.offsets[-1])
 
     @property
     def counts(self) -> NDArray[np.int64]:
@@ -114,7 +163,7 @@ class VDI:
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays in memory, with those of the packed form where there is one."""
-        arrays = (self.offsets, self.front, self.back, self.color, self.optical_depth)
+        arrays = [vars(self)[name] for name in ("offsets", *_MEDIA) if name in vars(self)]
         packed = 0 if self.packing is None else self.packing.nbytes
         return sum(array.nbytes for array in arrays) + packed
 
@@ -141,7 +190,7 @@ class VDI:
 
     def equals(self, other: VDI) -> bool:
         """Whether all arrays, the view and the bounds are the same to the last bit."""
-        names = ("offsets", "front", "back", "color", "optical_depth")
+        names = ("offsets", *_MEDIA)
         return (
             self.camera == other.camera
             and self.window_size == other.window_size
@@ -248,7 +297,7 @@ class VDI:
                 f"offsets must not decrease; offsets[{i}] = {self.offsets[i]} is followed by "
                 f"{self.offsets[i + 1]}"
             )
-        for name in ("front", "back", "color", "optical_depth"):
+        for name in _MEDIA:
             if len(getattr(self, name)) != n or self.offsets[-1] != n:
                 raise InvalidVDIError(
                     f"offsets[-1] = {self.offsets[-1]} supersegments, but front has {n} and "

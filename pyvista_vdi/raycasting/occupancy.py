@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +12,7 @@ from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.constants import SLABS, STACK
 from pyvista_vdi.device.work_order import GROUP
+from pyvista_vdi.model.packing import Packed8
 from pyvista_vdi.model.vdi import VDI
 
 #: Squares of stacks along the grid's longer edge: `OccupancyGrid.corners` has a box for each.
@@ -30,8 +34,10 @@ class OccupancyGrid:
     span the depth range of the VDI's bounds. Built on the device, from the VDI's arrays alone, so
     that a file need not carry it.
 
-    ``offsets`` are uint32, or uint64 if ``long_offsets``; ``nearest`` is the least view depth in
-    front of V_O's eye, and ``shifted`` says whether the depth coordinate is that of a long lens.
+    ``faces`` are the kernel's: buffers of fronts and backs, or of 8-byte lists their origins,
+    strides, words and step. ``offsets`` are uint32, or uint64 if ``long_offsets``; ``nearest`` is
+    the least view depth in front of V_O's eye, and ``shifted`` says whether the depth coordinate
+    is that of a long lens.
     """
 
     #: uint32 (stacks high, stacks wide, slabs); uint64 per stack: bit s is set where slab s is
@@ -44,8 +50,7 @@ class OccupancyGrid:
         runtime: Runtime,
         vdi: VDI,
         offsets: DeviceBuffer,
-        front: DeviceBuffer,
-        back: DeviceBuffer,
+        faces: Sequence[Any],
         *,
         nearest: float,
         shifted: bool,
@@ -66,15 +71,16 @@ class OccupancyGrid:
         with kept_together() as keep:
             self.counts = keep(runtime.buffer((high, wide, SLABS), np.uint32, "occupancy counts"))
             self.masks = keep(runtime.buffer((high, wide), np.uint64, "occupancy masks"))
-            defines = {"OFFSET_T": "ulong" if long_offsets else "uint"}
+            defines: dict[str, str | int] = {"OFFSET_T": "ulong" if long_offsets else "uint"}
+            if isinstance(vdi.packing, Packed8):
+                defines["PACKED"] = 8
             runtime.fill(self.counts, np.uint32(0))
             runtime.launch(
                 runtime.kernel("raycasting/occupancy.cl", "count_supersegments", defines),
                 -(-width * height // GROUP) * GROUP,
                 GROUP,
                 offsets,
-                front,
-                back,
+                *faces,
                 np.int32(width),
                 np.int32(height),
                 np.int32(wide),

@@ -116,12 +116,14 @@ def share_lit(vdi: VDI, near: float, far: float) -> float:
     counts = offsets[lists + 1] - offsets[lists]
     begins = np.cumsum(counts) - counts
     places = np.arange(counts.sum()) + np.repeat(offsets[lists] - begins, counts)
-    optical_depth = vdi.optical_depth[places].astype(np.float64)
+    own = np.repeat(lists, counts)
+    media = vdi._media_at(places, own, "optical_depth", "front", "back")
+    optical_depth = media["optical_depth"].astype(np.float64)
     before = np.cumsum(optical_depth) - optical_depth
     before -= np.repeat(before[begins], counts)
     last = begins + np.add.reduceat(before < _DARK, begins) - 1  # that light gets to
     left = (_DARK - before[last]) / np.maximum(optical_depth[last], np.finfo(np.float32).tiny)
-    front, back = (face[places[last]].astype(np.float64) for face in (vdi.front, vdi.back))
+    front, back = (media[face][last].astype(np.float64) for face in ("front", "back"))
     depth = front + np.minimum(left, 1.0) * (back - front) + vdi.depth_origin
     through = np.add.reduceat(optical_depth, begins) < _DARK
     shares = np.where(through, 1.0, (depth - near) / max(far - near, np.finfo(np.float64).tiny))

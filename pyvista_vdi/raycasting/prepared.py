@@ -5,13 +5,13 @@ from __future__ import annotations
 import functools
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Runtime, aligned_empty, kept_together
+from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.constants import BUNDLE, FIRST_BITS, LIST_HEADER
 from pyvista_vdi.device.work_order import GROUP
@@ -95,8 +95,8 @@ class PreparedVDI:
         first, last = offsets[occupied], offsets[occupied + 1] - 1
         near, far = (depth - self.depth_origin for depth in depths)
         front, back = (
-            np.clip(face.astype(np.float64), near, far)
-            for face in (vdi.front[first], vdi.back[last])
+            np.clip(vdi._media_at(rows, occupied, face)[face].astype(np.float64), near, far)
+            for face, rows in (("front", first), ("back", last))
         )
         rounded = np.maximum(np.abs(front), np.abs(back))
         if not (self.parallel or self.shifted):
@@ -160,27 +160,40 @@ class PreparedVDI:
             headers = (begins[:-1] | longest << FIRST_BITS).view(np.uint64)
         with (
             kept_together() as keep,
-            runtime.upload(vdi.front, "front depths") as front,
-            runtime.upload(vdi.back, "back depths") as back,
             runtime.upload(vdi.offsets.astype(offset_type), "list offsets") as starts,
         ):
-            self.occupancy = OccupancyGrid(
-                runtime,
-                vdi,
-                starts,
-                front,
-                back,
-                nearest=self.nearest,
-                shifted=self.shifted,
-                long_offsets=self.long_offsets,
-            )
-            keep(self.occupancy.counts), keep(self.occupancy.masks)
             self.headers = keep(runtime.upload(headers, "list headers"))
             if isinstance(vdi.packing, Packed8):
-                self.lists = self._packed_lists(vdi, vdi.packing, keep)
+                self._prepare_packed(vdi, vdi.packing, int(begins[-1]), starts, keep)
             else:
-                self.lists = self._prepared_lists(vdi, int(begins[-1]), starts, front, back, keep)
-            runtime.finish()  # the buffers above may be host memory in use
+                with (
+                    runtime.upload(vdi.front, "front depths") as front,
+                    runtime.upload(vdi.back, "back depths") as back,
+                ):
+                    self._note_occupied(vdi, starts, (front, back), keep)
+                    n = int(begins[-1])
+                    self.lists = self._prepared_lists(vdi, n, starts, front, back, keep)
+                    runtime.finish()  # the buffers above may be host memory in use
+            runtime.finish()
+
+    def _note_occupied(
+        self,
+        vdi: VDI,
+        starts: DeviceBuffer,
+        faces: Sequence[Any],
+        keep: _Keep,
+    ) -> None:
+        """Build the occupancy grid."""
+        self.occupancy = OccupancyGrid(
+            self.runtime,
+            vdi,
+            starts,
+            faces,
+            nearest=self.nearest,
+            shifted=self.shifted,
+            long_offsets=self.long_offsets,
+        )
+        keep(self.occupancy.counts), keep(self.occupancy.masks)
 
     def _prepared_lists(
         self,
@@ -237,39 +250,45 @@ class PreparedVDI:
             runtime.finish()  # the buffers above may be host memory in use
         return (*lists, keep(self._constants(1.0))) if packed else lists
 
-    def _packed_lists(
+    def _prepare_packed(
         self,
         vdi: VDI,
         packing: Packed8,
+        pairs: int,
+        starts: DeviceBuffer,
         keep: _Keep,
-    ) -> tuple[DeviceBuffer, ...]:
-        """Return lists of 8-byte supersegments that begin with their scales."""
-        runtime = self.runtime
-        counts = vdi.counts.reshape(-1)
-        occupied = np.flatnonzero(counts)
-        headers = np.zeros(len(counts) + 1, np.uint64)
-        headers[1:] = np.cumsum(counts > 0) * LIST_HEADER
-        first = (vdi.offsets + headers)[:-1][occupied].astype(np.int64)
-        words = aligned_empty((vdi.n_supersegments + len(occupied) * LIST_HEADER, 2), np.uint32)
-        words[first, 0] = packing.origins[occupied].view(np.uint32)
-        words[first, 1] = packing.strides[occupied]
-        words[first + 1, 0] = self._per_code(vdi, packing, occupied).view(np.uint32)
-        words[first + 1, 1] = 0
-        behind = np.ones(len(words), bool)
-        behind[first] = behind[first + 1] = False
-        words[behind] = packing.words
-        return (keep(runtime.upload(words, "supersegments")), keep(self._constants(packing.step)))
-
-    def _per_code(
-        self, vdi: VDI, packing: Packed8, lists: NDArray[np.int64]
-    ) -> NDArray[np.float32]:
-        """Return 1 over the model length of a code of depth along each list's centre ray."""
-        wide, high = vdi.window_size
+    ) -> None:
+        """Bring lists of 8-byte supersegments, which begin with their scales, to the device."""
+        runtime, (wide, high) = self.runtime, vdi.window_size
+        words = keep(runtime.result((max(1, pairs), 2), np.uint32, "supersegments", lasting=True))
         centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
-        a, b = lists % wide + 0.5 - wide / 2, lists // wide + 0.5 - high / 2
-        direction = centre[0] + a[:, np.newaxis] * centre[1] + b[:, np.newaxis] * centre[2]
-        lengths = np.linalg.norm(direction, axis=1) * packing.strides[lists] * packing.step
-        return (1 / lengths).astype(np.float32)
+        with (
+            runtime.upload(packing.origins, "origins of lists") as origins,
+            runtime.upload(packing.strides, "strides of lists") as strides,
+            runtime.upload(
+                packing.words if len(packing.words) else np.zeros((1, 2), np.uint32)
+            ) as stored,
+            runtime.upload(centre.astype(np.float32), "centre rays") as directions,
+        ):
+            runtime.launch(
+                runtime.kernel("raycasting/prepare_packed.cl", "prepare_packed", self.defines),
+                -(-wide * high // GROUP) * GROUP,
+                GROUP,
+                starts,
+                self.headers,
+                origins,
+                strides,
+                stored,
+                np.float32(packing.step),
+                np.int32(wide),
+                np.int32(high),
+                directions,
+                words,
+            )
+            faces = (origins, strides, stored, np.float32(packing.step))
+            self._note_occupied(vdi, starts, faces, keep)
+            runtime.finish()  # the buffers above may be host memory in use
+        self.lists = (words, keep(self._constants(packing.step)))
 
     def _constants(self, step: float) -> DeviceBuffer:
         constants = np.array([step, self.nearest - self.depth_origin], np.float32)

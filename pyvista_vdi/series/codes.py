@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -63,18 +63,25 @@ class Codes:
     @classmethod
     def of(cls, vdi: VDI) -> Codes:
         """Return those of a VDI of 8-byte precision."""
-        packed = vdi.packing
-        assert isinstance(packed, Packed8)
+        assert isinstance(vdi.packing, Packed8)
+        return cls.of_packed(vdi.counts.reshape(-1), vdi.packing)
+
+    @classmethod
+    def of_packed(
+        cls, counts: NDArray[Any], packed: Packed8, entries: NDArray[np.uint8] | None = None
+    ) -> Codes:
+        """Return those of lists of so many supersegments."""
         front, back = packed.depth_codes()
         return cls(
             packed.step,
-            vdi.counts.reshape(-1),
+            counts.astype(np.int64),
             packed.origins.astype(np.int64),
             packed.strides.astype(np.int64),
             front.astype(np.int64),
             back.astype(np.int64),
             packed.tau_codes().astype(np.int64),
             packed.colors(),
+            np.empty(0, np.uint8) if entries is None else entries,
         )
 
     def packed(self) -> tuple[NDArray[np.uint64], Packed8]:
@@ -194,6 +201,7 @@ class Samples:
         found = (directions @ to_model.T / distance).reshape(-1)
         return cls(tuple(found.tolist())) if np.isfinite(found).all() else None
 
+    @lru_cache(maxsize=4)  # noqa: B019 - small, and a series has one
     def pitches(self, window_size: tuple[int, int], step: float) -> Floats | None:
         """Return steps of the depth grid from sample to sample, per list; None if unusable.
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVDIError
-from pyvista_vdi.model.packing import TAU_CODES
+from pyvista_vdi.model.packing import TAU_CODES, Packed8
 from pyvista_vdi.series.codes import (
     ENTRIES,
     Codes,
@@ -29,7 +29,7 @@ from pyvista_vdi.series.codes import (
 
 #: How a list is written: by itself; as it was; placed as it was; with supersegments kept.
 OWN, SAME, PLACED, KEPT = range(4)
-_HOW = 3
+HOW = 3
 #: Added where a list's last face is guessed to be where it was.
 _END = 4
 
@@ -70,6 +70,10 @@ class Stepped:
     tables: Tables
     samples: Samples | None
     window_size: tuple[int, int]
+
+    def packed(self) -> tuple[NDArray[np.uint64], Packed8]:
+        """Return offsets and the packed form, checked."""
+        return self.codes.packed()
 
 
 def encoded(
@@ -166,7 +170,7 @@ def encoded(
     coded = ~same
     base = np.zeros(n_lists, np.int64)
     if before is not None:
-        by_it = (how & _HOW) >= PLACED
+        by_it = (how & HOW) >= PLACED
         base[by_it] = before.codes.counts[by_it]
     difference = codes.counts - base
     arrays["counts"] = np.where(
@@ -197,7 +201,7 @@ def decoded(
     kinds = {array.dtype.kind for name, array in arrays.items() if name != "extinctions"}
     _require(kinds == {"u"}, "all arrays")
     how_and_end = arrays["how"]
-    how = how_and_end & _HOW
+    how = how_and_end & HOW
     _require(len(how) == n_lists and (before is not None or not how.any()), "how lists are written")
     coded = how != SAME
     counts = np.zeros(n_lists, np.int64)
@@ -205,7 +209,7 @@ def decoded(
     _require(len(given) == np.count_nonzero(coded), "counts")
     by_it = how >= PLACED
     counts[coded] = given
-    counts[by_it] = _unfolded(counts[by_it])
+    counts[by_it] = unfolded(counts[by_it])
     if before is not None:
         counts[by_it] += before.codes.counts[by_it]
         counts[~coded] = before.codes.counts[~coded]
@@ -228,7 +232,7 @@ def decoded(
     old_front = old_back = old_rows
     moved_by = there.strides.astype(float) if pitches is None else pitches
     if before is not None:
-        shift[there.has] = _unfolded(_long(arrays, "shift", np.count_nonzero(there.has)))
+        shift[there.has] = unfolded(_long(arrays, "shift", np.count_nonzero(there.has)))
         _require(bool((np.abs(shift) < _FARTHEST).all()), "shift")
         old_view = _View(before.codes, view.lists[pays])
         kept[pays[view.own]] = _bits(arrays, "kept", np.count_nonzero(pays[view.own]))
@@ -258,7 +262,7 @@ def decoded(
 
     n_occupied = len(view.lists)
     origins = _origins(
-        _unfolded(_long(arrays, "origin", n_occupied)), there, shift, moved_by, pitches is None
+        unfolded(_long(arrays, "origin", n_occupied)), there, shift, moved_by, pitches is None
     )
     as_it_was = (how_and_end[view.lists] & _END) > 0
     _require(not (as_it_was & ~there.has).any(), "ends")
@@ -266,18 +270,16 @@ def decoded(
         spans = np.zeros(n_occupied)
     else:
         spans = np.where(as_it_was, (there.ends - origins).astype(float), back[view.last] * pitches)
-    strides = _strides(
-        _unfolded(_long(arrays, "stride", n_occupied)), spans, there, pitches is None
-    )
+    strides = _strides(unfolded(_long(arrays, "stride", n_occupied)), spans, there, pitches is None)
     _require(n_occupied == 0 or (strides.min() > 0 and strides.max() < 1 << 16), "strides")
     _require(n_occupied == 0 or int(np.abs(origins).max()) < 1 << 31, "origins")
     view.origins, view.strides = origins, strides
     unit = strides.astype(float) if pitches is None else pitches
     guessed = _codes_at(back, unit, view)
-    b = guessed + _unfolded(_long(arrays, "back", n_coded))
+    b = guessed + unfolded(_long(arrays, "back", n_coded))
     end = np.where(as_it_was, _rounded(there.ends - origins, strides), guessed[view.last])
-    b[view.last] = end + _unfolded(_long(arrays, "end", n_occupied))
-    f = _guessed_fronts(b, front, gap, unit, view) + _unfolded(_long(arrays, "front", n_coded))
+    b[view.last] = end + unfolded(_long(arrays, "end", n_occupied))
+    f = _guessed_fronts(b, front, gap, unit, view) + unfolded(_long(arrays, "front", n_coded))
     lengths = length + (b - guessed) * (strides / unit)[view.own]
 
     guess = np.zeros(n_coded, np.uint8)
@@ -287,7 +289,7 @@ def decoded(
     color, tau_guess = _guessed_media(entries, guess, kept, old_rows, lengths, tables, before)
     for k, name in enumerate(("red", "green", "blue")):
         color[:, k] += _long(arrays, name, n_coded).astype(np.uint8)
-    tau = tau_guess + _unfolded(_long(arrays, "optical_depth", n_coded))
+    tau = tau_guess + unfolded(_long(arrays, "optical_depth", n_coded))
 
     found = _merged(step, before, coded, counts, view, origins, strides)
     fields: dict[str, NDArray[Any]] = {"front": f, "back": b, "tau": tau, "color": color}
@@ -658,7 +660,8 @@ def _folded(values: Integers, wide: bool = False) -> NDArray[Any]:
     return folded if wide else _narrow(folded)
 
 
-def _unfolded(values: Integers) -> Integers:
+def unfolded(values: NDArray[Any]) -> NDArray[Any]:
+    """Return 0, -1, 1, -2, 2 … of 0, 1, 2, 3, 4 …; of a signed type."""
     return values >> 1 ^ -(values & 1)
 
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.io.vdi_file.chunks import DamagedChunkError, PackedArray, workers, write_chunks
 from pyvista_vdi.io.vdi_file.description import from_json, to_json
 from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES, Layout
+from pyvista_vdi.model.host_memory import aligned_empty
 
 #: Highest version of the format.
 FORMAT_VERSION = 1
@@ -135,7 +136,19 @@ def read_text(data: memoryview) -> tuple[dict[str, Any], int, int]:
     return text, begin, n_chunks
 
 
-def read_arrays(data: memoryview, codec: str) -> dict[str, NDArray[Any]]:
+class FrameArrays(dict[str, NDArray[Any]]):
+    """The arrays of a frame, all in one memory, which a device may use as it lies.
+
+    Attributes
+    ----------
+    memory : numpy.ndarray
+        uint8.
+    """
+
+    memory: NDArray[np.uint8]
+
+
+def read_arrays(data: memoryview, codec: str) -> FrameArrays:
     """Return the arrays of a frame's content, decompressed.
 
     Raises
@@ -146,19 +159,30 @@ def read_arrays(data: memoryview, codec: str) -> dict[str, NDArray[Any]]:
     text, begin, n_chunks = read_text(data)
     index = np.frombuffer(data, _INDEX, n_chunks, begin)
     body = data[begin + index.nbytes :]
-    arrays, tasks = {}, []
+    packed: dict[str, PackedArray] = {}
+    tasks: list[tuple[PackedArray, int, NDArray[Any]]] = []
     for name, (kind, rows) in text["arrays"].items():
         if kind not in _TYPES or isinstance(rows, bool) or not 0 <= int(rows) < 1 << 40:
             raise ValueError(f"its array {name!r} is of a kind that is unknown")
         layout = _layout(np.dtype(kind), int(rows))
-        sizes, index = index[: layout.n_chunks], index[layout.n_chunks :]
-        n_bytes = int(sizes["bytes"].sum(dtype=np.int64))
+        chunks, index = index[: layout.n_chunks], index[layout.n_chunks :]
+        n_bytes = int(chunks["bytes"].sum(dtype=np.int64))
         if n_bytes > len(body):
             raise ValueError(f"its array {name!r} is cut off")
-        packed = _packed(name, layout, codec, sizes, body[:n_bytes])
+        packed[name] = _packed(name, layout, codec, chunks, body[:n_bytes])
         body = body[n_bytes:]
-        arrays[name] = np.empty(layout.n_rows, layout.dtype)
-        tasks += [(packed, first, arrays[name][first:last]) for first, last in packed.ranges()]
+    sizes = [
+        -(-each.layout.n_rows * each.layout.dtype.itemsize // 8) * 8 for each in packed.values()
+    ]
+    arrays = FrameArrays()
+    arrays.memory = aligned_empty(sum(sizes), np.uint8)
+    begin = 0
+    for size, (name, each) in zip(sizes, packed.items(), strict=True):
+        kind, rows = each.layout.dtype, each.layout.n_rows
+        array = arrays.memory[begin : begin + rows * kind.itemsize].view(kind)
+        arrays[name] = array
+        tasks += [(each, first, array[first:last]) for first, last in each.ranges()]
+        begin += size
     with workers() as pool:
         for _ in pool.map(lambda task: task[0].read(task[1], task[2]), tasks):
             pass

@@ -33,6 +33,7 @@ from pyvista_vdi.series import layout
 from pyvista_vdi.series.codes import ENTRIES, Samples, Tables
 from pyvista_vdi.series.differences import Stepped, decoded
 from pyvista_vdi.series.layout import FrameHeader
+from pyvista_vdi.series.on_device import decoded_on, runtime_for_decoding
 from pyvista_vdi.series.series import VDISeries
 
 _REMEDY = "copy it from its source again, or generate the series anew"
@@ -385,23 +386,30 @@ class StepsReader(Sequence[VDI]):
                 vdi = self._vdi_in(source, data if source == i else self._content(source))
                 if source == i:
                     return vdi
-                media = {n: getattr(vdi, n) for n in ("front", "back", "color", "optical_depth")}
-                offsets, packing = vdi.offsets, vdi.packing
-            else:
-                step = self._step(source)
-                offsets, packing = step.codes.packed()
-                media = packing.media(step.codes.counts)
-            vdi = VDI(
+                again = VDI(
+                    camera,
+                    window_size,
+                    vdi.offsets,
+                    vdi.front,
+                    vdi.back,
+                    vdi.color,
+                    vdi.optical_depth,
+                    bounds,
+                    depth_origin=origin,
+                    metadata=metadata,
+                )
+                again.packing = vdi.packing
+                return again
+            offsets, packing = self._step(source).packed()
+            return VDI._of_packing(
                 camera,
                 window_size,
                 offsets,
-                **media,
-                bounds=bounds,
+                packing,
+                bounds,
                 depth_origin=origin,
                 metadata=metadata,
             )
-            vdi.packing = packing
-            return vdi
         except VDIFileError:
             raise
         except (*_CONTRADICTIONS, VDIError) as error:
@@ -443,8 +451,13 @@ class StepsReader(Sequence[VDI]):
             if before.window_size != window_size:
                 raise InvalidVDIError("it is written by a step of another window")
         self.n_decoded += 1
+        numbers = (arrays, number(text["step"]), samples, tables, window_size, before)
+        runtime = runtime_for_decoding()
+        found = None if runtime is None else decoded_on(runtime, *numbers)
+        if found is not None:
+            return found
         with np.errstate(all="ignore"):  # what overflows is found out when the codes are checked
-            return decoded(arrays, number(text["step"]), samples, tables, window_size, before)
+            return decoded(*numbers)
 
     def _place_of(self, step: int, needed_by: int) -> int:
         """Return where a step's frame stands among those that were found."""
@@ -533,7 +546,8 @@ def _tables(arrays: dict[str, NDArray[Any]]) -> Tables:
     extinctions = extinctions.astype(np.float32)
     if not (np.isfinite(extinctions).all() and (extinctions >= 0).all()):
         raise InvalidVDIError("its extinctions are not finite")
-    return Tables(colors.reshape(-1, 3), extinctions)
+    # Copies: the arrays of a frame lie in one memory
+    return Tables(colors.reshape(-1, 3).copy(), extinctions.copy())
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISeries:
