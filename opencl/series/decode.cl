@@ -1,6 +1,9 @@
 // A step of a series from the arrays of its frame: what series/differences.py's `decoded` does, list by list, to the last bit.
 // Whole numbers are exact, and doubles are summed, multiplied, divided and rounded as IEEE 754 has it, here as there.
 //
+// -D GRID, TAU_BASE, TAU_CODES   see model/packing.py
+// -D PLAIN                       nothing is known of samples: faces are counted in codes
+//
 // Where numbers are not those of a step that was written, `trouble` is set, and the host finds out what is wrong with them.
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #pragma OPENCL FP_CONTRACT OFF
@@ -152,7 +155,9 @@ __attribute__((vec_type_hint(float16))) __kernel void decode_lists(
     stride += max(1, (int)ceil(fmin(fmax(span, 0.0), TAME) / DEPTH_CODES));
     const double unit = moved_by;
 #endif
-    tame = tame && abs(origin) < 1 << 29 && stride > 0 && stride < 1 << 16 && (placed || !as_it_was);
+    tame = tame && stride > 0 && stride < 1 << 16 && (placed || !as_it_was);
+    // Its depths lie on the VDI's grid
+    tame = tame && abs(origin) <= GRID && origin + stride * DEPTH_CODES <= GRID + DEPTH_CODES + 1;
     if (!tame) {
         *trouble = 1;
         return;
@@ -199,7 +204,7 @@ __attribute__((vec_type_hint(float16))) __kernel void decode_lists(
         } else {
             const float samples = (float)(length + (b - guessed) * (stride / unit));
             const long bits = (long)as_uint(extinctions[entry] * samples);
-            tau = (int)clamp((bits + 0x8000 >> 16) - TAU_BASE + 1, 0L, (long)TAU_CODES);
+            tau = (int)clamp(((bits + 0x8000) >> 16) - TAU_BASE + 1, 0L, (long)TAU_CODES);
             red = colors[3 * entry];
             green = colors[3 * entry + 1];
             blue = colors[3 * entry + 2];

@@ -26,7 +26,7 @@ DEPTH_CODES = (1 << 14) - 1
 
 #: Whole steps of a VDI's depth grid that a depth is away from its origin at most. float32 holds
 #: every whole number to 2^24, and codes may be pushed by as many steps as there are codes.
-_GRID = (1 << 24) - (1 << 15)
+GRID = (1 << 24) - (1 << 15)
 
 #: No step is shorter: devices may take what is nearer to 0 than float32's normal numbers for 0.
 _LEAST_STEP_EXPONENT = -126
@@ -301,12 +301,12 @@ def _depths(
 
 
 def _grid_step(vdi: Lists) -> float:
-    """Return the shortest power of two of which at most :data:`_GRID` reach every depth."""
+    """Return the shortest power of two of which at most :data:`GRID` reach every depth."""
     if vdi.n_supersegments == 0:
         return 1.0
     farthest = max(-float(vdi.front.min()), float(vdi.back.max()))
-    exponent = math.frexp(farthest / _GRID)[1]  # farthest / _GRID < 2^exponent
-    if farthest / 2.0 ** (exponent - 1) <= _GRID:
+    exponent = math.frexp(farthest / GRID)[1]  # farthest / GRID < 2^exponent
+    if farthest / 2.0 ** (exponent - 1) <= GRID:
         exponent -= 1
     return 2.0 ** max(exponent, _LEAST_STEP_EXPONENT)
 
@@ -427,7 +427,7 @@ def check_grid(
         raise InvalidVDIError(f"the step of depths must be a power of two; got {step}")
     first = origins.astype(np.int64)
     last = first + strides.astype(np.int64) * DEPTH_CODES
-    if (np.abs(first) > _GRID).any() or (last > _GRID + DEPTH_CODES + 1).any():
+    if (np.abs(first) > GRID).any() or (last > GRID + DEPTH_CODES + 1).any():
         raise InvalidVDIError("a list's depths lie beyond the VDI's grid")
     occupied = counts > 0
     if ((strides > 0) != occupied).any() or origins[~occupied].any():

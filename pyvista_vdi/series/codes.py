@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import VDIError
+from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.packing import (
     DEPTH_CODES,
     TAU_BASE,
@@ -216,7 +217,11 @@ class Samples:
             x, y, z = (c[k] + u * c[k + 3] + v * c[k + 6] for k in range(3))
             pitches = 1 / (np.sqrt(x * x + y * y + z * z) * step)
         good = np.isfinite(pitches).all() and pitches.min() > 2.0**-8 and pitches.max() < 2.0**40
-        return np.asarray(pitches).reshape(-1) if good else None
+        if not good:
+            return None
+        found = aligned_empty(width * height, np.float64)  # which devices use as it lies
+        found[...] = np.asarray(pitches).reshape(-1)
+        return found
 
 
 def tau_values(codes: Integers) -> NDArray[np.float32]:

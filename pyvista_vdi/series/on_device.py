@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import Runtime, aligned_empty, get_runtime, kept_together
 from pyvista_vdi.errors import DeviceError, MissingDependencyError, NoDeviceError
-from pyvista_vdi.model.packing import TAU_BASE, TAU_CODES, Packed8, check_grid
+from pyvista_vdi.model.packing import GRID, TAU_BASE, TAU_CODES, Packed8, check_grid
 from pyvista_vdi.series.codes import Codes, Samples, Tables
 from pyvista_vdi.series.differences import HOW, KEPT, PLACED, SAME, Arrays, Stepped, unfolded
 
@@ -123,16 +123,13 @@ def decoded_on(
     if left is None:
         return None
     n = int(places.starts[-1])
-    color = tables.colors
+    check_grid(step, *(np.empty(0, np.int64),) * 3)  # of the step alone: the kernel looks at lists
     nothing = np.zeros(2, np.int32)
     base, streams = _together(arrays)
     trouble = np.zeros(1, np.int32)
-    defines = {
-        "TAU_BASE": TAU_BASE,
-        "TAU_CODES": TAU_CODES,
-        "PLAIN": 1 if pitches is None else None,
-    }
-    defines = {name: value for name, value in defines.items() if value is not None}
+    defines = {"GRID": GRID, "TAU_BASE": TAU_BASE, "TAU_CODES": TAU_CODES}
+    if pitches is None:
+        defines["PLAIN"] = 1
     with kept_together() as keep:
 
         def up(array: NDArray[Any], name: str) -> Any:
@@ -163,7 +160,7 @@ def decoded_on(
             up(nothing.astype(np.uint16) if old is None else old.packing.strides, "strides before"),
             up(nothing if old is None else old.packing.words, "supersegments before"),
             up(nothing.astype(np.uint8) if old is None else old.entries, "entries before"),
-            up(color, "colours of entries"),
+            up(tables.colors, "colours of entries"),
             up(tables.extinctions, "extinctions of entries"),
             origins,
             strides,
@@ -179,8 +176,6 @@ def decoded_on(
             runtime.download(strides),
             runtime.download(words)[:n],
         )
-        counts = np.diff(places.starts)
-        check_grid(step, packing.origins, packing.strides, counts)
         return PackedStep(
             places.starts, packing, runtime.download(entries)[:n], tables, samples, window_size
         )
@@ -218,7 +213,7 @@ class _Places:
         places.written = coded & (counts > 0)
         keeps = (way == KEPT) & (counts > 0)
         places.starts = _sums(counts)
-        table = np.empty((len(way), _PLACES), np.int32)
+        table = aligned_empty((len(way), _PLACES), np.int32)
         rows = _sums(np.where(coded, counts, 0))
         n_rows = int(rows[-1])
         occupied = _sums(places.written)
@@ -268,7 +263,10 @@ def _left(
     for values, limit in zip(found, _LIMITS, strict=True):
         if np.abs(values).max(initial=0) >= limit:
             return None
-    return tuple(values.astype(np.int32) for values in found)  # type: ignore[return-value]
+    left = tuple(aligned_empty(n, np.int32) for _ in found)
+    for values, given in zip(left, found, strict=True):
+        values[...] = given
+    return left  # type: ignore[return-value]
 
 
 #: Of origins and strides, and of shifts: those of ``differences``.
@@ -292,7 +290,8 @@ def _together(arrays: Arrays) -> tuple[NDArray[np.uint8], NDArray[np.uint32]]:
 
 def _sums(values: NDArray[Any]) -> NDArray[np.int32]:
     """Return the sums of the values before each, and of all."""
-    sums = np.zeros(len(values) + 1, np.int32)
+    sums = aligned_empty(len(values) + 1, np.int32)
+    sums[0] = 0
     np.cumsum(values, out=sums[1:], dtype=np.int32)
     return sums
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import warnings
@@ -20,7 +21,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi._version import __version__
-from pyvista_vdi.errors import InvalidVDIError, VDIError, VDIFileError, VDIWarning
+from pyvista_vdi.errors import (
+    Cancelled,
+    DeviceError,
+    DeviceMemoryError,
+    InvalidVDIError,
+    KernelBuildError,
+    VDIError,
+    VDIFileError,
+    VDIWarning,
+)
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import reader as vdi_reader
 from pyvista_vdi.io.vdi_file.chunks import CODECS, DamagedChunkError
@@ -35,6 +45,8 @@ from pyvista_vdi.series.differences import Stepped, decoded
 from pyvista_vdi.series.layout import FrameHeader
 from pyvista_vdi.series.on_device import decoded_on, runtime_for_decoding
 from pyvista_vdi.series.series import VDISeries
+
+_log = logging.getLogger(__name__)
 
 _REMEDY = "copy it from its source again, or generate the series anew"
 
@@ -161,6 +173,7 @@ class StepsReader(Sequence[VDI]):
         self._lock = Lock()
         self._steps = _Recent[Stepped](_KEPT_STEPS)
         self._vdis = _Recent[VDI](_KEPT_VDIS)
+        self._contents = _Recent[memoryview](1)  # of a frame, while it is looked at
         self._descriptions: dict[int, dict[str, Any]] = {}
         #: How many steps have been decoded so far.
         self.n_decoded = 0
@@ -361,11 +374,14 @@ class StepsReader(Sequence[VDI]):
             return self._stream.read(n)
 
     def _content(self, i: int) -> memoryview:
+        known = self._contents.get(i)
+        if known is not None:
+            return known
         place, header = self._frames[i]
         data = self._bytes_at(place + layout.HEADER_BYTES, header.n_bytes)
         if len(data) != header.n_bytes or zlib.crc32(data) != header.checksum:
             self._refuse(f"step {header.number} is not what was written: its checksum differs")
-        return memoryview(data)
+        return self._contents.put(i, memoryview(data))
 
     def _refuse(self, why: str) -> NoReturn:
         raise VDIFileError(f"{self._path} is damaged: {why}; {_REMEDY}")
@@ -410,7 +426,7 @@ class StepsReader(Sequence[VDI]):
                 depth_origin=origin,
                 metadata=metadata,
             )
-        except VDIFileError:
+        except (VDIFileError, Cancelled):
             raise
         except (*_CONTRADICTIONS, VDIError) as error:
             self._refuse(f"step {header.number} holds no valid VDI: {error}")
@@ -453,7 +469,11 @@ class StepsReader(Sequence[VDI]):
         self.n_decoded += 1
         numbers = (arrays, number(text["step"]), samples, tables, window_size, before)
         runtime = runtime_for_decoding()
-        found = None if runtime is None else decoded_on(runtime, *numbers)
+        try:
+            found = None if runtime is None else decoded_on(runtime, *numbers)
+        except (DeviceError, DeviceMemoryError, KernelBuildError) as error:
+            _log.debug("a step is decoded without the device", exc_info=error)
+            found = None
         if found is not None:
             return found
         with np.errstate(all="ignore"):  # what overflows is found out when the codes are checked

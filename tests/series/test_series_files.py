@@ -13,47 +13,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import stepped_vdis
+from stepped_vdis import SIZE, stepped_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, VDIWarning
 from pyvista_vdi.series import layout, reader, writer
 from pyvista_vdi.series.series import VDISeries
 
-SIZE = (24, 14)
 ARRAYS = ("offsets", "front", "back", "color", "optical_depth")
-
-
-def _vdi(seed=0, *, size=SIZE, metadata=None, step=0.0, still=0.5, palette=True):
-    """A VDI of lists whose faces lie at samples, some of them the same for every ``step``."""
-    fixed, random = np.random.default_rng(seed), np.random.default_rng([seed, int(step * 97)])
-    camera = pvdi.Camera((0, 0, 50), (0, 0, 0), (0, 1, 0))
-    n_lists = size[0] * size[1]
-    table = np.linspace(0, 1, 256)[:, np.newaxis] * (1.0, 0.5, 0.25)
-    fronts, backs, entries, counts = [], [], [], []
-    moves = fixed.random(n_lists) > still
-    for i in range(n_lists):
-        generator = random if moves[i] else np.random.default_rng([seed, i])
-        n = int(generator.integers(0, 9))
-        faces = np.sort(generator.choice(80, n + 1, replace=False)) * 0.25 + 40.0 + i * 0.01
-        fronts.append(faces[:-1])
-        backs.append(faces[1:])
-        entries.append(generator.integers(0, 256, n))
-        counts.append(n)
-    entries = np.concatenate(entries)
-    front, back = np.concatenate(fronts), np.concatenate(backs)
-    colors = table[entries] if palette else np.random.default_rng(1).random((len(entries), 3))
-    known = {"transfer_function": {"colors": table.tolist()}, "sample_distance": 0.25}
-    return pvdi.VDI(
-        camera,
-        size,
-        np.concatenate([[0], np.cumsum(counts)]),
-        front,
-        back,
-        colors,
-        (back - front) * (0.01 + entries / 256),
-        (-10, 10, -10, 10, -10, 10),
-        metadata=known if metadata is None else metadata,
-    )
 
 
 def _same(one, other):
@@ -62,7 +30,7 @@ def _same(one, other):
 
 @pytest.fixture(scope="module")
 def steps():
-    return [_vdi(step=k // 2).with_precision("8-byte") for k in range(24)]
+    return [stepped_vdi(step=k // 2).with_precision("8-byte") for k in range(24)]
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +66,7 @@ def test_every_step_is_read_to_the_last_bit(steps, saved):
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "deflate", "none"])
 @pytest.mark.parametrize("precision", ["8-byte", "16-byte", "exact"])
 def test_precisions_and_compressions(precision, compression, tmp_path):
-    steps = [_vdi(step=k // 2) for k in range(4)]
+    steps = [stepped_vdi(step=k // 2) for k in range(4)]
     path = VDISeries.of(steps).save(
         tmp_path / "a.vdis", precision=precision, compression=compression
     )
@@ -121,13 +89,13 @@ def test_precisions_and_compressions(precision, compression, tmp_path):
     ],
 )
 def test_guesses_that_are_wrong_cost_bytes_and_no_more(changes, tmp_path):
-    steps = [_vdi(step=k, **changes).with_precision("8-byte") for k in range(4)]
+    steps = [stepped_vdi(step=k, **changes).with_precision("8-byte") for k in range(4)]
     series = pvdi.read(VDISeries.of(steps).save(tmp_path / "a.vdis", key_every=8))
     assert all(_same(read, vdi) for read, vdi in zip(series, steps, strict=True))
 
 
 def test_views_windows_and_metadata_may_change_from_step_to_step(tmp_path):
-    first = _vdi()
+    first = stepped_vdi()
     camera = pvdi.Camera((0, 1, 50), (0, 0, 0), (0, 1, 0))
     arrays = {name: getattr(first, name) for name in ARRAYS}
     moved = pvdi.VDI(camera, SIZE, **arrays, bounds=first.bounds, metadata={"moved": [1.5]})
@@ -139,7 +107,7 @@ def test_views_windows_and_metadata_may_change_from_step_to_step(tmp_path):
 
 
 def test_depths_of_another_grid(tmp_path):
-    near = _vdi()
+    near = stepped_vdi()
     arrays = {name: getattr(near, name) for name in ARRAYS}
     arrays.update(front=near.front * 4, back=near.back * 4)
     far = pvdi.VDI(near.camera, SIZE, **arrays, bounds=near.bounds, metadata=near.metadata)
@@ -158,7 +126,7 @@ def _single_bytes(steps, folder):
 
 
 def test_a_still_scene_costs_next_to_nothing(tmp_path):
-    still = _vdi(size=(64, 36)).with_precision("8-byte")
+    still = stepped_vdi(size=(64, 36)).with_precision("8-byte")
     path = VDISeries.of([still] * 100).save(tmp_path / "a.vdis")
     assert path.stat().st_size <= 0.05 * sum(_single_bytes([still] * 100, tmp_path))
     steps = reader.StepsReader(path)
@@ -190,7 +158,7 @@ def test_noise_costs_no_more_than_single_files(tmp_path):
 
 
 def test_a_seek_decodes_three_steps_at_most(tmp_path):
-    steps = [_vdi(step=k).with_precision("8-byte") for k in range(20)]
+    steps = [stepped_vdi(step=k).with_precision("8-byte") for k in range(20)]
     path = VDISeries.of(steps).save(tmp_path / "a.vdis")
     for i in range(20):
         fresh = reader.StepsReader(path)
@@ -205,7 +173,7 @@ def test_a_seek_decodes_three_steps_at_most(tmp_path):
 
 def test_a_tolerance_is_kept(tmp_path):
     tolerance = 0.03
-    steps = [_vdi(step=k, size=(48, 27)).with_precision("8-byte") for k in range(6)]
+    steps = [stepped_vdi(step=k, size=(48, 27)).with_precision("8-byte") for k in range(6)]
     exact = VDISeries.of(steps).save(tmp_path / "a.vdis")
     path = VDISeries.of(steps).save(tmp_path / "b.vdis", tolerance=tolerance)
     assert path.stat().st_size < exact.stat().st_size
@@ -278,7 +246,7 @@ def test_a_writer_takes_volumes(tmp_path, default_runtime):
 
 def test_every_cut_leaves_the_finished_steps(steps, tmp_path):
     path = tmp_path / "a.vdis"
-    small = [_vdi(step=k, size=(6, 4)).with_precision("8-byte") for k in range(5)]
+    small = [stepped_vdi(step=k, size=(6, 4)).with_precision("8-byte") for k in range(5)]
     VDISeries.of(small).save(path)
     data = path.read_bytes()
     ends = [
@@ -299,7 +267,7 @@ def test_every_cut_leaves_the_finished_steps(steps, tmp_path):
 
 def test_flipped_bytes_are_noticed_and_cost_no_other_step(tmp_path):
     path = tmp_path / "a.vdis"
-    small = [_vdi(step=k, size=(6, 4)).with_precision("8-byte") for k in range(5)]
+    small = [stepped_vdi(step=k, size=(6, 4)).with_precision("8-byte") for k in range(5)]
     VDISeries.of(small).save(path, key_every=1)
     data = path.read_bytes()
     random = np.random.default_rng(0)
@@ -325,7 +293,7 @@ def test_flipped_bytes_are_noticed_and_cost_no_other_step(tmp_path):
 
 def test_a_step_without_its_header_is_told(tmp_path):
     path = tmp_path / "a.vdis"
-    small = [_vdi(step=k, size=(6, 4)).with_precision("8-byte") for k in range(4)]
+    small = [stepped_vdi(step=k, size=(6, 4)).with_precision("8-byte") for k in range(4)]
     with pvdi.SeriesWriter(path, key_every=1) as out:
         for vdi in small:
             out.append(vdi)
@@ -386,8 +354,8 @@ _KILLED = """
 import sys
 sys.path[:0] = {folders!r}
 import pyvista_vdi as pvdi
-from test_series_files import _vdi
-steps = [_vdi(step=k, size=(12, 8)).with_precision("8-byte") for k in range(8)]
+from stepped_vdis import stepped_vdi
+steps = [stepped_vdi(step=k, size=(12, 8)).with_precision("8-byte") for k in range(8)]
 with pvdi.SeriesWriter({path!r}) as out:
     print("begun", flush=True)
     for k in range(100000):
@@ -398,10 +366,10 @@ with pvdi.SeriesWriter({path!r}) as out:
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL on this system")
 def test_a_killed_writer_leaves_its_finished_steps(tmp_path):
     random = np.random.default_rng(0)
-    steps = [_vdi(step=k, size=(12, 8)).with_precision("8-byte") for k in range(8)]
+    steps = [stepped_vdi(step=k, size=(12, 8)).with_precision("8-byte") for k in range(8)]
     for k in range(int(os.environ.get("PYVISTA_VDI_KILLS", "3"))):
         path = tmp_path / f"{k}.vdis"
-        code = _KILLED.format(folders=[str(Path(__file__).parent)], path=str(path))
+        code = _KILLED.format(folders=[str(Path(stepped_vdis.__file__).parent)], path=str(path))
         with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as process:
             process.stdout.readline()
             while path.stat().st_size < 20_000 and process.poll() is None:

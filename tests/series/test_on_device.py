@@ -1,0 +1,153 @@
+"""Steps decoded by the kernel and by NumPy: the same to the last bit, for good numbers and bad."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from stepped_vdis import stepped_vdi
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import Cancelled, DeviceMemoryError, VDIFileError
+from pyvista_vdi.series import layout, on_device, reader
+from pyvista_vdi.series.series import VDISeries
+
+pytestmark = pytest.mark.device
+
+CASES = {
+    "samples": {},
+    "no samples": {"metadata": {}},
+    "other colours": {"palette": False},
+    "all the same": {"still": 1.0},
+    "nothing the same": {"still": 0.0},
+    "one list": {"size": (1, 1)},
+    "many lists": {"size": (97, 61)},
+}
+
+
+@pytest.fixture
+def made(monkeypatch, default_runtime):
+    """Counts the steps that the kernel has decoded, and those that it has given back."""
+    counts = {True: 0, False: 0}
+    decoded_on = on_device.decoded_on
+
+    def counted(*numbers):
+        step = decoded_on(*numbers)
+        counts[step is not None] += 1
+        return step
+
+    monkeypatch.setattr(reader, "decoded_on", counted)
+    return counts
+
+
+def _by_numpy(path, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(reader, "runtime_for_decoding", lambda: None)
+        return [(vdi.offsets, vdi.packing, vdi) for vdi in pvdi.read(path)]
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 0.03])
+@pytest.mark.parametrize("case", CASES)
+def test_kernel_and_numpy_give_the_same_bits(case, tolerance, made, monkeypatch, tmp_path):
+    steps = [stepped_vdi(step=k, **CASES[case]).with_precision("8-byte") for k in range(6)]
+    path = VDISeries.of(steps).save(tmp_path / "a.vdis", tolerance=tolerance, key_every=8)
+    by_numpy = _by_numpy(path, monkeypatch)
+    assert not made[True]
+    for (offsets, packing, vdi), read in zip(by_numpy, pvdi.read(path), strict=True):
+        np.testing.assert_array_equal(read.offsets, offsets)
+        for name in ("origins", "strides", "words"):
+            np.testing.assert_array_equal(getattr(read.packing, name), getattr(packing, name))
+        assert read.packing.step == packing.step
+        assert read.equals(vdi)
+        assert read.packing.nbytes + read.offsets.nbytes < read.nbytes  # unpacked by now
+    kinds = {header.kind for _, header in reader.StepsReader(path)._frames}
+    if layout.LISTS in kinds:
+        assert made[True]
+    assert not made[False]
+
+
+def test_without_the_arrays_in_one_memory(made, tmp_path, monkeypatch):
+    path = VDISeries.of([stepped_vdi(step=k).with_precision("8-byte") for k in range(3)]).save(
+        tmp_path / "a.vdis"
+    )
+    whole = list(pvdi.read(path))
+    read_arrays = layout.read_arrays
+    monkeypatch.setattr(layout, "read_arrays", lambda *what: dict(read_arrays(*what)))
+    assert all(a.equals(b) for a, b in zip(pvdi.read(path), whole, strict=True))
+    assert made[True] == 6
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_numbers_that_contradict_each_other_are_refused_alike(seed, made, tmp_path, monkeypatch):
+    """A frame's numbers are changed, its checksums are not looked at."""
+    random = np.random.default_rng(seed)
+    steps = [stepped_vdi(step=k, size=(12, 7)).with_precision("8-byte") for k in range(3)]
+    path = VDISeries.of(steps).save(tmp_path / "a.vdis")
+    read_arrays = layout.read_arrays
+
+    def changed(data, codec):
+        arrays = dict(read_arrays(data, codec))
+        again = np.random.default_rng([seed, len(data)])
+        names = sorted(name for name, array in arrays.items() if array.size)
+        name = names[again.integers(len(names))]
+        array = arrays[name] = arrays[name].copy()
+        place = again.integers(array.size)
+        if name == "extinctions":
+            array[place] = again.choice([0.0, 1e-3, 1e30])
+        else:
+            array[place] = again.integers(0, np.iinfo(array.dtype).max, endpoint=True)
+        if again.random() < 0.2:
+            arrays[name] = array[:-1]
+        return arrays
+
+    def outcome(i):
+        try:
+            vdi = pvdi.read(path)[i]
+        except VDIFileError:
+            # What is wrong first differs where the step that it is written by is damaged as well
+            return "refused"
+        return vdi.packing.words.tobytes(), vdi.packing.origins.tobytes(), vdi.offsets.tobytes()
+
+    monkeypatch.setattr(layout, "read_arrays", changed)
+    i = int(random.integers(3))
+    found = outcome(i)
+    monkeypatch.setattr(reader, "runtime_for_decoding", lambda: None)
+    assert outcome(i) == found
+
+
+def test_a_device_without_memory_costs_no_step(default_runtime, monkeypatch, tmp_path):
+    steps = [stepped_vdi(step=k).with_precision("8-byte") for k in range(3)]
+    path = VDISeries.of(steps).save(tmp_path / "a.vdis")
+
+    def fails(*_):
+        raise DeviceMemoryError("none left")
+
+    monkeypatch.setattr(reader, "decoded_on", fails)
+    assert all(a.equals(b) for a, b in zip(pvdi.read(path), steps, strict=True))
+
+
+def test_what_is_cancelled_is_not_damaged(default_runtime, monkeypatch, tmp_path):
+    path = VDISeries.of([stepped_vdi().with_precision("8-byte")]).save(tmp_path / "a.vdis")
+
+    def cancelled(*_):
+        raise Cancelled("by the player")
+
+    monkeypatch.setattr(reader, "decoded_on", cancelled)
+    with pytest.raises(Cancelled):
+        pvdi.read(path)[0]
+
+
+def test_a_packed_vdi_is_unpacked_when_it_is_asked_for(tmp_path, default_runtime):
+    vdi = stepped_vdi().with_precision("8-byte")
+    read = pvdi.read(VDISeries.of([vdi]).save(tmp_path / "a.vdis"))[0]
+    if "front" in vars(read):
+        pytest.skip("this frame is a whole file")
+    packed = read.nbytes
+    assert packed == read.offsets.nbytes + read.packing.nbytes
+    picture = pvdi.render(read, vdi.camera.azimuth(3), (40, 30))
+    assert read.nbytes == packed, "drawing has unpacked it"
+    np.testing.assert_array_equal(picture, pvdi.render(vdi, vdi.camera.azimuth(3), (40, 30)))
+    assert not read.front.flags.writeable
+    assert read.equals(vdi)
+    assert read.nbytes == vdi.nbytes
+    with pytest.raises(AttributeError, match="depths"):
+        _ = read.depths
