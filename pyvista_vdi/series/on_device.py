@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import Runtime, aligned_empty, get_runtime, kept_together
-from pyvista_vdi.errors import DeviceError, MissingDependencyError, NoDeviceError
+from pyvista_vdi.errors import DeviceError, InvalidVDIError, MissingDependencyError, NoDeviceError
 from pyvista_vdi.model.packing import GRID, TAU_BASE, TAU_CODES, Packed8, check_grid
 from pyvista_vdi.series.codes import Codes, Samples, Tables
 from pyvista_vdi.series.differences import HOW, KEPT, PLACED, SAME, Arrays, Stepped, unfolded
@@ -114,7 +114,10 @@ def decoded_on(
             return None
         if arrays[name].itemsize == 4 and arrays[name].max(initial=0) >= _TAME:
             return None
-    old = None if before is None else PackedStep.of(before)
+    try:
+        old = None if before is None else PackedStep.of(before)
+    except InvalidVDIError:  # it was not looked at, and may still do
+        return None
     places = _Places.of(arrays, way, old)
     if places is None:
         return None
