@@ -78,7 +78,7 @@ providers.provide(
     image_with_scalars="pyvista_vdi.plotting.volumes:as_image",
     notebook_bundle="pyvista_vdi.web.notebook:mime_bundle",
     scene_pages="pyvista_vdi.web.scenes.export:export_html",
-    temporal_volumes="pyvista_vdi.vtk_pipeline.filters.temporal:temporal_volumes",
+    temporal_volumes="pyvista_vdi.vtk_pipeline.filters.temporal:steps_and_times",
     thinned="pyvista_vdi.model.thinned:thinned",
     transfer_function_from_arguments="pyvista_vdi.plotting.classify:transfer_function_from_arguments",
     transfer_function_from_property="pyvista_vdi.vtk_pipeline:transfer_function_from_property",

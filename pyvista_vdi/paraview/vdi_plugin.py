@@ -621,7 +621,7 @@ class VDISeriesReader(vtk_pipeline.VDIReader):
 @smproxy.writer(
     name="VDIWriter",
     label="VDI Writer",
-    extensions="vdi exr",
+    extensions="vdi exr vdis",
     file_description="Volumetric Depth Image",
     support_reload=False,
 )
@@ -633,7 +633,7 @@ class VDISeriesReader(vtk_pipeline.VDIReader):
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
 class VDIWriter(vtk_pipeline.VDIWriter):
-    """A file of a VDI: :class:`pyvista_vdi.vtk_pipeline.VDIWriter`."""
+    """A file of a VDI, or of all time steps: :class:`pyvista_vdi.vtk_pipeline.VDIWriter`."""
 
     def Write(self) -> None:
         """Write the file; ParaView's output window says what went wrong."""

@@ -335,7 +335,7 @@ def temporal(folder):
     for time in (2, 0, 1):
         scene.AnimationTime = time
         simple.SaveScreenshot(str(folder / f"scene_{time}.png"), view, ImageResolution=SIZE)
-        simple.SaveData(str(folder / f"made_{time}.vdi"), source)
+    simple.SaveData(str(folder / "made.vdis"), source)
 
 
 def mistakes(folder):

@@ -327,8 +327,9 @@ def test_vdis_are_made_of_the_time_that_paraview_shows(paraview, tmp_path, defau
         ball.save(tmp_path / f"ball_{step}.vti")
     assert paraview("temporal", tmp_path).strip() == ""
     assert json.loads((tmp_path / "times.json").read_text()) == [0, 1, 2]
-    for step in range(3):
-        made = pvdi.read(tmp_path / f"made_{step}.vdi")
+    series = pvdi.read(tmp_path / "made.vdis")
+    assert series.times == (0, 1, 2)
+    for step, made in enumerate(series):
         expected = pvdi.generate(balls[step], made.camera, SCREEN, volume_property=ramp())
         np.testing.assert_array_equal(made.offsets, expected.offsets)
         np.testing.assert_allclose(made.optical_depth, expected.optical_depth, atol=1e-4)

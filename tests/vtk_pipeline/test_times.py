@@ -17,9 +17,9 @@ from vtkmodules.vtkRenderingCore import vtkVolumeProperty
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
-from pyvista_vdi.vtk_pipeline import VDIReader, VDIToImage, vdi_from_image
+from pyvista_vdi.vtk_pipeline import VDIReader, VDIToImage, VDIWriter, vdi_from_image, vdi_to_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import SourceInput
-from pyvista_vdi.vtk_pipeline.filters.temporal import temporal_volumes
+from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
 
 TIMES = (0.5, 1.0, 4.0)
 #: Times that are asked for, and the step that is nearest to each; of two, the earlier.
@@ -305,6 +305,22 @@ def test_a_mapper_draws_the_time_that_is_asked_of_the_source_or_before_it(vdis):
     plotter.close()
 
 
+def test_the_writer_writes_all_times(vdis, tmp_path):
+    producer, writer = Moving(), VDIWriter()
+    source = source_of(producer)
+    writer.SetInputConnection(source.GetOutputPort())
+    writer.SetFileName(tmp_path / "made.vdis")
+    writer.Write()
+    assert producer.read == [0, 1, 2]
+    series = pvdi.read(tmp_path / "made.vdis")
+    assert series.times == TIMES
+    assert all(made.equals(vdi) for made, vdi in zip(series, vdis, strict=True))
+    writer.SetInputData(vdi_to_image(vdis[0]))
+    with pytest.raises(InvalidArgumentError, match="announces no time steps"):
+        writer.Write()
+    assert len(pvdi.read(tmp_path / "made.vdis")) == 3
+
+
 # -- sources for generate_series -------------------------------------------------------------------
 
 
@@ -353,7 +369,7 @@ def test_what_cannot_be_a_series_is_refused():
     with pytest.raises(InvalidArgumentError, match="vtkRTAnalyticSource announces no time steps"):
         pvdi.generate_series(vtkRTAnalyticSource(), some_camera(), SIZE)
     two_blocks = Moving()
-    blocks, times = temporal_volumes(two_blocks)
+    blocks, times = steps_and_times(two_blocks)
     assert (len(blocks), times) == (3, TIMES)
     assert two_blocks.read == []
     group = vtkMultiBlockDataGroupFilter()

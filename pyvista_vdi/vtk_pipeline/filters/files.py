@@ -24,6 +24,7 @@ from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     wanted_time,
 )
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image
+from pyvista_vdi.vtk_pipeline.filters.temporal import Steps, steps_and_times
 
 
 def _as_path(path: str | os.PathLike[str] | None) -> str | None:
@@ -126,7 +127,8 @@ class VDIReader(Algorithm):
 class VDIWriter(Algorithm):
     """Write the VDI at its input, in its canonical VTK form, to a ``.vdi`` or ``.exr`` file.
 
-    The file appears whole or not at all. Nothing is written before :meth:`Write`.
+    To a ``.vdis`` file it writes those of all times that the input announces, one by one. The file
+    appears whole or not at all. Nothing is written before :meth:`Write`.
     """
 
     def __init__(self) -> None:
@@ -141,7 +143,7 @@ class VDIWriter(Algorithm):
         "FileName",
         "_path",
         "path",
-        "Set the file; its name ends in ``.vdi`` or ``.exr``.",
+        "Set the file; its name ends in ``.vdi``, ``.exr`` or ``.vdis``.",
         "Return the file.",
         _as_path,
     )
@@ -152,12 +154,18 @@ class VDIWriter(Algorithm):
         Raises
         ------
         InvalidArgumentError
-            If there is no file name, or it names no format.
+            If there is no file name, or it names no format; or that of a series, and the input has
+            no times.
         InvalidVDIError
             If the input is no VDI.
         OSError
             If it cannot be written.
         """
+        if is_series_file(self._path) and self.GetNumberOfInputConnections(0):
+            images, times = steps_and_times(self.GetInputAlgorithm(0, 0))
+            vdis = Steps(lambda i: vdi_from_image(images[i]), len(times))
+            VDISeries(vdis, times).save(self._path or "")
+            return
         self.Modified()
         self.Update()
 

@@ -1,4 +1,4 @@
-"""Volumes that change in time, from VTK's and PyVista's sources: read when they are asked for."""
+"""The time steps of VTK's and PyVista's sources: read when they are asked for."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.filters.algorithm import announced_times
 
 
-def temporal_volumes(source: Any) -> tuple[Sequence[Any], tuple[float, ...]]:
+def steps_and_times(source: Any) -> tuple[Sequence[Any], tuple[float, ...]]:
     """Return the steps of a source as a sequence of VTK's data, and their times.
 
     Parameters
@@ -35,14 +35,22 @@ def temporal_volumes(source: Any) -> tuple[Sequence[Any], tuple[float, ...]]:
         read = partial(_update_to, source, times)
     if not times:
         raise InvalidArgumentError(
-            f"{type(source).__name__} announces no time steps: pass its output to generate, or the "
-            "volumes of a series in a list"
+            f"{type(source).__name__} announces no time steps, which a series is made of: use what "
+            "it gives as one volume, or one VDI"
         )
-    return _Steps(read, len(times)), times
+    return Steps(read, len(times)), times
 
 
-class _Steps(Sequence[Any]):
-    """The data of each step; from one thread at a time, since there is one source."""
+class Steps(Sequence[Any]):
+    """What a function returns for each step; called by one thread at a time: there is one source.
+
+    Parameters
+    ----------
+    read : callable
+        Gets the step's index.
+    n : int
+        How many there are.
+    """
 
     def __init__(self, read: Callable[[int], Any], n: int) -> None:
         self._read, self._n = read, n
@@ -55,17 +63,17 @@ class _Steps(Sequence[Any]):
         if isinstance(index, slice):
             return [self[i] for i in range(self._n)[index]]
         with self._lock:
-            return _only_block(self._read(range(self._n)[index]))
+            return self._read(range(self._n)[index])
 
 
 def _read_point(reader: Any, i: int) -> Any:
     reader.set_active_time_point(i)
-    return reader.read()
+    return _only_block(reader.read())
 
 
 def _update_to(algorithm: Any, times: Sequence[float], i: int) -> Any:
     algorithm.UpdateTimeStep(times[i])
-    data = algorithm.GetOutputDataObject(0)
+    data = _only_block(algorithm.GetOutputDataObject(0))
     step = data.NewInstance()
     step.ShallowCopy(data)  # the output is another one at another time
     return step
