@@ -21,6 +21,7 @@ from vtkmodules.vtkCommonDataModel import (
     vtkPiecewiseFunction,
     vtkPolyData,
 )
+from vtkmodules.vtkCommonExecutionModel import vtkAlgorithm
 from vtkmodules.vtkFiltersSources import vtkOutlineSource
 from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
 
@@ -538,8 +539,10 @@ def _enter(view: Any, actor: Any, algorithm: VDIInScene) -> None:
             renderer.RemoveViewProp(shown)
         else:
             shown.SetVisibility(owner.visible_in(where))
-            if shown.GetVisibility():  # else wrong beside what is translucent
-                renderer.SetUseDepthPeelingForVolumes(False)
+            if shown.GetVisibility():
+                # ParaView does not where it keeps the outlines of an animation's times
+                vtkAlgorithm.UpdateTimeStep(owner, where.GetProperty("ViewTime").GetElement(0))
+                renderer.SetUseDepthPeelingForVolumes(False)  # else wrong beside the translucent
 
     renderer = view.GetClientSideObject().GetRenderer()
     renderer.AddViewProp(actor)

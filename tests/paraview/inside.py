@@ -309,6 +309,11 @@ def animation(folder):
         save_pixels(picture, folder / f"picture_{i}.npy")
         data = reader.GetClientSideObject().GetOutputDataObject(0).GetInformation()
         found["shown"].append(data.Get(vtkDataObject.DATA_TIME_STEP()))
+    # The same with ParaView's outlines kept, so that nothing is executed again
+    simple.GetSettingsProxy("GeneralSettings").CacheGeometryForAnimation = 1
+    for name, time in (("kept", 0.5), ("kept", 4.0), ("kept_0", 0.5)):
+        scene.AnimationTime = time
+        simple.SaveScreenshot(str(folder / f"{name}.png"), view, ImageResolution=SIZE)
     (folder / "more.vdis").replace(folder / "ball.vdis")
     simple.ReloadFiles(reader)
     found["reloaded"] = list(reader.TimestepValues)

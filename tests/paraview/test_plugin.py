@@ -314,6 +314,7 @@ def test_a_series_plays_with_paraviews_animation(paraview, tmp_path, default_run
         turned = pvdi.render(series[step], camera.azimuth(20), SCREEN)
         apart = np.abs(pixels(tmp_path / f"picture_{i}.npy", SCREEN) - turned).max(axis=2)
         assert (apart > ROUNDING).mean() <= SHARE_OF_BORDER_PIXELS
+    assert_alike(screenshot(tmp_path / "kept_0.png"), expected[0])
     played = sorted(tmp_path.glob("played*.png"))
     assert len(played) == 3
     for path, picture in zip(played, expected, strict=True):
