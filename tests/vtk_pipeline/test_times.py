@@ -14,6 +14,7 @@ from vtkmodules.vtkFiltersGeneral import vtkMultiBlockDataGroupFilter
 from vtkmodules.vtkFiltersHybrid import vtkTemporalInterpolator
 from vtkmodules.vtkImagingCore import vtkExtractVOI, vtkRTAnalyticSource
 from vtkmodules.vtkRenderingCore import vtkVolumeProperty
+from watched_windows import frame, frames_until
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
@@ -302,6 +303,35 @@ def test_a_mapper_draws_the_time_that_is_asked_of_the_source_or_before_it(vdis):
             asked.UpdateTimeStep(time)
             plotter.render()
             assert mapper.GetVDI().equals(vdis[step])
+    plotter.close()
+
+
+@pytest.mark.gl
+def test_in_a_watched_window_the_volume_is_drawn_until_its_vdi_is_there(gate):
+    producer = Moving()
+    source, mapper, actor = source_of(producer), pvdi.VDIMapper(), pvdi.VDIActor()
+    mapper.SetInputConnection(source.GetOutputPort())
+    mapper.SetInteractiveOffScreen(True)
+    mapper.SetDraw("vdi")
+    actor.SetMapper(mapper)
+    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
+    plotter.renderer.AddVolume(actor)
+    plotter.show(auto_close=False)
+    asked = vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
+    for generation, (algorithm, step) in enumerate(((producer, 2), (producer, 1), (source, 0)), 2):
+        # Asked for, and not made yet
+        algorithm.GetOutputInformation(0).Set(asked, TIMES[step])
+        gate.clear()
+        frame(plotter)
+        assert actor.status.stand_in
+        gate.set()
+        frames_until(plotter, lambda: actor.status.generation == generation)
+        assert not actor.status.stand_in
+        made = mapper.GetVDI()
+        expected = pvdi.generate(
+            ball_at(step), made.camera, made.window_size, volume_property=some_property()
+        )
+        assert made.equals(expected)
     plotter.close()
 
 
