@@ -325,8 +325,8 @@ def test_in_a_watched_window_the_volume_is_drawn_until_its_vdi_is_there(gate):
         frame(plotter)
         assert actor.status.stand_in
         gate.set()
-        frames_until(plotter, lambda: actor.status.generation == generation)
-        assert not actor.status.stand_in
+        frames_until(plotter, lambda: not actor.status.stand_in)
+        assert actor.status.generation == generation
         made = mapper.GetVDI()
         expected = pvdi.generate(
             ball_at(step), made.camera, made.window_size, volume_property=some_property()
