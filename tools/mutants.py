@@ -262,8 +262,8 @@ MUTANTS = (
     _m(
         "occupancy: less than the faces",
         "raycasting/occupancy.cl",
-        "slab_of(fronts[k] - margin,",
-        "slab_of(fronts[k] + 64 * margin,",
+        "slab_of(front - margin,",
+        "slab_of(front + 64 * margin,",
     ),
     _m(
         "occupancy: supersegments end a slab too early",
