@@ -35,6 +35,7 @@ ROOMS = {
     "volume": ("volume", "generation"),
     "raycasting": ("raycasting", "model"),
     "multi_vdi": ("raycasting",),
+    "series": ("series",),
 }
 
 
@@ -62,6 +63,7 @@ MARCH, MARCH_LISTS = "volume/march.cl", "generation/march_lists.cl"
 RUNS, SHORTEN = "generation/runs.cl", "generation/shorten_lists.cl"
 CRITERIA = "generation/criteria.cl"
 LISTS, RAYS = "raycasting/lists.cl", "raycasting/list_rays.cl"
+DECODE = "series/decode.cl"
 
 MUTANTS = (
     _m(
@@ -337,6 +339,22 @@ MUTANTS = (
         "meets > grades",
         "meets >= grades",
     ),
+    _m(
+        "packed lists: the scale lacks the stride",
+        "raycasting/prepare_packed.cl",
+        "length(direction) * (float)stride * step",
+        "length(direction) * step",
+    ),
+    _m("series: lists have not moved", DECODE, "rounded(shift * moved_by, 1.0, &tame)", "0"),
+    _m(
+        "series: kept ones that are left over do not matter",
+        DECODE,
+        "tame = tame && !bit_at(kept_there, place[THERE_BIT] + old);",
+        ";",
+    ),
+    _m("series: last faces are as the others", DECODE, "if (k == count - 1) {", "if (false) {"),
+    _m("series: numbers are rounded down", DECODE, "rint(value / unit)", "floor(value / unit)"),
+    _m("series: colours are the table's", DECODE, "if (same >= 0 && left == 0) {", "if (false) {"),
 )
 
 

@@ -19,6 +19,8 @@ CASES = {
     "other colours": {"palette": False},
     "all the same": {"still": 1.0},
     "nothing the same": {"still": 0.0},
+    "partly the same": {"partly": True},
+    "partly, no samples": {"partly": True, "metadata": {}},
     "one list": {"size": (1, 1)},
     "many lists": {"size": (97, 61)},
 }
@@ -80,7 +82,8 @@ def test_without_the_arrays_in_one_memory(made, tmp_path, monkeypatch):
 def test_numbers_that_contradict_each_other_are_refused_alike(seed, made, tmp_path, monkeypatch):
     """A frame's numbers are changed, its checksums are not looked at."""
     random = np.random.default_rng(seed)
-    steps = [stepped_vdi(step=k, size=(12, 7)).with_precision("8-byte") for k in range(3)]
+    steps = [stepped_vdi(step=k, size=(12, 7), partly=seed % 2 > 0) for k in range(3)]
+    steps = [step.with_precision("8-byte") for step in steps]
     path = VDISeries.of(steps).save(tmp_path / "a.vdis")
     read_arrays = layout.read_arrays
 
@@ -111,6 +114,31 @@ def test_numbers_that_contradict_each_other_are_refused_alike(seed, made, tmp_pa
     found = outcome(i)
     monkeypatch.setattr(reader, "runtime_for_decoding", lambda: None)
     assert outcome(i) == found
+
+
+def test_more_is_said_to_be_kept_than_is(made, tmp_path, monkeypatch):
+    steps = [stepped_vdi(step=k, partly=True).with_precision("8-byte") for k in range(2)]
+    path = VDISeries.of(steps).save(tmp_path / "a.vdis")
+    read_arrays = layout.read_arrays
+    refused = 0
+    for place in range(1, 40):
+
+        def changed(data, codec, place=place):
+            arrays = dict(read_arrays(data, codec))
+            if "kept_there" in arrays:
+                bits = np.unpackbits(arrays["kept_there"])
+                bits[np.flatnonzero(bits == 0)[-place]] = 1
+                arrays["kept_there"] = np.packbits(bits)
+            return arrays
+
+        monkeypatch.setattr(layout, "read_arrays", changed)
+        try:
+            assert pvdi.read(path)[1].equals(steps[1])  # a bit that fills up the last byte
+        except VDIFileError as error:
+            assert "what is kept" in str(error)
+            refused += 1
+    assert refused >= 32
+    assert made[False] == refused
 
 
 def test_a_device_without_memory_costs_no_step(default_runtime, monkeypatch, tmp_path):

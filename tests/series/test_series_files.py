@@ -86,6 +86,8 @@ def test_precisions_and_compressions(precision, compression, tmp_path):
         {"still": 1.0},
         {"still": 0.0},
         {"size": (1, 1)},
+        {"partly": True},
+        {"partly": True, "metadata": {}},
     ],
 )
 def test_guesses_that_are_wrong_cost_bytes_and_no_more(changes, tmp_path):

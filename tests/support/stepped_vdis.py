@@ -9,8 +9,14 @@ import pyvista_vdi as pvdi
 SIZE = (24, 14)
 
 
-def stepped_vdi(seed=0, *, size=SIZE, metadata=None, step=0.0, still=0.5, palette=True):
-    """A VDI of lists whose faces lie at samples, some of them the same for every ``step``."""
+def stepped_vdi(
+    seed=0, *, size=SIZE, metadata=None, step=0.0, still=0.5, palette=True, partly=False
+):
+    """A VDI of lists whose faces lie at samples, some of them the same for every ``step``.
+
+    ``partly``: of the lists that move, many supersegments stay where they were, and some of these
+    change their colours; all lists move along their rays.
+    """
     fixed, random = np.random.default_rng(seed), np.random.default_rng([seed, int(step * 97)])
     camera = pvdi.Camera((0, 0, 50), (0, 0, 0), (0, 1, 0))
     n_lists = size[0] * size[1]
@@ -21,10 +27,19 @@ def stepped_vdi(seed=0, *, size=SIZE, metadata=None, step=0.0, still=0.5, palett
         generator = random if moves[i] else np.random.default_rng([seed, i])
         n = int(generator.integers(0, 9))
         faces = np.sort(generator.choice(80, n + 1, replace=False)) * 0.25 + 40.0 + i * 0.01
-        fronts.append(faces[:-1])
-        backs.append(faces[1:])
-        entries.append(generator.integers(0, 256, n))
-        counts.append(n)
+        media = generator.integers(0, 256, n)
+        if partly:
+            generator = np.random.default_rng([seed, i])
+            n = int(generator.integers(0, 15))
+            faces = np.sort(generator.choice(80, n + 1, replace=False)) * 0.25
+            faces += 40.0 + i * 0.01 + 0.25 * random.integers(0, 4)
+            media = generator.integers(0, 256, n)
+            media = np.where(random.random(n) < 0.2, random.integers(0, 256, n), media)
+        there = random.random(n) < 0.8 if partly and moves[i] else np.ones(n, bool)
+        fronts.append(faces[:-1][there])
+        backs.append(faces[1:][there])
+        entries.append(media[there])
+        counts.append(np.count_nonzero(there))
     entries = np.concatenate(entries)
     front, back = np.concatenate(fronts), np.concatenate(backs)
     colors = table[entries] if palette else np.random.default_rng(1).random((len(entries), 3))
