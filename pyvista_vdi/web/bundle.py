@@ -24,6 +24,9 @@ from importlib import resources
 WORKER = "worker.js"
 SPAWN = "spawn.js"
 
+#: What reads and plays series, and zstd, which pages without a series do not have.
+OF_SERIES = ("differences.js", "frames.js", "steps.js", "zstd.js")
+
 #: What takes the place of SPAWN. The text ends with a call of what stands in it.
 _SPAWN_BUNDLED = """\
 function spawnWorker() {
@@ -46,7 +49,9 @@ _COMMENT = re.compile(r"^[ \t]*(?://[^\n]*|/\*\*.*?\*/[ \t]*)\n", re.MULTILINE |
 
 
 @cache
-def viewer_script(*, scene: bool = False, remote: bool = False, module: bool = False) -> str:
+def viewer_script(
+    *, scene: bool = False, remote: bool = False, series: bool = False, module: bool = False
+) -> str:
     """Return the viewer as one script.
 
     Parameters
@@ -55,6 +60,9 @@ def viewer_script(*, scene: bool = False, remote: bool = False, module: bool = F
         Whether it draws meshes, lines and text beside VDIs.
     remote : bool
         Whether it can be fed by ``pyvista-vdi serve``.
+    series : bool
+        Whether it plays series, and reads what zstd has compressed. Otherwise the names that
+        these modules export are null.
     module : bool
         Whether names stay in sight of what is written behind the script: for an ES module. By
         default the script is a function that is called, and shows nothing but its element.
@@ -70,6 +78,8 @@ def viewer_script(*, scene: bool = False, remote: bool = False, module: bool = F
         for entry in folder.iterdir()
         if entry.name.endswith(".js")
     }
+    if not series:
+        sources |= {name: _absent(sources[name]) for name in OF_SERIES if name in sources}
     entries = ["element.js", *["scene.js"] * scene, *["remote.js"] * remote]
     script = bundled(sources, entries)
     return script if module else f'(() => {{\n"use strict";\n{script}}})();\n'
@@ -119,6 +129,11 @@ def bundled(sources: Mapping[str, str], entries: Iterable[str]) -> str:
     if re.search(r"</script|<!--", script, re.IGNORECASE):
         raise ValueError("a module holds what would end a <script> or begin a comment of HTML")
     return script
+
+
+def _absent(text: str) -> str:
+    """Return a module in which all that another one exports is null."""
+    return "".join(f"export const {name} = null;\n" for name in _EXPORT.findall(text))
 
 
 def _in_order(entries: Iterable[str], needs: Mapping[str, list[str]]) -> list[str]:

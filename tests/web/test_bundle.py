@@ -7,7 +7,7 @@ from importlib import resources
 
 import pytest
 
-from pyvista_vdi.web.bundle import SPAWN, bundled
+from pyvista_vdi.web.bundle import OF_SERIES, SPAWN, bundled, viewer_script
 
 MODULES = {
     "a.js": 'import { b, B } from "./b.js";\nimport { spawnWorker } from "./spawn.js";\n'
@@ -61,3 +61,12 @@ def test_every_module_of_the_viewer_is_in_the_package_and_can_be_bundled():
     assert all(name.endswith(".js") for name in sources), sorted(sources)
     for name in sources.keys() - {SPAWN}:
         bundled(sources, [name])
+
+
+def test_what_plays_series_is_left_out_of_pages_without_one():
+    without, whole = viewer_script(), viewer_script(series=True)
+    assert "const unzstd = null;" in without
+    assert "class ZstdFrame" in whole
+    assert "class ZstdFrame" not in without
+    folder = resources.files("pyvista_vdi.web") / "viewer"
+    assert all((folder / name).is_file() for name in OF_SERIES)

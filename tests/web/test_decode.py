@@ -72,7 +72,7 @@ def large_vdi():
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("codec", ["lz4", "deflate", "none"])
+@pytest.mark.parametrize("codec", ["lz4", "zstd", "deflate", "none"])
 @pytest.mark.parametrize("precision", ["exact", "16-byte", "8-byte"])
 def test_arrays_are_python_s(codec, precision, page, tmp_path):
     vdis = [large_vdi(), *(random_vdi(np.random.default_rng(seed)) for seed in range(4))]
@@ -147,7 +147,7 @@ def test_every_truncation_is_noticed(page, tmp_path):
             assert "truncated" in answer, (cut, answer)
 
 
-@pytest.mark.parametrize("codec", ["deflate", "lz4", "none"])
+@pytest.mark.parametrize("codec", ["deflate", "lz4", "zstd", "none"])
 def test_every_changed_byte_is_noticed_or_harmless(codec, page, tmp_path):
     vdi = random_vdi(np.random.default_rng(2), max_window=(6, 5))
     data = vdi_bytes(vdi, tmp_path, compression=codec, precision="8-byte")
@@ -190,7 +190,7 @@ def test_hostile_headers(page, tmp_path):
             )
         ],
         "others": [
-            {"version": 5}, {"version": "4"}, {"codec": "deflate"}, {"codec": "zstd"},
+            {"version": 5}, {"version": "4"}, {"codec": "deflate"}, {"codec": "lzma"},
             {"codec": ["none"]}, {"precision": "half"}, {"depth_step": 0.3}, {"depth_step": -1},
             {"bounds": [1, 0, 0, 1, 0, 1]}, {"bounds": "x"}, {"arrays": None}, {"arrays": {}},
             {"metadata": None}, {"chunk_rows": 1}, {"format": "x"}, {"depth_origin": None},
@@ -201,7 +201,6 @@ def test_hostile_headers(page, tmp_path):
             answer = decoded(page, described(data, **change))
             assert isinstance(answer, str), (kind, change)
             assert answer.startswith("VDIFileError: "), (kind, change, answer)
-    assert "--compression deflate" in decoded(page, described(data, codec="zstd"))
 
 
 def test_streams_that_lie_about_their_size(page, tmp_path):

@@ -3,14 +3,15 @@
 // and depths against a VDI's rules; and nothing is allocated for a mere declaration.
 
 import {
-  REMEDY, VDIFileError, bytesOfBase64, crc32, damaged, inflate, unblosc, unshuffle,
+  REMEDY, VDIFileError, bytesOfBase64, crc32, damaged, decodes, mayHold, unpackChunk,
 } from "./unpack.js";
 
 const VERSIONS = [2, 3, 4];
 const CHUNK_ROWS = 1 << 16;
-const DEPTH_CODES = 16383; // Constants of docs/conventions.md, "Packed supersegments"
-const TAU_CODES = 4095;
-const GRID = 2 ** 24 - 2 ** 15;
+/** Constants of docs/conventions.md, "Packed supersegments". */
+export const DEPTH_CODES = 16383;
+export const TAU_CODES = 4095;
+export const GRID = 2 ** 24 - 2 ** 15;
 const MAX_EDGE = 65536;
 const DESCRIPTION = "vdi.json";
 const COARSE = "coarse.vdi";
@@ -72,12 +73,10 @@ export class LevelDecoder {
     const coarse = members.get(COARSE);
     if (!coarse) return;
     const whole = described(members);
-    this.onBegin({
-      windowSize: whole.window_size, camera: whole.camera, bounds: whole.bounds,
-      depthOrigin: whole.depth_origin,
-    });
+    const { windowSize, camera, bounds, depthOrigin, metadata, pictureSize } = whole.view;
+    this.onBegin({ windowSize, camera, bounds, depthOrigin });
     const vdi = await decodeVDI(checkedMember(coarse), "coarse");
-    this.onLevel({ ...vdi, metadata: whole.metadata, pictureSize: pictureSize(whole) });
+    this.onLevel({ ...vdi, metadata, pictureSize });
   }
 }
 
@@ -115,9 +114,7 @@ async function decodedFile(bytes, level) {
   const counts = await unpacked(file, arrays.counts);
   const offsets = offsetsOf(counts, arrays.counts.itemBytes, file.n);
   const vdi = {
-    windowSize: file.window_size, camera: file.camera, bounds: file.bounds,
-    depthOrigin: file.depth_origin, metadata: file.metadata, pictureSize: pictureSize(file), level,
-    precision: file.precision === "8-byte" ? "8-byte" : "exact", offsets,
+    ...file.view, level, precision: file.precision === "8-byte" ? "8-byte" : "exact", offsets,
   };
   const decode = file.precision === "8-byte" ? decodedCodes : decodedMedia;
   return Object.assign(vdi, await decode(file, arrays, offsets));
@@ -185,36 +182,53 @@ function described(members) {
         "write it anew by pyvista-vdi convert x.vdi -o y.vdi --compression deflate"
     );
   }
-  if (d.codec === "zstd") {
+  if (!decodes(d.codec)) {
     throw new VDIFileError(
-      "the VDI file is compressed with zstd, which browsers do not decode: " +
+      `the VDI file is compressed with ${d.codec}, which this page does not decode: ` +
         "pyvista-vdi convert x.vdi -o y.vdi --compression deflate"
     );
   }
-  const isWhole = (x, least, most) => Number.isInteger(x) && x >= least && x <= most;
-  const areNumbers = (x, length) =>
-    Array.isArray(x) && x.length === length && x.every(Number.isFinite);
-  const good = {
-    codec: (d.version > 3 ? ["deflate"] : ["none", "lz4"]).includes(d.codec),
-    window_size: areNumbers(d.window_size, 2) &&
-      d.window_size.every((x) => isWhole(x, 1, MAX_EDGE)),
-    n_supersegments: isWhole(d.n_supersegments, 0, 2 ** 30),
+  const n = d.n_supersegments;
+  requireAll(d, {
+    codec: (d.version > 3 ? ["deflate"] : ["none", "lz4", "zstd"]).includes(d.codec),
+    n_supersegments: Number.isInteger(n) && n >= 0 && n <= 2 ** 30,
     chunk_rows: d.chunk_rows === CHUNK_ROWS,
-    bounds: areNumbers(d.bounds, 6) && [0, 2, 4].every((k) => d.bounds[k] <= d.bounds[k + 1]),
-    depth_origin: Number.isFinite(d.depth_origin),
     precision: d.version === 2 || ["exact", "16-byte", "8-byte"].includes(d.precision),
     depth_step: d.precision !== "8-byte" || Number.isInteger(Math.log2(d.depth_step)),
-    camera: isCamera(d.camera, areNumbers),
+  });
+  return { ...d, view: checkedView(d), n, precision: d.version === 2 ? "exact" : d.precision };
+}
+
+const areNumbers = (x, length) =>
+  Array.isArray(x) && x.length === length && x.every(Number.isFinite);
+
+/**
+ * What a description says of a VDI's view, checked: windowSize, camera, bounds, depthOrigin,
+ * metadata and pictureSize.
+ */
+export function checkedView(d) {
+  requireAll(d, {
+    window_size: areNumbers(d.window_size, 2) &&
+      d.window_size.every((x) => Number.isInteger(x) && x >= 1 && x <= MAX_EDGE),
+    bounds: areNumbers(d.bounds, 6) && [0, 2, 4].every((k) => d.bounds[k] <= d.bounds[k + 1]),
+    depth_origin: Number.isFinite(d.depth_origin),
+    camera: isCamera(d.camera),
     metadata: d.metadata !== null && typeof d.metadata === "object",
+  });
+  return {
+    windowSize: d.window_size, camera: d.camera, bounds: d.bounds, depthOrigin: d.depth_origin,
+    metadata: d.metadata, pictureSize: pictureSize(d),
   };
+}
+
+function requireAll(d, good) {
   for (const [name, is] of Object.entries(good)) {
     const what = String(JSON.stringify(d[name])).slice(0, 80);
     if (!is) damaged(`its description's ${name} is ${what}`);
   }
-  return { ...d, n: d.n_supersegments, precision: d.version === 2 ? "exact" : d.precision };
 }
 
-function isCamera(c, areNumbers) {
+function isCamera(c) {
   return c !== null && typeof c === "object" &&
     ["position", "focal_point", "view_up"].every((name) => areNumbers(c[name], 3)) &&
     c.position.some((x, k) => x !== c.focal_point[k]) &&
@@ -261,8 +275,7 @@ function packedArrays(file, members) {
       if (8 * k + 8 > chunks.byteLength) damaged(`it has ${k} chunks where more belong`);
       const size = chunks.getUint32(8 * k, true);
       const raw = Math.min(CHUNK_ROWS, rows - first) * array.rowBytes;
-      const possible = { none: size === raw, lz4: size > 16 && raw <= 255 * size }[file.codec];
-      if (!(possible ?? raw <= 1032 * size) || at + size > bytes.length) {
+      if (!mayHold(file.codec, size, raw) || at + size > bytes.length) {
         damaged(`${size} bytes cannot hold the ${raw} of a chunk of array ${name}`);
       }
       array.chunks.push({ bytes: bytes.subarray(at, at + size), raw });
@@ -283,9 +296,7 @@ async function unpacked(file, array) {
   let at = 0;
   for (const { bytes, raw } of array.chunks) {
     const rows = out.subarray(at, at + raw);
-    if (file.codec === "none") rows.set(bytes);
-    else if (file.codec === "lz4") unblosc(bytes, rows, array.itemBytes);
-    else unshuffle(await inflate(bytes, raw), rows, array.rowBytes);
+    await unpackChunk(file.codec, bytes, rows, array.itemBytes, array.rowBytes);
     at += raw;
   }
   array.chunks = null;

@@ -1,4 +1,5 @@
 // Checksums and codecs: what lies in a file to the bytes that it stands for.
+import { unzstd } from "./zstd.js";
 
 /** What to do about a file that is not as it was written. */
 export const REMEDY = "load it again, or copy it from its source again";
@@ -63,24 +64,76 @@ export function crc32(bytes) {
 
 /** Decompress a zlib stream to exactly `raw` bytes; nothing more is ever unpacked. */
 export async function inflate(bytes, raw) {
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const reader = stream.getReader();
   const out = new Uint8Array(raw);
   let at = 0;
+  const whole = await inflatePieces(bytes, (piece) => {
+    if (at + piece.length > raw) return false;
+    out.set(piece, at);
+    at += piece.length;
+    return true;
+  });
+  if (!whole || at !== raw) {
+    damaged(`a chunk does not decompress to the ${raw} bytes that it stands for`);
+  }
+  return out;
+}
+
+/** Decompress a zlib stream of text, of which there may be `most` bytes. */
+export async function inflateText(bytes, most) {
+  const decoder = new TextDecoder();
+  let text = "";
+  let length = 0;
+  const whole = await inflatePieces(bytes, (piece) => {
+    length += piece.length;
+    text += decoder.decode(piece, { stream: true });
+    return length <= most;
+  });
+  if (!whole) damaged("a description does not decompress");
+  return text + decoder.decode();
+}
+
+// Give the pieces of what a zlib stream stands for until one is refused; whether all were taken.
+async function inflatePieces(bytes, take) {
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const reader = stream.getReader();
   try {
     for (;;) {
       const { done, value } = await reader.read();
-      if (done) break;
-      if (at + value.length > raw) throw new RangeError("more than belongs there");
-      out.set(value, at);
-      at += value.length;
+      if (done) return true;
+      if (!take(value)) return false;
     }
   } catch {
-    at = -1;
+    return false;
+  } finally {
+    reader.cancel().catch(() => {});
   }
-  reader.cancel().catch(() => {});
-  if (at !== raw) damaged(`a chunk does not decompress to the ${raw} bytes that it stands for`);
-  return out;
+}
+
+/** Whether so many compressed bytes may hold the `raw` that they are said to. */
+export function mayHold(codec, size, raw) {
+  if (codec === "none") return size === raw;
+  if (codec === "deflate") return raw <= 1032 * size;
+  return size > 16 && raw <= (codec === "zstd" ? 1 << 15 : 255) * size;
+}
+
+/**
+ * Decompress a chunk of an array's rows into `rows`.
+ *
+ * @param {string} codec "none", "lz4", "zstd" or "deflate".
+ * @param {Uint8Array} bytes
+ * @param {Uint8Array} rows
+ * @param {number} itemBytes Of a number; of Blosc's shuffling.
+ * @param {number} rowBytes Of a row; of the shuffling that goes with deflate.
+ */
+export async function unpackChunk(codec, bytes, rows, itemBytes, rowBytes) {
+  if (codec === "none") rows.set(bytes);
+  else if (codec === "deflate") unshuffle(await inflate(bytes, rows.length), rows, rowBytes);
+  else unblosc(bytes, rows, itemBytes, codec);
+}
+
+/** Whether this viewer decodes a codec: of pages that hold other ones, zstd is left out. */
+export function decodes(codec) {
+  return codec !== "zstd" || unzstd !== null;
 }
 
 /** Byte planes to elements: first the first bytes of all, then the second ones. */
@@ -93,10 +146,11 @@ export function unshuffle(planes, out, size) {
   out.set(planes.subarray(n * size, out.length), n * size);
 }
 
-/** Decompress a frame of Blosc 1 with LZ4 (c-blosc, README_CHUNK_FORMAT.rst) into `out`. */
-export function unblosc(bytes, out, itemBytes) {
+/** Decompress a frame of Blosc 1 (c-blosc, README_CHUNK_FORMAT.rst) by lz4 or zstd into `out`. */
+export function unblosc(bytes, out, itemBytes, codec) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  const wrong = () => damaged("a chunk is not in Blosc's format with lz4");
+  const wrong = () => damaged(`a chunk is not in Blosc's format with ${codec}`);
+  const unpack = codec === "zstd" ? unzstd : unlz4;
   const [flags, typeSize] = [bytes[2], bytes[3]];
   const blockBytes = view.getUint32(8, true);
   if (bytes[0] !== 2 || typeSize !== itemBytes || view.getUint32(4, true) !== out.length) wrong();
@@ -106,7 +160,7 @@ export function unblosc(bytes, out, itemBytes) {
     out.set(bytes.subarray(16));
     return;
   }
-  if (flags >> 5 !== 1 || flags & 4 || !blockBytes || blockBytes > out.length) wrong();
+  if (flags >> 5 !== (codec === "zstd" ? 4 : 1) || flags & 4 || !blockBytes || blockBytes > out.length) wrong();
   const block = new Uint8Array(blockBytes);
   for (let first = 0, k = 0; first < out.length; first += blockBytes, ++k) {
     const size = Math.min(blockBytes, out.length - first);
@@ -121,7 +175,7 @@ export function unblosc(bytes, out, itemBytes) {
       if (at + packed > bytes.length) wrong();
       const target = block.subarray((part * size) / parts, ((part + 1) * size) / parts);
       if (packed === target.length) target.set(bytes.subarray(at, at + packed));
-      else if (!unlz4(bytes.subarray(at, at + packed), target)) wrong();
+      else if (!unpack(bytes.subarray(at, at + packed), target)) wrong();
       at += packed;
     }
     const rows = out.subarray(first, first + size);
