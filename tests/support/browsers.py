@@ -36,7 +36,7 @@ import "./element.js";
 {script}
 const viewer = window.viewer = document.querySelector("vdi-viewer");
 window.heard = [];
-for (const name of ["camerachange", "framedrawn", "error"]) {{
+for (const name of ["camerachange", "framedrawn", "vditime", "error"]) {{
   viewer.addEventListener(name, (event) => heard.push([name, event.detail]));
 }}
 window.bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -75,12 +75,18 @@ def chromium():
 
 
 class Page:
-    """A page with a viewer; ``page`` is Playwright's."""
+    """A page with a viewer; ``page`` is Playwright's.
 
-    def __init__(self, page, files, expected):
+    ``asked`` has the names of the files that were asked for, and the range of each or None. Parts
+    are given of those whose names are in ``in_parts``.
+    """
+
+    def __init__(self, page, files, expected, in_parts=()):
         self.page = page
         self.complaints = []
         self.expected = expected
+        self.asked = []
+        self.in_parts = in_parts
         page.set_default_timeout(LONG)
         page.on("pageerror", lambda error: self._complain(str(error)))
         page.on("console", self._hear)
@@ -95,10 +101,17 @@ class Page:
         if not (self.expected and re.search(self.expected, text)):
             self.complaints.append(text)
 
-    @staticmethod
-    def _answer(route, files):
+    def _answer(self, route, files):
         name = route.request.url.removeprefix(SITE).partition("?")[0]
         content = files.get(name)
+        part = re.fullmatch(r"bytes=(\d+)-(\d+)", route.request.headers.get("range", ""))
+        self.asked.append((name, part and tuple(map(int, part.groups()))))
+        if part and name in self.in_parts:
+            begin, last = self.asked[-1][1]
+            sent = content[begin : last + 1]
+            where = f"bytes {begin}-{begin + len(sent) - 1}/{len(content)}"
+            route.fulfill(status=206, body=sent, headers={"Content-Range": where})
+            return
         module = resources.files("pyvista_vdi.web") / "viewer" / name
         if content is None and name.endswith(".js") and module.is_file():
             content = module.read_text(encoding="utf-8")
@@ -143,8 +156,8 @@ class Page:
 def open_page(chromium):
     """Open a page with a viewer of ``size`` CSS pixels, or one of ``files`` by its ``name``.
 
-    ``before`` runs before anything else. What the page complains of fails the test, but for what
-    ``expected`` (a pattern) is found in.
+    ``before`` runs before anything else. Of files named in ``in_parts`` the server gives parts.
+    What the page complains of fails the test, but for what ``expected`` (a pattern) is found in.
     """
     contexts, pages = [], []
 
@@ -157,6 +170,7 @@ def open_page(chromium):
         files=None,
         name=None,
         expected=None,
+        in_parts=(),
         **options,
     ):
         files = dict(files or {})
@@ -168,7 +182,7 @@ def open_page(chromium):
         context = chromium.new_context(**options)
         context.add_init_script(before)
         contexts.append(context)
-        page = Page(context.new_page(), files, expected)
+        page = Page(context.new_page(), files, expected, in_parts)
         pages.append(page)
         page.page.goto(SITE + name)
         if name == "page.html":

@@ -3,7 +3,7 @@
 // and depths against a VDI's rules; and nothing is allocated for a mere declaration.
 
 import {
-  REMEDY, VDIFileError, bytesOfBase64, crc32, damaged, decodes, mayHold, unpackChunk,
+  GrowingBytes, REMEDY, VDIFileError, crc32, damaged, decodes, mayHold, unpackChunk,
 } from "./unpack.js";
 
 const VERSIONS = [2, 3, 4];
@@ -27,9 +27,7 @@ export class LevelDecoder {
   constructor(onLevel, onBegin) {
     this.onLevel = onLevel;
     this.onBegin = onBegin;
-    this.bytes = new Uint8Array(1 << 16);
-    this.length = 0;
-    this.text = ""; // base64 that is not yet four characters
+    this.bytes = new GrowingBytes();
     this.beginning = true; // whether a coarse level may still come
   }
 
@@ -39,32 +37,20 @@ export class LevelDecoder {
    * @param {Uint8Array|string} piece Bytes, or base64 text.
    */
   async push(piece) {
-    if (typeof piece === "string") {
-      const text = this.text + piece.replace(/\s+/g, "");
-      this.text = text.slice(text.length & ~3);
-      piece = bytesOfBase64(text.slice(0, text.length & ~3));
-    }
-    const length = this.length + piece.length;
-    if (length > this.bytes.length) {
-      const larger = new Uint8Array(Math.max(length, 2 * this.bytes.length));
-      larger.set(this.bytes.subarray(0, this.length));
-      this.bytes = larger;
-    }
-    this.bytes.set(piece, this.length);
-    this.length = length;
+    this.bytes.push(piece);
     if (this.beginning) await this.lookForCoarse();
   }
 
   /** Say that there are no more bytes; resolves when the full level has been given. */
   async end() {
-    if (this.text) damaged("its base64 text ends within a byte");
-    if (!this.length) damaged("it is empty");
-    this.onLevel(await decodeVDI(this.bytes.subarray(0, this.length)));
+    if (this.bytes.broken) damaged("its base64 text ends within a byte");
+    if (!this.bytes.whole.length) damaged("it is empty");
+    this.onLevel(await decodeVDI(this.bytes.whole));
   }
 
   async lookForCoarse() {
     const members = new Map();
-    for (const member of membersOf(this.bytes.subarray(0, this.length), true)) {
+    for (const member of membersOf(this.bytes.whole, true)) {
       members.set(member.name, member);
       if (members.size === 2) break;
     }

@@ -3,6 +3,7 @@ import { checkedCamera } from "./camera.js";
 import { interact } from "./interaction.js";
 import { embedded, load } from "./loader.js";
 import { Pacer } from "./pacer.js";
+import { Player, playerControls } from "./player.js";
 import { Raycaster } from "./raycast.js";
 import { isParallel } from "./rays.js";
 
@@ -16,8 +17,15 @@ canvas { touch-action: none; outline-offset: -2px; }
 .without { object-fit: contain; }
 p { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.5em 1em; font: 14px sans-serif;
   color: white; background: #000a; }
+.controls { position: absolute; inset: auto 0 0 0; display: flex; align-items: center; gap: 0.5em;
+  padding: 0.2em 0.5em; font: 14px sans-serif; color: white; background: #0008; }
+.controls button { width: 2.5em; padding: 0.3em; border: 0; font: inherit; color: inherit;
+  background: none; cursor: pointer; }
+.controls input { flex: 1; min-width: 3em; accent-color: white; }
+.controls output { min-width: 3em; overflow: hidden; text-align: right; font-variant-numeric: tabular-nums; }
+.controls:not([hidden]) ~ p { bottom: 2.4em; }
 progress { position: absolute; inset: auto 0 0 0; width: 100%; height: 3px; border: 0; }
-[hidden] { display: none; }`;
+[hidden] { display: none !important; }`;
 
 /** Milliseconds after the last movement from which a view rests, and is drawn with all pixels. */
 const REST = 150;
@@ -28,6 +36,9 @@ export class VDIViewer extends HTMLElement {
 
   #parts = {};
   #gl = null;
+  #context = null; // its extension
+  #lost = false; // and whether it was given back by the element itself
+  #released = false;
   #raycaster = null;
   #pacer = null;
   #prepared = null;
@@ -40,16 +51,23 @@ export class VDIViewer extends HTMLElement {
   #moved = -Infinity;
   #drawing = false;
   #asked = false;
+  #wake = () => {};
   #scene = null; // what is drawn
   #coming = null; // what will be, as soon as it can
   #still = null; // URL of the picture that is laid over it
+  #series = null;
+  #player = null;
+  #step = null; // that is drawn with the next frame
+  #showPlayer = () => {};
 
   constructor() {
     super();
     const root = this.attachShadow({ mode: "open" });
     root.innerHTML = `<style>${STYLE}</style><img class="without" hidden alt="">` +
       `<canvas tabindex="0" role="img"></canvas><img class="over" hidden alt="">` +
-      `<canvas class="over" hidden></canvas><slot hidden></slot><progress max="1" hidden></progress><p role="alert" hidden></p>`;
+      `<canvas class="over" hidden></canvas><slot hidden></slot>` +
+      `<div class="controls" hidden></div><progress max="1" hidden></progress>` +
+      `<p role="alert" hidden></p>`;
     for (const name of ["img", "canvas", "progress", "p"]) this.#parts[name] = root.querySelector(name);
     this.#parts.over = root.querySelector("canvas.over");
     this.#parts.laid = root.querySelector("img.over");
@@ -107,6 +125,42 @@ export class VDIViewer extends HTMLElement {
     return { ...this.#status, supersegments: n, lists: windowSize, level, precision, pixels };
   }
 
+  /** The series that is shown: `times`, `length`, `nearest(time)`; null where it is one VDI. */
+  get series() {
+    return this.#series;
+  }
+
+  /** The time of the step that is shown, or will be when it is decoded; null without a series. */
+  get time() {
+    return this.#player && this.#player.time;
+  }
+
+  set time(time) {
+    if (!Number.isFinite(time)) throw new TypeError(`A time is a number; got ${time}.`);
+    this.#seek(this.#played().#series.nearest(time));
+  }
+
+  /** Whether one step is shown after the other. */
+  get playing() {
+    return this.#player !== null && this.#player.playing;
+  }
+
+  /**
+   * Show one step after the other, from the one that is shown, or from the first where the last
+   * one is and nothing follows it. Steps that are not decoded in time are left out.
+   *
+   * @param {{rate: number, loop: boolean}} [options] Steps per second, 24 by default; whether the
+   *   first step follows the last one, as it does by default.
+   */
+  play(options) {
+    this.#played().#player.play(options);
+  }
+
+  /** Stay at the step that is shown. */
+  pause() {
+    this.#player?.pause();
+  }
+
   /**
    * The picture at full quality: premultiplied RGBA, 8 bits, top row first, without background; a
    * scene's texts are in it.
@@ -140,7 +194,7 @@ export class VDIViewer extends HTMLElement {
   }
 
   /**
-   * Show what a URL, bytes or a stream hold: a .vdi file.
+   * Show what a URL, bytes or a stream hold: a .vdi file, or a series, .vdis.
    *
    * @param {string|URL|Uint8Array|ReadableStream} source
    * @returns {Promise<VDIViewer>} When all of it is drawn.
@@ -155,7 +209,12 @@ export class VDIViewer extends HTMLElement {
       await load(source, {
         signal: loading.signal,
         onBegin: (vdi) => !loading.signal.aborted && this.#warmUp(vdi),
-        onLevel: (prepared) => !loading.signal.aborted && this.setPrepared(prepared),
+        onLevel: (prepared) => {
+          if (loading.signal.aborted) return;
+          this.#endSeries();
+          this.setPrepared(prepared);
+        },
+        onSeries: (series) => this.#beginSeries(series),
         onProgress: (progress) => !loading.signal.aborted && this.#tell({ progress }),
       });
     } catch (error) {
@@ -199,7 +258,7 @@ export class VDIViewer extends HTMLElement {
       return;
     }
     if (!this.#camera) this.resetCamera();
-    this.#tell({ state: prepared.level === "coarse" ? "coarse" : "full",
+    this.#tell({ state: prepared.level === "coarse" ? "coarse" : "full", message: undefined,
       ...(prepared.level === "coarse" ? {} : { progress: 1 }) });
     this.invalidate();
   }
@@ -245,6 +304,64 @@ export class VDIViewer extends HTMLElement {
     this.invalidate(false);
   }
 
+  // -- series ------------------------------------------------------------------------------------
+
+  #beginSeries(series) {
+    this.#endSeries();
+    this.#series = series;
+    const player = this.#player = new Player(series, {
+      show: (prepared, time, step) => this.#showStep({ prepared, time, step }),
+      changed: () => {
+        if (!player.playing) this.#awaitStep();
+        this.#showPlayer();
+      },
+      failed: (error) => player === this.#player && this.#fail(error),
+    });
+    series.changed = () => this.#showPlayer();
+    this.#showPlayer();
+    if (this.hasAttribute("autoplay")) player.play();
+  }
+
+  #endSeries() {
+    this.#player?.close();
+    this.#player = this.#series = this.#step = null;
+    this.#showPlayer();
+  }
+
+  #played() {
+    if (!this.#player) throw new TypeError("There is no series that could be played, or not yet.");
+    return this;
+  }
+
+  #seek(step) {
+    const player = this.#player;
+    player.step = step;
+    if (!player.settled || this.#status.state !== "error" || !this.#raycaster) return;
+    if (this.#ready.settled) this.#renew();
+    this.setPrepared(this.#prepared); // of the step, whatever has failed since
+  }
+
+  // The element is ready again when a step that is asked for, or about to be drawn, is drawn.
+  #awaitStep() {
+    if ((this.#step || !this.#player?.settled) && this.#ready.settled) this.#renew();
+  }
+
+  // Between two frames: what is being drawn is drawn to its end with one step.
+  #showStep(shown) {
+    this.#step = shown;
+    if (this.#drawing) this.invalidate();
+    else this.#takeStep();
+  }
+
+  #takeStep() {
+    if (!this.#step) return;
+    const { prepared, time, step } = this.#step;
+    this.#step = null;
+    this.showStill(null);
+    this.setPrepared(prepared);
+    this.dispatchEvent(new CustomEvent("vditime", { detail: { time, step } }));
+  }
+
   // -- life --------------------------------------------------------------------------------------
 
   connectedCallback() {
@@ -269,12 +386,16 @@ export class VDIViewer extends HTMLElement {
       canvas.addEventListener("webglcontextlost", (event) => {
         event.preventDefault();
         this.#raycaster = this.#pacer = null;
+        this.#lost = true;
+        // Given up by an element that was moved, and is on the page again by now
+        if (this.#released && this.isConnected) setTimeout(() => this.#restore());
       });
       canvas.addEventListener("webglcontextrestored", () => this.isConnected && this.#begin());
     }
     this.#gl = gl;
-    if (gl.isContextLost()) gl.getExtension("WEBGL_lose_context")?.restoreContext();
-    else this.#begin();
+    this.#context ??= gl.getExtension("WEBGL_lose_context"); // there is none of a lost one
+    if (!gl.isContextLost()) this.#begin();
+    else if (this.#lost) this.#restore(); // otherwise when it is said that it is lost
     const viewer = this;
     interact(canvas, {
       get camera() { return viewer.#camera; },
@@ -282,6 +403,12 @@ export class VDIViewer extends HTMLElement {
       rest() { viewer.#moved = -Infinity; viewer.invalidate(); },
       reset() { viewer.resetCamera(); },
     }, signal);
+    this.#showPlayer = playerControls?.(this.shadowRoot.querySelector(".controls"), this.shadowRoot,
+      () => this.#player, () => this.#series.times, {
+        toggle: () => this.playing ? this.pause() : this.play(),
+        seek: (step) => this.#seek(step),
+      }, signal) ?? (() => {});
+    this.#showPlayer();
     const sizes = new ResizeObserver(() => this.#resize());
     sizes.observe(this);
     signal.addEventListener("abort", () => sizes.disconnect());
@@ -296,12 +423,15 @@ export class VDIViewer extends HTMLElement {
   disconnectedCallback() {
     this.#connected?.abort();
     this.#loading?.abort();
+    this.pause();
+    this.#series?.close(); // its worker; another one starts when it is needed again
     this.#raycaster?.dispose();
     this.#pacer?.dispose();
     this.#scene?.dispose();
     this.#raycaster = this.#pacer = null;
     // Browsers keep some sixteen contexts, and take the oldest from who still shows it
-    this.#gl?.getExtension("WEBGL_lose_context")?.loseContext();
+    this.#released = true;
+    this.#context?.loseContext();
   }
 
   attributeChangedCallback(name, before, value) {
@@ -311,10 +441,15 @@ export class VDIViewer extends HTMLElement {
     if (name === "still" && value) this.#parts.img.src = value;
   }
 
+  #restore() {
+    if (this.#gl.isContextLost()) this.#context?.restoreContext();
+  }
+
   // Take the graphics that there is, at first and after it was lost.
   #begin() {
     const gl = this.#gl;
     if (gl.isContextLost()) return;
+    this.#lost = this.#released = false;
     this.#raycaster = new Raycaster(gl);
     this.#pacer = new Pacer(gl);
     if (this.#scene) this.#give(this.#scene);
@@ -346,6 +481,7 @@ export class VDIViewer extends HTMLElement {
   invalidate(moves = true) {
     if (moves) this.#moved = performance.now();
     this.#asked = true;
+    this.#wake();
     const something = this.#prepared || this.#scene?.head;
     if (!this.#drawing && this.#raycaster && something && this.#camera) {
       this.#drawing = true;
@@ -359,6 +495,7 @@ export class VDIViewer extends HTMLElement {
     try {
       while (this.#raycaster && this.isConnected) {
         const pacer = this.#pacer, { width, height } = this.#parts.canvas;
+        this.#takeStep();
         const moving = performance.now() - this.#moved < REST;
         this.#asked = false;
         const shown = this.#prepared;
@@ -376,8 +513,10 @@ export class VDIViewer extends HTMLElement {
         this.#drawn(full, shown === this.#prepared);
         if (this.#asked) continue;
         if (full) return;
-        await new Promise((resolve) => setTimeout(resolve,
-          Math.max(0, REST - (performance.now() - this.#moved))));
+        await new Promise((resolve) => { // until the view rests, or moves on
+          this.#wake = resolve;
+          setTimeout(resolve, Math.max(0, REST - (performance.now() - this.#moved)));
+        });
       }
     } catch (error) {
       if (!this.#gl.isContextLost()) this.#fail(error);
@@ -420,7 +559,8 @@ export class VDIViewer extends HTMLElement {
   #drawn(full, latest) {
     const { state } = this.#status, whole = this.#scene?.complete ?? true;
     this.dispatchEvent(new CustomEvent("framedrawn", { detail: { full, state } }));
-    if (full && latest && whole && state === "full") this.#ready.resolve(this);
+    const settled = !this.#step && (this.#player?.settled ?? true);
+    if (full && latest && whole && settled && state === "full") this.#ready.resolve(this);
   }
 
   #announceCamera() {
@@ -450,8 +590,10 @@ export class VDIViewer extends HTMLElement {
 }
 
 function resolvers() {
-  const made = {};
+  const made = { settled: false };
   made.promise = new Promise((resolve, reject) => Object.assign(made, { resolve, reject }));
+  const settle = () => (made.settled = true);
+  made.promise.then(settle, settle);
   return made;
 }
 

@@ -1,53 +1,83 @@
 // A file from wherever it is to prepared levels: read piece by piece, decoded in a worker.
+import { beginsAsSeries } from "./frames.js";
+import { askPort, decodingPort, releasePort } from "./port.js";
+import { Series } from "./series.js";
 import { VDIFileError } from "./unpack.js";
-import { serve } from "./worker.js";
-import { spawnWorker } from "./spawn.js";
 
-const idle = []; // workers that have nothing to do
+const FIRST_BYTES = 1 << 16; // of a series that is read by ranges
 
 /**
- * Load a VDI: first its coarse level, where the file has one, then the whole.
+ * Load a VDI: first its coarse level, where the file has one, then the whole. Or a series.
  *
- * @param {string|URL|Uint8Array|ArrayBuffer|ReadableStream|AsyncIterable} source A .vdi file: where
+ * @param {string|URL|Uint8Array|ArrayBuffer|ReadableStream|AsyncIterable} source A .vdi or .vdis file: where
  *   it is, its bytes, or its pieces, which may be base64 text as {@link embedded} gives it.
  * @param {object} options
  * @param {(prepared: object) => void} options.onLevel Called with each level as prepare.js makes
  *   it; its `level` is "coarse" or "full".
  * @param {(vdi: object) => void} [options.onBegin] Called before a coarse level with its camera,
  *   windowSize, bounds and depthOrigin.
+ * @param {(series: Series) => void} [options.onSeries] Called with a series when it has a step. Of
+ *   an address whose server gives parts of files, steps are read when they are asked for.
  * @param {(fraction: number) => void} [options.onProgress] Called with the share that was read,
  *   0 to 1, where the length is known.
  * @param {AbortSignal} [options.signal] Ends it; the promise is then rejected by its reason.
- * @returns {Promise<void>} Resolves when the full level has been given.
+ * @returns {Promise<void>} Resolves when the full level has been given, or the series.
  * @throws {VDIFileError} A sentence that says what is wrong.
  */
 export async function load(
-  source, { onLevel, onBegin = () => {}, onProgress = () => {}, signal }
+  source, { onLevel, onBegin = () => {}, onSeries, onProgress = () => {}, signal }
 ) {
   signal?.throwIfAborted();
   const aborted = new Promise((_, reject) => {
     signal?.addEventListener("abort", () => reject(signal.reason), { once: true });
   });
   aborted.catch(() => {});
-  const port = await decodingPort();
-  const ask = (message) => Promise.race([aborted, new Promise((resolve, reject) => {
-    port.onmessage = ({ data }) => {
-      if (data.error) reject(new VDIFileError(data.error));
-      else if (data.done) resolve();
-      else if (!signal?.aborted) data.begun ? onBegin(data.begun) : onLevel(data.prepared);
-    };
-    port.onerror = (event) => reject(new VDIFileError(`the VDI is not decoded: ${event.message}`));
-    port.postMessage(message);
-  })]);
+  const began = decodingPort(); // it starts while the first bytes come
+  let port = null;
   try {
-    for await (const piece of piecesOf(source, onProgress, signal)) await ask({ piece });
+    if (isSeriesAddress(source) && Series && onSeries) {
+      const parts = await rangesOf(source, signal);
+      const series = parts.read && await Series.ofParts(parts);
+      signal?.throwIfAborted();
+      port = await began;
+      if (series) {
+        releasePort(port);
+        onSeries(series);
+        onProgress(1);
+        return;
+      }
+      source = parts.response ?? source;
+    }
+    port ??= await began;
+    const pieces = piecesOf(source, onProgress, signal);
+    const first = await Promise.race([aborted, pieces.next()]);
+    const rest = following(first, pieces);
+    if (Series && onSeries && !first.done && beginsAsSeries(first.value)) {
+      releasePort(port);
+      port = null;
+      await Promise.race([aborted, Series.ofPieces(rest, (series) => {
+        if (!signal?.aborted) onSeries(series);
+      })]);
+      return;
+    }
+    const hear = ({ begun, prepared }) => {
+      if (!signal?.aborted) begun ? onBegin(begun) : onLevel(prepared);
+    };
+    const ask = (message) => Promise.race([aborted, askPort(port, message, hear)]);
+    for await (const piece of rest) await ask({ piece });
     await ask({ end: true });
   } catch (error) {
-    port.terminate();
+    if (port) port.terminate();
+    else began.then(releasePort);
     throw error;
   }
-  port.onmessage = port.onerror = null;
-  if (port instanceof Worker) idle.push(port);
+  releasePort(port);
+}
+
+async function* following(first, pieces) {
+  if (first.done) return;
+  yield first.value;
+  yield* pieces;
 }
 
 const EMBEDDED = 'script[type="application/vdi+base64"]';
@@ -89,10 +119,10 @@ async function* piecesOf(source, onProgress, signal) {
     return;
   }
   let total = 0;
-  if (typeof source === "string" || source instanceof URL) {
-    const response = await fetched(source, signal);
-    total = Number(response.headers.get("Content-Length"));
-    source = response.body;
+  if (typeof source === "string" || source instanceof URL) source = await fetched(source, signal);
+  if (source instanceof Response) {
+    total = Number(source.headers.get("Content-Length"));
+    source = source.body;
   }
   if (!(source instanceof ReadableStream)) {
     yield* source;
@@ -115,10 +145,37 @@ async function* piecesOf(source, onProgress, signal) {
   }
 }
 
-async function fetched(url, signal) {
+// Whether an address is one of a series: by its name.
+function isSeriesAddress(source) {
+  if (typeof source !== "string" && !(source instanceof URL)) return false;
+  return URL.canParse(source, document.baseURI) &&
+    /\.vdis$/i.test(new URL(source, document.baseURI).pathname);
+}
+
+// A file whose server gives parts of it: its size, its first bytes and what reads others. Otherwise
+// the response with all of it, or nothing where the size is not said.
+async function rangesOf(url, signal) {
+  const ask = (begin, end, by) => fetched(url, by, { Range: `bytes=${begin}-${end - 1}` });
+  const response = await ask(0, FIRST_BYTES, signal);
+  if (response.status !== 206) return { response };
+  const size = Number(/\/(\d+)$/.exec(response.headers.get("Content-Range") ?? "")?.[1] ?? 0);
+  const first = new Uint8Array(await response.arrayBuffer());
+  if (!size || first.length !== Math.min(size, FIRST_BYTES)) return {};
+  const read = async (begin, end) => {
+    const part = await ask(begin, end);
+    const bytes = part.status === 206 ? new Uint8Array(await part.arrayBuffer()) : [];
+    if (bytes.length !== end - begin) {
+      throw new VDIFileError(`${url} breaks off, or is another file by now: load it again`);
+    }
+    return bytes;
+  };
+  return { read, size, first };
+}
+
+async function fetched(url, signal, headers = {}) {
   let response;
   try {
-    response = await fetch(url, { signal });
+    response = await fetch(url, { signal, headers });
   } catch (error) {
     if (signal?.aborted) throw error;
     throw new VDIFileError(
@@ -132,23 +189,4 @@ async function fetched(url, signal) {
     throw new VDIFileError(`${url} cannot be read: ${response.status} ${response.statusText}`);
   }
   return response;
-}
-
-// A worker that listens, or what stands for one on this thread where none may be started.
-async function decodingPort() {
-  if (idle.length) return idle.pop();
-  try {
-    const worker = spawnWorker();
-    await new Promise((resolve, reject) => {
-      worker.onmessage = resolve;
-      worker.onerror = reject;
-    });
-    return worker;
-  } catch {
-    const port = { onmessage: null, terminate() {} };
-    const scope = { postMessage: (data) => port.onmessage?.({ data }) };
-    port.postMessage = (data) => scope.onmessage({ data });
-    serve(scope);
-    return port;
-  }
 }

@@ -30,6 +30,40 @@ export function bytesOfBase64(text) {
   }
 }
 
+/** Bytes that come piece by piece, as such or as base64 text. */
+export class GrowingBytes {
+  #bytes = new Uint8Array(1 << 16);
+  #length = 0;
+  #text = ""; // that is not yet four characters
+
+  /** Those that have come. */
+  get whole() {
+    return this.#bytes.subarray(0, this.#length);
+  }
+
+  /** Whether text ended within a byte. */
+  get broken() {
+    return this.#text !== "";
+  }
+
+  /** @param {Uint8Array|string} piece Bytes that follow, or base64 text. */
+  push(piece) {
+    if (typeof piece === "string") {
+      const text = this.#text + piece.replace(/\s+/g, "");
+      this.#text = text.slice(text.length & ~3);
+      piece = bytesOfBase64(text.slice(0, text.length & ~3));
+    }
+    const length = this.#length + piece.length;
+    if (length > this.#bytes.length) {
+      const larger = new Uint8Array(Math.max(length, 2 * this.#bytes.length));
+      larger.set(this.whole);
+      this.#bytes = larger;
+    }
+    this.#bytes.set(piece, this.#length);
+    this.#length = length;
+  }
+}
+
 // Four tables, by which four bytes are taken in at once
 let crcTables = null;
 

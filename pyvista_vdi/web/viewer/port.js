@@ -1,0 +1,53 @@
+// The worker that decodes, or what stands for one on the page's own thread.
+import { spawnWorker } from "./spawn.js";
+import { VDIFileError } from "./unpack.js";
+import { serve } from "./worker.js";
+
+const idle = []; // workers that have nothing to do
+
+/** A worker that listens, or what stands for one on this thread where none may be started. */
+export async function decodingPort() {
+  if (idle.length) return idle.pop();
+  try {
+    const worker = spawnWorker();
+    await new Promise((resolve, reject) => {
+      worker.onmessage = resolve;
+      worker.onerror = reject;
+    });
+    return worker;
+  } catch {
+    const port = { onmessage: null, terminate() {} };
+    const scope = { postMessage: (data) => port.onmessage?.({ data }) };
+    port.postMessage = (data) => scope.onmessage({ data });
+    serve(scope);
+    return port;
+  }
+}
+
+/** Give back a port that has nothing to do. */
+export function releasePort(port) {
+  port.onmessage = port.onerror = null;
+  if (port instanceof Worker) idle.push(port);
+}
+
+/**
+ * Say something to a port, and wait until it is done.
+ *
+ * @param {object} port Of {@link decodingPort}.
+ * @param {object} message See worker.js.
+ * @param {(data: object) => void} hear Called with what it says meanwhile.
+ * @param {ArrayBuffer[]} [handed] What is handed over.
+ * @returns {Promise<void>}
+ * @throws {VDIFileError} A sentence that says what is wrong.
+ */
+export function askPort(port, message, hear, handed = []) {
+  return new Promise((resolve, reject) => {
+    port.onmessage = ({ data }) => {
+      if (data.error) reject(new VDIFileError(data.error));
+      else if (data.done) resolve();
+      else hear(data);
+    };
+    port.onerror = (event) => reject(new VDIFileError(`the VDI is not decoded: ${event.message}`));
+    port.postMessage(message, handed);
+  });
+}
