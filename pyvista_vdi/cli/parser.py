@@ -487,7 +487,7 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "convert": (
         "files",
-        "write a VDI, or each step of a series, as .vdi, OpenEXR deep image, .vti or a page, .html",
+        "write a VDI or each step of a series as .vdi, .exr or .vti, or either as one page, .html",
         "pyvista-vdi convert knee.vdi -o knee.exr",
         _add_convert,
     ),

@@ -13,9 +13,11 @@ from pyvista_vdi.cli.text import mebibytes, printable, table, vector
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.io import check_write_options, checked_target
 from pyvista_vdi.io import read as read_vdi
+from pyvista_vdi.io.files import HTML_SUFFIX
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.series import reader
+from pyvista_vdi.series.layout import SUFFIX
 from pyvista_vdi.series.series import VDISeries
 from pyvista_vdi.series.writer import SeriesWriter
 
@@ -136,10 +138,10 @@ def file_arguments(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def convert(options: argparse.Namespace, arguments: dict[str, Any]) -> int:
-    """Write each step of a series to a file of its own, or the series anew."""
+    """Write a series anew, as a page, or each of its steps to a file of its own."""
     steps: VDISeries = reader.read(options.file)
     target = Path(options.output)
-    if reader.is_series_file(target):
+    if target.suffix.lower() in (SUFFIX, HTML_SUFFIX):
         with measuring("converting") as bar:
             steps.save(target, progress=part(bar, 0.0, 1.0, "writing"), **arguments)
         say_written([target])

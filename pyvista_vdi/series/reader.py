@@ -38,6 +38,7 @@ from pyvista_vdi.io.vdi_file.description import from_json, number
 from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.packing import check_precision
+from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.series import layout
 from pyvista_vdi.series.codes import ENTRIES, Samples, Tables
@@ -47,6 +48,9 @@ from pyvista_vdi.series.on_device import decoded_on, runtime_for_decoding
 from pyvista_vdi.series.series import VDISeries
 
 _log = logging.getLogger(__name__)
+
+#: What the names of pages end in.
+_PAGE = ".html"
 
 _REMEDY = "copy it from its source again, or generate the series anew"
 
@@ -153,7 +157,7 @@ class StepsReader(Sequence[VDI]):
     Parameters
     ----------
     path : path-like
-        The file.
+        The file, or a page with one.
 
     Raises
     ------
@@ -164,7 +168,11 @@ class StepsReader(Sequence[VDI]):
     def __init__(self, path: str | os.PathLike[str]) -> None:
         try:
             self._path = Path(path)
-            self._stream: BinaryIO = self._path.open("rb")
+            self._stream: BinaryIO = (
+                provider("html_files").data_in(path)
+                if str(path).lower().endswith(_PAGE)
+                else self._path.open("rb")
+            )
         except (OSError, ValueError, TypeError) as error:
             raise VDIFileError(
                 f"{path!s} cannot be read: {getattr(error, 'strerror', None) or error}"
@@ -596,5 +604,8 @@ def read_info(path: str | os.PathLike[str]) -> SeriesInfo:
 
 
 def is_series_file(path: Any) -> bool:
-    """Whether a file is read as a series: by its name."""
-    return str(path).lower().endswith(layout.SUFFIX)
+    """Whether a file is read as a series: by its name, and a page by its content."""
+    name = str(path).lower()
+    if name.endswith(_PAGE):
+        return bool(provider("html_files").begins_with(path, layout.MAGIC))
+    return name.endswith(layout.SUFFIX)

@@ -172,16 +172,19 @@ class VDISeries(Sequence[VDI]):
         return self._maker(self.volumes[step], camera=camera, window_size=window_size)
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a ``.vdis`` file, which :func:`pyvista_vdi.read` opens; it appears whole or not.
+        """Write a ``.vdis`` file, or a page that plays it; it appears whole or not at all.
+
+        :func:`pyvista_vdi.read` opens both.
 
         Parameters
         ----------
         path : path-like
-            The target; its name ends in ``.vdis``.
+            The target; its name ends in ``.vdis``, or in ``.html``.
         **options
-            ``precision``, by default the first step's; ``tolerance``, ``key_every``,
-            ``compression`` and ``level`` as for :class:`pyvista_vdi.SeriesWriter`; and
-            ``progress``, called with the finished fraction.
+            ``precision``, by default the first step's, and ``"8-byte"`` in a page; ``tolerance``,
+            ``key_every``, ``compression`` and ``level`` as for :class:`pyvista_vdi.SeriesWriter`;
+            and ``progress``, called with the finished fraction. For pages ``title``,
+            ``background`` and ``autoplay`` as well.
 
         Returns
         -------
@@ -195,6 +198,8 @@ class VDISeries(Sequence[VDI]):
         InvalidArgumentError
             If an option is out of its range.
         """
+        if str(path).lower().endswith(".html"):
+            return provider("html_files").write_series(self, path, **options)  # type: ignore[no-any-return]
         return provider("write_series")(self, self.times, path, **options)  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:

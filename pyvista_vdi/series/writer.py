@@ -226,14 +226,27 @@ def write(
         compression,
         level,
     )
-    done = Pieces(progress, len(times))
     with whole_file(target) as stream:
-        writer.begin(stream)
-        for i, time in enumerate(times):
-            writer.write(stream, steps[i], time)
-            done()
-        writer.finish(stream)
+        write_all(stream, writer, steps, times, progress)
     return target
+
+
+def write_all(
+    stream: BinaryIO,
+    writer: StepsWriter,
+    steps: Sequence[VDI],
+    times: Sequence[float],
+    progress: Progress | None,
+) -> int:
+    """Write a whole file to a stream; return how many bytes show its first step."""
+    done, first = Pieces(progress, len(times)), 0
+    writer.begin(stream)
+    for i, time in enumerate(times):
+        writer.write(stream, steps[i], time)
+        first = first or stream.tell()
+        done()
+    writer.finish(stream)
+    return first
 
 
 class StepsWriter:

@@ -24,10 +24,12 @@ from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.layout import COARSE, DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.vdi_file.writer import write_to
-from pyvista_vdi.io.whole_file import whole_file
+from pyvista_vdi.io.whole_file import check_writable, whole_file
 from pyvista_vdi.model.compositing import opacity, transmittance
 from pyvista_vdi.model.metrics import over_background
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.series.series import VDISeries
+from pyvista_vdi.series.writer import KEY_EVERY, StepsWriter, write_all
 from pyvista_vdi.web.bundle import viewer_script
 
 #: What the script elements that hold a .vdi file as base64 say of themselves.
@@ -38,6 +40,11 @@ _SCENE = '<script type="application/vdi-scene+base64">{}</script>\n'
 
 #: Longest edge of the still picture, pixels, and the quality of its JPEG.
 _STILL_EDGE, _STILL_QUALITY = 480, 75
+
+#: Bytes of a part of a series, which a page decodes from base64 at once; a multiple of three.
+_PART = 3 << 20
+#: Bytes of a page within which its data begin: behind the still picture.
+_HEAD = 1 << 20
 
 # To its end, or to that of a file that was cut
 _DATA = re.compile(rb'<script type="%b">([^<]*)' % re.escape(DATA_TYPE).encode())
@@ -86,7 +93,7 @@ class View:
     Attributes
     ----------
     vdi : VDI or None
-        As it is sent; ``None`` if all is in the scene.
+        As it is sent; ``None`` if all is in the scene, or it is a series.
     background : str
         As CSS has it.
     still : numpy.ndarray
@@ -97,6 +104,8 @@ class View:
         What is seen beside the VDI: see :mod:`pyvista_vdi.web.scenes.scene`.
     attributes : dict of str to str
         More attributes of the element.
+    series : sequence of bytes
+        Parts of a .vdis file; the first shows its first step.
     """
 
     vdi: VDI | None
@@ -105,6 +114,7 @@ class View:
     still_size: Sequence[int]
     scene: bytes | None = None
     attributes: dict[str, str] = field(default_factory=dict)
+    series: Sequence[bytes] = ()
 
 
 def page(
@@ -170,21 +180,22 @@ def assembled(
     """
     title = html.escape(title)
     has_scene = any(view.scene is not None for view in views)
+    has_series = any(view.series for view in views)
     parts = []
     for number, view in enumerate(views):
-        first, rest = "", ""
+        files = list(view.series)
         if view.vdi is not None:
             stream = io.BytesIO()
             write_to(stream, view.vdi, DEFLATE, level, progress if number == 0 else None)
             data = stream.getvalue()
             cut = _end_of_coarse(stream)
-            of = f' data-of="{number}"' if number else ""  # read() looks for the first one's
-            first, rest = (
-                f'<script type="{DATA_TYPE}"{of}>{_text(part)}</script>\n'
-                for part in (data[:cut], data[cut:])
-            )
+            files = [data[:cut], data[cut:]]
+        of = f' data-of="{number}"' if number else ""  # read() looks for the first one's
+        texts = [f'<script type="{DATA_TYPE}"{of}>{_text(part)}</script>\n' for part in files]
+        first, rest = "".join(texts[:1]), "".join(texts[1:])
         scene = "" if view.scene is None else _SCENE.format(_text(view.scene))
-        script = "" if number else f"<script>\n{viewer_script(scene=has_scene)}</script>\n"
+        viewer = "" if number else viewer_script(scene=has_scene, series=has_series)
+        script = f"<script>\n{viewer}</script>\n" if viewer else ""
         named = {name: html.escape(value) for name, value in view.attributes.items()}
         parts.append(
             _VIEW.format(
@@ -235,18 +246,71 @@ def write(
     return target
 
 
+def write_series(
+    series: VDISeries,
+    path: str | os.PathLike[str],
+    *,
+    precision: str = "8-byte",
+    tolerance: float = 0.0,
+    key_every: int = KEY_EVERY,
+    compression: str = "zstd",
+    level: int | None = None,
+    title: str | None = None,
+    background: Sequence[float] = (0.0, 0.0, 0.0),
+    autoplay: bool = False,
+    progress: Progress | None = None,
+) -> Path:
+    """Write a page that plays a series: see :meth:`pyvista_vdi.VDISeries.save`, and :func:`page`.
+
+    With ``autoplay`` it plays as soon as it is opened.
+    """
+    target = Path(os.path.realpath(check_writable(Path(path))))
+    writer, stream = StepsWriter(precision, tolerance, key_every, compression, level), io.BytesIO()
+    percents = " ".join(f"{100 * channel:g}%" for channel in background)
+    first = series[0]
+    still = over_background(_from_generating_view(first), background)
+    cut = write_all(stream, writer, series, series.times, progress)
+    data, cut = stream.getvalue(), -(-cut // 3) * 3
+    view = View(
+        None,
+        f"rgb({percents})",
+        np.rint(still * 255).astype(np.uint8),
+        first.picture_size,
+        attributes={"autoplay": ""} if autoplay else {},
+        series=[data[:cut], *(data[k : k + _PART] for k in range(cut, len(data), _PART))],
+    )
+    content = assembled([view], title=target.stem if title is None else title)
+    with whole_file(target) as out:
+        out.write(content)
+    return target
+
+
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDI:
     """Read the VDI that a page shows: see :func:`pyvista_vdi.io.read`."""
-    return reader.read(path, progress=progress, stream=_data(path))
+    return reader.read(path, progress=progress, stream=data_in(path))
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:
     """Read what a page's VDI says about itself: see :func:`pyvista_vdi.io.read_info`."""
-    return reader.read_info(path, stream=_data(path))
+    return reader.read_info(path, stream=data_in(path))
 
 
-def _data(path: str | os.PathLike[str]) -> BinaryIO:
-    """Return the .vdi file in a page."""
+def begins_with(path: str | os.PathLike[str], magic: bytes) -> bool:
+    """Whether the file in a page begins so; False where there is none."""
+    try:
+        with Path(path).open("rb") as stream:
+            found = _DATA.search(stream.read(_HEAD))
+    except (OSError, TypeError, ValueError):
+        return False
+    text = found[1].lstrip()[: -(-len(magic) // 3) * 4] if found else b""
+    try:
+        return base64.b64decode(text).startswith(magic)
+    except binascii.Error:
+        return False
+
+
+def data_in(path: str | os.PathLike[str]) -> BinaryIO:
+    """Return the .vdi file in a page, or the .vdis one."""
     try:
         content = Path(path).read_bytes()
     except (OSError, TypeError, ValueError) as error:

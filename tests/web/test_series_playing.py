@@ -6,6 +6,7 @@ import base64
 
 import numpy as np
 import pytest
+from browsers import Page
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -286,3 +287,52 @@ def test_another_file_takes_its_place_and_the_element_can_move(series, data, pla
         page.evaluate("viewer.play({ rate: 0 })")
     with pytest.raises(Exception, match="is a number"):
         page.evaluate("() => { viewer.time = 'x'; }")
+
+
+def test_a_page_of_its_own_plays_from_disk(series, chromium, tmp_path):
+    path = series.save(tmp_path / "a ball.html", autoplay=True, background=(0.1, 0.2, 0.3))
+    read = pvdi.read(path)
+    assert isinstance(read, pvdi.VDISeries)
+    assert read.times == series.times
+    assert all(one.equals(other) for one, other in zip(read, series, strict=True))
+    context = chromium.new_context(viewport={"width": 160, "height": 90})
+    try:
+        page = Page(context.new_page(), {}, None)
+        asked = []
+        page.page.on("request", lambda request: asked.append(request.url))
+        page.page.goto(path.as_uri())
+        page.evaluate(
+            """() => {
+              window.viewer = document.querySelector("vdi-viewer");
+              window.textOf = (bytes) => btoa(String.fromCharCode(...bytes));
+            }"""
+        )
+        page.wait_for("viewer.series?.complete && viewer.playing && viewer.time > 1")
+        page.evaluate("viewer.pause()")
+        page.evaluate("viewer.time = 4")
+        assert worst(page.screenshot(series.camera, SIZE), series[8], series.camera) <= CLOSE
+        assert page.page.title() == "a ball"
+        assert not [url for url in asked if not url.startswith((path.as_uri(), "blob:"))]
+    finally:
+        context.close()
+    assert not page.complaints
+
+
+def test_pages_are_read_and_converted_as_files_are(series, tmp_path, capsys):
+    from pyvista_vdi.cli import main
+
+    path, page, again = (tmp_path / name for name in ("a.vdis", "a.html", "b.vdis"))
+    series.save(path)
+    assert main(["convert", str(path), "-o", str(page)]) == 0
+    assert main(["info", str(page)]) == 0
+    assert "9, times 0 to 4" in capsys.readouterr().out
+    assert main(["convert", str(page), "-o", str(again)]) == 0
+    assert all(a.equals(b) for a, b in zip(pvdi.read(again), series, strict=True))
+    text = page.read_bytes()
+    assert text.count(b'<script type="application/vdi+base64">') == 2
+    page.write_bytes(text[: text.rindex(b"</script>") - 3000])
+    short = pvdi.read(page)  # cut off: it ends with its last finished step
+    assert 0 < len(short) < len(series)
+    page.write_bytes(b"<p>nothing</p>")
+    with pytest.raises(pvdi.errors.VDIFileError, match="not a page"):
+        pvdi.read(page)
