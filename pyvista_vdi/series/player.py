@@ -9,9 +9,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from pyvista_vdi.device import Runtime
+from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
-from pyvista_vdi.model.checks import as_float
+from pyvista_vdi.model.checks import as_float, memory_limit_bytes
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.raycasting.prepared import prepared_vdi
@@ -21,8 +21,22 @@ from pyvista_vdi.series.series import VDISeries
 RATE = 24.0
 #: Steps that are decoded before their time comes: what takes longer than the others finds them.
 _AHEAD = 3
+#: Bytes of decoded steps that are kept, so that the next round need not decode them.
+_MEMORY = 1 << 30
+#: Bytes of a step on a device over those of its arrays, which are kept as well.
+_ON_DEVICE = 1.2
 #: Share of the last step's decoding in what the next one is expected to take.
 _LAST = 0.3
+
+
+class _Decoding(Job):
+    """Work beside the frames, and not in turns with them: what it makes is what they wait for."""
+
+    def done(self) -> Any:
+        """Do it, and return what has become of it."""
+        runtime = get_runtime(self._device)
+        with runtime.queue_scope():
+            return self._work(runtime, self._report)
 
 
 class Player:
@@ -31,7 +45,8 @@ class Player:
     The thread that draws asks for :attr:`vdi` in its frames and calls :meth:`advance` between two
     of them. Another thread decodes the steps that come next and brings them to the device. Where
     that is slower than the rate, it takes the steps that will be due when they are ready, so that
-    what is shown is late by a frame at most.
+    what is shown is late by a frame at most. Decoded steps are kept as long as they fit in
+    :attr:`memory`; those that come last of all are let go of first.
 
     Parameters
     ----------
@@ -48,12 +63,15 @@ class Player:
         Steps that were left out since :meth:`play`.
     device : optional
         Where steps are drawn, see :func:`pyvista_vdi.list_devices`.
+    memory : float
+        Bytes that decoded steps may take, on the device and beside it; a few are always kept.
     """
 
     def __init__(self, series: VDISeries, clock: Callable[[], float] = time.perf_counter) -> None:
         self.series = series
         self.dropped = 0
         self.device: Any = None
+        self.memory: float = _MEMORY
         self._clock = clock
         self._rate, self._loop = RATE, True
         # Places go on where the series begins anew: place p is step p modulo the steps
@@ -63,6 +81,7 @@ class Player:
         self._playing = False
         self._lock = threading.Lock()
         self._ready: dict[int, VDI] = {}  # by step
+        self._bytes: dict[int, float] = {}  # that each takes
         self._instead: VDI | None = None  # of the step that is shown
         self._broken: set[int] = set()
         self._unsaid: list[Exception] = []  # why they are
@@ -116,7 +135,7 @@ class Player:
         if known is None:
             known = self.series[step]
             with self._lock:
-                self._ready[step] = known
+                self._keep(step, known)
         return known
 
     def replace(self, vdi: VDI) -> None:
@@ -136,7 +155,9 @@ class Player:
         """Steps per second."""
         return self._rate
 
-    def play(self, rate: float = RATE, *, loop: bool = True) -> None:
+    def play(
+        self, rate: float = RATE, *, loop: bool = True, memory_limit: float | str | None = None
+    ) -> None:
         """Go on from the step that is shown, or from the first where the last one is.
 
         Parameters
@@ -145,15 +166,20 @@ class Player:
             Steps per second, more than 0. Time begins with the next frame.
         loop : bool
             Whether the first step follows the last one; otherwise that is the end.
+        memory_limit : float or str, optional
+            Another :attr:`memory`, bytes, or as ``"2 GiB"``.
 
         Raises
         ------
         InvalidArgumentError
-            If the rate is none.
+            If the rate is none, or the limit no number of bytes.
         """
         rate_ = as_float(rate)
         if isinstance(rate, bool) or not 0 < rate_ < math.inf:
             raise InvalidArgumentError(f"rate must be steps per second, above 0; got {rate!r}")
+        limit = memory_limit_bytes(memory_limit)
+        if limit is not None:
+            self.memory = limit
         n = len(self.series)
         with self._lock:
             self._rate, self._loop = rate_, bool(loop)
@@ -187,7 +213,7 @@ class Player:
         if not self._loop and self._place == len(self.series) - 1:
             self.pause()
         elif not self._worker.running and self._wanted() is not None:
-            self._worker.put(Job(lambda on, _report: self._decode(on), self.device))
+            self._worker.put(_Decoding(lambda on, _report: self._decode(on), self.device))
         with self._lock:
             error = self._unsaid.pop() if self._unsaid else None
         if error is not None:
@@ -199,6 +225,8 @@ class Player:
         self.pause()
         self._worker.clear()
         self._worker.join()
+        self._ready.clear()
+        self._bytes.clear()
 
     # -- places ----------------------------------------------------------------------------------
 
@@ -219,11 +247,27 @@ class Player:
         return None
 
     def _move(self, place: int) -> None:
-        """Show a place, and forget the steps that are neither that nor soon to come."""
-        self._place, self._instead, n = place, None, len(self.series)
-        keep = {(place + k) % n for k in range(_AHEAD + 2)}
-        for step in [step for step in self._ready if step not in keep]:
-            del self._ready[step]
+        """Show a place."""
+        self._place, self._instead = place, None
+        self._trim()
+
+    def _keep(self, step: int, vdi: VDI) -> None:
+        """Keep a decoded step."""
+        self._ready[step], self._bytes[step] = vdi, vdi.nbytes * (1 + _ON_DEVICE)
+        self._trim()
+
+    def _trim(self) -> None:
+        """Let go of what memory is not enough for, from what is shown in the longest time on.
+
+        In a round that does not fit, the same steps are kept in each.
+        """
+        n = len(self.series)
+        # A step may be shown although the next one is due already
+        first = max(self._place, self._due_at(self._clock()) - 1) if self._playing else self._place
+        last = sorted(self._ready, key=lambda step: (step != self.step, (step - first) % n))
+        while len(last) > _AHEAD + 1 and sum(self._bytes.values()) > self.memory:
+            step = last.pop()
+            del self._ready[step], self._bytes[step]
 
     # -- behind the frames -----------------------------------------------------------------------
 
@@ -260,7 +304,5 @@ class Player:
             took = self._clock() - began
             with self._lock:
                 self._seconds += (took - self._seconds) * (_LAST if self._seconds else 1)
-                self._ready[step] = vdi
-                for late in [k for k in self._ready if k != self.step][: -_AHEAD - 1]:
-                    del self._ready[late]
+                self._keep(step, vdi)
         return True

@@ -64,7 +64,13 @@ class PlayingMethods:
         player = None if mapper is None else mapper.painter.upkeep.player
         return player is not None and player.playing
 
-    def play(self: Any, rate: float = RATE, *, loop: bool = True) -> None:
+    def play(
+        self: Any,
+        rate: float = RATE,
+        *,
+        loop: bool = True,
+        memory_limit: float | str | None = None,
+    ) -> None:
         """Show one step after the other, from the one that is shown, while the view can be turned.
 
         Steps are decoded behind the frames, ahead of their time. Those that are not ready when
@@ -78,13 +84,16 @@ class PlayingMethods:
             Steps per second.
         loop : bool
             Whether the first step follows the last; otherwise that is the end.
+        memory_limit : float or str, optional
+            Bytes that decoded steps may take, or as ``"2 GiB"``; 1 GiB by default. Those that are
+            kept need not be decoded in the next round.
 
         Raises
         ------
         InvalidArgumentError
-            If no series is shown, or the rate is none.
+            If no series is shown, the rate is none, or the limit no number of bytes.
         """
-        self._player().play(rate, loop=loop)
+        self._player().play(rate, loop=loop, memory_limit=memory_limit)
         upkeep, renderer = self.GetMapper().painter.upkeep, self.GetMapper().painter.renderer()
         window = None if renderer is None else renderer.GetRenderWindow()
         # Before the first frame there is nothing to look at, and that frame looks itself
