@@ -347,7 +347,9 @@ def _rgba(colors: Array) -> Array:
 
 
 def _material(look: Any) -> dict[str, Any]:
-    edge = look.GetLineWidth() if look.GetUseLineWidthForEdgeThickness() else look.GetEdgeWidth()
+    # VTK before 9.5 draws edges as wide as lines
+    own_width = not getattr(look, "GetUseLineWidthForEdgeThickness", lambda: True)()
+    edge = look.GetEdgeWidth() if own_width else look.GetLineWidth()
     return {
         "ambient": look.GetAmbient(),
         "ambientColor": list(look.GetAmbientColor()),
