@@ -76,7 +76,7 @@ async def evaluated(port, url, script):
         return answer["result"]["value"]
 
 
-def picture_in_firefox(folder, page):
+def picture_in_firefox(folder, page, script=SHOT):
     """The picture of a page's viewer, premultiplied, uint8 (H, W, 4)."""
     named = os.environ.get("PYVISTA_VDI_FIREFOX")
     executable = named or shutil.which("firefox-esr") or shutil.which("firefox")
@@ -98,7 +98,7 @@ def picture_in_firefox(folder, page):
         try:
             addresses = (re.search(r"ws://[^:]*:(\d+)", line) for line in process.stderr)
             port = next(filter(None, addresses))[1]
-            text = asyncio.run(evaluated(port, page.as_uri(), SHOT))
+            text = asyncio.run(evaluated(port, page.as_uri(), script))
         finally:
             process.terminate()
             process.wait()
@@ -131,3 +131,18 @@ def test_a_scene_is_drawn_as_vtk_draws_it(tmp_path):
     plotter.close()
     assert np.ptp(expected) > 200
     assert np.abs(got - expected).mean() <= 1  # .4 seen, by silhouettes
+
+
+def test_a_page_of_a_series_shows_its_steps(tmp_path, default_runtime):
+    """The last step, by which all that it is written by is decoded: zstd, worker, differences."""
+    balls = [soft_ball() for _ in range(3)]
+    for k, ball in enumerate(balls):
+        ball["v"] = ball["v"] * (1 - 0.1 * k)
+    camera = filling_camera(balls[0].bounds, SIZE)
+    series = pvdi.generate_series(balls, camera, SIZE, cmap="viridis", clim=(0, 255))
+    page = series.save(tmp_path / "balls.html")
+    seek = SHOT.replace("await viewer.ready;", "await viewer.ready; viewer.time = 2;", 1)
+    picture = picture_in_firefox(tmp_path, page, seek)
+    expected = pvdi.render(pvdi.read(page)[2], camera, SIZE) * 255.0
+    assert expected.max() > 200
+    assert np.abs(picture - expected).max() <= 1

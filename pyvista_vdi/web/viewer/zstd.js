@@ -2,6 +2,8 @@
 
 const MAX_BLOCK = 1 << 17;
 const HUFFMAN_BITS = 11;
+const LONG = 48; // bytes that are copied sooner by a call than by a loop
+const POWERS = Uint32Array.from({ length: 32 }, (_, code) => 2 ** code);
 
 // Length codes: extra bits of each; their bases follow, as every code begins where the last ends.
 const LITERALS = lengthCodes([...Array(16).fill(0), 1, 1, 1, 1, 2, 2, 3, 3, 4, 6, 7, 8, 9, 10, 11,
@@ -305,7 +307,7 @@ class ZstdFrame {
     for (let k = n - 1; ; --k) {
       const code = ofOffsets.symbol[offset];
       let distance = code > 25 ? take(code - 16) * 65536 + take(16) : take(code);
-      distance += 2 ** code;
+      distance += POWERS[code];
       const matchCode = ofMatches.symbol[match];
       const length = MATCHES.base[matchCode] + take(MATCHES.bits[matchCode]);
       const literalCode = ofLiterals.symbol[literal];
@@ -326,7 +328,13 @@ class ZstdFrame {
       if (taken + fresh > literals.length || to + fresh + length > out.length) wrong();
       for (const last = taken + fresh; taken < last;) out[to++] = literals[taken++];
       if (!(a > 0 && a <= to)) wrong();
-      for (const last = to + length; to < last; ++to) out[to] = out[to - a];
+      if (length < LONG || (a > 1 && a < length)) {
+        for (const last = to + length; to < last; ++to) out[to] = out[to - a];
+      } else {
+        if (a === 1) out.fill(out[to - 1], to, to + length);
+        else out.copyWithin(to, to - a, to - a + length);
+        to += length;
+      }
       if (k === 0) break;
     }
     if (bit !== first) wrong();
