@@ -50,8 +50,8 @@ async function ofStep(number, decode) {
     return await decode();
   } catch (error) {
     if (error instanceof VDIFileError) {
-      const why = error.message.replace(`; ${REMEDY}`, "");
-      throw new VDIFileError(`step ${number} of the series: ${why}; ${REMEDY}`);
+      const why = error.message.replace(`; ${REMEDY}`, "").replace(/^.* is damaged: /, "");
+      throw new VDIFileError(`step ${number} of the series is damaged: ${why}; ${REMEDY}`);
     }
     if (error instanceof RangeError) {
       throw new VDIFileError(
