@@ -195,7 +195,8 @@ def test_changed_bytes_are_refused_where_python_refuses_them(saved, page, tmp_pa
             try:
                 reader[i]
             except VDIFileError:
-                assert step.startswith(f"VDIFileError: step {i} of the series is damaged: "), (k, step)
+                said = f"VDIFileError: step {i} of the series is damaged: "
+                assert step.startswith(said), (k, step)
                 refused += 1
             else:
                 assert_the_same(step, whole[i])
