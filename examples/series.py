@@ -24,10 +24,10 @@ def density(step: int) -> pvdi.Volume:
     """Return a step of the plume, uint8 (z, y, x): it could come from a simulation's file."""
     z, y, x = np.mgrid[-1 : 1 : POINTS * 1j, -1 : 1 : POINTS * 1j, -1 : 1 : POINTS * 1j]
     time, height = step / STEPS, (z + 1) / 2
-    along = x - 0.9 * height**2 * (0.4 + time)
-    radius = 0.08 + 0.3 * height
+    along = x + 0.3 - 0.6 * height**2 * (0.4 + time)
+    radius = 0.08 + 0.25 * height
     puffs = 1 + 0.5 * np.sin(9 * (height - 2 * time)) * np.cos(6 * y + 3 * along)
-    values = np.exp(-(along**2 + y**2) / radius**2) * (1 - 0.6 * height) * puffs
+    values = np.exp(-(along**2 + y**2) / radius**2) * (1 - height**3) * puffs
     values *= height < 0.3 + time
     return pvdi.Volume(
         np.clip(200 * values, 0, 255).astype(np.uint8), (2 / (POINTS - 1),) * 3, (-1, -1, -1)
