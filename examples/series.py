@@ -17,7 +17,7 @@ import pyvista as pv
 
 import pyvista_vdi as pvdi
 
-STEPS, POINTS, SIZE = 16, 64, (480, 360)
+STEPS, POINTS, SIZE = 12, 48, (480, 360)
 
 
 def density(step: int) -> pvdi.Volume:

@@ -110,9 +110,9 @@ def test_series_example_writes_a_movie_of_its_steps(tmp_path):
     assert sizes is not None, said
     assert float(sizes[1]) < 0.3 * float(sizes[2])
     with Image.open(target) as movie:
-        assert (movie.size, movie.n_frames) == ((480, 360), 16)
+        assert (movie.size, movie.n_frames) == ((480, 360), 12)
         dark = []
-        for k in (0, 5, 10, 15):
+        for k in (0, 4, 8, 11):
             movie.seek(k)
             dark.append((np.asarray(movie.convert("L")) < 128).mean())
     assert all(later > 1.2 * before for before, later in pairwise(dark[:3])), "it has not risen"

@@ -22,7 +22,7 @@ CASES = {
     "partly the same": {"partly": True},
     "partly, no samples": {"partly": True, "metadata": {}},
     "one list": {"size": (1, 1)},
-    "many lists": {"size": (97, 61)},
+    "many lists": {"size": (49, 33)},
 }
 
 
