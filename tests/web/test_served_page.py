@@ -105,7 +105,9 @@ def test_a_view_at_rest_is_the_volumes_own_picture(page):
     over = """viewer.shadowRoot.querySelector("img.over")"""
     _wait(page, "viewer.camera !== null && remote.received.full >= 1")
     page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 9 }")
-    _wait(page, f"remote.received.full >= 1 && !{over}.hidden")
+    # The bar of what is being loaded lies over the picture's last rows
+    bar = """viewer.shadowRoot.querySelector("progress")"""
+    _wait(page, f"remote.received.full >= 2 && !{over}.hidden && {bar}.hidden")
     file = page.locator("vdi-viewer").screenshot()
     shown = np.asarray(Image.open(io.BytesIO(file)).convert("RGB"), np.int16)
     state = page.evaluate("viewer.camera")
