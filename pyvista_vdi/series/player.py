@@ -210,7 +210,7 @@ class Player:
             with self._lock:
                 self.dropped += place - self._place - 1
                 self._move(place)
-        if not self._loop and self._place == len(self.series) - 1:
+        if self._is_over():
             self.pause()
         elif not self._worker.running and self._wanted() is not None:
             self._worker.put(_Decoding(lambda on, _report: self._decode(on), self.device))
@@ -235,6 +235,13 @@ class Player:
         since = now if self._since is None else self._since
         place = self._from + int((now - since) * self._rate)
         return place if self._loop else min(place, len(self.series) - 1)
+
+    def _is_over(self) -> bool:
+        """Whether time is at the last step, and none that could be shown is left."""
+        last = len(self.series) - 1
+        if self._loop or self._due_at(self._clock()) < last:
+            return False
+        return all(step in self._broken for step in range(self._place + 1, last + 1))
 
     def _next(self) -> int | None:
         """Return the last place that is due and ready, beyond that which is shown."""

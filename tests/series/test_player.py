@@ -164,6 +164,22 @@ def test_without_a_loop_the_last_step_is_the_end(player, clock):
     assert (player.step, player.playing) == (0, True)
 
 
+def test_the_end_comes_although_the_last_step_is_damaged(player, steps, clock):
+    steps.damaged = (N - 1,)
+    player.step = N - 3
+    player.play(rate=10, loop=False)
+    player.advance()
+    told = 0
+    for _ in range(10):
+        _settled(player)
+        clock.now += 0.1
+        try:
+            player.advance()
+        except VDIFileError:
+            told += 1
+    assert (player.step, player.playing, told) == (N - 2, False, 1)
+
+
 def test_a_seek_goes_on_playing_from_there(player, clock):
     player.play(rate=10)
     player.advance()
