@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.io import check_write_options, checked_target
 from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.io.files import HTML_SUFFIX
+from pyvista_vdi.io.whole_file import check_writable, with_suffix
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.series import reader
@@ -43,21 +45,32 @@ def series(options: argparse.Namespace) -> int:
     steps = _vdis(options.files) if kinds[0] != "volume" else None
     looks = classification(options)
     Classification(looks, "series")  # refused before a volume is read
-    with measuring("writing a series") as bar:
+    target = check_writable(with_suffix(Path(options.output), (SUFFIX,), "a series")).resolve()
+    # A writer's file grows step by step: it gets its name when it is whole, and all have been read
+    with (
+        tempfile.TemporaryDirectory(prefix=".pyvista-vdi-", dir=target.parent) as folder,
+        measuring("writing a series") as bar,
+    ):
+        part = Path(folder) / target.name
         if steps is not None:
-            with SeriesWriter(options.output, **arguments) as out:
+            with SeriesWriter(part, **arguments) as out:
                 for i, (time, vdi) in enumerate(steps):
                     out.append(vdi, time if times is None else times[i])
                     bar((i + 1) / max(i + 2, len(options.files)))
         else:
-            _write_volumes(options, looks, arguments, bar)
+            _write_volumes(part, options, looks, arguments, bar)
+        part.replace(target)
     about = reader.read_info(options.output)
     print(f"{printable(options.output)}: {len(about.times)} steps, {mebibytes(about.file_bytes)}")
     return 0
 
 
 def _write_volumes(
-    options: argparse.Namespace, looks: dict[str, Any], arguments: dict[str, Any], bar: Any
+    target: Path,
+    options: argparse.Namespace,
+    looks: dict[str, Any],
+    arguments: dict[str, Any],
+    bar: Any,
 ) -> None:
     from pyvista_vdi.cli.generate import generating_view
 
@@ -69,7 +82,7 @@ def _write_volumes(
             )
             if out is None:
                 out = SeriesWriter(
-                    options.output,
+                    target,
                     generating_view(options, volume),
                     options.size,
                     max_supersegments=options.max_supersegments,

@@ -113,3 +113,22 @@ def test_times_of_what_has_none(series, volumes, capsys, tmp_path):
             error = run(capsys, "view", file, "--screenshot", target, *option, status=1)
             assert f"{option[0]} is for series" in error
             assert not target.exists()
+
+
+def test_a_series_takes_the_place_of_one_that_it_is_made_of(series, capsys, tmp_path):
+    path = tmp_path / "run.vdis"
+    path.write_bytes(series.read_bytes())
+    before = list(pvdi.read(path)[:2])
+    pvdi.VDISeries.of(before, [5.0, 6.0]).save(tmp_path / "later.vdis")
+    run(capsys, "series", path, tmp_path / "later.vdis", "-o", path)
+    assert pvdi.read(path).times == (0.0, 0.5, 2.0, 5.0, 6.0)
+    assert pvdi.read(path)[4].equals(before[1])
+
+
+def test_a_run_that_fails_leaves_what_was_there(series, volumes, capsys, tmp_path):
+    path = tmp_path / "run.vdis"
+    path.write_bytes(series.read_bytes())
+    np.save(tmp_path / "flat.npy", np.zeros((3, 4)))
+    run(capsys, "series", volumes[0], tmp_path / "flat.npy", "-o", path, status=1)
+    assert path.read_bytes() == series.read_bytes()
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["flat.npy", "run.vdis"]
