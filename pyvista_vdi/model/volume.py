@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError
 from pyvista_vdi.model.checks import as_floats
+from pyvista_vdi.model.grid import Geometry
 
 #: Voxel types that the kernels read as they are.
 VOXEL_TYPES: tuple[str, ...] = (
@@ -24,7 +25,7 @@ VOXEL_TYPES: tuple[str, ...] = (
 _WIDENED = {"bool": "uint8", "float16": "float32"}
 
 
-class Volume:
+class Volume(Geometry):
     """Scalars, or colours with opacity, at the points of a uniform grid.
 
     The grid's model coordinates are ``origin + direction @ (spacing * (x, y, z))`` for the point
@@ -54,9 +55,6 @@ class Volume:
     """
 
     array: NDArray[np.generic]
-    spacing: tuple[float, float, float]
-    origin: tuple[float, float, float]
-    direction: NDArray[np.float64]
     name: str
 
     def __init__(
@@ -80,7 +78,7 @@ class Volume:
             )
 
     @property
-    def dimensions(self) -> tuple[int, int, int]:
+    def dimensions(self) -> tuple[int, int, int]:  # type: ignore[override]
         """Number of points along x, y and z."""
         nz, ny, nx = self.array.shape[:3]
         return nx, ny, nz
@@ -94,34 +92,6 @@ class Volume:
     def scalars(self) -> NDArray[np.generic]:
         """What opacity depends on, (nz, ny, nx)."""
         return self.array[..., 3] if self.rgba else self.array
-
-    @property
-    def index_to_model(self) -> NDArray[np.float64]:
-        """Point index (x, y, z) to model coordinates, float64 (4, 4)."""
-        matrix = np.eye(4)
-        matrix[:3, :3] = self.direction * np.asarray(self.spacing)
-        matrix[:3, 3] = self.origin
-        return matrix
-
-    @property
-    def bounds(self) -> tuple[float, float, float, float, float, float]:
-        """Axis-aligned bounds in the model frame: x0, x1, y0, y1, z0, z1; model units."""
-        axes = self.index_to_model[:3, :3] * (np.asarray(self.dimensions) - 1)
-        low = np.asarray(self.origin) + np.minimum(axes, 0).sum(axis=1)
-        high = np.asarray(self.origin) + np.maximum(axes, 0).sum(axis=1)
-        x, y, z = zip(low.tolist(), high.tolist(), strict=True)
-        return (*x, *y, *z)
-
-    @property
-    def length(self) -> float:
-        """Diagonal of :attr:`bounds`, model units (``pyvista.DataSet.length``)."""
-        x0, x1, y0, y1, z0, z1 = self.bounds
-        return float(np.linalg.norm([x1 - x0, y1 - y0, z1 - z0]))
-
-    @property
-    def default_unit_distance(self) -> float:
-        """The opacity unit distance that ``Plotter.add_volume`` takes by default, model units."""
-        return self.length / (float(np.mean(self.dimensions)) - 1)
 
     def finite_range(self) -> tuple[float, float]:
         """Return the smallest and the largest scalar, NaN left out.
