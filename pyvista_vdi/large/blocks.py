@@ -86,10 +86,13 @@ class Blocks:
         The grid.
     cuts : tuple of tuple of int
         Along z, y and x: the first point of each block, and behind them the number of points.
+    chunks : (int, int, int)
+        Points of a chunk along z, y and x: blocks begin where chunks do.
     """
 
     grid: Grid
     cuts: tuple[tuple[int, ...], ...]
+    chunks: Indices
 
     @classmethod
     def of(
@@ -120,7 +123,8 @@ class Blocks:
                 break
             axis = min(short, key=lambda k: lengths[k])
             lengths[axis] = min(2 * lengths[axis], points[axis])
-        return cls(Grid.of(geometry), tuple(map(_cuts, points, lengths)))
+        z, y, x = chunks
+        return cls(Grid.of(geometry), tuple(map(_cuts, points, lengths)), (z, y, x))
 
     @property
     def counts(self) -> Indices:
@@ -138,6 +142,44 @@ class Blocks:
     def own(self, block: Indices) -> tuple[slice, ...]:
         """Return where a block's own points lie in the grid, (z, y, x)."""
         return tuple(slice(cuts[k], cuts[k + 1]) for cuts, k in zip(self.cuts, block, strict=True))
+
+    def ranges(
+        self, block: Indices, values: Values
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the least and the largest scalar of each of a block's chunks, NaN left out."""
+        scalars = values[..., 3] if values.ndim == 4 else values
+        low = high = scalars
+        for axis, chunk in enumerate(self.chunks):
+            starts = np.arange(0, scalars.shape[axis], chunk)
+            low = np.fmin.reduceat(low, starts, axis=axis)
+            high = np.fmax.reduceat(high, starts, axis=axis)
+        return low.astype(np.float64), high.astype(np.float64)
+
+    def _chunks_of(self, block: Indices) -> tuple[slice, ...]:
+        parts = zip(self.own(block), self.chunks, strict=True)
+        return tuple(slice(part.start // chunk, -(-part.stop // chunk)) for part, chunk in parts)
+
+    def of_chunks(
+        self, low: NDArray[np.float64], high: NDArray[np.float64]
+    ) -> dict[Indices, tuple[float, float]]:
+        """Return the least and the largest scalar of each block, of those of all chunks."""
+        return {
+            block: (
+                float(np.fmin.reduce(low[self._chunks_of(block)], axis=None)),
+                float(np.fmax.reduce(high[self._chunks_of(block)], axis=None)),
+            )
+            for block in self
+        }
+
+    def to_chunks(
+        self, ranges: Mapping[Indices, tuple[NDArray[np.float64], NDArray[np.float64]]]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the least and the largest scalar of each chunk, of those of all blocks."""
+        shape = [-(-cuts[-1] // n) for cuts, n in zip(self.cuts, self.chunks, strict=True)]
+        low, high = np.full(shape, np.nan), np.full(shape, np.nan)
+        for block, (of_low, of_high) in ranges.items():
+            low[self._chunks_of(block)], high[self._chunks_of(block)] = of_low, of_high
+        return low, high
 
     def neighbours(self, block: Indices, halo: Halo) -> dict[Offset, Indices]:
         """Return the neighbours of which a block needs points, by where they lie."""

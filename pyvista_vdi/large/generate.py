@@ -21,6 +21,9 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 
+#: Where a block is of which V_O sees nothing.
+NOWHERE = Rectangle(0, 0, 0, 0)
+
 
 def task_of(
     volume: Volume,
@@ -47,7 +50,8 @@ def task_of(
     require_room(0, (width, height))
     point_bytes = volume.array.dtype.itemsize * (4 if volume.rgba else 1)
     blocks = Blocks.of(volume, chunks, point_bytes, block_bytes or BLOCK_BYTES)
-    scalars = volume.finite_range()
+    gradients = transfer_function.gradient_opacities is not None
+    scalars = volume.finite_range() if gradients else (np.nan, np.nan)  # nothing else asks
     camera = Camera.from_any(camera)
     return Task.of(blocks, camera, (width, height), transfer_function, options, scalars)
 
@@ -80,6 +84,20 @@ def vdi_of(
         depth_origin=depth_origin,
         metadata={**made_by, "blocks": list(task.blocks.counts), **(metadata or {})},
     ).with_precision(task.options.precision)
+
+
+def known_ranges(volume: Volume) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Return the least and the largest scalar of each chunk, if they are known."""
+    ranges = getattr(volume.array, "ranges", None)
+    return None if ranges is None else ranges()  # type: ignore[no-any-return]
+
+
+def keep_ranges(volume: Volume, task: Task, seen: Mapping[Indices, Seen]) -> None:
+    """Keep what the first pass has found beside the store, so that nothing unseen is read again."""
+    if hasattr(volume.array, "keep_ranges"):
+        volume.array.keep_ranges(
+            *task.blocks.to_chunks({block: found.ranges for block, found in seen.items()})
+        )
 
 
 def generate_chunked(
@@ -115,22 +133,24 @@ def generate_chunked(
     windows = blocks.windows(task.camera, task.size)
     report(progress, 0.0)
     seen: dict[Indices, Seen] = {}
-    for k, block in enumerate(blocks):
-        window = windows.get(block, Rectangle(0, 0, 0, 0))
+    known = known_ranges(volume)
+    order = task.to_read(windows, known)
+    for k, block in enumerate(order):
+        window = windows.get(block, NOWHERE)
         seen[block] = task.first_pass(block, volume.array[blocks.own(block)], window, device)
-        report(progress, 0.4 * (k + 1) / len(blocks))
-    depths: dict[Indices, NDArray[np.float16]] = {
-        block: found.depths for block, found in seen.items() if found.depths is not None
-    }
+        report(progress, 0.4 * (k + 1) / len(order))
+    if known is None and len(seen) == len(blocks):
+        keep_ranges(volume, task, seen)
     pieces: list[Piece] = []
-    for k, (block, light) in enumerate(light_entering(task, windows, depths).items()):
+    entering = light_entering(task, windows, seen)
+    for k, (block, light) in enumerate(entering.items()):
         parts = {
             offset: halo.from_slabs(seen[other].slabs, offset)
             for offset, other in blocks.neighbours(block, halo).items()
         }
         values = blocks.with_halo(volume.array[blocks.own(block)], parts, halo)
         pieces.append(task.second_pass(block, values, windows[block], light, device))
-        report(progress, 0.4 + 0.5 * (k + 1) / len(depths))
+        report(progress, 0.4 + 0.5 * (k + 1) / len(entering))
     rows = task.merge(0, task.size[1], pieces, device)
     report(progress, 1.0)
     return vdi_of(task, volume, [rows], get_runtime(device).info.name, metadata)

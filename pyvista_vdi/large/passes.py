@@ -8,7 +8,7 @@ other, and merged to the budget.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -37,6 +37,8 @@ from pyvista_vdi.volume.classified_volume import (
 )
 from pyvista_vdi.volume.march_step import march_step
 
+Ends = tuple[float, float]
+
 #: Light of which nothing is told apart any more, as an optical depth.
 _DARK = 80.0
 
@@ -49,15 +51,19 @@ class Seen(NamedTuple):
     depths : numpy.ndarray or None
         Optical depth of each ray of the block's window, float16 (rows, columns); ``None`` where
         the block is transparent.
-    ends : (float, float)
-        Least and largest scalar of its own points, NaN left out; NaN where there is none.
     slabs : dict
         What neighbours need of its points, by axis (z, y, x) and side.
+    ends : dict
+        Least and largest scalar of each slab, and by ``None`` of all its own points; NaN left out,
+        and where there is nothing else.
+    ranges : (numpy.ndarray, numpy.ndarray)
+        Least and largest scalar of each of its chunks, float64.
     """
 
     depths: NDArray[np.float16] | None
-    ends: tuple[float, float]
     slabs: dict[tuple[int, int], Values]
+    ends: dict[tuple[int, int] | None, Ends]
+    ranges: tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 class Piece(NamedTuple):
@@ -159,17 +165,18 @@ class Task:
         self, block: Indices, values: Values, window: Rectangle, device: Any = None
     ) -> Seen:
         """Find the optical depths of a block's rays, without its neighbours' points."""
-        halo = self.halo
-        slabs = halo.slabs(values)
-        ends = _ends(values)
-        if not (ends[0] <= ends[1] and self.may_be_visible(*ends)):
-            return Seen(None, ends, slabs)
+        slabs = self.halo.slabs(values)
+        ends: dict[tuple[int, int] | None, Ends] = {None: _ends(values)}
+        ends.update((side, _ends(slab)) for side, slab in slabs.items())
+        seen = Seen(None, slabs, ends, self.blocks.ranges(block, values))
+        if not (window.pixels and self.may_be_visible(*seen.ends[None])):
+            return seen
         runtime = get_runtime(device)
         volume = self._volume(values)
         part = self.blocks.part(block, None, self.scalar_range)
         with _Marched(self, runtime, volume, part, window) as marched:
             depths = marched.optical_depths()
-        return Seen(depths.astype(np.float16) if depths.any() else None, ends, slabs)
+        return seen._replace(depths=depths.astype(np.float16)) if depths.any() else seen
 
     def second_pass(
         self,
@@ -196,14 +203,52 @@ class Task:
         return _merged(self, get_runtime(device), y0, y1, [p.rows(y0, y1) for p in pieces])
 
     def may_be_visible(self, low: float, high: float) -> bool:
-        """Whether anything between two scalars is not transparent."""
+        """Whether anything between two scalars is not transparent; not where they are NaN."""
+        if not low <= high:
+            return False
         table = self.transfer_function.opacities
         first, last = self.transfer_function.scalar_range
         per_scalar = (len(table) - 1) / (last - first) if last > first else np.inf
         with np.errstate(invalid="ignore"):
-            at = np.nan_to_num((np.array([low, high], np.float64) - first) * per_scalar)
+            at = np.nan_to_num((np.array([low, high]) - first) * per_scalar)
         begin, end = np.clip([np.floor(at[0] - 1e-3), np.ceil(at[1] + 1e-3)], 0, len(table) - 1)
         return bool((table[int(begin) : int(end) + 1] > 0).any())
+
+    def visible(self, block: Indices, seen: Mapping[Indices, Seen]) -> bool:
+        """Whether anything in a block's cells may be visible, of what the first pass has found.
+
+        Between its last point and a neighbour's first one there is something of both.
+        """
+        if block not in seen:
+            return False
+        ends = [seen[block].ends[None]]
+        for offset, other in self.blocks.neighbours(block, self.halo).items():
+            axis = next(k for k, along in enumerate(offset) if along)
+            if other in seen:
+                ends.append(seen[other].ends[axis, offset[axis]])
+        low, high = zip(*ends, strict=True)
+        return self.may_be_visible(np.fmin.reduce(low), np.fmax.reduce(high))
+
+    def to_read(
+        self,
+        windows: Mapping[Indices, Rectangle],
+        ranges: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
+    ) -> list[Indices]:
+        """Return the blocks that the first pass must read, in the order in which V_O sees them.
+
+        ``ranges``: least and largest scalar of each chunk, where they are known. A block in the
+        window that may be visible needs its neighbours' points; no others are read.
+        """
+        of_blocks = None if ranges is None else self.blocks.of_chunks(*ranges)
+        wanted = set()
+        for block in windows:
+            around = [block, *self.blocks.neighbours(block, self.halo).values()]
+            if of_blocks is not None:
+                low, high = zip(*(of_blocks[other] for other in around), strict=True)
+                if not self.may_be_visible(np.fmin.reduce(low), np.fmax.reduce(high)):
+                    continue
+            wanted.update(around)
+        return [block for block in self.blocks.in_order(self.camera) if block in wanted]
 
     def _volume(self, values: Values) -> Volume:
         grid = self.blocks.grid
@@ -322,11 +367,11 @@ def _downloaded(records: Records, part: Slice) -> tuple[NDArray[np.uint16], NDAr
 
 def _merged(task: Task, runtime: Runtime, y0: int, y1: int, pieces: list[Piece]) -> Rows:
     width = task.size[0]
-    pieces = [piece for piece in pieces if len(piece.runs)]
-    largest = [int(piece.counts.max()) for piece in pieces]
-    more = max([CHUNK_STEPS, *largest])
-    slices = Slices((width, y1 - y0), task.options, more)
     window, options = Rectangle(0, width, y0, y1), task.options
+    longest = options.max_supersegments
+    if options.criterion != "least-error":  # what blocks record is cut when all of it is together
+        longest = Slices((width, y1 - y0), options).kept
+    slices = Slices((width, y1 - y0), options, max(CHUNK_STEPS, longest))
     medium = task.rays()
     with (
         Records(runtime, medium, task.camera, task.size, slices, options, window) as records,
@@ -337,17 +382,12 @@ def _merged(task: Task, runtime: Runtime, y0: int, y1: int, pieces: list[Piece])
         merge, pack = Merge(records, options), Pack(records, lists)
         for part in slices:
             records.clear()
-            held = 0
-            for piece, most in zip(pieces, largest, strict=True):
-                first = y0 + part.first_row
+            first = y0 + part.first_row
+            for piece in pieces:
                 of_part = piece.rows(first, first + part.rows)
-                if not len(of_part.runs):
-                    continue
-                if held + most > slices.capacity:
-                    merge.shorten(part)
-                    held = slices.kept
-                _append(records, part, of_part)
-                held += most
+                if len(of_part.runs):
+                    _append(records, part, of_part)
+                    merge.shorten(part)  # each ray by what it has itself, whatever the rows
             merge.to_budget(part)
             if part.number > 0:
                 lists.wait()
@@ -392,21 +432,21 @@ def _ends(values: Values) -> tuple[float, float]:
 
 
 def light_entering(
-    task: Task,
-    windows: dict[Indices, Rectangle],
-    depths: dict[Indices, NDArray[np.float16]],
+    task: Task, windows: Mapping[Indices, Rectangle], seen: Mapping[Indices, Seen]
 ) -> dict[Indices, NDArray[np.float16]]:
-    """Return the light that enters each block along the rays of its window, 0 to 1.
+    """Return the light that enters each block that may be seen, along its window's rays, 0 to 1.
 
-    ``depths`` are those of the blocks that are not transparent.
+    Blocks come in the order in which V_O sees them.
     """
     width, height = task.size
     passed = np.zeros((height, width), np.float32)
     found = {}
     for block in task.blocks.in_order(task.camera):
-        if block in depths:
+        if block in windows and task.visible(block, seen):
             x0, x1, y0, y1 = windows[block]
             before = passed[y0:y1, x0:x1]
             found[block] = np.exp(-np.minimum(before, _DARK)).astype(np.float16)
-            before += depths[block]
+            depths = seen[block].depths
+            if depths is not None:
+                before += depths
     return found
