@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from pyvista_vdi.series.generate import generate_series
     from pyvista_vdi.series.series import VDISeries
     from pyvista_vdi.series.writer import SeriesWriter
+    from pyvista_vdi.sets.generate import generate_set
+    from pyvista_vdi.sets.vdi_set import VDISet
     from pyvista_vdi.vtk_pipeline import VDIActor, VDIMapper, VDISource
 
 #: Where each public name lives; loaded when it is first used (PEP 562).
@@ -51,6 +53,7 @@ _HOMES = {
     "VDIActor": "vtk_pipeline",
     "VDIMapper": "vtk_pipeline",
     "VDISeries": "series.series",
+    "VDISet": "sets.vdi_set",
     "VDISource": "vtk_pipeline",
     "Volume": "model.volume",
     "compare_images": "model.metrics",
@@ -58,6 +61,7 @@ _HOMES = {
     "estimate": "api",
     "generate": "api",
     "generate_series": "series.generate",
+    "generate_set": "sets.generate",
     "list_devices": "device",
     "pick": "api",
     "read": "api",
@@ -85,7 +89,9 @@ providers.provide(
     vdi_from_image="pyvista_vdi.vtk_pipeline:vdi_from_image",
     volume_from_vtk="pyvista_vdi.vtk_pipeline:volume_from_vtk",
     vti_files="pyvista_vdi.vtk_pipeline.filters.vti",
+    write_cinema="pyvista_vdi.sets.cinema:write",
     write_series="pyvista_vdi.series.writer:write",
+    write_set="pyvista_vdi.sets.files:write",
     write_vdi="pyvista_vdi.io:write",
 )
 

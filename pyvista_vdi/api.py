@@ -24,6 +24,7 @@ from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest,
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, warn_missed
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
+from pyvista_vdi.sets.vdi_set import VDISet
 
 if TYPE_CHECKING:
     from pyvista_vdi.generation.estimate import Estimate
@@ -226,8 +227,10 @@ def render(
 
     Parameters
     ----------
-    vdi : VDI or vtkImageData, or list or tuple of them
+    vdi : VDI or VDISet or vtkImageData, or list or tuple of them
         What :func:`generate` or :func:`read` returned, or its VTK form (``pv.read("x.vdi")``).
+        A :class:`VDISet` shows what was made nearest to the view, by itself blended with what is
+        about as near.
         Several are merged by depth along each ray; their order does not matter, to the last bit.
     camera : pyvista.Camera or vtkCamera or Camera
         The new view V_N. Its model transform places the VDI's model frame in the world.
@@ -291,8 +294,9 @@ def render(
         from pyvista_vdi.raycasting.multi_vdi import render_vdis
         from pyvista_vdi.raycasting.placed import common_window_size, placed_vdis
 
+        several = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
         placed = placed_vdis(
-            [as_vdi(one) for one in vdi] if isinstance(vdi, list | tuple) else [as_vdi(vdi)],
+            _seen_in_scene(several, view, model_transforms),
             view,
             model_transforms=model_transforms,
             clipping_planes=clipping_planes,
@@ -303,9 +307,6 @@ def render(
         size = common_window_size(placed) if window_size is None else window_size
         frame = _frame(None, view, size, RenderOptions(), opaque_depth, device)
         return render_vdis(placed, frame)
-    vdi = as_vdi(vdi)
-    from pyvista_vdi.raycasting.raycast import render_vdi
-
     options = RenderOptions(
         clipping_planes,
         cropping,
@@ -314,6 +315,13 @@ def render(
         preview_samples,
         TRANSMITTANCE_CUTOFF if transmittance_cutoff is None else transmittance_cutoff,
     )
+    if isinstance(vdi, VDISet):
+        from pyvista_vdi.sets.render import render_set
+
+        return render_set(vdi, _frame(vdi, view, window_size, options, opaque_depth, device))
+    vdi = as_vdi(vdi)
+    from pyvista_vdi.raycasting.raycast import render_vdi
+
     return render_vdi(vdi, _frame(vdi, view, window_size, options, opaque_depth, device))
 
 
@@ -356,12 +364,12 @@ def render_depth(
         If there is no device, or it fails.
     """
     view = Camera.from_any(camera)
-    vdi = as_vdi(vdi)
+    seen = _seen(vdi, view)
     from pyvista_vdi.raycasting.raycast import render_first_hits
 
     options = RenderOptions(clipping_planes, cropping, opacity_multiplier, skip_empty)
-    frame = _frame(vdi, view, window_size, options, opaque_depth, device)
-    return render_first_hits(vdi, frame, FirstHit.of(opacity_threshold, accumulated))
+    frame = _frame(_made_for(vdi, seen), view, window_size, options, opaque_depth, device)
+    return render_first_hits(seen, frame, FirstHit.of(opacity_threshold, accumulated))
 
 
 def pick(
@@ -381,8 +389,8 @@ def pick(
 
     Parameters
     ----------
-    vdi : VDI or vtkImageData
-        As for :func:`render`.
+    vdi : VDI or VDISet or vtkImageData
+        As for :func:`render`; of a set the hit is one of the VDI nearest to the view.
     camera : pyvista.Camera or vtkCamera or Camera
         The view. Its model transform places the VDI's model frame in the world.
     pixel : (float, float)
@@ -419,12 +427,12 @@ def pick(
     A single ray, walked in float64 on the host: no device is needed.
     """
     view = Camera.from_any(camera)
-    vdi = as_vdi(vdi)
+    seen = _seen(vdi, view)
     from pyvista_vdi.raycasting.picking import pick_vdi
 
     options = RenderOptions(clipping_planes, cropping, opacity_multiplier)
-    frame = _frame(vdi, view, window_size, options, opaque_depth)
-    return pick_vdi(vdi, frame, pixel, FirstHit.of(opacity_threshold, accumulated))
+    frame = _frame(_made_for(vdi, seen), view, window_size, options, opaque_depth)
+    return pick_vdi(seen, frame, pixel, FirstHit.of(opacity_threshold, accumulated))
 
 
 @_classified
@@ -523,14 +531,15 @@ def render_volume(
 def read(path: str | os.PathLike[str], **options: Any) -> Any:
     """Read a VDI from a file that :meth:`VDI.save` or VTK wrote, or any deep OpenEXR image.
 
-    Or a series of them.
+    Or a series or a set of them.
 
     Parameters
     ----------
     path : path-like
         A ``.vdi`` file, an OpenEXR deep image, whose name ends in ``.exr``, or a VDI's VTK form
         in one of VTK's image files, ``.vti``, or a page with a VDI in it, ``.html``. Or the series
-        in a ``.vdis`` file, whose steps are read when they are asked for.
+        in a ``.vdis`` file, or the set in a ``.vdiset`` file, whose VDIs are read when they are
+        asked for.
     **options
         For ``.exr`` files of other programs: ``camera``, the view that the image shows, where
         the file does not say it; ``thickness``, world units, given to samples that have none
@@ -539,7 +548,7 @@ def read(path: str | os.PathLike[str], **options: Any) -> Any:
 
     Returns
     -------
-    VDI or VDISeries
+    VDI or VDISeries or VDISet
         The same to the last bit if this package wrote the file; what is lost with other programs'
         files is said in the documentation of files.
 
@@ -558,7 +567,10 @@ def read(path: str | os.PathLike[str], **options: Any) -> Any:
     """
     from pyvista_vdi.io import read as read_file
     from pyvista_vdi.series import reader
+    from pyvista_vdi.sets import files as sets
 
+    if sets.is_set_file(path):
+        return sets.read(path, **options)
     if reader.is_series_file(path):
         return reader.read(path, **options)
     return read_file(path, **options)
@@ -620,8 +632,30 @@ def estimate(
     )
 
 
+def _seen(vdi: Any, view: Camera) -> VDI:
+    """Return what a user calls a VDI as one: of a set that which is nearest to the view."""
+    return vdi[vdi.nearest(view)] if isinstance(vdi, VDISet) else as_vdi(vdi)
+
+
+def _seen_in_scene(
+    vdis: Sequence[Any], view: Camera, model_transforms: Sequence[ArrayLike] | None
+) -> list[VDI]:
+    """Return the VDIs of a scene, each seen where its model transform places it."""
+    if model_transforms is None or len(model_transforms) != len(vdis):  # refused where it is used
+        return [_seen(vdi, view) for vdi in vdis]
+    return [
+        _seen(vdi, view.replace(model_transform=placed)) if isinstance(vdi, VDISet) else as_vdi(vdi)
+        for vdi, placed in zip(vdis, model_transforms, strict=True)
+    ]
+
+
+def _made_for(vdi: Any, seen: VDI) -> VDI | VDISet:
+    """Return what knows the size of pictures: the set, where there is one."""
+    return vdi if isinstance(vdi, VDISet) else seen
+
+
 def _frame(
-    vdi: VDI | None,
+    vdi: VDI | VDISet | None,
     camera: Camera,
     window_size: Sequence[int] | None,
     options: RenderOptions,

@@ -106,7 +106,7 @@ def angle_from_generating_view(vdi: VDI, camera: Any) -> float:
     direction of projection; that direction also stands in for an eye at the very centre.
     """
     old, new = (
-        vdi.camera.model_transform[:3, :3] @ _towards_eye(view, vdi.bounds)
+        vdi.camera.model_transform[:3, :3] @ towards_eye(view, vdi.bounds)
         for view in (vdi.camera, Camera.from_any(camera))
     )
     old, new = old / np.linalg.norm(old), new / np.linalg.norm(new)
@@ -400,7 +400,7 @@ def world_centre(camera: Camera, bounds: Sequence[float]) -> Floats:
     return np.asarray(matrix[:3, :3] @ ((low + high) / 2) + matrix[:3, 3])
 
 
-def _towards_eye(camera: Camera, bounds: Sequence[float]) -> Floats:
+def towards_eye(camera: Camera, bounds: Sequence[float]) -> Floats:
     """Direction in which the eye stands, seen from the centre of the bounds; model frame."""
     to_world = camera.model_transform[:3, :3]
     direction = np.linalg.solve(

@@ -224,8 +224,8 @@ def unpacked(data: memoryview | bytes) -> bytes:
     return text
 
 
-def head_bytes(head: Mapping[str, Any]) -> bytes:
+def head_bytes(head: Mapping[str, Any], magic: bytes = MAGIC) -> bytes:
     """Return the bytes that a file begins with."""
     text = json.dumps(head, allow_nan=False).encode()
     checksum = zlib.crc32(text, zlib.crc32(struct.pack("<II", FORMAT_VERSION, len(text))))
-    return MAGIC + HEAD.pack(FORMAT_VERSION, len(text), checksum) + text
+    return magic + HEAD.pack(FORMAT_VERSION, len(text), checksum) + text

@@ -54,8 +54,8 @@ _PAGE = ".html"
 
 _REMEDY = "copy it from its source again, or generate the series anew"
 
-#: Decoded steps that are kept: those that others are made from, and those that were asked for.
-_KEPT_STEPS, _KEPT_VDIS = 3, 4
+#: Decoded steps that are kept: those that others are made from.
+_KEPT_STEPS = 3
 
 #: Bytes that are searched at a time.
 _WINDOW = 1 << 20
@@ -165,6 +165,13 @@ class StepsReader(Sequence[VDI]):
         If the file is absent, foreign, of a newer version or damaged, or has no finished step.
     """
 
+    _MAGIC, _PART = layout.MAGIC, "step"
+    _FOREIGN = (
+        "a series of VDIs: it begins with {!r}; such a file is written by VDISeries.save(), "
+        "SeriesWriter or 'pyvista-vdi series'"
+    )
+    _KEPT_VDIS = 4  # that were asked for last
+
     def __init__(self, path: str | os.PathLike[str]) -> None:
         try:
             self._path = Path(path)
@@ -180,7 +187,7 @@ class StepsReader(Sequence[VDI]):
         weakref.finalize(self, self._stream.close)
         self._lock = Lock()
         self._steps = _Recent[Stepped](_KEPT_STEPS)
-        self._vdis = _Recent[VDI](_KEPT_VDIS)
+        self._vdis = _Recent[VDI](self._KEPT_VDIS)
         self._contents = _Recent[memoryview](1)  # of a frame, while it is looked at
         self._descriptions: dict[int, dict[str, Any]] = {}
         #: How many steps have been decoded so far.
@@ -196,7 +203,8 @@ class StepsReader(Sequence[VDI]):
             self._needed = {header.by for _, header in self._frames}
             if not self._frames:
                 raise VDIFileError(
-                    f"{self._path} has no finished step: it was cut off, or none is written yet"
+                    f"{self._path} has no finished {self._PART}: it was cut off, or none is "
+                    "written yet"
                 )
         except OSError as error:
             self._stream.close()
@@ -259,15 +267,13 @@ class StepsReader(Sequence[VDI]):
     # -- the file --------------------------------------------------------------------------------
 
     def _read_head(self) -> tuple[dict[str, Any], int]:
-        head = self._bytes_at(0, len(layout.MAGIC) + layout.HEAD.size)
-        if not head or not layout.MAGIC.startswith(head[: len(layout.MAGIC)]):
-            raise VDIFileError(
-                f"{self._path} is not a series of VDIs: it begins with {head[:8]!r}; such a file "
-                "is written by VDISeries.save(), SeriesWriter or 'pyvista-vdi series'"
-            )
-        if len(head) < len(layout.MAGIC) + layout.HEAD.size:
+        magic = self._MAGIC
+        head = self._bytes_at(0, len(magic) + layout.HEAD.size)
+        if not head or not magic.startswith(head[: len(magic)]):
+            raise VDIFileError(f"{self._path} is not {self._FOREIGN.format(head[:8])}")
+        if len(head) < len(magic) + layout.HEAD.size:
             self._refuse("it ends within its head")
-        version, n_text, checksum = layout.HEAD.unpack(head[len(layout.MAGIC) :])
+        version, n_text, checksum = layout.HEAD.unpack(head[len(magic) :])
         if version > layout.FORMAT_VERSION:
             raise VDIFileError(
                 f"{self._path} is of format version {version}; this is pyvista-vdi {__version__}, "
@@ -275,7 +281,7 @@ class StepsReader(Sequence[VDI]):
                 "upgrade by pip install -U pyvista-vdi"
             )
         text = self._bytes_at(len(head), n_text if n_text <= MAX_DESCRIPTION_BYTES else 0)
-        begun = zlib.crc32(head[len(layout.MAGIC) : -4])
+        begun = zlib.crc32(head[len(magic) : -4])
         if version < 1 or len(text) != n_text or zlib.crc32(text, begun) != checksum:
             self._refuse("its head is not what was written")
         self._version = int(version)
@@ -283,12 +289,16 @@ class StepsReader(Sequence[VDI]):
             found = from_json(text)
             check_precision(found["precision"])
             if not 0 <= number(found["tolerance"]) < 1 or found["codec"] not in (*CODECS, "none"):
-                self._refuse("its head names what no series has")
+                self._refuse("its head names what no such file has")
+            self._check_head(found)
         except VDIFileError:
             raise
         except (VDIError, KeyError, TypeError, ValueError, RecursionError) as error:
             self._refuse(f"its head is incomplete or wrong: {error!r}")
         return found, len(head) + n_text
+
+    def _check_head(self, found: dict[str, Any]) -> None:
+        """Take what else the head says; VDIError, KeyError, TypeError or ValueError if wrong."""
 
     def _indexed(self, begin: int) -> list[tuple[int, FrameHeader]] | None:
         """Return the frames that the index names; None where there is none, or it is damaged."""
@@ -341,8 +351,8 @@ class StepsReader(Sequence[VDI]):
         lost = sorted(set(range(numbers[-1] + 1)) - set(numbers)) if numbers else []
         if lost:
             warnings.warn(
-                f"{self._path} is damaged: steps {', '.join(map(str, lost))} cannot be found, "
-                f"{len(frames)} others are read; {_REMEDY}",
+                f"{self._path} is damaged: {self._PART}s {', '.join(map(str, lost))} cannot be "
+                f"found, {len(frames)} others are read; {_REMEDY}",
                 VDIWarning,
                 stacklevel=4,
             )
@@ -388,7 +398,9 @@ class StepsReader(Sequence[VDI]):
         place, header = self._frames[i]
         data = self._bytes_at(place + layout.HEADER_BYTES, header.n_bytes)
         if len(data) != header.n_bytes or zlib.crc32(data) != header.checksum:
-            self._refuse(f"step {header.number} is not what was written: its checksum differs")
+            self._refuse(
+                f"{self._PART} {header.number} is not what was written: its checksum differs"
+            )
         return self._contents.put(i, memoryview(data))
 
     def _refuse(self, why: str) -> NoReturn:
@@ -437,7 +449,7 @@ class StepsReader(Sequence[VDI]):
         except (VDIFileError, Cancelled):
             raise
         except (*_CONTRADICTIONS, VDIError) as error:
-            self._refuse(f"step {header.number} holds no valid VDI: {error}")
+            self._refuse(f"{self._PART} {header.number} holds no valid VDI: {error}")
 
     def _vdi_in(self, i: int, data: memoryview) -> VDI:
         """Return the VDI of a frame that holds a whole file."""
@@ -492,7 +504,9 @@ class StepsReader(Sequence[VDI]):
         numbers = [header.number for _, header in self._frames]
         k = bisect_left(numbers, step)
         if k == len(numbers) or numbers[k] != step:
-            self._refuse(f"step {needed_by} is written by step {step}, which cannot be found")
+            self._refuse(
+                f"{self._PART} {needed_by} is written by {self._PART} {step}, which cannot be found"
+            )
         return k
 
     def _text(self, i: int) -> tuple[dict[str, Any], memoryview]:
@@ -512,14 +526,14 @@ class StepsReader(Sequence[VDI]):
             except (DamagedChunkError, ValueError, KeyError) as error:
                 if isinstance(error, VDIFileError):
                     raise
-                self._refuse(f"step {header.number}: {error}")
+                self._refuse(f"{self._PART} {header.number}: {error}")
             found = text.get("description")
             if found is not None:
                 if not isinstance(found, dict):
-                    self._refuse(f"step {header.number} is not described")
+                    self._refuse(f"{self._PART} {header.number} is not described")
                 self._descriptions[i] = found
             elif header.by < 0:
-                self._refuse(f"step {header.number} is not described")
+                self._refuse(f"{self._PART} {header.number} is not described")
             else:
                 i = self._place_of(header.by, header.number)
         found = self._descriptions[i]
@@ -553,7 +567,9 @@ class StepsReader(Sequence[VDI]):
                 found["metadata"],
             )
         except (VDIError, KeyError, TypeError, ValueError, OverflowError) as error:
-            self._refuse(f"step {self._frames[i][1].number} is described wrongly: {error!r}")
+            self._refuse(
+                f"{self._PART} {self._frames[i][1].number} is described wrongly: {error!r}"
+            )
 
 
 def _samples(found: Any) -> Samples | None:

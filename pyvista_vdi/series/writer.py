@@ -298,17 +298,24 @@ class StepsWriter:
     def __len__(self) -> int:
         return len(self._entries)
 
-    def begin(self, stream: BinaryIO) -> None:
-        """Write the file's head."""
+    def begin(
+        self,
+        stream: BinaryIO,
+        magic: bytes = layout.MAGIC,
+        name: str = layout.FORMAT_NAME,
+        **more: Any,
+    ) -> None:
+        """Write the file's head, of this format or of one that is like it, with what is more."""
         head = {
-            "format": layout.FORMAT_NAME,
+            "format": name,
             "written_by": f"pyvista-vdi {__version__}",
             "precision": self._precision,
             "tolerance": self._tolerance,
             "key_every": self._key_every,
             "codec": self._codec,
+            **more,
         }
-        stream.write(layout.head_bytes(head))
+        stream.write(layout.head_bytes(head, magic))
 
     def checked_time(self, time: float | None) -> float:
         """Return the next step's time, or raise InvalidArgumentError."""

@@ -17,6 +17,7 @@ import io as text_io
 import itertools
 import json
 import os
+import struct
 import tempfile
 import tracemalloc
 import warnings
@@ -40,6 +41,7 @@ from pyvista_vdi.model import host_memory
 from pyvista_vdi.model.view import View
 from pyvista_vdi.series import layout
 from pyvista_vdi.series import reader as series_reader
+from pyvista_vdi.sets import files as set_files
 from pyvista_vdi.web import messages
 from pyvista_vdi.web.page import _DATA
 from pyvista_vdi.web.page import page as page_of
@@ -247,6 +249,56 @@ def vdis_frames(data: bytes) -> None:
             content += header.to_bytes() + frame
     content = choices.patched(content) if choices.chance(8) else content
     _read_all("frames.vdis", content, VDIS_RATIO, series_reader.read_info, _steps_of)
+
+
+def _views_of(path: Path) -> Iterator[VDI]:
+    """The VDIs of a set that can be read."""
+    vdi_set = set_files.read(path)
+    vdi_set.weights(vdi_set.cameras[0])
+    for i in range(min(len(vdi_set), 6)):
+        with contextlib.suppress(VDIError):
+            yield vdi_set[i]
+
+
+def vdiset_bytes(data: bytes) -> None:
+    """Any bytes as a ``.vdiset`` file."""
+    _read_all("bytes.vdiset", data, VDIS_RATIO, set_files.read_info, _views_of)
+
+
+@cache
+def _set_parts(index: int, compression: str) -> tuple[dict[str, Any], bytes]:
+    """A small set's head, and the bytes behind it."""
+    first = base_vdi(index)
+    vdis = [_seen_from(first, first.camera.azimuth(angle)) for angle in (0, 20, 40)]
+    path = pvdi.VDISet.of(vdis).save(work_folder() / "base.vdiset", compression=compression)
+    views = set_files.SetReader(path)
+    content = path.read_bytes()[views._frames[0][0] :]
+    path.unlink()
+    return views._head, content
+
+
+def _seen_from(vdi: VDI, camera: Camera) -> VDI:
+    return VDI(
+        camera,
+        vdi.window_size,
+        **_arrays(vdi),
+        bounds=vdi.bounds,
+        depth_origin=vdi.depth_origin,
+    )
+
+
+def vdiset_heads(data: bytes) -> None:
+    """A ``.vdiset`` file whose head was changed, with a checksum that fits."""
+    choices = Choices(data)
+    head, content = _set_parts(choices.integer(0, 7), choices.pick(COMPRESSIONS))
+    for _ in range(choices.integer(0, 3)):
+        head = choices.edited(head)
+    text = json.dumps(head).encode("utf-8", "surrogatepass")
+    begin = struct.pack("<II", layout.FORMAT_VERSION, len(text))
+    checksum = zlib.crc32(text, zlib.crc32(begin))
+    content = set_files.MAGIC + begin + struct.pack("<I", checksum) + text + content
+    content = choices.patched(content) if choices.chance(4) else content
+    _read_all("heads.vdiset", content, VDIS_RATIO, set_files.read_info, _views_of)
 
 
 def exr_bytes(data: bytes) -> None:
@@ -885,6 +937,7 @@ TARGETS: dict[str, Callable[[bytes], None]] = {
     for target in (
         *(vdi_bytes, vdi_members, exr_bytes, exr_patches),
         *(vdis_bytes, vdis_frames),
+        *(vdiset_bytes, vdiset_heads),
         *(html_bytes, html_patches, served_messages),
         *(validator, vtk_form, command_line, public_functions),
     )

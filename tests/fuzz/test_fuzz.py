@@ -26,6 +26,8 @@ EXAMPLES = {
     "exr_patches": 200,
     "vdis_bytes": 100,
     "vdis_frames": 40,
+    "vdiset_bytes": 60,
+    "vdiset_heads": 40,
     "html_bytes": 50,
     "html_patches": 150,
     "served_messages": 400,
