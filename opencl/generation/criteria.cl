@@ -183,7 +183,7 @@ inline int cut_to_limit(__global float *record, int count, int limit, float per_
 __kernel void cut_lists(
     int limit,
     int width, int height,
-    int first_row, int rows,
+    int first_column, int columns, int first_row, int rows,
     __global const float *forms,
     int capacity,
     float reference_length,
@@ -193,8 +193,8 @@ __kernel void cut_lists(
     __global uint *counts)
 {
     const uint item = (uint)get_global_id(0);
-    const Rays rays = rays_of_block(item, width, height, first_row, rows);
-    const Int list = rays.y * width + rays.x;
+    const Rays rays = rays_of_part(item, width, height, first_column, columns, first_row, rows);
+    const Int list = rays.y * columns + rays.x;
     const int count = load_counts(counts, list, rays.present);
     if (count == 0)
         return;

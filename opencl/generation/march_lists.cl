@@ -26,39 +26,53 @@ inline void store_last_run(__global float *records, Int starts, Int count, Run r
     store_run_at(records, places.each, run);
 }
 
-// Work-items are the pixels of V_O in rows first_row .. first_row + rows - 1, in blocks of 4 x 4, or the blocks; records are in
-// the order of the work-items, counts and offsets in the order of the lists.
+// Work-items are the pixels of V_O in columns first_column .. first_column + columns - 1 of rows first_row .. first_row + rows - 1,
+// in blocks of 4 x 4, or the blocks; records are in the order of the work-items, counts and offsets in the order of the lists.
+// -D GRID_PART: steps are counted from the first one in the part of the grid, see volume/march.cl
+
+#ifdef GRID_PART
+#define ENTERING_PARAMETER                                                                                        \
+    int window_row, /* the first of the rows that `entering` has */                                               \
+    __global const float *entering, /* light that enters the part along each ray, 0 to 1 */
+#else
+#define ENTERING_PARAMETER
+#endif
 
 KERNEL_OF_LANES void march_lists(
     MEDIUM_PARAMETERS
     VIEW_PARAMETERS
-    int first_row, int rows,
+    int first_column, int columns, int first_row, int rows,
     int first_step, int steps,       // of this chunk
     int grain,                       // steps in a voxel
     float finest,                    // threshold of rays whose record has never been full
     int capacity,                    // runs in a record: at least as many as are in it now and `steps` more
     float reference_length,          // model units
     float hidden_weight,             // weight of what the view from V_O cannot see, 0 to 1
+    ENTERING_PARAMETER
     __global const float *thresholds, // merge errors up to this are accepted, one per ray
     __global float *all_records,
     __global uint *counts)           // runs in each record, by list
 {
     const uint first = (uint)get_global_id(0) * LANES;
-    const Rays rays = rays_of_block(first, width, height, first_row, rows);
+    const Rays rays = rays_of_part(first, width, height, first_column, columns, first_row, rows);
     if (!ANY(rays.present))
         return;
     March march;
     if (!ANY(begin_march(&march, forms, planes, rays.a, rays.b, sample_distance, unit_distance, INFINITY)))
         return;
     const Medium medium = MEDIUM;
-    const Int begun = rays.present & (march.steps > first_step);
+#ifdef GRID_PART
+    march_in_part(&march, &medium);
+#endif
+    const Int begin = BEGIN_OF(march) + first_step;
+    const Int begun = rays.present & (march.steps > begin);
     if (!ANY(begun))
         return;
-    const Int end = SELECT((Int)(first_step), min(first_step + steps, march.steps), begun);
+    const Int end = SELECT(begin, min(begin + steps, march.steps), begun);
     const Real per_reference = march.units * unit_distance / reference_length;
     const Real threshold = LOAD_LANES(0, thresholds + first);
     __global float *records = all_records + record_start(first, capacity);
-    const Int lists = rays.y * width + rays.x;
+    const Int lists = rays.y * columns + rays.x;
 
     // The records' last runs may still grow. Their features, the means of their steps', are kept, which is cheaper than
     // computing them of their media
@@ -79,7 +93,15 @@ KERNEL_OF_LANES void march_lists(
         opacity = SELECT(opacity, last.OPACITY, some);
     }
 #define GROWING_RUN RUN(run_front, run_back, tau, before, red, green, blue, opacity)
-    Real transmittance = SELECT((Real)(1.0f), before - before * opacity, some);
+#ifdef GRID_PART
+    const Places places = {SELECT((Int)(0), (first_row - window_row) * columns + lists, rays.present)};
+#define ENTERING(n) entering[places.each[n]]
+    const Real unmet = OF_LANES(Real, ENTERING); // before the ray's first run
+#undef ENTERING
+#else
+    const Real unmet = 1.0f;
+#endif
+    Real transmittance = SELECT(unmet, before - before * opacity, some);
     Real4 feature = run_feature(GROWING_RUN, per_reference);
     Real run_length = SELECT((Real)(0.0f), (run_back - run_front) * per_reference, some);
 #if defined(COMPENSATED) && COMPENSATED > 1
@@ -88,7 +110,7 @@ KERNEL_OF_LANES void march_lists(
     // A ray that cannot keep every detail asks about homogeneity once in a voxel only: the steps of a group are composited
     // without asking
     const Int group = SELECT((Int)(1), (Int)(grain), threshold > finest);
-    Int k = first_step;
+    Int k = begin;
     Int left = group; // steps of this group
     Real group_front = step_face(&march, k);
     Real group_tau = 0.0f, group_red = 0.0f, group_green = 0.0f, group_blue = 0.0f, group_opacity = 0.0f;
@@ -167,23 +189,27 @@ KERNEL_OF_LANES void march_lists(
 
 // The steps of the longest ray of each slice of rows.
 __kernel void longest_marches(
-    __global const float *forms,
-    int planes,
-    float sample_distance,
-    float unit_distance,
-    int width, int height,
+#ifdef GRID_PART
+    MEDIUM_PARAMETERS
+#endif
+    VIEW_PARAMETERS
+    int first_column, int columns, int first_row, int rows,
     int slice_rows,                // a multiple of a block's
     __global int *longest)         // of each slice; 0 at first
 {
     const uint first = (uint)get_global_id(0) * LANES;
-    const Rays rays = rays_of_block(first, width, height, 0, height);
+    const Rays rays = rays_of_part(first, width, height, first_column, columns, first_row, rows);
     if (!ANY(rays.present))
         return;
     March march;
     if (!ANY(begin_march(&march, forms, planes, rays.a, rays.b, sample_distance, unit_distance, INFINITY)))
         return;
-    __global int *of_slice = longest + block_pixel(first, width).y / slice_rows;
-    const int steps = largest_lane(SELECT((Int)(0), march.steps, rays.present));
+#ifdef GRID_PART
+    const Medium medium = MEDIUM;
+    march_in_part(&march, &medium);
+#endif
+    __global int *of_slice = longest + block_pixel(first, columns).y / slice_rows;
+    const int steps = largest_lane(SELECT((Int)(0), march.steps - BEGIN_OF(march), rays.present));
     if (steps > *of_slice) // an old value is only lower, and does no harm
         atomic_max(of_slice, steps);
 }

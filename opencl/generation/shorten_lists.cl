@@ -269,7 +269,7 @@ KERNEL_OF_LANES void shorten_lists(
     int limit,
     int exactly,
     int width, int height,
-    int first_row, int rows,
+    int first_column, int columns, int first_row, int rows,
     __global const float *forms,
     int capacity,
     float reference_length,
@@ -280,10 +280,10 @@ KERNEL_OF_LANES void shorten_lists(
     __global uint *counts)
 {
     const uint first = (uint)get_global_id(0) * LANES;
-    const Rays rays = rays_of_block(first, width, height, first_row, rows);
+    const Rays rays = rays_of_part(first, width, height, first_column, columns, first_row, rows);
     if (!ANY(rays.present))
         return;
-    const Int lists = rays.y * width + rays.x;
+    const Int lists = rays.y * columns + rays.x;
     Int runs = load_counts(counts, lists, rays.present);
     if (!ANY(runs > limit))
         return;

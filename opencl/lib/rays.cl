@@ -128,23 +128,29 @@ inline Ray ray_of_pixel(int2 pixel, int width, int height)
 }
 #endif
 
-// The rays of a work-item through some rows of a window, from `first` on: one, or those of a block.
+// The rays of a work-item through part of a window, from `first` on: one, or those of a block.
 typedef struct {
-    Int x, y;    // pixels, of the rows
+    Int x, y;    // pixels, of the part
     Int present; // those in the window
     Real a, b;   // pixel offsets
 } Rays;
 
-inline Rays rays_of_block(uint first, int width, int height, int first_row, int rows)
+inline Rays rays_of_part(uint first, int width, int height, int first_column, int columns, int first_row, int rows)
 {
-    const int2 corner = block_pixel(first, width);
+    const int2 corner = block_pixel(first, columns);
     Rays rays;
     rays.x = corner.x + (LANE_NUMBERS & 3);
     rays.y = corner.y + (LANE_NUMBERS >> 2);
-    rays.present = (rays.x < width) & (rays.y < rows);
-    rays.a = offsets_from_middle(rays.x, width);
+    rays.present = (rays.x < columns) & (rays.y < rows);
+    rays.a = offsets_from_middle(first_column + rays.x, width);
     rays.b = offsets_from_middle(first_row + rays.y, height);
     return rays;
+}
+
+// Those of whole rows.
+inline Rays rays_of_block(uint first, int width, int height, int first_row, int rows)
+{
+    return rays_of_part(first, width, height, 0, width, first_row, rows);
 }
 
 // Pixel of a work-item for part of a window, in strips STRIP blocks high, each from left to right, so that one work-item's lists

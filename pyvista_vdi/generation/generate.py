@@ -19,7 +19,7 @@ from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.classified_volume import DeviceVolume, GridRays
 
 Progress = Callable[[float], object]
 
@@ -94,7 +94,7 @@ def generate_vdi(
         growing_lists(runtime, size, options.max_supersegments, slices.rows * width) as lists,
     ):
         merge, pack = Merge(records, options), Pack(records, lists)
-        _report(progress, 0.0)
+        report(progress, 0.0)
         for part in slices:
             records.clear()
             for chunk in march.chunks(part):
@@ -103,11 +103,34 @@ def generate_vdi(
             merge.to_budget(part)
             if part.number > 0:
                 lists.wait()  # for the slice before: the device has this one to go on with
-                _report(progress, part.first_row / height)
+                report(progress, part.first_row / height)
             pack.append(part)
         offsets, front, back, color, optical_depth = lists.finished()
-    _report(progress, 1.0)
+    report(progress, 1.0)
 
+    made_by = made_from(volume, transfer_function, options, medium, runtime.info.name)
+    return VDI(
+        camera,
+        size,
+        offsets,
+        front,
+        back,
+        color,
+        optical_depth,
+        volume.bounds,
+        depth_origin=records.depth_origin,
+        metadata={**made_by, **(metadata or {})},
+    ).with_precision(options.precision)
+
+
+def made_from(
+    volume: Volume,
+    transfer_function: TransferFunction,
+    options: GenerationOptions,
+    medium: DeviceVolume | GridRays,
+    device: str,
+) -> dict[str, Any]:
+    """Return what made a VDI, for its metadata."""
     made_by = {
         "generator": f"pyvista-vdi {__version__}",
         "criterion": options.criterion,
@@ -123,29 +146,19 @@ def generate_vdi(
             "spacing": list(volume.spacing),
             "dtype": volume.array.dtype.name,
         },
-        "device": runtime.info.name,
+        "device": device,
     }
     if transfer_function.shading is not None:
         made_by["lights"] = options.lights.to_dict()
     if options.ambient_occlusion is not None:
         made_by["ambient_occlusion"] = options.ambient_occlusion.to_dict(volume)
-    return VDI(
-        camera,
-        size,
-        offsets,
-        front,
-        back,
-        color,
-        optical_depth,
-        volume.bounds,
-        depth_origin=records.depth_origin,
-        metadata={**made_by, **(metadata or {})},
-    ).with_precision(options.precision)
+    return made_by
 
 
-def _report(progress: Progress | None, fraction: float) -> None:
+def report(progress: Progress | None, fraction: float) -> None:
+    """Say how far generation is; give it up if the answer is False."""
     if progress is not None and progress(fraction) is False:
         raise Cancelled(f"generation was cancelled at {fraction:.0%}")
 
 
-__all__ = ["generate_vdi"]
+__all__ = ["generate_vdi", "made_from", "report"]

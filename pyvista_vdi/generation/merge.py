@@ -41,7 +41,11 @@ class Merge:
         Such a ray's threshold is raised. What follows the last chunk does it at least error.
         """
         if self._cut is not None or not chunk.last:
-            self._shorten(part, self._records.slices.kept, exactly=False)
+            self.shorten(part)
+
+    def shorten(self, part: Slice) -> None:
+        """Merge what is least unlike in records that are longer than is kept."""
+        self._shorten(part, self._records.slices.kept, exactly=False)
 
     def to_budget(self, part: Slice) -> None:
         """Merge at least error, or cut by another criterion, until the budget is kept."""

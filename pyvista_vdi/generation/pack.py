@@ -26,7 +26,7 @@ class Pack:
         records, (width, height) = self._records, self._records.size
         entries: tuple[Any, ...] = ()
         if records.of_rays:  # depths count from where a ray enters
-            of_slice = (np.int32(height), np.int32(part.first_row))
+            of_slice = (np.int32(height), np.int32(records.window.y0 + part.first_row))
             entries = (records.forms, np.int32(records.planes), *of_slice)
         records.launch(
             self._step,

@@ -11,11 +11,11 @@ from pyvista_vdi.device import Runtime
 from pyvista_vdi.device.constants import RUN_WORDS
 from pyvista_vdi.device.ray_forms import check_list_space
 from pyvista_vdi.device.steps import Step
-from pyvista_vdi.device.work_order import block_items
+from pyvista_vdi.device.work_order import Rectangle, block_items
 from pyvista_vdi.generation.slices import Slice, Slices
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.classified_volume import DeviceVolume, GridRays
 
 #: Merge error that no picture shows: a difference of a thousandth of full opacity over one voxel.
 _INDISTINGUISHABLE = 1e-6
@@ -28,25 +28,28 @@ class Records:
     compiled with; ``march`` their arguments ``forms`` to ``unit_distance``, ``weights`` those of a
     merge error. ``runs`` come with their merge ``errors``, and with the number (``counts``) and the
     accepted merge error (``thresholds``) of each ray: ``finest`` until its record has been full.
+    ``window`` is what the slices are cut of: part of V_O's window, or all of it.
     """
 
     def __init__(
         self,
         runtime: Runtime,
-        medium: DeviceVolume,
+        medium: DeviceVolume | GridRays,
         camera: Camera,
         size: tuple[int, int],
         slices: Slices,
         options: GenerationOptions,
+        window: Rectangle | None = None,
     ) -> None:
-        check_list_space(camera, medium.volume.bounds)
+        check_list_space(camera, medium.grid.bounds)
         self.runtime, self.size, self.slices = runtime, size, slices
+        self.window = window or Rectangle(0, size[0], 0, size[1])
         rays = medium.forms(camera, size)
         self.planes, self.depth_origin = rays.planes, rays.rays.reference_depth
         self.of_medium, self.of_rays = {**medium.defines, **rays.defines}, rays.defines
         # Differences stay below 1e18, whose square float32 still holds
         self.finest = np.float32(max(min(options.tolerance, 1e18) ** 2, _INDISTINGUISHABLE))
-        voxel = min(medium.volume.spacing)
+        voxel = min(medium.grid.spacing)
         self.weights = (np.float32(voxel), np.float32(options.hidden_weight))
         items, capacity = slices.items, slices.capacity
         with ExitStack() as stack:
@@ -78,9 +81,12 @@ class Records:
 
     def launch(self, step: Step, part: Slice, *arguments: Any) -> None:
         """Launch a step for the rays of a slice."""
-        step.launch(self.runtime, block_items(self.size[0], part.rows), *arguments)
+        columns = self.window.x1 - self.window.x0
+        step.launch(self.runtime, block_items(columns, part.rows), *arguments)
 
     def place(self, part: Slice) -> tuple[np.int32, ...]:
         """Return the arguments ``width`` to ``rows`` of the kernels that take a slice's rays."""
-        width, height = self.size
-        return tuple(np.int32(n) for n in (width, height, part.first_row, part.rows))
+        window = self.window
+        columns, first_row = window.x1 - window.x0, window.y0 + part.first_row
+        place = (*self.size, window.x0, columns, first_row, part.rows)
+        return tuple(np.int32(n) for n in place)

@@ -36,6 +36,15 @@ class Slice(NamedTuple):
 class Slices:
     """The slices of a window, and the buffers that one of them takes.
 
+    Parameters
+    ----------
+    size : (int, int)
+        Lists along the window's width and height.
+    options : GenerationOptions
+        The budget, the criterion and the memory limit.
+    more : int
+        Most runs that are recorded of a ray between two looks at the length of its record.
+
     Attributes
     ----------
     kept : int
@@ -50,14 +59,16 @@ class Slices:
         On the device, of records, lists and all else but the volume.
     """
 
-    def __init__(self, size: tuple[int, int], options: GenerationOptions) -> None:
+    def __init__(
+        self, size: tuple[int, int], options: GenerationOptions, more: int = CHUNK_STEPS
+    ) -> None:
         limit = options.max_supersegments
         # Twice the budget: the records' thresholds then stay well below the final merges' errors
         self.kept = max(2 * limit, limit + 12)
-        self.capacity = self.kept + CHUNK_STEPS
+        self.capacity = self.kept + more
         if options.criterion != "least-error":
             self.kept = max(self.kept, _UNMERGED_RUNS)
-            self.capacity = self.kept + CHUNK_STEPS + limit  # the kernel cuts into what is free
+            self.capacity = self.kept + more + limit  # the kernel cuts into what is free
         self.capacity = -(-self.capacity // ERRORS_AT_A_TIME) * ERRORS_AT_A_TIME
         width, self._height = size
         most = _SLICE_BYTES

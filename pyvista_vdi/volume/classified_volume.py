@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.float32_limits import MOST_STEPS, compensation, entries, held_unit_distance
+from pyvista_vdi.model.grid import Geometry
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import Planes
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -31,6 +32,7 @@ from pyvista_vdi.volume.bricks import (
     least_brick_bytes,
     too_small,
 )
+from pyvista_vdi.volume.grid_part import GridPart
 from pyvista_vdi.volume.light_tables import gradient_table, lighting_table, shading_defines
 from pyvista_vdi.volume.occlusion_grid import ambient_transmittances
 from pyvista_vdi.volume.upload import (
@@ -104,6 +106,9 @@ class DeviceVolume:
     by_scalar : bool
         Look up the medium of each scalar where that can be done; otherwise the table stays the
         transfer function.
+    part : GridPart, optional
+        Where the volume's points lie in a grid of which they are a part: marches then go along the
+        whole grid's rays, and take the steps that belong to the part.
     room : Room, optional
         Memory that there is; a volume for which it is too little is held brick by brick. Without
         it a volume is held in one piece or refused.
@@ -112,6 +117,10 @@ class DeviceVolume:
 
     Attributes
     ----------
+    volume : Volume
+        The scalars.
+    grid : Volume or Grid
+        What rays are marched through: the volume, or the grid that it is a part of.
     bricks : DeviceBricks or None
         What is on the device, where that is not the whole volume: steps must be sampled by a
         :class:`~pyvista_vdi.volume.bricks.StepSampler` before kernels march along them.
@@ -135,6 +144,7 @@ class DeviceVolume:
         *,
         skip_empty: bool = True,
         by_scalar: bool = True,
+        part: GridPart | None = None,
         room: Room | None = None,
         **changes: Any,
     ) -> None:
@@ -146,9 +156,10 @@ class DeviceVolume:
                 f"expected a TransferFunction, got {type(transfer_function).__name__}"
             )
         self.volume = volume
-        self.sample_distance = checked_sample_distance(volume, options.sample_distance)
+        self.grid: Geometry = volume if part is None else part.grid
+        self.sample_distance = checked_sample_distance(self.grid, options.sample_distance)
         self.unit_distance = held_unit_distance(
-            transfer_function.unit_distance or volume.default_unit_distance, self.sample_distance
+            transfer_function.unit_distance or self.grid.default_unit_distance, self.sample_distance
         )
         low, high = transfer_function.scalar_range
         native = reads_natively(runtime, volume, transfer_function, room)
@@ -182,7 +193,9 @@ class DeviceVolume:
         self._gradient: tuple[DeviceBuffer, ...] = ()
         shading = shading_defines(transfer_function, self._lights)
         if transfer_function.gradient_opacities is not None:
-            gradient = gradient_table(volume, transfer_function, scale.unit if scale else 1.0)
+            scalars = volume.finite_range() if part is None else part.scalar_range
+            per_difference = scale.unit if scale else 1.0
+            gradient = gradient_table(volume.spacing, scalars, transfer_function, per_difference)
             self._gradient = (runtime.upload(gradient, "gradient opacity"),)
         self._occlusion: tuple[Any, ...] = ()
         if options.ambient_occlusion is not None:
@@ -198,7 +211,11 @@ class DeviceVolume:
             )
             shading["OCCLUSION"] = 1
         self.defines.update(shading)
-        self.defines.update(compensation(volume.length / self.sample_distance))
+        self.defines.update(compensation(self.grid.length / self.sample_distance))
+        self._part: tuple[Any, ...] = ()
+        if part is not None:
+            self._part = part.arguments
+            self.defines["GRID_PART"] = 1
         # Last: nothing that fails then keeps them for as long as somebody looks at the error
         self.bricks: DeviceBricks | None = None
         if room is not None and not whole:
@@ -234,7 +251,7 @@ class DeviceVolume:
     @property
     def most_steps(self) -> int:
         """Steps of the longest ray."""
-        return math.ceil(self.volume.length / self.sample_distance) + 1
+        return math.ceil(self.grid.length / self.sample_distance) + 1
 
     def medium_arguments(self, camera: Camera) -> tuple[Any, ...]:
         """Arguments ``voxels`` to ``forms``, without it, of the kernels that march.
@@ -243,6 +260,7 @@ class DeviceVolume:
         """
         return (
             *self._classified(self._distances),
+            *self._part,
             *self._lighting(camera),
             *self._gradient,
             *self._occlusion,
@@ -334,7 +352,7 @@ class DeviceVolume:
         if self._shading is None:
             return ()
         if self._lit is None or self._lit[0] != camera:
-            table = lighting_table(self.volume, camera, self._shading, self._lights)
+            table = lighting_table(self.grid, camera, self._shading, self._lights)
             self._lit = (camera, self.runtime.upload(table, "lights"))
         return (self._lit[1],)
 
@@ -392,23 +410,44 @@ class DeviceVolume:
         self, camera: Camera, window_size: Sequence[int], clipping_planes: Planes = ()
     ) -> MarchForms:
         """Return what the kernels march along in a view."""
-        pixel_rays = rays.pixel_rays(camera, window_size, self.volume.bounds)
-        to_index = rays.inverse_affine(self.volume.index_to_model)
-        index = [pixel_rays.form(row[:3], row[3]) for row in to_index[:3]]
-        direction = [pixel_rays.form(axis) for axis in np.eye(3)]
-        planes = []
-        for form, points in zip(index, self.volume.dimensions, strict=True):
-            far = -form
-            far[0] += points - 1
-            planes += [form, far]
-        planes += rays.eye_plane(camera, pixel_rays)
-        planes += rays.user_planes(camera, pixel_rays, clipping_planes)
-        reach = rays.largest_value(camera, window_size, self.volume.bounds, index)
-        defines = entries(reach, max(self.volume.dimensions))
-        return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), defines)
+        return march_forms(self.grid, camera, window_size, clipping_planes)
 
 
-def checked_sample_distance(volume: Volume, sample_distance: float | None) -> float:
+@dataclass(frozen=True)
+class GridRays:
+    """The rays of a classified volume whose values are elsewhere, as of a :class:`DeviceVolume`."""
+
+    grid: Geometry
+    sample_distance: float
+    unit_distance: float
+    defines: dict[str, str | int | None] = field(default_factory=dict)
+
+    def forms(self, camera: Camera, window_size: Sequence[int]) -> MarchForms:
+        """Return what the kernels march along in a view."""
+        return march_forms(self.grid, camera, window_size)
+
+
+def march_forms(
+    grid: Geometry, camera: Camera, window_size: Sequence[int], clipping_planes: Planes = ()
+) -> MarchForms:
+    """Return what the kernels march along in a view of a grid."""
+    pixel_rays = rays.pixel_rays(camera, window_size, grid.bounds)
+    to_index = rays.inverse_affine(grid.index_to_model)
+    index = [pixel_rays.form(row[:3], row[3]) for row in to_index[:3]]
+    direction = [pixel_rays.form(axis) for axis in np.eye(3)]
+    planes = []
+    for form, points in zip(index, grid.dimensions, strict=True):
+        far = -form
+        far[0] += points - 1
+        planes += [form, far]
+    planes += rays.eye_plane(camera, pixel_rays)
+    planes += rays.user_planes(camera, pixel_rays, clipping_planes)
+    reach = rays.largest_value(camera, window_size, grid.bounds, index)
+    defines = entries(reach, max(grid.dimensions))
+    return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), defines)
+
+
+def checked_sample_distance(volume: Geometry, sample_distance: float | None) -> float:
     """Return the length of a step in model units; half the smallest spacing by default."""
     least = volume.length / MOST_STEPS
     if sample_distance is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,9 @@ from numpy.typing import NDArray
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import LARGEST_POWER
+from pyvista_vdi.model.grid import Geometry
 from pyvista_vdi.model.lighting import Light, Lights, Shading
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.volume import Volume
 
 #: Share of the scalar range beyond which VTK tells no gradient magnitudes apart.
 GRADIENT_SHARE = 0.25
@@ -37,7 +38,7 @@ def shading_defines(transfer_function: TransferFunction, lights: Lights) -> dict
 
 
 def lighting_table(
-    volume: Volume, camera: Camera, shading: Shading, lights: Lights
+    grid: Geometry, camera: Camera, shading: Shading, lights: Lights
 ) -> NDArray[np.float32]:
     """Return the material and the lights of a view.
 
@@ -49,7 +50,7 @@ def lighting_table(
         to_frame[:3, 3] = -rays.inverse_affine(camera.model_to_view)[:3, 3]
     else:
         to_frame = camera.model_to_view
-    index_to_frame = to_frame @ volume.index_to_model
+    index_to_frame = to_frame @ grid.index_to_model
     # Of normals only the direction matters: scaled to what float32 holds, whatever the spacing
     normal = rays.inverse_affine(index_to_frame)[:3, :3].T
     normal = normal / np.abs(normal).max()
@@ -84,7 +85,10 @@ def _light(light: Light, camera: Camera) -> list[float]:
 
 
 def gradient_table(
-    volume: Volume, transfer_function: TransferFunction, per_difference: float
+    spacing: Sequence[float],
+    scalar_range: tuple[float, float],
+    transfer_function: TransferFunction,
+    per_difference: float,
 ) -> NDArray[np.float32]:
     """Return the gradient opacities, and how differences on the device lead to their places.
 
@@ -95,9 +99,8 @@ def gradient_table(
     table = transfer_function.gradient_opacities
     low, high = transfer_function.gradient_range
     per_magnitude = (len(table) - 1) / (high - low)
-    smallest, largest = volume.finite_range()
-    spacing = np.asarray(volume.spacing)
-    to_table = spacing.mean() / (2 * spacing) * per_difference * per_magnitude
+    smallest, largest = scalar_range
+    to_table = np.mean(spacing) / (2 * np.asarray(spacing)) * per_difference * per_magnitude
     last = GRADIENT_SHARE * (largest - smallest) * per_magnitude
     with np.errstate(over="ignore"):
         return np.array(

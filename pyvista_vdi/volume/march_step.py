@@ -18,6 +18,7 @@ _IN_BLOCKS: Mapping[str, Define] = {
     "MACROCELL_SHIFT": None,
     "COMPENSATED": 1,
     "CROPPED": None,
+    "GRID_PART": None,
     "OPACITY_MULTIPLIER": None,
     "SHADED": None,
     "HEADLIGHT": None,

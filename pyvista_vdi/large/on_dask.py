@@ -1,0 +1,366 @@
+"""A chunked volume to a VDI on the workers of a Dask cluster.
+
+The client submits tasks and sums up the light; values, lists and rows stay with the workers and go
+from one to the other. Every task is a function of its arguments, so that Dask does again what was
+lost with a worker. Which worker did what, and what came first, changes no bit.
+"""
+
+from __future__ import annotations
+
+import threading
+import uuid
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from distributed import Client, Future, KilledWorker, as_completed, get_worker
+from numpy.typing import NDArray
+
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.device.work_order import Rectangle
+from pyvista_vdi.errors import (
+    Cancelled,
+    DeviceError,
+    DeviceMemoryError,
+    InvalidVolumeError,
+    NoDeviceError,
+    VDIFileError,
+    VDIWarning,
+)
+from pyvista_vdi.generation.generate import Progress, report
+from pyvista_vdi.large.blocks import Indices, Offset, Values
+from pyvista_vdi.large.generate import NOWHERE, keep_ranges, known_ranges, task_of, vdi_of
+from pyvista_vdi.large.passes import Piece, Rows, Seen, Task, light_entering
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+
+#: Share of the workers' memory that values may take which are kept from the first pass to the
+#: second; otherwise they are read again.
+_SHARE_FOR_VALUES = 0.25
+#: Errors that keep their type where they say which block they are of.
+_OURS = (DeviceMemoryError, InvalidVolumeError, NoDeviceError, VDIFileError)
+#: Times that Dask tries again what a lost worker was at.
+_RETRIES = 3
+#: Rows of lists are shared out in multiples of this.
+_ROWS = 4
+#: Ranges of rows for each worker, so that one with more to do does not keep all others waiting.
+_RANGES_PER_WORKER = 4
+#: Shares of the two passes and of the merging in what is reported.
+_SHARES = (0.4, 0.4, 0.2)
+#: A worker's threads do one block after the other: a block's memory is needed once.
+_one_block = threading.Lock()
+
+
+def generate_on_dask(
+    volume: Volume,
+    camera: Camera,
+    window_size: Sequence[int],
+    transfer_function: TransferFunction,
+    options: GenerationOptions | None = None,
+    *,
+    client: Client,
+    device: Any = None,
+    progress: Progress | None = None,
+    metadata: Mapping[str, Any] | None = None,
+    chunks: Sequence[int] | None = None,
+    block_bytes: int | None = None,
+    **changes: Any,
+) -> VDI:
+    """Make a VDI of a chunked volume on the workers of a cluster.
+
+    Parameters are those of :func:`~pyvista_vdi.large.generate.generate_chunked`, and:
+
+    client : distributed.Client
+        Of the cluster. ``device`` is a selector that each worker understands.
+
+    Raises
+    ------
+    NoDeviceError
+        If no worker has an OpenCL device.
+    DeviceError
+        If a block could not be made; the message names it.
+    Cancelled
+        If ``progress`` returned ``False``.
+
+    Warns
+    -----
+    VDIWarning
+        If some workers have no device: they do nothing.
+    """
+    options = GenerationOptions.of(options, changes)
+    workers = _workers_with_device(client, device)
+    chunks = volume.array.chunks if chunks is None else chunks  # type: ignore[attr-defined]
+    task = task_of(volume, camera, window_size, transfer_function, options, chunks, block_bytes)
+    run = _Run(client, task, volume, list(workers), device, progress)
+    try:
+        rows = run.rows()
+    except BaseException:
+        run.cancel()
+        raise
+    names = sorted(set(workers.values()))
+    return vdi_of(task, volume, rows, ", ".join(names), metadata)
+
+
+class _Run:
+    """One generation: its futures, and what is known of it."""
+
+    def __init__(
+        self,
+        client: Client,
+        task: Task,
+        volume: Volume,
+        workers: list[str],
+        device: Any,
+        progress: Progress | None,
+    ) -> None:
+        self._client, self._task, self._volume = client, task, volume
+        self._workers, self._device, self._progress = workers, device, progress
+        self._token = uuid.uuid4().hex[:12]
+        self._futures: list[Future[Any]] = []
+        known = client.scheduler_info(n_workers=-1)["workers"]
+        memory = sum(known[at]["memory_limit"] or np.inf for at in workers)
+        self._kept = volume.array.nbytes <= _SHARE_FOR_VALUES * memory
+        self._done = 0.0
+
+    def rows(self) -> list[Rows]:
+        """Return the finished lists, from the lowest rows to the highest."""
+        task, blocks, halo = self._task, self._task.blocks, self._task.halo
+        report(self._progress, 0.0)
+        windows = blocks.windows(task.camera, task.size)
+        known = known_ranges(self._volume)
+        order = task.to_read(windows, known)
+        values = {block: self._values(block) for block in order}
+        first = {
+            block: self._submit(
+                "first-pass", block, _first_pass, values[block], windows.get(block, NOWHERE)
+            )
+            for block in order
+        }
+        seen = self._gathered("seen", first, _without_slabs, _SHARES[0])
+        if known is None and len(seen) == len(blocks):
+            keep_ranges(self._volume, task, seen)
+        pieces = {}
+        for block, light in light_entering(task, windows, seen).items():
+            neighbours = blocks.neighbours(block, halo)
+            pieces[block] = self._submit(
+                "second-pass",
+                block,
+                _second_pass,
+                values[block],
+                windows[block],
+                light,
+                {offset: first[other] for offset, other in neighbours.items()},
+            )
+        del values, seen
+        lengths = self._gathered("lengths", pieces, _lengths, _SHARES[1])
+        first.clear()
+        return self._merged(windows, pieces, lengths)
+
+    def cancel(self) -> None:
+        """Give up what has not been done."""
+        self._client.cancel(self._futures, force=True)
+
+    def _values(self, block: Indices) -> Any:
+        """Return a block's points, as a future where they are kept, or what reads them."""
+        array, box = self._volume.array, self._task.blocks.own(block)
+        lazy = getattr(array, "lazy", None)
+        if lazy is not None:
+            return self._client.compute(lazy[box], workers=self._workers)
+        read = _Read(array, box)
+        if not self._kept:
+            return read
+        key = (f"read-{self._token}", *block)
+        return self._client.submit(read, key=key, workers=self._workers, retries=_RETRIES)
+
+    def _submit(
+        self, name: str, at: tuple[int, ...], function: Callable[..., Any], *arguments: Any
+    ) -> Future[Any]:
+        future = self._client.submit(
+            function,
+            self._task,
+            at,
+            *arguments,
+            self._device,
+            key=(f"{name}-{self._token}", *at),
+            workers=self._workers,
+            retries=_RETRIES,
+            pure=False,
+        )
+        self._futures.append(future)
+        return future
+
+    def _gathered(
+        self,
+        name: str,
+        futures: Mapping[Indices, Future[Any]],
+        function: Callable[[Any], Any],
+        share: float,
+    ) -> dict[Indices, Any]:
+        """Return what a function makes of each block's result, as they come."""
+        parts = {
+            self._client.submit(
+                function, future, key=(f"{name}-{self._token}", *block), retries=_RETRIES
+            ): block
+            for block, future in futures.items()
+        }
+        self._futures += parts
+        found = {}
+        for future in as_completed(parts):
+            found[parts[future]] = self._result(future, parts[future])
+            self._report(share / len(parts))
+        return found
+
+    def _merged(
+        self,
+        windows: Mapping[Indices, Rectangle],
+        pieces: Mapping[Indices, Future[Any]],
+        lengths: Mapping[Indices, NDArray[np.int64]],
+    ) -> list[Rows]:
+        height = self._task.size[1]
+        of_rows = np.zeros(height, np.int64)
+        for block, many in lengths.items():
+            window = windows[block]
+            of_rows[window.y0 : window.y1] += many
+        merged = {}
+        for y0, y1 in balanced(of_rows, _RANGES_PER_WORKER * len(self._workers)):
+            parts = [
+                self._submit("rows", (*block, y0), _rows, pieces[block], y0, y1)
+                for block in pieces
+                if windows[block].y0 < y1 and windows[block].y1 > y0
+            ]
+            merged[self._submit("merge", (y0, y1), _merge, parts)] = y0
+        found: dict[int, Rows] = {}
+        for future in as_completed(merged):
+            found[merged[future]] = self._result(future, (merged[future],))
+            self._report(_SHARES[2] / len(merged))
+        return [found[y0] for y0 in sorted(found)]
+
+    def _result(self, future: Future[Any], at: tuple[int, ...]) -> Any:
+        try:
+            return future.result()
+        except KilledWorker as error:
+            raise DeviceError(
+                f"{_named(self._task, at)} could not be made: the workers that were at it died, "
+                f"{_RETRIES + 1} in all (of too little memory, mostly): give workers more, or a "
+                f"smaller block_bytes; {error}"
+            ) from error
+
+    def _report(self, share: float) -> None:
+        self._done = min(self._done + share, 1.0)
+        report(self._progress, self._done)
+
+
+class _Read:
+    """Points of an array that whoever needs them reads."""
+
+    def __init__(self, array: Any, box: tuple[slice, ...]) -> None:
+        self.array, self.box = array, box
+
+    def __call__(self) -> Values:
+        values: Values = self.array[self.box]
+        return values
+
+
+def balanced(weights: NDArray[np.int64], parts: int) -> Iterator[tuple[int, int]]:
+    """Cut rows into ranges of like weight, each of whole groups of four rows but the last."""
+    groups = -(-len(weights) // _ROWS)
+    sums = np.add.reduceat(weights, np.arange(0, len(weights), _ROWS)).cumsum()
+    wanted = np.arange(1, parts) * (sums[-1] / parts)
+    cuts = np.unique([0, *np.searchsorted(sums, wanted, side="right"), groups])
+    for first, last in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
+        yield first * _ROWS, min(last * _ROWS, len(weights))
+
+
+def _workers_with_device(client: Client, device: Any) -> dict[str, str]:
+    """Return the device of each worker that has one; warn of the others."""
+    answers = client.run(_device_name, device, on_error="return")
+    if not answers:
+        raise NoDeviceError("the cluster has no workers: start some, or wait for them")
+    without = {at: answer for at, answer in answers.items() if not isinstance(answer, str)}
+    names = "; ".join(f"{at}: {answer}" for at, answer in without.items())
+    if len(without) == len(answers):
+        raise NoDeviceError(f"no worker of the cluster has an OpenCL device: {names}")
+    if without:
+        warnings.warn(
+            f"{len(without)} of {len(answers)} workers have no OpenCL device and do nothing: "
+            f"{names}",
+            VDIWarning,
+            stacklevel=4,
+        )
+    return {at: name for at, name in answers.items() if at not in without}
+
+
+def _device_name(device: Any) -> str:
+    return get_runtime(device).info.name
+
+
+# What follows runs on workers
+
+
+def _first_pass(task: Task, block: Indices, values: Any, window: Rectangle, device: Any) -> Seen:
+    with _at(task, block):
+        return task.first_pass(block, _at_hand(values), window, device)
+
+
+def _second_pass(
+    task: Task,
+    block: Indices,
+    values: Any,
+    window: Rectangle,
+    light: NDArray[np.float16],
+    neighbours: Mapping[Offset, Seen],
+    device: Any,
+) -> Piece:
+    with _at(task, block):
+        halo = task.halo
+        parts = {at: halo.from_slabs(seen.slabs, at) for at, seen in neighbours.items()}
+        whole = task.blocks.with_halo(_at_hand(values), parts, halo)
+        return task.second_pass(block, whole, window, light, device)
+
+
+def _rows(task: Task, at: tuple[int, ...], piece: Piece, y0: int, y1: int, device: Any) -> Piece:
+    part = piece.rows(y0, y1)
+    return part._replace(runs=part.runs.copy())
+
+
+def _merge(task: Task, at: tuple[int, int], pieces: Sequence[Piece], device: Any) -> Rows:
+    with _at(task, at):
+        return task.merge(*at, pieces, device)
+
+
+def _without_slabs(seen: Seen) -> Seen:
+    return seen._replace(slabs={})
+
+
+def _lengths(piece: Piece) -> NDArray[np.int64]:
+    return piece.counts.sum(axis=1, dtype=np.int64)
+
+
+def _at_hand(values: Any) -> Values:
+    found: Values = values() if isinstance(values, _Read) else values
+    return found
+
+
+@contextmanager
+def _at(task: Task, at: tuple[int, ...]) -> Iterator[None]:
+    """Do one thing at a time in a process, and say what failed where."""
+    try:
+        with _one_block:
+            yield
+    except (Cancelled, MemoryError):
+        raise
+    except Exception as error:
+        kind = type(error) if isinstance(error, _OURS) else DeviceError
+        raise kind(f"{_named(task, at)} on worker {get_worker().address}: {error}") from error
+
+
+def _named(task: Task, at: tuple[int, ...]) -> str:
+    if len(at) < 3:
+        return f"rows {at[0]} and following of the VDI"
+    box = ", ".join(f"{part.start}:{part.stop}" for part in task.blocks.own((at[0], at[1], at[2])))
+    return f"block {at[:3]} (points [{box}] of the volume)"

@@ -1,0 +1,45 @@
+"""A part of a grid whose points alone are on a device: ``-D GRID_PART`` of ``volume/march.cl``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pyvista_vdi.model.grid import Grid
+
+Ends = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class GridPart:
+    """Where points that are at hand lie in their grid, and which of its cells belong to them.
+
+    Attributes
+    ----------
+    grid : Grid
+        The whole grid.
+    first : (int, int, int)
+        Index x, y, z of the first point at hand.
+    lower, upper : (float, float, float)
+        Index positions between which the part's own cells lie, the upper ones excluded; infinite
+        at the ends of the grid, where rounding may put a midpoint outside.
+    scalar_range : (float, float)
+        Of the whole grid's values.
+    """
+
+    grid: Grid
+    first: tuple[int, int, int]
+    lower: Ends
+    upper: Ends
+    scalar_range: tuple[float, float]
+
+    @property
+    def arguments(self) -> tuple[Any, ...]:
+        """Arguments ``part_first`` to ``part_upper`` of the kernels that march."""
+        return (
+            np.array([*self.first, 0], np.int32),
+            np.array([*self.lower, 0], np.float32),
+            np.array([*self.upper, 0], np.float32),
+        )
