@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import BLENDINGS, DEFAULTS, IN_PLACE, Classification
 from pyvista_vdi.model.inputs import as_vdi, as_volume
@@ -70,6 +70,7 @@ def generate(
     lights: Any = None,
     ambient_occlusion: Any = None,
     memory_limit: int | float | str | None = None,
+    client: Any = None,
     device: Any = None,
     progress: Callable[[float], object] | None = None,
     **classification: Any,
@@ -131,6 +132,10 @@ def generate(
         Most bytes to take on the device, or a text such as ``"2 GiB"``; by default what the device
         has. A volume that does not fit goes there brick by brick: that takes more time, and the
         VDI is the same to the last bit. See docs/performance.md, "Larger than memory".
+    client : distributed.Client, optional
+        Of a Dask cluster, whose workers make the VDI of a chunked volume (a :class:`Volume` of a
+        Dask, zarr or h5py array, or of :func:`open_volume`). Without it such a volume is made
+        block by block on the local device. See docs/large_volumes.md.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     progress : callable, optional
@@ -191,6 +196,30 @@ def generate(
         memory_limit=memory_limit,  # type: ignore[arg-type]  # a text becomes bytes
     )
     volume = as_volume(volume, looks.scalars, looks.preference)
+    if volume.chunked:
+        from pyvista_vdi.large.entrance import generate_in_blocks
+
+        if dial is not None:
+            raise UnsupportedError(
+                "quality, target_ssim, target_fps and max_bytes measure the scene, and "
+                f"{volume.name!r} is chunked: give max_supersegments, or load a coarse level"
+            )
+        return generate_in_blocks(
+            volume,
+            view,
+            window_size,
+            looks.transfer_function(volume),
+            options,
+            client=client,
+            device=device,
+            progress=progress,
+            metadata={"classification": looks.describe(), "scalars": volume.name},
+        )
+    if client is not None:
+        raise InvalidArgumentError(
+            f"client is for chunked volumes, and {volume.name!r} is in memory: give a Volume of a "
+            "Dask array (dask.array.from_array), or leave client out"
+        )
     from pyvista_vdi.quality.probe import generate_by_dial
 
     vdi = generate_by_dial(

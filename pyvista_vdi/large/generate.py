@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.device.work_order import Rectangle
@@ -16,6 +15,7 @@ from pyvista_vdi.generation.list_arrays import require_room
 from pyvista_vdi.large.blocks import BLOCK_BYTES, Blocks, Indices
 from pyvista_vdi.large.passes import Piece, Rows, Seen, Task, light_entering
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.chunked import Ranges
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
@@ -86,16 +86,24 @@ def vdi_of(
     ).with_precision(task.options.precision)
 
 
-def known_ranges(volume: Volume) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+def chunks_of(volume: Volume, chunks: Sequence[int] | None) -> Sequence[int]:
+    """Return where blocks of a volume may be cut."""
+    if chunks is not None:
+        return chunks
+    if volume.chunks is not None:
+        return volume.chunks.chunks
+    raise InvalidArgumentError(f"the volume {volume.name!r} is not chunked: give chunks")
+
+
+def known_ranges(volume: Volume) -> Ranges | None:
     """Return the least and the largest scalar of each chunk, if they are known."""
-    ranges = getattr(volume.array, "ranges", None)
-    return None if ranges is None else ranges()  # type: ignore[no-any-return]
+    return None if volume.chunks is None else volume.chunks.ranges()
 
 
 def keep_ranges(volume: Volume, task: Task, seen: Mapping[Indices, Seen]) -> None:
     """Keep what the first pass has found beside the store, so that nothing unseen is read again."""
-    if hasattr(volume.array, "keep_ranges"):
-        volume.array.keep_ranges(
+    if volume.chunks is not None:
+        volume.chunks.keep_ranges(
             *task.blocks.to_chunks({block: found.ranges for block, found in seen.items()})
         )
 
@@ -124,10 +132,7 @@ def generate_chunked(
         Most bytes of a block's points, unless a chunk has more.
     """
     options = GenerationOptions.of(options, changes)
-    if chunks is None:
-        chunks = getattr(volume.array, "chunks", None)
-        if chunks is None:
-            raise InvalidArgumentError(f"the volume {volume.name!r} is not chunked: give chunks")
+    chunks = chunks_of(volume, chunks)
     task = task_of(volume, camera, window_size, transfer_function, options, chunks, block_bytes)
     blocks, halo = task.blocks, task.halo
     windows = blocks.windows(task.camera, task.size)

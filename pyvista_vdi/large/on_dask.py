@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from distributed import Client, Future, KilledWorker, as_completed, get_worker
+from distributed import CancelledError, Client, Future, KilledWorker, as_completed, get_worker
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
@@ -26,12 +26,20 @@ from pyvista_vdi.errors import (
     DeviceMemoryError,
     InvalidVolumeError,
     NoDeviceError,
+    VDIError,
     VDIFileError,
     VDIWarning,
 )
 from pyvista_vdi.generation.generate import Progress, report
 from pyvista_vdi.large.blocks import Indices, Offset, Values
-from pyvista_vdi.large.generate import NOWHERE, keep_ranges, known_ranges, task_of, vdi_of
+from pyvista_vdi.large.generate import (
+    NOWHERE,
+    chunks_of,
+    keep_ranges,
+    known_ranges,
+    task_of,
+    vdi_of,
+)
 from pyvista_vdi.large.passes import Piece, Rows, Seen, Task, light_entering
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import GenerationOptions
@@ -64,6 +72,7 @@ def generate_on_dask(
     options: GenerationOptions | None = None,
     *,
     client: Client,
+    workers: Sequence[str] | None = None,
     device: Any = None,
     progress: Progress | None = None,
     metadata: Mapping[str, Any] | None = None,
@@ -77,6 +86,8 @@ def generate_on_dask(
 
     client : distributed.Client
         Of the cluster. ``device`` is a selector that each worker understands.
+    workers : sequence of str, optional
+        Addresses of those that may be taken; all by default.
 
     Raises
     ------
@@ -93,16 +104,16 @@ def generate_on_dask(
         If some workers have no device: they do nothing.
     """
     options = GenerationOptions.of(options, changes)
-    workers = _workers_with_device(client, device)
-    chunks = volume.array.chunks if chunks is None else chunks  # type: ignore[attr-defined]
+    able = _workers_with_device(client, device, workers)
+    chunks = chunks_of(volume, chunks)
     task = task_of(volume, camera, window_size, transfer_function, options, chunks, block_bytes)
-    run = _Run(client, task, volume, list(workers), device, progress)
+    run = _Run(client, task, volume, list(able), device, progress)
     try:
         rows = run.rows()
     except BaseException:
         run.cancel()
         raise
-    names = sorted(set(workers.values()))
+    names = sorted(set(able.values()))
     return vdi_of(task, volume, rows, ", ".join(names), metadata)
 
 
@@ -123,6 +134,10 @@ class _Run:
         self._token = uuid.uuid4().hex[:12]
         self._futures: list[Future[Any]] = []
         known = client.scheduler_info(n_workers=-1)["workers"]
+        # A worker that is started again has another address: tasks are tied to some only where
+        # others cannot do them, and even then go elsewhere, to fail, when all of these are gone
+        some = {"workers": workers, "allow_other_workers": True}
+        self._where: dict[str, Any] = some if len(workers) < len(known) else {}
         memory = sum(known[at]["memory_limit"] or np.inf for at in workers)
         self._kept = volume.array.nbytes <= _SHARE_FOR_VALUES * memory
         self._done = 0.0
@@ -167,15 +182,16 @@ class _Run:
 
     def _values(self, block: Indices) -> Any:
         """Return a block's points, as a future where they are kept, or what reads them."""
-        array, box = self._volume.array, self._task.blocks.own(block)
-        lazy = getattr(array, "lazy", None)
-        if lazy is not None:
-            return self._client.compute(lazy[box], workers=self._workers)
+        array, box = self._volume.chunks, self._task.blocks.own(block)
+        if array is None:
+            return self._volume.array[box].copy()  # goes with the task
+        if array.lazy is not None:
+            return self._client.compute(array.lazy[box], **self._where)
         read = _Read(array, box)
         if not self._kept:
             return read
         key = (f"read-{self._token}", *block)
-        return self._client.submit(read, key=key, workers=self._workers, retries=_RETRIES)
+        return self._client.submit(read, key=key, retries=_RETRIES, **self._where)
 
     def _submit(
         self, name: str, at: tuple[int, ...], function: Callable[..., Any], *arguments: Any
@@ -187,9 +203,9 @@ class _Run:
             *arguments,
             self._device,
             key=(f"{name}-{self._token}", *at),
-            workers=self._workers,
             retries=_RETRIES,
             pure=False,
+            **self._where,
         )
         self._futures.append(future)
         return future
@@ -249,6 +265,12 @@ class _Run:
                 f"{_RETRIES + 1} in all (of too little memory, mostly): give workers more, or a "
                 f"smaller block_bytes; {error}"
             ) from error
+        except (VDIError, CancelledError):
+            raise
+        except Exception as error:  # of whoever reads: it does not know what for
+            raise DeviceError(
+                f"{_named(self._task, at)} could not be made: {type(error).__name__}: {error}"
+            ) from error
 
     def _report(self, share: float) -> None:
         self._done = min(self._done + share, 1.0)
@@ -276,9 +298,13 @@ def balanced(weights: NDArray[np.int64], parts: int) -> Iterator[tuple[int, int]
         yield first * _ROWS, min(last * _ROWS, len(weights))
 
 
-def _workers_with_device(client: Client, device: Any) -> dict[str, str]:
+def _workers_with_device(
+    client: Client, device: Any, workers: Sequence[str] | None
+) -> dict[str, str]:
     """Return the device of each worker that has one; warn of the others."""
-    answers = client.run(_device_name, device, on_error="return")
+    answers = client.run(
+        _device_name, device, workers=None if workers is None else list(workers), on_error="return"
+    )
     if not answers:
         raise NoDeviceError("the cluster has no workers: start some, or wait for them")
     without = {at: answer for at, answer in answers.items() if not isinstance(answer, str)}

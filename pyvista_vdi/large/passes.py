@@ -26,6 +26,7 @@ from pyvista_vdi.generation.records import Records
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
 from pyvista_vdi.large.blocks import Blocks, Halo, Indices, Values
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.chunked import Ranges
 from pyvista_vdi.model.float32_limits import held_unit_distance
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -63,7 +64,7 @@ class Seen(NamedTuple):
     depths: NDArray[np.float16] | None
     slabs: dict[tuple[int, int], Values]
     ends: dict[tuple[int, int] | None, Ends]
-    ranges: tuple[NDArray[np.float64], NDArray[np.float64]]
+    ranges: Ranges
 
 
 class Piece(NamedTuple):
@@ -232,7 +233,7 @@ class Task:
     def to_read(
         self,
         windows: Mapping[Indices, Rectangle],
-        ranges: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
+        ranges: Ranges | None,
     ) -> list[Indices]:
         """Return the blocks that the first pass must read, in the order in which V_O sees them.
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError
 from pyvista_vdi.model.checks import as_floats
+from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
 from pyvista_vdi.model.grid import Geometry
 
 #: Voxel types that the kernels read as they are.
@@ -35,7 +38,8 @@ class Volume(Geometry):
     Parameters
     ----------
     array : array_like, shape (nz, ny, nx) or (nz, ny, nx, 4)
-        The scalars: uint8, int8, uint16, int16, uint32, int32, float32 or float64 (bool and
+        Dask, zarr and h5py arrays are read chunk by chunk, where a part is needed. The scalars:
+        uint8, int8, uint16, int16, uint32, int32, float32 or float64 (bool and
         float16 are widened; 64-bit integers become float64 when that is exact). Or straight RGBA,
         uint8, whose fourth component is the scalar. At least two points along each axis.
     spacing : array_like of float, shape (3,)
@@ -54,7 +58,7 @@ class Volume(Geometry):
         the grid is not finite, positive and invertible.
     """
 
-    array: NDArray[np.generic]
+    array: NDArray[Any]
     name: str
 
     def __init__(
@@ -66,7 +70,7 @@ class Volume(Geometry):
         *,
         name: str = "values",
     ) -> None:
-        self.array = _checked_array(array)
+        self.array = _chunked(array) if is_chunked(array) else _checked_array(array)
         self.spacing = _checked_vector("spacing", spacing)
         self.origin = _checked_vector("origin", origin)
         self.direction = _checked_direction(direction)
@@ -89,6 +93,22 @@ class Volume(Geometry):
         return self.array.ndim == 4
 
     @property
+    def chunks(self) -> ChunkedArray | None:
+        """What reads the voxels chunk by chunk; ``None`` where they are in memory."""
+        array: Any = self.array
+        return array if isinstance(array, ChunkedArray) else None
+
+    @property
+    def chunked(self) -> bool:
+        """Whether the voxels are read chunk by chunk: VDIs are then made block by block."""
+        return self.chunks is not None
+
+    def load(self) -> Volume:
+        """Return the volume with all its voxels in memory."""
+        array = self.array[:, :, :] if self.chunked else self.array
+        return Volume(array, self.spacing, self.origin, self.direction, name=self.name)
+
+    @property
     def scalars(self) -> NDArray[np.generic]:
         """What opacity depends on, (nz, ny, nx)."""
         return self.array[..., 3] if self.rgba else self.array
@@ -101,10 +121,14 @@ class Volume(Geometry):
         InvalidVolumeError
             If every value is NaN.
         """
-        if self.array.dtype.kind != "f":
+        if self.chunks is not None:
+            lows, highs = self.chunks.found_ranges()
+            low, high = float(np.fmin.reduce(lows, None)), float(np.fmax.reduce(highs, None))
+        elif self.array.dtype.kind != "f":
             return float(self.scalars.min()), float(self.scalars.max())
-        low = float(np.fmin.reduce(self.array, axis=None))
-        high = float(np.fmax.reduce(self.array, axis=None))
+        else:
+            low = float(np.fmin.reduce(self.array, axis=None))
+            high = float(np.fmax.reduce(self.array, axis=None))
         if np.isnan(low):
             raise InvalidVolumeError(
                 f"every value of {self.name!r} is NaN: there is nothing to render"
@@ -115,6 +139,34 @@ class Volume(Geometry):
         nx, ny, nz = self.dimensions
         kind = "RGBA" if self.rgba else self.array.dtype
         return f"Volume({nx} x {ny} x {nz} {kind}, spacing={self.spacing})"
+
+
+def _chunked(array: Any) -> Any:
+    """Return an array that is read chunk by chunk, which has been read nowhere yet."""
+    if isinstance(array, ChunkedArray):
+        return array
+    kind = np.dtype(array.dtype).newbyteorder("=").name
+    if kind in ("int64", "uint64"):
+        found = ChunkedArray(array, checked=_from_long_integers, dtype=np.float64)
+    else:
+        kind = _WIDENED.get(kind, kind)
+        if kind not in VOXEL_TYPES:
+            raise InvalidVolumeError(_unsupported(array.dtype))
+        found = ChunkedArray(array, dtype=kind)
+    _check_planes(found.shape)
+    return found
+
+
+def _check_planes(shape: tuple[int, ...]) -> None:
+    if min(shape[:3]) < 2:
+        raise InvalidVolumeError(
+            f"the volume has only one plane of points: its shape is {shape[:3]} (z, y, x), "
+            "and a volume needs at least two points along each axis"
+        )
+
+
+def _unsupported(dtype: Any) -> str:
+    return f"voxels of type {dtype} are not supported: convert to one of {', '.join(VOXEL_TYPES)}"
 
 
 def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
@@ -134,20 +186,13 @@ def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
         )
     if array.size == 0:
         raise InvalidVolumeError(f"the volume is empty: its shape is {array.shape}")
-    if min(array.shape[:3]) < 2:
-        raise InvalidVolumeError(
-            f"the volume has only one plane of points: its shape is {array.shape[:3]} (z, y, x), "
-            "and a volume needs at least two points along each axis"
-        )
+    _check_planes(array.shape)
     kind = array.dtype.newbyteorder("=").name
     if kind in ("int64", "uint64"):
         return _from_long_integers(array)
     kind = _WIDENED.get(kind, kind)
     if kind not in VOXEL_TYPES:
-        raise InvalidVolumeError(
-            f"voxels of type {array.dtype} are not supported: convert to one of "
-            f"{', '.join(VOXEL_TYPES)}"
-        )
+        raise InvalidVolumeError(_unsupported(array.dtype))
     return np.ascontiguousarray(array, dtype=kind)
 
 

@@ -192,9 +192,10 @@ def blending_name(mode: Any) -> str:
     return str(_BLENDING_NAMES.get(name, name))
 
 
-def _scalar_range(scalars: NDArray[Any], clim: float | ArrayLike | None) -> tuple[float, float]:
+def _scalar_range(scalars: Any, clim: float | ArrayLike | None) -> tuple[float, float]:
     if clim is None:
-        values = np.asarray(scalars)
+        # Of what is read chunk by chunk the ends are known, or found so
+        values = np.asarray(scalars.found_ranges() if hasattr(scalars, "found_ranges") else scalars)
         if values.dtype.kind == "f" and np.isnan(values).all():
             raise InvalidVolumeError("every value is NaN: there is nothing to render")
         low, high = float(np.nanmin(values)), float(np.nanmax(values))

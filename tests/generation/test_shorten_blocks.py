@@ -53,7 +53,8 @@ def shortened(runtime, lanes, records, limit, exactly, *, hidden_weight=0.25, re
         runtime.write(lengths, counts)
         runtime.launch(
             function, items // lanes, GROUP // lanes,
-            *(np.int32(n) for n in (limit, exactly, width, height, 0, width, FIRST_ROW, ROWS)), rays,
+            *(np.int32(n) for n in (limit, exactly, width, height, 0, width, FIRST_ROW, ROWS)),
+            rays,
             np.int32(capacity), np.float32(reference), np.float32(hidden_weight), of_items,
             all_records, errors, lengths,
         )  # fmt: skip

@@ -1,0 +1,231 @@
+"""Arrays that are read chunk by chunk: of Dask, zarr and h5py, none of which is imported here.
+
+Whoever gives such an array has its library. Nothing is read until a part is asked for.
+"""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.errors import InvalidVolumeError
+
+#: The least and the largest scalar of each chunk, NaN left out; NaN where there is nothing else.
+Ranges = tuple[NDArray[np.float64], NDArray[np.float64]]
+#: Keeps ranges beside a store, and gives them back: ``load() -> Ranges | None``, ``save(ranges)``.
+Keeper = Any
+#: Chunks of arrays that have none.
+_CHUNK_POINTS = 64
+
+
+class ChunkedArray:
+    """A three-dimensional array in chunks, of which parts are read as NumPy arrays.
+
+    Parameters
+    ----------
+    source : dask.array.Array or zarr.Array or h5py.Dataset
+        Whatever has ``shape``, ``dtype``, ``chunks`` and is indexed by slices.
+    index : sequence of int or slice, optional
+        What is taken of a source that has more dimensions, time and channel say: a number for each
+        axis that is left out, ``slice(None)`` for z, y and x.
+    name : str, optional
+        What messages call it.
+    checked : callable, optional
+        Turns what was read into what a volume holds: widened, native, C-contiguous.
+    dtype : dtype_like, optional
+        Of that.
+    keeper : optional
+        Keeps the ranges of chunks beside the store.
+
+    Attributes
+    ----------
+    shape, dtype, ndim, size, nbytes
+        As of a NumPy array (z, y, x).
+    chunks : (int, int, int)
+        Points of a chunk along z, y and x; the last ones may have fewer.
+    source : str
+        What messages call it.
+    lazy : dask.array.Array or None
+        The array as Dask has it, if it does.
+    """
+
+    def __init__(
+        self,
+        source: Any,
+        *,
+        index: Sequence[int | slice] | None = None,
+        name: str | None = None,
+        checked: Callable[[NDArray[Any]], NDArray[Any]] | None = None,
+        dtype: Any = None,
+        keeper: Keeper = None,
+    ) -> None:
+        library = type(source).__module__.partition(".")[0]
+        self.lazy = source if library == "dask" else None
+        self._array = source
+        self._index = tuple(index) if index is not None else (slice(None),) * 3
+        if self.lazy is not None and index is not None:
+            self.lazy = self._array = source[self._index]
+            self._index = (slice(None),) * 3
+        kept = [k for k, at in enumerate(self._index) if isinstance(at, slice)]
+        if len(kept) != 3 or len(self._index) != len(self._array.shape):
+            raise InvalidVolumeError(
+                f"a volume is a three-dimensional array; got shape {tuple(source.shape)}: choose "
+                "time and channel (pyvista_vdi.open_volume does), or index the array"
+            )
+        z, y, x = (int(self._array.shape[k]) for k in kept)
+        self.shape: tuple[int, int, int] = (z, y, x)
+        self.dtype = np.dtype(dtype if dtype is not None else source.dtype)
+        self.chunks = self._chunks(kept)
+        self.source = name or _described(source)
+        self._checked = checked
+        if self.lazy is not None and (checked is not None or self.dtype != source.dtype):
+            self.lazy = self._array = self.lazy.map_blocks(
+                _held, checked, self.dtype, dtype=self.dtype
+            )
+        self._keeper = keeper
+        self._ranges: Ranges | None = None
+
+    def _chunks(self, kept: Sequence[int]) -> tuple[int, int, int]:
+        chunks: Any = getattr(self._array, "chunks", None) or (_CHUNK_POINTS,) * len(self._index)
+        # Dask has the lengths of all chunks along an axis, of which the last may be shorter
+        along = [(chunks[k],) if isinstance(chunks[k], int) else tuple(chunks[k]) for k in kept]
+        lengths = [max(of_axis) for of_axis in along]
+        if any(n != max(of_axis) for of_axis in along for n in of_axis[:-1]):
+            raise InvalidVolumeError(
+                f"the chunks of {_described(self._array)} are of different lengths along an axis: "
+                "rechunk the array (array.rechunk((128, 128, 128)))"
+            )
+        z, y, x = (min(int(length), n) for length, n in zip(lengths, self.shape, strict=True))
+        return z, y, x
+
+    @property
+    def ndim(self) -> int:
+        """3."""
+        return 3
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return math.prod(self.shape)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all points in memory."""
+        return self.size * self.dtype.itemsize
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, box: tuple[slice, ...]) -> NDArray[Any]:
+        """Read a part: three slices of step 1 (z, y, x)."""
+        if (
+            not isinstance(box, tuple)
+            or len(box) != 3
+            or not all(isinstance(part, slice) and part.step in (None, 1) for part in box)
+        ):
+            raise InvalidVolumeError(
+                f"{self.source} is read by three slices of step 1 (z, y, x); got {box!r}: "
+                "load the volume (volume.load()) for anything else"
+            )
+        parts = iter(box)
+        at = tuple(next(parts) if isinstance(k, slice) else k for k in self._index)
+        found = self._array[at]
+        if self.lazy is not None:
+            return np.ascontiguousarray(found.compute())
+        return _held(found, self._checked, self.dtype)
+
+    def __array__(self, *_: Any, **__: Any) -> NDArray[Any]:
+        """Refuse to become one array in memory by accident."""
+        raise InvalidVolumeError(
+            f"{self.source} is read chunk by chunk, and this needs all of its "
+            f"{self.nbytes / 2**30:.3g} GiB in memory: pyvista_vdi.generate makes a VDI of it "
+            "block by block; volume.load() reads it whole"
+        )
+
+    def ranges(self) -> Ranges | None:
+        """Return the least and the largest scalar of each chunk, or None while nobody knows."""
+        if self._ranges is None and self._keeper is not None:
+            self._ranges = self._keeper.load()
+        return self._ranges
+
+    def keep_ranges(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
+        """Keep what was found while the array was read."""
+        self._ranges = (low, high)
+        if self._keeper is not None:
+            self._keeper.save(self._ranges)
+
+    def found_ranges(self) -> Ranges:
+        """Return the ranges, from the chunks themselves where nobody knows them yet."""
+        ranges = self.ranges()
+        if ranges is None:
+            counts = [-(-n // chunk) for n, chunk in zip(self.shape, self.chunks, strict=True)]
+            low, high = np.full(counts, np.nan), np.full(counts, np.nan)
+            for at, box in self._boxes(counts):
+                part = self[box]
+                low[at], high[at] = np.fmin.reduce(part, axis=None), np.fmax.reduce(part, axis=None)
+            self.keep_ranges(low, high)
+            ranges = low, high
+        return ranges
+
+    def _boxes(self, counts: Sequence[int]) -> Iterator[tuple[tuple[int, ...], tuple[slice, ...]]]:
+        for at in itertools.product(*map(range, counts)):
+            yield (
+                at,
+                tuple(slice(k * n, (k + 1) * n) for k, n in zip(at, self.chunks, strict=True)),
+            )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave an open HDF5 file behind: it is opened where this is unpickled."""
+        state = dict(self.__dict__)
+        if type(self._array).__module__.partition(".")[0] == "h5py":
+            state["_array"] = _InFile(self._array.file.filename, self._array.name)
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        if isinstance(self._array, _InFile):
+            self._array = self._array.open()
+
+    def __repr__(self) -> str:
+        return f"ChunkedArray({self.source}, {self.shape} {self.dtype}, chunks={self.chunks})"
+
+
+class _InFile:
+    """Where a data set of an HDF5 file is."""
+
+    def __init__(self, path: str, name: str) -> None:
+        self.path, self.name = path, name
+
+    def open(self) -> Any:
+        return importlib.import_module("h5py").File(self.path, "r")[self.name]
+
+
+def is_chunked(array: Any) -> bool:
+    """Whether an array is one that is read chunk by chunk, by who made it."""
+    return isinstance(array, ChunkedArray) or (
+        not isinstance(array, np.ndarray)
+        and type(array).__module__.partition(".")[0] in ("dask", "zarr", "h5py")
+        and all(hasattr(array, name) for name in ("shape", "dtype", "chunks"))
+    )
+
+
+def _held(values: Any, checked: Callable[[Any], Any] | None, dtype: Any) -> NDArray[Any]:
+    """Return what was read as a volume holds it."""
+    array = np.asarray(values) if checked is None else checked(np.asarray(values))
+    return np.ascontiguousarray(array, dtype=dtype)
+
+
+def _described(source: Any) -> str:
+    library = type(source).__module__.partition(".")[0]
+    if library == "h5py":
+        return f"{source.file.filename}::{source.name}"
+    if library == "zarr":
+        store, path = getattr(source, "store", ""), getattr(source, "path", "")
+        return f"the zarr array {store}/{path}".rstrip("/ ")
+    return f"the {library} array of shape {tuple(source.shape)}"
