@@ -31,6 +31,7 @@ from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, refuse_settings
 from pyvista_vdi.quality.ways import checked_draw
 from pyvista_vdi.quality.when_anew import REGENERATE_BELOW, checked_bound
 from pyvista_vdi.series.series import VDISeries
+from pyvista_vdi.sets.vdi_set import VDISet
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
@@ -132,11 +133,12 @@ class AddVDI(Component):
 
         Parameters
         ----------
-        volume : pyvista.ImageData, numpy.ndarray, pyvista.MultiBlock, Volume, VDI or VDISeries
+        volume : pyvista.ImageData, numpy.ndarray, pyvista.MultiBlock, Volume, or one or more VDIs
             A uniform grid, or a rectilinear one of equidistant points (other grids are refused,
             with the remedy), a NumPy array as ``add_volume`` takes it, blocks of uniform grids, a
-            VDI, a VDI as ``pyvista.read("x.vdi")`` gives it, or a series of VDIs, which plays
-            (``actor.play()``, ``actor.time``). With VDIs nothing is generated, and arguments that
+            VDI, a VDI as ``pyvista.read("x.vdi")`` gives it, a :class:`VDISeries`, which plays
+            (``actor.play()``, ``actor.time``), or a :class:`VDISet`, of which the nearest to the
+            view is drawn. With VDIs nothing is generated, and arguments that
             only a volume can honour are refused.
         scalars : str or numpy.ndarray, optional
             Name of an array, or the values, per point or per cell; RGBA as uint8 (n, 4).
@@ -325,9 +327,9 @@ class AddVDI(Component):
         changed = _changed({**classified, **vars(looks)}, DEFAULTS)
         shown: VDI | VDISource
         prop: Any = None
-        series = volume if isinstance(volume, VDISeries) else None
-        if series is not None:
-            volume = series[0]  # which all steps look like
+        several = volume if isinstance(volume, VDISeries | VDISet) else None
+        if several is not None:
+            volume = several[0]  # which all steps, and all views, look like
         if isinstance(volume, VDI) or is_vdi_image(volume):
             chosen = {"quality": quality, "target_ssim": target_ssim, "full_fps": full_fps}
             chosen |= {"max_bytes": max_bytes, "target_angle": target_angle}
@@ -402,8 +404,10 @@ class AddVDI(Component):
             actor.prop = prop
             if not prop.independent_components:
                 vdi_mapper.painter.give_proxy(4)
-        if series is not None:
-            vdi_mapper.SetSeries(series)
+        if isinstance(several, VDISeries):
+            vdi_mapper.SetSeries(several)
+        elif several is not None:
+            vdi_mapper.SetVDISet(several)
         elif isinstance(shown, VDI):
             vdi_mapper.SetVDI(shown)
         else:

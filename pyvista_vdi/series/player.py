@@ -22,14 +22,14 @@ RATE = 24.0
 #: Steps that are decoded before their time comes: what takes longer than the others finds them.
 _AHEAD = 3
 #: Bytes of decoded steps that are kept, so that the next round need not decode them.
-_MEMORY = 1 << 30
+MEMORY = 1 << 30
 #: Bytes of a step on a device over those of its arrays, which are kept as well.
-_ON_DEVICE = 1.2
+ON_DEVICE = 1.2
 #: Share of the last step's decoding in what the next one is expected to take.
 _LAST = 0.3
 
 
-class _Decoding(Job):
+class Decoding(Job):
     """Work beside the frames, and not in turns with them: what it makes is what they wait for."""
 
     def done(self) -> Any:
@@ -71,7 +71,7 @@ class Player:
         self.series = series
         self.dropped = 0
         self.device: Any = None
-        self.memory: float = _MEMORY
+        self.memory: float = MEMORY
         self._clock = clock
         self._rate, self._loop = RATE, True
         # Places go on where the series begins anew: place p is step p modulo the steps
@@ -213,7 +213,7 @@ class Player:
         if self._is_over():
             self.pause()
         elif not self._worker.running and self._wanted() is not None:
-            self._worker.put(_Decoding(lambda on, _report: self._decode(on), self.device))
+            self._worker.put(Decoding(lambda on, _report: self._decode(on), self.device))
         with self._lock:
             error = self._unsaid.pop() if self._unsaid else None
         if error is not None:
@@ -260,7 +260,7 @@ class Player:
 
     def _keep(self, step: int, vdi: VDI) -> None:
         """Keep a decoded step."""
-        self._ready[step], self._bytes[step] = vdi, vdi.nbytes * (1 + _ON_DEVICE)
+        self._ready[step], self._bytes[step] = vdi, vdi.nbytes * (1 + ON_DEVICE)
         self._trim()
 
     def _trim(self) -> None:

@@ -100,6 +100,11 @@ class SetSettings:
     views: int
     nbytes: float = math.nan
 
+    def finer(self) -> SetSettings:
+        """Return those of a V_O that comes to help where others did not do."""
+        longest = math.ceil(_FINER * self.max_supersegments)
+        return dataclasses.replace(self, lists=_FINER * self.lists, max_supersegments=longest)
+
 
 def generate_set(
     volume: Any,
@@ -231,7 +236,7 @@ def generate_set(
     settings = placing.settings(lists, max_supersegments, sphere=isinstance(views, str))
     first = orbit(probes[0], read.bounds, spread(settings.views)) if isinstance(views, str) else []
     vdi_set = placing.placed(settings, first or probes[:1])
-    vdi_set._maker = maker.of(settings)
+    vdi_set._maker = Growth(maker, settings, goal)
     return vdi_set
 
 
@@ -334,6 +339,26 @@ class _Truth:
 _MEDIUM = ("sample_distance", "lights", "ambient_occlusion", "memory_limit")
 
 
+@dataclass(frozen=True)
+class Growth:
+    """Makes VDIs of other views of a set's volume."""
+
+    maker: ViewMaker
+    settings: SetSettings
+    goal: float
+
+    def __call__(self, camera: Camera) -> VDI:
+        """Return a VDI of a view, made as those of the set."""
+        return self.maker.of(self.settings)(camera)
+
+    def lacking(self, vdi_set: VDISet, camera: Camera) -> VDI | None:
+        """Return a finer VDI of a view that does not reach the goal, else None."""
+        parts = [(vdi_set[i], weight) for i, weight in vdi_set.weights(camera)]
+        if self.maker.ssim(parts, camera) >= self.goal:
+            return None
+        return self.maker.of(self.settings.finer())(camera)
+
+
 class _Placing:
     """Puts V_Os among views until all reach a goal."""
 
@@ -418,14 +443,7 @@ class _Placing:
             self._report(_PILOT_SHARE + _FIRST_SHARE * len(vdis) / len(first))
             vdis.append(make(view))
         vdi_set = VDISet(vdis, window_size=self._maker.window_size)
-        # What comes to help has more and longer lists than what did not do
-        finer = self._maker.of(
-            dataclasses.replace(
-                settings,
-                lists=_FINER * settings.lists,
-                max_supersegments=math.ceil(_FINER * settings.max_supersegments),
-            )
-        )
+        finer = self._maker.of(settings.finer())
         ssim = np.full(len(self._probes), -np.inf)
         shown: list[Any] = [None] * len(self._probes)
         hopeless = np.zeros(len(self._probes), bool)

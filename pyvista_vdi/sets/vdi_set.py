@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,18 @@ BLEND = 6.0
 _LENS = math.tan(math.radians(15))
 #: Most V_Os that a picture is blended of.
 MOST_BLENDED = 3
+
+
+class Maker(Protocol):
+    """What makes VDIs of other views of the volume."""
+
+    def __call__(self, camera: Camera) -> VDI:
+        """Return a VDI of a view."""
+        ...
+
+    def lacking(self, vdi_set: VDISet, camera: Camera) -> VDI | None:
+        """Return a VDI of a view that does not reach what the set is to reach, else None."""
+        ...
 
 
 class VDISet(Sequence[VDI]):
@@ -89,7 +101,7 @@ class VDISet(Sequence[VDI]):
         self._cameras = tuple(cameras)
         self._places = self._places_of(self._cameras)
         self._blend = BLEND
-        self._maker: Callable[[Camera], VDI] | None = None  # of the volume, where it is at hand
+        self._maker: Maker | None = None  # of the volume, where it is at hand
 
     @classmethod
     def of(cls, vdis: Iterable[VDI], *, window_size: Sequence[int] | None = None) -> VDISet:
@@ -178,10 +190,18 @@ class VDISet(Sequence[VDI]):
         camera : Camera or vtkCamera or pyvista.Camera
             The view; its model transform places the set.
         """
-        here = self._places_of([Camera.from_any(camera)])
-        cross = np.linalg.norm(np.cross(self._places[:, :3], here[:, :3]), axis=1)
-        angle = np.arctan2(cross, self._places[:, :3] @ here[0, :3])
-        return np.degrees(np.hypot(angle, self._places[:, 3] - here[0, 3]))
+        return _apart(self._places, self._places_of([Camera.from_any(camera)]))
+
+    def apart(self, one: Any, other: Any) -> float:
+        """Return how far the eyes of two views are from each other, as :meth:`distances` does.
+
+        Parameters
+        ----------
+        one, other : Camera or vtkCamera or pyvista.Camera
+            The views.
+        """
+        first, second = self._places_of([Camera.from_any(view) for view in (one, other)])
+        return float(_apart(first[None], second[None])[0])
 
     def nearest(self, camera: Any) -> int:
         """Return the index of the VDI whose V_O is nearest to a view; of two, the earlier.
@@ -239,6 +259,18 @@ class VDISet(Sequence[VDI]):
                 "of the volume and add them"
             )
         return self._maker(Camera.from_any(camera))
+
+    def lacking(self, camera: Any) -> VDI | None:
+        """Return a VDI of a view, made if the set's picture of it misses the target, else None.
+
+        Parameters
+        ----------
+        camera : Camera or vtkCamera or pyvista.Camera
+            As for :meth:`generate`, whose error it has, too.
+        """
+        if self._maker is None:
+            return self.generate(camera)
+        return self._maker.lacking(self, Camera.from_any(camera))
 
     def add(self, vdi: VDI) -> None:
         """Add a VDI of the same scene, as from another thread.
@@ -316,3 +348,9 @@ class VDISet(Sequence[VDI]):
             for view, length in zip(cameras, lengths, strict=True)
         ]
         return np.column_stack([towards / lengths[:, None], np.log(away)])
+
+
+def _apart(places: NDArray[np.float64], here: NDArray[np.float64]) -> NDArray[np.float64]:
+    cross = np.linalg.norm(np.cross(places[:, :3], here[:, :3]), axis=1)
+    angle = np.arctan2(cross, places[:, :3] @ here[0, :3])
+    return np.asarray(np.degrees(np.hypot(angle, places[:, 3] - here[0, 3])))

@@ -12,6 +12,7 @@ from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
 from pyvista_vdi.series.player import Player
+from pyvista_vdi.sets.vdi_set import VDISet
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.playing import PlayingMethods
 from pyvista_vdi.vtk_pipeline.drawing.shader import show_image
@@ -59,6 +60,19 @@ class VDIActorMethods(PlayingMethods):
     @vdi.setter
     def vdi(self: Any, vdi: VDI) -> None:
         self._mapper_for(" that could show a VDI").SetVDI(vdi)
+
+    @property
+    def vdi_set(self: Any) -> VDISet | None:
+        """The set of which the nearest VDI is shown; ``None`` where a single one or a volume is.
+
+        Another one that is set is shown from the next frame on.
+        """
+        mapper = self.GetMapper()
+        return None if mapper is None else mapper.GetVDISet()
+
+    @vdi_set.setter
+    def vdi_set(self: Any, vdi_set: VDISet) -> None:
+        self._mapper_for(" that could show a set").SetVDISet(vdi_set)
 
     def _mapper_for(self: Any, what: str) -> Any:
         """Return the mapper; without one, say what there cannot be."""
@@ -187,6 +201,8 @@ class VDIActorMethods(PlayingMethods):
         player = None if mapper is None else mapper.painter.upkeep.player
         if player is not None:
             return self._step_anew(player, camera, window_size)  # type: ignore[no-any-return]
+        if mapper is not None and mapper.GetVDISet() is not None:
+            return self._view_added(mapper.GetVDISet(), camera)  # type: ignore[no-any-return]
         if source is None:
             raise InvalidArgumentError(
                 "this actor shows a VDI without its volume, which cannot be generated anew: add "
@@ -204,6 +220,21 @@ class VDIActorMethods(PlayingMethods):
         elif renderer is not None and min(renderer.GetSize()) > 0:
             shown.take_size(renderer)
         return source.GetVDI()  # type: ignore[no-any-return]
+
+    def _view_added(self: Any, vdi_set: VDISet, camera: Any) -> VDI:
+        """Have a set have a VDI of a view, by default of that which is shown."""
+        renderer = self.GetMapper().painter.renderer()
+        if camera is None and renderer is not None:
+            camera = renderer.GetActiveCamera()
+        if camera is None:
+            raise InvalidArgumentError(
+                "nothing shows this actor, so there is no view: pass camera, or add the actor to "
+                "a renderer first"
+            )
+        vdi = vdi_set.generate(Camera.from_any(camera, model_transform=as_array(self.GetMatrix())))
+        vdi_set.add(vdi)
+        self.GetMapper().Modified()
+        return vdi
 
     def _step_anew(self: Any, player: Player, camera: Any, window_size: Any) -> VDI:
         """Have the step that is shown made for another view, and show that as long as it is."""

@@ -21,6 +21,7 @@ from pyvista_vdi.quality.ways import checked_draw
 from pyvista_vdi.quality.when_anew import checked_bound
 from pyvista_vdi.raycasting.picking import checked_opacity
 from pyvista_vdi.series.series import VDISeries
+from pyvista_vdi.sets.vdi_set import VDISet
 from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
 from pyvista_vdi.vtk_pipeline.filters.algorithm import DEVICE, accessors
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
@@ -118,6 +119,29 @@ class VDIMapperMethods:
         """Return the series of which a step is drawn; ``None`` where there is none."""
         player = self.painter.upkeep.player
         return None if player is None else player.series
+
+    def SetVDISet(self, vdi_set: VDISet) -> None:
+        """Draw a set: of each frame's view the VDI that is nearest, or a blend of several.
+
+        Where its volume is at hand it grows behind the frames while nobody turns, by views that
+        do not reach its target; ``SetRegenerate("never")`` has it stay as it is.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is none.
+        """
+        if not isinstance(vdi_set, VDISet):
+            raise InvalidArgumentError(
+                f"SetVDISet takes a VDISet; got {type(vdi_set).__name__}: VDISet.of makes one of "
+                "several VDIs"
+            )
+        self._set_input(input_of(vdi_set))
+
+    def GetVDISet(self) -> VDISet | None:
+        """Return the set that is drawn; ``None`` where there is none."""
+        shower = self.painter.upkeep.shower
+        return None if shower is None else shower.vdi_set
 
     def GetVDI(self) -> VDI | None:
         """Return the VDI that was drawn last, or would be drawn; ``None`` before the first."""

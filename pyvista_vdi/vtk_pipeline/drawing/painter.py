@@ -20,6 +20,7 @@ from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.sets.render import blended
 from pyvista_vdi.vtk_pipeline.drawing import passes
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
 from pyvista_vdi.vtk_pipeline.drawing.few_lists import FewLists
@@ -393,7 +394,11 @@ class Painter:
             image = frame.stand_in.picture(request, frame.view.camera if lasts else None)
         else:
             assert frame.vdi is not None
-            image = render_vdi(frame.few_lists or frame.vdi, request)
+            parts = self.upkeep.blended_parts(frame.vdi) if frame.few_lists is None else []
+            if parts:
+                image = blended(parts, request)
+            else:
+                image = render_vdi(frame.few_lists or frame.vdi, request)
         seconds = time.perf_counter() - before
         if frame.stand_in is not None:
             frame.stand_in.took(width * height, seconds)

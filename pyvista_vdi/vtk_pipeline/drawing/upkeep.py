@@ -19,9 +19,15 @@ from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.quality.ways import Ways
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.series.player import Player
+from pyvista_vdi.sets.shower import SetShower
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SeriesInput, SourceInput
+from pyvista_vdi.vtk_pipeline.filters.inputs import (
+    Input,
+    SeriesInput,
+    SetInput,
+    SourceInput,
+)
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.interaction import browser
@@ -90,9 +96,21 @@ class Upkeep:
         return self.input.player if isinstance(self.input, SeriesInput) else None
 
     @property
+    def shower(self) -> SetShower | None:
+        """What shows the VDIs of a set, where a set is shown."""
+        return self.input.shower if isinstance(self.input, SetInput) else None
+
+    @property
     def _busy(self) -> bool:
         """Whether something goes on that the event loop has to look at."""
+        if self.shower is not None:
+            return self.shower.growing
         return self.regeneration.busy or (self.player is not None and self.player.playing)
+
+    def blended_parts(self, vdi: VDI) -> list[tuple[VDI, float]]:
+        """Return the VDIs of a set that a picture is blended of, with weights; none for one."""
+        parts = [] if self.shower is None else self.shower.parts()
+        return parts if len(parts) > 1 and parts[0][0] is vdi else []
 
     def retry(self) -> None:
         """Try again what failed before, and give up what is being made in the background."""
@@ -129,6 +147,8 @@ class Upkeep:
         if not isinstance(source, SourceInput):
             if isinstance(source, SeriesInput):
                 source.player.device = frame.painter.device
+            if isinstance(source, SetInput):
+                self._look_around(source.shower, frame)
             vdi = self._updated(source)
             self._mind_the_angle(vdi, frame.view)
             return vdi
@@ -155,6 +175,16 @@ class Upkeep:
         elif one_view and decide:
             self._follow_changes(source, frame)
         return self._updated(source)
+
+    def _look_around(self, shower: SetShower, frame: Frame) -> None:
+        """Have a set show the frame's view, and grow where nobody turns and the picture lacks."""
+        window = frame.renderer.GetRenderWindow()
+        shower.device = frame.painter.device
+        shower.look(frame.view.camera)
+        if self._interaction.moving(window):
+            shower.stop_growing()
+        elif self._interaction.asynchronous(window) and self.regeneration.policy == "auto":
+            shower.grow()
 
     def tick(self, window: Any) -> None:
         """Have the event loop look at what goes on, if something does and no hand moves."""
@@ -308,6 +338,8 @@ class Upkeep:
         try:
             if self.player is not None:
                 return self.player.advance()
+            if self.shower is not None:
+                return self.shower.advance()
             return self.regeneration.collect()
         except Exception as error:
             self._complain(error)

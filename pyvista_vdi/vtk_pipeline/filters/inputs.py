@@ -13,6 +13,8 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.series.player import Player
 from pyvista_vdi.series.series import VDISeries
+from pyvista_vdi.sets.shower import SetShower
+from pyvista_vdi.sets.vdi_set import VDISet
 from pyvista_vdi.vtk_pipeline.filters.algorithm import wanted_time
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
@@ -83,6 +85,35 @@ class SeriesInput(Input):
     def rest(self) -> None:
         """Pause, and leave no thread."""
         self.player.close()
+
+
+class SetInput(Input):
+    """The VDI of a set that is nearest to the view."""
+
+    def __init__(self, shower: SetShower) -> None:
+        super().__init__()
+        self.shower = shower
+
+    def vdi(self) -> VDI | None:
+        """Return the nearest VDI, decoded now if it is not ready."""
+        self._vdi = self.shower.vdi
+        return self._vdi
+
+    def bounds(self) -> tuple[float, ...] | None:
+        """Return the bounds that all VDIs have."""
+        return self.shower.vdi_set.bounds
+
+    def stamp(self) -> Any:
+        """Return which VDI it is."""
+        return self.shower.nearest
+
+    def shared(self) -> Input:
+        """Return an input that looks at the same set by itself."""
+        return SetInput(SetShower(self.shower.vdi_set))
+
+    def rest(self) -> None:
+        """Leave no thread."""
+        self.shower.close()
 
 
 class SourceInput(Input):
@@ -215,11 +246,13 @@ class ImageInput(Input):
 
 
 def input_of(data: Any) -> Input:
-    """Return what to draw for a VDI, a series, a canonical image, or a :class:`VDISource`."""
+    """Return what to draw for a VDI, a series or set of them, an image of one or a VDISource."""
     if isinstance(data, VDI):
         return Input(data)
     if isinstance(data, VDISeries):
         return SeriesInput(Player(data))
+    if isinstance(data, VDISet):
+        return SetInput(SetShower(data))
     if isinstance(data, VDISource):
         return SourceInput(data)
     if is_vdi_image(data):
@@ -227,8 +260,8 @@ def input_of(data: Any) -> Input:
         image.vdi()  # refuse a damaged one now
         return image
     raise InvalidVDIError(
-        f"a VDIMapper draws a VDI, its canonical image, a series or a VDISource's output; got "
-        f"{type(data).__name__}: put a VDISource between a volume and the mapper"
+        f"a VDIMapper draws a VDI, its canonical image, a series, a set or a VDISource's output; "
+        f"got {type(data).__name__}: put a VDISource between a volume and the mapper"
     )
 
 
