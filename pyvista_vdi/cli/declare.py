@@ -16,7 +16,10 @@ from pyvista_vdi.quality.dial import QUALITIES, TARGET_ANGLE
 #: Where options go: a verb's parser, or a group of it.
 Options = argparse._ActionsContainer
 
-VDI_FILE = "a .vdi file, a series, .vdis, an .exr deep image, a VDI as .vti, or a page, .html"
+VDI_FILE = (
+    "a .vdi file, a series, .vdis, a set, .vdiset, an .exr deep image, a VDI as .vti, or a page, "
+    ".html"
+)
 
 VOLUME_FILE = (
     "a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), .npy, a raw file "

@@ -28,13 +28,17 @@ def devices(options: argparse.Namespace) -> int:
 
 def info(options: argparse.Namespace) -> int:
     """Print what a file says about itself: a VDI, or a volume."""
-    from pyvista_vdi.cli.inputs import is_series, is_volume, read_volume, volume_name
+    from pyvista_vdi.cli.inputs import is_series, is_set, is_volume, read_volume, volume_name
     from pyvista_vdi.io import read_info
 
     if is_series(options):
         from pyvista_vdi.cli import series
 
         return series.info(options)
+    if is_set(options):
+        from pyvista_vdi.cli import sets
+
+        return sets.info(options)
     if is_volume(options):
         rows = _of_volume(read_volume(options))
         source = options.file or volume_name(options)
@@ -53,6 +57,7 @@ def convert(options: argparse.Namespace) -> int:
         file_options,
         given_camera,
         is_series,
+        is_set,
         measuring,
         part,
         say_vdi,
@@ -63,6 +68,10 @@ def convert(options: argparse.Namespace) -> int:
         from pyvista_vdi.cli import series
 
         return series.convert(options, series.file_arguments(options))
+    if is_set(options):
+        from pyvista_vdi.cli import series, sets
+
+        return sets.convert(options, series.file_arguments(options))
     target = checked_target(options.output)
     file_arguments = file_options(options)
     foreign = {

@@ -70,9 +70,18 @@ def is_series(options: argparse.Namespace) -> bool:
     return options.file is not None and is_series_file(options.file)
 
 
+def is_set(options: argparse.Namespace) -> bool:
+    """Whether FILE names a set of VDIs."""
+    from pyvista_vdi.sets.files import is_set_file
+
+    return options.file is not None and is_set_file(options.file)
+
+
 def is_volume(options: argparse.Namespace) -> bool:
-    """Whether FILE or ``--example`` names a volume, and neither a VDI nor a series."""
-    if options.example is not None or not (is_vdi_file(options.file) or is_series(options)):
+    """Whether FILE or ``--example`` names a volume, and not a VDI, a series or a set."""
+    if options.example is not None:
+        return True
+    if not (is_vdi_file(options.file) or is_series(options) or is_set(options)):
         return True
     given = [n for n in _OF_A_VOLUME if getattr(options, n) is not None]
     if given:

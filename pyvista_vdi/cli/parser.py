@@ -312,6 +312,28 @@ def _add_series(parser: argparse.ArgumentParser) -> None:
     declare.device(parser)
 
 
+def _add_set(parser: argparse.ArgumentParser) -> None:
+    declare.volume(parser)
+    declare.output(parser, ".vdiset to write")
+    declare.size(parser, (640, 360))
+    group = parser.add_argument_group("goal")
+    ssim = "SSIM of every direction against volume rendering (default: 0.98)"
+    declare.option(group, "--target-ssim", ssim, "S", float)
+    most = "most bytes of the file, like 70MB; goes before the SSIM"
+    declare.option(group, "--max-bytes", most, "SIZE", declare.parse_bytes)
+    most = "most VDIs (default: 400)"
+    declare.option(group, "--max-views", most, "N", declare.parse_count)
+    group = parser.add_argument_group("lists", "By default a short measurement chooses them.")
+    declare.option(group, "--lists", "lists per pixel along an edge", "N", float)
+    declare.option(group, "--max-supersegments", "longest list", "N", int)
+    declare.step(group, "step along the ray, model units (default: half the smallest spacing)")
+    declare.memory_limit(group)
+    declare.camera(parser, "the view that the volume fills; it tells distance, lens and up")
+    declare.classification(parser)
+    declare.occlusion(parser)
+    declare.device(parser)
+
+
 def _add_compare(parser: argparse.ArgumentParser) -> None:
     front = (
         "our ways to draw against VTK's, by time and SSIM, for every known volume at hand, "
@@ -487,7 +509,7 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "convert": (
         "files",
-        "write a VDI or each step of a series as .vdi, .exr or .vti, or either as one page, .html",
+        "write a VDI, or each one of a series or set, as .vdi, .exr, .vti or .html; a set as .cdb",
         "pyvista-vdi convert knee.vdi -o knee.exr",
         _add_convert,
     ),
@@ -496,6 +518,12 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
         "write VDIs, or those of volumes, that are time steps to one file",
         "pyvista-vdi series density_*.nrrd -o run.vdis --cmap bone --clim 0 255",
         _add_series,
+    ),
+    "set": (
+        "sets",
+        "write VDIs of a volume from as many sides as pictures from everywhere need",
+        "pyvista-vdi set knee.nrrd -o knee.vdiset --cmap bone --opacity sigmoid_6",
+        _add_set,
     ),
     "paraview": (
         "paraview",

@@ -23,6 +23,7 @@ from pyvista_vdi.plotting.imports import import_pyvista
 from pyvista_vdi.plotting.screen import why_no_window
 from pyvista_vdi.series.player import RATE
 from pyvista_vdi.series.series import VDISeries
+from pyvista_vdi.sets.vdi_set import VDISet
 
 
 def render(options: argparse.Namespace) -> int:
@@ -75,28 +76,28 @@ def view(options: argparse.Namespace) -> int:
     return 0
 
 
-def _at(found: VDI | VDISeries, time: float | None) -> VDI:
-    """Return a VDI, or of a series the step nearest in time, by default the first."""
+def _at(found: VDI | VDISeries | VDISet, time: float | None) -> VDI | VDISet:
+    """Return a VDI or a set, or of a series the step nearest in time, by default the first."""
     if isinstance(found, VDISeries):
         return found[0 if time is None else found.nearest(time)]
     return found
 
 
-def _refuse_times(shown: VDI | VDISeries | Volume, options: argparse.Namespace) -> None:
+def _refuse_times(shown: VDI | VDISeries | VDISet | Volume, options: argparse.Namespace) -> None:
     if not isinstance(shown, VDISeries) and (options.play or options.time is not None):
         name = "play" if options.play else "time"
         raise UnsupportedError(f"--{name} is for series, .vdis: leave it out")
 
 
 def _show(
-    shown: VDI | VDISeries | Volume,
+    shown: VDI | VDISeries | VDISet | Volume,
     camera: Camera,
     size: tuple[int, int],
     looks: dict[str, Any],
     options: argparse.Namespace,
     screenshot: str | None,
 ) -> None:
-    """Open a plotter that shows a VDI, a series or a volume from a view, or write what it shows.
+    """Open a plotter that shows one of these from a view, or write what it shows.
 
     No file is written where the picture cannot be drawn or is interrupted.
     """

@@ -159,15 +159,20 @@ def convert(options: argparse.Namespace, arguments: dict[str, Any]) -> int:
             steps.save(target, progress=part(bar, 0.0, 1.0, "writing"), **arguments)
         say_written([target])
         return 0
-    digits = max(4, len(str(len(steps) - 1)))
+    return write_each(steps, target, arguments)
+
+
+def write_each(vdis: Sequence[VDI], target: Path, arguments: dict[str, Any]) -> int:
+    """Write each of several VDIs to a file of its own, named by a number."""
+    digits = max(4, len(str(len(vdis) - 1)))
     files = [
-        target.with_name(f"{target.stem}_{i:0{digits}}{target.suffix}") for i in range(len(steps))
+        target.with_name(f"{target.stem}_{i:0{digits}}{target.suffix}") for i in range(len(vdis))
     ]
     checked_target(files[0])
     check_write_options(files[0], arguments)
     with measuring("converting") as bar:
         for i, file in enumerate(files):
-            steps[i].save(file, **arguments)
+            vdis[i].save(file, **arguments)
             bar((i + 1) / len(files))
     print(f"Written: {printable(files[0])} to {printable(files[-1].name)}, {len(files)} files")
     return 0

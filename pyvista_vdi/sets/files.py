@@ -52,6 +52,8 @@ class SetReader(StepsReader):
         self.about = found["about"]
         if not isinstance(self.about, dict):
             raise TypeError("what is said about a set is a dictionary")
+        if self.about.get("camera") is not None:
+            Camera.from_dict(self.about["camera"])
         if len(self.all_bounds) != 6 or not all(map(math.isfinite, self.all_bounds)):
             raise ValueError("bounds are six finite numbers")
 

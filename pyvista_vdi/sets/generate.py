@@ -236,6 +236,7 @@ def generate_set(
     settings = placing.settings(lists, max_supersegments, sphere=isinstance(views, str))
     first = orbit(probes[0], read.bounds, spread(settings.views)) if isinstance(views, str) else []
     vdi_set = placing.placed(settings, first or probes[:1])
+    vdi_set.about["camera"] = (around if isinstance(views, str) else probes[0]).to_dict()
     vdi_set._maker = Growth(maker, settings, goal)
     return vdi_set
 

@@ -72,7 +72,7 @@ class VDISet(Sequence[VDI]):
     bounds : tuple of float
         As above.
     about : dict
-        What made it. ``target_ssim``; ``chosen``: ``lists`` per pixel along an edge and
+        What made it. ``camera``; ``target_ssim``; ``chosen``: ``lists`` per pixel along an edge and
         ``max_supersegments``; ``reached``: of how many ``directions`` the SSIM was measured, the
         ``least`` and the ``mean``.
     """
@@ -131,6 +131,15 @@ class VDISet(Sequence[VDI]):
                     f"{vdi.bounds}, the first {views[0].bounds}"
                 )
         return cls(views, window_size=window_size)
+
+    @property
+    def camera(self) -> Camera:
+        """The view to begin with, for pictures of :attr:`window_size`; else the first V_O.
+
+        Of a sphere the one that told distance and lens, of cameras the first.
+        """
+        stored = self.about.get("camera")
+        return self._cameras[0] if stored is None else Camera.from_dict(stored)
 
     @property
     def picture_size(self) -> tuple[int, int]:

@@ -35,6 +35,7 @@ VERBS = (
     "tradeoff",
     "convert",
     "series",
+    "set",
     "paraview",
 )
 

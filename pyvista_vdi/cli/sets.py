@@ -1,0 +1,119 @@
+"""The verb ``set``, and what ``info`` and ``convert`` do with files of sets."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+from pyvista_vdi.cli.generate import generating_view
+from pyvista_vdi.cli.inputs import (
+    ambient_occlusion,
+    classification,
+    measuring,
+    part,
+    read_volume,
+    say_written,
+)
+from pyvista_vdi.cli.series import write_each
+from pyvista_vdi.cli.text import mebibytes, printable, table, vector
+from pyvista_vdi.io.whole_file import check_writable, with_suffix
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.sets import cinema, files
+from pyvista_vdi.sets.generate import generate_set
+
+#: Options that are arguments of ``generate_set`` of the same name, given only if the user did.
+_GOAL = ("target_ssim", "max_bytes", "max_views", "lists", "max_supersegments")
+
+
+def set(options: argparse.Namespace) -> int:  # noqa: A001 - the verb's name
+    """Generate a set of VDIs and write it."""
+    target = check_writable(with_suffix(Path(options.output), (files.SUFFIX,), "a set"))
+    looks = classification(options)
+    Classification(looks, "set")  # refused before the volume is read
+    occlusion = ambient_occlusion(options)
+    volume = read_volume(options)
+    start = time.perf_counter()
+    with measuring("generating a set") as bar:
+        vdi_set = generate_set(
+            volume,
+            "sphere",
+            options.size,
+            camera=generating_view(options, volume),
+            sample_distance=options.sample_distance,
+            ambient_occlusion=occlusion,
+            memory_limit=options.memory_limit,
+            device=options.device,
+            progress=part(bar, 0.0, 0.9, "generating"),
+            **{n: getattr(options, n) for n in _GOAL if getattr(options, n) is not None},
+            **looks,
+        )
+        vdi_set.save(target, progress=part(bar, 0.9, 1.0, "writing"))
+    seconds = time.perf_counter() - start
+    print(
+        f"{printable(options.output)}: {len(vdi_set)} VDIs, {mebibytes(target.stat().st_size)}, "
+        f"{seconds:.1f} s; {_reached(vdi_set.about)}"
+    )
+    return 0
+
+
+def info(options: argparse.Namespace) -> int:
+    """Print what a file of a set says about itself."""
+    about, made = files.read_info(options.file)
+    vdi_set = files.read(options.file)
+    if options.json:
+        state = {**vars(about), "path": str(about.path), "camera": vdi_set.camera.to_dict()}
+        del state["times"], state["keys"]
+        state["window_size"] = vdi_set.window_size
+        state["views"] = [camera.to_dict() for camera in vdi_set.cameras]
+        print(json.dumps({**state, "about": made}, indent=1))
+        return 0
+    width, height = vdi_set.window_size
+    chosen = made.get("chosen", {})
+    print(
+        table(
+            {
+                "file": f"{about.path}, {mebibytes(about.file_bytes)}, {about.codec}",
+                "written by": f"{about.written_by}, format version {about.format_version}",
+                "views": f"{len(vdi_set)}",
+                "bytes a view": f"{min(about.step_bytes)} to {max(about.step_bytes)}",
+                "precision": about.precision,
+                "pictures": f"{width} x {height}",
+                "chosen": json.dumps(chosen),
+                "reached": _reached(made),
+                "eye": vector(vdi_set.camera.position),
+                "bounds": vector(vdi_set.bounds),
+            }
+        )
+    )
+    return 0
+
+
+def convert(options: argparse.Namespace, arguments: dict[str, Any]) -> int:
+    """Write a set anew, as a Cinema database, or each of its VDIs to a file of its own."""
+    vdi_set, target = files.read(options.file), Path(options.output)
+    suffix = target.suffix.lower()
+    if suffix not in (files.SUFFIX, cinema.SUFFIX):
+        return write_each(vdi_set, target, arguments)
+    with measuring("converting") as bar:
+        if suffix == cinema.SUFFIX:
+            cinema.write(vdi_set, target, progress=part(bar, 0.0, 1.0, "writing"))
+        else:
+            vdi_set.save(target, progress=part(bar, 0.0, 1.0, "writing"), **arguments)
+    say_written([target])
+    return 0
+
+
+def _reached(about: dict[str, Any]) -> str:
+    """Return in words what a set was measured to give."""
+    try:
+        reached = about["reached"]
+        return (
+            f"SSIM {reached['least']:.4f} or more in {reached['directions']} directions, "
+            f"{reached['mean']:.4f} in the mean"
+            + (f"; {reached['below_target']} miss the target" if reached["below_target"] else "")
+        )
+    except (KeyError, TypeError, ValueError):  # VDIs that somebody has put together
+        return "not measured"

@@ -1,0 +1,93 @@
+"""The verb ``set``, and what others do with the file that it writes."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import cli
+from pyvista_vdi.sets import generate
+
+SIZE = (32, 24)
+
+
+def run(capsys, *arguments, status=0):
+    """Run the command and return what it prints, or says where it fails."""
+    assert cli.main([str(argument) for argument in arguments]) == status
+    out, error = capsys.readouterr()
+    return out if status == 0 else error
+
+
+@pytest.fixture(scope="module")
+def volume(tmp_path_factory):
+    path = tmp_path_factory.mktemp("volume") / "v.npy"
+    z, y, x = np.mgrid[:9, :9, :9] - 4
+    np.save(path, (250 * np.exp(-(x**2 + 2 * y**2 + z**2) / 9)).astype(np.uint8))
+    return path
+
+
+@pytest.fixture(scope="module")
+def saved(volume, tmp_path_factory, default_runtime):
+    pytest.importorskip("pyvista")
+    path = tmp_path_factory.mktemp("sets") / "a.vdiset"
+    arguments = ["set", volume, "-o", path, "--size", "32x24", "--cmap", "bone", "--lists", "1"]
+    arguments += ["--max-supersegments", "3", "--target-ssim", "0.7", "--max-views", "9"]
+    with pytest.MonkeyPatch.context() as fewer:
+        fewer.setattr(generate, "DIRECTIONS", 10)
+        assert cli.main([str(argument) for argument in arguments]) == 0
+    return path
+
+
+def test_a_volume_becomes_a_set(saved, capsys):
+    vdis = pvdi.read(saved)
+    assert isinstance(vdis, pvdi.VDISet)
+    assert 1 < len(vdis) <= 9
+    assert vdis.window_size == SIZE
+    assert vdis.about["chosen"] == {"lists": 1.0, "max_supersegments": 3}
+    out = run(capsys, "info", saved)
+    assert "SSIM" in out
+    assert "32 x 24" in out
+    state = json.loads(run(capsys, "info", saved, "--json"))
+    assert len(state["views"]) == len(vdis)
+    assert state["about"]["reached"]["directions"] == 10
+
+
+def test_it_is_rendered_from_all_sides(saved, capsys, tmp_path):
+    from PIL import Image
+
+    vdis = pvdi.read(saved)
+    run(capsys, "render", saved, "-o", tmp_path / "a.png", "--azimuth", "140")
+    with Image.open(tmp_path / "a.png") as picture:
+        seen = np.asarray(picture)[..., 3]
+    image = pvdi.render(vdis, vdis.camera.azimuth(140))
+    assert np.abs(seen / 255 - image[..., 3]).max() <= 0.5 / 255 + 1e-6
+    assert seen.max() > 50
+
+
+@pytest.mark.gl
+def test_it_is_viewed(saved, capsys, tmp_path):
+    assert "written" in run(capsys, "view", saved, "--screenshot", tmp_path / "v.png")
+
+
+def test_it_is_converted(saved, capsys, tmp_path):
+    vdis = pvdi.read(saved)
+    run(capsys, "convert", saved, "-o", tmp_path / "a.cdb")
+    with (tmp_path / "a.cdb" / "data.csv").open(encoding="utf-8", newline="") as stream:
+        assert len(list(csv.DictReader(stream))) == len(vdis)
+    again = tmp_path / "b.vdiset"
+    run(capsys, "convert", saved, "-o", again, "--compression", "deflate")
+    assert all(one.equals(two) for one, two in zip(pvdi.read(again), vdis, strict=True))
+    assert f"{len(vdis)} files" in run(capsys, "convert", saved, "-o", tmp_path / "v.vdi")
+    assert pvdi.read(tmp_path / "v_0001.vdi").equals(vdis[1])
+
+
+def test_mistakes_are_named(volume, saved, capsys, tmp_path):
+    assert ".vdiset" in run(capsys, "set", volume, "-o", tmp_path / "a.vdi", status=1)
+    message = run(capsys, "view", saved, "--play", "--screenshot", tmp_path / "a.png", status=1)
+    assert "--play is for series" in message
+    bad = ["set", volume, "-o", tmp_path / "a.vdiset", "--target-ssim", "2"]
+    assert "target_ssim" in run(capsys, *bad, status=1)
