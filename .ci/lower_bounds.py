@@ -9,7 +9,7 @@ from pathlib import Path
 import tomllib
 
 #: Extras whose lower bounds the test-suite exercises.
-TESTED_EXTRAS = ("cpu", "exr", "notebook", "plot", "test", "web")
+TESTED_EXTRAS = ("cpu", "dask", "exr", "hdf5", "notebook", "plot", "test", "web", "zarr")
 
 
 def lower_bounds(pyproject: Path) -> list[str]:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from pyvista_vdi.device import describe_devices, list_devices
     from pyvista_vdi.errors import *
     from pyvista_vdi.generation.estimate import Estimate
+    from pyvista_vdi.io.stores import open_volume
     from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
     from pyvista_vdi.model.camera import Camera
     from pyvista_vdi.model.cropping import Cropping
@@ -63,6 +64,7 @@ _HOMES = {
     "generate_series": "series.generate",
     "generate_set": "sets.generate",
     "list_devices": "device",
+    "open_volume": "io.stores",
     "pick": "api",
     "read": "api",
     "render": "api",
@@ -80,6 +82,7 @@ registration.install()
 providers.provide(
     html_files="pyvista_vdi.web.page",
     image_with_scalars="pyvista_vdi.plotting.volumes:as_image",
+    range_keeper="pyvista_vdi.io.ranges:keeper_of",
     notebook_bundle="pyvista_vdi.web.notebook:mime_bundle",
     scene_pages="pyvista_vdi.web.scenes.export:export_html",
     temporal_volumes="pyvista_vdi.vtk_pipeline.filters.temporal:steps_and_times",

@@ -15,6 +15,9 @@ class Geometry:
     origin: tuple[float, float, float]
     direction: NDArray[np.float64]
     dimensions: tuple[int, int, int]
+    #: What the opacity unit distance is by default, if not that of these points: a level of a
+    #: multi-scale store has the finest level's, so that all levels look the same; model units.
+    unit_distance: float | None = None
 
     @property
     def index_to_model(self) -> NDArray[np.float64]:
@@ -42,6 +45,8 @@ class Geometry:
     @property
     def default_unit_distance(self) -> float:
         """The opacity unit distance that ``Plotter.add_volume`` takes by default, model units."""
+        if self.unit_distance is not None:
+            return self.unit_distance
         return self.length / (float(np.mean(self.dimensions)) - 1)
 
 
@@ -57,14 +62,23 @@ class Grid(Geometry):
         As of a :class:`~pyvista_vdi.model.volume.Volume`, model units.
     direction : numpy.ndarray, float64 (3, 3)
         Columns are the directions of the index axes.
+    unit_distance : float or None
+        In place of :attr:`default_unit_distance`.
     """
 
     dimensions: tuple[int, int, int]
     spacing: tuple[float, float, float]
     origin: tuple[float, float, float]
     direction: NDArray[np.float64]
+    unit_distance: float | None = None
 
     @classmethod
     def of(cls, geometry: Geometry) -> Grid:
         """Return the grid of a volume."""
-        return cls(geometry.dimensions, geometry.spacing, geometry.origin, geometry.direction)
+        return cls(
+            geometry.dimensions,
+            geometry.spacing,
+            geometry.origin,
+            geometry.direction,
+            geometry.unit_distance,
+        )

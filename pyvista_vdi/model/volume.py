@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from pyvista_vdi.errors import InvalidVolumeError
 from pyvista_vdi.model.checks import as_floats
 from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
 from pyvista_vdi.model.grid import Geometry
+from pyvista_vdi.model.providers import provider
 
 #: Voxel types that the kernels read as they are.
 VOXEL_TYPES: tuple[str, ...] = (
@@ -70,7 +72,7 @@ class Volume(Geometry):
         *,
         name: str = "values",
     ) -> None:
-        self.array = _chunked(array) if is_chunked(array) else _checked_array(array)
+        self.array = chunked_array(array) if is_chunked(array) else _checked_array(array)
         self.spacing = _checked_vector("spacing", spacing)
         self.origin = _checked_vector("origin", origin)
         self.direction = _checked_direction(direction)
@@ -106,7 +108,9 @@ class Volume(Geometry):
     def load(self) -> Volume:
         """Return the volume with all its voxels in memory."""
         array = self.array[:, :, :] if self.chunked else self.array
-        return Volume(array, self.spacing, self.origin, self.direction, name=self.name)
+        loaded = Volume(array, self.spacing, self.origin, self.direction, name=self.name)
+        loaded.unit_distance = self.unit_distance
+        return loaded
 
     @property
     def scalars(self) -> NDArray[np.generic]:
@@ -141,18 +145,25 @@ class Volume(Geometry):
         return f"Volume({nx} x {ny} x {nz} {kind}, spacing={self.spacing})"
 
 
-def _chunked(array: Any) -> Any:
-    """Return an array that is read chunk by chunk, which has been read nowhere yet."""
+def chunked_array(array: Any, index: Sequence[int | slice] | None = None) -> Any:
+    """Return an array that is read chunk by chunk, as a volume holds it; nothing is read yet.
+
+    ``index`` says what is taken of an array of more dimensions, as of a :class:`ChunkedArray`.
+    """
     if isinstance(array, ChunkedArray):
         return array
     kind = np.dtype(array.dtype).newbyteorder("=").name
-    if kind in ("int64", "uint64"):
-        found = ChunkedArray(array, checked=_from_long_integers, dtype=np.float64)
-    else:
-        kind = _WIDENED.get(kind, kind)
-        if kind not in VOXEL_TYPES:
-            raise InvalidVolumeError(_unsupported(array.dtype))
-        found = ChunkedArray(array, dtype=kind)
+    long = kind in ("int64", "uint64")
+    kind = "float64" if long else _WIDENED.get(kind, kind)
+    if kind not in VOXEL_TYPES:
+        raise InvalidVolumeError(_unsupported(array.dtype))
+    found = ChunkedArray(
+        array,
+        index=index,
+        checked=_from_long_integers if long else None,
+        dtype=kind,
+        keeper=provider("range_keeper")(array, index),
+    )
     _check_planes(found.shape)
     return found
 

@@ -27,6 +27,7 @@ OWNERS = {
     "aiohttp": ("web",),
     "anywidget": ("web",),
     "distributed": ("large",),
+    "h5py": ("io",),
     "paraview": ("paraview",),
     "pyopencl": ("device",),
     "pyvista": ("plotting", "examples", "web", "measure", "cli"),
@@ -34,6 +35,7 @@ OWNERS = {
     "traitlets": ("web",),
     "vtk": ("vtk_pipeline", "plotting", "paraview", "web", "measure"),
     "vtkmodules": ("vtk_pipeline", "plotting", "paraview", "web", "measure"),
+    "zarr": ("io",),
 }
 
 #: Rooms and loose modules from the lowest to the highest; what stands in one line may not import
@@ -59,7 +61,12 @@ LEVELS = (
 
 #: Rooms in a room, likewise from the lowest to the highest.
 LEVELS_WITHIN = {
-    "io": (("whole_file", "progress"), ("png", "vdi_file"), ("deep_exr",), ("files",)),
+    "io": (
+        ("whole_file", "progress"),
+        ("png", "ranges", "vdi_file"),
+        ("deep_exr", "stores"),
+        ("files",),
+    ),
     "vtk_pipeline": (("filters",), ("interaction",), ("drawing",)),
 }
 
@@ -84,6 +91,7 @@ HEAVY = (
     "trame",
     "vtk",
     "vtkmodules",
+    "zarr",
 )
 
 

@@ -1,0 +1,483 @@
+"""Volumes in stores of chunks: zarr, OME-Zarr and HDF5; the metadata are read, no voxel is.
+
+zarr and h5py are optional, and imported where a store of theirs is opened.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidVolumeError,
+    MissingDependencyError,
+    UnsupportedError,
+)
+from pyvista_vdi.io.ranges import ZARR_FILES
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.grid import Grid
+from pyvista_vdi.model.levels import required_level
+from pyvista_vdi.model.volume import Volume, chunked_array
+
+_HDF5 = (".h5", ".hdf5", ".he5", ".ims")
+
+#: Axes of an array that does not name them, from the last one backwards; those of OME-Zarr.
+_AXES = ("t", "c", "z", "y", "x")
+
+#: Lengths in metres, by the names that OME-Zarr takes of UDUNITS-2.
+_UNITS = {
+    "angstrom": 1e-10,
+    "picometer": 1e-12,
+    "nanometer": 1e-9,
+    "micrometer": 1e-6,
+    "micron": 1e-6,
+    "millimeter": 1e-3,
+    "centimeter": 1e-2,
+    "decimeter": 1e-1,
+    "meter": 1.0,
+    "kilometer": 1e3,
+    "inch": 0.0254,
+}
+
+#: What libraries and metadata that break their format raise.
+_BROKEN = (OSError, KeyError, IndexError, TypeError, ValueError, AttributeError, RuntimeError)
+
+
+@dataclass(frozen=True)
+class Level:
+    """One array of a store, and where its points are.
+
+    Attributes
+    ----------
+    path : str
+        In the store.
+    array : zarr.Array or h5py.Dataset
+        As the library has it, with all its axes.
+    grid : Grid
+        Of its points along x, y and z.
+    """
+
+    path: str
+    array: Any
+    grid: Grid
+
+
+@dataclass(frozen=True)
+class Store:
+    """What the metadata of a store say.
+
+    Attributes
+    ----------
+    path : str
+        As it was opened.
+    levels : tuple of Level
+        From the finest to the coarsest.
+    axes : tuple of str
+        ``t``, ``c``, ``z``, ``y``, ``x`` or others, in the order of the arrays.
+    unit : str
+        Of lengths; empty where it is not known.
+    channels : tuple of str
+        Names, where they are known.
+    kind : str
+        What it is, such as ``"OME-Zarr 0.5"``.
+    """
+
+    path: str
+    levels: tuple[Level, ...]
+    axes: tuple[str, ...]
+    unit: str = ""
+    channels: tuple[str, ...] = ()
+    kind: str = "zarr"
+
+    def index(self, time: int, channel: int | str) -> tuple[int | slice, ...]:
+        """Return what is taken of its arrays: a number along time and channel, all of z, y, x."""
+        if isinstance(channel, str):
+            if channel not in self.channels:
+                raise InvalidArgumentError(
+                    f"{self.path} has no channel {channel!r}: its channels are "
+                    f"{', '.join(self.channels) or 'not named, give a number'}"
+                )
+            channel = self.channels.index(channel)
+        wanted = {"t": ("time", time), "c": ("channel", channel)}
+        shape = dict(zip(self.axes, self.levels[0].array.shape, strict=True))
+        for axis, (name, number) in wanted.items():
+            count = shape.get(axis, 1)
+            if not isinstance(number, int) or not 0 <= number < count:
+                raise InvalidArgumentError(
+                    f"{self.path} has {count} along {name}, 0 to {count - 1}; got {number!r}"
+                )
+        for axis, count in shape.items():
+            if axis not in _AXES and count != 1:
+                raise UnsupportedError(
+                    f"{self.path} has {count} points along an axis {axis!r}, which is neither "
+                    "time, channel, z, y nor x: give a Volume of an indexed dask array instead"
+                )
+        return tuple(
+            slice(None) if axis in "zyx" else wanted.get(axis, ("", 0))[1] for axis in self.axes
+        )
+
+
+class StoredVolume(Volume):
+    """A level of a store as a volume whose voxels are read chunk by chunk.
+
+    Made by :func:`open_volume`. Colours and opacities are the same for all levels, if ``clim`` is
+    given: lengths are the same, and opacities refer to the finest level's distance of voxels.
+
+    Attributes
+    ----------
+    store : Store
+        What the store says of itself: its levels, axes, unit and channels.
+    level : int
+        Which one this is; 0 is the finest.
+    why : str
+        Why it was chosen.
+    time : int
+        Which step it is.
+    channel : int or str
+        Which channel it is.
+    """
+
+    def __init__(
+        self, store: Store, level: int, why: str, time: int = 0, channel: int | str = 0
+    ) -> None:
+        chosen, index = store.levels[level], store.index(time, channel)
+        grid = chosen.grid
+        number: Any = index[store.axes.index("c")] if "c" in store.axes else 0
+        super().__init__(
+            chunked_array(chosen.array, index),
+            grid.spacing,
+            grid.origin,
+            name=store.channels[number] if number < len(store.channels) else "values",
+        )
+        self.store, self.level, self.why = store, level, why
+        self.time, self.channel = time, channel
+        self.unit_distance = store.levels[0].grid.default_unit_distance
+
+    def at_level(
+        self,
+        level: int | str = "auto",
+        camera: Camera | None = None,
+        window_size: Sequence[int] | None = None,
+    ) -> StoredVolume:
+        """Return another level, chosen as :func:`open_volume` does."""
+        number, why = _chosen(self.store, level, camera, window_size)
+        return StoredVolume(self.store, number, why, self.time, self.channel)
+
+    def describe(self) -> str:
+        """Return which level it is, and why, as one line."""
+        nx, ny, nz = self.dimensions
+        return (
+            f"level {self.level} of {len(self.store.levels)} ({nx} x {ny} x {nz} points): "
+            f"{self.why}"
+        )
+
+
+def is_store(path: str | os.PathLike[str]) -> bool:
+    """Whether a path looks like one that :func:`open_volume` opens, by its name or its files."""
+    outer, inner = _parts(path)
+    suffixes = (".zarr", *_HDF5)
+    if inner or outer.rstrip("/\\").lower().endswith(suffixes):
+        return True
+    return os.path.isdir(outer) and any(  # noqa: PTH112 - pathlib's raises for too long names
+        (Path(outer) / name).is_file() for name in ZARR_FILES
+    )
+
+
+def open_volume(
+    path: str | os.PathLike[str],
+    *,
+    level: int | str = "auto",
+    camera: Any = None,
+    window_size: Sequence[int] | None = None,
+    time: int = 0,
+    channel: int | str = 0,
+) -> StoredVolume:
+    """Open a volume in a store of chunks, of which only the metadata are read.
+
+    Parameters
+    ----------
+    path : path-like
+        ``"x.zarr"``, ``"x.ome.zarr"`` or ``"x.h5::/path"``: a zarr array, an image of OME-Zarr 0.4
+        or 0.5, an HDF5 file. What follows ``::`` is a group or an array in it; without it the only
+        one.
+    level : int or "auto"
+        Level of a multi-scale image, 0 is the finest. ``"auto"``: the finest whose voxels are no
+        finer than half a list's width where the volume is nearest to V_O; without a camera the
+        finest.
+    camera : Camera or anything that :func:`generate` takes as one, optional
+        V_O.
+    window_size : (int, int), optional
+        Lists of V_O along x and y; with ``camera``.
+    time : int
+        Which time step.
+    channel : int or str
+        Which channel, by its number or its name.
+
+    Returns
+    -------
+    StoredVolume
+        A :class:`Volume` that is read where a part is needed. Its ``describe()`` says which level
+        it is and why.
+
+    Raises
+    ------
+    MissingDependencyError
+        If zarr or h5py is not installed.
+    InvalidVolumeError
+        If there is no store, or its metadata break their format.
+    UnsupportedError
+        If it is of another version, or OME-Zarr 0.5 where zarr is older than 3; if its axes are
+        not z, y, x in this order behind time and channel.
+    InvalidArgumentError
+        If it has no such level, time or channel.
+    """
+    outer, inner = _parts(path)
+    if not is_store(path) or outer.lower().endswith(_HDF5):
+        store = _open_hdf5(outer, inner)
+    else:
+        store = _open_zarr(outer, inner)
+    number, why = _chosen(store, level, camera, window_size)
+    return StoredVolume(store, number, why, time, channel)
+
+
+def _parts(path: str | os.PathLike[str]) -> tuple[str, str]:
+    outer, _, inner = os.fspath(path).partition("::")
+    return outer, inner.strip("/")
+
+
+def _chosen(
+    store: Store, level: int | str, camera: Any, window_size: Sequence[int] | None
+) -> tuple[int, str]:
+    count = len(store.levels)
+    if level != "auto":
+        if not isinstance(level, int) or not 0 <= level < count:
+            raise InvalidArgumentError(
+                f'level must be "auto" or from 0, the finest, to {count - 1}, as {store.path} has '
+                f"{count}; got {level!r}"
+            )
+        return level, "asked for"
+    if (camera is None) != (window_size is None):
+        raise InvalidArgumentError(
+            "a level is chosen for a camera and a window_size: give both, or neither for the finest"
+        )
+    if camera is None or window_size is None:
+        return 0, "the finest, as no view was given" if count > 1 else "the only one"
+    grids = [one.grid for one in store.levels]
+    return required_level(grids, Camera.from_any(camera), window_size, store.unit)
+
+
+# -- HDF5 ------------------------------------------------------------------------------------------
+
+
+def _open_hdf5(path: str, inner: str) -> Store:
+    try:
+        import h5py
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"{path} needs h5py ({error}): pip install 'pyvista-vdi[hdf5]'"
+        ) from error
+    try:
+        file = h5py.File(path, "r")
+    except (OSError, ValueError) as error:
+        raise InvalidVolumeError(f"{path} cannot be read as HDF5: {error}") from error
+    found: dict[str, Any] = {}
+
+    def visit(name: str, node: Any) -> None:
+        if isinstance(node, h5py.Dataset) and node.ndim > 2:
+            found[name] = node
+
+    file.visititems(visit)
+    return _of_array(path, _only(path, inner, found), "HDF5")
+
+
+def _only(path: str, inner: str, found: Mapping[str, Any]) -> tuple[str, Any]:
+    """Return the array that is meant, by its name or as the only one."""
+    if inner in found:
+        return inner, found[inner]
+    if not inner and len(found) == 1:
+        return next(iter(found.items()))
+    known = ", ".join([f"{path}::{name}" for name in sorted(found)][:8])
+    said = f"has no array {inner!r} of three or more dimensions" if inner else "holds several"
+    raise InvalidVolumeError(
+        f"{path} {said}: open one of {known}" if found else f"{path} holds no array of 3 dimensions"
+    )
+
+
+def _of_array(path: str, named: tuple[str, Any], kind: str) -> Store:
+    """Return an array that stands by itself, with what its attributes say of its voxels."""
+    name, array = named
+    axes = _axis_names(array)
+    if axes[-3:] != ("z", "y", "x"):
+        raise UnsupportedError(
+            f"{path}::{name} has the axes {', '.join(axes)}: the last three must be z, y, x; give "
+            "pyvista_vdi.Volume a transposed dask array instead"
+        )
+    attributes = dict(array.attrs)
+    unit, spacing = "", attributes.get("spacing")
+    if "element_size_um" in attributes:
+        unit, spacing = "micrometer", attributes["element_size_um"]
+    try:
+        grid = _grid(array.shape[-3:], spacing, attributes.get("origin"))
+    except _BROKEN as error:
+        raise InvalidVolumeError(
+            f"{path}::{name}: element_size_um, spacing and origin must be three numbers, along "
+            f"z, y and x ({error})"
+        ) from error
+    return Store(path, (Level(name, array, grid),), axes, unit, (), kind)
+
+
+def _axis_names(array: Any) -> tuple[str, ...]:
+    """Return the names that zarr 3, xarray or HDF5 have for an array's axes, or OME's order."""
+    names: Any = getattr(getattr(array, "metadata", None), "dimension_names", None)
+    names = names or array.attrs.get("_ARRAY_DIMENSIONS") or [d.label for d in _dims(array)]
+    short = [{"time": "t", "channel": "c"}.get(str(n).lower(), str(n).lower()) for n in names]
+    if len(short) == array.ndim and set(short) >= {"z", "y", "x"}:
+        return tuple(short)
+    if not 3 <= array.ndim <= len(_AXES):
+        raise InvalidVolumeError(
+            f"a volume has three axes, before them time and channel; got shape {array.shape}"
+        )
+    return _AXES[2:] if array.ndim == 3 else _AXES[-array.ndim :]
+
+
+def _dims(array: Any) -> Any:
+    return getattr(array, "dims", ())
+
+
+def _grid(shape: Sequence[int], spacing: Any = None, origin: Any = None) -> Grid:
+    """Return the grid of points whose numbers are given along z, y and x."""
+    numbers = [(1.0,) * 3 if spacing is None else spacing, (0.0,) * 3 if origin is None else origin]
+    along = [np.asarray(n, dtype=np.float64).ravel()[-3:][::-1].tolist() for n in numbers]
+    (x, y, z), (at_x, at_y, at_z) = along
+    nz, ny, nx = shape
+    return Grid((nx, ny, nz), (x, y, z), (at_x, at_y, at_z), np.eye(3))
+
+
+# -- zarr ------------------------------------------------------------------------------------------
+
+
+def _open_zarr(path: str, inner: str) -> Store:
+    try:
+        import zarr
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"{path} needs zarr ({error}): pip install 'pyvista-vdi[zarr]'"
+        ) from error
+    if int(zarr.__version__.split(".")[0]) < 3 and (Path(path) / "zarr.json").exists():
+        raise UnsupportedError(
+            f"{path} is of zarr's format 3, as OME-Zarr 0.5 is, and zarr {zarr.__version__} reads "
+            "format 2 alone: install zarr 3, which needs Python 3.11 or newer"
+        )
+    try:
+        node: Any = zarr.open(path, mode="r")
+        node = node[inner] if inner else node
+    except Exception as error:  # each version and each kind of store has errors of its own
+        raise InvalidVolumeError(
+            f"{path}{'::' + inner if inner else ''} cannot be read as zarr: {error or 'not there'}"
+        ) from error
+    if hasattr(node, "shape"):
+        return _of_array(path, (inner, node), "zarr")
+    attributes = node.attrs.asdict()
+    if "bioformats2raw.layout" in {*attributes, *attributes.get("ome", {})} and "0" in node:
+        node, inner = node["0"], f"{inner}/0".strip("/")
+        attributes = node.attrs.asdict()
+    described = attributes.get("ome", attributes)
+    if "plate" in described or "well" in described:
+        raise UnsupportedError(f"{path} is a plate of many images: open one, such as {path}::A/1/0")
+    if "multiscales" not in described:
+        arrays = {name: array for name, array in node.arrays() if array.ndim > 2}
+        return _of_array(path, _only(path, inner and "", arrays), "zarr")
+    try:
+        return _multiscale(path, node, described, "ome" in attributes)
+    except _BROKEN as error:
+        if isinstance(error, (InvalidVolumeError, UnsupportedError)):
+            raise
+        raise InvalidVolumeError(
+            f"the metadata of {path} break OME-Zarr ({type(error).__name__}: {error}): write them "
+            "anew, or open an array of it by its name, as x.zarr::0"
+        ) from error
+
+
+def _multiscale(path: str, group: Any, described: Mapping[str, Any], in_ome: bool) -> Store:
+    image = described["multiscales"][0]
+    version = str((described if in_ome else image).get("version", "0.4"))
+    if version not in (("0.5",) if in_ome else ("0.4",)):
+        raise UnsupportedError(
+            f"{path} is of OME-Zarr {version}: 0.4 and 0.5 are read; open an array of it by its "
+            f"name instead ({path}::0), which knows no spacing"
+        )
+    kinds = {"time": "t", "channel": "c"}
+    axes = tuple(kinds.get(axis.get("type"), axis["name"]) for axis in image["axes"])
+    if axes[-3:] != ("z", "y", "x"):
+        raise UnsupportedError(
+            f"{path} has the axes {', '.join(axes)}: the last three must be z, y, x; give "
+            "pyvista_vdi.Volume a transposed dask array instead"
+        )
+    units = [axis.get("unit") for axis in image["axes"][-3:]]
+    factors, unit = _to_one_unit(path, units)
+    levels = []
+    for entry in image["datasets"]:
+        array = group[entry["path"]]
+        scale, translation = _placed(
+            path,
+            len(axes),
+            [
+                *entry["coordinateTransformations"],
+                *image.get("coordinateTransformations", ()),
+            ],
+        )
+        grid = _grid(array.shape[-3:], scale[-3:] * factors, translation[-3:] * factors)
+        levels.append(Level(entry["path"], array, grid))
+    names = [channel.get("label") for channel in described.get("omero", {}).get("channels", ())]
+    return Store(
+        path,
+        tuple(levels),
+        axes,
+        unit,
+        tuple(str(name) for name in names) if all(names) else (),
+        f"OME-Zarr {version}",
+    )
+
+
+def _to_one_unit(path: str, units: Sequence[str | None]) -> tuple[Any, str]:
+    """Return what lengths along z, y, x are multiplied by, and the unit that they then have."""
+    unit = units[-1] or ""
+    if len(set(units)) == 1:
+        return np.ones(3), unit
+    if any(name not in _UNITS for name in units):
+        raise UnsupportedError(
+            f"{path} has lengths in {', '.join(map(str, units))} along z, y, x, of which one is "
+            "not known: write them in one unit"
+        )
+    lengths = np.array([_UNITS[str(name)] for name in units])
+    return lengths / lengths[-1], unit
+
+
+def _placed(
+    path: str, count: int, steps: Sequence[Mapping[str, Any]]
+) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    """Return the scale and the translation that transformations, one after another, make."""
+    scale, translation = np.ones(count), np.zeros(count)
+    for step in steps:
+        kind = step["type"]
+        if kind == "identity":
+            continue
+        if kind not in ("scale", "translation") or kind not in step:
+            raise UnsupportedError(
+                f"{path} places its voxels by a transformation of type {kind!r}: scale and "
+                "translation with numbers are read"
+            )
+        numbers = np.asarray(step[kind], dtype=np.float64)
+        if numbers.shape != (count,):
+            raise ValueError(f"{kind} has {numbers.size} numbers for {count} axes")
+        if kind == "scale":
+            scale, translation = scale * numbers, translation * numbers
+        else:
+            translation = translation + numbers
+    return scale, translation

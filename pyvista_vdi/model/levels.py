@@ -1,0 +1,115 @@
+"""Which level of a multi-scale volume a view requires."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.grid import Geometry
+
+#: How far beyond a plane a corner may lie by rounding; the volume is of size 1, planes of norm 1.
+_ROUNDING = 1e-9
+
+#: Edges of a voxel that differ by less are the same.
+_COARSER = 1.01
+
+
+def nearest_depth(grid: Geometry, camera: Camera, window_size: Sequence[int]) -> float | None:
+    """Return the view depth of the visible part of a grid's box that is nearest to the eye.
+
+    Parameters
+    ----------
+    grid : Geometry
+        Of a volume.
+    camera : Camera
+        V_O.
+    window_size : (int, int)
+        Lists of V_O along x and y.
+
+    Returns
+    -------
+    float or None
+        World units, 0 where the eye is in the box; ``None`` where nothing of it is in the window.
+    """
+    to_view = camera.model_to_view @ grid.index_to_model
+    to_view[:3, :3] *= np.asarray(grid.dimensions) - 1  # the box is [0, 1]³ then
+    viewport = camera.viewport_matrix(window_size) @ to_view
+    box = np.concatenate([np.eye(4)[:3], np.eye(4)[3] - np.eye(4)[:3]])
+    window = [viewport[3] + sign * viewport[axis] for axis in (0, 1) for sign in (1, -1)]
+    planes = np.concatenate([box, window])  # the inside is where planes @ (x, y, z, 1) >= 0
+    planes /= np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
+    # The least depth of a convex body is that of a corner, where three of its planes meet
+    threes = np.array(list(itertools.combinations(planes, 3)))
+    threes = threes[np.abs(np.linalg.det(threes[:, :, :3])) > _ROUNDING]
+    corners = np.linalg.solve(threes[:, :, :3], -threes[:, :, 3:])[..., 0]
+    corners = corners[(corners @ planes[:, :3].T + planes[:, 3] >= -_ROUNDING).all(axis=1)]
+    if not len(corners):
+        return None
+    return max(0.0, float((corners @ to_view[2, :3] + to_view[2, 3]).min()))
+
+
+def nearest_list_width(grid: Geometry, camera: Camera, window_size: Sequence[int]) -> float | None:
+    """Return how wide a list of V_O is where the visible part of a grid is nearest, world units."""
+    depth = nearest_depth(grid, camera, window_size)
+    if depth is None:
+        return None
+    size = np.asarray(check_window_size(window_size))
+    width = float((2 * np.asarray(camera.half_extent(window_size)) / size).min())
+    return width if camera.parallel_projection else width * depth
+
+
+def voxel_edges(grid: Geometry, camera: Camera) -> NDArray[np.float64]:
+    """Return the distances of neighbouring points along x, y and z, world units."""
+    to_world = camera.model_to_view[:3, :3] @ grid.index_to_model[:3, :3]
+    return np.asarray(np.linalg.norm(to_world, axis=0))
+
+
+def required_level(
+    levels: Sequence[Geometry], camera: Camera, window_size: Sequence[int], unit: str = ""
+) -> tuple[int, str]:
+    """Return the level that a view requires, and why.
+
+    It is the finest whose voxels are no finer than half a list's width where the volume is nearest
+    to V_O: what a finer one has more is lost between the lists. Edges of voxels count along the
+    axes in which the next level is coarser: many stores keep their few planes in all levels.
+
+    Parameters
+    ----------
+    levels : sequence of Geometry
+        From the finest to the coarsest.
+    camera : Camera
+        V_O.
+    window_size : (int, int)
+        Lists of V_O along x and y.
+    unit : str
+        What lengths are called.
+
+    Returns
+    -------
+    (int, str)
+        Its number, and a sentence.
+    """
+    width = nearest_list_width(levels[0], camera, window_size)
+    if width is None:
+        return len(levels) - 1, "the coarsest, as V_O sees nothing of the volume"
+    if width == 0:
+        return 0, "the finest, as V_O is in the volume"
+    edges = [voxel_edges(level, camera) for level in levels]
+    unit = unit and f" {unit}"
+    said = [" x ".join(f"{edge:.3g}" for edge in of_level) + unit for of_level in edges]
+    half = f"half a list's width, {width / 2:.3g}{unit} where the volume is nearest to V_O"
+    for k, (now, following) in enumerate(itertools.pairwise(edges)):
+        changing = now[following > _COARSER * now]
+        if changing.max(initial=0) >= width / 2:
+            finer = f"; those of level {k - 1}, {said[k - 1]}, are finer" if k else ""
+            return k, f"voxels of {said[k]} are no finer than {half}{finer}"
+    return len(levels) - 1, (
+        f"the coarsest, voxels of {said[-1]}: those of level {len(levels) - 2}, {said[-2]}, are "
+        f"finer than {half}"
+        if len(levels) > 1
+        else "the only one"
+    )

@@ -1,0 +1,90 @@
+"""The level that a view requires, against widths of lists computed by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.grid import Grid
+from pyvista_vdi.model.levels import nearest_depth, nearest_list_width, required_level
+
+#: A cube from -1 to 1 at four levels: voxels of 2/64, 2/32, 2/16 and 2/8.
+LEVELS = [Grid((n + 1,) * 3, (2 / n,) * 3, (-1.0,) * 3, np.eye(3)) for n in (64, 32, 16, 8)]
+#: tan(45 degrees) = 1: at depth Z the window is 2 Z high.
+FROM_TEN = Camera(position=(0, 0, 10), focal_point=(0, 0, 0), view_up=(0, 1, 0), view_angle=90)
+
+
+def test_width_at_the_nearest_face():
+    # The face is 9 in front of the eye, where 90 lists share 18
+    assert nearest_depth(LEVELS[0], FROM_TEN, (90, 90)) == pytest.approx(9, rel=1e-12)
+    assert nearest_list_width(LEVELS[0], FROM_TEN, (90, 90)) == pytest.approx(0.2, rel=1e-12)
+    assert nearest_list_width(LEVELS[0], FROM_TEN, (180, 90)) == pytest.approx(0.2, rel=1e-12)
+
+
+# Half a list's width at 9 is 9 / lists; voxels are .03125, .0625, .125, .25
+@pytest.mark.parametrize(
+    ("lists", "level"),
+    [(1000, 0), (288, 0), (287, 1), (144, 1), (143, 2), (72, 2), (71, 3), (9, 3)],
+)
+def test_level_is_the_finest_that_is_no_finer_than_half_a_list(lists, level):
+    found, why = required_level(LEVELS, FROM_TEN, (lists, lists), "mm")
+    assert found == level
+    assert "half a list's width" in why
+    assert f"{9 / lists:.3g} mm" in why
+
+
+def test_parallel_lists_are_equally_wide_everywhere():
+    view = FROM_TEN.replace(parallel_projection=True, parallel_scale=3.0)
+    assert nearest_list_width(LEVELS[0], view, (20, 10)) == pytest.approx(0.6)
+    assert required_level(LEVELS, view, (96, 48))[0] == 1  # half a list is .0625
+
+
+def test_a_transform_of_the_model_counts():
+    matrix = np.diag([4.0, 4, 4, 1])
+    far = Camera(
+        position=(0, 0, 40), focal_point=(0, 0, 0), view_up=(0, 1, 0), view_angle=90,
+        model_transform=matrix,
+    )  # fmt: skip
+    for lists in (287, 144, 143):
+        near = required_level(LEVELS, FROM_TEN, (lists, lists))[0]
+        assert required_level(LEVELS, far, (lists, lists))[0] == near
+
+
+def test_only_what_is_in_the_window_is_near():
+    # The cube's edge at x = 1 comes into a window of 90 degrees 2 before the eye, its face at 1
+    view = Camera(position=(3, 0, 2), focal_point=(3, 0, -9), view_up=(0, 1, 0), view_angle=90)
+    assert nearest_depth(LEVELS[0], view, (64, 64)) == pytest.approx(2, rel=1e-12)
+    assert nearest_depth(LEVELS[0], view, (128, 64)) == pytest.approx(1, rel=1e-12)
+    # A turned view, beside points by the dozen
+    view = view.azimuth(25).elevation(-20)
+    points = np.random.default_rng(2).uniform(-1, 1, (400_000, 3))
+    seen = points @ view.view_matrix[:3, :3].T + view.view_matrix[:3, 3]
+    nearest = seen[(np.abs(seen[:, :2]) <= seen[:, 2:]).all(axis=1), 2].min()
+    assert nearest - 0.05 < nearest_depth(LEVELS[0], view, (64, 64)) <= nearest
+
+
+def test_in_the_volume_the_finest_and_past_it_the_coarsest():
+    inside = FROM_TEN.replace(position=(0, 0, 0.5), focal_point=(0, 0, -1))
+    assert required_level(LEVELS, inside, (9, 9)) == (0, "the finest, as V_O is in the volume")
+    away = FROM_TEN.replace(focal_point=(0, 0, 20))
+    level, why = required_level(LEVELS, away, (9000, 9000))
+    assert level == 3
+    assert "sees nothing" in why
+
+
+def test_axes_that_no_level_makes_coarser_do_not_count():
+    # As microscopes have it: planes lie five times as far apart, and all levels keep them
+    def levels(between_planes):
+        return [
+            Grid((n + 1, n + 1, 13), (2 / n, 2 / n, between_planes), (-1,) * 3, np.eye(3))
+            for n in (64, 32, 16)
+        ]
+
+    for between_planes in (10 / 64, 2 / 64):
+        few = levels(between_planes)
+        half = nearest_list_width(few[0], FROM_TEN, (100, 100)) / 2
+        assert 2 / 32 < half < 2 / 16
+        assert required_level(few, FROM_TEN, (100, 100))[0] == 2
+        assert required_level(few[:2], FROM_TEN, (100, 100))[0] == 1
+        assert required_level(few, FROM_TEN, (200, 200))[0] == 1
