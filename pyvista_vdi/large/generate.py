@@ -61,9 +61,13 @@ def vdi_of(
     volume: Volume,
     rows: Sequence[Rows],
     device_name: str,
+    read: int,
     metadata: Mapping[str, Any] | None,
 ) -> VDI:
-    """Return the VDI of finished rows, from the lowest to the highest."""
+    """Return the VDI of finished rows, from the lowest to the highest.
+
+    ``read``: points that were read of the volume, twice where they were.
+    """
     offsets = np.zeros(task.size[0] * task.size[1] + 1, np.uint64)
     np.cumsum(np.concatenate([part.lengths for part in rows]), out=offsets[1:])
     front, back, color, optical_depth = (
@@ -82,7 +86,12 @@ def vdi_of(
         optical_depth,
         task.blocks.grid.bounds,
         depth_origin=depth_origin,
-        metadata={**made_by, "blocks": list(task.blocks.counts), **(metadata or {})},
+        metadata={
+            **made_by,
+            "blocks": list(task.blocks.counts),
+            "points_read": read,
+            **(metadata or {}),
+        },
     ).with_precision(task.options.precision)
 
 
@@ -158,4 +167,5 @@ def generate_chunked(
         report(progress, 0.4 + 0.5 * (k + 1) / len(entering))
     rows = task.merge(0, task.size[1], pieces, device)
     report(progress, 1.0)
-    return vdi_of(task, volume, [rows], get_runtime(device).info.name, metadata)
+    read = blocks.points([*order, *entering])
+    return vdi_of(task, volume, [rows], get_runtime(device).info.name, read, metadata)

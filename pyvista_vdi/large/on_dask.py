@@ -114,7 +114,7 @@ def generate_on_dask(
         run.cancel()
         raise
     names = sorted(set(able.values()))
-    return vdi_of(task, volume, rows, ", ".join(names), metadata)
+    return vdi_of(task, volume, rows, ", ".join(names), run.points_read, metadata)
 
 
 class _Run:
@@ -141,6 +141,7 @@ class _Run:
         memory = sum(known[at]["memory_limit"] or np.inf for at in workers)
         self._kept = volume.array.nbytes <= _SHARE_FOR_VALUES * memory
         self._done = 0.0
+        self.points_read = 0
 
     def rows(self) -> list[Rows]:
         """Return the finished lists, from the lowest rows to the highest."""
@@ -159,8 +160,11 @@ class _Run:
         seen = self._gathered("seen", first, _without_slabs, _SHARES[0])
         if known is None and len(seen) == len(blocks):
             keep_ranges(self._volume, task, seen)
+        entering = light_entering(task, windows, seen)
+        again = () if self._kept else entering
+        self.points_read = blocks.points([*order, *again])
         pieces = {}
-        for block, light in light_entering(task, windows, seen).items():
+        for block, light in entering.items():
             neighbours = blocks.neighbours(block, halo)
             pieces[block] = self._submit(
                 "second-pass",
