@@ -280,6 +280,8 @@ def large_part(options: argparse.Namespace) -> dict[str, Any]:
                 "supersegments": vdi.n_supersegments,
                 "blocks": vdi.metadata["blocks"],
                 "points_read": vdi.metadata["points_read"],
+                "runs_merged": vdi.metadata["runs_merged"],
+                "rays": int((np.diff(vdi.offsets.astype(np.int64)) > 0).sum()),
                 "read_over_visible": vdi.metadata["points_read"] / visible,
                 "visible": visible / volume.array.size,
                 "restarts": len({p for p, _ in before.values()} ^ {p for p, _ in after.values()}),

@@ -61,12 +61,13 @@ def vdi_of(
     volume: Volume,
     rows: Sequence[Rows],
     device_name: str,
-    read: int,
+    counted: Mapping[str, int],
     metadata: Mapping[str, Any] | None,
 ) -> VDI:
     """Return the VDI of finished rows, from the lowest to the highest.
 
-    ``read``: points that were read of the volume, twice where they were.
+    ``counted``: the points that were read of the volume, again where they were, and the runs of
+    all blocks together.
     """
     offsets = np.zeros(task.size[0] * task.size[1] + 1, np.uint64)
     np.cumsum(np.concatenate([part.lengths for part in rows]), out=offsets[1:])
@@ -89,7 +90,7 @@ def vdi_of(
         metadata={
             **made_by,
             "blocks": list(task.blocks.counts),
-            "points_read": read,
+            **counted,
             **(metadata or {}),
         },
     ).with_precision(task.options.precision)
@@ -167,5 +168,8 @@ def generate_chunked(
         report(progress, 0.4 + 0.5 * (k + 1) / len(entering))
     rows = task.merge(0, task.size[1], pieces, device)
     report(progress, 1.0)
-    read = blocks.points([*order, *entering])
-    return vdi_of(task, volume, [rows], get_runtime(device).info.name, read, metadata)
+    counted = {
+        "points_read": blocks.points([*order, *entering]),
+        "runs_merged": sum(len(piece.runs) for piece in pieces),
+    }
+    return vdi_of(task, volume, [rows], get_runtime(device).info.name, counted, metadata)

@@ -114,7 +114,7 @@ def generate_on_dask(
         run.cancel()
         raise
     names = sorted(set(able.values()))
-    return vdi_of(task, volume, rows, ", ".join(names), run.points_read, metadata)
+    return vdi_of(task, volume, rows, ", ".join(names), run.counted, metadata)
 
 
 class _Run:
@@ -141,7 +141,7 @@ class _Run:
         memory = sum(known[at]["memory_limit"] or np.inf for at in workers)
         self._kept = volume.array.nbytes <= _SHARE_FOR_VALUES * memory
         self._done = 0.0
-        self.points_read = 0
+        self.counted: dict[str, int] = {}
 
     def rows(self) -> list[Rows]:
         """Return the finished lists, from the lowest rows to the highest."""
@@ -162,7 +162,7 @@ class _Run:
             keep_ranges(self._volume, task, seen)
         entering = light_entering(task, windows, seen)
         again = () if self._kept else entering
-        self.points_read = blocks.points([*order, *again])
+        self.counted["points_read"] = blocks.points([*order, *again])
         pieces = {}
         for block, light in entering.items():
             neighbours = blocks.neighbours(block, halo)
@@ -178,6 +178,7 @@ class _Run:
         del values, seen
         lengths = self._gathered("lengths", pieces, _lengths, _SHARES[1])
         first.clear()
+        self.counted["runs_merged"] = int(sum(many.sum() for many in lengths.values()))
         return self._merged(windows, pieces, lengths)
 
     def cancel(self) -> None:
