@@ -70,6 +70,7 @@ def main() -> int:
     add_volumes(parser, VOLUMES)
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
     parser.add_argument("--edge", type=int, default=EDGE, help="points of the large volume")
+    parser.add_argument("--known", action="store_true", help="find the ranges of chunks before")
     parser.add_argument("--store", type=Path, help="where the large volume is, or is written to")
     options = parser.parse_args()
     target = options.out / "large.json"
@@ -252,10 +253,11 @@ def large_part(options: argparse.Namespace) -> dict[str, Any]:
 
     with tempfile.TemporaryDirectory() as folder:
         volume = stored(options, folder)
-        volume.chunks._ranges = None
         camera = filling_camera(volume.bounds, options.size)
         with Cluster(WORKER_BYTES) as cluster:
             before = cluster.peaks()
+            if options.known:
+                volume.chunks.found_ranges()
             bar = tqdm(total=1.0, desc="large", leave=False)
             with get_task_stream(client=cluster.client) as stream:
                 start = time.perf_counter()

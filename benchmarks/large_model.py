@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from common import add_size, new_parser  # beside this file
 
-from pyvista_vdi.large.on_dask import _RANGES_PER_WORKER, _ROWS
+from pyvista_vdi.large.on_dask import RANGES_PER_WORKER
+from pyvista_vdi.large.rows import ROWS
 from pyvista_vdi.measure.report import write_text
 
 WORKERS = (1, 2, 4, 16, 64, 256, 1000, 4000, 10_000)
@@ -100,7 +101,7 @@ def simulated(system: System, points: float, size: tuple[int, int], workers: int
     block = system.edge**3
     meetings = rays * CROSSED * along  # of a ray and a block
     reading = block / min(system.link, system.storage / min(workers, n))
-    ranges = min(_RANGES_PER_WORKER * workers, -(-size[1] // _ROWS))
+    ranges = min(RANGES_PER_WORKER * workers, -(-size[1] // ROWS))
     of_a_block = math.ceil(ranges / along) + (ranges > 1)  # ranges that its rows lie in
     runs = meetings * scaled_runs(system)
     exchanged = runs * RUN_BYTES / min(workers, ranges) / system.link * (1 - 1 / workers)
@@ -144,8 +145,8 @@ def report(systems: list[System], options: Any) -> str:
     costs = (
         f"Simulated: {options.points:.0e} points of a byte, {width} x {height} lists. One core: "
         f"{1 / one.first:.2e} points a second in the first pass, {1 / one.second:.2e} in the "
-        f"second, {1 / one.merge:.2e} runs merged; {one.runs:.1f} runs of a ray in a block of 256^3; the "
-        f"scheduler {one.task * 1e3:g} ms a task."
+        f"second, {1 / one.merge:.2e} runs merged; {one.runs:.1f} runs of a ray in a block of "
+        f"256^3; the scheduler {one.task * 1e3:g} ms a task."
     )
     lines = [costs]
     for system in systems:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -142,12 +142,6 @@ class Blocks:
     def own(self, block: Indices) -> tuple[slice, ...]:
         """Return where a block's own points lie in the grid, (z, y, x)."""
         return tuple(slice(cuts[k], cuts[k + 1]) for cuts, k in zip(self.cuts, block, strict=True))
-
-    def points(self, blocks: Iterable[Indices]) -> int:
-        """Return how many points some blocks own, together."""
-        return sum(
-            math.prod(part.stop - part.start for part in self.own(block)) for block in blocks
-        )
 
     def ranges(
         self, block: Indices, values: Values

@@ -14,6 +14,7 @@ from pyvista_vdi.generation.generate import Progress, made_from, report
 from pyvista_vdi.generation.list_arrays import require_room
 from pyvista_vdi.large.blocks import BLOCK_BYTES, Blocks, Indices
 from pyvista_vdi.large.passes import Piece, Rows, Seen, Task, light_entering
+from pyvista_vdi.large.reading import Plan
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.chunked import Ranges
 from pyvista_vdi.model.options import GenerationOptions
@@ -23,6 +24,15 @@ from pyvista_vdi.model.volume import Volume
 
 #: Where a block is of which V_O sees nothing.
 NOWHERE = Rectangle(0, 0, 0, 0)
+
+
+def refuse_unsupported(name: str, options: GenerationOptions) -> None:
+    """Refuse what blocks cannot do."""
+    if options.ambient_occlusion is not None:
+        raise UnsupportedError(
+            f"ambient occlusion needs the volume {name!r} in one piece: leave "
+            "ambient_occlusion out, or load the volume (volume.load()) where it fits"
+        )
 
 
 def task_of(
@@ -41,11 +51,7 @@ def task_of(
     UnsupportedError
         If ambient occlusion is asked for.
     """
-    if options.ambient_occlusion is not None:
-        raise UnsupportedError(
-            f"ambient occlusion needs the volume {volume.name!r} in one piece: leave "
-            "ambient_occlusion out, or load the volume (volume.load()) where it fits"
-        )
+    refuse_unsupported(volume.name, options)
     width, height = check_window_size(window_size)
     require_room(0, (width, height))
     point_bytes = volume.array.dtype.itemsize * (4 if volume.rgba else 1)
@@ -150,9 +156,10 @@ def generate_chunked(
     seen: dict[Indices, Seen] = {}
     known = known_ranges(volume)
     order = task.to_read(windows, known)
+    reading = Plan.of(task, volume.array, known)
     for k, block in enumerate(order):
         window = windows.get(block, NOWHERE)
-        seen[block] = task.first_pass(block, volume.array[blocks.own(block)], window, device)
+        seen[block] = task.first_pass(block, reading.read(block)(), window, device)
         report(progress, 0.4 * (k + 1) / len(order))
     if known is None and len(seen) == len(blocks):
         keep_ranges(volume, task, seen)
@@ -163,13 +170,13 @@ def generate_chunked(
             offset: halo.from_slabs(seen[other].slabs, offset)
             for offset, other in blocks.neighbours(block, halo).items()
         }
-        values = blocks.with_halo(volume.array[blocks.own(block)], parts, halo)
+        values = blocks.with_halo(reading.read(block)(), parts, halo)
         pieces.append(task.second_pass(block, values, windows[block], light, device))
         report(progress, 0.4 + 0.5 * (k + 1) / len(entering))
     rows = task.merge(0, task.size[1], pieces, device)
     report(progress, 1.0)
     counted = {
-        "points_read": blocks.points([*order, *entering]),
+        "points_read": sum(reading.read(block).points for block in [*order, *entering]),
         "runs_merged": sum(len(piece.runs) for piece in pieces),
     }
     return vdi_of(task, volume, [rows], get_runtime(device).info.name, counted, metadata)

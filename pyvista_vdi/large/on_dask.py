@@ -41,6 +41,8 @@ from pyvista_vdi.large.generate import (
     vdi_of,
 )
 from pyvista_vdi.large.passes import Piece, Rows, Seen, Task, light_entering
+from pyvista_vdi.large.reading import Plan, Read
+from pyvista_vdi.large.rows import balanced
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -54,10 +56,8 @@ _SHARE_FOR_VALUES = 0.25
 _OURS = (DeviceMemoryError, InvalidVolumeError, NoDeviceError, VDIFileError)
 #: Times that Dask tries again what a lost worker was at.
 _RETRIES = 3
-#: Rows of lists are shared out in multiples of this.
-_ROWS = 4
 #: Ranges of rows for each worker, so that one with more to do does not keep all others waiting.
-_RANGES_PER_WORKER = 4
+RANGES_PER_WORKER = 4
 #: Shares of the two passes and of the merging in what is reported.
 _SHARES = (0.4, 0.4, 0.2)
 #: A worker's threads do one block after the other: a block's memory is needed once.
@@ -150,7 +150,11 @@ class _Run:
         windows = blocks.windows(task.camera, task.size)
         known = known_ranges(self._volume)
         order = task.to_read(windows, known)
-        values = {block: self._values(block) for block in order}
+        chunks = self._volume.chunks
+        lazy = chunks is not None and chunks.lazy is not None  # Dask knows what it computes
+        reading = Plan.of(task, self._volume.array, None if lazy else known)
+        reads = {block: reading.read(block) for block in order}
+        values = {block: self._values(block, read) for block, read in reads.items()}
         first = {
             block: self._submit(
                 "first-pass", block, _first_pass, values[block], windows.get(block, NOWHERE)
@@ -162,7 +166,7 @@ class _Run:
             keep_ranges(self._volume, task, seen)
         entering = light_entering(task, windows, seen)
         again = () if self._kept else entering
-        self.counted["points_read"] = blocks.points([*order, *again])
+        self.counted["points_read"] = sum(reads[block].points for block in [*order, *again])
         pieces = {}
         for block, light in entering.items():
             neighbours = blocks.neighbours(block, halo)
@@ -185,14 +189,13 @@ class _Run:
         """Give up what has not been done."""
         self._client.cancel(self._futures, force=True)
 
-    def _values(self, block: Indices) -> Any:
+    def _values(self, block: Indices, read: Read) -> Any:
         """Return a block's points, as a future where they are kept, or what reads them."""
-        array, box = self._volume.chunks, self._task.blocks.own(block)
+        array = self._volume.chunks
         if array is None:
-            return self._volume.array[box].copy()  # goes with the task
+            return read().copy()  # goes with the task
         if array.lazy is not None:
-            return self._client.compute(array.lazy[box], **self._where)
-        read = _Read(array, box)
+            return self._client.compute(array.lazy[read.box], **self._where)
         if not self._kept:
             return read
         key = (f"read-{self._token}", *block)
@@ -248,7 +251,7 @@ class _Run:
             window = windows[block]
             of_rows[window.y0 : window.y1] += many
         merged = {}
-        for y0, y1 in balanced(of_rows, _RANGES_PER_WORKER * len(self._workers)):
+        for y0, y1 in balanced(of_rows, RANGES_PER_WORKER * len(self._workers)):
             parts = [
                 self._submit("rows", (*block, y0), _rows, pieces[block], y0, y1)
                 for block in pieces
@@ -280,27 +283,6 @@ class _Run:
     def _report(self, share: float) -> None:
         self._done = min(self._done + share, 1.0)
         report(self._progress, self._done)
-
-
-class _Read:
-    """Points of an array that whoever needs them reads."""
-
-    def __init__(self, array: Any, box: tuple[slice, ...]) -> None:
-        self.array, self.box = array, box
-
-    def __call__(self) -> Values:
-        values: Values = self.array[self.box]
-        return values
-
-
-def balanced(weights: NDArray[np.int64], parts: int) -> Iterator[tuple[int, int]]:
-    """Cut rows into ranges of like weight, each of whole groups of four rows but the last."""
-    groups = -(-len(weights) // _ROWS)
-    sums = np.add.reduceat(weights, np.arange(0, len(weights), _ROWS)).cumsum()
-    wanted = np.arange(1, parts) * (sums[-1] / parts)
-    cuts = np.unique([0, *np.searchsorted(sums, wanted, side="right"), groups])
-    for first, last in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
-        yield first * _ROWS, min(last * _ROWS, len(weights))
 
 
 def _workers_with_device(
@@ -373,7 +355,7 @@ def _lengths(piece: Piece) -> NDArray[np.int64]:
 
 
 def _at_hand(values: Any) -> Values:
-    found: Values = values() if isinstance(values, _Read) else values
+    found: Values = values() if isinstance(values, Read) else values
     return found
 
 

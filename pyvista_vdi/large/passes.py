@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.device.constants import RUN_WORDS
@@ -203,17 +203,21 @@ class Task:
         """
         return _merged(self, get_runtime(device), y0, y1, [p.rows(y0, y1) for p in pieces])
 
-    def may_be_visible(self, low: float, high: float) -> bool:
+    def may_be_visible(self, low: ArrayLike, high: ArrayLike) -> NDArray[np.bool_]:
         """Whether anything between two scalars is not transparent; not where they are NaN."""
-        if not low <= high:
-            return False
         table = self.transfer_function.opacities
         first, last = self.transfer_function.scalar_range
         per_scalar = (len(table) - 1) / (last - first) if last > first else np.inf
         with np.errstate(invalid="ignore"):
-            at = np.nan_to_num((np.array([low, high]) - first) * per_scalar)
-        begin, end = np.clip([np.floor(at[0] - 1e-3), np.ceil(at[1] + 1e-3)], 0, len(table) - 1)
-        return bool((table[int(begin) : int(end) + 1] > 0).any())
+            at = np.nan_to_num((np.array([low, high], np.float64) - first) * per_scalar)
+        # A thousandth of an entry on either side covers the rounding of scalars
+        begin = np.clip(np.floor(at[0] - 1e-3), 0, len(table) - 1).astype(int)
+        end = np.clip(np.ceil(at[1] + 1e-3), 0, len(table) - 1).astype(int)
+        before = np.concatenate([[0], np.cumsum(table > 0)])
+        found: NDArray[np.bool_] = (before[end + 1] > before[begin]) & (
+            np.asarray(low) <= np.asarray(high)
+        )
+        return found
 
     def visible(self, block: Indices, seen: Mapping[Indices, Seen]) -> bool:
         """Whether anything in a block's cells may be visible, of what the first pass has found.
@@ -228,7 +232,7 @@ class Task:
             if other in seen:
                 ends.append(seen[other].ends[axis, offset[axis]])
         low, high = zip(*ends, strict=True)
-        return self.may_be_visible(np.fmin.reduce(low), np.fmax.reduce(high))
+        return bool(self.may_be_visible(np.fmin.reduce(low), np.fmax.reduce(high)))
 
     def to_read(
         self,

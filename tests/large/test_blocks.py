@@ -288,6 +288,50 @@ def test_known_ranges_leave_blocks_unread():
     assert set(light_entering(task, windows, seen)) <= set(some)
 
 
+class Store:
+    """A zarr array, as far as volumes know, that counts the points that are read."""
+
+    chunks = (8, 8, 8)
+
+    def __init__(self, values):
+        self.values, self.shape, self.dtype, self.points = values, values.shape, values.dtype, 0
+
+    def __getitem__(self, box):
+        part = self.values[box]
+        self.points += part.size
+        return part
+
+
+Store.__module__ = "zarr.test"
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
+def test_what_nothing_shows_of_is_read_once(default_runtime, interpolation):
+    """The second VDI of a store knows its ranges: bytes that are not read change no bit of it."""
+    rng = np.random.default_rng(8)
+    values = np.zeros((48, 40, 40), np.uint8)
+    values[:20] = rng.integers(1, 9, (20, 40, 40))  # noise of which nothing shows
+    values[14:30, 10:20, 5:30] = rng.integers(100, 200, (16, 10, 25))
+    store = Store(values)
+    volume = Volume(store)
+    opacities = np.where(np.arange(256) < 50, 0, 0.3)
+    function = TransferFunction(np.ones((256, 3)), opacities, (0, 255), interpolation=interpolation)
+    camera = VIEWS["all of it"](volume)
+    read, made = [], []
+    for _ in range(2):
+        store.points = 0
+        vdi = generate_chunked(volume, camera, WINDOW, function, block_bytes=16**3)
+        assert vdi.metadata["points_read"] == store.points
+        read.append(store.points)
+        made.append(vdi)
+    assert read[0] > values.size
+    assert read[1] < 0.6 * read[0]  # most of the noise is, where it touches what is seen
+    for name in ("offsets", "front", "back", "color", "optical_depth"):
+        np.testing.assert_array_equal(getattr(made[0], name), getattr(made[1], name), name)
+    whole = generate_vdi(Volume(values), camera, WINDOW, function)
+    np.testing.assert_allclose(ray_depths(made[1]), ray_depths(whole), rtol=2.4e-5, atol=1e-7)
+
+
 def test_what_cannot_be_done_in_blocks_is_refused():
     volume = volume_of("uint8")
     camera = VIEWS["all of it"](volume)

@@ -17,7 +17,8 @@ from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 from pyvista_vdi import Volume
 from pyvista_vdi.errors import Cancelled, DeviceError, NoDeviceError, VDIWarning
 from pyvista_vdi.large.generate import generate_chunked
-from pyvista_vdi.large.on_dask import balanced, generate_on_dask
+from pyvista_vdi.large.on_dask import generate_on_dask
+from pyvista_vdi.large.rows import balanced
 
 ARRAYS = ("offsets", "front", "back", "color", "optical_depth")
 

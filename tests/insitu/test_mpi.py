@@ -1,0 +1,126 @@
+"""Blocks with four ranks of Open MPI, and a simulation that hands them in."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.insitu import InSitu
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.quality.probe import turned
+
+PROGRAM = Path(__file__).parents[1] / "support" / "mpi_program.py"
+
+needs_mpi = pytest.mark.skipif(
+    shutil.which("mpirun") is None or find_spec("mpi4py") is None,
+    reason="needs mpirun (Debian: openmpi-bin) and mpi4py (extra: mpi)",
+)
+
+
+def run(case, folder):
+    mpirun = ["mpirun", "--oversubscribe", "--allow-run-as-root", "-n", "4"]
+    done = subprocess.run(
+        [*mpirun, sys.executable, PROGRAM, case, folder],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@needs_mpi
+def test_four_ranks_make_the_vdi_of_the_same_blocks(tmp_path, default_runtime):
+    run("same", tmp_path)
+    found = pvdi.read(tmp_path / "mpi.vdi")
+    volume = volume_of("uint8")
+    function = transfer_for(volume, "linear", gradient_opacities=[0.2, 1], gradient_range=(0, 30))
+    camera = VIEWS["all of it"](volume)
+    whole = generate_vdi(
+        volume, camera, WINDOW, function, max_supersegments=8, device=default_runtime.info.selector
+    )
+    assert found.metadata["blocks"] == [2, 1, 2]
+    assert found.n_supersegments > 1000
+    # float32 sums of up to 200 steps, in another order: 200 x 2^-24, and as much for the other
+    np.testing.assert_allclose(ray_depths(found), ray_depths(whole), rtol=2.4e-5, atol=1e-7)
+    view = turned(camera, volume.bounds, 5)
+    assert compare_images(*(pvdi.render(vdi, view) for vdi in (found, whole))).ssim > 0.99
+
+
+def ray_depths(vdi):
+    sums = np.concatenate([[0], np.cumsum(vdi.optical_depth, dtype=np.float64)])
+    return np.diff(sums[vdi.offsets.astype(np.int64)])
+
+
+@needs_mpi
+def test_what_fails_on_one_rank_is_said_by_all(tmp_path):
+    run("failing", tmp_path)
+
+
+@needs_mpi
+def test_a_simulation_writes_a_series_and_single_files(tmp_path):
+    run("series", tmp_path)
+    series = pvdi.read(tmp_path / "run.vdis")
+    assert list(series.times) == [0.0, 1.0]
+    assert sorted(path.name for path in tmp_path.glob("*.vdi")) == ["s00.vdi", "s02.vdi"]
+    for k, name in enumerate(("s00.vdi", "s02.vdi")):
+        single = pvdi.read(tmp_path / name)
+        assert single.n_supersegments > 1000
+        np.testing.assert_array_equal(series[k].front, single.front)
+        np.testing.assert_array_equal(series[k].optical_depth, single.optical_depth)
+
+
+class OneRank:
+    """A communicator of one."""
+
+    rank, size = 0, 1
+
+    def allgather(self, value):
+        return [value]
+
+    gather = alltoall = allgather
+
+    def alltoall(self, values):  # noqa: F811
+        return values
+
+    def scatter(self, values):
+        return values[0]
+
+    def bcast(self, value):
+        return value
+
+
+def test_one_rank_is_one_piece(tmp_path, default_runtime):
+    volume = volume_of("uint8")
+    camera = VIEWS["all of it"](volume)
+    path = str(tmp_path / "{}.vdi")
+    options = {"clim": (0, 200), "precision": "exact", "device": default_runtime.info.selector}
+    with InSitu(path, camera, WINDOW, volume.dimensions, comm=OneRank(), **options) as show:
+        show(volume.array, (0, 0, 0), 0.0)
+    found = pvdi.read(tmp_path / "0.vdi")
+    expected = pvdi.generate(volume, camera, WINDOW, **options)
+    assert found.n_supersegments == expected.n_supersegments
+    np.testing.assert_array_equal(found.front, expected.front)
+
+
+def test_what_is_missing_is_said(tmp_path):
+    camera = VIEWS["all of it"](volume_of("uint8"))
+    arguments = (camera, WINDOW, (8, 8, 8))
+    with pytest.raises(InvalidArgumentError, match="clim"):
+        InSitu(tmp_path / "x.vdis", *arguments, comm=OneRank())
+    with pytest.raises(InvalidArgumentError, match="place for the step"):
+        InSitu(tmp_path / "x.vdi", *arguments, comm=OneRank(), clim=(0, 1))
+    with pytest.raises(InvalidArgumentError, match="every"):
+        InSitu(tmp_path / "x.vdis", *arguments, comm=OneRank(), clim=(0, 1), every=0)
+    with pytest.raises(TypeError, match="colour"):
+        InSitu(tmp_path / "x.vdis", *arguments, comm=OneRank(), clim=(0, 1), colour="red")
