@@ -23,7 +23,8 @@ VDI_FILE = (
 
 VOLUME_FILE = (
     "a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), .npy, a raw file "
-    "named like x_1024x1024x795_uint8.raw, or a folder of slices (DICOM, TIFF or PNG)"
+    "named like x_1024x1024x795_uint8.raw, a folder of slices (DICOM, TIFF or PNG), or a store of "
+    "chunks (.ome.zarr, .zarr, x.h5::/path)"
 )
 
 # -- types of options ------------------------------------------------------------------------------
@@ -65,6 +66,20 @@ def parse_count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"expected a whole number above 0; got {text!r}")
     return int(text)
+
+
+def parse_level(text: str) -> int | str:
+    """Return ``"auto"``, or a level's number."""
+    if text != "auto" and not text.isdecimal():
+        raise argparse.ArgumentTypeError(
+            f"expected auto, or a level's number from 0, the finest; got {text!r}"
+        )
+    return text if text == "auto" else int(text)
+
+
+def parse_channel(text: str) -> int | str:
+    """Return a channel's number, or its name."""
+    return int(text) if text.isdecimal() else text
 
 
 def parse_port(text: str) -> int:
@@ -181,6 +196,15 @@ def _file_or_example(
     text = "between voxels, in place of what the volume's file says (1 where it says nothing)"
     option(options, "--spacing", text, xyz, float, nargs=3)
     option(options, "--origin", "of its first voxel, in the same way", xyz, float, nargs=3)
+    store(options)
+
+
+def store(options: Options) -> None:
+    """Add what is taken of a store of chunks."""
+    text = "of a multi-scale store: 0 is the finest; auto (default): what the view requires"
+    option(options, "--level", text, "auto|N", parse_level)
+    option(options, "--channel", "of a store (default: 0)", "N|NAME", parse_channel)
+    option(options, "--time-index", "of a store: which step (default: 0)", "N", int)
 
 
 def array(options: Options) -> None:
@@ -345,7 +369,7 @@ def file_format(parser: argparse.ArgumentParser) -> None:
         choices=("lz4", "zstd", "deflate", "zips", "zlib", "lzma", "none"),
     )
     level = "1 (fast) to 9 (small); by default 9 for lz4, 6 for deflate, 1 for others"
-    option(group, "--level", level, "N", int)
+    option(group, "--compression-level", level, "N", int)
     option(
         group,
         "--precision",
@@ -357,6 +381,12 @@ def file_format(parser: argparse.ArgumentParser) -> None:
     standard = "leave out of an .exr what makes it exact: tau, and corrections"
     switch(group, "--standard-channels", standard)
     switch(group, "--linear", "write an .exr's colours as linear light, for compositing")
+
+
+def scheduler(options: Options) -> None:
+    """Add the cluster."""
+    text = "of a store: its VDI is made by the workers of the Dask cluster with this scheduler"
+    option(options, "--scheduler", text, "ADDRESS")
 
 
 def device(options: Options) -> None:

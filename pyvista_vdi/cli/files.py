@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from pyvista_vdi.cli.text import mebibytes, plain_number, table, vector
+from pyvista_vdi.io.stores import StoredVolume
 
 if TYPE_CHECKING:
     from pyvista_vdi.io import FileInfo
@@ -40,7 +41,7 @@ def info(options: argparse.Namespace) -> int:
 
         return sets.info(options)
     if is_volume(options):
-        rows = _of_volume(read_volume(options))
+        rows = _of_volume(read_volume(options, in_chunks=True))
         source = options.file or volume_name(options)
         print(json.dumps(rows, indent=1) if options.json else _volume_text(source, rows))
         return 0
@@ -88,17 +89,34 @@ def convert(options: argparse.Namespace) -> int:
 
 
 def _of_volume(volume: Volume) -> dict[str, Any]:
-    low, high = volume.finite_range()
-    return {
+    # What all chunks hold is not read for this: there may be terabytes
+    known = volume.chunks is None or volume.chunks.ranges() is not None
+    rows = {
         "dimensions": volume.dimensions,
         "scalars": volume.name,
         "type": f"{volume.array.dtype}{', RGBA' if volume.rgba else ''}",
-        "range": (low, high),
+        "range": volume.finite_range() if known else None,
         "spacing": volume.spacing,
         "origin": volume.origin,
         "direction": volume.direction.tolist(),
         "bounds": volume.bounds,
         "memory_bytes": volume.array.nbytes,
+    }
+    return {**rows, "store": _of_store(volume)} if isinstance(volume, StoredVolume) else rows
+
+
+def _of_store(volume: StoredVolume) -> dict[str, Any]:
+    store, array = volume.store, volume.chunks
+    return {
+        "kind": store.kind,
+        "unit": store.unit,
+        "axes": dict(zip(store.axes, store.levels[0].array.shape, strict=True)),
+        "channels": store.channels,
+        "chunks": array.chunks[::-1] if array else (),
+        "levels": [
+            {"path": one.path, "dimensions": one.grid.dimensions, "spacing": one.grid.spacing}
+            for one in store.levels
+        ],
     }
 
 
@@ -111,14 +129,31 @@ def _volume_text(source: str, about: dict[str, Any]) -> str:
             "volume": source,
             "points": " x ".join(str(n) for n in about["dimensions"]),
             "scalars": f"{about['scalars']}, {about['type']}, "
-            f"{about['range'][0]:g} to {about['range'][1]:g}",
+            + ("{:g} to {:g}".format(*about["range"]) if about["range"] else "range not known yet"),
             "spacing": vector(about["spacing"]),
             "origin": vector(about["origin"]),
             **({"axes": ", ".join(vector(axis) for axis in axes)} if turned else {}),
             "bounds": vector(about["bounds"]),
             "in memory": mebibytes(about["memory_bytes"]),
+            **(_store_rows(about["store"]) if "store" in about else {}),
         }
     )
+
+
+def _store_rows(store: dict[str, Any]) -> dict[str, str]:
+    axes = ", ".join(f"{count} along {axis}" for axis, count in store["axes"].items())
+    unit = f"; lengths in {store['unit']}" if store["unit"] else ""
+    levels = {
+        f"level {k}": f"{' x '.join(str(n) for n in level['dimensions'])} points, spacing "
+        f"{vector(level['spacing'])}"
+        for k, level in enumerate(store["levels"])
+    }
+    return {
+        "store": f"{store['kind']}: {axes}{unit}",
+        "chunks": " x ".join(str(n) for n in store["chunks"]),
+        **({"channels": ", ".join(store["channels"])} if store["channels"] else {}),
+        **levels,
+    }
 
 
 def _text(about: FileInfo) -> str:

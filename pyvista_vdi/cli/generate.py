@@ -17,8 +17,11 @@ from pyvista_vdi.cli.inputs import (
     read_volume,
     say_vdi,
 )
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.generation.estimate import estimate
 from pyvista_vdi.io import checked_target
+from pyvista_vdi.io.stores import StoredVolume
+from pyvista_vdi.large.entrance import connected
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
@@ -39,29 +42,34 @@ def generate(options: argparse.Namespace) -> int:
     arguments = classification(options)
     looks = Classification(arguments, "generate")  # refused before the volume is read
     occlusion = ambient_occlusion(options)
-    volume = read_volume(options)
+    volume = read_volume(options, in_chunks=True)
     view = generating_view(options, volume)
-    needed = estimate(
-        volume,
-        options.size,
-        max_supersegments=options.max_supersegments,
-        criterion=options.criterion,
-        ambient_occlusion=occlusion,
-        memory_limit=options.memory_limit,
-        transfer_function=looks.transfer_function(volume),
-    )
+    if isinstance(volume, StoredVolume):
+        level = "auto" if options.level is None else options.level
+        volume = volume.at_level(level, view, options.size)
+        print(volume.describe(), file=sys.stderr)
+    if options.scheduler is not None and not volume.chunked:
+        raise UnsupportedError("--scheduler is for stores of chunks, such as x.ome.zarr")
+    nx, ny, nz = volume.dimensions
     width, height = options.size
-    print(
-        f"{volume.dimensions[0]} x {volume.dimensions[1]} x {volume.dimensions[2]} points, "
-        + (
-            f"{width} x {height} lists: up to {needed.total / 2**20:.0f} MiB"
-            if dial is None
-            else f"pictures of {width} x {height}: settings are chosen by a measurement"
-        ),
-        file=sys.stderr,
-    )
+    if volume.chunked:
+        needed = f"{width} x {height} lists: block by block"
+    elif dial is not None:
+        needed = f"pictures of {width} x {height}: settings are chosen by a measurement"
+    else:
+        most = estimate(
+            volume,
+            options.size,
+            max_supersegments=options.max_supersegments,
+            criterion=options.criterion,
+            ambient_occlusion=occlusion,
+            memory_limit=options.memory_limit,
+            transfer_function=looks.transfer_function(volume),
+        )
+        needed = f"{width} x {height} lists: up to {most.total / 2**20:.0f} MiB"
+    print(f"{nx} x {ny} x {nz} points, {needed}", file=sys.stderr)
     start = time.perf_counter()
-    with measuring("generating a VDI") as bar:
+    with connected(options.scheduler) as client, measuring("generating a VDI") as bar:
         vdi = generate_vdi(
             volume,
             view,
@@ -75,6 +83,7 @@ def generate(options: argparse.Namespace) -> int:
             **asked,
             ambient_occlusion=occlusion,
             memory_limit=options.memory_limit,
+            client=client,
             device=options.device,
             progress=bar,
             **arguments,

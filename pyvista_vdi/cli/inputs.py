@@ -15,8 +15,10 @@ from typing import Any, TypeVar
 from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
 from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file
+from pyvista_vdi.io.stores import StoredVolume, is_store, open_volume
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -40,13 +42,28 @@ _CLASSIFICATION = (
 #: Options that say how a volume's file is read.
 _OF_A_VOLUME = ("scalars", "preference", "spacing", "origin")
 
+#: Options that say what is taken of a store of chunks.
+_OF_A_STORE = ("level", "channel", "time_index")
 
-def read_volume(options: argparse.Namespace) -> Volume:
-    """Return the volume that is named, with the scalars, the spacing and the origin asked for."""
-    if options.example is not None:
+
+def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volume:
+    """Return the volume that is named, with the scalars, the spacing and the origin asked for.
+
+    A store is read whole, unless ``in_chunks``.
+    """
+    if options.example is None and is_store(options.file):
+        volume: Any = _open_store(options)
+        if not in_chunks:
+            volume = _loaded(volume)
+    elif any(getattr(options, name) is not None for name in _OF_A_STORE):
+        name = next(n for n in _OF_A_STORE if getattr(options, n) is not None).replace("_", "-")
+        raise UnsupportedError(
+            f"--{name} is for stores of chunks, such as x.ome.zarr, and this is none: leave it out"
+        )
+    elif options.example is not None:
         from pyvista_vdi import examples
 
-        volume: Any = examples.load_data(options.example, as_volume=True)
+        volume = examples.load_data(options.example, as_volume=True)
     else:
         from pyvista_vdi.measure.volumes import read_file
 
@@ -61,6 +78,21 @@ def read_volume(options: argparse.Namespace) -> Volume:
         taken.direction,
         name=taken.name,
     )
+
+
+def _open_store(options: argparse.Namespace) -> StoredVolume:
+    return open_volume(
+        options.file,
+        level="auto" if options.level is None else options.level,
+        channel=0 if options.channel is None else options.channel,
+        time=0 if options.time_index is None else options.time_index,
+    )
+
+
+def _loaded(volume: StoredVolume) -> Volume:
+    remedy = "take a coarser level by --level, or make a VDI of it (pyvista-vdi generate)"
+    require_free_memory(volume.array.nbytes, f"the volume in {volume.store.path}", remedy)
+    return volume.load()
 
 
 def is_series(options: argparse.Namespace) -> bool:
@@ -83,10 +115,11 @@ def is_volume(options: argparse.Namespace) -> bool:
         return True
     if not (is_vdi_file(options.file) or is_series(options) or is_set(options)):
         return True
-    given = [n for n in _OF_A_VOLUME if getattr(options, n) is not None]
+    given = [n for n in (*_OF_A_VOLUME, *_OF_A_STORE) if getattr(options, n) is not None]
     if given:
+        name = given[0].replace("_", "-")
         raise UnsupportedError(
-            f"{printable(options.file)} is a VDI: --{given[0]} is for volumes, leave it out"
+            f"{printable(options.file)} is a VDI: --{name} is for volumes, leave it out"
         )
     return False
 
@@ -204,10 +237,16 @@ def given_camera(options: argparse.Namespace) -> Camera | None:
     return _from_json(options.camera_json, Camera.from_dict, "camera")
 
 
+def of_the_file(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the arguments of a file that were given; ``--level`` is that of a volume's store."""
+    names = {"compression": "compression", "compression_level": "level", "precision": "precision"}
+    values = {argument: getattr(options, name) for name, argument in names.items()}
+    return {argument: value for argument, value in values.items() if value is not None}
+
+
 def file_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments of ``VDI.save`` that the options stand for; refused now, not later."""
-    names = ("compression", "level", "precision")
-    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    given = of_the_file(options)
     if options.standard_channels:
         given["exact"] = False
     if options.linear:

@@ -155,6 +155,7 @@ def _add_generate(parser: argparse.ArgumentParser) -> None:
     declare.limits(parser)
     declare.dial(parser)
     declare.file_format(parser)
+    declare.scheduler(parser)
     declare.device(parser)
 
 
@@ -296,13 +297,14 @@ def _add_series(parser: argparse.ArgumentParser) -> None:
     declare.option(group, "--precision", text, choices=PRECISIONS)
     text = "zstd (default), lz4, deflate or none"
     declare.option(group, "--compression", text, choices=("zstd", "lz4", "deflate", "none"))
-    declare.option(group, "--level", "1 (fast) to 9 (small)", "N", int)
+    declare.option(group, "--compression-level", "1 (fast) to 9 (small)", "N", int)
     group = parser.add_argument_group("volumes", "What VDIs are made of them; not for VDIs.")
     xyz = ("X", "Y", "Z")
     declare.option(
         group, "--spacing", "between voxels, in place of the files'", xyz, float, nargs=3
     )
     declare.option(group, "--origin", "of the first voxel, likewise", xyz, float, nargs=3)
+    declare.store(group)
     declare.size(group, WINDOW_SIZE)
     declare.longest(group, "longest list (default: 20)")
     declare.step(group, "step along the ray, model units (default: half the smallest spacing)")

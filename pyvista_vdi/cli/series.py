@@ -9,7 +9,14 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi.cli.inputs import classification, measuring, part, read_volume, say_written
+from pyvista_vdi.cli.inputs import (
+    classification,
+    measuring,
+    of_the_file,
+    part,
+    read_volume,
+    say_written,
+)
 from pyvista_vdi.cli.text import mebibytes, printable, table, vector
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.io import check_write_options, checked_target
@@ -22,9 +29,6 @@ from pyvista_vdi.series import reader
 from pyvista_vdi.series.layout import SUFFIX
 from pyvista_vdi.series.series import VDISeries
 from pyvista_vdi.series.writer import SeriesWriter
-
-#: Options of the file, which are arguments of the same name.
-_OF_THE_FILE = ("precision", "compression", "level")
 
 
 def series(options: argparse.Namespace) -> int:
@@ -147,7 +151,7 @@ def info(options: argparse.Namespace) -> int:
 
 def file_arguments(options: argparse.Namespace) -> dict[str, Any]:
     """Return the options of the file that were given."""
-    return {n: getattr(options, n) for n in _OF_THE_FILE if getattr(options, n) is not None}
+    return of_the_file(options)
 
 
 def convert(options: argparse.Namespace, arguments: dict[str, Any]) -> int:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
-from pyvista_vdi.errors import MissingDependencyError
+from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
 from pyvista_vdi.large.generate import generate_chunked
 from pyvista_vdi.model.vdi import VDI
 
@@ -22,7 +24,40 @@ def generate_in_blocks(*arguments: Any, client: Any = None, **options: Any) -> V
     try:
         from pyvista_vdi.large.on_dask import generate_on_dask
     except ImportError as error:
-        raise MissingDependencyError(
-            f"a cluster needs dask.distributed ({error}): pip install 'pyvista-vdi[dask]'"
-        ) from error
+        raise _without_dask(error) from error
     return generate_on_dask(*arguments, client=client, **options)
+
+
+@contextmanager
+def connected(address: str | None) -> Iterator[Any]:
+    """Connect to the Dask scheduler at an address; ``None`` is the client of none.
+
+    Raises
+    ------
+    MissingDependencyError
+        If dask.distributed is not installed.
+    InvalidArgumentError
+        If no scheduler answers.
+    """
+    if address is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise _without_dask(error) from error
+    try:
+        client = Client(address)
+    except (OSError, ValueError) as error:
+        raise InvalidArgumentError(
+            f"no Dask scheduler answers at {address!r} ({error}): `dask scheduler` starts one and "
+            "says its address"
+        ) from error
+    with client:
+        yield client
+
+
+def _without_dask(error: ImportError) -> MissingDependencyError:
+    return MissingDependencyError(
+        f"a cluster needs dask.distributed ({error}): pip install 'pyvista-vdi[dask]'"
+    )

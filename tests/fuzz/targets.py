@@ -548,7 +548,8 @@ _VERBS: dict[str, tuple[tuple[Any, ...], tuple[str, ...]]] = {
         ((_VOLUMES,), ("-o", _OUTPUTS), ("--size", _SIZES)),
         (
             *("--max-supersegments", "--tolerance", "--view-cone", "--clim", "--opacity", "--cmap"),
-            *("--level", "--compression", "--position", "--focal-point", "--view-up", "--azimuth"),
+            *("--level", "--channel", "--time-index", "--compression-level", "--compression"),
+            *("--position", "--focal-point", "--view-up", "--azimuth"),
             *("--elevation", "--view-angle", "--parallel-scale", "--camera-json", "--n-colors"),
             *("--transfer-function", "--sample-distance", "--scalars", "--preference", "--tf"),
             *("--device", "--opacity-unit-distance", "--log-scale", "--flip-scalars"),
@@ -564,7 +565,10 @@ _VERBS: dict[str, tuple[tuple[Any, ...], tuple[str, ...]]] = {
     ),
     "convert": (
         ((_INPUTS,), ("-o", _OUTPUTS)),
-        ("--level", "--compression", "--camera-json", "--thickness", "--standard-channels"),
+        (
+            *("--compression-level", "--compression", "--camera-json", "--thickness"),
+            "--standard-channels",
+        ),
     ),
     "info": (((_INPUTS,),), ("--json",)),
     "devices": ((), ("--json",)),

@@ -1,0 +1,111 @@
+"""Volumes in stores of chunks on the command line."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.cli import main
+
+VALUES = np.add.outer(np.add.outer(np.arange(16), np.arange(24)), np.arange(32)).astype(np.uint8)
+LOOK = ("--cmap", "bone", "--opacity", "linear", "--clim", "0", "80")
+
+
+@pytest.fixture
+def image(tmp_path):
+    """An image of OME-Zarr 0.4 at two levels, its metadata by hand, and two channels."""
+    zarr = pytest.importorskip("zarr")
+    path = tmp_path / "x.ome.zarr"
+    new = {"zarr_format": 2} if int(zarr.__version__.split(".")[0]) > 2 else {}
+    group = zarr.open_group(str(path), mode="w", **new)
+    for level in (0, 1):
+        values = VALUES[:: 2**level, :: 2**level, :: 2**level]
+        array = zarr.open(
+            str(path / str(level)),
+            mode="w",
+            shape=(2, *values.shape),
+            chunks=(1, 8, 8, 8),
+            dtype="u1",
+            **new,
+        )
+        array[0], array[1] = values, values // 2
+    axes = [{"name": "c", "type": "channel"}]
+    axes += [{"name": n, "type": "space", "unit": "micrometer"} for n in "zyx"]
+    datasets = [
+        {
+            "path": str(level),
+            "coordinateTransformations": [{"type": "scale", "scale": [1] + [0.5 * 2**level] * 3}],
+        }
+        for level in (0, 1)
+    ]
+    group.attrs["multiscales"] = [{"version": "0.4", "axes": axes, "datasets": datasets}]
+    group.attrs["omero"] = {"channels": [{"label": "dapi"}, {"label": "gfp"}]}
+    return path
+
+
+def test_info_tells_levels_and_reads_no_voxel(image, capsys):
+    for chunk in (file for file in image.rglob("*") if file.name[0] in "01" and file.is_file()):
+        chunk.write_bytes(b"rubbish")
+    assert main(["info", str(image)]) == 0
+    said = capsys.readouterr().out
+    for part in (
+        "dapi, uint8, range not known yet",
+        "OME-Zarr 0.4: 2 along c, 16 along z, 24 along y, 32 along x; lengths in micrometer",
+        "level 1    16 x 12 x 8 points, spacing (1, 1, 1)",
+    ):
+        assert part in said
+    assert main(["info", str(image), "--json"]) == 0
+    about = json.loads(capsys.readouterr().out)
+    assert about["range"] is None
+    assert about["store"]["channels"] == ["dapi", "gfp"]
+
+
+def test_generate_says_the_level_and_why(image, tmp_path, capsys, default_runtime):
+    target = tmp_path / "x.vdi"
+    files = (str(image), "-o", str(target), "--size", "16x9", "--channel", "gfp", *LOOK)
+    assert main(["generate", *files]) == 0
+    assert "level 1 of 2 (16 x 12 x 8 points): the coarsest" in capsys.readouterr().err
+    assert pvdi.read(target).metadata["volume"]["dimensions"] == [16, 12, 8]
+    assert main(["generate", *files, "--level", "0"]) == 0
+    assert "level 0 of 2 (32 x 24 x 16 points): asked for" in capsys.readouterr().err
+
+
+def test_generate_on_a_cluster(image, tmp_path, default_runtime):
+    distributed = pytest.importorskip("distributed")
+    files = (str(image), "--size", "16x9", *LOOK)
+    here, there = tmp_path / "here.vdi", tmp_path / "there.vdi"
+    assert main(["generate", *files, "-o", str(here)]) == 0
+    with distributed.LocalCluster(
+        n_workers=1, processes=False, protocol="tcp://", dashboard_address=":0"
+    ) as cluster:
+        address = cluster.scheduler_address
+        assert main(["generate", *files, "-o", str(there), "--scheduler", address]) == 0
+    one, other = pvdi.read(here), pvdi.read(there)
+    np.testing.assert_array_equal(one.offsets, other.offsets)
+    np.testing.assert_array_equal(one.color, other.color)
+
+
+def test_other_verbs_read_it_whole(image, tmp_path, default_runtime):
+    target = tmp_path / "x.vdis"
+    command = ["series", str(image), str(image), "-o", str(target), "--size", "16x9", *LOOK]
+    assert main(command) == 0
+    assert len(pvdi.read(target)) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--example", "brain", "--level", "0"), "--level is for stores of chunks"),
+        (("--example", "brain", "--time-index", "0"), "--time-index is for stores"),
+        (("--example", "brain", "--scheduler", "x"), "--scheduler is for stores"),
+        (("none.ome.zarr",), "none.ome.zarr cannot be read as zarr"),
+        (("x.zarr", "--level", "best"), "auto, or a level's number"),
+    ],
+)
+def test_mistakes_are_named(arguments, message, tmp_path, capsys):
+    pytest.importorskip("zarr")
+    assert main(["generate", *arguments, "-o", str(tmp_path / "x.vdi"), *LOOK]) in (1, 2)
+    assert message in capsys.readouterr().err
