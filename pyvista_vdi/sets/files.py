@@ -78,7 +78,7 @@ def write(
     precision: str = "8-byte",
     tolerance: float = 0.0,
     compression: str = "zstd",
-    level: int | None = None,
+    level: int = 1,
     progress: Progress | None = None,
 ) -> Path:
     """Write a set to a file, which appears whole or not at all: see :meth:`VDISet.save`."""

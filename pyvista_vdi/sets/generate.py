@@ -45,7 +45,7 @@ _OPTIONS = tuple(
 #: SSIM that every direction is to have.
 TARGET_SSIM = 0.98
 #: Directions of a sphere whose error is measured.
-DIRECTIONS = 128
+DIRECTIONS = 160
 #: Most VDIs of a set.
 MOST_VIEWS = 400
 #: Half angle of the cone that a V_O of a set has to serve, degrees: others serve what is beyond.
@@ -67,6 +67,8 @@ _PILOTS = 2
 _PILOT_SHARE, _FIRST_SHARE = 0.1, 0.6
 #: Degrees from the nearest of n directions that are spread, times the root of n.
 _SPACING = 138.0
+#: Share of the loss that directions which are measured have to spare: others lie between them.
+_SPARE = 0.05
 #: Share of the loss that is allowed at the farthest by what was measured of a few directions.
 _SHARE = 0.87
 #: Loss next to V_O, times this, is borne between V_Os where it is above what is allowed.
@@ -373,6 +375,7 @@ class _Placing:
         progress: Progress | None,
     ) -> None:
         self._maker, self._probes, self._goal = maker, probes, goal
+        self._aim = 1 - (1 - _SPARE) * (1 - goal)
         self._max_bytes, self._max_views = max_bytes, max_views
         self._progress = progress
 
@@ -452,7 +455,7 @@ class _Placing:
         while True:
             self._judge(vdi_set, ssim, shown)
             worst = int(np.where(hopeless, np.inf, ssim).argmin())
-            if ssim[worst] >= self._goal or np.count_nonzero(hopeless) >= _IN_VAIN:
+            if ssim[worst] >= self._aim or np.count_nonzero(hopeless) >= _IN_VAIN:
                 break
             each = _FINER**3 * taken / len(vdi_set)
             full = self._max_bytes is not None and taken + each > self._max_bytes
@@ -461,7 +464,7 @@ class _Placing:
             vdi_set.add(finer(self._probes[worst]))
             taken += each
             self._judge(vdi_set, ssim, shown)
-            hopeless[worst] = ssim[worst] < self._goal  # although from its own V_O
+            hopeless[worst] = ssim[worst] < self._aim  # although from its own V_O
         vdi_set.about = self._about(settings, ssim)
         self._report(1.0)
         return vdi_set
@@ -554,7 +557,7 @@ def _between(at: list[float], rows: NDArray[np.float64], x: float) -> NDArray[np
 def file_bytes(vdi: VDI) -> int:
     """Return what a VDI takes in a .vdiset file with the defaults of :meth:`VDISet.save`."""
     stream = io.BytesIO()
-    StepsWriter("8-byte", 0.0, 1, "zstd", None).write(stream, vdi, 0.0)
+    StepsWriter("8-byte", 0.0, 1, "zstd", 1).write(stream, vdi, 0.0)
     return stream.tell()
 
 

@@ -315,7 +315,7 @@ class VDISet(Sequence[VDI]):
             The target; its name ends in ``.vdiset``.
         **options
             ``precision`` (``"8-byte"``), ``tolerance`` (0), ``compression`` (``"zstd"``) and
-            ``level`` as for :class:`pyvista_vdi.SeriesWriter`; ``progress``, called with the
+            ``level`` (1) as for :class:`pyvista_vdi.SeriesWriter`; ``progress``, called with the
             finished fraction.
 
         Returns

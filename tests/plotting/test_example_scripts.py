@@ -30,6 +30,7 @@ ARGUMENTS = {
     "pipeline.py": ["picture.png"],
     "plotter.py": [],
     "series.py": [],
+    "sets.py": [],
     "tradeoff.py": [],
     "web_page.py": ["page.html"],
     "web_scene.py": ["scene.html"],
@@ -58,7 +59,7 @@ def run_example(name, folder):
     )
     assert done.returncode == 0, done.stderr
     assert "VDIWarning" not in done.stderr
-    suffix = ".gif" if name in ("interactive.py", "series.py") else ".png"
+    suffix = ".gif" if name in ("interactive.py", "series.py", "sets.py") else ".png"
     suffix = Path(arguments[0]).suffix if arguments else suffix
     target = folder / (arguments[0] if arguments else Path(name).with_suffix(suffix))
     assert list(folder.glob(f"*{suffix}")) == [target]
@@ -116,6 +117,17 @@ def test_series_example_writes_a_movie_of_its_steps(tmp_path):
             movie.seek(k)
             dark.append((np.asarray(movie.convert("L")) < 128).mean())
     assert all(later > 1.2 * before for before, later in pairwise(dark[:3])), "it has not risen"
+
+
+def test_sets_example_writes_a_movie_of_a_turn(tmp_path):
+    said, target = run_example("sets.py", tmp_path)
+    assert "'below_target': 0" in said
+    with Image.open(target) as movie:
+        assert (movie.size, movie.n_frames) == ((200, 150), 24)
+        for k in (0, 7, 12, 23):
+            movie.seek(k)
+            there = (np.asarray(movie.convert("L")) < 128).mean()
+            assert 0.02 < there < 0.5  # from every side there is a knot
 
 
 def test_tradeoff_example_draws_its_three_fronts(tmp_path):
