@@ -31,6 +31,7 @@ _LEAST_POINTS = 4
 _SLACK = 1.0
 
 Indices = tuple[int, int, int]
+Ends = tuple[float, float]
 Offset = tuple[int, int, int]
 Values = NDArray[Any]
 
@@ -147,13 +148,12 @@ class Blocks:
         self, block: Indices, values: Values
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the least and the largest scalar of each of a block's chunks, NaN left out."""
-        scalars = values[..., 3] if values.ndim == 4 else values
-        low = high = scalars
-        for axis, chunk in enumerate(self.chunks):
-            starts = np.arange(0, scalars.shape[axis], chunk)
-            low = np.fmin.reduceat(low, starts, axis=axis)
-            high = np.fmax.reduceat(high, starts, axis=axis)
-        return low.astype(np.float64), high.astype(np.float64)
+        counts = [-(-n // chunk) for n, chunk in zip(values.shape, self.chunks, strict=False)]
+        low, high = np.empty(counts), np.empty(counts)
+        for at in np.ndindex(*counts):
+            box = tuple(slice(k * n, (k + 1) * n) for k, n in zip(at, self.chunks, strict=True))
+            low[at], high[at] = ends_of(values[box])
+        return low, high
 
     def _chunks_of(self, block: Indices) -> tuple[slice, ...]:
         parts = zip(self.own(block), self.chunks, strict=True)
@@ -256,6 +256,14 @@ class Blocks:
         return sorted(
             self, key=lambda block: sum(abs(k - at) for k, at in zip(block, places, strict=True))
         )
+
+
+def ends_of(values: Values) -> Ends:
+    """Return the least and the largest scalar, NaN left out, unless there is nothing else."""
+    scalars = values[..., 3] if values.ndim == 4 else values
+    if values.dtype.kind != "f":
+        return float(scalars.min()), float(scalars.max())
+    return float(np.fmin.reduce(scalars, axis=None)), float(np.fmax.reduce(scalars, axis=None))
 
 
 def _cuts(points: int, length: int) -> tuple[int, ...]:

@@ -24,7 +24,7 @@ from pyvista_vdi.generation.merge import Merge
 from pyvista_vdi.generation.pack import Pack
 from pyvista_vdi.generation.records import Records
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
-from pyvista_vdi.large.blocks import Blocks, Halo, Indices, Values
+from pyvista_vdi.large.blocks import Blocks, Ends, Halo, Indices, Values, ends_of
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.chunked import Ranges
 from pyvista_vdi.model.float32_limits import held_unit_distance
@@ -37,8 +37,6 @@ from pyvista_vdi.volume.classified_volume import (
     checked_sample_distance,
 )
 from pyvista_vdi.volume.march_step import march_step
-
-Ends = tuple[float, float]
 
 #: Light of which nothing is told apart any more, as an optical depth.
 _DARK = 80.0
@@ -167,8 +165,8 @@ class Task:
     ) -> Seen:
         """Find the optical depths of a block's rays, without its neighbours' points."""
         slabs = self.halo.slabs(values)
-        ends: dict[tuple[int, int] | None, Ends] = {None: _ends(values)}
-        ends.update((side, _ends(slab)) for side, slab in slabs.items())
+        ends: dict[tuple[int, int] | None, Ends] = {None: ends_of(values)}
+        ends.update((side, ends_of(slab)) for side, slab in slabs.items())
         seen = Seen(None, slabs, ends, self.blocks.ranges(block, values))
         if not (window.pixels and self.may_be_visible(*seen.ends[None])):
             return seen
@@ -427,13 +425,6 @@ def _append(records: Records, part: Slice, piece: Piece) -> None:
             records.counts,
         )
         runtime.finish()  # the runs may be host memory in use
-
-
-def _ends(values: Values) -> tuple[float, float]:
-    scalars = values[..., 3] if values.ndim == 4 else values
-    if values.dtype.kind != "f":
-        return float(scalars.min()), float(scalars.max())
-    return float(np.fmin.reduce(scalars, axis=None)), float(np.fmax.reduce(scalars, axis=None))
 
 
 def light_entering(

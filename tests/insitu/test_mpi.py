@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 
 import pyvista_vdi as pvdi
@@ -19,6 +21,7 @@ from pyvista_vdi.insitu import InSitu
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.quality.probe import turned
 
+EXAMPLE = Path(__file__).parents[2] / "examples" / "insitu.py"
 PROGRAM = Path(__file__).parents[1] / "support" / "mpi_program.py"
 
 needs_mpi = pytest.mark.skipif(
@@ -28,15 +31,20 @@ needs_mpi = pytest.mark.skipif(
 
 
 def run(case, folder):
-    mpirun = ["mpirun", "--oversubscribe", "--allow-run-as-root", "-n", "4"]
+    run_program(4, PROGRAM, case, folder)
+
+
+def run_program(ranks, program, *arguments):
+    mpirun = ["mpirun", "--oversubscribe", "--allow-run-as-root", "-n", str(ranks)]
     done = subprocess.run(
-        [*mpirun, sys.executable, PROGRAM, case, folder],
+        [*mpirun, sys.executable, program, *arguments],
         capture_output=True,
         text=True,
         timeout=300,
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
 
 
 @needs_mpi
@@ -78,6 +86,15 @@ def test_a_simulation_writes_a_series_and_single_files(tmp_path):
         assert single.n_supersegments > 1000
         np.testing.assert_array_equal(series[k].front, single.front)
         np.testing.assert_array_equal(series[k].optical_depth, single.optical_depth)
+
+
+@needs_mpi
+def test_the_example_writes_a_picture_and_says_what_it_costs(tmp_path):
+    said = run_program(2, EXAMPLE, tmp_path / "smoke.png")
+    assert re.search(r"solver: \d+ ms a step; in situ: \d+ ms a VDI", said), said
+    picture = np.asarray(Image.open(tmp_path / "smoke.png").convert("RGB")).astype(int)
+    assert (picture[..., 0] - picture[..., 2] > 60).sum() > 200  # orange, in the spiral's middle
+    assert len(pvdi.read(tmp_path / "smoke.vdis")) == 7
 
 
 class OneRank:

@@ -39,11 +39,13 @@ ARGUMENTS = {
 
 #: Those that serve, which write no picture: tests/web/test_served_examples.py runs them.
 SERVING = ["serve.py", "trame_app.py"]
+#: Those for several processes: tests/insitu/test_mpi.py runs them.
+PARALLEL = ["insitu.py"]
 
 
 def test_every_example_is_run_here():
     found = sorted(path.name for path in EXAMPLES.glob("*.py"))
-    assert found == sorted([*ARGUMENTS, *SERVING])
+    assert found == sorted([*ARGUMENTS, *SERVING, *PARALLEL])
 
 
 def run_example(name, folder):
