@@ -50,6 +50,8 @@ CUTS = {2: (2, 1, 1), 4: (2, 2, 1), 8: (2, 2, 2)}
 NEAR = 2.0
 #: Points along the edges of the large volume and of its chunks; bytes that a worker may have.
 EDGE, CHUNK, WORKER_BYTES = 2048, 128, 800_000_000
+#: Points along the edges of the volume that is timed.
+FAST_EDGE = 1024
 
 
 LEGEND = (
@@ -71,6 +73,7 @@ def main() -> int:
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
     parser.add_argument("--edge", type=int, default=EDGE, help="points of the large volume")
     parser.add_argument("--known", action="store_true", help="find the ranges of chunks before")
+    parser.add_argument("--fast-store", type=Path, help="the same of the one that is timed")
     parser.add_argument("--store", type=Path, help="where the large volume is, or is written to")
     options = parser.parse_args()
     target = options.out / "large.json"
@@ -297,49 +300,44 @@ def large_part(options: argparse.Namespace) -> dict[str, Any]:
 
 def speed_part(options: argparse.Namespace) -> dict[str, Any]:
     """Return the time of one worker over that of two, and the share of exchange and merging."""
-    import zarr
     from distributed import get_task_stream
 
-    volume = examples.load_data("brain", as_volume=True)
-    camera = filling_camera(volume.bounds, options.size)
+    from pyvista_vdi.large.on_dask import generate_on_dask
+
+    ratios: list[float] = []
+    parts: dict[str, float] = {}
+    small = argparse.Namespace(**{**vars(options), "edge": FAST_EDGE, "store": options.fast_store})
     with tempfile.TemporaryDirectory() as folder, Cluster(4 * 10**9) as cluster:
-        values = np.repeat(np.repeat(np.repeat(volume.array, 2, 0), 2, 1), 2, 2)
-        array = zarr.create_array(
-            store=f"{folder}/x.zarr", shape=values.shape, chunks=(64,) * 3, dtype="u1"
-        )
-        array[...] = values
-        spacing = [s / 2 for s in volume.spacing]
-        ratios, parts = [], {}
-        for turn in range(4):
+        volume = stored(small, folder)
+        volume.chunks.found_ranges()
+        camera = filling_camera(volume.bounds, options.size)
+        looks = {k: v for k, v in LOOKS.items() if k != "sample_distance"}
+        function = Classification(looks, "a benchmark").transfer_function(volume)
+        for turn in range(3):
             seconds = {}
             for workers in (cluster.workers[:1], cluster.workers):
-                chunked = pvdi.Volume(zarr.open_array(f"{folder}/x.zarr", mode="r"), spacing)
-                from pyvista_vdi.large.on_dask import generate_on_dask
-
-                looks = {**TRANSFER_FUNCTIONS["steep"], "interpolation": "linear"}
-                function = Classification(looks, "a benchmark").transfer_function(volume)
                 with get_task_stream(client=cluster.client) as stream:
                     start = time.perf_counter()
                     generate_on_dask(
-                        chunked,
+                        volume,
                         camera,
                         options.size,
                         function,
                         client=cluster.client,
                         workers=workers,
-                        block_bytes=2**21,
+                        block_bytes=2**24,
                     )
                     seconds[len(workers)] = time.perf_counter() - start
                 parts = shares(stream.data)
             if turn:  # the first one compiles
                 ratios.append(seconds[1] / seconds[2])
-        merging = sum(parts.get(kind, 0) for kind in ("rows", "merge", "lengths", "transfer"))
-        return {
-            "ratio": statistics.median(ratios),
-            "ratios": ratios,
-            "shares": parts,
-            "exchange_and_merge": merging / sum(parts.values()),
-        }
+    merging = sum(parts.get(kind, 0) for kind in ("rows", "merge", "lengths", "transfer"))
+    return {
+        "ratio": statistics.median(ratios),
+        "ratios": ratios,
+        "shares": parts,
+        "exchange_and_merge": merging / sum(parts.values()),
+    }
 
 
 # -- what is written ------------------------------------------------------------------------------

@@ -228,7 +228,11 @@ class _Run:
         """Return what a function makes of each block's result, as they come."""
         parts = {
             self._client.submit(
-                function, future, key=(f"{name}-{self._token}", *block), retries=_RETRIES
+                function,
+                future,
+                key=(f"{name}-{self._token}", *block),
+                retries=_RETRIES,
+                **self._where,
             ): block
             for block, future in futures.items()
         }

@@ -24,6 +24,7 @@ ARGUMENTS = {
     "dial.py": ["picture.png"],
     "files.py": ["picture.png"],
     "interactive.py": [],
+    "large_volume.py": ["picture.png"],
     "occlusion.py": [],
     "overlap.py": [],
     "picking.py": ["picture.png"],
@@ -69,7 +70,16 @@ def run_example(name, folder):
 
 
 @pytest.mark.parametrize(
-    "name", ["plotter.py", "pipeline.py", "overlap.py", "picking.py", "files.py", "occlusion.py"]
+    "name",
+    [
+        "plotter.py",
+        "pipeline.py",
+        "overlap.py",
+        "picking.py",
+        "files.py",
+        "occlusion.py",
+        "large_volume.py",
+    ],
 )
 def test_example_writes_a_picture(name, tmp_path):
     said, target = run_example(name, tmp_path)
