@@ -349,9 +349,9 @@ def render(
 
         return render_set(vdi, _frame(vdi, view, window_size, options, opaque_depth, device))
     vdi = as_vdi(vdi)
-    from pyvista_vdi.raycasting.raycast import render_vdi
+    from pyvista_vdi.raycasting.bands import render_fitting
 
-    return render_vdi(vdi, _frame(vdi, view, window_size, options, opaque_depth, device))
+    return render_fitting(vdi, _frame(vdi, view, window_size, options, opaque_depth, device))
 
 
 def render_depth(
