@@ -25,7 +25,10 @@ WORKER = "worker.js"
 SPAWN = "spawn.js"
 
 #: What reads and plays series, and zstd, which pages without a series do not have.
-OF_SERIES = ("differences.js", "frames.js", "player.js", "series.js", "steps.js", "zstd.js")
+OF_SERIES = (
+    *("differences.js", "frames.js", "player.js", "series.js", "steps.js", "surround.js"),
+    "zstd.js",
+)
 
 #: What takes the place of SPAWN. The text ends with a call of what stands in it.
 _SPAWN_BUNDLED = """\

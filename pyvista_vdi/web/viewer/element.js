@@ -6,6 +6,7 @@ import { Pacer } from "./pacer.js";
 import { Player, playerControls } from "./player.js";
 import { Raycaster } from "./raycast.js";
 import { isParallel } from "./rays.js";
+import { Surround } from "./surround.js";
 
 const STYLE = `
 :host { display: block; position: relative; width: 100%; aspect-ratio: 16 / 9; overflow: hidden;
@@ -125,9 +126,14 @@ export class VDIViewer extends HTMLElement {
     return { ...this.#status, supersegments: n, lists: windowSize, level, precision, pixels };
   }
 
-  /** The series that is shown: `times`, `length`, `nearest(time)`; null where it is one VDI. */
+  /** The series that is shown: `times`, `length`, `nearest(time)`; null where it is none. */
   get series() {
-    return this.#series;
+    return this.#series?.views ? null : this.#series;
+  }
+
+  /** Of a set: how many VDIs are there, and which is nearest to the view; null where it is none. */
+  get set() {
+    return this.#series?.views ? { length: this.#series.length, nearest: this.#player.step } : null;
   }
 
   /** The time of the step that is shown, or will be when it is decoded; null without a series. */
@@ -194,7 +200,7 @@ export class VDIViewer extends HTMLElement {
   }
 
   /**
-   * Show what a URL, bytes or a stream hold: a .vdi file, or a series, .vdis.
+   * Show what a URL, bytes or a stream hold: a .vdi file, a series, .vdis, or a set, .vdiset.
    *
    * @param {string|URL|Uint8Array|ReadableStream} source
    * @returns {Promise<VDIViewer>} When all of it is drawn.
@@ -265,7 +271,7 @@ export class VDIViewer extends HTMLElement {
 
   /** Go back to the view that the VDI was made for, or in which the scene began. */
   resetCamera() {
-    const of = this.#scene?.camera ?? this.#prepared?.camera;
+    const of = this.#scene?.camera ?? this.#series?.camera ?? this.#prepared?.camera;
     if (of) {
       const { parallel_scale, view_angle, ...rest } = of;
       this.camera = isParallel(of) ? { ...rest, parallel_scale, parallel_projection: true }
@@ -309,6 +315,10 @@ export class VDIViewer extends HTMLElement {
   #beginSeries(series) {
     this.#endSeries();
     this.#series = series;
+    if (series.views) {
+      this.#beginSet(series);
+      return;
+    }
     const player = this.#player = new Player(series, {
       show: (prepared, time, step) => this.#showStep({ prepared, time, step }),
       changed: () => {
@@ -322,6 +332,18 @@ export class VDIViewer extends HTMLElement {
     if (this.hasAttribute("autoplay")) player.play();
   }
 
+  // The nearest VDI of a set is a step that the view chooses.
+  #beginSet(set) {
+    const surround = this.#player = new Surround(set, {
+      show: (prepared, step) => this.#showStep({ prepared, time: null, step }),
+      changed: () => surround === this.#player && this.#awaitStep(),
+      failed: (error) => surround === this.#player && this.#fail(error),
+    });
+    set.changed = () => surround.grown();
+    if (this.#camera) surround.look(this.#camera);
+    else this.resetCamera();
+  }
+
   #endSeries() {
     this.#player?.close();
     this.#player = this.#series = this.#step = null;
@@ -329,7 +351,7 @@ export class VDIViewer extends HTMLElement {
   }
 
   #played() {
-    if (!this.#player) throw new TypeError("There is no series that could be played, or not yet.");
+    if (!this.series) throw new TypeError("There is no series that could be played, or not yet.");
     return this;
   }
 
@@ -359,7 +381,7 @@ export class VDIViewer extends HTMLElement {
     this.#step = null;
     this.showStill(null);
     this.setPrepared(prepared);
-    this.dispatchEvent(new CustomEvent("vditime", { detail: { time, step } }));
+    if (this.series) this.dispatchEvent(new CustomEvent("vditime", { detail: { time, step } }));
   }
 
   // -- life --------------------------------------------------------------------------------------
@@ -404,7 +426,7 @@ export class VDIViewer extends HTMLElement {
       reset() { viewer.resetCamera(); },
     }, signal);
     this.#showPlayer = playerControls?.(this.shadowRoot.querySelector(".controls"), this.shadowRoot,
-      () => this.#player, () => this.#series.times, {
+      () => this.series && this.#player, () => this.#series.times, {
         toggle: () => this.playing ? this.pause() : this.play(),
         seek: (step) => this.#seek(step),
       }, signal) ?? (() => {});
@@ -564,6 +586,7 @@ export class VDIViewer extends HTMLElement {
   }
 
   #announceCamera() {
+    this.#player?.look?.(this.#camera);
     this.dispatchEvent(new CustomEvent("camerachange", { detail: { camera: this.camera } }));
   }
 

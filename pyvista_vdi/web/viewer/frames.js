@@ -3,6 +3,7 @@ import { KIND } from "./steps.js";
 import { REMEDY, VDIFileError, crc32 } from "./unpack.js";
 
 const MAGIC_BYTES = [0x89, 0x56, 0x44, 0x49, 0x53, 0x0d, 0x0a, 0x1a];
+const SET_MAGIC_BYTES = MAGIC_BYTES.map((byte, k) => k === 4 ? 0x56 : byte); // .vdiset
 const HEADER_BYTES = 40;
 const ENTRY_BYTES = 8 + HEADER_BYTES;
 const STEP = 0x50455453; // "STEP", as a little-endian number
@@ -11,26 +12,36 @@ const INDX = 0x58444e49;
 /** Bytes at a file's end that say where its index is. */
 export const TRAILER_BYTES = 16;
 
-/** Whether bytes, or base64 text, are the beginning of a series. */
+const beginsBy = (bytes, magic) =>
+  magic.every((byte, k) => bytes[k] === byte || k >= bytes.length);
+
+/** Whether bytes, or base64 text, are the beginning of a series, or of a set. */
 export function beginsAsSeries(piece) {
   if (typeof piece === "string") return /^\s*iVZE/.test(piece);
-  return piece.length > 0 && MAGIC_BYTES.every((byte, k) => piece[k] === byte || k >= piece.length);
+  return piece.length > 0 && [MAGIC_BYTES, SET_MAGIC_BYTES].some((magic) => beginsBy(piece, magic));
 }
 
 function broken(why) {
   throw new VDIFileError(`the series is damaged: ${why}; ${REMEDY}`);
 }
 
+/** How many bytes a file's head takes; 0 where there are too few bytes to say so. */
+export function headBytes(bytes) {
+  if (bytes.length < 20) return 0;
+  return 20 + new DataView(bytes.buffer, bytes.byteOffset, 20).getUint32(12, true);
+}
+
 /**
  * What a file begins with.
  *
  * @param {Uint8Array} bytes From the file's begin.
- * @returns {{begin: number, codec: string}|null} Where frames begin, and their codec; null where
- *   there are too few bytes to say so.
+ * @returns {{begin: number, codec: string, set: object|null}|null} Where frames begin, and their
+ *   codec; of a set views, bounds and the camera to begin with. null where there are too few bytes
+ *   to say so.
  * @throws {VDIFileError} If it is of a newer version, or damaged.
  */
 export function headOf(bytes) {
-  if (!MAGIC_BYTES.every((byte, k) => bytes[k] === byte || k >= bytes.length)) {
+  if (bytes.length && !beginsAsSeries(bytes)) {
     throw new VDIFileError("this is no series of VDIs: it begins with other bytes than one");
   }
   if (bytes.length < 20) return null;
@@ -48,14 +59,32 @@ export function headOf(bytes) {
   said.set(bytes.subarray(8, 16));
   said.set(text, 8);
   if (version < 1 || crc32(said) !== checksum) broken("its head is not what was written");
-  let codec;
+  let told;
   try {
-    ({ codec } = JSON.parse(new TextDecoder().decode(text)));
+    told = JSON.parse(new TextDecoder().decode(text));
   } catch {
     broken("its head is no JSON");
   }
+  const { codec } = told ?? {};
   if (!["none", "lz4", "zstd", "deflate"].includes(codec)) broken("its head names no codec");
-  return { begin: 20 + size, codec };
+  const set = beginsBy(bytes, MAGIC_BYTES) ? null : setOf(told);
+  return { begin: 20 + size, codec, set };
+}
+
+// What a set's head says beside that.
+function setOf({ views, bounds, about }) {
+  const numbers = (values, n) => Array.isArray(values) && values.length === n &&
+    values.every(Number.isFinite);
+  const good = (view) => view !== null && typeof view === "object" && numbers(view.position, 3) &&
+    numbers(view.focal_point, 3) && numbers(view.view_up, 3) &&
+    (view.model_transform === undefined || (Array.isArray(view.model_transform) &&
+      view.model_transform.length === 4 && view.model_transform.every((row) => numbers(row, 4))));
+  const camera = about?.camera ?? views?.[0];
+  if (!Array.isArray(views) || !views.length || ![...views, camera].every(good) ||
+      !numbers(bounds, 6)) {
+    broken("its head does not say from where it was made");
+  }
+  return { views, bounds, camera };
 }
 
 // A frame's header; null where there is none.

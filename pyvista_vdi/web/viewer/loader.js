@@ -7,10 +7,11 @@ import { VDIFileError } from "./unpack.js";
 const FIRST_BYTES = 1 << 16; // of a series that is read by ranges
 
 /**
- * Load a VDI: first its coarse level, where the file has one, then the whole. Or a series.
+ * Load a VDI: first its coarse level, where the file has one, then the whole. Or a series or a set.
  *
- * @param {string|URL|Uint8Array|ArrayBuffer|ReadableStream|AsyncIterable} source A .vdi or .vdis file: where
- *   it is, its bytes, or its pieces, which may be base64 text as {@link embedded} gives it.
+ * @param {string|URL|Uint8Array|ArrayBuffer|ReadableStream|AsyncIterable} source A .vdi, .vdis or
+ *   .vdiset file: where it is, its bytes, or its pieces, which may be base64 text as
+ *   {@link embedded} gives it.
  * @param {object} options
  * @param {(prepared: object) => void} options.onLevel Called with each level as prepare.js makes
  *   it; its `level` is "coarse" or "full".
@@ -145,11 +146,11 @@ async function* piecesOf(source, onProgress, signal) {
   }
 }
 
-// Whether an address is one of a series: by its name.
+// Whether an address is one of a series, or a set: by its name.
 function isSeriesAddress(source) {
   if (typeof source !== "string" && !(source instanceof URL)) return false;
   return URL.canParse(source, document.baseURI) &&
-    /\.vdis$/i.test(new URL(source, document.baseURI).pathname);
+    /\.vdis(et)?$/i.test(new URL(source, document.baseURI).pathname);
 }
 
 // A file whose server gives parts of it: its size, its first bytes and what reads others. Otherwise

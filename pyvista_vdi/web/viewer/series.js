@@ -1,6 +1,6 @@
-// A .vdis file in a page: its times, and its steps when they are asked for, decoded in a worker.
+// A .vdis or .vdiset file in a page: its steps, or views, when they are asked for, by a worker.
 import {
-  TRAILER_BYTES, findFrames, headOf, indexPlace, indexedFrames,
+  TRAILER_BYTES, findFrames, headBytes, headOf, indexPlace, indexedFrames,
 } from "./frames.js";
 import { askPort, decodingPort } from "./port.js";
 import { GrowingBytes, REMEDY, VDIFileError } from "./unpack.js";
@@ -22,9 +22,20 @@ export class Series {
   /** Called when there are more steps. */
   changed = () => {};
 
-  constructor(codec, read) {
+  /** Of a set the V_Os' cameras by the numbers of its VDIs; else null, as the two that follow. */
+  views = null;
+  bounds = null;
+  camera = null;
+
+  constructor({ codec, set }, read) {
     this.#codec = codec;
     this.#read = read;
+    Object.assign(this, set);
+  }
+
+  /** The number that a step has in the file: others before it may be lost. */
+  numberOf(i) {
+    return this.#frames[i].number;
   }
 
   /** How many steps there are. */
@@ -95,6 +106,9 @@ export class Series {
   }
 
   #take(frames) {
+    if (this.views && frames.some(({ number }) => number >= this.views.length)) {
+      throw new VDIFileError(`the set is damaged: it has more VDIs than views; ${REMEDY}`);
+    }
     this.#frames = frames;
     this.changed();
   }
@@ -114,7 +128,7 @@ export class Series {
     const give = (frames) => {
       if (!frames.length || frames.length === series?.length) return;
       const begun = series !== null;
-      series ??= new Series(head.codec, async (place, size) =>
+      series ??= new Series(head, async (place, size) =>
         bytes.whole.subarray(place, place + size));
       series.#take([...frames]);
       if (!begun) onSeries(series);
@@ -147,7 +161,8 @@ export class Series {
    * @returns {Promise<Series|null>} null where it has no index, and must be read as a whole.
    */
   static async ofParts({ read, size, first }) {
-    const head = headOf(first);
+    const whole = headBytes(first); // of a set of many views it is long
+    const head = headOf(whole <= first.length || whole > size ? first : await read(0, whole));
     if (!head) return null;
     const tailAt = Math.max(0, size - first.length);
     let tail = tailAt === 0 ? first : await read(tailAt, size);
@@ -159,7 +174,7 @@ export class Series {
     if (!frames.length) throw noStep();
     const kept = new Map(); // place -> promise of bytes; what was used last is last
     let bytes = 0;
-    const series = new Series(head.codec, (at, n) => {
+    const series = new Series(head, (at, n) => {
       const known = kept.get(at) ?? read(at, at + n);
       bytes += kept.delete(at) ? 0 : n;
       kept.set(at, known);
