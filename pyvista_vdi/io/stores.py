@@ -207,9 +207,9 @@ def open_volume(
         or 0.5, an HDF5 file. What follows ``::`` is a group or an array in it; without it the only
         one.
     level : int or "auto"
-        Level of a multi-scale image, 0 is the finest. ``"auto"``: the finest whose voxels are no
-        finer than half a list's width where the volume is nearest to V_O; without a camera the
-        finest.
+        Level of a multi-scale image, 0 is the finest. ``"auto"``: the coarsest whose voxels are
+        still as fine as half a list's width where the volume is nearest to V_O; without a camera
+        the finest.
     camera : Camera or anything that :func:`generate` takes as one, optional
         V_O.
     window_size : (int, int), optional

@@ -73,9 +73,9 @@ def required_level(
 ) -> tuple[int, str]:
     """Return the level that a view requires, and why.
 
-    It is the finest whose voxels are no finer than half a list's width where the volume is nearest
-    to V_O: what a finer one has more is lost between the lists. Edges of voxels count along the
-    axes in which the next level is coarser: many stores keep their few planes in all levels.
+    It is the coarsest whose voxels are still as fine as half a list's width where the volume is
+    nearest to V_O: between the lists, what a finer one has more is hardly seen. Edges of voxels
+    count along the axes in which a level is coarser: many stores keep their few planes in all.
 
     Parameters
     ----------
@@ -102,14 +102,15 @@ def required_level(
     unit = unit and f" {unit}"
     said = [" x ".join(f"{edge:.3g}" for edge in of_level) + unit for of_level in edges]
     half = f"half a list's width, {width / 2:.3g}{unit} where the volume is nearest to V_O"
-    for k, (now, following) in enumerate(itertools.pairwise(edges)):
-        changing = now[following > _COARSER * now]
-        if changing.max(initial=0) >= width / 2:
-            finer = f"; those of level {k - 1}, {said[k - 1]}, are finer" if k else ""
-            return k, f"voxels of {said[k]} are no finer than {half}{finer}"
-    return len(levels) - 1, (
-        f"the coarsest, voxels of {said[-1]}: those of level {len(levels) - 2}, {said[-2]}, are "
-        f"finer than {half}"
-        if len(levels) > 1
-        else "the only one"
+    chosen = 0
+    for k, now in enumerate(edges):
+        if now[now > _COARSER * edges[0]].max(initial=0) > width / 2:
+            break
+        chosen = k
+    coarser = (
+        f"those of level {chosen + 1}, {said[chosen + 1]}, are coarser than {half}"
+        if (chosen + 1 < len(levels))
+        else f"they are no coarser than {half}"
     )
+    name = "the finest, " if chosen == 0 else "the coarsest, " if chosen + 1 == len(levels) else ""
+    return chosen, f"{name}voxels of {said[chosen]}: {coarser}"

@@ -25,9 +25,9 @@ def test_width_at_the_nearest_face():
 # Half a list's width at 9 is 9 / lists; voxels are .03125, .0625, .125, .25
 @pytest.mark.parametrize(
     ("lists", "level"),
-    [(1000, 0), (288, 0), (287, 1), (144, 1), (143, 2), (72, 2), (71, 3), (9, 3)],
+    [(1000, 0), (145, 0), (143, 1), (73, 1), (71, 2), (37, 2), (35, 3), (9, 3)],
 )
-def test_level_is_the_finest_that_is_no_finer_than_half_a_list(lists, level):
+def test_level_is_the_coarsest_that_is_no_coarser_than_half_a_list(lists, level):
     found, why = required_level(LEVELS, FROM_TEN, (lists, lists), "mm")
     assert found == level
     assert "half a list's width" in why
@@ -37,7 +37,8 @@ def test_level_is_the_finest_that_is_no_finer_than_half_a_list(lists, level):
 def test_parallel_lists_are_equally_wide_everywhere():
     view = FROM_TEN.replace(parallel_projection=True, parallel_scale=3.0)
     assert nearest_list_width(LEVELS[0], view, (20, 10)) == pytest.approx(0.6)
-    assert required_level(LEVELS, view, (96, 48))[0] == 1  # half a list is .0625
+    assert required_level(LEVELS, view, (94, 47))[0] == 1  # half a list is a little over .0625
+    assert required_level(LEVELS, view, (98, 49))[0] == 0
 
 
 def test_a_transform_of_the_model_counts():
@@ -46,7 +47,7 @@ def test_a_transform_of_the_model_counts():
         position=(0, 0, 40), focal_point=(0, 0, 0), view_up=(0, 1, 0), view_angle=90,
         model_transform=matrix,
     )  # fmt: skip
-    for lists in (287, 144, 143):
+    for lists in (145, 143, 71):
         near = required_level(LEVELS, FROM_TEN, (lists, lists))[0]
         assert required_level(LEVELS, far, (lists, lists))[0] == near
 
@@ -85,6 +86,6 @@ def test_axes_that_no_level_makes_coarser_do_not_count():
         few = levels(between_planes)
         half = nearest_list_width(few[0], FROM_TEN, (100, 100)) / 2
         assert 2 / 32 < half < 2 / 16
-        assert required_level(few, FROM_TEN, (100, 100))[0] == 2
-        assert required_level(few[:2], FROM_TEN, (100, 100))[0] == 1
-        assert required_level(few, FROM_TEN, (200, 200))[0] == 1
+        assert required_level(few, FROM_TEN, (100, 100))[0] == 1
+        assert required_level(few, FROM_TEN, (200, 200))[0] == 0
+        assert required_level(few, FROM_TEN, (50, 50))[0] == 2
