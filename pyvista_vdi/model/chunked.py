@@ -142,7 +142,16 @@ class ChunkedArray:
 
     def __array__(self, *_: Any, **__: Any) -> NDArray[Any]:
         """Refuse to become one array in memory by accident."""
-        raise InvalidVolumeError(
+        raise self._needed_whole()
+
+    def __getattr__(self, name: str) -> Any:
+        """Refuse in the same words what NumPy's arrays have beyond this, ``reshape`` say."""
+        if not name.startswith("_") and hasattr(np.ndarray, name):
+            raise self._needed_whole()
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+    def _needed_whole(self) -> InvalidVolumeError:
+        return InvalidVolumeError(
             f"{self.source} is read chunk by chunk, and this needs all of its "
             f"{self.nbytes / 2**30:.3g} GiB in memory: pyvista_vdi.generate makes a VDI of it "
             "block by block; volume.load() reads it whole"

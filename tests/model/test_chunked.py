@@ -135,6 +135,15 @@ def test_what_needs_the_whole_array_says_so():
         pvdi.generate(volume, camera, (16, 9), transfer_function=function, target_ssim=0.9)
     with pytest.raises(InvalidVolumeError, match="three slices of step 1"):
         volume.array[0]
+    with pytest.raises(InvalidVolumeError, match=r"read chunk by chunk.*volume\.load\(\)"):
+        volume.array.reshape(-1)
+    assert not hasattr(volume.array, "_something")
+
+
+def test_add_vdi_says_that_it_needs_the_whole_array():
+    pv = pytest.importorskip("pyvista")
+    with pytest.raises(InvalidVolumeError, match=r"read chunk by chunk.*volume\.load\(\)"):
+        pv.Plotter(off_screen=True).add_vdi(Volume(Counted()), cmap="bone")
 
 
 def test_uneven_chunks_are_refused():
