@@ -10,12 +10,12 @@ from __future__ import annotations
 import threading
 import uuid
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from distributed import CancelledError, Client, Future, KilledWorker, as_completed, get_worker
+from distributed import CancelledError, Client, Future, KilledWorker, as_completed, get_worker, wait
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
@@ -56,6 +56,8 @@ _SHARE_FOR_VALUES = 0.25
 _OURS = (DeviceMemoryError, InvalidVolumeError, NoDeviceError, VDIFileError)
 #: Times that Dask tries again what a lost worker was at.
 _RETRIES = 3
+#: Seconds after which is looked whether the only workers that may do something are still there.
+_LOOK_EVERY = 5.0
 #: Ranges of rows for each worker, so that one with more to do does not keep all others waiting.
 RANGES_PER_WORKER = 4
 #: Shares of the two passes and of the merging in what is reported.
@@ -135,8 +137,8 @@ class _Run:
         self._futures: list[Future[Any]] = []
         known = client.scheduler_info(n_workers=-1)["workers"]
         # A worker that is started again has another address: tasks are tied to some only where
-        # others cannot do them, and even then go elsewhere, to fail, when all of these are gone
-        some = {"workers": workers, "allow_other_workers": True}
+        # others may not do them
+        some = {"workers": workers, "allow_other_workers": False}
         self._where: dict[str, Any] = some if len(workers) < len(known) else {}
         memory = sum(known[at]["memory_limit"] or np.inf for at in workers)
         self._kept = volume.array.nbytes <= _SHARE_FOR_VALUES * memory
@@ -238,7 +240,7 @@ class _Run:
         }
         self._futures += parts
         found = {}
-        for future in as_completed(parts):
+        for future in self._completed(parts):
             found[parts[future]] = self._result(future, parts[future])
             self._report(share / len(parts))
         return found
@@ -263,14 +265,44 @@ class _Run:
             ]
             merged[self._submit("merge", (y0, y1), _merge, parts)] = y0
         found: dict[int, Rows] = {}
-        for future in as_completed(merged):
+        for future in self._completed(merged):
             found[merged[future]] = self._result(future, (merged[future],))
             self._report(_SHARES[2] / len(merged))
         return [found[y0] for y0 in sorted(found)]
 
+    def _completed(self, futures: Collection[Future[Any]]) -> Iterator[Future[Any]]:
+        """Yield futures as they are done, as long as there are workers that may do them."""
+        if not self._where:
+            yield from as_completed(futures)
+            return
+        pending = set(futures)
+        while pending:
+            try:
+                done, pending = wait(pending, _LOOK_EVERY, return_when="FIRST_COMPLETED")
+            except TimeoutError:
+                self._require_workers()
+                continue
+            yield from done
+
+    def _require_workers(self) -> None:
+        there = self._client.scheduler_info(n_workers=-1)["workers"]
+        if not set(there) & set(self._workers):
+            raise DeviceError(
+                f"the workers that may make the VDI are gone: {', '.join(self._workers)}"
+            )
+
+    def _value(self, future: Future[Any]) -> Any:
+        """Return what a future that was done holds, made again if it was lost meanwhile."""
+        while self._where:
+            try:
+                return future.result(timeout=_LOOK_EVERY)
+            except TimeoutError:
+                self._require_workers()
+        return future.result()
+
     def _result(self, future: Future[Any], at: tuple[int, ...]) -> Any:
         try:
-            return future.result()
+            return self._value(future)
         except KilledWorker as error:
             raise DeviceError(
                 f"{_named(self._task, at)} could not be made: the workers that were at it died, "

@@ -162,6 +162,25 @@ def test_workers_without_a_device_are_named(client, scene, expected):
         choose(before)
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes are killed by SIGKILL")
+def test_nobody_waits_for_workers_that_are_gone(client, scene):
+    arguments, options = scene
+    client.wait_for_workers(2)
+    one = list(client.scheduler_info()["workers"])[:1]
+    pid = next(iter(client.run(os.getpid, workers=one).values()))
+    alive = [True]
+
+    def progress(done):
+        if done > 0.2 and alive[0]:
+            alive[0] = False
+            os.kill(pid, signal.SIGKILL)
+
+    with pytest.raises(DeviceError, match=f"are gone: {one[0]}"):
+        generate_on_dask(*arguments, client=client, workers=one, progress=progress, **options)
+    client.wait_for_workers(2)
+
+
 def test_rows_are_balanced_by_what_is_in_them():
     weights = np.zeros(99, np.int64)
     weights[40:60] = 100
