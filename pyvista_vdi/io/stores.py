@@ -21,6 +21,7 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.io.ranges import ZARR_FILES
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.chunked import closed, opened
 from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.levels import required_level
 from pyvista_vdi.model.volume import Volume, chunked_array
@@ -67,6 +68,12 @@ class Level:
     array: Any
     grid: Grid
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "array": closed(self.array)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state, array=opened(state["array"]))
+
 
 @dataclass(frozen=True)
 class Store:
@@ -108,7 +115,7 @@ class Store:
         shape = dict(zip(self.axes, self.levels[0].array.shape, strict=True))
         for axis, (name, number) in wanted.items():
             count = shape.get(axis, 1)
-            if not isinstance(number, int) or not 0 <= number < count:
+            if not isinstance(number, (int, np.integer)) or not 0 <= number < count:
                 raise InvalidArgumentError(
                     f"{self.path} has {count} along {name}, 0 to {count - 1}; got {number!r}"
                 )
@@ -119,7 +126,8 @@ class Store:
                     "time, channel, z, y nor x: give a Volume of an indexed dask array instead"
                 )
         return tuple(
-            slice(None) if axis in "zyx" else wanted.get(axis, ("", 0))[1] for axis in self.axes
+            slice(None) if axis in "zyx" else int(wanted.get(axis, ("", 0))[1])
+            for axis in self.axes
         )
 
 
@@ -256,12 +264,12 @@ def _chosen(
 ) -> tuple[int, str]:
     count = len(store.levels)
     if level != "auto":
-        if not isinstance(level, int) or not 0 <= level < count:
+        if not isinstance(level, (int, np.integer)) or not 0 <= level < count:
             raise InvalidArgumentError(
                 f'level must be "auto" or from 0, the finest, to {count - 1}, as {store.path} has '
                 f"{count}; got {level!r}"
             )
-        return level, "asked for"
+        return int(level), "asked for"
     if (camera is None) != (window_size is None):
         raise InvalidArgumentError(
             "a level is chosen for a camera and a window_size: give both, or neither for the finest"

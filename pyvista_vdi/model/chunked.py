@@ -191,15 +191,10 @@ class ChunkedArray:
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave an open HDF5 file behind: it is opened where this is unpickled."""
-        state = dict(self.__dict__)
-        if type(self._array).__module__.partition(".")[0] == "h5py":
-            state["_array"] = _InFile(self._array.file.filename, self._array.name)
-        return state
+        return {**self.__dict__, "_array": closed(self._array)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        if isinstance(self._array, _InFile):
-            self._array = self._array.open()
+        self.__dict__.update(state, _array=opened(state["_array"]))
 
     def __repr__(self) -> str:
         return f"ChunkedArray({self.source}, {self.shape} {self.dtype}, chunks={self.chunks})"
@@ -213,6 +208,18 @@ class _InFile:
 
     def open(self) -> Any:
         return importlib.import_module("h5py").File(self.path, "r")[self.name]
+
+
+def closed(array: Any) -> Any:
+    """Return what is pickled in place of an array: of an HDF5 file's, where it is."""
+    if type(array).__module__.partition(".")[0] == "h5py":
+        return _InFile(array.file.filename, array.name)
+    return array
+
+
+def opened(array: Any) -> Any:
+    """Return the array in whose place another was pickled."""
+    return array.open() if isinstance(array, _InFile) else array
 
 
 def is_chunked(array: Any) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import pickle
 import warnings
@@ -307,6 +308,21 @@ def test_hdf5(tmp_path):
         pvdi.open_volume(f"{path}::/two")
     labelled = pvdi.open_volume(f"{path}::/three", time=1)
     np.testing.assert_array_equal(labelled.load().array, VALUES[1, 0])
+    again = pickle.loads(pickle.dumps(labelled))
+    np.testing.assert_array_equal(again.load().array, VALUES[1, 0])
+    np.testing.assert_array_equal(copy.deepcopy(again).store.levels[0].array, VALUES[:, 0])
+    assert (again.time, again.spacing, again.why) == (1, labelled.spacing, labelled.why)
+
+
+def test_numbers_of_numpy_choose_as_others_do(image):
+    volume = pvdi.open_volume(image[0], level=np.int64(1), time=np.uint8(1), channel=np.int32(2))
+    np.testing.assert_array_equal(volume.load().array, VALUES[1, 2, ::2, ::2, ::2])
+    assert volume.describe().startswith("level 1 of 3")
+    assert volume.at_level(0).channel == 2
+    # Ranges are kept for what was chosen, and not for the type of a number
+    volume.finite_range()
+    same = pvdi.open_volume(image[0], level=1, time=1, channel=2)
+    assert same.array.ranges() is not None
 
 
 def test_what_is_no_store_is_said(tmp_path):
