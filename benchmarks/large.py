@@ -216,7 +216,7 @@ class Cluster:
         from distributed import Client, LocalCluster
 
         self.cluster = LocalCluster(
-            n_workers=2, threads_per_worker=1, memory_limit=memory, dashboard_address=None
+            n_workers=2, threads_per_worker=1, memory_limit=memory, dashboard_address=":0"
         )
         self.client = Client(self.cluster)
         cores = sorted(os.sched_getaffinity(0))

@@ -62,7 +62,7 @@ def main() -> None:
         volume = pvdi.open_volume(store, camera=camera, window_size=SIZE)
         print(volume.describe())
         with (
-            LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+            LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
             Client(cluster) as client,
         ):
             looks = {"cmap": "cividis", "opacity": [0, 0, 0.2, 0.5, 0.9], "clim": (0, 255)}
