@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pyvista_vdi import examples
     from pyvista_vdi.api import estimate, generate, pick, read, render, render_depth, render_volume
     from pyvista_vdi.device import describe_devices, list_devices
+    from pyvista_vdi.device.report import Report
     from pyvista_vdi.errors import *
     from pyvista_vdi.generation.estimate import Estimate
     from pyvista_vdi.io.stores import open_volume
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from pyvista_vdi.model.cropping import Cropping
     from pyvista_vdi.model.lighting import Light, Lights, Shading
     from pyvista_vdi.model.metrics import compare_images
+    from pyvista_vdi.model.presets import presets
     from pyvista_vdi.model.transfer_function import TransferFunction
     from pyvista_vdi.model.vdi import VDI
     from pyvista_vdi.model.volume import Volume
@@ -47,6 +49,7 @@ _HOMES = {
     "Light": "model.lighting",
     "Lights": "model.lighting",
     "Pick": "raycasting.picking",
+    "Report": "device.report",
     "SeriesWriter": "series.writer",
     "Shading": "model.lighting",
     "TransferFunction": "model.transfer_function",
@@ -66,6 +69,7 @@ _HOMES = {
     "list_devices": "device",
     "open_volume": "io.stores",
     "pick": "api",
+    "presets": "model.presets",
     "read": "api",
     "render": "api",
     "render_depth": "api",
@@ -84,6 +88,8 @@ providers.provide(
     image_with_scalars="pyvista_vdi.plotting.volumes:as_image",
     range_keeper="pyvista_vdi.io.ranges:keeper_of",
     notebook_bundle="pyvista_vdi.web.notebook:mime_bundle",
+    notebook_html="pyvista_vdi.web.notebook:html_of",
+    plot="pyvista_vdi.plotting.accessor:plot",
     scene_pages="pyvista_vdi.web.scenes.export:export_html",
     temporal_volumes="pyvista_vdi.vtk_pipeline.filters.temporal:steps_and_times",
     thinned="pyvista_vdi.model.thinned:thinned",

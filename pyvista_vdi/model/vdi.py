@@ -274,6 +274,32 @@ class VDI:
             f"{self.n_supersegments} supersegments, {self.nbytes / 2**20:.1f} MiB)"
         )
 
+    def plot(self, **arguments: Any) -> Any:
+        """Show it in a window, from its generating view.
+
+        Parameters
+        ----------
+        **arguments
+            Those of ``volume.vdi.plot``: ``pyvista.plot``'s and ``Plotter.show``'s
+            (``off_screen``, ``screenshot``, ``return_img``, ``cpos`` and so on); all others go to
+            ``Plotter.add_vdi``. Needs PyVista.
+
+        Returns
+        -------
+        object
+            What ``Plotter.show`` returns.
+
+        Examples
+        --------
+        >>> import pyvista_vdi as pvdi
+        >>> pvdi.read("brain.vdi").plot()  # doctest: +SKIP
+        """
+        return provider("plot")(self, **arguments)
+
+    def _repr_html_(self) -> str:
+        """Return a thumbnail and the figures, for what shows HTML and no viewer."""
+        return provider("notebook_html")(self)  # type: ignore[no-any-return]
+
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
         """Return what a notebook shows: a viewer, or a picture."""
         return provider("notebook_bundle")(self, include, exclude)

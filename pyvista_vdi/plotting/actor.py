@@ -70,6 +70,15 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         super().__init__()
         self._become_vdi_actor()
 
+    def __repr__(self) -> str:
+        """Return what is shown, and what of it the last frame drew."""
+        if self.GetMapper() is None:
+            return "PlotterVDIActor(without a mapper)"
+        if self.vdi is None:
+            return "PlotterVDIActor(makes its VDI in the first frame)"
+        hidden = "" if self.GetVisibility() else ", hidden"
+        return f"PlotterVDIActor({self.vdi!r}{hidden})"
+
     def SetMapper(self, mapper: Any) -> None:  # noqa: N802
         """Set the mapper, and hold it: PyVista's lose their lookup table with the last reference.
 

@@ -23,6 +23,7 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.model.checks import as_float, not_taken
 from pyvista_vdi.model.classification import BLENDINGS
 from pyvista_vdi.model.lighting import Shading
+from pyvista_vdi.model.presets import presets
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.vtk_pipeline.filters.properties import (
     RGBA_OPACITY,
@@ -81,6 +82,8 @@ class Looks:
         """Return the lookup table that ``Plotter.add_volume`` would build for some values."""
         if isinstance(self.cmap, pv.LookupTable):
             return self.cmap
+        if isinstance(self.cmap, str) and self.cmap in presets:
+            return self._of_preset(self.cmap).lookup_table(scalars)
         low, high = _scalar_range(scalars, self.clim)
         if self.log_scale and low <= 0:
             low = sys.float_info.min
@@ -108,6 +111,16 @@ class Looks:
         if isinstance(self.annotations, dict):
             table.annotations = self.annotations
         return table
+
+    def _of_preset(self, name: str) -> Looks:
+        """Return them with a preset's colours, and its range and opacity where none are given."""
+        look = presets[name]
+        if self.clim is not None:
+            del look["clim"]
+        if not (isinstance(self.opacity, str) and self.opacity == "linear"):
+            del look["opacity"]
+        del look["shade"]  # is asked for apart
+        return replace(self, **look)
 
     def volume_property(
         self, table: pv.LookupTable, default_distance: float | None = None, *, rgba: bool = False
@@ -230,7 +243,7 @@ def _color_map(cmap: Any) -> Any:
         if isinstance(cmap, str):
             import matplotlib as mpl
 
-            near = difflib.get_close_matches(cmap, list(mpl.colormaps), n=3)
+            near = difflib.get_close_matches(cmap, [*mpl.colormaps, *presets], n=3)
             hint = f": did you mean {' or '.join(map(repr, near))}?" if near else ""
         raise kind(
             f"cmap={cmap!r} is no colour map (a name, a list of colour names, a matplotlib "

@@ -12,6 +12,9 @@ from pyvista_vdi.errors import MissingDependencyError
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.web.still import still
 
+#: Longest edge of a thumbnail, pixels.
+_THUMBNAIL = 240
+
 
 def mime_bundle(
     vdi: VDI, include: Collection[str] | None = None, exclude: Collection[str] | None = None
@@ -108,6 +111,15 @@ def _without_a_viewer(vdi: VDI, why: str) -> dict[str, str]:
     picture = still(vdi)
     if picture is None:
         return text
-    shown = f'<img src="data:image/png;base64,{picture}"><br>'
-    words = f"<code>{html.escape(repr(vdi))}</code><br>{html.escape(why)}"
-    return {**text, "text/html": shown + words, "image/png": picture}
+    shown = f"{_html(vdi, picture)}<br>{html.escape(why)}"
+    return {**text, "text/html": shown, "image/png": picture}
+
+
+def html_of(vdi: VDI) -> str:
+    """Return a thumbnail and the figures of a VDI; the figures alone where there is no device."""
+    return _html(vdi, still(vdi, longest=_THUMBNAIL))
+
+
+def _html(vdi: VDI, picture: str | None) -> str:
+    words = f"<code>{html.escape(repr(vdi))}</code>"
+    return words if picture is None else f'<img src="data:image/png;base64,{picture}"><br>{words}'

@@ -57,9 +57,13 @@ def still(
     camera: dict[str, Any] | None = None,
     background: Sequence[float] | None = None,
     clipping_planes: ArrayLike | None = None,
+    longest: int = _EDGE,
 ) -> str | None:
-    """Return a view, the VDI's own by default, as base64 PNG; ``None`` without a device."""
-    share = min(1, _EDGE / max(vdi.picture_size))
+    """Return a view, the VDI's own by default, as base64 PNG; ``None`` without a device.
+
+    Its longer edge has at most ``longest`` pixels.
+    """
+    share = min(1, longest / max(vdi.picture_size))
     size = [max(1, round(edge * share)) for edge in vdi.picture_size]
     camera = viewer_camera(vdi.camera, vdi.picture_size) if camera is None else camera
     try:

@@ -1,0 +1,49 @@
+"""Make the pictures of the README and of the pages *Presets* and *Recipes*, small enough to commit.
+
+    python docs/make_pictures.py [NAME ...]
+
+Look at every one of them afterwards.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyvista as pv
+from PIL import Image
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import examples
+
+TARGET = Path(__file__).resolve().parent / "images"
+
+
+def main(names: list[str]) -> None:
+    """Make those whose names begin so, or all."""
+    for name in pvdi.presets:
+        if not names or any(f"preset-{name}".startswith(each) for each in names):
+            keep(preset(name), f"preset-{name}")
+
+
+def preset(name: str) -> np.ndarray:
+    """Return what a preset shows: of a phantom, or of the shipped brain."""
+    volume = examples.load_brain() if name.startswith("mri") else examples.load_data("catphan")
+    step = (-150, 270, 130) if name.startswith("mri") else (-230, -230, 290)
+    plotter = pv.Plotter(off_screen=True, window_size=(320, 240))
+    plotter.background_color = "black"
+    look = {**pvdi.presets[name], "interpolation": "linear"}
+    plotter.add_vdi(volume, **look, show_scalar_bar=False)
+    plotter.camera_position = [np.add(volume.center, step), volume.center, (0, 0, 1)]
+    return np.asarray(plotter.screenshot(return_img=True))
+
+
+def keep(picture: np.ndarray, name: str, colors: int = 128) -> None:
+    """Store a picture with a palette."""
+    file = TARGET / f"{name}.png"
+    Image.fromarray(picture).quantize(colors).save(file, optimize=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

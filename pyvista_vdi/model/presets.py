@@ -1,0 +1,175 @@
+"""Looks for CT and MRI by name: ``pl.add_vdi(volume, **pvdi.presets["ct-bone"])``.
+
+The control points are this project's own. CT's stand in Hounsfield units, so a scan must be
+calibrated, as DICOM files are; MRI has no unit, and its points are shares of the values' range.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pyvista_vdi.errors import InvalidArgumentError
+
+#: Entries of the tables that are made of the control points.
+_ENTRIES = 256
+
+
+class _Points(NamedTuple):
+    """Control points of one look: (value, colour as #rrggbb, opacity of a voxel), values rising."""
+
+    shows: str
+    points: tuple[tuple[float, str, float], ...]
+    in_hounsfield: bool
+
+
+_POINTS = {
+    "ct-bone": _Points(
+        "bone alone",
+        ((150, "#a0522d", 0), (300, "#d9a577", 0.1), (700, "#f2e3c6", 0.5), (1600, "#ffffff", 0.9)),
+        True,
+    ),
+    "ct-skin": _Points(
+        "the surface against air",
+        (
+            (-500, "#8a5a44", 0),
+            (-250, "#d9a184", 0.2),
+            (0, "#eec0a4", 0.5),
+            (400, "#f7ead9", 0.7),
+            (1500, "#ffffff", 0.9),
+        ),
+        True,
+    ),
+    "ct-muscle": _Points(
+        "muscle, faintly, around bone",
+        (
+            (-30, "#5a1a14", 0),
+            (40, "#93372b", 0.04),
+            (90, "#b4503e", 0.08),
+            (200, "#d9a577", 0.1),
+            (600, "#f2e3c6", 0.5),
+            (1500, "#ffffff", 0.9),
+        ),
+        True,
+    ),
+    "ct-angiography": _Points(
+        "vessels filled with contrast medium, and bone",
+        (
+            (130, "#5c0a0a", 0),
+            (220, "#b01818", 0.15),
+            (350, "#e8442e", 0.5),
+            (600, "#f2d7b8", 0.4),
+            (1500, "#ffffff", 0.7),
+        ),
+        True,
+    ),
+    "mri-brain": _Points(
+        "a brain whose skull has been removed",
+        (
+            (0.25, "#5e3c3a", 0),
+            (0.4, "#a67f78", 0.15),
+            (0.6, "#d8bfb4", 0.5),
+            (1.0, "#fff6ec", 0.9),
+        ),
+        False,
+    ),
+    "mri-skin": _Points(
+        "the surface of whatever gives signal",
+        (
+            (0.08, "#7a4b3a", 0),
+            (0.2, "#c98e74", 0.35),
+            (0.5, "#eec0a4", 0.7),
+            (1.0, "#fff4ea", 0.9),
+        ),
+        False,
+    ),
+    "mri-muscle": _Points(
+        "tissue of middling signal, translucent",
+        (
+            (0.15, "#4a1512", 0),
+            (0.35, "#93372b", 0.05),
+            (0.55, "#c4604a", 0.1),
+            (0.75, "#e6b59c", 0.03),
+            (1.0, "#fff4ea", 0.02),
+        ),
+        False,
+    ),
+    "mri-angiography": _Points(
+        "the brightest signal: blood that flows, in time-of-flight scans",
+        (
+            (0.55, "#5c0a0a", 0),
+            (0.7, "#c02020", 0.2),
+            (0.85, "#f06040", 0.6),
+            (1.0, "#ffd9b8", 0.9),
+        ),
+        False,
+    ),
+}
+
+
+def _arguments(look: _Points) -> dict[str, Any]:
+    values, colors, opacities = zip(*look.points, strict=True)
+    rgb = [[int(color[i : i + 2], 16) for i in (1, 3, 5)] for color in colors]
+    first = values[0] if look.in_hounsfield else 0.0
+    at = np.linspace(first, values[-1], _ENTRIES)
+    channels = [np.interp(at, values, channel) for channel in np.transpose(rgb)]
+    table = np.rint(np.stack(channels, axis=1)).astype(int)
+    alpha = np.rint(255 * np.interp(at, values, opacities)).astype(int)
+    return {
+        "cmap": ["#{:02x}{:02x}{:02x}".format(*color) for color in table],
+        "opacity": alpha.tolist(),  # bytes: as long as n_colors, taken as it is
+        "clim": (float(first), float(values[-1])) if look.in_hounsfield else None,
+        "n_colors": _ENTRIES,
+        "shade": True,
+    }
+
+
+class Presets(Mapping[str, dict[str, Any]]):
+    """Arguments of ``add_vdi``, ``add_volume`` and :func:`pyvista_vdi.generate`, by name.
+
+    Each look is a new dictionary of ``cmap``, ``opacity``, ``clim``, ``n_colors`` and ``shade``;
+    ``presets["ct-bone"] | {"shade": False}`` changes a part of it.
+
+    Examples
+    --------
+    >>> import pyvista_vdi as pvdi
+    >>> pvdi.presets["ct-bone"]["clim"]
+    (150.0, 1600.0)
+    """
+
+    def __getitem__(self, name: str) -> dict[str, Any]:
+        try:
+            return _arguments(_POINTS[name])
+        except (KeyError, TypeError):
+            near = difflib.get_close_matches(str(name), _POINTS, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(_POINTS)}"
+            raise InvalidArgumentError(f"no preset is called {name!r}: {hint}") from None
+
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and name in _POINTS
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_POINTS)
+
+    def __len__(self) -> int:
+        return len(_POINTS)
+
+    def __repr__(self) -> str:
+        width = max(map(len, _POINTS))
+        lines = []
+        for name, look in _POINTS.items():
+            low, high = look.points[0][0], look.points[-1][0]
+            unit = (
+                f"{low:g} to {high:g} HU"
+                if look.in_hounsfield
+                else f"from {low:.0%} of the range of values"
+            )
+            lines.append(f"{name:{width}}  {look.shows}; {unit}")
+        return "\n".join(lines)
+
+
+#: The looks.
+presets = Presets()

@@ -1,0 +1,66 @@
+"""``pvdi.Report()``, and how a VDI shows itself."""
+
+from __future__ import annotations
+
+from base64 import b64decode
+from importlib import metadata
+from io import BytesIO
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.device import report
+from pyvista_vdi.errors import NoDeviceError
+from pyvista_vdi.model.standard_cases import filling_camera
+
+SIZE = (64, 48)
+
+
+def test_a_report_names_versions_and_devices(default_runtime):
+    said = repr(pvdi.Report())
+    assert "numpy " in said
+    assert metadata.version("numpy") in said
+    assert default_runtime.info.name in said
+    assert "<pre>" in pvdi.Report()._repr_html_()
+
+
+def test_a_report_says_what_is_missing(monkeypatch):
+    def none():
+        raise NoDeviceError("no device")
+
+    found = metadata.version
+    monkeypatch.setattr(report, "describe_devices", none)
+    monkeypatch.setattr(report, "_version", lambda n: None if n == "h5py" else found(n))
+    described = pvdi.Report()
+    assert described.packages["h5py"] is None
+    assert 'pip install "pyvista-vdi[hdf5]"' in repr(described)
+    assert "no device" in repr(described)
+
+
+@pytest.fixture(scope="module")
+def vdi(default_runtime):
+    z, y, x = np.mgrid[:9, :9, :9]
+    volume = pvdi.Volume((x * y + z).astype(np.float32))
+    shades = np.linspace(0, 1, 16)
+    look = pvdi.TransferFunction(np.stack([shades] * 3, axis=1), shades / 2, (0, 72))
+    view = filling_camera(volume.bounds, SIZE)
+    return pvdi.generate(volume, view, SIZE, transfer_function=look)
+
+
+def test_html_shows_a_thumbnail(vdi):
+    said = vdi._repr_html_()
+    assert "64 x 48 lists" in said
+    encoded = said.partition("base64,")[2].partition('"')[0]
+    assert Image.open(BytesIO(b64decode(encoded))).size == SIZE
+
+
+@pytest.mark.gl
+def test_plot_shows_the_generating_view(vdi):
+    pytest.importorskip("pyvista")
+    options = {"show_scalar_bar": False, "show_axes": False, "background": "black"}
+    shown = vdi.plot(off_screen=True, return_img=True, **options)
+    right, turned = (pvdi.render(vdi, vdi.camera.azimuth(angle))[..., :3] for angle in (0, 3))
+    off, far = (np.abs(shown[..., :3] - 255 * each).mean() for each in (right, turned))
+    assert off < 0.1 * far, (off, far)  # rounding and the plotter's clipping planes, but no turn
