@@ -30,7 +30,7 @@ def main(names: list[str]) -> None:
 def preset(name: str) -> np.ndarray:
     """Return what a preset shows: of a phantom, or of the shipped brain."""
     volume = examples.load_brain() if name.startswith("mri") else examples.load_data("catphan")
-    step = (-150, 270, 130) if name.startswith("mri") else (-230, -230, 290)
+    step = (-150, 270, 130) if name.startswith("mri") else (-265, -265, 335)
     plotter = pv.Plotter(off_screen=True, window_size=(320, 240))
     plotter.background_color = "black"
     look = {**pvdi.presets[name], "interpolation": "linear"}

@@ -1,0 +1,118 @@
+"""What can be told of Windows and macOS from here: names of files, imports, versions kept together.
+
+Needs a checkout: the folder that ``PYVISTA_VDI_CHECKOUT`` names, or the one these tests lie in.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import pyvista_vdi
+from pyvista_vdi._version import __version__
+
+CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
+PACKAGE = Path(pyvista_vdi.__file__).parent
+
+#: Modules of Python that Windows has not.
+POSIX = ("fcntl", "grp", "pwd", "resource", "termios", "tty", "pty", "posix", "syslog")
+#: Names that Windows keeps for devices, with any extension.
+RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
+
+
+def _at_import(tree):
+    """Yield the nodes that run when a module is imported: none in a function."""
+    waiting = [tree]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        for child in ast.iter_child_nodes(node):
+            if not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+                waiting.append(child)
+
+
+@pytest.mark.fast
+def test_no_module_needs_posix_to_be_imported():
+    found = []
+    for path in PACKAGE.rglob("*.py"):
+        for node in _at_import(ast.parse(path.read_text(encoding="utf-8"))):
+            names = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                names = [node.module or ""]
+            found += [f"{path.name}:{node.lineno} {n}" for n in names if n.split(".")[0] in POSIX]
+    assert not found
+
+
+def test_the_package_is_imported_where_posix_modules_are_absent():
+    # "posix" itself is what Python's os is made of here
+    code = f"import sys; sys.modules.update(dict.fromkeys({POSIX[:5]!r}))"
+    modules = "pyvista_vdi.cli.parser, pyvista_vdi.model.vdi"
+    subprocess.run([sys.executable, "-c", f"{code}; import {modules}"], check=True)
+
+
+@pytest.fixture
+def names():
+    """Return the names of the checkout's files."""
+    if not (CHECKOUT / ".git").exists():
+        pytest.skip("no checkout at hand: set PYVISTA_VDI_CHECKOUT to one")
+    listing = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=CHECKOUT, capture_output=True, check=True
+    )
+    return [name for name in os.fsdecode(listing.stdout).split("\0") if name]
+
+
+def test_every_file_can_be_checked_out_on_windows_and_macos(names):
+    """No character or name that they refuse, no two names that differ by case, none too long."""
+    parts = {part for name in names for part in name.split("/")}
+    assert not [p for p in parts if re.search(r'[<>:"\\|?*\x00-\x1f]|[. ]$', p)]
+    assert not [p for p in parts if RESERVED.fullmatch(p)]
+    assert len({name.lower() for name in names}) == len(set(names))
+    assert max(map(len, names)) < 160  # Windows' limit, 260, less a folder to check out into
+
+
+def test_text_is_opened_with_its_encoding():
+    """Windows' default is not UTF-8."""
+    found = []
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if (
+                isinstance(node, ast.Call)
+                and isinstance(node.func, ast.Attribute)
+                and node.func.attr in ("read_text", "write_text")
+                and "encoding" not in {k.arg for k in node.keywords}
+                and len(node.args) < (1 if node.func.attr == "read_text" else 2)
+            ):
+                found.append(f"{path.relative_to(PACKAGE)}:{node.lineno}")
+    assert not found
+
+
+def test_one_version():
+    if not (CHECKOUT / "CITATION.cff").is_file():
+        pytest.skip("no checkout at hand: set PYVISTA_VDI_CHECKOUT to one")
+    for name, pattern in (
+        ("CITATION.cff", r"^version: (\S+)$"),
+        ("tools/conda/recipe.yaml", r'^  version: "(\S+)"$'),
+    ):
+        text = (CHECKOUT / name).read_text(encoding="utf-8")
+        assert re.findall(pattern, text, re.MULTILINE) == [__version__], name
+
+
+def test_the_conda_recipe_has_the_wheel_s_requirements():
+    tomllib = pytest.importorskip("tomllib", reason="tomllib is Python 3.11's")
+    recipe = CHECKOUT / "tools" / "conda" / "recipe.yaml"
+    if not recipe.is_file():
+        pytest.skip("no checkout at hand: set PYVISTA_VDI_CHECKOUT to one")
+    project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    listed = set(re.findall(r"^    - (\S+) >=(\S+)$", recipe.read_text("utf-8"), re.MULTILINE))
+    needed = project["dependencies"] + project["optional-dependencies"]["plot"]
+    conda_names = {"vtk": "vtk-base", "matplotlib": "matplotlib-base"}
+    wanted = {tuple(re.split(">=", line)) for line in needed}
+    assert {(conda_names.get(name, name), least) for name, least in wanted} <= listed
