@@ -131,6 +131,7 @@ def test_series_example_writes_a_movie_of_its_steps(tmp_path):
     assert all(later > 1.2 * before for before, later in pairwise(dark[:3])), "it has not risen"
 
 
+@pytest.mark.slow
 def test_sets_example_writes_a_movie_of_a_turn(tmp_path):
     said, target = run_example("sets.py", tmp_path)
     assert "'below_target': 0" in said
