@@ -69,6 +69,20 @@ def test_opengl_draws_the_same_but_for_rounded_corners():
     assert off <= MOST_ROUNDED * pixels
 
 
+@pytest.mark.gl
+def test_opengl_draws_all_lists_of_a_wide_window():
+    """Points carry lists' numbers, which VTK would take for places that no camera sees."""
+    from pyvista_vdi.measure.rivals.opengl import OpenGLFrusta
+
+    rng = np.random.default_rng(7)
+    vdi = strategies.random_vdi(rng, window=(400, 3), max_supersegments=2)
+    drawn = OpenGLFrusta(vdi, vdi.window_size)
+    image = drawn.image(vdi.camera)
+    drawn.close()
+    np.testing.assert_allclose(image, reference.render(vdi, vdi.camera), atol=TOLERANCE)
+    assert drawn.nbytes == vdi.n_supersegments * (12 + 8 + 16 + 4)
+
+
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 def test_no_frustum_hides_an_earlier_one(kind):
     for _, vdi, camera, size in cases(kind, 3):

@@ -150,6 +150,7 @@ class OpenGLFrusta(OffScreenVolume):
         shaders.SetGeometryShaderCode(_GEOMETRY)
         shaders.SetFragmentShaderCode(_FRAGMENT)
         super().__init__("OpenGL", actor, size)
+        self.renderer.GetCullers().RemoveAllItems()  # points are lists' numbers, no positions
         self.renderer.SetUseOIT(False)  # frusta are blended in the order in which they come
         self._window.Render()
         if float_buffer:
