@@ -7,7 +7,11 @@ Look at every one of them afterwards.
 
 from __future__ import annotations
 
+import contextlib
+import re
+import shutil
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +29,22 @@ def main(names: list[str]) -> None:
     for name in pvdi.presets:
         if not names or any(f"preset-{name}".startswith(each) for each in names):
             keep(preset(name), f"preset-{name}")
+    if not names or "recipes" in names:
+        recipes()
+
+
+def recipes() -> None:
+    """Run the blocks of the page *Recipes*, and keep what they write."""
+    text = (TARGET.parent / "recipes.md").read_text(encoding="utf-8")
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        for block in re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
+            exec(block, {})
+        for file in Path(folder).glob("*.png"):
+            keep(np.asarray(Image.open(file).convert("RGB")), file.stem)
+        for file in Path(folder).glob("*.gif"):
+            shutil.copy(file, TARGET)
+    shown = [Image.open(TARGET / f"recipe-{name}.png") for name in ("clipped", "field", "mri")]
+    keep(np.concatenate([np.asarray(each.convert("RGB")) for each in shown], axis=1), "front")
 
 
 def preset(name: str) -> np.ndarray:
