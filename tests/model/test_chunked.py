@@ -41,6 +41,19 @@ def hdf5_data(values, folder):
 SOURCES = {"dask": dask_array, "zarr": zarr_array, "h5py": hdf5_data}
 
 
+@pytest.mark.parametrize("source", ["dask", "h5py"])
+def test_colours_are_refused_by_name(source, tmp_path):
+    colours = np.zeros((4, 5, 6, 4), dtype=np.uint8)
+    if source == "dask":
+        array = pytest.importorskip("dask.array").from_array(colours)
+    else:
+        file = pytest.importorskip("h5py").File(tmp_path / "x.h5", "w")
+        array = file.create_dataset("colours", data=colours)
+    with pytest.raises(InvalidVolumeError, match=r"RGBA: .*Volume\(numpy\.asarray\(array\)\)"):
+        Volume(array)
+    assert Volume(np.asarray(array)).rgba
+
+
 @pytest.mark.parametrize("source", SOURCES)
 @pytest.mark.parametrize("dtype", ["uint8", ">i2", "float32", "bool", "float16", "int64"])
 def test_parts_are_those_of_the_array(source, dtype, tmp_path):
