@@ -22,7 +22,7 @@ from unittest import mock
 
 import numpy as np
 from common import add_clock, add_size, begun, clock_of, new_parser, save  # beside this file
-from scaling import Fit, fitted
+from scaling import Fit, _short, fitted
 from tqdm import tqdm
 
 from pyvista_vdi import examples, reference
@@ -530,7 +530,7 @@ def write_plot(results: Mapping[str, Any], target: Path) -> None:
         panel.set(xscale="log" if axis in POWERS else "linear", yscale="log", xlabel=AXES[axis][0])
         if axis in POWERS:
             values = [value for value, _ in rows_of(results, axis)]
-            panel.set_xticks(values, [f"{value:.4g}" for value in values])
+            panel.set_xticks(values, [_short(value) for value in values])
             panel.tick_params(axis="x", which="minor", bottom=False, labelbottom=False)
         panel.grid(alpha=0.3, which="both")
         panel.legend(fontsize=6)
