@@ -296,7 +296,7 @@ class VDI:
         """
         return provider("plot")(self, **arguments)
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:
         """Return a thumbnail and the figures, for what shows HTML and no viewer."""
         return provider("notebook_html")(self)  # type: ignore[no-any-return]
 

@@ -115,9 +115,9 @@ def _without_a_viewer(vdi: VDI, why: str) -> dict[str, str]:
     return {**text, "text/html": shown, "image/png": picture}
 
 
-def html_of(vdi: VDI) -> str:
-    """Return a thumbnail and the figures of a VDI; the figures alone where there is no device."""
-    return _html(vdi, still(vdi, longest=_THUMBNAIL))
+def html_of(vdi: VDI) -> str | None:
+    """Return a thumbnail and the figures of a VDI, or the figures alone; nothing in a terminal."""
+    return None if _in_a_terminal() else _html(vdi, still(vdi, longest=_THUMBNAIL))
 
 
 def _html(vdi: VDI, picture: str | None) -> str:
