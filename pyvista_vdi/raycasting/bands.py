@@ -45,12 +45,12 @@ def render_fitting(vdi: VDI, request: FrameRequest) -> NDArray[np.float32]:
 
 def render_in_bands(vdi: VDI, request: FrameRequest, n: int) -> NDArray[np.float32]:
     """Raycast a VDI in n bands of rows, each by itself."""
-    width, height = request.size
-    image = np.zeros((height, width, 4), np.float32)
+    image: NDArray[np.float32] | None = None
     cuts = np.linspace(0, vdi.window_size[1], n + 1).round().astype(int).tolist()
     for k in in_order(vdi, cuts, request.camera):
         behind = render_vdi(band(vdi, cuts[k], cuts[k + 1]), request)
-        image += (1 - image[..., 3:]) * behind
+        image = behind if image is None else image + (1 - image[..., 3:]) * behind
+    assert image is not None  # there are bands
     return image
 
 

@@ -29,7 +29,7 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 from pyvista_vdi.reference.rays import pixel_ray
-from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.classified_volume import DeviceVolume, march_forms
 
 pytestmark = pytest.mark.extremes
 
@@ -77,14 +77,7 @@ def test_what_is_not_very_thin_is_computed_in_float32_alone(runtime, dimensions)
     for azimuth in range(0, 91, 15):
         for options in ({}, {"distance": 1.3}, {"parallel": True}):
             camera = view(volume, azimuth, 35, **options)
-            assert not DeviceVolume.forms(_Bare(volume), camera, (640, 480)).defines
-
-
-class _Bare:
-    """What :meth:`DeviceVolume.forms` needs of itself: no device."""
-
-    def __init__(self, volume):
-        self.volume = volume
+            assert not march_forms(volume, camera, (640, 480)).defines
 
 
 def test_needles(runtime, worst):

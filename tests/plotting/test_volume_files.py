@@ -107,12 +107,14 @@ def write_in(kind, folder, direction):
     return path
 
 
+#: Options of stores of chunks, which no other file has.
+_OF_A_STORE = ("level", "channel", "time_index")
 FORMATS = ("vti", "nrrd", "nhdr", "mha", "mhd", "nii", "nii.gz", "dicom")
 
 
 def read(path, **options):
     """Read as every verb does that takes a volume."""
-    absent = ("example", "scalars", "preference", "spacing", "origin")
+    absent = ("example", "scalars", "preference", "spacing", "origin", *_OF_A_STORE)
     return read_volume(Namespace(**dict.fromkeys(absent) | {"file": str(path)} | options))
 
 
