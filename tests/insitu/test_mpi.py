@@ -89,6 +89,7 @@ def test_a_simulation_writes_a_series_and_single_files(tmp_path):
 
 
 @needs_mpi
+@pytest.mark.slow
 def test_the_example_writes_a_picture_and_says_what_it_costs(tmp_path):
     said = run_program(2, EXAMPLE, tmp_path / "smoke.png")
     assert re.search(r"solver: \d+ ms a step; in situ: \d+ ms a VDI", said), said

@@ -136,7 +136,9 @@ def test_rays_meet_blocks_in_their_order_and_windows(view):
 
 
 @pytest.mark.parametrize("view", VIEWS)
-@pytest.mark.parametrize("cuts", CUTS, ids=str)
+@pytest.mark.parametrize(
+    "cuts", [CUTS[0], *(pytest.param(c, marks=pytest.mark.slow) for c in CUTS[1:])], ids=str
+)
 def test_every_step_belongs_to_one_block(runtime, view, cuts):
     """Optical depths add up whatever is merged: a step that is lost or taken twice shows."""
     volume = volume_of("uint8", (1, 1.3, 0.8))

@@ -78,7 +78,7 @@ def run_example(name, folder):
         "picking.py",
         "files.py",
         "occlusion.py",
-        "large_volume.py",
+        pytest.param("large_volume.py", marks=pytest.mark.slow),
     ],
 )
 def test_example_writes_a_picture(name, tmp_path):
@@ -117,6 +117,7 @@ def test_interactive_example_writes_an_animation_with_a_new_vdi(tmp_path):
     assert np.abs(last - first)[100:].mean() > 5, "nothing has turned"
 
 
+@pytest.mark.slow
 def test_series_example_writes_a_movie_of_its_steps(tmp_path):
     said, target = run_example("series.py", tmp_path)
     sizes = re.search(r"series\.vdis: ([\d.]+) MiB for ([\d.]+) MiB", said)
@@ -143,6 +144,7 @@ def test_sets_example_writes_a_movie_of_a_turn(tmp_path):
             assert 0.02 < there < 0.5  # from every side there is a knot
 
 
+@pytest.mark.slow
 def test_tradeoff_example_draws_its_three_fronts(tmp_path):
     said, target = run_example("tradeoff.py", tmp_path)
     assert all(f"{kind}: " in said for kind in ("frame", "memory", "generation"))
