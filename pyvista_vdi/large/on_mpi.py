@@ -90,7 +90,7 @@ def generate_on_mpi(
         On all ranks, if one of them fails; the message names it.
     """
     options = GenerationOptions.of(options, changes)
-    with _together(comm, "reading the arguments"):
+    with together(comm, "reading the arguments"):
         own = Volume(values, name=name)
         size = check_window_size(window_size)
         refuse_unsupported(name, options)
@@ -102,11 +102,11 @@ def generate_on_mpi(
     block = {rank: at for at, rank in ranks.items()}[comm.rank]
     windows = blocks.windows(task.camera, task.size)
     window = windows.get(block, NOWHERE)
-    with _together(comm, "the first pass"):
+    with together(comm, "the first pass"):
         seen = task.first_pass(block, own.array, window, device)
     light, order, scattered = None, None, None
     summaries = comm.gather(seen._replace(slabs={}))
-    with _together(comm, "the light"):
+    with together(comm, "the light"):
         if comm.rank == 0:
             of_blocks = {at: summaries[rank] for at, rank in ranks.items()}
             found = light_entering(task, windows, of_blocks)
@@ -116,7 +116,7 @@ def generate_on_mpi(
     order = comm.bcast(order)
     parts = _exchanged(comm, task, block, ranks, seen.slabs)
     piece = Piece(window, np.zeros((0, 0), np.uint16), np.zeros((0, 8), np.float32))
-    with _together(comm, "the second pass"):
+    with together(comm, "the second pass"):
         if light is not None:
             whole = blocks.with_halo(own.array, parts, task.halo)
             piece = task.second_pass(block, whole, window, light, device)
@@ -127,7 +127,7 @@ def generate_on_mpi(
     ]
     received = comm.alltoall(sent)
     rows = None
-    with _together(comm, "merging"):
+    with together(comm, "merging"):
         if comm.rank < len(ranges):
             y0, y1 = ranges[comm.rank]
             pieces = [received[ranks[at]] for at in order]
@@ -144,8 +144,14 @@ def generate_on_mpi(
 
 
 @contextmanager
-def _together(comm: Any, what: str) -> Iterator[None]:
-    """Do something on all ranks; if one fails, all raise, so that nobody waits for it."""
+def together(comm: Any, what: str) -> Iterator[None]:
+    """Do something on all ranks; if one fails, all raise, so that nobody waits for it.
+
+    Raises
+    ------
+    DeviceError
+        On all ranks; the message says what failed, on how many of them, and why on the first.
+    """
     error: Exception | None = None
     try:
         yield

@@ -37,13 +37,15 @@ except ImportError as error:
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
+from pyvista_vdi.series.reader import is_series_file
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce_times, wanted_time, watch
 from pyvista_vdi.vtk_pipeline.filters.convert import (
     require_image,
     scalars_of,
     vdi_from_image,
-    volume_from_vtk,
 )
+from pyvista_vdi.vtk_pipeline.filters.ranks import RanksVDISource, is_first_rank
+from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
 
 #: What ParaView's plugin manager shows.
 paraview_plugin_name = "VDI"
@@ -292,7 +294,7 @@ class _Looking(Algorithm):
 )
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
-class VDISource(_Looking, vtk_pipeline.VDISource):
+class VDISource(_Looking, RanksVDISource):
     """A volume's VDI: :class:`pyvista_vdi.VDISource`, and a view and a ramp by default."""
 
     def __init__(self) -> None:
@@ -404,7 +406,7 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
     def _set_looks(self, image: vtkImageData) -> None:
         """Bring the volume property up to date with what is given, and with defaults."""
         prop = self._looks
-        low, high = scalars_of(image, self.GetScalars(), self._kind).GetFiniteRange()
+        low, high = self._scalar_range(image)
         color, opacity = vtkColorTransferFunction(), vtkPiecewiseFunction()
         for x, share in ((low, 0.0), (high, 1.0)):
             color.AddRGBPoint(x, share, share, share)
@@ -415,8 +417,7 @@ class VDISource(_Looking, vtk_pipeline.VDISource):
         prop.GetScalarOpacity().DeepCopy(self._functions.get("opacity") or opacity)
         distance = self._unit_distance
         if distance is None:
-            volume = volume_from_vtk(image, self.GetScalars(), self._kind)
-            distance = volume.default_unit_distance
+            distance = self._default_unit_distance(image)
         prop.SetScalarOpacityUnitDistance(distance)
         self.SetVolumeProperty(prop)
 
@@ -450,6 +451,9 @@ class VDIToImage(_Looking, vtk_pipeline.VDIToImage):
         self._watching = False
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
+        if not is_first_rank():  # one picture is enough
+            vtkImageData.GetData(outputs, 0).Initialize()
+            return
         self.SetCamera(self._given_camera())
         super()._execute(inputs, outputs)
         if not self._watching:
@@ -626,6 +630,7 @@ class VDISeriesReader(vtk_pipeline.VDIReader):
     label="VDI Writer",
     extensions="vdi exr vdis",
     file_description="Volumetric Depth Image",
+    supports_parallel="1",
     support_reload=False,
 )
 @smproperty.xml(
@@ -638,10 +643,19 @@ class VDISeriesReader(vtk_pipeline.VDIReader):
 class VDIWriter(vtk_pipeline.VDIWriter):
     """A file of a VDI, or of all time steps: :class:`pyvista_vdi.vtk_pipeline.VDIWriter`."""
 
+    def _execute(self, inputs: Any, outputs: Any) -> None:
+        if is_first_rank():  # all have the VDI
+            super()._execute(inputs, outputs)
+
     def Write(self) -> None:
         """Write the file; ParaView's output window says what went wrong."""
         try:
-            super().Write()
+            if is_series_file(self.GetFileName()) and not is_first_rank():
+                images, _ = steps_and_times(self.GetInputAlgorithm(0, 0))
+                for _ in images:  # which the first rank's needs the others for
+                    pass
+            else:
+                super().Write()
         except (VDIError, OSError) as error:
             _say(self, error)
 

@@ -35,17 +35,21 @@ def brain():
     volume.VOI = [0, 180, 0, 216, 0, 180]
     volume.SampleRateI = volume.SampleRateJ = volume.SampleRateK = STEP
     volume.UpdatePipeline()
+    return volume, *functions()
+
+
+def functions():
     color = simple.GetColorTransferFunction("ImageScalars")
     color.ColorSpace = "RGB"
     color.RGBPoints = COLORS
     color.ScalarRangeInitialized = 1
     opacity = simple.GetOpacityTransferFunction("ImageScalars")
     opacity.Points = OPACITIES
-    return volume, color, opacity
+    return color, opacity
 
 
-def brain_source():
-    volume, color, opacity = brain()
+def brain_source(volume=None):
+    volume, color, opacity = brain() if volume is None else (volume, *functions())
     source = simple.VDISource(Input=volume, ColorFunction=color, OpacityFunction=opacity)
     source.WindowSize = SIZE
     source.ScalarOpacityUnitDistance = UNIT_DISTANCE
@@ -61,12 +65,12 @@ def black_view(size):
     return view
 
 
-def show_picture(picture, size):
+def show_picture(picture, size, representation="Slice"):
     """Show a VDIToImage so that its pixels are the view's."""
     width, height = size
     view = black_view(size)
     shown = simple.Show(picture, view, "UniformGridRepresentation")
-    shown.Representation = "Slice"
+    shown.Representation = representation
     simple.ColorBy(shown, ("POINTS", "RGBA"))
     shown.MapScalars = 0
     view.CameraParallelProjection = 1
@@ -198,6 +202,33 @@ def scene(folder):
     shot("deleted")
 
 
+def in_time(folder):
+    """Return the source of a volume in several files, a time step each."""
+    volume = simple.OpenDataFile([str(folder / f"ball_{step}.vti") for step in range(3)])
+    source = simple.VDISource(Input=volume, WindowSize=SIZE, ScalarOpacityUnitDistance=0.2)
+    source.ColorFunction = simple.GetColorTransferFunction("v")
+    source.OpacityFunction = simple.GetOpacityTransferFunction("v")
+    source.ColorFunction.RGBPoints = [0.0, 0.0, 0.2, 1.0, 255.0, 1.0, 0.5, 0.0]
+    source.ColorFunction.ColorSpace = "RGB"
+    source.OpacityFunction.Points = [0.0, 0.0, 0.5, 0.0, 255.0, 0.8, 0.5, 0.0]
+    return source
+
+
+def ranks(folder):
+    """Make VDIs of points, of cells and of time steps with all ranks of a server."""
+    source = brain_source(simple.OpenDataFile(str(folder / "brain.vti")))
+    simple.SaveData(str(folder / "points.vdi"), source)
+    picture = simple.VDIToImage(Input=source, Azimuth=AZIMUTH)
+    view = show_picture(picture, SIZE, "Surface")
+    simple.SaveScreenshot(str(folder / "picture.png"), view, ImageResolution=SIZE)
+    cells = brain_source(simple.PointDatatoCellData(Input=source.Input))
+    cells.Scalars = ["CELLS", "ImageScalars"]
+    simple.SaveData(str(folder / "cells.vdi"), cells)
+    wavelet = simple.Wavelet(WholeExtent=[-9, 10, -8, 12, -7, 6])
+    simple.SaveData(str(folder / "wavelet.vdi"), simple.VDISource(Input=wavelet, WindowSize=SIZE))
+    simple.SaveData(str(folder / "steps.vdis"), in_time(folder))
+
+
 def settings(folder):
     """Say what the properties became, and what a change of them did."""
     scalars, color, opacity = brain()
@@ -322,13 +353,7 @@ def animation(folder):
 
 def temporal(folder):
     """Make VDIs of a volume in several files, a time step each, as the animation goes."""
-    volume = simple.OpenDataFile([str(folder / f"ball_{step}.vti") for step in range(3)])
-    source = simple.VDISource(Input=volume, WindowSize=SIZE, ScalarOpacityUnitDistance=0.2)
-    source.ColorFunction = simple.GetColorTransferFunction("v")
-    source.OpacityFunction = simple.GetOpacityTransferFunction("v")
-    source.ColorFunction.RGBPoints = [0.0, 0.0, 0.2, 1.0, 255.0, 1.0, 0.5, 0.0]
-    source.ColorFunction.ColorSpace = "RGB"
-    source.OpacityFunction.Points = [0.0, 0.0, 0.5, 0.0, 255.0, 0.8, 0.5, 0.0]
+    source = in_time(folder)
     view = black_view(SIZE)
     view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = (5, 4, 3), (0, 0, 0), (0, 0, 1)
     simple.SetActiveView(view)

@@ -256,20 +256,23 @@ class VDISource(SourceSettings):
         image = vtkDataObject.GetData(inputs[0], 0)
         request = self._make_request(image, self.GetCamera(), self._window_size, warn=True)
         if self._vdi is None or self._request is None or request.key != self._request.key:
-            self._vdi = generate_by_dial(
-                *request.arguments,
-                request.dial,
-                request.options,
-                device=request.device,
-                progress=self._advance,
-                metadata=request.metadata,
-            )
+            self._vdi = self._generate(request)
             self._request = request
             warn_missed(self._vdi, stacklevel=2)
         vtkImageData.GetData(outputs, 0).ShallowCopy(vdi_to_image(self._vdi))
         # A dial has chosen it only now, and a volume's bounds may change with time
         announce(outputs, self._vdi.window_size)
         ask_for_all([outputs])
+
+    def _generate(self, request: Request) -> VDI:
+        return generate_by_dial(
+            *request.arguments,
+            request.dial,
+            request.options,
+            device=request.device,
+            progress=self._advance,
+            metadata=request.metadata,
+        )
 
     def _make_request(
         self,
@@ -358,7 +361,7 @@ class VDISource(SourceSettings):
         data = self.GetInputDataObject(0, 0)
         if data is not None and not isinstance(data, vtkImageData):
             return None
-        if data is not None and data.GetNumberOfPoints() > 0:
+        if data is not None and data.GetNumberOfPoints() > 0 and self._holds_all(data):
             grid.CopyStructure(data)
             return grid
         if extent is None:
@@ -372,6 +375,10 @@ class VDISource(SourceSettings):
             if information.Has(key):
                 put(information.Get(key))
         return grid
+
+    def _holds_all(self, data: vtkImageData) -> bool:
+        """Whether the data at the input are all of it."""
+        return True
 
     def _advance(self, fraction: float) -> bool:
         self.UpdateProgress(fraction)
