@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
-from pyvista_vdi.large.on_mpi import generate_on_mpi
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.large.on_mpi import generate_on_mpi, mpi
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.grid import Grid
@@ -90,13 +90,7 @@ class InSitu:
         **options: Any,
     ) -> None:
         if comm is None:
-            try:
-                from mpi4py import MPI
-            except ImportError as error:
-                raise MissingDependencyError(
-                    f"in situ needs mpi4py ({error}): pip install 'pyvista-vdi[mpi]'"
-                ) from error
-            comm = MPI.COMM_WORLD
+            comm = mpi().COMM_WORLD
         if every < 1:
             raise InvalidArgumentError(f"every must be 1 or more steps; got {every!r}")
         self._path, self._comm, self._every, self._device = str(path), comm, every, device

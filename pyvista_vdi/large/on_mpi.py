@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import DeviceError, InvalidArgumentError
+from pyvista_vdi.errors import DeviceError, InvalidArgumentError, MissingDependencyError
 from pyvista_vdi.large.blocks import Blocks, Indices, Offset, Values
 from pyvista_vdi.large.generate import NOWHERE, refuse_unsupported, vdi_of
 from pyvista_vdi.large.passes import Piece, Task, light_entering
@@ -30,6 +30,24 @@ from pyvista_vdi.model.volume import Volume
 
 #: Tag of the messages that bring neighbours' points; the place of the neighbour is added.
 _HALO_TAG = 7100
+
+
+def mpi() -> Any:
+    """Return mpi4py's module ``MPI``.
+
+    Raises
+    ------
+    MissingDependencyError
+        If mpi4py is not installed.
+    """
+    try:
+        from mpi4py import MPI
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"several ranks need mpi4py ({error}): pip install 'pyvista-vdi[mpi]', for the Python "
+            "that they run"
+        ) from error
+    return MPI
 
 
 def generate_on_mpi(

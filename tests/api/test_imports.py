@@ -28,7 +28,7 @@ OWNERS = {
     "anywidget": ("web",),
     "distributed": ("large",),
     "h5py": ("io",),
-    "mpi4py": ("insitu",),
+    "mpi4py": ("large",),
     "paraview": ("paraview",),
     "pyopencl": ("device",),
     "pyvista": ("plotting", "examples", "web", "measure", "cli"),

@@ -16,12 +16,8 @@ from numpy.typing import NDArray
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
-from pyvista_vdi.errors import (
-    InvalidVolumeError,
-    MissingDependencyError,
-    UnsupportedError,
-)
-from pyvista_vdi.large.on_mpi import generate_on_mpi, together
+from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
+from pyvista_vdi.large.on_mpi import generate_on_mpi, mpi, together
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.vdi import VDI
@@ -52,14 +48,7 @@ def communicator() -> Any:
     controller = vtkMultiProcessController.GetGlobalController()
     if controller is None or controller.GetNumberOfProcesses() < 2:
         return None
-    try:
-        from mpi4py import MPI
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"a VDI of {controller.GetNumberOfProcesses()} ranks needs mpi4py ({error}): install "
-            "'pyvista-vdi[mpi]' for the Python of these ranks, or start one"
-        ) from error
-    return MPI.COMM_WORLD.Dup()  # VTK's own messages do not meet ours
+    return mpi().COMM_WORLD.Dup()  # VTK's own messages do not meet ours
 
 
 def is_first_rank() -> bool:
@@ -192,11 +181,9 @@ def _boxes(points: Any, ranks: int) -> list[Box]:
     InvalidVolumeError
         If there are too few points for so many ranks.
     """
-    from mpi4py import MPI
-
     counts = [1, 1, 1]
     longest_first = sorted(range(3), key=lambda axis: -int(points[axis]))
-    for axis, n in zip(longest_first, sorted(MPI.Compute_dims(ranks, 3))[::-1], strict=True):
+    for axis, n in zip(longest_first, sorted(mpi().Compute_dims(ranks, 3))[::-1], strict=True):
         counts[axis] = n
     if any(n // count < _LEAST_POINTS for n, count in zip(points, counts, strict=True)):
         raise InvalidVolumeError(
