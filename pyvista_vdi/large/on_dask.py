@@ -10,8 +10,10 @@ from __future__ import annotations
 import threading
 import uuid
 import warnings
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -31,7 +33,7 @@ from pyvista_vdi.errors import (
     VDIWarning,
 )
 from pyvista_vdi.generation.generate import Progress, report
-from pyvista_vdi.large.blocks import Indices, Offset, Values
+from pyvista_vdi.large.blocks import Indices, Values
 from pyvista_vdi.large.generate import (
     NOWHERE,
     chunks_of,
@@ -156,31 +158,28 @@ class _Run:
         lazy = chunks is not None and chunks.lazy is not None  # Dask knows what it computes
         reading = Plan.of(task, self._volume.array, None if lazy else known)
         reads = {block: reading.read(block) for block in order}
-        values = {block: self._values(block, read) for block, read in reads.items()}
-        first = {
-            block: self._submit(
-                "first-pass", block, _first_pass, values[block], windows.get(block, NOWHERE)
-            )
-            for block in order
-        }
+        values = self._values(reads)
+        in_window = [windows.get(block, NOWHERE) for block in order]
+        first = self._mapped(
+            "first-pass", order, self._bound(_first_pass), order, values.values(), in_window
+        )
         seen = self._gathered("seen", first, _without_slabs, _SHARES[0])
         if known is None and len(seen) == len(blocks):
             keep_ranges(self._volume, task, seen)
         entering = light_entering(task, windows, seen)
         again = () if self._kept else entering
         self.counted["points_read"] = sum(reads[block].points for block in [*order, *again])
-        pieces = {}
-        for block, light in entering.items():
-            neighbours = blocks.neighbours(block, halo)
-            pieces[block] = self._submit(
-                "second-pass",
-                block,
-                _second_pass,
-                values[block],
-                windows[block],
-                light,
-                {offset: first[other] for offset, other in neighbours.items()},
-            )
+        around = [blocks.neighbours(block, halo) for block in entering]
+        pieces = self._mapped(
+            "second-pass",
+            entering,
+            self._bound(_second_pass),
+            entering,
+            [values[block] for block in entering],
+            [windows[block] for block in entering],
+            entering.values(),
+            *([first.get(found.get(at)) for found in around] for at in halo.offsets()),
+        )
         del values, seen
         lengths = self._gathered("lengths", pieces, _lengths, _SHARES[1])
         first.clear()
@@ -191,34 +190,42 @@ class _Run:
         """Give up what has not been done."""
         self._client.cancel(self._futures, force=True)
 
-    def _values(self, block: Indices, read: Read) -> Any:
-        """Return a block's points, as a future where they are kept, or what reads them."""
+    def _values(self, reads: Mapping[Indices, Read]) -> dict[Indices, Any]:
+        """Return blocks' points, as futures where they are kept, or what reads them."""
         array = self._volume.chunks
         if array is None:
-            return read().copy()  # goes with the task
+            return {block: read().copy() for block, read in reads.items()}  # go with the tasks
         if array.lazy is not None:
-            return self._client.compute(array.lazy[read.box], **self._where)
-        if not self._kept:
-            return read
-        key = (f"read-{self._token}", *block)
-        return self._client.submit(read, key=key, retries=_RETRIES, **self._where)
+            futures = self._client.compute(
+                [array.lazy[r.box] for r in reads.values()], **self._where
+            )
+            return dict(zip(reads, futures, strict=True))
+        return self._mapped("read", reads, _read, reads.values()) if self._kept else dict(reads)
 
-    def _submit(
-        self, name: str, at: tuple[int, ...], function: Callable[..., Any], *arguments: Any
-    ) -> Future[Any]:
-        future = self._client.submit(
+    def _bound(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        return partial(function, self._task, self._device)
+
+    def _mapped(
+        self,
+        name: str,
+        places: Iterable[tuple[int, ...]],
+        function: Callable[..., Any],
+        *columns: Iterable[Any],
+        priority: int = 0,
+    ) -> dict[Any, Future[Any]]:
+        """Submit a function of each place's arguments, all of them as one graph."""
+        at = list(places)
+        futures = self._client.map(
             function,
-            self._task,
-            at,
-            *arguments,
-            self._device,
-            key=(f"{name}-{self._token}", *at),
+            *map(list, columns),
+            key=[(f"{name}-{self._token}", *place) for place in at],
             retries=_RETRIES,
             pure=False,
+            priority=priority,
             **self._where,
         )
-        self._futures.append(future)
-        return future
+        self._futures += futures
+        return dict(zip(at, futures, strict=True))
 
     def _gathered(
         self,
@@ -228,17 +235,8 @@ class _Run:
         share: float,
     ) -> dict[Indices, Any]:
         """Return what a function makes of each block's result, as they come."""
-        parts = {
-            self._client.submit(
-                function,
-                future,
-                key=(f"{name}-{self._token}", *block),
-                retries=_RETRIES,
-                **self._where,
-            ): block
-            for block, future in futures.items()
-        }
-        self._futures += parts
+        mapped = self._mapped(name, futures, function, futures.values())
+        parts = {future: block for block, future in mapped.items()}
         found = {}
         for future in self._completed(parts):
             found[parts[future]] = self._result(future, parts[future])
@@ -256,14 +254,33 @@ class _Run:
         for block, many in lengths.items():
             window = windows[block]
             of_rows[window.y0 : window.y1] += many
-        merged = {}
-        for y0, y1 in balanced(of_rows, RANGES_PER_WORKER * len(self._workers)):
-            parts = [
-                self._submit("rows", (*block, y0), _rows, pieces[block], y0, y1)
-                for block in pieces
-                if windows[block].y0 < y1 and windows[block].y1 > y0
-            ]
-            merged[self._submit("merge", (y0, y1), _merge, parts)] = y0
+        ranges = list(balanced(of_rows, RANGES_PER_WORKER * len(self._workers)))
+        cut = [
+            (block, y0, y1)
+            for y0, y1 in ranges
+            for block in pieces
+            if windows[block].y0 < y1 and windows[block].y1 > y0
+        ]
+        rows = self._mapped(
+            "rows",
+            [(*block, y0) for block, y0, _ in cut],
+            _rows,
+            [pieces[block] for block, _, _ in cut],
+            *zip(*(ends for _, *ends in cut), strict=True),
+        )
+        of_ranges: dict[int, list[Future[Any]]] = {y0: [] for y0, _ in ranges}
+        for block, y0, _ in cut:
+            of_ranges[y0].append(rows[(*block, y0)])
+        # Merged rows need less memory than pieces: before the next range is cut
+        mapped = self._mapped(
+            "merge",
+            ranges,
+            self._bound(_merge),
+            ranges,
+            *zip_longest(*of_ranges.values()),
+            priority=1,
+        )
+        merged = {future: y0 for (y0, _), future in mapped.items()}
         found: dict[int, Rows] = {}
         for future in self._completed(merged):
             found[merged[future]] = self._result(future, (merged[future],))
@@ -351,35 +368,40 @@ def _device_name(device: Any) -> str:
 # What follows runs on workers
 
 
-def _first_pass(task: Task, block: Indices, values: Any, window: Rectangle, device: Any) -> Seen:
+def _read(read: Read) -> Values:
+    return read()
+
+
+def _first_pass(task: Task, device: Any, block: Indices, values: Any, window: Rectangle) -> Seen:
     with _at(task, block):
         return task.first_pass(block, _at_hand(values), window, device)
 
 
 def _second_pass(
     task: Task,
+    device: Any,
     block: Indices,
     values: Any,
     window: Rectangle,
     light: NDArray[np.float16],
-    neighbours: Mapping[Offset, Seen],
-    device: Any,
+    *around: Seen | None,
 ) -> Piece:
     with _at(task, block):
         halo = task.halo
-        parts = {at: halo.from_slabs(seen.slabs, at) for at, seen in neighbours.items()}
+        neighbours = zip(halo.offsets(), around, strict=True)
+        parts = {at: halo.from_slabs(seen.slabs, at) for at, seen in neighbours if seen is not None}
         whole = task.blocks.with_halo(_at_hand(values), parts, halo)
         return task.second_pass(block, whole, window, light, device)
 
 
-def _rows(task: Task, at: tuple[int, ...], piece: Piece, y0: int, y1: int, device: Any) -> Piece:
+def _rows(piece: Piece, y0: int, y1: int) -> Piece:
     part = piece.rows(y0, y1)
     return part._replace(runs=part.runs.copy())
 
 
-def _merge(task: Task, at: tuple[int, int], pieces: Sequence[Piece], device: Any) -> Rows:
+def _merge(task: Task, device: Any, at: tuple[int, int], *pieces: Piece | None) -> Rows:
     with _at(task, at):
-        return task.merge(*at, pieces, device)
+        return task.merge(*at, [piece for piece in pieces if piece is not None], device)
 
 
 def _without_slabs(seen: Seen) -> Seen:
