@@ -307,13 +307,13 @@ def speed_part(options: argparse.Namespace) -> dict[str, Any]:
     ratios: list[float] = []
     parts: dict[str, float] = {}
     small = argparse.Namespace(**{**vars(options), "edge": FAST_EDGE, "store": options.fast_store})
-    with tempfile.TemporaryDirectory() as folder, Cluster(4 * 10**9) as cluster:
+    with tempfile.TemporaryDirectory() as folder, Cluster(10**10) as cluster:
         volume = stored(small, folder)
         volume.chunks.found_ranges()
         camera = filling_camera(volume.bounds, options.size)
         looks = {k: v for k, v in LOOKS.items() if k != "sample_distance"}
         function = Classification(looks, "a benchmark").transfer_function(volume)
-        for turn in range(3):
+        for turn in range(6):
             seconds = {}
             for workers in (cluster.workers[:1], cluster.workers):
                 with get_task_stream(client=cluster.client) as stream:
