@@ -79,9 +79,12 @@ def add_size(parser: argparse.ArgumentParser, size: tuple[int, int] = WINDOW_SIZ
 
 def add_volumes(parser: argparse.ArgumentParser, volumes: Sequence[str] | None = None) -> None:
     """Add ``--volumes``: those by default, or every known one."""
-    names = sorted(examples.VOLUMES)
     parser.add_argument(
-        "--volumes", nargs="+", choices=names, default=volumes or names, metavar="NAME"
+        "--volumes",
+        nargs="+",
+        choices=sorted(examples.VOLUMES),
+        default=volumes or examples.WHOLE,
+        metavar="NAME",
     )
 
 

@@ -1,6 +1,7 @@
 """The shipped volumes, and those in the folder that ``PYVISTA_VDI_DATA`` names.
 
-Two volumes are part of the package: a brain (MRI) and a turbulent mixing layer (simulation).
+Three volumes are part of the package: a brain (MRI), a phantom with pins of known density (CT) and
+a turbulent mixing layer (simulation).
 Their source and terms stand in ``pyvista_vdi/data/README.md``. The others listed by
 :data:`VOLUMES` are well-known test data whose terms do not allow shipping them; they are read
 from the folder that the environment variable ``PYVISTA_VDI_DATA`` names, where it has them.
@@ -48,12 +49,15 @@ class ExampleVolume:
         One phrase: method and subject.
     shipped : bool
         Whether it is part of the package.
+    part_of : str
+        Name of the volume that it is cut out of; empty if it is whole.
     """
 
     file_name: str
     quantity: str
     description: str
     shipped: bool = False
+    part_of: str = ""
 
 
 #: Every volume known by name.
@@ -86,6 +90,13 @@ VOLUMES: dict[str, ExampleVolume] = {
         "hounsfield",
         "cone-beam CT of a CatPhan phantom, anisotropic",
     ),
+    "ct": ExampleVolume(
+        "catphan_ct_412x412x19_i16.nrrd",
+        "hounsfield",
+        "cone-beam CT of a CatPhan phantom, its slices with pins and line pairs",
+        shipped=True,
+        part_of="catphan",
+    ),
     "embryo": ExampleVolume("embryo_256_u8.nrrd", "intensity", "scan of an embryo"),
     "heptane": ExampleVolume(
         "heptane_302_u8.nrrd", "intensity", "simulation of a burning jet of heptane"
@@ -115,6 +126,9 @@ VOLUMES: dict[str, ExampleVolume] = {
         "visible_female_head_512x512x234_u8.nrrd", "intensity", "CT of a head and shoulders"
     ),
 }
+
+#: Names of those that are not cut out of another: what tables of all volumes have.
+WHOLE: tuple[str, ...] = tuple(name for name in sorted(VOLUMES) if not VOLUMES[name].part_of)
 
 
 def available() -> tuple[str, ...]:
@@ -282,6 +296,36 @@ def load_rayleigh_taylor(*, as_volume: bool = False) -> pv.ImageData | Volume:
     dtype('uint8')
     """
     return load_data("rayleigh_taylor", as_volume=as_volume)  # type: ignore[call-overload]
+
+
+@overload
+def load_ct(*, as_volume: Literal[False] = ...) -> pv.ImageData: ...
+@overload
+def load_ct(*, as_volume: Literal[True]) -> Volume: ...
+def load_ct(*, as_volume: bool = False) -> pv.ImageData | Volume:
+    """Load the shipped CT of a phantom, a cylinder of plastic with pins of known density.
+
+    412 x 412 x 19 points, int16, 0.488 x 0.488 x 2.5 mm apart; its axis is z. No patient's scan
+    may be copied here.
+
+    Parameters
+    ----------
+    as_volume : bool, default: False
+        Return the engine's :class:`~pyvista_vdi.Volume`, which needs neither VTK nor PyVista.
+
+    Returns
+    -------
+    pyvista.ImageData or Volume
+        The scan; its scalars are called ``"hounsfield"`` and are in Hounsfield units, -1000 (air)
+        to 1810.
+
+    Examples
+    --------
+    >>> from pyvista_vdi import examples
+    >>> examples.load_ct(as_volume=True).spacing
+    (0.48828125, 0.48828125, 2.5)
+    """
+    return load_data("ct", as_volume=as_volume)  # type: ignore[call-overload]
 
 
 def _locate(example: ExampleVolume) -> Path | None:

@@ -46,7 +46,8 @@ def _plan(options: argparse.Namespace) -> Plan:
     """Return the profile with what the options change."""
     chosen: dict[str, Any] = dict(PROFILES[options.profile])
     if options.profile == "full":
-        chosen["datasets"] = (*examples.available(), *chosen["datasets"])
+        whole = (name for name in examples.available() if name in examples.WHOLE)
+        chosen["datasets"] = (*whole, *chosen["datasets"])
     if options.datasets or options.volume:
         chosen["datasets"] = (*(options.datasets or ()), *(options.volume or ()))
     changes = {

@@ -77,7 +77,7 @@ def _front(options: argparse.Namespace) -> int:
     files = output_files(options, "front", "json", "md")
     require_new(files["json"], options)
     more = {"window_size": options.size, "repeats": options.repeats}
-    plan = Plan.quick(**more) if options.quick else Plan(tuple(sorted(examples.VOLUMES)), **more)
+    plan = Plan.quick(**more) if options.quick else Plan(examples.WHOLE, **more)
     with measuring("front", files["json"]) as bar:
         found = measure_front(
             plan, files["json"], resume=options.resume, device=options.device, progress=bar

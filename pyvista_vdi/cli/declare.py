@@ -188,8 +188,8 @@ def _file_or_example(
     option(
         source,
         "--example",
-        "a volume known by name: brain and rayleigh_taylor are shipped, others are read from the "
-        "folder that PYVISTA_VDI_DATA names",
+        "a volume known by name: brain, ct and rayleigh_taylor are shipped, others are read from "
+        "the folder that PYVISTA_VDI_DATA names",
         "NAME",
     )
     xyz = ("X", "Y", "Z")

@@ -342,7 +342,7 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
         "transfer function and view: hours"
     )
     declare.volume(parser, ("--front", front))
-    declare.switch(parser, "--quick", "of --front: 24 cases of the shipped volumes, minutes")
+    declare.switch(parser, "--quick", "of --front: 24 cases of two shipped volumes, minutes")
     declare.switch(parser, "--resume", "of --front: go on with front.json where it was left")
     declare.option(parser, "--out", "where the files go", "FOLDER", default=".")
     declare.size(parser, WINDOW_SIZE)

@@ -67,7 +67,10 @@ UNMOVED = {
         "RaySamples ambient_transmittance build_vdi render render_joint render_joint_range "
         "render_pixels render_range samples volume_image"
     ),
-    "examples": "available load_brain load_data load_rayleigh_taylor path VOLUMES ExampleVolume",
+    "examples": (
+        "available load_brain load_ct load_data load_rayleigh_taylor path VOLUMES WHOLE "
+        "ExampleVolume"
+    ),
     "errors": "VDIError",
 }
 

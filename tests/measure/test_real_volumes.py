@@ -108,7 +108,7 @@ def standard_cases():
     volumes. Also the known misses, and one look alone of the largest volume.
     """
     for name, look, interpolation in product(
-        sorted(examples.VOLUMES), TRANSFER_FUNCTIONS, ("nearest", "linear")
+        examples.WHOLE, TRANSFER_FUNCTIONS, ("nearest", "linear")
     ):
         known = (name, look, interpolation) in TOO_THIN
         if known or look == "soft" or (interpolation == "nearest" and name != "allen_mouse_brain"):

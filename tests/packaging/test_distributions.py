@@ -131,10 +131,12 @@ def test_wheel_holds_kernels_types_volumes_and_licences(wheel_names):
     assert "pyvista_vdi/py.typed" in wheel_names
     assert "pyvista_vdi/data/brain_colin27_181x217x181_u8.nrrd" in wheel_names
     assert "pyvista_vdi/data/rayleigh_taylor_dns_192x192x192_u8.nrrd" in wheel_names
-    assert "pyvista_vdi/data/LICENSE-brain.txt" in wheel_names
+    assert "pyvista_vdi/data/catphan_ct_412x412x19_i16.nrrd" in wheel_names
+    terms = {f"pyvista_vdi/data/LICENSE-{name}.txt" for name in ("brain", "catphan")}
+    assert terms <= set(wheel_names)
     assert "pyvista_vdi/data/README.md" in wheel_names
     licences = {name.partition(".dist-info/licenses/")[2] for name in wheel_names} - {""}
-    assert licences == {"LICENSE", "pyvista_vdi/data/LICENSE-brain.txt"}
+    assert licences == {"LICENSE", *terms}
 
 
 def test_wheel_metadata_and_entry_points(wheel, wheel_names):
