@@ -55,6 +55,34 @@ step() {
     fi
 }
 
+# Steps that use one core each, side by side: NAME:FUNCTION ... What they print comes one by one.
+steps_together() {
+    local pair name start wanted=()
+    for pair in "$@"; do
+        [[ -z ${CI_ONLY:-} || " $CI_ONLY " == *" ${pair%%:*} "* ]] && wanted+=("$pair")
+    done
+    for pair in ${wanted[@]+"${wanted[@]}"}; do
+        name=${pair%%:*}
+        (
+            start=$SECONDS
+            set +e
+            (set -euo pipefail && "${pair#*:}") </dev/null >"$work/$name.log" 2>&1
+            printf '%d %d' $? $((SECONDS - start)) >"$work/$name.status"
+        ) &
+    done
+    wait
+    for pair in ${wanted[@]+"${wanted[@]}"}; do
+        name=${pair%%:*}
+        run_step "$name" said_before "$name"
+        results[-1]+="  ($(cut -d' ' -f2 "$work/$name.status") s beside others)"
+    done
+}
+
+said_before() {
+    cat "$work/$1.log"
+    return "$(cut -d' ' -f1 "$work/$1.status")"
+}
+
 # A step without which the following ones make no sense.
 required_step() {
     run_step "$@"

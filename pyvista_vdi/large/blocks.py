@@ -214,10 +214,10 @@ class Blocks:
         """Return which part of the grid a block is, with the halo's points at hand or without."""
         before = halo.before if halo else 0
         first = [cuts[k] - before * (k > 0) for cuts, k in zip(self.cuts, block, strict=True)]
-        lower, upper = self._ends(block, math.inf)
+        lower, upper = self.ends(block, math.inf)
         return GridPart(self.grid, _xyz(first), _xyz(lower), _xyz(upper), scalar_range)
 
-    def _ends(self, block: Indices, beyond: float) -> tuple[list[float], list[float]]:
+    def ends(self, block: Indices, beyond: float = 0.0) -> tuple[list[float], list[float]]:
         """Index positions (z, y, x) between which a block's cells lie; beyond the grid's ends."""
         lower, upper = [], []
         for cuts, k in zip(self.cuts, block, strict=True):
@@ -230,7 +230,7 @@ class Blocks:
         to_view = camera.model_to_view @ self.grid.index_to_model
         found = {}
         for block in self:
-            lower, upper = self._ends(block, 0.0)
+            lower, upper = self.ends(block)
             axes = [(low, high) for low, high in zip(lower, upper, strict=True)]
             corners = np.array([[x, y, z, 1.0] for z, y, x in itertools.product(*axes)])
             window = _window(corners @ to_view.T, camera, size)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.device.work_order import Rectangle
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.generation.generate import Progress, made_from, report
 from pyvista_vdi.generation.list_arrays import require_room
 from pyvista_vdi.large.blocks import BLOCK_BYTES, Blocks, Indices
@@ -26,15 +26,6 @@ from pyvista_vdi.model.volume import Volume
 NOWHERE = Rectangle(0, 0, 0, 0)
 
 
-def refuse_unsupported(name: str, options: GenerationOptions) -> None:
-    """Refuse what blocks cannot do."""
-    if options.ambient_occlusion is not None:
-        raise UnsupportedError(
-            f"ambient occlusion needs the volume {name!r} in one piece: leave "
-            "ambient_occlusion out, or load the volume (volume.load()) where it fits"
-        )
-
-
 def task_of(
     volume: Volume,
     camera: Camera,
@@ -44,14 +35,7 @@ def task_of(
     chunks: Sequence[int],
     block_bytes: int | None = None,
 ) -> Task:
-    """Return a VDI's task, after what blocks cannot do has been refused.
-
-    Raises
-    ------
-    UnsupportedError
-        If ambient occlusion is asked for.
-    """
-    refuse_unsupported(volume.name, options)
+    """Return a VDI's task."""
     width, height = check_window_size(window_size)
     require_room(0, (width, height))
     point_bytes = volume.array.dtype.itemsize * (4 if volume.rgba else 1)
@@ -163,6 +147,9 @@ def generate_chunked(
         report(progress, 0.4 * (k + 1) / len(order))
     if known is None and len(seen) == len(blocks):
         keep_ranges(volume, task, seen)
+    ambient = (
+        task.ambient([each.opacities for each in seen.values()], device) if task.occlusion else None
+    )
     pieces: list[Piece] = []
     entering = light_entering(task, windows, seen)
     for k, (block, light) in enumerate(entering.items()):
@@ -171,7 +158,7 @@ def generate_chunked(
             for offset, other in blocks.neighbours(block, halo).items()
         }
         values = blocks.with_halo(reading.read(block)(), parts, halo)
-        pieces.append(task.second_pass(block, values, windows[block], light, device))
+        pieces.append(task.second_pass(block, values, windows[block], light, device, ambient))
         report(progress, 0.4 + 0.5 * (k + 1) / len(entering))
     rows = task.merge(0, task.size[1], pieces, device)
     report(progress, 1.0)

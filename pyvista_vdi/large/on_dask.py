@@ -42,7 +42,7 @@ from pyvista_vdi.large.generate import (
     task_of,
     vdi_of,
 )
-from pyvista_vdi.large.passes import Piece, Rows, Seen, Task, light_entering
+from pyvista_vdi.large.passes import Opacities, Piece, Rows, Seen, Task, light_entering
 from pyvista_vdi.large.reading import Plan, Read
 from pyvista_vdi.large.rows import balanced
 from pyvista_vdi.model.camera import Camera
@@ -167,6 +167,12 @@ class _Run:
         if known is None and len(seen) == len(blocks):
             keep_ranges(self._volume, task, seen)
         entering = light_entering(task, windows, seen)
+        ambient: list[Any] = [None] * len(entering)
+        if task.occlusion is not None:
+            parts = self._mapped("opacities", order, _opacities, first.values())
+            columns = ([part] for part in parts.values())
+            (found,) = self._mapped("ambient", [()], self._bound(_ambient), *columns).values()
+            ambient = [found] * len(entering)
         again = () if self._kept else entering
         self.counted["points_read"] = sum(reads[block].points for block in [*order, *again])
         around = [blocks.neighbours(block, halo) for block in entering]
@@ -178,6 +184,7 @@ class _Run:
             [values[block] for block in entering],
             [windows[block] for block in entering],
             entering.values(),
+            ambient,
             *([first.get(found.get(at)) for found in around] for at in halo.offsets()),
         )
         del values, seen
@@ -384,6 +391,7 @@ def _second_pass(
     values: Any,
     window: Rectangle,
     light: NDArray[np.float16],
+    ambient: NDArray[np.float32] | None,
     *around: Seen | None,
 ) -> Piece:
     with _at(task, block):
@@ -391,7 +399,7 @@ def _second_pass(
         neighbours = zip(halo.offsets(), around, strict=True)
         parts = {at: halo.from_slabs(seen.slabs, at) for at, seen in neighbours if seen is not None}
         whole = task.blocks.with_halo(_at_hand(values), parts, halo)
-        return task.second_pass(block, whole, window, light, device)
+        return task.second_pass(block, whole, window, light, device, ambient)
 
 
 def _rows(piece: Piece, y0: int, y1: int) -> Piece:
@@ -405,7 +413,16 @@ def _merge(task: Task, device: Any, at: tuple[int, int], *pieces: Piece | None) 
 
 
 def _without_slabs(seen: Seen) -> Seen:
-    return seen._replace(slabs={})
+    return seen._replace(slabs={}, opacities=None)
+
+
+def _opacities(seen: Seen) -> Opacities | None:
+    return seen.opacities
+
+
+def _ambient(task: Task, device: Any, *opacities: Opacities | None) -> NDArray[np.float32]:
+    with _at(task, ()):
+        return task.ambient(opacities, device)
 
 
 def _lengths(piece: Piece) -> NDArray[np.int64]:
@@ -431,6 +448,8 @@ def _at(task: Task, at: tuple[int, ...]) -> Iterator[None]:
 
 
 def _named(task: Task, at: tuple[int, ...]) -> str:
+    if not at:
+        return "the VDI's ambient occlusion"
     if len(at) < 3:
         return f"rows {at[0]} and following of the VDI"
     box = ", ".join(f"{part.start}:{part.stop}" for part in task.blocks.own((at[0], at[1], at[2])))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, MissingDependencyError
 from pyvista_vdi.large.blocks import Blocks, Indices, Offset, Values
-from pyvista_vdi.large.generate import NOWHERE, refuse_unsupported, vdi_of
+from pyvista_vdi.large.generate import NOWHERE, vdi_of
 from pyvista_vdi.large.passes import Piece, Task, light_entering
 from pyvista_vdi.large.rows import balanced
 from pyvista_vdi.model.camera import Camera, check_window_size
@@ -111,7 +111,6 @@ def generate_on_mpi(
     with together(comm, "reading the arguments"):
         own = Volume(values, name=name)
         size = check_window_size(window_size)
-        refuse_unsupported(name, options)
     blocks, ranks = _blocks(comm, grid, own.dimensions, first)
     ends = comm.allgather(own.finite_range() if np.isfinite(own.array).any() else (np.nan,) * 2)
     low, high = zip(*ends, strict=True)
@@ -122,22 +121,24 @@ def generate_on_mpi(
     window = windows.get(block, NOWHERE)
     with together(comm, "the first pass"):
         seen = task.first_pass(block, own.array, window, device)
-    light, order, scattered = None, None, None
+    light, order, scattered, ambient = None, None, None, None
     summaries = comm.gather(seen._replace(slabs={}))
     with together(comm, "the light"):
         if comm.rank == 0:
             of_blocks = {at: summaries[rank] for at, rank in ranks.items()}
             found = light_entering(task, windows, of_blocks)
             order = list(found)
+            if task.occlusion is not None:
+                ambient = task.ambient([each.opacities for each in of_blocks.values()], device)
             scattered = [found.get({r: at for at, r in ranks.items()}[r]) for r in range(comm.size)]
     light = comm.scatter(scattered)
-    order = comm.bcast(order)
+    order, ambient = comm.bcast((order, ambient))
     parts = _exchanged(comm, task, block, ranks, seen.slabs)
     piece = Piece(window, np.zeros((0, 0), np.uint16), np.zeros((0, 8), np.float32))
     with together(comm, "the second pass"):
         if light is not None:
             whole = blocks.with_halo(own.array, parts, task.halo)
-            piece = task.second_pass(block, whole, window, light, device)
+            piece = task.second_pass(block, whole, window, light, device, ambient)
     ranges, counted = _ranges(comm, task, piece, light is not None)
     sent = [
         piece.rows(*ranges[r]) if light is not None and r < len(ranges) else None
@@ -154,7 +155,11 @@ def generate_on_mpi(
     if comm.rank != 0:
         return None
     described: Any = SimpleNamespace(
-        name=name, dimensions=grid.dimensions, spacing=grid.spacing, array=own.array
+        name=name,
+        dimensions=grid.dimensions,
+        spacing=grid.spacing,
+        length=grid.length,
+        array=own.array,
     )
     finished = [part for part in gathered if part is not None]
     device_name = get_runtime(device).info.name

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.device.constants import RUN_WORDS
 from pyvista_vdi.device.work_order import Rectangle, block_items
+from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.generation.list_arrays import growing_lists
 from pyvista_vdi.generation.march import March
 from pyvista_vdi.generation.merge import Merge
@@ -25,10 +26,11 @@ from pyvista_vdi.generation.pack import Pack
 from pyvista_vdi.generation.records import Records
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
 from pyvista_vdi.large.blocks import Blocks, Ends, Halo, Indices, Values, ends_of
+from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.chunked import Ranges
 from pyvista_vdi.model.float32_limits import held_unit_distance
-from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.options import GenerationOptions, MediumOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.classified_volume import (
@@ -36,8 +38,14 @@ from pyvista_vdi.volume.classified_volume import (
     GridRays,
     checked_sample_distance,
 )
+from pyvista_vdi.volume.grid_part import GridPart
 from pyvista_vdi.volume.march_step import march_step
+from pyvista_vdi.volume.occlusion_grid import ambient_of_opacities
 
+Opacities = tuple[tuple[int, int, int], NDArray[np.float32]]
+
+#: Most bytes of the grid of ambient occlusion, which is not cut into blocks.
+_MOST_OCCLUSION = 2**31
 #: Light of which nothing is told apart any more, as an optical depth.
 _DARK = 80.0
 
@@ -57,12 +65,16 @@ class Seen(NamedTuple):
         and where there is nothing else.
     ranges : (numpy.ndarray, numpy.ndarray)
         Least and largest scalar of each of its chunks, float64.
+    opacities : ((int, int, int), numpy.ndarray) or None
+        Where there is ambient occlusion: the first node along x, y and z, and what the block has of
+        the opacities of nodes from it on, float32 (nz, ny, nx); ``None`` where that is nothing.
     """
 
     depths: NDArray[np.float16] | None
     slabs: dict[tuple[int, int], Values]
     ends: dict[tuple[int, int] | None, Ends]
     ranges: Ranges
+    opacities: Opacities | None = None
 
 
 class Piece(NamedTuple):
@@ -141,8 +153,24 @@ class Task:
         options: GenerationOptions,
         scalar_range: tuple[float, float],
     ) -> Task:
-        """Make defaults that follow from the whole grid explicit."""
+        """Make defaults that follow from the whole grid explicit.
+
+        Raises
+        ------
+        DeviceMemoryError
+            If ambient occlusion is asked for, and its grid is too large to be made in one piece.
+        """
         grid = blocks.grid
+        if options.ambient_occlusion is not None:
+            asked = options.ambient_occlusion
+            occlusion = OcclusionGrid.of(grid, asked)
+            if occlusion.nbytes > _MOST_OCCLUSION:
+                gib, nodes = occlusion.nbytes / 2**30, " x ".join(map(str, occlusion.nodes))
+                raise DeviceMemoryError(
+                    f"ambient occlusion with a radius of {asked.radius_in(grid)} needs {gib:.1f} "
+                    f"GiB for a grid of {nodes} nodes, of {_MOST_OCCLUSION / 2**30:g} GiB at most: "
+                    "a larger radius takes a coarser grid"
+                )
         step = checked_sample_distance(grid, options.sample_distance)
         unit = transfer_function.unit_distance or grid.default_unit_distance
         changes: dict[str, Any] = {"sample_distance": step}
@@ -160,6 +188,12 @@ class Task:
         """What blocks read of their neighbours."""
         return Halo.of(self.transfer_function)
 
+    @property
+    def occlusion(self) -> OcclusionGrid | None:
+        """The grid on which ambient occlusion is computed, if it is asked for."""
+        asked = self.options.ambient_occlusion
+        return None if asked is None else OcclusionGrid.of(self.blocks.grid, asked)
+
     def first_pass(
         self, block: Indices, values: Values, window: Rectangle, device: Any = None
     ) -> Seen:
@@ -168,14 +202,34 @@ class Task:
         ends: dict[tuple[int, int] | None, Ends] = {None: ends_of(values)}
         ends.update((side, ends_of(slab)) for side, slab in slabs.items())
         seen = Seen(None, slabs, ends, self.blocks.ranges(block, values))
-        if not (window.pixels and self.may_be_visible(*seen.ends[None])):
+        occlusion = self.occlusion
+        if not (window.pixels or occlusion) or not self.may_be_visible(*seen.ends[None]):
             return seen
         runtime = get_runtime(device)
         volume = self._volume(values)
         part = self.blocks.part(block, None, self.scalar_range)
-        with _Marched(self, runtime, volume, part, window) as marched:
+        with _Marched(self, runtime, volume, part, window, lit=False) as marched:
+            if occlusion is not None:
+                seen = seen._replace(opacities=marched.opacities(block, occlusion))
+            if not window.pixels:
+                return seen
             depths = marched.optical_depths()
         return seen._replace(depths=depths.astype(np.float16)) if depths.any() else seen
+
+    def ambient(
+        self, opacities: Iterable[Opacities | None], device: Any = None
+    ) -> NDArray[np.float32]:
+        """Return the mean transmittances around the occlusion's nodes, of all blocks' opacities.
+
+        The grid is as coarse as its radius: it is made in one piece.
+        """
+        grid = self.occlusion
+        assert grid is not None
+        of_all = np.zeros(grid.nodes[::-1], np.float32)
+        for (x, y, z), part in filter(None, opacities):
+            nz, ny, nx = part.shape
+            of_all[z : z + nz, y : y + ny, x : x + nx] += part
+        return ambient_of_opacities(get_runtime(device), grid, of_all)
 
     def second_pass(
         self,
@@ -184,14 +238,17 @@ class Task:
         window: Rectangle,
         light: NDArray[np.float16],
         device: Any = None,
+        ambient: NDArray[np.float32] | None = None,
     ) -> Piece:
         """Make the lists of a block, whose points come with their halo.
 
-        ``light``: that which enters it along each ray of its window, 0 to 1.
+        ``light``: that which enters it along each ray of its window, 0 to 1; ``ambient``: what
+        :meth:`ambient` returns, where there is occlusion.
         """
         runtime = get_runtime(device)
         part = self.blocks.part(block, self.halo, self.scalar_range)
-        with _Marched(self, runtime, self._volume(values), part, window) as marched:
+        volume = self._volume(values)
+        with _Marched(self, runtime, volume, part, window, ambient=ambient) as marched:
             return marched.lists(light)
 
     def merge(self, y0: int, y1: int, pieces: Iterable[Piece], device: Any = None) -> Rows:
@@ -244,7 +301,8 @@ class Task:
         """
         of_blocks = None if ranges is None else self.blocks.of_chunks(*ranges)
         wanted = set()
-        for block in windows:
+        # What hides light from what is seen may itself be out of sight
+        for block in windows if self.occlusion is None else self.blocks:
             around = [block, *self.blocks.neighbours(block, self.halo).values()]
             if of_blocks is not None:
                 low, high = zip(*(of_blocks[other] for other in around), strict=True)
@@ -269,11 +327,20 @@ class _Marched:
     """A block on a device, and the rays through its window."""
 
     def __init__(
-        self, task: Task, runtime: Runtime, volume: Volume, part: Any, window: Rectangle
+        self,
+        task: Task,
+        runtime: Runtime,
+        volume: Volume,
+        part: GridPart,
+        window: Rectangle,
+        *,
+        lit: bool = True,
+        ambient: NDArray[np.float32] | None = None,
     ) -> None:
         self._task, self._runtime, self._window = task, runtime, window
+        options = MediumOptions.of(task.options, {} if lit else {"ambient_occlusion": None})
         self._medium = DeviceVolume(
-            runtime, volume, task.transfer_function, task.options, part=part
+            runtime, volume, task.transfer_function, options, part=part, ambient=ambient
         )
         self._size = (window.x1 - window.x0, window.y1 - window.y0)
 
@@ -282,6 +349,13 @@ class _Marched:
 
     def __exit__(self, *_: object) -> None:
         self._runtime.finish()
+
+    def opacities(self, block: Indices, grid: OcclusionGrid) -> Opacities | None:
+        """Return what the block has of the opacities of the occlusion's nodes around it."""
+        ends = self._task.blocks.ends(block)
+        first, nodes = grid.nodes_around(*(tuple(reversed(end)) for end in ends))
+        found = self._medium.part_opacities(grid, first, nodes)
+        return (first, found) if found.any() else None
 
     def optical_depths(self) -> NDArray[np.float32]:
         """Return those of the window's rays, (rows, columns)."""

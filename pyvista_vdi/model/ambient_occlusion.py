@@ -7,6 +7,7 @@ such as ambient occlusion" (section 2). What is computed: docs/conventions.md, "
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.model.grid import Geometry
 
 #: Radius by default, as a share of the bounds' diagonal.
 DEFAULT_RADIUS = 0.05
@@ -110,12 +111,12 @@ class AmbientOcclusion:
             f"pyvista_vdi.AmbientOcclusion; got {value!r}"
         )
 
-    def radius_in(self, volume: Volume) -> float:
+    def radius_in(self, volume: Geometry) -> float:
         """Return the radius in a volume, model units; beyond its diagonal nothing occludes."""
         radius = DEFAULT_RADIUS * volume.length if self.radius is None else self.radius
         return min(radius, volume.length)
 
-    def to_dict(self, volume: Volume) -> dict[str, Any]:
+    def to_dict(self, volume: Geometry) -> dict[str, Any]:
         """Return what can be written to JSON, with the radius in this volume."""
         return {**asdict(self), "radius": self.radius_in(volume)}
 
@@ -146,7 +147,7 @@ class OcclusionGrid:
     offsets: NDArray[np.float64]
 
     @classmethod
-    def of(cls, volume: Volume, occlusion: AmbientOcclusion) -> OcclusionGrid:
+    def of(cls, volume: Geometry, occlusion: AmbientOcclusion) -> OcclusionGrid:
         """Return the grid for a volume."""
         radius = occlusion.radius_in(volume)
         spacing, points = np.array(volume.spacing), np.array(volume.dimensions)
@@ -164,6 +165,18 @@ class OcclusionGrid:
             radius / steps,
             directions[:, None, :] * along[None, :, None],
         )
+
+    def nodes_around(
+        self, lower: Sequence[float], upper: Sequence[float]
+    ) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
+        """Return the first node, and nodes, along x, y and z, whose boxes meet part of the volume.
+
+        ``lower``, ``upper``: index positions between which it lies.
+        """
+        cell = np.array(self.cell)
+        first = np.clip(np.ceil(np.array(lower) / cell - 0.5), 0, None)
+        last = np.clip(np.floor(np.array(upper) / cell + 0.5), None, np.array(self.nodes) - 1)
+        return _triple(first.astype(int)), _triple((last - first).astype(int) + 1)
 
     @property
     def margin(self) -> tuple[int, int, int]:

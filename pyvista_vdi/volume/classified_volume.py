@@ -34,7 +34,7 @@ from pyvista_vdi.volume.bricks import (
 )
 from pyvista_vdi.volume.grid_part import GridPart
 from pyvista_vdi.volume.light_tables import gradient_table, lighting_table, shading_defines
-from pyvista_vdi.volume.occlusion_grid import ambient_transmittances
+from pyvista_vdi.volume.occlusion_grid import ambient_transmittances, opacities_of_part
 from pyvista_vdi.volume.upload import (
     MACROCELL_BYTES,
     TABLE_BYTES,
@@ -109,6 +109,8 @@ class DeviceVolume:
     part : GridPart, optional
         Where the volume's points lie in a grid of which they are a part: marches then go along the
         whole grid's rays, and take the steps that belong to the part.
+    ambient : numpy.ndarray, float32 (nz, ny, nx), optional
+        Mean transmittance around the nodes of the whole grid's occlusion, which a part cannot know.
     room : Room, optional
         Memory that there is; a volume for which it is too little is held brick by brick. Without
         it a volume is held in one piece or refused.
@@ -145,6 +147,7 @@ class DeviceVolume:
         skip_empty: bool = True,
         by_scalar: bool = True,
         part: GridPart | None = None,
+        ambient: NDArray[np.float32] | None = None,
         room: Room | None = None,
         **changes: Any,
     ) -> None:
@@ -197,7 +200,13 @@ class DeviceVolume:
             per_difference = scale.unit if scale else 1.0
             gradient = gradient_table(volume.spacing, scalars, transfer_function, per_difference)
             self._gradient = (runtime.upload(gradient, "gradient opacity"),)
+        self._part: tuple[Any, ...] = ()
+        if part is not None:
+            self._part = part.arguments
+            self.defines["GRID_PART"] = 1
         self._occlusion: tuple[Any, ...] = ()
+        unlit = {k: v for k, v in shading.items() if k == "GRADIENT_OPACITY"}
+        self._of_opacities = {**self.defines, **unlit}
         if options.ambient_occlusion is not None:
             if not whole:
                 raise DeviceMemoryError(
@@ -205,17 +214,10 @@ class DeviceVolume:
                     f"{bytes_text(device_bytes(volume, scale))}: raise memory_limit, leave "
                     "ambient_occlusion out, or use another device"
                 )
-            unlit = {k: v for k, v in shading.items() if k == "GRADIENT_OPACITY"}
-            self._occlusion = self._occluded(
-                options.ambient_occlusion, transfer_function, {**self.defines, **unlit}
-            )
+            self._occlusion = self._occluded(options.ambient_occlusion, transfer_function, ambient)
             shading["OCCLUSION"] = 1
         self.defines.update(shading)
         self.defines.update(compensation(self.grid.length / self.sample_distance))
-        self._part: tuple[Any, ...] = ()
-        if part is not None:
-            self._part = part.arguments
-            self.defines["GRID_PART"] = 1
         # Last: nothing that fails then keeps them for as long as somebody looks at the error
         self.bricks: DeviceBricks | None = None
         if room is not None and not whole:
@@ -314,10 +316,14 @@ class DeviceVolume:
         self,
         occlusion: AmbientOcclusion,
         transfer_function: TransferFunction,
-        defines: dict[str, str | int | None],
+        ambient: NDArray[np.float32] | None,
     ) -> tuple[Any, ...]:
         """Return the grid of the occlusion as kernel arguments, made once and kept."""
-        grid = OcclusionGrid.of(self.volume, occlusion)
+        grid = OcclusionGrid.of(self.grid, occlusion)
+        to_nodes = np.array([*(1 / edge for edge in grid.cell), occlusion.strength], np.float32)
+        nodes = np.array([*grid.nodes, 0], dtype=np.int32)
+        if ambient is not None:
+            return self.runtime.upload(ambient, "ambient occlusion"), nodes, to_nodes
         # Colours and shading have no part in it
         opacity = transfer_function.replace(
             colors=np.zeros_like(transfer_function.colors), shading=None
@@ -330,21 +336,37 @@ class DeviceVolume:
             if kept is None or kept[0] != key:
                 uploads.occlusions.pop(self.runtime, None)  # its memory goes first
                 kept = None
-                ambient = ambient_transmittances(
+                found = ambient_transmittances(
                     self.runtime,
                     grid,
                     (*self._classified(self._visible), *self._gradient),
                     self._classified(self._visible)[-2:],
-                    defines,
+                    self._of_opacities,
                     self.sample_distance,
                     self.unit_distance,
                 )
-                uploads.occlusions[self.runtime] = kept = (key, ambient)
-        to_nodes = [*(1 / edge for edge in grid.cell), occlusion.strength]
-        return (
-            kept[1],
-            np.array([*grid.nodes, 0], dtype=np.int32),
-            np.array(to_nodes, dtype=np.float32),
+                uploads.occlusions[self.runtime] = kept = (key, found)
+        return kept[1], nodes, to_nodes
+
+    def part_opacities(
+        self,
+        grid: OcclusionGrid,
+        first: tuple[int, int, int],
+        nodes: tuple[int, int, int],
+    ) -> NDArray[np.float32]:
+        """Return what this part of a volume has of the opacities of its occlusion's nodes.
+
+        ``first``: the first of ``nodes``, both along x, y and z; float32 (nz, ny, nx).
+        """
+        return opacities_of_part(
+            self.runtime,
+            grid,
+            (*self._classified(self._visible), *self._part, *self._gradient),
+            self._of_opacities,
+            (self.sample_distance, self.unit_distance),
+            self.grid.dimensions,
+            first,
+            nodes,
         )
 
     def _lighting(self, camera: Camera) -> tuple[DeviceBuffer, ...]:

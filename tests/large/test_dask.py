@@ -79,6 +79,13 @@ def test_whoever_makes_it_the_bytes_are_the_same(client, scene, expected):
     check_same(generate_on_dask(*arguments, client=client, workers=one, **options), expected)
 
 
+def test_occlusion_is_the_same_by_workers(client, scene, default_device):
+    arguments, options = scene
+    options = {**options, "ambient_occlusion": 8.0}
+    expected = generate_chunked(*arguments, device=default_device, **options)
+    check_same(generate_on_dask(*arguments, client=client, **options), expected)
+
+
 def kill_at(client, fraction):
     """Return a progress callback that kills a worker once that much is done."""
     alive = [True]

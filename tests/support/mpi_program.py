@@ -35,7 +35,7 @@ def own_block(volume, rank):
 
 
 def same(folder):
-    """Write the VDI of four blocks, with gradients, which need more of the neighbours."""
+    """Write the VDI of four blocks, with gradients and occlusion, which need others' points."""
     volume = volume_of("uint8")
     values, first = own_block(volume, (COMM.rank + 3) % 4)
     function = transfer_for(volume, "linear", gradient_opacities=[0.2, 1], gradient_range=(0, 30))
@@ -47,6 +47,7 @@ def same(folder):
         WINDOW,
         function,
         max_supersegments=8,
+        ambient_occlusion=8.0,
         comm=COMM,
     )
     assert (vdi is None) == (COMM.rank > 0)
