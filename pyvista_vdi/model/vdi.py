@@ -289,6 +289,14 @@ class VDI:
         object
             What ``Plotter.show`` returns.
 
+        Notes
+        -----
+        The picture is that of :func:`pyvista_vdi.render` to half of 1/255, its rounding, with
+        ``anti_aliasing=False``. PyVista's own setting takes eight samples of a pixel: where the
+        outline of the bounds crosses a pixel, samples beside it count as empty, as they do for
+        VTK's volumes, and the pixel gets a part of its light. In a window of 64 x 48 that was 3
+        pixels, by 3.7/255; of the same volume drawn by VTK, 21 pixels, by up to 20/255.
+
         Examples
         --------
         >>> import pyvista_vdi as pvdi

@@ -60,7 +60,10 @@ def test_html_shows_a_thumbnail(vdi):
 def test_plot_shows_the_generating_view(vdi):
     pytest.importorskip("pyvista")
     options = {"show_scalar_bar": False, "show_axes": False, "background": "black"}
-    shown = vdi.plot(off_screen=True, return_img=True, **options)
-    right, turned = (pvdi.render(vdi, vdi.camera.azimuth(angle))[..., :3] for angle in (0, 3))
-    off, far = (np.abs(shown[..., :3] - 255 * each).mean() for each in (right, turned))
-    assert off < 0.2 * far, (off, far)  # rounding and the plotter's clipping planes, but no turn
+    right = 255 * pvdi.render(vdi, vdi.camera)[..., :3]
+    shown = vdi.plot(off_screen=True, return_img=True, anti_aliasing=False, **options)
+    assert np.abs(shown[..., :3] - right).max() <= 0.51  # rounding to 8 bits, and the driver's own
+    # Of eight samples, those beside the outline of the bounds count as empty: pixels lack light
+    off = vdi.plot(off_screen=True, return_img=True, **options)[..., :3] - right
+    assert off.max() <= 0.51
+    assert (off < -0.51).any(axis=2).sum() <= 8  # 3 where it was measured, 0 where there is no MSAA
