@@ -36,6 +36,7 @@ ROOMS = {
     "raycasting": ("raycasting", "model"),
     "multi_vdi": ("raycasting",),
     "series": ("series",),
+    "large": ("large",),
 }
 
 
@@ -47,6 +48,7 @@ class Mutant:
     file: str  # below opencl/
     old: str
     new: str
+    rooms: tuple[str, ...] | None = None  # if not those of the kernel's folder
 
     def changed(self, text: str) -> str:
         """Return the kernel's text with the mutation; ValueError if it does not occur once."""
@@ -55,8 +57,8 @@ class Mutant:
         return text.replace(self.old, self.new)
 
 
-def _m(name: str, file: str, old: str, new: str) -> Mutant:
-    return Mutant(name, file, old, new)
+def _m(name: str, file: str, old: str, new: str, rooms: tuple[str, ...] | None = None) -> Mutant:
+    return Mutant(name, file, old, new, rooms)
 
 
 MARCH, MARCH_LISTS = "volume/march.cl", "generation/march_lists.cl"
@@ -64,6 +66,7 @@ RUNS, SHORTEN = "generation/runs.cl", "generation/shorten_lists.cl"
 CRITERIA = "generation/criteria.cl"
 LISTS, RAYS = "raycasting/lists.cl", "raycasting/list_rays.cl"
 DECODE = "series/decode.cl"
+LARGE, OPTICAL_DEPTHS, LARGE_RUNS = ("large",), "large/optical_depths.cl", "large/runs.cl"
 
 MUTANTS = (
     _m(
@@ -355,6 +358,60 @@ MUTANTS = (
     _m("series: last faces are as the others", DECODE, "if (k == count - 1) {", "if (false) {"),
     _m("series: numbers are rounded down", DECODE, "rint(value / unit)", "floor(value / unit)"),
     _m("series: colours are the table's", DECODE, "if (same >= 0 && left == 0) {", "if (false) {"),
+    _m(
+        "large: a step that is sampled stands for itself alone",
+        OPTICAL_DEPTHS,
+        "of_step * (float)stride",
+        "of_step",
+    ),
+    _m(
+        "large: which steps are sampled depends on the block",
+        OPTICAL_DEPTHS,
+        "(march.begin + (stride - 1)) / stride * stride",
+        "march.begin",
+    ),
+    _m("large: runs that touch are not joined", LARGE_RUNS, "run.FRONT == last.BACK", "false"),
+    _m(
+        "large: runs are joined whatever they look like",
+        LARGE_RUNS,
+        "hidden_weight) <= finest)",
+        "hidden_weight) <= INFINITY)",
+    ),
+    _m(
+        "large: each block begins with all the light",
+        LARGE_RUNS,
+        "transmittance = last.TRANSMITTANCE - last.TRANSMITTANCE * last.OPACITY;",
+        "",
+    ),
+    _m("large: rows of a block are not its window's", LARGE_RUNS, "* window.z + x", "* window.z"),
+    _m(
+        "large: a step at a face belongs to two blocks",
+        MARCH,
+        "WHILE((end > begin) & behind_part(march, medium, end - 1), end -= COUNT(moves))",
+        "",
+        LARGE,
+    ),
+    _m(
+        "large: macrocells are the whole grid's",
+        MARCH,
+        "TO_REAL(((n) << MACROCELL_SHIFT) + FIRST_OF_PART(axis))",
+        "TO_REAL((n) << MACROCELL_SHIFT)",
+        LARGE,
+    ),
+    _m(
+        "large: occlusion by samples in a neighbour's cells",
+        "volume/ambient_occlusion.cl",
+        "(position) < part_upper.axis)",
+        "true)",
+        LARGE,
+    ),
+    _m(
+        "large: occlusion by the part's first nodes",
+        "volume/ambient_occlusion.cl",
+        "(node + first_node.xyz) * cell.xyz",
+        "node * cell.xyz",
+        LARGE,
+    ),
 )
 
 
@@ -416,7 +473,7 @@ def main() -> None:
         for mutant in MUTANTS
         if any(text in f"{mutant.name} {mutant.file}" for text in options.only or [""])
     ]
-    rooms = {mutant: ROOMS[mutant.file.partition("/")[0]] for mutant in chosen}
+    rooms = {each: each.rooms or ROOMS[each.file.partition("/")[0]] for each in chosen}
     for each in sorted({room for of_mutant in rooms.values() for room in of_mutant}):
         if tests_fail(None, (each,), options):
             raise SystemExit(f"tests/{each} fails without a mutant: nothing can be said")

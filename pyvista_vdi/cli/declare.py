@@ -100,6 +100,14 @@ def parse_rate(text: str) -> float:
     return rate
 
 
+def parse_frames_per_second(text: str) -> float:
+    """Return frames per second, above 0."""
+    rate = parse_rate(text)
+    if rate == 0:
+        raise argparse.ArgumentTypeError("expected frames per second, above 0; got 0")
+    return rate
+
+
 def parse_opacity(text: str) -> str | list[float]:
     """Return the name of a mapping, or opacities from ``0,0.2,1``."""
     return list(parse_numbers(text)) if re.match(r"[-+.\d]", text) else text

@@ -137,7 +137,7 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
             given[name] = getattr(options, name)
     path = getattr(options, "transfer_function", None)
     if path is not None:
-        given["transfer_function"] = _from_json(
+        given["transfer_function"] = from_json(
             path, TransferFunction.from_dict, "transfer function"
         )
     return given
@@ -234,7 +234,7 @@ def given_camera(options: argparse.Namespace) -> Camera | None:
     """Return the view in the file that ``--camera-json`` names, if it was given."""
     if options.camera_json is None:
         return None
-    return _from_json(options.camera_json, Camera.from_dict, "camera")
+    return from_json(options.camera_json, Camera.from_dict, "camera")
 
 
 def of_the_file(options: argparse.Namespace) -> dict[str, Any]:
@@ -270,7 +270,8 @@ def has_own_place(options: argparse.Namespace) -> bool:
     return any(getattr(options, name) is not None for name in names)
 
 
-def _from_json(path: str, build: Callable[[dict[str, Any]], _T], kind: str) -> _T:
+def from_json(path: str, build: Callable[[dict[str, Any]], _T], kind: str) -> _T:
+    """Return what a file of JSON describes; ``kind`` says what that is."""
     try:
         state = json.loads(Path(path).read_text(encoding="utf-8"))
         return build(state)

@@ -17,6 +17,25 @@ from pyvista_vdi.model.standard_cases import ANGLES, ELEVATION, WINDOW_SIZE
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
 
 
+#: What the command says without a verb.
+_LESSON = f"""pyvista-vdi {__version__}: {_DESCRIPTION[0].lower() + _DESCRIPTION[1:]}
+
+A first session, with a volume that is shipped:
+
+  pyvista-vdi generate --example brain --tf soft -o brain.vdi     make a VDI
+  pyvista-vdi view brain.vdi                                      turn it in a window
+  pyvista-vdi render brain.vdi -o brain.png --azimuth 20          or a picture from elsewhere
+  pyvista-vdi convert brain.vdi -o brain.html                     or a page that turns it
+  pyvista-vdi turntable --example brain --tf soft -o brain.gif    or a moving picture
+
+With your own, a file or a folder of DICOM slices:
+
+  pyvista-vdi generate scans/head -o head.vdi --cmap ct-bone
+
+pyvista-vdi --help lists all verbs, pyvista-vdi generate --help explains one, and
+pyvista-vdi devices says on what it runs.
+"""
+
 #: So many names are listed where none of them is meant; more are left to ``--help``.
 _LISTED = 16
 
@@ -52,7 +71,7 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
     """
     parser, verbs = _make_parser()
     if not arguments:
-        parser.print_help()
+        print(_LESSON, end="")
         return None
     if not arguments[0].startswith("-") and arguments[0] not in verbs:
         raise UsageError(
@@ -252,6 +271,51 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
         "generating view",
     )
     declare.classification(parser, tables=False)
+    declare.device(parser)
+
+
+def _add_frames(parser: argparse.ArgumentParser, frames: str) -> None:
+    declare.vdi_or_volume(parser)
+    declare.output(
+        parser,
+        ".gif to write; or .mp4, .webm (pip install 'pyvista-vdi[movie]'); or pictures, "
+        "frame_{:04d}.png",
+    )
+    declare.size(parser, None)
+    declare.option(
+        parser,
+        "--background",
+        "a name, #rrggbb or R,G,B from 0 to 1 (default: black)",
+        "COLOR",
+        declare.parse_color,
+        default=(0.0, 0.0, 0.0),
+    )
+    declare.option(parser, "--frames", frames, "N", declare.parse_count)
+    text = "frames per second (default: 25)"
+    declare.option(parser, "--fps", text, "RATE", declare.parse_frames_per_second, default=25.0)
+
+
+def _add_turntable(parser: argparse.ArgumentParser) -> None:
+    _add_frames(parser, "of the whole turn (default: four seconds of them)")
+    text = "turn by so many in all, about the view's up direction (default: 360)"
+    declare.option(parser, "--degrees", text, "DEGREES", float, default=360.0)
+    declare.camera(parser, "the first view is the VDI's own, or one that the volume fills")
+    declare.classification(parser)
+    declare.device(parser)
+
+
+def _add_movie(parser: argparse.ArgumentParser) -> None:
+    _add_frames(
+        parser,
+        "in all (default: a series has one for each step, a path four seconds of them from one "
+        "view to the next)",
+    )
+    text = "views to fly along, each Camera.to_dict() as JSON; two at least"
+    declare.option(parser, "--path", text, "FILE", nargs="+")
+    text = "turn by so many meanwhile, about the view's up direction (default: 0)"
+    declare.option(parser, "--turn", text, "DEGREES", float, default=0.0)
+    declare.camera(parser, "the first view is the VDI's own, or one that the volume fills")
+    declare.classification(parser)
     declare.device(parser)
 
 
@@ -478,6 +542,18 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
         "open a window in which a VDI, or a volume by a VDI of it, can be turned",
         "pyvista-vdi view knee.vdi",
         _add_view,
+    ),
+    "turntable": (
+        "movie",
+        "turn a VDI, a set or a volume about itself and write a moving picture",
+        "pyvista-vdi turntable knee.vdiset -o knee.gif --frames 60",
+        _add_turntable,
+    ),
+    "movie": (
+        "movie",
+        "play a series, or fly along a path of views, and write a moving picture",
+        "pyvista-vdi movie run.vdis -o run.mp4 --turn 20",
+        _add_movie,
     ),
     "serve": (
         "serve",

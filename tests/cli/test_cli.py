@@ -98,11 +98,20 @@ def complaint(capsys, *arguments, status=1):
 
 
 def test_help_names_every_verb(capsys):
-    for arguments in ([], ["--help"]):
-        status, out, _ = run(capsys, *arguments)
-        assert status == 0
-        # argparse begins a new line behind a long one
-        assert all(re.search(rf"^    {verb}\s", out, re.MULTILINE) for verb in VERBS)
+    status, out, _ = run(capsys, "--help")
+    assert status == 0
+    # argparse begins a new line behind a long one
+    assert all(re.search(rf"^    {verb}\s", out, re.MULTILINE) for verb in VERBS)
+
+
+def test_without_a_verb_it_shows_commands_that_parse(capsys):
+    status, out, _ = run(capsys)
+    assert status == 0
+    shown = re.findall(r"^  pyvista-vdi (.+?)(?:  .*)?$", out, re.MULTILINE)
+    assert [line.split()[0] for line in shown][:2] == ["generate", "view"]
+    assert len(shown) == 6
+    for line in shown:
+        assert parser.parse(line.split()) is not None
 
 
 @pytest.mark.parametrize("verb", VERBS)
@@ -125,7 +134,7 @@ def test_version(capsys):
     ("arguments", "message"),
     [
         (["generat"], "there is no verb 'generat': did you mean 'generate'?"),
-        (["zzz"], "there is no verb 'zzz': known are devices, generate, render, view, serve"),
+        (["zzz"], "there is no verb 'zzz': known are devices, generate, render, view, turntable"),
         (["info"], "one of the arguments FILE --example is required; see pyvista-vdi info --help"),
         # Not "argument VOLUME: not allowed with argument --example" for the value behind it
         (

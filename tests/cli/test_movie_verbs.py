@@ -1,0 +1,172 @@
+"""The verbs ``turntable`` and ``movie``: frames are those that ``render`` draws."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import cli
+from pyvista_vdi.cli.movie import camera_path
+from pyvista_vdi.io import to_bytes
+from pyvista_vdi.model.standard_cases import filling_camera
+
+SIZE = (64, 48)
+#: A GIF has 256 colours: what a byte of a smooth picture may differ by (measured: 12).
+OF_A_PALETTE = 24
+
+
+def run(capsys, *arguments, status=0):
+    """Run the command and return what it prints, or says where it fails."""
+    assert cli.main([str(argument) for argument in arguments]) == status
+    out, error = capsys.readouterr()
+    return out + error if status == 0 else error
+
+
+@pytest.fixture(scope="module")
+def volume(tmp_path_factory):
+    path = tmp_path_factory.mktemp("volume") / "v.npy"
+    z, y, x = np.mgrid[:9, :9, :9] - 4
+    np.save(path, (250 * np.exp(-((x - 1) ** 2 + 3 * y**2 + z**2) / 9)).astype(np.uint8))
+    return path
+
+
+@pytest.fixture(scope="module")
+def saved(volume, default_runtime):
+    path = volume.with_name("v.vdi")
+    view = pvdi.Camera((2, -25, 12), (4, 4, 4), (0, 0, 1))
+    table = pvdi.TransferFunction(
+        np.linspace([0, 0, 1], [1, 1, 0], 4), [0, 0.2, 0.4, 0.6], (0, 250)
+    )
+    pvdi.generate(pvdi.Volume(np.load(volume)), view, SIZE, transfer_function=table).save(path)
+    return path
+
+
+def expected(vdi, view):
+    return to_bytes(pvdi.render(vdi, view, SIZE), (0, 0, 0)).astype(int)
+
+
+def test_a_turntable_is_a_turn_of_frames(saved, capsys, tmp_path):
+    target = tmp_path / "v.gif"
+    said = run(capsys, "turntable", saved, "-o", target, "--frames", 6, "--fps", 10)
+    assert "6 frames of 64 x 48 pixels, 0.6 s at 10 a second" in said
+    assert said.count("views more than 60 degrees") == 1
+    vdi = pvdi.read(saved)
+    with Image.open(target) as movie:
+        assert (movie.n_frames, movie.info["duration"], movie.info["loop"]) == (6, 100, 0)
+        for k in range(6):
+            movie.seek(k)
+            frame = np.asarray(movie.convert("RGB")).astype(int)
+            assert np.abs(frame - expected(vdi, vdi.camera.azimuth(60 * k))).max() <= OF_A_PALETTE
+    assert [path.name for path in tmp_path.iterdir()] == ["v.gif"]
+
+
+def test_a_volume_is_drawn_by_volume_rendering(volume, capsys, tmp_path):
+    pytest.importorskip("pyvista")
+    looks = {"cmap": "bone", "opacity": "linear"}
+    options = [f"--{name}={value}" for name, value in looks.items()]
+    target = tmp_path / "frame_{}.png"
+    run(capsys, "turntable", volume, "-o", target, "--size", "64x48", "--frames", 2, *options)
+    read = pvdi.Volume(np.load(volume))
+    view = filling_camera(read.bounds, SIZE)
+    for k in range(2):
+        picture = pvdi.render_volume(read, view.azimuth(180 * k), SIZE, **looks)
+        found = np.asarray(Image.open(tmp_path / f"frame_{k}.png"))
+        np.testing.assert_array_equal(found, to_bytes(picture, (0, 0, 0)))
+
+
+def test_a_series_plays_and_turns_meanwhile(saved, capsys, tmp_path):
+    vdi = pvdi.read(saved)
+    steps = [vdi, vdi.with_precision("8-byte"), vdi]
+    pvdi.VDISeries(steps, (0.0, 1.0, 2.0)).save(tmp_path / "run.vdis")
+    target = tmp_path / "f_{:02d}.png"
+    run(capsys, "movie", tmp_path / "run.vdis", "-o", target, "--turn", 30)
+    series = pvdi.read(tmp_path / "run.vdis")
+    for k in range(3):
+        found = np.asarray(Image.open(tmp_path / f"f_{k:02d}.png")).astype(int)
+        view = vdi.camera.azimuth(15 * k)
+        np.testing.assert_array_equal(found, expected(series[k], view))
+
+
+def test_a_path_passes_its_views(saved, capsys, tmp_path):
+    vdi = pvdi.read(saved)
+    keys = [vdi.camera, vdi.camera.azimuth(20), vdi.camera.azimuth(40).elevation(20)]
+    files = []
+    for k, key in enumerate(keys):
+        files.append(tmp_path / f"{k}.json")
+        files[-1].write_text(json.dumps(key.to_dict()))
+    target = tmp_path / "p{}.png"
+    run(capsys, "movie", saved, "-o", target, "--frames", 5, "--path", *files)
+    for frame, key in ((0, keys[0]), (2, keys[1]), (4, keys[2])):
+        found = np.asarray(Image.open(tmp_path / f"p{frame}.png")).astype(int)
+        # The spline's rounding moves few samples over borders
+        assert np.abs(found - expected(vdi, key)).mean() < 0.1
+
+
+def test_views_of_a_path_go_evenly_about_their_point():
+    """Two views a turn apart: the point stays, the distance too, and the angle grows as eased."""
+    first = pvdi.Camera((0, -5, 0), (0, 0, 0), (0, 0, 1))
+    path = camera_path([first, first.azimuth(90)], np.linspace(0, 1, 9))
+    angles = [np.degrees(np.arctan2(view.position[0], -view.position[1])) for view in path]
+    assert np.diff(angles).min() > 0
+    np.testing.assert_allclose([angles[0], angles[4], angles[8]], [0, 45, 90], atol=1e-6)
+    for view in path:
+        np.testing.assert_allclose(np.linalg.norm(view.position), 5, rtol=1e-9)
+        np.testing.assert_allclose(view.focal_point, 0, atol=1e-12)
+        np.testing.assert_allclose(view.axes[1], (0, 0, 1), atol=1e-9)
+
+
+@pytest.mark.skipif(find_spec("imageio_ffmpeg") is None, reason="needs the extra: movie")
+@pytest.mark.parametrize("suffix", ["mp4", "webm"])
+def test_a_film_has_its_frames(saved, capsys, tmp_path, suffix):
+    import imageio_ffmpeg
+
+    target = tmp_path / f"v.{suffix}"
+    run(capsys, "movie", saved, "-o", target, "--turn", 20, "--frames", 8, "--size", "65x49")
+    ffmpeg = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-i", str(target)]
+    raw = subprocess.run(
+        [*ffmpeg, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"], capture_output=True, check=True
+    )
+    decoded = np.frombuffer(raw.stdout, np.uint8).reshape(-1, 48, 64, 3)
+    assert len(decoded) == 8
+    vdi = pvdi.read(saved)
+    for found, view in ((decoded[0], vdi.camera), (decoded[-1], vdi.camera.azimuth(20))):
+        assert np.abs(found.astype(int) - expected(vdi, view)).mean() < 6  # half the colours
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["turntable", "v.vdi", "-o", "v.avi"], "is no moving picture"),
+        (["turntable", "v.vdi", "-o", "v.png"], "frame_{:04d}.png"),
+        (["movie", "v.vdi", "-o", "v.gif"], "nothing moves"),
+        (["movie", "v.vdi", "-o", "v.gif", "--path", "a.json"], "two views at least"),
+        (["movie", "v.vdi", "-o", "absent/v.gif", "--turn", "9"], "absent"),
+        (["turntable", "v.vdi", "-o", "v.gif", "--fps", "0"], "above 0"),
+    ],
+)
+def test_mistakes_are_said_before_anything_is_drawn(
+    saved, capsys, monkeypatch, tmp_path, arguments, said
+):
+    monkeypatch.chdir(saved.parent)
+    before = sorted(saved.parent.iterdir())
+    assert said in run(capsys, *arguments, status=2 if "--fps" in arguments else 1)
+    assert sorted(saved.parent.iterdir()) == before
+
+
+def test_a_movie_that_fails_leaves_what_was_there(saved, capsys, monkeypatch, tmp_path):
+    target = tmp_path / "v.gif"
+    target.write_bytes(b"what was there")
+
+    def failing(*_, **__):
+        raise pvdi.errors.DeviceError("the device is gone")
+
+    monkeypatch.setattr("pyvista_vdi.cli.movie.render", failing)
+    assert "gone" in run(capsys, "turntable", saved, "-o", target, "--frames", 3, status=1)
+    assert target.read_bytes() == b"what was there"
+    assert [path.name for path in tmp_path.iterdir()] == ["v.gif"]
