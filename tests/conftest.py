@@ -21,6 +21,7 @@ import os
 import re
 import signal
 import sysconfig
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -135,9 +136,15 @@ STARTERS = frozenset({"subprocess", "multiprocessing", "run_python", "fork"})
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what runs on each device to test, and what is fast."""
+    """Mark what runs on each device to test, what is fast, and what nightly alone runs."""
     seen = set()
     for item in items:
+        some = item.get_closest_marker("every")
+        if some is not None:
+            # By the case's name: other cases on another device, the same in every process
+            chosen = zlib.crc32(item.name.encode()) % some.args[0] == 0
+            if not chosen and item.function in seen:
+                item.add_marker("slow")
         if any(map(item.get_closest_marker, ("slow", "paraview"))):
             continue
         if "runtime" in getattr(item, "fixturenames", ()):

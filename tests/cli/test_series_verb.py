@@ -125,6 +125,7 @@ def test_a_series_takes_the_place_of_one_that_it_is_made_of(series, capsys, tmp_
     assert pvdi.read(path)[4].equals(before[1])
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_leaves_what_was_there(series, volumes, capsys, tmp_path):
     path = tmp_path / "run.vdis"
     path.write_bytes(series.read_bytes())

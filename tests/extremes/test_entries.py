@@ -173,6 +173,7 @@ def thin_slab(thickness, optical_depth=1.0, parallel=False):
     )  # fmt: skip
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("precision", ["exact", "16-byte"])
 @pytest.mark.parametrize("parallel", [False, True])
 @pytest.mark.parametrize(

@@ -76,6 +76,7 @@ def test_worlds(runtime, worst, scale, offset, lit_by, look):
     check(runtime, worst, volume, function, None if lit_by == "headlight" else lamps(volume))
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("lit_by", "look"),
     [
@@ -128,6 +129,7 @@ def test_a_light_inside_the_volume(runtime, worst, attenuation):
     check(runtime, worst, volume, transfer(shading=SHINY), Lights((bulb,)))
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("look", ["plain", *LOOKS])
 @pytest.mark.parametrize(
     ("scale", "offset"), [(1e-9, 1e7), pytest.param(1e9, 1e7, marks=pytest.mark.slow)]

@@ -150,6 +150,7 @@ def test_a_range_of_one_scalar(runtime, worst, at, dtype):
     check(runtime, worst, Volume(cube), function)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("dtype", ["float32", "float64", "int32"])
 @pytest.mark.parametrize("look", ["plain", "gradient", "shaded"])
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])

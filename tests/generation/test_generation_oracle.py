@@ -116,6 +116,7 @@ def check_against_reference(
     return exact
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
 @pytest.mark.parametrize("dtype", VOXEL_TYPES)
 def test_every_voxel_type(runtime, dtype, interpolation):

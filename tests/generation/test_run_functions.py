@@ -332,6 +332,7 @@ def test_make_room(call, limit):
         assert np.mean(long) > limit / 4
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("hidden_weight", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("limit", [1, 2, 5, 20])
 def test_merge_to_limit_is_greedy(call, limit, hidden_weight):

@@ -512,6 +512,7 @@ def test_every_truncation_is_noticed(file):
             pvdi.read(file)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::pyvista_vdi.errors.VDIWarning")
 def test_changed_bytes_never_crash(file):
     """OpenEXR has no checksums but zlib's, so that not every change is seen; none goes astray."""

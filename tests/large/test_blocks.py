@@ -173,6 +173,7 @@ KINDS = {
 }
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_pictures_are_those_of_one_piece(runtime, kind):
     """At V_O to the rounding of float32; elsewhere lists are merged a little otherwise at faces.

@@ -91,6 +91,7 @@ def test_busy_lanes_are_those_that_do_not_wait_for_the_longest():
     assert counting.busy_lanes(np.zeros(16, int)) == 1.0
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("angle", [0.0, 5.0, 30.0, 160.0])
 @pytest.mark.parametrize("parallel", [False, True])
 def test_walk_meets_what_the_reference_meets(scene, angle, parallel):

@@ -57,6 +57,7 @@ def looks(transfer_function, interpolation):
     return {**TRANSFER_FUNCTIONS[transfer_function], "interpolation": interpolation}
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("name", "transfer_function", "interpolation"), list(MEASURED))
 def test_shipped_volumes_small(name, transfer_function, interpolation, default_runtime):
     pytest.importorskip("pyvista")

@@ -40,6 +40,7 @@ def cases(kind, number=N_CASES):
         yield f"seed {seed}, view {kind!r}", vdi, *strategies.random_view(rng, vdi, kind)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 @pytest.mark.parametrize("way", WAYS)
 def test_pictures_are_the_oracles(runtime, way, kind):
@@ -52,6 +53,7 @@ def test_pictures_are_the_oracles(runtime, way, kind):
     assert result.drawn > result.pixels / 10
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_opengl_draws_the_same_but_for_rounded_corners():
     from pyvista_vdi.measure.rivals.opengl import OpenGLFrusta

@@ -80,6 +80,7 @@ def shown(plotter):
     return np.asarray(plotter.screenshot(return_img=True)).astype(int)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("arguments", "change"), CHANGES.values(), ids=CHANGES)
 def test_changes_of_the_grid_show_where_add_volume_s_show(arguments, change):
     differences = []

@@ -74,11 +74,11 @@ def run_example(name, folder):
     [
         "plotter.py",
         "pipeline.py",
-        "overlap.py",
-        "picking.py",
         "files.py",
-        "occlusion.py",
-        pytest.param("large_volume.py", marks=pytest.mark.slow),
+        *(
+            pytest.param(f"{name}.py", marks=pytest.mark.slow)
+            for name in ("overlap", "picking", "occlusion", "large_volume")
+        ),
     ],
 )
 def test_example_writes_a_picture(name, tmp_path):
@@ -89,6 +89,7 @@ def test_example_writes_a_picture(name, tmp_path):
     assert np.ptp(image.reshape(-1, 3).astype(int), axis=0).max() > 100
 
 
+@pytest.mark.slow
 def test_dial_example_writes_a_picture_of_three_qualities(tmp_path):
     said, target = run_example("dial.py", tmp_path)
     assert "predicted SSIM 0.9" in said

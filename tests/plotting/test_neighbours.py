@@ -223,6 +223,7 @@ def picture(kind: Add, add: Callable[..., object], *, later: bool = False) -> np
     return image
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in KINDS]
 )
@@ -239,6 +240,7 @@ def test_a_vdi_beside_it_is_drawn_as_a_volume_is(name):
 # -- assemblies ------------------------------------------------------------------------------------
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("kind", [vtkPropAssembly, vtkAssembly])
 @pytest.mark.parametrize("how", ["one", "nested", "two"])
 def test_parts_of_an_assembly_are_drawn(kind, how):

@@ -39,6 +39,7 @@ print("all well")
 """
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     "imports",
     [

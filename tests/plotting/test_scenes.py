@@ -351,6 +351,7 @@ def test_turned_view_stays_close():
     assert WINDOW[0] == ours.shape[1]
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("lighting", ["light kit", "three lights", "none"])
 def test_shaded_by_the_plotter_s_lights(lighting):
     def scene(plotter, add):
@@ -372,6 +373,7 @@ def test_shaded_by_a_lamp_that_was_added_later():
     assert_as_vtk(scene, lighting="none")
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("lighting", ["light kit", "three lights", "none"])
 def test_lights_that_move_with_the_camera_make_no_vdi(lighting):
     """VTK writes the eye of each frame into its headlights: they are the same lights."""

@@ -95,6 +95,7 @@ def test_which_frames_are_drawn_as_the_aligned_view(runtime, monkeypatch):
     assert drawn_by(first_hit=FirstHit.of(0.5, True)) == "raycast"
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize("window", WINDOWS, ids=lambda window: f"{window[0]}x{window[1]}")
 def test_every_pixel_is_its_own_list(runtime, window, precision, monkeypatch):
@@ -157,6 +158,7 @@ def in_another_world(rng, camera):
     )
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("corner", "window"),
     [

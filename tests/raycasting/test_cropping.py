@@ -42,6 +42,7 @@ def _dealt(request, monkeypatch):
     strategies.deal_rays(monkeypatch, request.param)
 
 
+@pytest.mark.every(3)
 @pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize("kind", ["flags", *PRESETS])
 def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind):

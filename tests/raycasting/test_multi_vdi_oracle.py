@@ -125,6 +125,7 @@ def compare_cases(runtime, kind):
     return said, moved, seen, pixels
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("dealt", DEALT)
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 def test_every_pixel_is_within_the_range_of_the_moved_rays(runtime, kind, dealt):
@@ -356,6 +357,7 @@ def side_by_side(rng, count, precisions=("exact",)):
     return placed, (323, 187)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("dealt", strategies.DEALT)
 @pytest.mark.parametrize("precisions", [("exact",), ("exact", "16-byte", "8-byte")])
 def test_where_no_two_are_met_each_is_drawn_as_by_itself(runtime, dealt, precisions, monkeypatch):

@@ -286,6 +286,7 @@ def only_within(rng, vdi):
     )
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 def test_nothing_is_seen_beside_the_occupied_cells(runtime, kind):
     """Pictures by all rays, and where the cells' corners are: V_O in all the ways of above."""

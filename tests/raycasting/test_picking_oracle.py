@@ -50,6 +50,7 @@ def overheard(monkeypatch, vdi, camera, size, pixel):
     return heard[-1]
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("kind", VIEWS)
 def test_the_hit_is_the_first_that_the_oracle_meets(kind, monkeypatch):
     hits = 0
@@ -125,6 +126,7 @@ def test_the_position_lies_in_the_supersegment_and_on_the_ray(kind):
             assert front - slack <= z <= back + slack
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("kind", VIEWS)
 def test_the_kernel_sees_the_same_depth(runtime, kind):
     """Within 2e-5 of the depth: roundings of list coordinates, 5e-7 seen outside the bounds and

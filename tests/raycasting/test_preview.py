@@ -63,6 +63,7 @@ def test_a_homogeneous_medium_is_exact_with_any_number_of_samples(runtime, paral
     np.testing.assert_allclose(drawn, exact, rtol=0, atol=ROUNDING)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("seed", range(6))
 def test_more_samples_come_closer_to_the_full_frame(runtime, seed):
     rng = np.random.default_rng(seed)

@@ -47,6 +47,7 @@ def compare_cases(runtime, kind):
     return total(parts)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("dealt", strategies.DEALT)
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind, dealt):

@@ -389,6 +389,7 @@ def pairs_of_views():
         yield pytest.param(own, new, marks=() if quick else pytest.mark.slow)
 
 
+@pytest.mark.every(5)
 @pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize(("generating_view", "name"), list(pairs_of_views()))
 def test_sparse_vdis(runtime, generating_view, name):
@@ -401,6 +402,7 @@ def test_sparse_vdis(runtime, generating_view, name):
         assert passed.drawn > MIN_DRAWN
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("generating_view", GENERATING_VIEWS)
 def test_rays_that_end_early(runtime, generating_view):
     """At opaque geometry, at clipping planes, and where nothing more can be seen."""
@@ -432,6 +434,7 @@ def test_rays_that_end_early(runtime, generating_view):
     assert_same_bits(runtime, changed(vdi, optical_depth=tau), camera, size)
 
 
+@pytest.mark.every(3)
 @pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 def test_random_vdis(runtime, kind):

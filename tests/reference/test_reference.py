@@ -249,6 +249,7 @@ def test_centre_ray_lengths_are_the_formula_of_the_design(seed):
     np.testing.assert_allclose(centre_ray_scale(vdi), expected, rtol=1e-12)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_range_contains_the_unmoved_ray_and_is_narrow_away_from_borders(seed):
     _, vdi, camera, size = case(seed, "around")

@@ -267,6 +267,7 @@ def test_every_cut_leaves_the_finished_steps(steps, tmp_path):
         assert series[finished - 1].equals(small[finished - 1])
 
 
+@pytest.mark.slow
 def test_flipped_bytes_are_noticed_and_cost_no_other_step(tmp_path):
     path = tmp_path / "a.vdis"
     small = [stepped_vdi(step=k, size=(6, 4)).with_precision("8-byte") for k in range(5)]

@@ -162,6 +162,7 @@ def test_pictures_are_the_reference_s(runtime, seed):
     np.testing.assert_allclose(reference.render(own, camera), expected, atol=1e-5)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("more", ["nearest", "gradient opacity", "shading", "RGBA", "opaque"])
 def test_with_everything_else_as_well(runtime, more):
     """The extinction is that of the marches; lit colours are darkened as unlit ones are."""

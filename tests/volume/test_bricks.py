@@ -84,6 +84,7 @@ def make(runtime, volume, camera, function, **options):
 # -- the same bytes -------------------------------------------------------------------------------
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", VIEWS)
 @pytest.mark.parametrize(
     ("dtype", "interpolation"),
@@ -292,6 +293,7 @@ def test_what_was_used_longest_ago_makes_room(runtime):
     assert rounds() == ([], 0)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("limit", [2.45, 2.6, 3.0, 4.0])
 def test_the_limit_is_kept_and_the_estimate_says_so(runtime, used, monkeypatch, limit):
     volume = volume_of(np.float32)

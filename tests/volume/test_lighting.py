@@ -124,6 +124,7 @@ def test_gradient_opacity_is_the_reference_s(runtime, dtype, shaded):
     np.testing.assert_allclose(image, expected, atol=TOLERANCE)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
 @pytest.mark.parametrize("name", [*LIGHTS, None])
 def test_blocks_of_rays_are_lit_as_one_ray_is(monkeypatch, runtime, name, interpolation):

@@ -61,6 +61,7 @@ def opaque_depth():
     return depth
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     "options",
     [
@@ -82,6 +83,7 @@ def test_options(check, options, interpolation):
     check(volume_of(np.uint8, spacing=(1, 0.8, 1.3)), interpolation=interpolation, **options)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
 @pytest.mark.parametrize("blending", ["maximum", "minimum", "average", "additive"])
 @pytest.mark.parametrize("interpolation", INTERPOLATIONS)

@@ -124,6 +124,7 @@ def slow(scene):
     return pytest.param(scene, marks=pytest.mark.slow, id=scene.__name__)
 
 
+@pytest.mark.every(3)
 @pytest.mark.filterwarnings("ignore:coverage='bounds'")
 @pytest.mark.parametrize(
     "scene",

@@ -92,6 +92,7 @@ CHANGES = [
 ]  # fmt: skip
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("parallel", [False, True])
 def test_drags_are_those_of_vtks_trackball_camera(parallel, data, open_page):
     """By VTK's own style, with its own events, in a window of the same size."""

@@ -130,6 +130,7 @@ SERIES = {
 }
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", SERIES)
 def test_steps_are_python_s(name, page, tmp_path):
     vdis, options = SERIES[name]

@@ -424,6 +424,7 @@ def test_any_message_is_taken_or_refused(message):
         )
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     "camera",
     [
