@@ -23,7 +23,23 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
     "sphinx_copybutton",
+    "sphinx_gallery.gen_gallery",
 ]
+# The pictures are committed (docs/make_gallery.py): a build of the site executes nothing. Pages and
+# lists of who uses what come from the scripts' text
+sphinx_gallery_conf = {
+    "examples_dirs": "gallery",
+    "gallery_dirs": "auto_gallery",
+    "backreferences_dir": "auto_gallery/backreferences",
+    "doc_module": ("pyvista_vdi",),
+    "plot_gallery": False,
+    "filename_pattern": r"\.py$",
+    "within_subsection_order": "FileNameSortKey",
+    "remove_config_comments": True,
+    "download_all_examples": False,
+    "show_signature": False,
+    "thumbnail_size": (320, 240),
+}
 # Links into others' pages need the network, which a build that must pass does without
 if os.environ.get("PYVISTA_VDI_INTERSPHINX") == "1":
     extensions.append("sphinx.ext.intersphinx")
@@ -35,7 +51,7 @@ intersphinx_mapping = {
 copybutton_exclude = ".linenos, .gp, .go"
 templates_path = ["_templates"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}  # .rst: autosummary's own pages
-exclude_patterns = ["_build", "readme.md"]
+exclude_patterns = ["_build", "gallery", "readme.md"]
 
 myst_enable_extensions = ["deflist", "dollarmath"]
 myst_heading_anchors = 3

@@ -1,9 +1,10 @@
-"""Make the gallery's pictures: run every example off-screen and a small comparison.
+"""Make the gallery's pictures: run its scripts, examples off-screen, and a small comparison.
 
-    python docs/make_gallery.py
+    python docs/make_gallery.py [NAME ...]
 
-Each picture is scaled down and reduced to 256 colours, to be committed. Look at every one of them
-afterwards: an example says at its head what one should see.
+With names, those scripts of ``docs/gallery`` alone. The pictures of ``examples/`` are scaled down
+and reduced to 256 colours, to be committed. Look at every one of them afterwards: an example says
+at its head what one should see.
 """
 
 from __future__ import annotations
@@ -24,24 +25,31 @@ WIDTH = 480
 SHEET_WIDTH = 1280
 LARGEST_FILE = 100 * 1024
 
-#: Examples whose pictures hold text, which must stay readable.
-WIDE = ("tradeoff",)
+#: Those of the scripts of docs/gallery, which are JPEG.
+LARGEST_PHOTO = 150 * 1024
+
+#: Examples whose pictures are on the site, those that hold text wide.
+SHOWN, WIDE = ("occlusion", "overlap", "picking", "tradeoff"), ("tradeoff",)
 
 COMPARISON = ("brain", "steep", "320x180")
 
 
-def main() -> None:
-    """Make them all."""
-    TARGET.mkdir(exist_ok=True)
+def main(names: list[str]) -> None:
+    """Make those of the names, or all."""
     environment = {**os.environ, "PYVISTA_OFF_SCREEN": "true"}
     if not os.environ.get("DISPLAY"):
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for example in sorted((DOCS.parent / "examples").glob("*.py")):
-            if example.stem == "interactive":
-                run(environment, str(example), str(TARGET / "interactive.gif"))
-                continue
+        for script in sorted((DOCS / "gallery").glob("*.py")):
+            if not names or script.stem in names:
+                run({**environment, "MPLBACKEND": "agg"}, str(script), folder=folder)
+                keep_photo(folder / f"{script.stem}.png", TARGET / f"gallery-{script.stem}.jpg")
+        if names:
+            return
+        examples = DOCS.parent / "examples"
+        run(environment, str(examples / "interactive.py"), str(TARGET / "interactive.gif"))
+        for example in (examples / f"{stem}.py" for stem in SHOWN):
             picture = folder / f"{example.stem}.png"
             run(environment, str(example), str(picture))
             width = SHEET_WIDTH if example.stem in WIDE else WIDTH
@@ -52,9 +60,15 @@ def main() -> None:
         keep(folder / f"{volume}-{look}.png", TARGET / "compare.png", SHEET_WIDTH)
 
 
-def run(environment: dict[str, str], *arguments: str) -> None:
-    """Run Python with these arguments."""
-    subprocess.run([sys.executable, *arguments], check=True, env=environment)
+def run(environment: dict[str, str], *arguments: str, folder: Path | None = None) -> None:
+    """Run Python with these arguments, in a folder."""
+    subprocess.run([sys.executable, *arguments], check=True, env=environment, cwd=folder)
+
+
+def keep_photo(source: Path, target: Path) -> None:
+    """Store a picture as JPEG."""
+    Image.open(source).convert("RGB").save(target, quality=85, optimize=True)
+    require_small(target, LARGEST_PHOTO)
 
 
 def keep(source: Path, target: Path, width: int) -> None:
@@ -64,9 +78,14 @@ def keep(source: Path, target: Path, width: int) -> None:
         height = round(picture.height * width / picture.width)
         picture = picture.resize((width, height), Image.Resampling.LANCZOS)
     picture.quantize(256, dither=Image.Dither.FLOYDSTEINBERG).save(target, optimize=True)
-    if target.stat().st_size > LARGEST_FILE:
-        sys.exit(f"{target} has {target.stat().st_size} bytes, more than {LARGEST_FILE}")
+    require_small(target, LARGEST_FILE)
+
+
+def require_small(file: Path, most: int) -> None:
+    """End the program if a file is too large to be committed."""
+    if file.stat().st_size > most:
+        sys.exit(f"{file} has {file.stat().st_size} bytes, more than {most}")
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])
