@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pyvista_vdi._version import __version__
 
-sys.path.insert(0, str(Path(__file__).parent))  # where live.py is
+sys.path.insert(0, str(Path(__file__).parent))  # where live.py and terms.py are
 
 project = "pyvista-vdi"
 author = "The pyvista-vdi developers"
@@ -17,6 +17,7 @@ version = release = __version__
 
 extensions = [
     "live",
+    "terms",
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",
@@ -64,4 +65,4 @@ autodoc_default_options = {"members": True}
 
 html_theme = "furo"
 html_title = f"pyvista-vdi {version}"
-html_static_path: list[str] = []
+html_static_path = ["_static"]

@@ -9,6 +9,7 @@ committed files with the ones that this script draws.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape
@@ -51,7 +52,7 @@ class Drawing:
         font = f' font-family="{family}"' if family else ""
         self.parts.append(
             f'<text x="{at[0]:.1f}" y="{at[1]:.1f}" text-anchor="{anchor}" font-size="{size:g}"'
-            f' fill="{color}" font-weight="{weight}"{font}>{escape(content)}</text>'
+            f' fill="{color}" font-weight="{weight}"{font}>{_typeset(escape(content))}</text>'
         )
 
     def line(
@@ -108,6 +109,15 @@ class Drawing:
     def svg(self) -> str:
         """Return the file's text."""
         return "\n".join([*self.parts, "</svg>"]) + "\n"
+
+
+def _typeset(text: str) -> str:
+    """Set V_O and its like in italics, with the index below the line."""
+    term = (
+        r'<tspan font-style="italic">\1<tspan dy="3" font-size="75%">\2</tspan></tspan>'
+        '<tspan dy="-3">\u200b</tspan>'  # back on the line, by a character of no width
+    )
+    return re.sub(r"\b([VN])_([ONS])\b", term, text)
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> list[Point]:

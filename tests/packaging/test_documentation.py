@@ -41,6 +41,16 @@ def test_diagrams_are_those_that_the_script_draws():
         assert drawn.read_bytes() == text.encode(), f"{name}: run python docs/diagrams.py"
 
 
+def test_terms_are_typeset_and_names_are_not():
+    pytest.importorskip("sphinx")
+    spec = importlib.util.spec_from_file_location("terms", DOCS / "terms.py")
+    terms = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(terms)
+    parts = terms.typeset("V_O's lists have N_S; a.V_O, V_Old, t_near_far and t_near() are names")
+    assert [part.astext() for part in parts if part.tagname == "inline"] == ["VO", "NS"]
+    assert "".join(part.astext() for part in parts).endswith("are names")
+
+
 def test_included_tables_bring_no_headings():
     """A title within an included file would be a page of its own in the site's menu."""
     included = 0
