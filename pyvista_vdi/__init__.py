@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from pyvista_vdi.model.transfer_function import TransferFunction
     from pyvista_vdi.model.vdi import VDI
     from pyvista_vdi.model.volume import Volume
+    from pyvista_vdi.plotting.plotter import Plotter
     from pyvista_vdi.raycasting.picking import Pick
     from pyvista_vdi.series.generate import generate_series
     from pyvista_vdi.series.series import VDISeries
@@ -49,6 +50,7 @@ _HOMES = {
     "Light": "model.lighting",
     "Lights": "model.lighting",
     "Pick": "raycasting.picking",
+    "Plotter": "plotting.plotter",
     "Report": "device.report",
     "SeriesWriter": "series.writer",
     "Shading": "model.lighting",

@@ -1,0 +1,27 @@
+"""``Plotter``: PyVista's, as editors and type checkers see it with what this package adds."""
+
+from __future__ import annotations
+
+import pyvista as pv
+
+from pyvista_vdi.plotting.clip_plane import AddVDIClipPlane
+from pyvista_vdi.plotting.component import AddVDI
+
+
+class Plotter(pv.Plotter):
+    """A :class:`pyvista.Plotter` that says what this package adds to it.
+
+    Every plotter of PyVista's has ``add_vdi`` where this package is installed; tools that read code
+    do not know that. Of this one they complete and check ``add_vdi`` and ``add_vdi_clip_plane``. It
+    does what PyVista's does, and takes its arguments.
+
+    Examples
+    --------
+    >>> import pyvista_vdi as pvdi
+    >>> plotter = pvdi.Plotter(off_screen=True)
+    >>> actor = plotter.add_vdi(pvdi.examples.load_brain(), cmap="mri-brain")
+    >>> plotter.close()
+    """
+
+    add_vdi: AddVDI
+    add_vdi_clip_plane: AddVDIClipPlane
