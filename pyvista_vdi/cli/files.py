@@ -7,7 +7,7 @@ import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from pyvista_vdi.cli.text import mebibytes, plain_number, table, vector
+from pyvista_vdi.cli.text import LENGTHS, mebibytes, plain_number, table, vector
 from pyvista_vdi.io.stores import StoredVolume
 
 if TYPE_CHECKING:
@@ -134,6 +134,7 @@ def _volume_text(source: str, about: dict[str, Any]) -> str:
             "origin": vector(about["origin"]),
             **({"axes": ", ".join(vector(axis) for axis in axes)} if turned else {}),
             "bounds": vector(about["bounds"]),
+            **(LENGTHS if about.get("store", {}).get("unit") is None else {}),
             "in memory": mebibytes(about["memory_bytes"]),
             **(_store_rows(about["store"]) if "store" in about else {}),
         }
@@ -176,6 +177,7 @@ def _text(about: FileInfo) -> str:
         "looking at": f"{vector(view.focal_point)}, up {vector(view.view_up)}, {lens}",
         "bounds": vector(about.bounds),
         "depth origin": plain_number(about.depth_origin),
+        **LENGTHS,
         **{name: _short(value) for name, value in about.metadata.items()},
     }
     return table(rows)

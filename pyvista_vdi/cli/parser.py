@@ -18,7 +18,7 @@ _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them
 
 
 #: What the command says without a verb.
-_LESSON = f"""pyvista-vdi {__version__}: {_DESCRIPTION[0].lower() + _DESCRIPTION[1:]}
+_LESSON = f"""{_DESCRIPTION} Version {__version__}.
 
 A first session, with a volume that is shipped:
 

@@ -17,7 +17,7 @@ from pyvista_vdi.cli.inputs import (
     read_volume,
     say_written,
 )
-from pyvista_vdi.cli.text import mebibytes, printable, table, vector
+from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.io import check_write_options, checked_target
 from pyvista_vdi.io import read as read_vdi
@@ -143,6 +143,7 @@ def info(options: argparse.Namespace) -> int:
                 "lists": f"{width} x {height}",
                 "eye": vector(about.camera.position),
                 "bounds": vector(about.bounds),
+                **LENGTHS,
             }
         )
     )

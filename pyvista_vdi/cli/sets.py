@@ -18,7 +18,7 @@ from pyvista_vdi.cli.inputs import (
     say_written,
 )
 from pyvista_vdi.cli.series import write_each
-from pyvista_vdi.cli.text import mebibytes, printable, table, vector
+from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
 from pyvista_vdi.io.whole_file import check_writable, with_suffix
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.sets import cinema, files
@@ -85,6 +85,7 @@ def info(options: argparse.Namespace) -> int:
                 "reached": _reached(made),
                 "eye": vector(vdi_set.camera.position),
                 "bounds": vector(vdi_set.bounds),
+                **LENGTHS,
             }
         )
     )

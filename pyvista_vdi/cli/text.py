@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+#: What lengths and positions in tables are measured in: files of VDIs say no more.
+LENGTHS = {"lengths": "in the units of the volume's spacing, model units"}
+
 
 def printable(text: object) -> str:
     """Return a text whose every character can be shown: names and files may hold any.
