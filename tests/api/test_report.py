@@ -30,7 +30,7 @@ def test_a_report_says_what_is_missing(monkeypatch):
     def none():
         raise NoDeviceError("no device")
 
-    found = metadata.version
+    found = report._version
     monkeypatch.setattr(report, "describe_devices", none)
     monkeypatch.setattr(report, "_version", lambda n: None if n == "h5py" else found(n))
     described = pvdi.Report()
