@@ -259,7 +259,7 @@ run_fuzzing() {
 # The plugin in a real ParaView; tools/ installs one where there is none.
 run_paraview_tests() {
     # PYTHON is the tests' interpreter, ParaView has its own
-    env -u PYTHON bash "$work/source/tools/install_paraview.sh" \
+    env -u PYTHON EXTRAS=cpu,mpi bash "$work/source/tools/install_paraview.sh" \
         "$work/paraview" "$(compgen -G "$work/dist/*.whl")"
     export PYVISTA_VDI_PARAVIEW=$work/paraview PYVISTA_VDI_REQUIRE_PARAVIEW=1
     run_tests -m paraview -n 0 # one ParaView at a time
