@@ -21,6 +21,7 @@ from real_data import require_data
 import pyvista_vdi as pvdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.thinned import lists_crossed
 from pyvista_vdi.model.vdi import VDI
 
 #: See above.
@@ -65,7 +66,7 @@ function texture(format, width, height) {
   return made;
 }
 
-window.picture = (camera, width, height, clippingPlanes, depth) => {
+window.picture = (camera, width, height, clippingPlanes, depth, few) => {
   const target = texture(gl.RGBA32F, width, height);
   let depthTexture = null;
   if (depth) {
@@ -76,7 +77,7 @@ window.picture = (camera, width, height, clippingPlanes, depth) => {
   const framebuffer = gl.createFramebuffer();
   gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
   gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target, 0);
-  raycaster.draw({ camera, width, height, clippingPlanes, depthTexture });
+  raycaster.draw({ camera, width, height, clippingPlanes, depthTexture, few });
   const seen = new Float32Array(4 * width * height);
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, seen);
   gl.deleteFramebuffer(framebuffer);
@@ -124,6 +125,14 @@ def in_javascript(vdi):
     return state
 
 
+def ball_in_shells():
+    """Scalars of 33 points along each edge: shells around the middle, nothing in the corners."""
+    axis = np.linspace(-1, 1, 33)
+    z, y, x = np.meshgrid(axis, axis, axis, indexing="ij")
+    radius = np.sqrt(x**2 + y**2 + z**2)
+    return (np.where(radius < 1, 1 + np.cos(9 * radius + x), 0) * 100).astype(np.uint8)
+
+
 class Raycaster:
     """The page's raycaster."""
 
@@ -133,7 +142,7 @@ class Raycaster:
     def give(self, vdi):
         self.page.evaluate("(vdi) => give(vdi)", in_javascript(vdi))
 
-    def draw(self, camera, size, *, clipping_planes=(), opaque_depth=None):
+    def draw(self, camera, size, *, clipping_planes=(), opaque_depth=None, few=False):
         """Premultiplied RGBA, float32 (H, W, 4), top row first."""
         planes = [
             {"origin": [float(x) for x in plane[:3]], "normal": [float(x) for x in plane[3:]]}
@@ -141,7 +150,7 @@ class Raycaster:
         ]
         depth = None if opaque_depth is None else text_of(opaque_depth[::-1])
         text = self.page.evaluate(
-            "(given) => picture(...given)", [camera.to_dict(), *size, planes, depth]
+            "(given) => picture(...given)", [camera.to_dict(), *size, planes, depth, few]
         )
         seen = np.frombuffer(base64.b64decode(text), np.float32)
         return seen.reshape(size[1], size[0], 4)[::-1]
@@ -193,6 +202,48 @@ def test_every_pixel_is_within_the_range_of_the_moved_ray(raycaster, precision):
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_random_vdis_in_numbers(raycaster, precision):
     check_views(raycaster, precision, range(3, 40))
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_every_second_list_is_drawn_as_a_vdi_of_those(raycaster, precision):
+    """The shader's thinning against the oracle's picture of ``vdi.thinned``; odd windows, too."""
+    drawn = 0
+    for case, (steps, size) in enumerate(
+        (((2, 1), (70, 45)), ((1, 2), (64, 41)), ((2, 2), (51, 37)))
+    ):
+        view = Camera((4.5, 1, 0.5), (0, 0, 0), (0, 0, 1), view_angle=35)
+        volume = pvdi.Volume(ball_in_shells(), spacing=(1 / 16,) * 3, origin=(-1, -1, -1))
+        vdi = pvdi.generate(
+            volume, view, size, max_supersegments=6, cmap="viridis", opacity="linear"
+        )
+        vdi = vdi.with_precision(precision)
+        raycaster.give(vdi)
+        raycaster.page.evaluate(
+            "(steps) => { raycaster.thinning = () => steps; }", [k - 1 for k in steps]
+        )
+        for angle in (0, 25, 70, 200):
+            camera = view.azimuth(angle).elevation(0 if case else 20)
+            image = raycaster.draw(camera, (40, 31), few=True)
+            thinned = vdi.thinned(*steps)
+            name = f"steps {steps}, {angle} degrees, {precision}"
+            result = explain(thinned, camera, (40, 31), image, name=name, tolerance=TOLERANCE)
+            assert not result.failures, "\n".join(result.failures)
+            drawn += result.drawn
+    assert drawn > 3000
+
+
+def test_every_second_list_is_taken_where_it_is_worth_it(raycaster):
+    """The edge that most lists are crossed along, as by Python; none near the generating view."""
+    view = Camera((4.5, 1, 0.5), (0, 0, 0), (0, 0, 1), view_angle=35)
+    volume = pvdi.Volume(ball_in_shells(), spacing=(1 / 16,) * 3, origin=(-1, -1, -1))
+    vdi = pvdi.generate(volume, view, (200, 150), cmap="viridis", opacity="linear")
+    raycaster.give(vdi)
+    for camera in (view, view.azimuth(2), view.azimuth(40), view.azimuth(-90), view.elevation(50)):
+        crossed = lists_crossed(vdi, camera)
+        expected = [int(crossed.max() >= 16 and n >= crossed.max() / 2) for n in crossed]
+        found = raycaster.page.evaluate("(camera) => raycaster.thinning(camera)", camera.to_dict())
+        assert found == expected, crossed
+    assert max(expected) == 1
 
 
 def check_ends(raycaster, cases):

@@ -522,10 +522,12 @@ export class VDIViewer extends HTMLElement {
         this.#asked = false;
         const shown = this.#prepared;
         const camera = this.#camera;
+        const few = pacer.few(moving && this.#raycaster.thinning(camera).some(Boolean), width, height);
         const size = moving ? pacer.sizeFor(width, height) : [width, height];
-        const full = size[0] === width && size[1] === height;
+        const full = size[0] === width && size[1] === height && !few;
         const target = pacer.screen(width, height);
-        const painter = this.#painter(camera, ...size, size[0] / this.clientWidth, moving);
+        const density = size[0] / this.clientWidth;
+        const painter = this.#painter(camera, ...size, { density, moving, few });
         const done = await pacer.inBands(target, ...size, painter,
           () => !full || !this.#asked || moving);
         if (this.#gl.isContextLost()) return;
@@ -561,10 +563,10 @@ export class VDIViewer extends HTMLElement {
   }
 
   // What draws a view into the bound target: called for each band, with the scissor set. `density`:
-  // pixels of it for one of the page, which lines and points are as wide as.
-  #painter(camera, width, height, density = 1, moving = false) {
+  // pixels of it for one of the page, which lines and points are as wide as; `few`: of few lists.
+  #painter(camera, width, height, { density = 1, moving = false, few = false } = {}) {
     const gl = this.#gl, raycaster = this.#raycaster, scene = this.#scene, planes = this.#planes;
-    const view = { camera, width, height, density, moving, clippingPlanes: planes };
+    const view = { camera, width, height, density, moving, few, clippingPlanes: planes };
     return (target) => {
       if (scene) {
         scene.paint(raycaster, target, view);
@@ -572,7 +574,7 @@ export class VDIViewer extends HTMLElement {
       }
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-      raycaster.draw({ camera, width, height, clippingPlanes: planes });
+      raycaster.draw({ camera, width, height, clippingPlanes: planes, few });
       gl.disable(gl.BLEND);
     };
   }

@@ -6,18 +6,35 @@ const FRAME_SECONDS = 1 / 30;
 const BAND_SECONDS = 1 / 20;
 /** Least share of the pixels: a quarter along each edge. */
 const LEAST_SHARE = 1 / 16;
+/** Shares of the pixels below which frames take every second list, and above which all again. */
+const FEW_BELOW = 0.25, FEW_ABOVE = 0.45;
+/** Time of a frame of every second list over one of all (docs/decisions/any_view.md). */
+const FEW_COST = 0.8;
 /** Share of a frame by which its size may miss the goal before it is changed. */
 const DEAD_BAND = 0.25;
 
 /** Targets to draw into, and how many pixels they can have. */
 export class Pacer {
   #perPixel = null; // seconds, by the frames before
+  #few = false; // whether those had every second list
   #screen = null;
 
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
     this.gl = gl;
     this.share = 1; // of the pixels, in the frame before
+  }
+
+  /**
+   * Whether the next frame is to have every second list.
+   *
+   * @param {boolean} worth Whether they would cost less: in a movement, in a view from the side.
+   */
+  few(worth, width, height) {
+    const share = FRAME_SECONDS / (this.#perPixel * width * height);
+    const few = worth && this.#perPixel !== null && share < (this.#few ? FEW_ABOVE : FEW_BELOW);
+    if (few !== this.#few) this.#perPixel *= few ? FEW_COST : 1 / FEW_COST;
+    return (this.#few = few);
   }
 
   /** Pixels of the next frame of a movement in a window of width x height. */

@@ -1,10 +1,15 @@
 // A VDI in WebGL 2: textures of its lists, and a fragment shader that casts a ray for each pixel.
 import { TEXTURE_WIDTH } from "./prepare.js";
-import { frameForms, frameOf, isParallel, listSpace, pixelRays, pixelsOfBoxes } from "./rays.js";
+import {
+  frameForms, frameOf, isParallel, listSpace, listsCrossed, pixelRays, pixelsOfBoxes, thinnedSpace,
+} from "./rays.js";
 import { MOST_PLANES, VERTEX_SHADER, fragmentShader } from "./shader.js";
 
 /** A ray ends where less transmittance than this is left. */
 const TRANSMITTANCE_CUTOFF = 1e-6;
+
+/** Lists that rays must cross along an edge for every second one to be worth it. */
+const OBLIQUE = 16;
 
 /** Rows of pixels that are drawn at once. */
 const STRIP = 16;
@@ -80,11 +85,16 @@ export class Raycaster {
    *   normal points to is kept.
    * @param {WebGLTexture} [view.depthTexture] R32F: view depth of what is opaque, world units, at
    *   each texel of the framebuffer; rays end there.
+   * @param {boolean} [view.few] Whether every second list does: see {@link thinning}.
    */
-  draw({ camera, width, height, corner = [0, 0], clippingPlanes = [], depthTexture = null }) {
+  draw({ camera, width, height, corner = [0, 0], clippingPlanes = [], depthTexture = null,
+    few = false }) {
     const { gl, vdi } = this;
     if (!vdi) return;
-    const { space, bounds, windowSize } = vdi;
+    const { bounds } = vdi;
+    const thinned = few ? this.thinning(camera) : [0, 0];
+    const { space, windowSize } = thinned.some(Boolean)
+      ? thinnedSpace(vdi.space, vdi.windowSize, thinned) : vdi;
     const frame = camera.model_transform ? frameOf({ bounds, camera }) : vdi.frame;
     const rays = pixelRays(frame, camera, [width, height]);
     const { coordinates, planes } = frameForms(frame, space, windowSize, rays, isParallel(camera),
@@ -107,6 +117,7 @@ export class Raycaster {
     gl.uniform3fv(u.planeSlope, planeSlope);
     gl.uniformMatrix3fv(u.direction, false, rays.direction.flat());
     gl.uniform2i(u.window, ...windowSize);
+    gl.uniform2i(u.thinned, ...thinned);
     gl.uniform1f(u.depthOrigin, space.origin);
     gl.uniform1f(u.firstDepth, vdi.firstDepth);
     gl.uniform1f(u.slabsPerDepth, vdi.slabsPerDepth);
@@ -125,6 +136,20 @@ export class Raycaster {
     this.drawStrips(pixelsOfBoxes(frame, camera, [width, height], vdi.corners), corner, height);
     gl.bindVertexArray(null);
     gl.activeTexture(gl.TEXTURE0);
+  }
+
+  /**
+   * Along which edges every second list does for a view with few pixels: those that most lists are
+   * crossed along; none near V_O, where a ray's cost is not that of the lists.
+   *
+   * @returns {number[]} 1 or 0 for the window's width and height.
+   */
+  thinning(camera) {
+    const { vdi } = this;
+    if (!vdi) return [0, 0];
+    const frame = camera.model_transform ? frameOf({ bounds: vdi.bounds, camera }) : vdi.frame;
+    const crossed = listsCrossed(frame, vdi.space, camera), most = Math.max(...crossed);
+    return crossed.map((many) => Number(most >= OBLIQUE && many >= most / 2));
   }
 
   // Draw only where something may be seen: strip by strip, from the first to the last such pixel,

@@ -154,7 +154,7 @@ export class Scene {
     gl.disable(gl.BLEND);
   }
 
-  #drawVDIs(raycaster, { camera, width, height, moving, clippingPlanes }, depthTexture) {
+  #drawVDIs(raycaster, { camera, width, height, moving, few, clippingPlanes }, depthTexture) {
     const bodies = this.#bodies.map((body, k) => k ? body : { ...body, raycaster })
       .filter(({ raycaster: caster }) => caster?.vdi);
     const boxes = bodies.map((body) => cornersOf(body.raycaster.vdi.bounds, matrixOf(body)));
@@ -168,7 +168,7 @@ export class Scene {
       const slab = near === -Infinity ? [] : [plane(near, 1), plane(far, -1)];
       caster.draw({
         camera: { ...camera, model_transform: matrixOf(bodies[body]) },
-        width, height, depthTexture, clippingPlanes: [...planes, ...clippingPlanes, ...slab],
+        width, height, depthTexture, few, clippingPlanes: [...planes, ...clippingPlanes, ...slab],
       });
     }
   }

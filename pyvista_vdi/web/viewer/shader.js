@@ -41,6 +41,7 @@ uniform vec3 formValue[4], formSlope[4]; // u, v, depth coordinate, denominator:
 uniform vec3 planeValue[PLANES], planeSlope[PLANES];
 uniform mat3 direction;           // model' length per t: columns for 1, a and b
 uniform ivec2 window;             // lists
+uniform ivec2 thinned;            // along each edge: 1 for every second list, or 0
 uniform float depthOrigin;        // world'
 uniform float firstDepth, slabsPerDepth; // of the occupancy grid, offsets from the depth origin
 uniform float cutoff;
@@ -106,7 +107,7 @@ float depthOfCode(uint code) {
 #endif
 
 void enter(int i, int j) {
-  list = texelFetch(lists, ivec2(i, j), 0);
+  list = texelFetch(lists, ivec2(i, j) << thinned, 0);
 #ifdef PACKED
   count = int(list.y & 0xffffu);
 #else
@@ -244,6 +245,8 @@ CLIPPING
   vec2 step_ = mix(vec2(-1.0), vec2(1.0), upwards);
   ahead = vec2(upwards) - half_;
   vec2 cell = clamp(floor(start.xy + half_), vec2(0.0), last);
+  ivec2 stackShift = ivec2(STACK_SHIFT) - thinned;
+  vec2 stackEdge = vec2(ivec2(1) << stackShift); // of a stack, lists
   float depth = sense * start.z;
   bool goes = true;
   bool fresh = abs(along.x) + abs(along.y) > 2.0; // a stack that has not been looked at
@@ -253,14 +256,13 @@ CLIPPING
 
   for (int look = 0; goes && look < 100000; ++look) {
     if (fresh) { // pass by what is empty
-      const float EDGE = float(1 << STACK_SHIFT);
       for (int stack = 0; stack < 100000; ++stack) {
-        uvec2 mask = texelFetch(masks, ivec2(cell) >> STACK_SHIFT, 0).xy;
+        uvec2 mask = texelFetch(masks, ivec2(cell) >> stackShift, 0).xy;
         int slab = int(clamp((offsetOf(sense * depth) - firstDepth) * slabsPerDepth, 0.0, 63.0));
         int nearestOne = nearestSlab(mask, slab);
         if (nearestOne == slab) break;
-        vec2 first = floor(cell / EDGE) * EDGE;
-        vec2 edge = mix(first, first + (EDGE - 1.0), upwards);
+        vec2 first = floor(cell / stackEdge) * stackEdge;
+        vec2 edge = mix(first, first + (stackEdge - 1.0), upwards);
         vec2 border = crossings(edge);
         float until = min(border.x, border.y);
         if (nearestOne >= 0 && along.z != 0.0) {
@@ -277,7 +279,7 @@ CLIPPING
         if (moves.y) r = max(r, entered.y);
         depth = sense * (r * along.z + deep.z);
         cell = to;
-        if (floor(to / EDGE) * EDGE == first) break;
+        if (floor(to / stackEdge) * stackEdge == first) break;
       }
     }
     fresh = false;
@@ -314,7 +316,7 @@ CLIPPING
         goes = left >= cutoff;
       } else {
         vec2 next = cell + (border.x <= border.y ? vec2(step_.x, 0.0) : vec2(0.0, step_.y));
-        fresh = floor(next / float(1 << STACK_SHIFT)) != floor(cell / float(1 << STACK_SHIFT));
+        fresh = floor(next / stackEdge) != floor(cell / stackEdge);
         goes = rNext < rEnd && left >= cutoff && all(greaterThanEqual(next, vec2(0.0))) &&
           all(lessThanEqual(next, last));
         cell = next;
