@@ -12,8 +12,19 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
-from common import add_looks, add_size, add_volumes, at_hand, looks_of, new_parser, save, subject_of
+from common import (
+    Subject,
+    add_looks,
+    add_size,
+    add_volumes,
+    at_hand,
+    looks_of,
+    new_parser,
+    save,
+    subject_of,
+)
 
+from pyvista_vdi.io import whole_file
 from pyvista_vdi.measure.front import OurVolume
 from pyvista_vdi.measure.report import table
 from pyvista_vdi.measure.vtk_baselines import VTKBaseline, property_from_transfer_function
@@ -32,20 +43,21 @@ def way_of(drawn_by: Any) -> str:
     return drawn_by.mapper.painter.status().drawn if isinstance(drawn_by, OurVolume) else "volume"
 
 
-def shown(drawn_by: Any, views: list[Any], rate: float) -> dict[str, Any]:
-    """Go along the path; times, what was raycast, and pictures."""
+def shown(drawn_by: Any, views: list[Any], rate: float, every: int) -> dict[str, Any]:
+    """Go along the path; times, what was raycast, and the pictures that are judged."""
     window = drawn_by.renderer.GetRenderWindow()
     window.SetDesiredUpdateRate(STILL)
     drawn_by.render(views[0])
     window.SetDesiredUpdateRate(rate)
     drawn_by.render(views[0])
     times, ways, pictures = [], [], []
-    for view in views:
+    for number, view in enumerate(views):
         began = time.perf_counter()
         drawn_by.render(view)
         times.append(time.perf_counter() - began)
         ways.append(way_of(drawn_by))
-        pictures.append(drawn_by.pixels())
+        if number % every == 0:
+            pictures.append(drawn_by.pixels())
         # A hand that waits for the next frame of the rate
         time.sleep(max(0.0, 1 / rate - times[-1]))
     window.SetDesiredUpdateRate(STILL)
@@ -61,45 +73,60 @@ def main() -> None:
     parser.add_argument("--target-fps", type=float, default=30.0)
     parser.add_argument("--every", type=int, default=3, help="frames for one that is judged (3)")
     options = parser.parse_args()
-    results = {}
+    results, tables = {}, []
     for name in at_hand(options.volumes):
         subject = subject_of(name, options)
-        volume, look, size = subject.volume, looks_of(options), options.size
+        volume = subject.volume
         voxel = min(volume.spacing)
         views = [subject.view.azimuth(360 * k / FRAMES) for k in range(FRAMES)]
-        ours = OurVolume(volume, look, size, "auto", voxel / 2, subject.view, options.device)
-        ours.mapper.SetInteractiveOffScreen(True)
-        ours.mapper.SetRegenerate("auto")
-        ours.mapper.SetTargetFrameRate(options.target_fps)
-        exact = OurVolume(volume, look, size, "volume", voxel / 2, subject.view, options.device)
+        exact = own(subject, options, "volume", "never")
         prop = property_from_transfer_function(volume, subject.classified)
-        candidates = {"ours": (ours, exact)}
+        candidates: dict[str, Any] = {
+            "ours": (own(subject, options, "auto", "auto"), exact),
+            "a VDI alone": (own(subject, options, "vdi", "never"), exact),
+        }
         for mapper in ("gpu", "fixed_point"):
-            theirs = VTKBaseline(volume, prop, size, mapper, voxel)
+            theirs = VTKBaseline(volume, prop, options.size, mapper, voxel)
             theirs.adjust_by_rate()
-            full = VTKBaseline(volume, prop, size, mapper, voxel / 2)
+            full = VTKBaseline(volume, prop, options.size, mapper, voxel / 2)
             candidates[mapper] = (theirs, full)
         results[name] = {}
         for who, (drawn_by, full) in candidates.items():
-            found = shown(drawn_by, views, options.target_fps)
+            found = shown(drawn_by, views, options.target_fps, options.every)
             ssim = [
                 float(compare_images(picture, full.image(view)).ssim)
                 for picture, view in zip(
-                    found.pop("pictures")[:: options.every], views[:: options.every], strict=True
+                    found.pop("pictures"), views[:: options.every], strict=True
                 )
             ]
             late = float(np.mean(np.array(found["times"]) > LATE / options.target_fps))
             tenths = [float(np.mean(part)) for part in np.array_split(ssim, PARTS)]
             results[name][who] = {**found, "ssim": ssim, "late": late, "tenths": tenths}
             drawn_by.close()
+        for full in {id(full): full for _, full in candidates.values()}.values():
             full.close()
-        report(name, results[name])
+        tables.append(report(name, results[name]))
+        print(tables[-1], flush=True)
     given = {n: getattr(options, n) for n in ("size", "tf", "target_fps", "interpolation")}
-    save({"options": given, "volumes": results}, options.out / "turn.json")
+    target = options.out / f"turn_{options.size[0]}x{options.size[1]}.json"
+    save({"options": given, "volumes": results}, target)
+    with whole_file(target.with_suffix(".md")) as stream:
+        stream.write("\n".join(tables).encode())
 
 
-def report(name: str, found: dict[str, Any]) -> None:
-    """Print what was found for a volume."""
+def own(subject: Subject, options: Any, draw: str, regenerate: str) -> OurVolume:
+    """Return our actor in a window that counts as watched."""
+    volume, step = subject.volume, min(subject.volume.spacing) / 2
+    look = looks_of(options)
+    actor = OurVolume(volume, look, options.size, draw, step, subject.view, options.device)
+    actor.mapper.SetInteractiveOffScreen(True)
+    actor.mapper.SetRegenerate(regenerate)
+    actor.mapper.SetTargetFrameRate(options.target_fps)
+    return actor
+
+
+def report(name: str, found: dict[str, Any]) -> str:
+    """Return a table of what was found for a volume."""
     rows = [
         [
             who,
@@ -112,7 +139,7 @@ def report(name: str, found: dict[str, Any]) -> None:
         for who, of in found.items()
     ]
     heads = [name, "mean SSIM", "by tenths of the path", "late", "median ms", "frames of"]
-    print("\n".join(table(heads, rows)), flush=True)
+    return "\n".join([*table(heads, rows), ""])
 
 
 if __name__ == "__main__":

@@ -815,6 +815,13 @@ class Runtime:
         """
         self._turns.checkpoint()
 
+    def clock(self) -> float:
+        """Return seconds that go by for the calling thread's work, to be subtracted.
+
+        In background work they stand still while frames go first.
+        """
+        return self._turns.clock()
+
     def holding(self, lock: threading.Lock) -> contextlib.AbstractContextManager[None]:
         """Hold a lock under which device work is done.
 

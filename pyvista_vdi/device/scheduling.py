@@ -49,11 +49,14 @@ class Worker:
         Says whether the work is no longer wanted.
     turn_began : float
         When its turn began, seconds of ``time.perf_counter``.
+    worked : float
+        How long its turns before took, seconds.
     """
 
     def __init__(self, cancelled: Callable[[], bool]) -> None:
         self.cancelled = cancelled
         self.turn_began = 0.0
+        self.worked = 0.0
         self._rates: dict[str, deque[float]] = {}  # items per second of the last pieces
 
     def piece(self, kind: str, seconds: float) -> int | None:
@@ -167,6 +170,11 @@ class Turns:
                 self._take_turn(worker)
         return min(turn if over else left, LONGEST_PIECE)
 
+    def clock(self) -> float:
+        """See :meth:`pyvista_vdi.device.Runtime.clock`."""
+        worker, now = self.worker, time.perf_counter()
+        return now if worker is None else worker.worked + now - worker.turn_began
+
     def _turn(self) -> float:
         recent = list(self._recent)
         if not recent:
@@ -200,6 +208,7 @@ class Turns:
     def _end_turn(self, worker: Worker) -> None:
         with self._changed:
             if self._holder is worker:
+                worker.worked += time.perf_counter() - worker.turn_began
                 self._holder = None
                 self._changed.notify_all()
 

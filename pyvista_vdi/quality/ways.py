@@ -53,6 +53,11 @@ class Ways:
         self._volume: float | None = None  # seconds per pixel
         self._way: Way = "vdi"
 
+    @property
+    def way(self) -> Way:
+        """What was chosen last."""
+        return self._way
+
     def took(self, way: Way, angle: float, pixels: float, seconds: float) -> None:
         """Note what a frame's rays have taken.
 
@@ -74,7 +79,7 @@ class Ways:
             self._volume = _mean(self._volume, each)
         else:
             near = round(angle / _NEIGHBOURS)
-            self._at_v_o[near] = _mean(self._at_v_o.get(near), each / _rise(angle))
+            self._at_v_o[near] = _mean(self._at_v_o.get(near), each / rise(angle))
 
     def seconds_per_pixel(self, way: Way, angle: float) -> float | None:
         """Return what a ray is expected to take; ``None`` where no frame has told."""
@@ -83,7 +88,7 @@ class Ways:
         if not self._at_v_o:
             return None
         nearest = min(self._at_v_o, key=lambda near: abs(near - angle / _NEIGHBOURS))
-        return self._at_v_o[nearest] * _rise(angle)
+        return self._at_v_o[nearest] * rise(angle)
 
     def choose(
         self,
@@ -139,7 +144,8 @@ def _mean(before: float | None, new: float) -> float:
     return new if before is None else before + _NEWEST * (new - before)
 
 
-def _rise(angle: float) -> float:
+def rise(angle: float) -> float:
+    """Return what a ray takes through a VDI, over one at V_O, so many degrees from there."""
     return float(np.interp(angle, _ANGLES, _RISE))
 
 

@@ -70,6 +70,31 @@ def test_background_work_waits_for_the_end_of_a_frame():
     assert order == ["frame", "work"]
 
 
+def test_a_workers_clock_stands_still_while_a_frame_goes_first():
+    each, held = Turns(), threading.Event()
+
+    def work():
+        with each.background(never):
+            began = each.clock()
+            held.set()
+            while not each._arriving:  # the frame knocks
+                pass
+            before = each.clock() - began
+            each._end_turn(each.worker)
+            each._take_turn(each.worker)
+            return before, each.clock() - began
+
+    thread = InThread(work)
+    wait(held)
+    with each.foreground():
+        began = each.clock()  # of no worker: seconds
+        while each.clock() < began + 0.2:
+            pass
+    before, after = thread.value()
+    # A frame of .2 s lies between the two: a tenth of it is for a busy machine
+    assert 0 < before <= after < before + 0.02
+
+
 def test_a_frame_waits_for_the_piece_in_progress_and_no_longer():
     order, each = [], Turns()
     piece, arrived = threading.Event(), threading.Event()

@@ -12,6 +12,8 @@ from watched_windows import MOVING, WINDOW, frame, no_estimates, watched  # noqa
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.quality.ways import Ways
+from pyvista_vdi.vtk_pipeline.interaction import regeneration
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import HEADROOM
 
 pytestmark = pytest.mark.gl
 
@@ -84,7 +86,8 @@ def known(monkeypatch, way):
 
     def choose(self, angle, pixels, seconds, ssim=None, bound=0.0):
         asked.append((angle, pixels, seconds))
-        return way[0]
+        self._way = way[0]
+        return self._way
 
     monkeypatch.setattr(Ways, "choose", choose)
     return asked
@@ -114,7 +117,47 @@ def test_auto_draws_what_was_chosen_and_brightness_does_not_jump(plotter, monkey
     frame(plotter, MOVING)
     angle, _, seconds = asked[-1]
     assert angle == pytest.approx(40, abs=0.1)
-    assert seconds == pytest.approx(1 / 30)
+    assert seconds == pytest.approx(1 / 30 / HEADROOM)
+
+
+def test_in_motion_errors_are_estimated_of_vdis_that_are_drawn(
+    plotter,
+    monkeypatch,
+    no_estimates,  # noqa: F811
+):
+    way = ["volume"]
+    known(monkeypatch, way)
+    monkeypatch.setattr(regeneration, "_ESTIMATE_PERIOD_IN_MOTION", 0.0)
+    no_estimates.ssim = 0.99
+    actor = watched(plotter, draw="auto", regenerate="auto")
+    worker = actor.mapper.painter.upkeep.regeneration._estimation._worker
+
+    def asked():
+        for _ in range(3):
+            plotter.camera.azimuth += 40
+            frame(plotter, MOVING)
+            worker.join()
+        return no_estimates.asked
+
+    before = asked()
+    assert asked() == before, "frames of the volume have no error"
+    way[0] = "vdi"
+    assert asked() > before
+
+
+def test_the_first_frame_of_a_volume_in_motion_is_no_slower_than_a_picture_has_told(
+    plotter, monkeypatch
+):
+    known(monkeypatch, ["volume"])
+    actor = watched(plotter, draw="auto")
+    upkeep = actor.mapper.painter.upkeep
+    upkeep._preparation.join()
+    upkeep.ways = Ways()
+    upkeep.ways.took("volume", 0.0, 1.0, 1e-3)  # a millisecond per ray
+    plotter.camera.azimuth = 40
+    frame(plotter, MOVING)
+    assert actor.status.drawn == "volume"
+    assert actor.status.samples == 60 * 51  # the floor: a sixteenth
 
 
 def test_auto_goes_by_what_frames_take(plotter, monkeypatch):

@@ -20,7 +20,8 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.ways import Way
+from pyvista_vdi.quality.view_error import angle_from_generating_view
+from pyvista_vdi.quality.ways import Way, rise
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import Cost, WindowClock
@@ -73,6 +74,8 @@ class Frame:
         What is seen: see :meth:`showing`.
     stand_in : StandIn or None
         What is seen in place of a VDI that is to come.
+    angle : float
+        Between the view and that of the VDI, degrees; 0 for a volume.
     few_lists : VDI or None
         What is raycast in place of the VDI in a preview: every second of its lists.
     options : RenderOptions
@@ -92,6 +95,7 @@ class Frame:
     full_size: tuple[int, int] = (0, 0)
     vdi: VDI | None = None
     stand_in: StandIn | None = None
+    angle: float = 0.0
     few_lists: VDI | None = None
     options: RenderOptions = field(default_factory=RenderOptions)
     depth: Image | None = None
@@ -157,8 +161,9 @@ class Frame:
             transmittance_cutoff=self.painter.transmittance_cutoff,
         )
         if isinstance(seen, StandIn):
-            return replace(self, stand_in=seen, vdi=None, options=options)
-        return replace(self, vdi=seen, stand_in=None, options=options)
+            return replace(self, stand_in=seen, vdi=None, angle=0.0, options=options)
+        angle = angle_from_generating_view(seen, self.view.camera)
+        return replace(self, vdi=seen, stand_in=None, angle=angle, options=options)
 
     @property
     def key(self) -> Any:
@@ -179,6 +184,11 @@ class Frame:
     def cost(self) -> Cost:
         """What tells how much a ray takes."""
         return self.way if self.few_lists is None else "few lists"
+
+    @property
+    def effort(self) -> float:
+        """What a ray is expected to take over one from the VDI's own view."""
+        return rise(self.angle)
 
     @property
     def bounds(self) -> tuple[float, ...]:

@@ -134,7 +134,7 @@ def _raycast(frames: Sequence[Frame]) -> OwnedImage:
     )
     seconds = time.perf_counter() - before
     for frame in frames:  # as if each had drawn its own
-        frame.clock.drawn(frame.size, frame.full_size, seconds / len(frames))
+        frame.clock.drawn(frame.size, frame.full_size, seconds / len(frames), effort=frame.effort)
     return joint
 
 

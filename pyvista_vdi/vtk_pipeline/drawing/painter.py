@@ -358,14 +358,28 @@ class Painter:
         width, height = frame.full_size
         floor = min(1.0, 1 / frame.mapper.GetMaximumImageSampleDistance() ** 2)
         if frame.stand_in is None or frame.stand_in.lasting:
-            pixels, cost = width * height, frame.cost
-            share = frame.clock.share(frame.renderer, self.interaction, pixels, floor, cost)
+            share = frame.clock.share(
+                frame.renderer,
+                self.interaction,
+                width * height,
+                floor,
+                frame.cost,
+                effort=frame.effort,
+                expected=self._expected(frame),
+            )
         elif self._may_be_coarse(frame):
             rate = self.interaction.target or _STAND_IN_RATE
             share = max(frame.stand_in.share(rate, width * height), floor)
         else:
             share = 1.0
         return reduced(frame.full_size, min(share, 1 / self.image_distance**2))
+
+    def _expected(self, frame: Frame) -> float | None:
+        """Return the seconds that a full picture of the volume is expected to take."""
+        each = self.upkeep.ways.seconds_per_pixel("volume", 0.0)
+        if frame.way != "volume" or each is None:
+            return None
+        return each * frame.covered(frame.bounds)
 
     def _size_at_rest(self, frame: Frame) -> tuple[int, int]:
         return reduced(frame.full_size, 1 / self.image_distance**2)
@@ -403,12 +417,9 @@ class Painter:
         if frame.stand_in is not None:
             frame.stand_in.took(width * height, seconds)
         if frame.stand_in is None or frame.stand_in.lasting:
-            frame.clock.drawn(frame.size, frame.full_size, seconds, frame.cost)
-        angle = 0.0
-        if frame.vdi is not None and self._scene is not None:
-            angle = angle_from_generating_view(frame.vdi, self._scene[0])
+            frame.clock.drawn(frame.size, frame.full_size, seconds, frame.cost, frame.effort)
         if frame.few_lists is None:
-            self.upkeep.ways.took(frame.way, angle, frame.covered(frame.bounds), seconds)
+            self.upkeep.ways.took(frame.way, frame.angle, frame.covered(frame.bounds), seconds)
         self._raycasts += 1
         drawn = Drawn(
             image,

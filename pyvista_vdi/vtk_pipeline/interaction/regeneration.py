@@ -74,6 +74,7 @@ class Regeneration:
         self._moved_at = 0.0
         self._estimated_at = -math.inf
         self._moving = False
+        self._shown = True
 
     # -- what goes on ----------------------------------------------------------------------------
 
@@ -114,19 +115,21 @@ class Regeneration:
         view: View,
         *,
         moving: bool,
+        shown: bool,
         ask: Callable[[], VDIStatus],
         options: RenderOptions,
     ) -> None:
         """Look at the frame's view and at what the VDI was made of, and begin what is needed.
 
         ``source`` has made a VDI, and ``stamp`` changes whenever it may have to make another.
-        ``ask`` gives the status for a policy that is a callable. ``options`` say how the VDI is
+        ``shown`` says whether the VDI is what is drawn, and not the volume in its place. ``ask``
+        gives the status for a policy that is a callable. ``options`` say how the VDI is
         drawn (clipping planes in world coordinates), for the estimate: a change of them needs no
         new VDI, and by itself no new estimate, which is of the view. VDIError is raised, once, if
         what has changed cannot be made a VDI of.
         """
         self._notice(source, view, moving)
-        self._options = options
+        self._options, self._shown = options, shown
         if stamp != self._stamp:
             self._stamp = stamp
             self._follow_changes(source, view)
@@ -193,6 +196,9 @@ class Regeneration:
     def _decide(self, source: VDISource) -> None:
         """Estimate the view's error, and begin a VDI of the view if it is too large."""
         self._drop_if_outdated()
+        if self._moving and not self._shown:
+            self._estimation.cancel()  # frames of the volume have no error, and need the time
+            return
         vdi, view, made = source.GetCurrentVDI(), self._view, source.GetCurrentRequest()
         if self._target is not None or self._estimation.running or self._failed:
             return

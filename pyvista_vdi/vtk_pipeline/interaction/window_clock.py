@@ -28,6 +28,16 @@ Cost = Way | Literal["few lists"]
 #: the time; twice as many pixels with half the lists lose what half the pixels with all do.
 _FEW_BELOW, _FEW_ABOVE = 0.25, 0.65
 
+#: What is aimed at, over the rate that is to be kept: single frames vary about their mean, and an
+#: aim at the rate itself makes every second one late (docs/decisions/frame_rate.md).
+HEADROOM = 1.15
+
+#: What a VDI of all or of every second list is changed for, and what its rays take over its own.
+_OTHER_LISTS: dict[Cost, tuple[Cost, float]] = {
+    "vdi": ("few lists", 0.5),
+    "few lists": ("vdi", 2.0),
+}
+
 #: Cameras remembered per window; more than any scene has viewports that are turned in turn.
 _KNOWN_CAMERAS = 16
 
@@ -76,8 +86,8 @@ class Interaction:
         return browser.watches(window) if self.off_screen is None else self.off_screen
 
     def rate(self, window: Any) -> float:
-        """Return the frames per second that frames keep while a hand moves."""
-        return float(self.target or window.GetDesiredUpdateRate())
+        """Return the frames per second to aim at while a hand moves."""
+        return HEADROOM * float(self.target or window.GetDesiredUpdateRate())
 
     def moving(self, window: Any) -> bool:
         """Whether a hand moves, by VTK's convention."""
@@ -96,8 +106,9 @@ class _Frame:
     interactive: bool = False  # whether one may be a preview
     preview: bool = False  # whether one is
     target: float = 0.0  # the highest rate that one wants to keep, 1/s
-    pixels: int = 0  # that were raycast
-    full_pixels: int = 0  # those of full images
+    rays: int = 0  # that were cast, each by its effort
+    full_rays: int = 0  # those of full images
+    images: int = 0  # that were raycast
     work: float = 0.0  # seconds that this took
     cost: Cost = "vdi"  # what was raycast
 
@@ -139,7 +150,8 @@ class WindowClock:
         self._interacting = False
         self._previewed = False
         self._picture_wanted = False
-        self._full_pixels_before = 0
+        self._full_rays_before = 0
+        self._images_before = 0
         self._resting: dict[Cost, tuple[int, float, float]] = {}
         self._foreground = contextlib.ExitStack()  # from the frame's start to its end
         self._frame = _Frame()
@@ -208,12 +220,22 @@ class WindowClock:
         return window is None or tuple(window.GetTileScale()) == (1, 1)
 
     def share(
-        self, renderer: Any, interaction: Interaction, pixels: int, floor: float, cost: Cost = "vdi"
+        self,
+        renderer: Any,
+        interaction: Interaction,
+        pixels: int,
+        floor: float,
+        cost: Cost = "vdi",
+        *,
+        effort: float = 1.0,
+        expected: float | None = None,
     ) -> float:
         """Return the share of its pixels, 0 to 1, that a VDI is drawn with in this frame.
 
         ``interaction`` is what its mapper allows, ``pixels`` those of the full image, ``floor``
-        the least share, and ``cost`` says what is drawn.
+        the least share, ``cost`` says what is drawn, ``effort`` what a ray of this view is
+        expected to take over one of others, and ``expected`` how many seconds a full image may
+        take where no frame has told.
         """
         window = self._window.Get()
         if not interaction.wants_preview(window):
@@ -227,9 +249,16 @@ class WindowClock:
         frame.target = max(frame.target, target)
         if frame.share is None:
             # The other VDIs of this frame are not known yet: count on those of the last
+            full = round(pixels * effort)
+            if self._images_before > 1:
+                full = max(self._full_rays_before, full)
+            if expected is not None:
+                self._resting.setdefault(cost, (full, expected, expected))
             controller = self._tuned(max(target, self._target), floor, cost)
-            full = max(self._full_pixels_before, pixels)
             frame.share = controller.choose(full) / full
+            if cost == "few lists":
+                # With more pixels the next frame takes all lists; what a full frame shows is exact
+                frame.share = min(frame.share, _FEW_ABOVE)
         return max(frame.share, floor)
 
     def few_lists(self, interaction: Interaction) -> bool:
@@ -238,12 +267,18 @@ class WindowClock:
         return preview and self.single
 
     def drawn(
-        self, size: tuple[int, int], full: tuple[int, int], seconds: float, cost: Cost = "vdi"
+        self,
+        size: tuple[int, int],
+        full: tuple[int, int],
+        seconds: float,
+        cost: Cost = "vdi",
+        effort: float = 1.0,
     ) -> None:
         """Note a raycast of this frame: the image's size, the viewport's, its time, and of what."""
         self._frame.cost = cost
-        self._frame.pixels += size[0] * size[1]
-        self._frame.full_pixels += full[0] * full[1]
+        self._frame.rays += round(size[0] * size[1] * effort)
+        self._frame.full_rays += round(full[0] * full[1] * effort)
+        self._frame.images += 1
         self._frame.work += seconds
 
     def showed(self, preview: bool) -> None:
@@ -272,7 +307,7 @@ class WindowClock:
         started, self._started = self._started, None
         frame, self._frame = self._frame, _Frame()
         self._previewed = frame.preview
-        if frame.pixels:
+        if frame.rays:
             # The first frame began before anybody looked at the clock: its work is known
             seconds = frame.work if started is None else time.perf_counter() - started
             self._record(frame, seconds)
@@ -287,16 +322,19 @@ class WindowClock:
         self.seconds = seconds
         self._cost = frame.cost
         if not frame.interactive:
-            self._resting[frame.cost] = (frame.pixels, frame.work, seconds)
+            self._resting[frame.cost] = (frame.rays, frame.work, seconds)
             return
         self._interacting = True
         self._target = frame.target
-        self._full_pixels_before = frame.full_pixels
+        self._full_rays_before, self._images_before = frame.full_rays, frame.images
         if frame.cost in self._controllers:
-            self._controllers[frame.cost].record(frame.pixels, frame.work, seconds)
-        if frame.cost == "vdi":
-            # Before others have told, half the lists are expected to take half the time
-            self._resting["few lists"] = (frame.pixels, frame.work / 2, seconds - frame.work / 2)
+            self._controllers[frame.cost].record(frame.rays, frame.work, seconds)
+        if frame.cost in _OTHER_LISTS:
+            # Half the lists are expected to take half the time
+            other, factor = _OTHER_LISTS[frame.cost]
+            work = frame.work * factor
+            self._resting[other] = (frame.rays, work, seconds - frame.work + work)
+            self._controllers.pop(other, None)  # what it knew was of another view
         if frame.cost != "volume" and frame.share is not None:
             bound = _FEW_ABOVE if frame.cost == "few lists" else _FEW_BELOW
             self._few_lists = frame.share < bound
