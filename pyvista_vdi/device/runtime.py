@@ -815,6 +815,10 @@ class Runtime:
         """
         self._turns.checkpoint()
 
+    def aside(self) -> contextlib.AbstractContextManager[None]:
+        """Let frames go on inside the ``with`` block, whose background work needs no device."""
+        return self._turns.aside()
+
     def clock(self) -> float:
         """Return seconds that go by for the calling thread's work, to be subtracted.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.device.ray_forms import pixel_rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.quality import ways
+from pyvista_vdi.vtk_pipeline.drawing import few_lists
 from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, sampled
 from pyvista_vdi.vtk_pipeline.interaction import regeneration
@@ -392,6 +394,30 @@ def test_few_pixels_from_the_side_take_few_lists(plotter, counted):
     plotter.camera.Azimuth(-30)  # near V_O all lists are taken, however few the pixels are
     frame(plotter, MOVING)
     assert counted.windows[-1] == full
+
+
+def test_frames_go_on_while_fewer_lists_are_made(plotter, counted, monkeypatch):
+    drawn, waited = threading.Event(), []
+    thinned = few_lists.thinned
+
+    def slow(vdi, *steps):
+        waited.append(drawn.wait(30))  # s; frames that waited for this would end the test here
+        return thinned(vdi, *steps)
+
+    monkeypatch.setattr(few_lists, "thinned", slow)
+    actor = watched(plotter, target_fps=100.0)
+    plotter.camera.Azimuth(30)
+    frame(plotter)
+    worker = actor.mapper.painter._few_lists._worker
+    while not worker.running:
+        plotter.camera.Azimuth(1e-3)
+        frame(plotter, MOVING)
+    for _ in range(3):
+        plotter.camera.Azimuth(1e-3)
+        frame(plotter, MOVING)
+    drawn.set()
+    worker.join()
+    assert waited == [True]
 
 
 def test_what_few_lists_cost_in_another_view_is_not_believed(plotter, counted):

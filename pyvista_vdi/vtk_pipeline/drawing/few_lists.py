@@ -80,7 +80,8 @@ class FewLists:
 
 def _thinning(vdi: VDI, steps: Steps) -> Callable[[Runtime, Callable[[float], None]], VDI]:
     def work(runtime: Runtime, _: Callable[[float], None]) -> VDI:
-        made = thinned(vdi, *steps)
+        with runtime.aside():  # hundreds of milliseconds where lists are many
+            made = thinned(vdi, *steps)
         prepared_vdi(runtime, made)  # on the device before a frame waits for it
         return made
 
