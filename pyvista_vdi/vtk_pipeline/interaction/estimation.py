@@ -50,6 +50,8 @@ class Estimation:
         shown, estimators = options or RenderOptions(), self._estimators
 
         def judge(runtime: Runtime, _: Callable[[float], None]) -> Estimate:
+            with runtime.aside():  # loads SciPy, the first time: a quarter of a second
+                from skimage.metrics import structural_similarity  # noqa: F401
             error = estimators.of(request, runtime).estimate(
                 vdi,
                 view.camera,
