@@ -20,7 +20,7 @@ import numpy as np
 
 from pyvista_vdi import examples
 from pyvista_vdi.measure.clock import median, take_turns
-from pyvista_vdi.measure.report import describe_system, table
+from pyvista_vdi.measure.report import ABSENT, closing, describe_system, table
 from pyvista_vdi.measure.results import ResultsFile
 from pyvista_vdi.measure.session import Steps, check_count
 from pyvista_vdi.measure.vtk_baselines import (
@@ -90,14 +90,34 @@ def front_of(points: Sequence[Point]) -> list[Point]:
     return best
 
 
-def gains(points: Sequence[Point]) -> list[float]:
-    """Return VTK's time over ours for each point of VTK's front, at its SSIM less :data:`SLACK`."""
-    ours = [p for p in points if p.ours]
+def over(points: Sequence[Point], others: Sequence[Point]) -> list[float]:
+    """Return each time of the front of ``points`` over the least of ``others`` that are as near.
+
+    As near is an SSIM that is less by :data:`SLACK` at most. Points that none comes as near as are
+    left out.
+    """
     found = []
-    for theirs in front_of([p for p in points if not p.ours]):
-        as_near = [p.seconds for p in ours if p.ssim >= theirs.ssim - SLACK]
-        found.append(theirs.seconds / min(as_near))
+    for point in front_of(points):
+        as_near = [p.seconds for p in others if p.ssim >= point.ssim - SLACK]
+        if as_near:
+            found.append(point.seconds / min(as_near))
     return found
+
+
+def gains(points: Sequence[Point]) -> list[float]:
+    """Return VTK's time over ours for each point of VTK's front."""
+    return over([p for p in points if not p.ours], [p for p in points if p.ours])
+
+
+def full_gain(points: Sequence[Point]) -> float:
+    """Return that of the full picture of VTK's faster mapper: a ray a pixel, steps of a voxel."""
+    full = [p for p in points if not p.ours and (p.distance, p.step) == (1.0, STEPS[0])]
+    return over([min(full, key=lambda p: p.seconds)], [p for p in points if p.ours])[0]
+
+
+def cost_alone(points: Sequence[Point]) -> list[float]:
+    """Return the time over VTK's for each point of the front of the VDI alone."""
+    return over([p for p in points if p.who == "vdi"], [p for p in points if not p.ours])
 
 
 @dataclass(frozen=True)
@@ -331,7 +351,7 @@ class _Everybody:
         for way in ways:
             seconds = median(taken[str(way)])
             assert seconds is not None
-            yield Point(*way, seconds, ssim[way])
+            yield Point(*way, round(seconds, 6), round(ssim[way], 6))
 
 
 def _set(baseline: VTKBaseline, distance: float, step: float) -> None:
@@ -340,17 +360,30 @@ def _set(baseline: VTKBaseline, distance: float, step: float) -> None:
 
 
 def summary(found: FrontFile) -> list[str]:
-    """Return lines of a table in Markdown: gains over VTK by view, and of all."""
-    by_view: dict[str, list[float]] = {}
-    rows, everything = [], []
-    for _, angle, zoom, points in found.views():
-        gained = gains(points)
+    """Return lines of a report in Markdown: gains over VTK by view and by case, and on what."""
+    by_view: dict[str, list[list[Point]]] = {}
+    by_case: dict[str, list[list[Point]]] = {}
+    for case, angle, zoom, points in found.views():
         title = f"{angle:g} degrees" + (f", zoomed by {zoom:g}" if zoom != 1 else "")
-        by_view.setdefault(title, []).extend(gained)
-        everything += gained
-    for title, gained in [*by_view.items(), ("all", everything)]:
-        if gained:
-            mean = math.exp(float(np.mean(np.log(gained))))
-            rows.append([title, str(len(gained)), f"{mean:.2f}", f"{min(gained):.2f}"])
-    head = ["view", "points of VTK's front", "VTK's time / ours, geometric mean", "worst"]
-    return table(head, rows)
+        by_view.setdefault(title, []).append(points)
+        by_case.setdefault(case, []).append(points)
+    by_view["all"] = [points for views in by_case.values() for points in views]
+    lines = []
+    for first, groups in (("view", by_view), ("volume, transfer function", by_case)):
+        rows = []
+        for title, views in groups.items():
+            gained = [gain for points in views for gain in gains(points)]
+            if gained:
+                full = _mean([full_gain(points) for points in views])
+                alone = _mean([cost for points in views for cost in cost_alone(points)])
+                least = f"{min(gained):.2f}"
+                rows.append([title, str(len(gained)), _mean(gained), least, full, alone])
+        head = [first, "points of VTK's front", "VTK's time / ours, geometric mean", "worst"]
+        more = ["of VTK's full picture", "a VDI's alone / VTK's"]
+        lines += [*table([*head, *more], rows), ""]
+    return lines[:-1] + closing(found.data)
+
+
+def _mean(ratios: Sequence[float]) -> str:
+    """Return the geometric mean."""
+    return f"{math.exp(float(np.mean(np.log(ratios)))):.2f}" if ratios else ABSENT

@@ -281,7 +281,17 @@ def _ssim(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
         return math.nan
     from skimage.metrics import structural_similarity  # loads SciPy
 
-    return float(structural_similarity(a, b, **SSIM_ARGUMENTS))
+    # Windows in which nothing differs have an SSIM of 1: only the others are filtered
+    other = (a != b).any(axis=2)
+    if not other.any():
+        return 1.0
+    ends = [np.flatnonzero(other.any(axis=axis))[[0, -1]] for axis in (1, 0)]
+    near = tuple(slice(max(0, low - SSIM_WINDOW), high + 1 + SSIM_WINDOW) for low, high in ends)
+    there = float(structural_similarity(a[near], b[near], **SSIM_ARGUMENTS))
+    middles, of_all = (
+        math.prod(edge - SSIM_WINDOW + 1 for edge in image.shape[:2]) for image in (a[near], a)
+    )
+    return 1 - (1 - there) * (middles / of_all)
 
 
 def _ratio(mean: float, reference: float) -> float:

@@ -14,7 +14,9 @@ from pyvista_vdi.measure.front import (
     FrontFile,
     Plan,
     Point,
+    cost_alone,
     front_of,
+    full_gain,
     gains,
     measure_front,
     summary,
@@ -37,6 +39,11 @@ def test_gains_are_at_equal_ssim():
     ours = [point("volume", 2.0, 1.0), point("vdi", 1.0, 0.949), point("vdi", 0.1, 0.9)]
     # The slack lets .949 stand for .95, and nothing stand for 1 but 1
     assert gains([*theirs, *ours]) == [4.0 / 1.0, 8.0 / 2.0]
+    # That of the faster mapper, though the other's is nearer
+    assert full_gain([*theirs, *ours]) == 4.0 / 1.0
+    # Nobody of theirs is faster than 4 s; a VDI that comes nearer than all is not compared
+    assert cost_alone([*theirs, *ours]) == [0.1 / 4.0, 1.0 / 4.0]
+    assert cost_alone([*theirs[1:], point("vdi", 1.0, 0.96)]) == []
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +79,9 @@ def test_everybody_is_measured_and_resumed(measured, monkeypatch):
     assert [share for share, *_ in seen] == sorted(share for share, *_ in seen)
     lines = summary(found)
     assert any(line.startswith("| 30 degrees ") for line in lines)
-    assert any(line.startswith("| all ") for line in lines)
+    assert [line for line in lines if line.startswith("| all ")]
+    assert [line for line in lines if line.startswith("| brain, soft ")]
+    assert lines[-1].startswith("Measured from ")
     # What is there is not measured again
     before = path.read_text()
     again = measure_front(plan, path, resume=True)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import (
+    SSIM_ARGUMENTS,
     ListEdges,
     compare_images,
     list_edges,
@@ -137,6 +138,22 @@ def test_black_images():
     black = np.zeros((12, 12, 3))
     assert compare_images(black, black).mean_brightness_ratio == 1.0
     assert compare_images(picture(size=(12, 12)), black).mean_brightness_ratio == math.inf
+
+
+def test_ssim_leaves_out_no_window_of_a_difference():
+    """Only where pictures differ it is filtered: against scikit-image's of the whole pictures."""
+    from skimage.metrics import structural_similarity
+
+    rng = np.random.default_rng(5)
+    for case in range(60):
+        image = rng.random((*rng.integers(11, 60, size=2), 3))
+        other = image.copy()
+        first = [rng.integers(0, edge) for edge in image.shape[:2]]
+        patch = tuple(slice(k, k + rng.integers(1, 30)) for k in first)
+        other[patch] = rng.random(other[patch].shape)
+        expected = structural_similarity(image, other, **SSIM_ARGUMENTS)
+        found = compare_images(image, other).ssim
+        assert found == pytest.approx(expected, abs=1e-12), (case, image.shape, patch)
 
 
 def test_tiny_images_have_no_ssim():
