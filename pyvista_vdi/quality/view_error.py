@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.device import ray_forms as rays
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError
+from pyvista_vdi.errors import Cancelled, InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.metrics import SSIM_WINDOW, over_background
@@ -105,11 +105,11 @@ def angle_from_generating_view(vdi: VDI, camera: Any) -> float:
     gives the angle that one sees. In parallel projection the eye is infinitely far against the
     direction of projection; that direction also stands in for an eye at the very centre.
     """
+    shown = vdi.camera.model_transform[:3, :3]
     old, new = (
-        vdi.camera.model_transform[:3, :3] @ towards_eye(view, vdi.bounds)
+        eye_from_centre(view, vdi.bounds, shown)[0]
         for view in (vdi.camera, Camera.from_any(camera))
     )
-    old, new = old / np.linalg.norm(old), new / np.linalg.norm(new)
     sine, cosine = np.linalg.norm(np.cross(old, new)), old @ new
     return math.degrees(math.atan2(sine, cosine))
 
@@ -397,19 +397,37 @@ def world_centre(camera: Camera, bounds: Sequence[float]) -> Floats:
     """Return the centre of bounds in the model frame, world coordinates."""
     matrix = camera.model_transform
     low, high = np.asarray(bounds)[::2], np.asarray(bounds)[1::2]
-    return np.asarray(matrix[:3, :3] @ ((low + high) / 2) + matrix[:3, 3])
+    return np.asarray(matrix[:3, :3] @ (low / 2 + high / 2) + matrix[:3, 3])
 
 
-def towards_eye(camera: Camera, bounds: Sequence[float]) -> Floats:
-    """Direction in which the eye stands, seen from the centre of the bounds; model frame."""
+def eye_from_centre(
+    camera: Camera, bounds: Sequence[float], shown: ArrayLike
+) -> tuple[Floats, float]:
+    """Return in which direction the eye stands from the centre of the bounds, and how far.
+
+    A unit vector and a length, of the model frame as the matrix ``shown`` (3, 3) shows it. In
+    parallel projection, and of an eye at the centre, they are of the vector against the view.
+
+    Raises
+    ------
+    InvalidCameraError
+        If float64 cannot hold the vector.
+    """
     to_world = camera.model_transform[:3, :3]
-    direction = np.linalg.solve(
-        to_world, np.asarray(camera.position) - world_centre(camera, bounds)
-    )
-    diagonal = np.linalg.norm(np.diff(np.reshape(bounds, (3, 2))))
-    if camera.parallel_projection or np.linalg.norm(direction) <= _AT_CENTRE * diagonal:
-        direction = np.linalg.solve(to_world, -camera.axes[2])
-    return np.asarray(direction)
+    with np.errstate(over="ignore", invalid="ignore"):
+        offset = np.asarray(camera.position) - world_centre(camera, bounds)
+        vector = np.linalg.solve(to_world, offset)
+        diagonal = math.hypot(*np.diff(np.reshape(bounds, (3, 2))).ravel())
+        if camera.parallel_projection or math.hypot(*vector) <= _AT_CENTRE * diagonal:
+            vector = np.linalg.solve(to_world, -camera.axes[2])
+        vector = np.asarray(shown) @ vector
+    length = math.hypot(*vector)  # squares may overflow
+    if not 0 < length < math.inf:
+        raise InvalidCameraError(
+            f"an eye at {camera.position} is {length} from the centre of the bounds "
+            f"{tuple(bounds)}, which has no direction in float64: move it"
+        )
+    return vector / length, length
 
 
 def _pixel_width(camera: Camera, size: tuple[int, int], bounds: Sequence[float]) -> float:

@@ -24,7 +24,7 @@ from pyvista_vdi.io.whole_file import with_suffix
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.render_options import FrameRequest
-from pyvista_vdi.quality.view_error import towards_eye
+from pyvista_vdi.quality.view_error import eye_from_centre
 from pyvista_vdi.sets.render import blended
 from pyvista_vdi.sets.vdi_set import VDISet
 
@@ -137,7 +137,7 @@ def _lenses(vdi_set: VDISet) -> list[Camera]:
 
 
 def _numbers(camera: Camera, vdi_set: VDISet) -> dict[str, float]:
-    x, y, z = towards_eye(camera, vdi_set.bounds)
+    (x, y, z), _ = eye_from_centre(camera, vdi_set.bounds, np.eye(3))
     numbers = {
         "phi": math.degrees(math.atan2(y, x)),
         "theta": math.degrees(math.atan2(math.hypot(x, y), z)),

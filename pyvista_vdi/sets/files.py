@@ -14,6 +14,7 @@ from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
 from pyvista_vdi.io.whole_file import check_writable, whole_file, with_suffix
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.view_error import eye_from_centre
 from pyvista_vdi.series.reader import SeriesInfo, StepsReader
 from pyvista_vdi.series.writer import StepsWriter
 from pyvista_vdi.sets.vdi_set import VDISet
@@ -56,6 +57,8 @@ class SetReader(StepsReader):
             Camera.from_dict(self.about["camera"])
         if len(self.all_bounds) != 6 or not all(map(math.isfinite, self.all_bounds)):
             raise ValueError("bounds are six finite numbers")
+        for view in self._views:  # as the set will ask
+            eye_from_centre(view, self.all_bounds, self._views[0].model_transform[:3, :3])
 
     @property
     def cameras(self) -> list[Camera]:

@@ -17,7 +17,7 @@ from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.view_error import towards_eye
+from pyvista_vdi.quality.view_error import eye_from_centre
 
 #: Degrees by which a V_O may be farther than the nearest and still be seen: benchmarks/sets.py.
 BLEND = 6.0
@@ -64,6 +64,8 @@ class VDISet(Sequence[VDI]):
     ------
     InvalidArgumentError
         If there is no VDI, or cameras are not as many.
+    InvalidCameraError
+        If an eye is farther from the centre of the bounds than float64 can say.
 
     Attributes
     ----------
@@ -349,14 +351,15 @@ class VDISet(Sequence[VDI]):
         float64 (n, 4). Directions are those of the model as the first V_O's transform shows it.
         """
         shown = self._cameras[0].model_transform[:3, :3]
-        towards = np.stack([shown @ towards_eye(view, self.bounds) for view in cameras])
-        lengths = np.linalg.norm(towards, axis=1)
+        towards, lengths = zip(
+            *(eye_from_centre(view, self.bounds, shown) for view in cameras), strict=True
+        )
         # Of a parallel view, which is infinitely far: where a lens shows as much of the height
         away = [
             view.parallel_scale / _LENS if view.parallel_projection else length
             for view, length in zip(cameras, lengths, strict=True)
         ]
-        return np.column_stack([towards / lengths[:, None], np.log(away)])
+        return np.column_stack([towards, np.log(away)])
 
 
 def _apart(places: NDArray[np.float64], here: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -22,6 +22,9 @@ from plugin_scenes import (
     soft_ball,
 )
 from pyvista import Plotter
+
+# Before any widget: else PyVista 0.49's pv.Spline fails once a spline widget was added
+from vtkmodules import vtkCommonComputationalGeometry  # noqa: F401
 from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 from vtkmodules.vtkCommonDataModel import vtkPlane
 from vtkmodules.vtkRenderingCore import vtkAssembly, vtkPropAssembly

@@ -13,7 +13,7 @@ import pytest
 from drawing import raycast_volume, render_vdi
 
 from pyvista_vdi import VDI, Camera, Light, Lights, Shading, TransferFunction, Volume
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError
+from pyvista_vdi.errors import Cancelled, InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -498,11 +498,20 @@ PARALLEL = FRONT.replace(parallel_projection=True, parallel_scale=2)
         # An eye at the centre looks along its direction of projection
         (FRONT, Camera((0, 0, 0), (0, 5, 0), (0, 0, 1)), 0),
         (FRONT, Camera((0, 0, 0), (5, 0, 0), (0, 0, 1)), 90),
+        # The squares of these overflow
+        (FRONT, Camera((1e300, -1e300, 0), (0, 0, 0), (0, 0, 1)), 45),
+        (FRONT, FRONT.azimuth(40).replace(model_transform=np.diag([1e-300] * 3 + [1])), 40),
     ],
 )
 def test_angle_from_the_generating_view(old, new, expected):
     found = angle_from_generating_view(empty_vdi(old), new)
     assert found == pytest.approx(expected, abs=1e-6)
+
+
+def test_an_eye_beyond_float64_is_refused():
+    far = FRONT.replace(position=(0, -1.7e308, 0), focal_point=(0, 0, 0))
+    with pytest.raises(InvalidCameraError, match=r"1\.7e\+308.* from the centre .* move it"):
+        angle_from_generating_view(empty_vdi(bounds=(-1, 1, 1e307, 1.7e308, -1, 1)), far)
 
 
 def test_the_angle_is_about_the_centre_of_the_bounds():

@@ -120,8 +120,9 @@ def test_of_two_eyes_in_a_line_the_one_at_that_distance_is_nearest(volume, aroun
     assert both.nearest(near) == 0
     assert both.nearest(far) == 1
     # Twice as far is ln 2, as if turned by that angle
-    twice = around.replace(position=centre + 2 * np.subtract(around.position, centre))
-    assert both.distances(twice)[0] == pytest.approx(np.degrees(np.log(2)), rel=1e-6)
+    for k in (2, 1e300):
+        away = around.replace(position=centre + k * np.subtract(around.position, centre))
+        assert both.distances(away)[0] == pytest.approx(np.degrees(np.log(k)), rel=1e-6)
 
 
 def test_weights_add_up_and_nothing_jumps_on_a_path(made, around):

@@ -43,6 +43,7 @@ def site(tmp_path_factory, default_runtime):
     for name in ("index", "gallery"):
         text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
         blocks = re.findall(r"^<(?:div|iframe).*?^$", text, re.MULTILINE | re.DOTALL)
+        blocks = [block for block in blocks if "<iframe" in block]  # cards' pictures are not here
         body = "".join(block + '<p style="height: 1500px">' for block in blocks)
         content = f'<!doctype html><meta charset="utf-8">{body}'
         (folder / f"{name}.html").write_text(content, encoding="utf-8")
