@@ -11,12 +11,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from tqdm import tqdm
+
 from pyvista_vdi import examples
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.io import read, whole_file
 from pyvista_vdi.measure.clock import take_turns
-from pyvista_vdi.measure.report import without_infinities
+from pyvista_vdi.measure.report import describe_system, without_infinities, write_text
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
@@ -177,6 +179,46 @@ def save(results: Mapping[str, Any], target: Path) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(target) as stream:
         stream.write(json.dumps(without_infinities(dict(results)), indent=1).encode() + b"\n")
+
+
+def measure_missing(
+    name: str,
+    options: argparse.Namespace,
+    case: Mapping[str, Any],
+    wanted: Iterable[str],
+    measured: Callable[[str], Any],
+    report: Callable[[dict[str, Any]], str],
+    *,
+    parts: str = "volumes",
+) -> dict[str, Any]:
+    """Measure the parts that an earlier run of the same case has not, and write all results.
+
+    Parameters
+    ----------
+    name : str
+        Of the files in ``options.out``, before the window's size.
+    options : argparse.Namespace
+        With ``size``, ``device`` and ``redo``.
+    case : mapping
+        As for :func:`begun`, beside the window's size and the system.
+    wanted : iterable of str
+        Names of the parts.
+    measured, report : callable
+        What makes one of them, and the text of all.
+    parts : str
+        As for :func:`begun`.
+    """
+    width, height = options.size
+    target = options.out / f"{name}_{width}x{height}.json"
+    head = {"window_size": [width, height], "system": describe_system(options.device), **case}
+    results = begun(target, head, parts)
+    for part in tqdm(list(wanted), unit="part", disable=not sys.stderr.isatty()):
+        if part not in results[parts] or options.redo:
+            results[parts][part] = measured(part)
+            save(results, target)
+    write_text(target.with_suffix(".md"), report(results))
+    print(f"Written: {target}, and .md beside it")
+    return results
 
 
 def looks_of(options: argparse.Namespace, look: str | None = None) -> dict[str, Any]:

@@ -20,16 +20,14 @@ import numpy as np
 from common import (  # beside this file
     add_vdi_options,
     at_hand,
-    begun,
+    measure_missing,
     new_parser,
-    save,
     timed,
     vdi_of,
 )
-from tqdm import tqdm
 
 from pyvista_vdi.io import FORMAT_VERSION, read, read_info
-from pyvista_vdi.measure.report import describe_system, system_line, write_text
+from pyvista_vdi.measure.report import describe_system, system_line
 from pyvista_vdi.model.vdi import VDI
 
 #: Bytes of a supersegment in the dense form: two depths, four colour components, float32.
@@ -56,24 +54,19 @@ LEGEND = (
 def main() -> int:
     """Measure what is missing, and write what was found."""
     options = parsed()
-    width, height = options.size
-    target = options.out / f"files_{width}x{height}.json"
     case = {
-        "window_size": [width, height],
         "transfer_function": options.tf,
         "max_supersegments": options.max_supersegments,
         "format_version": FORMAT_VERSION,
         "system": {**describe_system(options.device), "numcodecs": version("numcodecs")},
     }
-    results = begun(target, case)
-    for name in tqdm(at_hand(options.volumes), unit="volume"):
-        if name in results["volumes"] and not options.redo:
-            continue
+
+    def measured_of(volume: str) -> dict[str, Any]:
         with tempfile.TemporaryDirectory(dir=options.disk) as folder:
-            results["volumes"][name] = measured(vdi_of(name, options), Path(folder), options)
-        save(results, target)
-    write_text(target.with_suffix(".md"), report(results))
-    print(f"Written: {target}, and .md beside it")
+            return measured(vdi_of(volume, options), Path(folder), options)
+
+    volumes = at_hand(options.volumes)
+    results = measure_missing("files", options, case, volumes, measured_of, report)
     return 0 if all(v["identical"] for v in results["volumes"].values()) else 1
 
 

@@ -30,20 +30,17 @@ from common import (  # beside this file
     add_size,
     add_volumes,
     at_hand,
-    begun,
     looks_of,
+    measure_missing,
     new_parser,
-    save,
     subject_of,
 )
-from tqdm import tqdm
 
 from pyvista_vdi.api import render_volume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.clock import take_turns
 from pyvista_vdi.measure.compare.bounds import FRAME_RATIO_ANGLE
-from pyvista_vdi.measure.report import describe_system, write_text
 from pyvista_vdi.measure.vtk_baselines import MAPPERS, VTKBaseline, add_volume_property
 
 #: Ratios: title, what is divided, and by which candidate or by the fastest of which.
@@ -69,23 +66,19 @@ def main() -> int:
     options = parsed()
     if not os.environ.get("VTK_DEFAULT_OPENGL_WINDOW") and not os.environ.get("DISPLAY"):
         os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
-    width, height = options.size
-    target = options.out / f"generation_{width}x{height}.json"
     case = {
-        "window_size": [width, height],
         "transfer_function": options.tf,
         "interpolation": options.interpolation,
         "max_supersegments": options.max_supersegments,
-        "system": describe_system(options.device),
     }
-    results = begun(target, case)
-    for name in tqdm(at_hand(options.volumes), unit="volume"):
-        if name in results["volumes"] and not options.redo:
-            continue
-        results["volumes"][name] = measured(subject_of(name, options), options)
-        save(results, target)
-    write_text(target.with_suffix(".md"), report(results))
-    print(f"Written: {target}, and .md beside it")
+    measure_missing(
+        "generation",
+        options,
+        case,
+        at_hand(options.volumes),
+        lambda volume: measured(subject_of(volume, options), options),
+        report,
+    )
     return 0
 
 

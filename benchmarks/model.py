@@ -24,10 +24,9 @@ from common import (  # beside this file
     add_looks,
     add_redo,
     add_size,
-    begun,
     clock_of,
+    measure_missing,
     new_parser,
-    save,
 )
 from counting import (
     CountedVDI,
@@ -41,12 +40,11 @@ from counting import (
     walk,
 )
 from machine import Rates, Stopwatch, cache_of
-from tqdm import tqdm
 
 from pyvista_vdi.device import Profile, Runtime, get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.paper import find_dataset
-from pyvista_vdi.measure.report import describe_system, system_line, table, write_text
+from pyvista_vdi.measure.report import system_line, table
 from pyvista_vdi.measure.session import VDIRenderer
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import FrameRequest
@@ -615,30 +613,22 @@ def plotted(watch: Stopwatch, vdi: VDI, size: tuple[int, int]) -> float:
 def main() -> int:
     """Measure what is missing, and write what was found."""
     options = parsed()
-    width, height = options.size
-    runtime = get_runtime(options.device)
-    rates = Rates.read_for(runtime, options.machine or options.out)
-    target = options.out / f"model_{width}x{height}.json"
+    rates = Rates.read_for(get_runtime(options.device), options.machine or options.out)
     case = {
-        "window_size": [width, height],
         "max_supersegments": options.max_supersegments,
         "interpolation": options.interpolation,
         "every": options.every,
         "clock": options.clock,
-        "system": describe_system(options.device),
     }
-    results = begun(target, case)
-    bar = tqdm(options.volumes, unit="volume", disable=not sys.stderr.isatty())
-    for name in bar:
-        bar.set_description(name)
-        if name in results["volumes"] and not options.redo:
-            continue
-        results["volumes"][name] = measured(name, options, rates)
-        save(results, target)
-    text = report(results)
-    write_text(target.with_suffix(".md"), text)
-    print(text)
-    print(f"Written: {target}, and .md beside it")
+    results = measure_missing(
+        "model",
+        options,
+        case,
+        options.volumes,
+        lambda volume: measured(volume, options, rates),
+        report,
+    )
+    print(report(results))
     return 0
 
 

@@ -16,18 +16,16 @@ import numpy as np
 from common import (  # beside this file
     add_vdi_options,
     at_hand,
-    begun,
+    measure_missing,
     new_parser,
-    save,
     timed,
     vdi_of,
     window_size,
 )
 from files import DENSE_BYTES, mebibytes
-from tqdm import tqdm
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.measure.report import describe_system, system_line, write_text
+from pyvista_vdi.measure.report import system_line
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.render_options import FrameRequest
@@ -53,23 +51,19 @@ LEGEND = (
 def main() -> int:
     """Measure what is missing, and write what was found."""
     options = parsed()
-    width, height = options.size
-    target = options.out / f"packed_{width}x{height}.json"
     case = {
-        "window_size": [width, height],
         "frame": list(options.frame or options.size),
         "transfer_function": options.tf,
         "max_supersegments": options.max_supersegments,
-        "system": describe_system(options.device),
     }
-    results = begun(target, case)
-    for name in tqdm(at_hand(options.volumes), unit="volume"):
-        if name in results["volumes"] and not options.redo:
-            continue
-        results["volumes"][name] = measured(vdi_of(name, options), options)
-        save(results, target)
-    write_text(target.with_suffix(".md"), report(results))
-    print(f"Written: {target}, and .md beside it")
+    results = measure_missing(
+        "packed",
+        options,
+        case,
+        at_hand(options.volumes),
+        lambda volume: measured(vdi_of(volume, options), options),
+        report,
+    )
     return 0 if most_loss(results) <= MOST_LOSS else 1
 
 

@@ -8,7 +8,6 @@ See README.md in this folder.
 from __future__ import annotations
 
 import argparse
-import os
 import statistics
 import sys
 import tempfile
@@ -19,15 +18,14 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from common import add_redo, add_size, begun, new_parser, save  # beside this file
+from common import add_redo, add_size, measure_missing, new_parser  # beside this file
 from series import LOOKS
-from series_data import SERIES
+from series_data import SERIES, series_at_hand
 from tqdm import tqdm
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import examples
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.measure.report import describe_system, system_line, table, write_text
+from pyvista_vdi.measure.report import system_line, table
 from pyvista_vdi.measure.vtk_baselines import (
     MAPPERS,
     VTKBaseline,
@@ -65,20 +63,13 @@ def main() -> int:
     parser.add_argument("--series", nargs="+", choices=names, default=names)
     parser.add_argument("--seconds", type=float, default=10.0, help="that a series is played for")
     options = parser.parse_args()
-    width, height = options.size
-    target = options.out / f"playing_{width}x{height}.json"
-    case = {"window_size": [width, height], "system": describe_system(options.device)}
-    results = begun(target, case, "series")
-    for name in options.series:
-        if name == "rayleigh_taylor" and not os.environ.get(examples.DATA_VARIABLE):
-            print(f"Left out, {examples.DATA_VARIABLE} is not set: {name}", file=sys.stderr)
-            continue
-        if name not in results["series"] or options.redo:
-            with tempfile.TemporaryDirectory() as folder:
-                results["series"][name] = measured(name, Path(folder), options)
-            save(results, target)
-    write_text(target.with_suffix(".md"), report(results))
-    print(f"Written: {target}, and .md beside it")
+
+    def measured_of(name: str) -> dict[str, Any]:
+        with tempfile.TemporaryDirectory() as folder:
+            return measured(name, Path(folder), options)
+
+    wanted = series_at_hand(options.series)
+    measure_missing("playing", options, {}, wanted, measured_of, report, parts="series")
     return 0
 
 

@@ -10,8 +10,8 @@ at the same steps between the same points, so that the lists alone make the diff
 
 from __future__ import annotations
 
+import argparse
 import heapq
-import sys
 
 import numpy as np
 from scipy.ndimage import map_coordinates, zoom
@@ -90,8 +90,11 @@ def projected(field, angle, kind, samples_per_voxel=2):
     return picture
 
 
-def main(names):
+def main():
     """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("volumes", nargs="+", metavar="VOLUME", choices=sorted(examples.VOLUMES))
+    names = parser.parse_args().volumes
     print("| volume | projection | K | mean length | " + " | ".join(f"{a}°" for a in ANGLES) + " |")
     print("|---" * (4 + len(ANGLES)) + "|")
     for name in names:
@@ -123,4 +126,4 @@ def main(names):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -6,7 +6,6 @@ Writes ``series_WxH.json`` (all figures) and ``.md`` (the table). See README.md 
 from __future__ import annotations
 
 import argparse
-import os
 import statistics
 import sys
 import tempfile
@@ -15,13 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import add_size, begun, new_parser, save  # beside this file
-from series_data import SERIES
+from common import add_redo, add_size, measure_missing, new_parser  # beside this file
+from series_data import SERIES, series_at_hand
 from tqdm import tqdm
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import examples
-from pyvista_vdi.measure.report import describe_system, system_line, write_text
+from pyvista_vdi.measure.report import system_line
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.series import reader
@@ -54,28 +52,18 @@ def main() -> int:
     parser = new_parser(__doc__)
     add_size(parser, (320, 180))
     parser.add_argument("--series", nargs="+", choices=SERIES, default=list(SERIES))
-    parser.add_argument("--redo", action="store_true", help="measure what is there as well")
+    add_redo(parser)
     parser.add_argument(
         "--timings", action="store_true", help="time generation, in a series over alone"
     )
     options = parser.parse_args()
-    width, height = options.size
-    target = options.out / f"series_{width}x{height}.json"
-    results = begun(
-        target,
-        {"window_size": [width, height], "system": describe_system(options.device)},
-        "series",
-    )
-    for name in options.series:
-        if name == "rayleigh_taylor" and not os.environ.get(examples.DATA_VARIABLE):
-            print(f"Left out, {examples.DATA_VARIABLE} is not set: {name}", file=sys.stderr)
-            continue
-        if name not in results["series"] or options.redo:
-            with tempfile.TemporaryDirectory() as folder:
-                results["series"][name] = measured(name, Path(folder), options)
-            save(results, target)
-    write_text(target.with_suffix(".md"), report(results))
-    print(f"Written: {target}, and .md beside it")
+
+    def measured_of(name: str) -> dict[str, Any]:
+        with tempfile.TemporaryDirectory() as folder:
+            return measured(name, Path(folder), options)
+
+    wanted = series_at_hand(options.series)
+    measure_missing("series", options, {}, wanted, measured_of, report, parts="series")
     return 0
 
 

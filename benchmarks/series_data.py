@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -99,6 +100,15 @@ SERIES = {
     "cut": Data(25, cut, "a head behind a cut that moves"),
     "still": Data(100, still, "a head that does not change"),
 }
+
+
+def series_at_hand(names: Iterable[str]) -> list[str]:
+    """Return those whose data are here, and say which are not."""
+    here = list(names)
+    if "rayleigh_taylor" in here and not os.environ.get(examples.DATA_VARIABLE):
+        print(f"Left out, {examples.DATA_VARIABLE} is not set: rayleigh_taylor", file=sys.stderr)
+        here.remove("rayleigh_taylor")
+    return here
 
 
 def main() -> None:

@@ -14,17 +14,15 @@ import numpy as np
 from common import (  # beside this file
     add_vdi_options,
     at_hand,
-    begun,
+    measure_missing,
     new_parser,
-    save,
     timed,
     vdi_of,
 )
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from pyvista_vdi.device import Runtime, get_runtime
-from pyvista_vdi.measure.report import describe_system, system_line, write_text
+from pyvista_vdi.measure.report import system_line
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
@@ -46,22 +44,18 @@ LEGEND = (
 def main() -> int:
     """Measure what is missing, and write what was found."""
     options = parsed()
-    width, height = options.size
-    target = options.out / f"skipping_{width}x{height}.json"
     case = {
-        "window_size": [width, height],
         "transfer_function": options.tf,
         "max_supersegments": options.max_supersegments,
-        "system": describe_system(options.device),
     }
-    results = begun(target, case)
-    for name in tqdm(at_hand(options.volumes), unit="volume"):
-        if name in results["volumes"] and not options.redo:
-            continue
-        results["volumes"][name] = measured(vdi_of(name, options), options)
-        save(results, target)
-    write_text(target.with_suffix(".md"), report(results))
-    print(f"Written: {target}, and .md beside it")
+    results = measure_missing(
+        "skipping",
+        options,
+        case,
+        at_hand(options.volumes),
+        lambda volume: measured(vdi_of(volume, options), options),
+        report,
+    )
     same = all(a["identical"] for v in results["volumes"].values() for a in v["angles"])
     return 0 if same else 1
 
@@ -96,14 +90,20 @@ def measured(vdi: VDI, options: argparse.Namespace) -> dict[str, Any]:
 def build_seconds(runtime: Runtime, vdi: VDI, repeats: int) -> float:
     """Return the time to build the grid from arrays that are on the device, median."""
     with (
-        runtime.upload(vdi.offsets.astype(np.uint32)) as offsets,
+        runtime.upload(vdi.offsets.astype(np.int32)) as offsets,
         runtime.upload(vdi.front) as front,
         runtime.upload(vdi.back) as back,
     ):
 
         def build() -> None:
             grid = OccupancyGrid(
-                runtime, vdi, offsets, front, back, nearest=0.0, shifted=False, long_offsets=False
+                runtime,
+                vdi,
+                offsets,
+                (front, back),
+                nearest=0.0,
+                shifted=False,
+                long_offsets=False,
             )
             grid.counts.release()
             grid.masks.release()

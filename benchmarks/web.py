@@ -325,17 +325,19 @@ def main() -> None:
 
 def report(result: dict[str, Any]) -> None:
     """Print what was found for a volume."""
-    asked, then = (
-        (np.median(column), min(column)) for column in zip(*result["coarse"], strict=True)
-    )
     print(
         f"{result['volume']}: {len(result['vdis'])} VDIs, "
         f"{result['vdis'].count('full')} of them full, {result['bytes_of_levels']} bytes, pictures "
-        f"{result['bytes_of_pictures']} bytes; coarse ones on the screen after "
-        f"{np.median(result['delays']):.2f} s (median), {max(result['delays']):.2f} s (worst), "
-        f"SSIM of the view asked for {asked[0]:.3f} (median), {asked[1]:.3f} (worst), "
-        f"of the view then {then[0]:.3f}, {then[1]:.3f}"
+        f"{result['bytes_of_pictures']} bytes"
     )
+    if result["coarse"]:  # pictures of a small window are full at once
+        asked, then = np.transpose(result["coarse"])
+        print(
+            f"coarse ones on the screen after {np.median(result['delays']):.2f} s (median), "
+            f"{max(result['delays']):.2f} s (worst), SSIM of the view asked for "
+            f"{np.median(asked):.3f} (median), {asked.min():.3f} (worst), of the view then "
+            f"{np.median(then):.3f}, {then.min():.3f}"
+        )
     for latency, time_ms in result["frames"]:
         print(
             f"motion to picture in Chromium, {latency:g} ms of latency: {time_ms:.0f} ms (median)"
