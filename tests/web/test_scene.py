@@ -14,6 +14,7 @@ import pytest
 import pyvista as pv
 from browsers import LONG, Page
 from plugin_scenes import soft_ball
+from scipy import ndimage
 from skimage.metrics import structural_similarity
 from vtkmodules.vtkCommonDataModel import vtkPlane
 
@@ -178,7 +179,7 @@ def translucent_and_textured(plotter):
     mapper.block_attr[1].color = "y"
     plotter.remove_all_lights()
     plotter.add_light(pv.Light(light_type="headlight"))
-    plotter.add_axes(viewport=(0, 0, 0.3, 0.4))
+    plotter.add_axes(viewport=(0, 0, 0.3, 0.4), labels_off=True)
 
 
 def apart(plotter):
@@ -344,6 +345,24 @@ def test_texts_and_scalar_bars_stand_where_vtk_has_them(vertical, plotter, open_
             boxes.append((rows.min(), rows.max(), columns.min(), columns.max()))
         # Letters of another font are wider and higher by some pixels
         assert np.abs(np.subtract(*boxes)).max() <= 12, boxes
+
+
+def test_letters_of_axes_stand_where_vtk_has_them(plotter, open_page):
+    plotter.window_size = size = (480, 270)
+    ball(plotter, opacity=[0, 0])
+    plotter.add_axes(viewport=(0, 0, 0.4, 0.6), color="k")
+    plotter.show(auto_close=False)
+    page = open_page(SMALL)
+    assert give(page, plotter).left_out == []
+    picture = shot(page, size)
+    got = picture[..., :3] + (255 - picture[..., 3:])
+    centres = []
+    for pixels in (got, plotter.screenshot(return_img=True)[..., :3].astype(int)):
+        letters, count = ndimage.label(ndimage.binary_dilation(pixels.max(axis=2) < 128))
+        assert count == 3
+        centres.append(ndimage.center_of_mass(letters > 0, letters, range(1, count + 1)))
+    # Fonts differ: a letter's middle by a pixel or two
+    assert np.abs(np.subtract(*centres)).max() < 3, centres
 
 
 def test_labels_stand_at_their_points_and_nearer_ones_before_others(plotter, open_page):

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonCore import VTK_FLOAT, vtkFloatArray, vtkPoints
+from vtkmodules.vtkCommonCore import VTK_FLOAT, vtkFloatArray, vtkPoints, vtkVersion
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkDataObject, vtkPolyData
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkRenderingCore import vtkActor
 from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLPolyDataMapper
 
 from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.measure.rivals.frusta import to_window
 from pyvista_vdi.measure.rivals.medium import Floats, Medium, view_of
 from pyvista_vdi.measure.vtk_baselines import OffScreenVolume
@@ -116,6 +117,11 @@ class OpenGLFrusta(OffScreenVolume):
         Window, pixels.
     float_buffer : bool
         Whether colours are blended in float32; otherwise, as on a screen, in steps of 1/255.
+
+    Raises
+    ------
+    UnsupportedError
+        If VTK is older than 9.5.
     """
 
     def __init__(self, vdi: VDI, size: tuple[int, int], *, float_buffer: bool = True) -> None:
@@ -150,8 +156,14 @@ class OpenGLFrusta(OffScreenVolume):
         shaders.SetGeometryShaderCode(_GEOMETRY)
         shaders.SetFragmentShaderCode(_FRAGMENT)
         super().__init__("OpenGL", actor, size)
+        if not hasattr(self.renderer, "SetUseOIT"):
+            self.close()
+            raise UnsupportedError(
+                "frusta are blended in the order in which they come, which VTK "
+                f"{vtkVersion.GetVTKVersion()} cannot: update it to 9.5 or newer"
+            )
         self.renderer.GetCullers().RemoveAllItems()  # points are lists' numbers, no positions
-        self.renderer.SetUseOIT(False)  # frusta are blended in the order in which they come
+        self.renderer.SetUseOIT(False)
         self._window.Render()
         if float_buffer:
             frame = self._window.GetRenderFramebuffer()
