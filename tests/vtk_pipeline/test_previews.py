@@ -35,7 +35,7 @@ from pyvista_vdi.vtk_pipeline.drawing import few_lists
 from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, sampled
 from pyvista_vdi.vtk_pipeline.interaction import regeneration
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import HEADROOM, reduced
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import HEADROOM, WindowClock, reduced
 
 pytestmark = pytest.mark.gl
 
@@ -367,6 +367,32 @@ def test_frames_keep_the_rate_where_rays_get_dearer_as_views_turn_away(plotter, 
         frame(plotter, MOVING)
         rates.append(1 / (counted.now - began))
     assert min(rates) > 60 / 1.2, rates
+
+
+def test_few_frames_are_late_where_some_take_longer(plotter, counted):
+    """Each tenth half as long again: of an aim at 1.15 times the rate they would all be late."""
+    rng = np.random.default_rng(5)
+    actor = watched(plotter, target_fps=60.0)
+    clock = WindowClock.of(plotter.render_window)
+    seconds = []
+
+    def frames(count, disturbed):
+        for _ in range(count):
+            counted.dear = 1.5 if rng.random() < disturbed else 1.0
+            plotter.camera.Azimuth(1e-3)
+            began = counted.now
+            frame(plotter, MOVING)
+            seconds.append(counted.now - began)
+        return np.array(seconds[-count:])
+
+    frames(100, 0.1)
+    # 1 % is aimed at; binomial with 300 frames: a standard deviation of .6 %
+    assert np.mean(frames(300, 0.1) > 1.2 / 60) < 0.03
+    assert clock.aim(actor.mapper.painter.interaction) > 1.2 * 60
+    # Undisturbed, the whole time is used again, but for the headroom and the controller's tenth
+    frames(400, 0.0)
+    assert clock.aim(actor.mapper.painter.interaction) == pytest.approx(HEADROOM * 60)
+    assert np.median(frames(20, 0.0)) == pytest.approx(1 / 60 / HEADROOM, rel=0.1)
 
 
 def test_few_pixels_from_the_side_take_few_lists(plotter, counted):

@@ -233,7 +233,7 @@ class Upkeep:
         way = self.ways.choose(
             angle_from_generating_view(vdi, frame.view.camera),
             frame.covered(vdi.bounds),
-            1 / self._interaction.rate(window) if moves else None,
+            1 / frame.clock.aim(self._interaction) if moves else None,
             self.regeneration.ssim(vdi),
             self.regeneration.bound,
         )

@@ -28,9 +28,14 @@ Cost = Way | Literal["few lists"]
 #: the time; twice as many pixels with half the lists lose what half the pixels with all do.
 _FEW_BELOW, _FEW_ABOVE = 0.25, 0.65
 
-#: What is aimed at, over the rate that is to be kept: single frames vary about their mean, and an
-#: aim at the rate itself makes every second one late (docs/decisions/frame_rate.md).
-HEADROOM = 1.15
+#: Least and most of what is aimed at, over the rate that is to be kept: single frames vary about
+#: their mean, and an aim at the rate makes every second one late (docs/decisions/frame_rate.md).
+HEADROOM, _MOST_HEADROOM = 1.15, 1.6
+#: Periods of the rate from which a frame is late, and the share of frames that is aimed at: a third
+#: of what is allowed, for a late one teaches only the next.
+_LATE, _LATE_SHARE = 1.2, 0.01
+#: By which power of e a late frame raises the headroom, about; those in time take it back.
+_RAISE = 0.05
 
 #: What a VDI of all or of every second list is changed for, and what its rays take over its own.
 _OTHER_LISTS: dict[Cost, tuple[Cost, float]] = {
@@ -86,8 +91,8 @@ class Interaction:
         return browser.watches(window) if self.off_screen is None else self.off_screen
 
     def rate(self, window: Any) -> float:
-        """Return the frames per second to aim at while a hand moves."""
-        return HEADROOM * float(self.target or window.GetDesiredUpdateRate())
+        """Return the frames per second to be kept while a hand moves."""
+        return float(self.target or window.GetDesiredUpdateRate())
 
     def moving(self, window: Any) -> bool:
         """Whether a hand moves, by VTK's convention."""
@@ -105,7 +110,7 @@ class _Frame:
     share: float | None = None  # of its pixels that each is drawn with; None before one has asked
     interactive: bool = False  # whether one may be a preview
     preview: bool = False  # whether one is
-    target: float = 0.0  # the highest rate that one wants to keep, 1/s
+    target: float = 0.0  # the highest rate that one aims at, 1/s
     rays: int = 0  # that were cast, each by its effort
     full_rays: int = 0  # those of full images
     images: int = 0  # that were raycast
@@ -146,6 +151,7 @@ class WindowClock:
         self._few_lists = False  # whether previews had better have fewer lists
         self._floor = 0.0
         self._target = 0.0
+        self._headroom = HEADROOM
         self._started: float | None = None
         self._interacting = False
         self._previewed = False
@@ -219,6 +225,10 @@ class WindowClock:
         window = self._window.Get()
         return window is None or tuple(window.GetTileScale()) == (1, 1)
 
+    def aim(self, interaction: Interaction) -> float:
+        """Return the frames per second to aim at, so that few are late for the rate to be kept."""
+        return self._headroom * interaction.rate(self._window.Get())
+
     def share(
         self,
         renderer: Any,
@@ -245,7 +255,7 @@ class WindowClock:
             return 1.0
         frame = self._frame
         frame.interactive = True
-        target = interaction.rate(window)
+        target = self.aim(interaction)
         frame.target = max(frame.target, target)
         if frame.share is None:
             # The other VDIs of this frame are not known yet: count on those of the last
@@ -326,6 +336,10 @@ class WindowClock:
             return
         self._interacting = True
         self._target = frame.target
+        # A stochastic approximation of the quantile (Robbins and Monro 1951)
+        late = seconds * frame.target > _LATE * self._headroom
+        raised = self._headroom * math.exp(_RAISE * (late - _LATE_SHARE))
+        self._headroom = min(max(HEADROOM, raised), _MOST_HEADROOM)
         self._full_rays_before, self._images_before = frame.full_rays, frame.images
         if frame.cost in self._controllers:
             self._controllers[frame.cost].record(frame.rays, frame.work, seconds)
