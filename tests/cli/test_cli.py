@@ -349,7 +349,8 @@ def test_no_zero_has_a_sign(capsys, tmp_path):
     assert status == 0
     assert re.search(r"^depth origin +0$", out, re.MULTILINE)
     assert re.search(r"^eye +\(0, 0, 5\)$", out, re.MULTILINE)
-    assert not re.search(r"-0\b(?!\.)", out)
+    # The file's own path may end a number so: pytest's first folder on a machine is pytest-0
+    assert not re.search(r"-0\b(?!\.)", out.replace(str(tmp_path), ""))
 
 
 # -- verbs -----------------------------------------------------------------------------------------
