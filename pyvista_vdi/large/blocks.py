@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.chunked import Ranges
 from pyvista_vdi.model.grid import Geometry, Grid
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.volume.grid_part import GridPart
@@ -144,9 +145,7 @@ class Blocks:
         """Return where a block's own points lie in the grid, (z, y, x)."""
         return tuple(slice(cuts[k], cuts[k + 1]) for cuts, k in zip(self.cuts, block, strict=True))
 
-    def ranges(
-        self, block: Indices, values: Values
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def ranges(self, values: Values) -> Ranges:
         """Return the least and the largest scalar of each of a block's chunks, NaN left out."""
         counts = [-(-n // chunk) for n, chunk in zip(values.shape, self.chunks, strict=False)]
         low, high = np.empty(counts), np.empty(counts)
@@ -159,9 +158,7 @@ class Blocks:
         parts = zip(self.own(block), self.chunks, strict=True)
         return tuple(slice(part.start // chunk, -(-part.stop // chunk)) for part, chunk in parts)
 
-    def of_chunks(
-        self, low: NDArray[np.float64], high: NDArray[np.float64]
-    ) -> dict[Indices, tuple[float, float]]:
+    def of_chunks(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> dict[Indices, Ends]:
         """Return the least and the largest scalar of each block, of those of all chunks."""
         return {
             block: (
@@ -171,9 +168,7 @@ class Blocks:
             for block in self
         }
 
-    def to_chunks(
-        self, ranges: Mapping[Indices, tuple[NDArray[np.float64], NDArray[np.float64]]]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def to_chunks(self, ranges: Mapping[Indices, Ranges]) -> Ranges:
         """Return the least and the largest scalar of each chunk, of those of all blocks."""
         shape = [-(-cuts[-1] // n) for cuts, n in zip(self.cuts, self.chunks, strict=True)]
         low, high = np.full(shape, np.nan), np.full(shape, np.nan)

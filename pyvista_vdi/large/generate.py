@@ -16,7 +16,7 @@ from pyvista_vdi.large.blocks import BLOCK_BYTES, Blocks, Indices
 from pyvista_vdi.large.passes import Piece, Rows, Seen, Task, light_entering
 from pyvista_vdi.large.reading import Plan
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.chunked import Ranges
+from pyvista_vdi.model.chunked import ChunkedArray, Ranges
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
@@ -95,17 +95,24 @@ def chunks_of(volume: Volume, chunks: Sequence[int] | None) -> Sequence[int]:
     raise InvalidArgumentError(f"the volume {volume.name!r} is not chunked: give chunks")
 
 
-def known_ranges(volume: Volume) -> Ranges | None:
+def known_ranges(volume: Volume, task: Task) -> Ranges | None:
     """Return the least and the largest scalar of each chunk, if they are known."""
-    return None if volume.chunks is None else volume.chunks.ranges()
+    array = _with_ranges(volume, task)
+    return None if array is None else array.ranges()
 
 
 def keep_ranges(volume: Volume, task: Task, seen: Mapping[Indices, Seen]) -> None:
     """Keep what the first pass has found beside the store, so that nothing unseen is read again."""
-    if volume.chunks is not None:
-        volume.chunks.keep_ranges(
-            *task.blocks.to_chunks({block: found.ranges for block, found in seen.items()})
-        )
+    array = _with_ranges(volume, task)
+    if array is not None:
+        ranges = {block: found.ranges for block, found in seen.items()}
+        array.keep_ranges(*task.blocks.to_chunks(ranges))
+
+
+def _with_ranges(volume: Volume, task: Task) -> ChunkedArray | None:
+    """Return the volume's array if its chunks are the task's: ranges are kept of no others."""
+    array = volume.chunks
+    return array if array is not None and array.chunks == task.blocks.chunks else None
 
 
 def generate_chunked(
@@ -138,7 +145,7 @@ def generate_chunked(
     windows = blocks.windows(task.camera, task.size)
     report(progress, 0.0)
     seen: dict[Indices, Seen] = {}
-    known = known_ranges(volume)
+    known = known_ranges(volume, task)
     order = task.to_read(windows, known)
     reading = Plan.of(task, volume.array, known)
     for k, block in enumerate(order):

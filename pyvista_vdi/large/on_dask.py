@@ -152,7 +152,7 @@ class _Run:
         task, blocks, halo = self._task, self._task.blocks, self._task.halo
         report(self._progress, 0.0)
         windows = blocks.windows(task.camera, task.size)
-        known = known_ranges(self._volume)
+        known = known_ranges(self._volume, task)
         order = task.to_read(windows, known)
         chunks = self._volume.chunks
         lazy = chunks is not None and chunks.lazy is not None  # Dask knows what it computes

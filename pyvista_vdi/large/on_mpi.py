@@ -116,12 +116,13 @@ def generate_on_mpi(
     low, high = zip(*ends, strict=True)
     scalars = (float(np.fmin.reduce(low)), float(np.fmax.reduce(high)))
     task = Task.of(blocks, Camera.from_any(camera), size, transfer_function, options, scalars)
-    block = {rank: at for at, rank in ranks.items()}[comm.rank]
+    places = {rank: at for at, rank in ranks.items()}
+    block = places[comm.rank]
     windows = blocks.windows(task.camera, task.size)
     window = windows.get(block, NOWHERE)
     with together(comm, "the first pass"):
         seen = task.first_pass(block, own.array, window, device)
-    light, order, scattered, ambient = None, None, None, None
+    order, scattered, ambient = None, None, None
     summaries = comm.gather(seen._replace(slabs={}))
     with together(comm, "the light"):
         if comm.rank == 0:
@@ -130,7 +131,7 @@ def generate_on_mpi(
             order = list(found)
             if task.occlusion is not None:
                 ambient = task.ambient([each.opacities for each in of_blocks.values()], device)
-            scattered = [found.get({r: at for at, r in ranks.items()}[r]) for r in range(comm.size)]
+            scattered = [found.get(places[r]) for r in range(comm.size)]
     light = comm.scatter(scattered)
     order, ambient = comm.bcast((order, ambient))
     parts = _exchanged(comm, task, block, ranks, seen.slabs)

@@ -173,13 +173,12 @@ class Task:
                 )
         step = checked_sample_distance(grid, options.sample_distance)
         unit = transfer_function.unit_distance or grid.default_unit_distance
-        changes: dict[str, Any] = {"sample_distance": step}
         return cls(
             blocks,
             camera,
             size,
             transfer_function.replace(unit_distance=unit),
-            GenerationOptions.of(options, changes),
+            GenerationOptions.of(options, {"sample_distance": step}),
             scalar_range,
         )
 
@@ -201,7 +200,7 @@ class Task:
         slabs = self.halo.slabs(values)
         ends: dict[tuple[int, int] | None, Ends] = {None: ends_of(values)}
         ends.update((side, ends_of(slab)) for side, slab in slabs.items())
-        seen = Seen(None, slabs, ends, self.blocks.ranges(block, values))
+        seen = Seen(None, slabs, ends, self.blocks.ranges(values))
         occlusion = self.occlusion
         if not (window.pixels or occlusion) or not self.may_be_visible(*seen.ends[None]):
             return seen

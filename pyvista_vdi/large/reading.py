@@ -1,4 +1,4 @@
-"""Which chunks are read at all: none of which nothing shows, and none that are constant."""
+"""Which chunks are read at all: none of which nothing shows, and none that are known."""
 
 from __future__ import annotations
 
@@ -89,13 +89,16 @@ class Plan:
         """Plan the reading for a task.
 
         A chunk whose values lie in a range of which nothing shows, in the cells to its neighbours
-        neither, may have any value of the range. A constant chunk has its own.
+        neither, may have any value of the range. A constant chunk has its own; one of floats may
+        have NaN beside it, which ranges leave out.
         """
         if ranges is None:
             return cls(array, task.blocks)
         low, high = ranges
         around = task.may_be_visible(_around(np.fmin, low), _around(np.fmax, high))
-        constant = (low == high) | np.isnan(low)
+        constant = np.isnan(low)
+        if array.dtype.kind != "f":
+            constant |= low == high
         return cls(array, task.blocks, around & ~constant, low)
 
     def read(self, block: Indices) -> Read:

@@ -80,7 +80,7 @@ def test_ranges_of_chunks_come_together_and_apart():
     values[:4, :5] = np.nan
     blocks = Blocks.of(Volume(values), (4, 5, 6), 4, 8 * 10 * 12 * 4)
     low, high = blocks.to_chunks(
-        {block: blocks.ranges(block, values[blocks.own(block)]) for block in blocks}
+        {block: blocks.ranges(values[blocks.own(block)]) for block in blocks}
     )
     assert low.shape == (4, 4, 3)
     np.testing.assert_array_equal(low[3, 1, 2], values[12:, 5:10, 12:].min())
@@ -330,7 +330,7 @@ def test_known_ranges_leave_blocks_unread():
     blocks = task.blocks
     windows = blocks.windows(camera, WINDOW)
     ranges = blocks.to_chunks(
-        {block: blocks.ranges(block, volume.array[blocks.own(block)]) for block in blocks}
+        {block: blocks.ranges(volume.array[blocks.own(block)]) for block in blocks}
     )
     some = task.to_read(windows, ranges)
     assert 0 < len(some) < len(blocks) == len(task.to_read(windows, None))
@@ -383,6 +383,32 @@ def test_what_nothing_shows_of_is_read_once(default_runtime, interpolation):
         np.testing.assert_array_equal(getattr(made[0], name), getattr(made[1], name), name)
     whole = generate_vdi(Volume(values), camera, WINDOW, function)
     np.testing.assert_allclose(ray_depths(made[1]), ray_depths(whole), rtol=2.4e-5, atol=1e-7)
+
+
+def test_nan_beside_one_value_stays_nan(default_runtime):
+    """Ranges leave NaN out: a chunk of NaN and one value is read all the same."""
+    values = np.full((24, 24, 24), np.nan, np.float32)
+    values[4:20, 6:18, 3:12] = 7
+    volume = Volume(Store(values))
+    function = TransferFunction(np.ones((2, 3)), [0.3, 0.3], (0, 10))
+    camera = VIEWS["all of it"](volume)
+    vdis = [generate_chunked(volume, camera, WINDOW, function, block_bytes=1) for _ in range(2)]
+    assert vdis[1].equals(vdis[0])
+    assert vdis[1].metadata["points_read"] < vdis[0].metadata["points_read"]  # of NaN alone
+
+
+def test_ranges_are_of_the_array_s_own_chunks(default_runtime):
+    values = np.zeros((24, 24, 24), np.uint8)
+    values[4:20, 6:18, 3:12] = 100
+    volume = Volume(Store(values))
+    function = TransferFunction(np.ones((2, 3)), [0, 0.3], (0, 255))
+    camera = VIEWS["all of it"](volume)
+    generate_chunked(volume, camera, WINDOW, function, chunks=(12, 12, 12), block_bytes=1)
+    assert volume.chunks.ranges() is None
+    generate_chunked(volume, camera, WINDOW, function, block_bytes=1)
+    assert volume.chunks.ranges()[0].shape == (3, 3, 3)
+    other = generate_chunked(volume, camera, WINDOW, function, chunks=(12, 12, 12), block_bytes=1)
+    assert other.metadata["points_read"] > values.size
 
 
 @pytest.mark.parametrize(("radius", "view"), [(6.0, "all of it"), (20.0, "from inside")])
