@@ -11,7 +11,7 @@ from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDI
 from pyvista_vdi.io.deep_exr import files as exr
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import layout, reader, writer
-from pyvista_vdi.io.vdi_file.chunks import CODECS
+from pyvista_vdi.io.vdi_file.chunks import CODECS, check_level
 from pyvista_vdi.io.vdi_file.layout import DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.whole_file import check_writable, with_suffix
@@ -76,6 +76,8 @@ def write(
     """
     target = checked_target(path)
     check_write_options(target, options)
+    if options.get("level", 0) is None:  # as where it is not given
+        del options["level"]
     if _is_exr(target):
         return exr.write(vdi, target, progress=progress, **options)
     if _is_vti(target):
@@ -219,14 +221,13 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
     else:
         names = (*names, "precision")
     _check_names("written", path, options, names)
-    compression, level = options.get("compression", compressions[0]), options.get("level", 1)
+    compression, level = options.get("compression", compressions[0]), options.get("level")
     if compression not in compressions:
         known = f"one of {', '.join(compressions[:-1])} and " if compressions[1:] else ""
         raise InvalidArgumentError(
             f"compression of {path} must be {known}{compressions[-1]}; got {compression!r}"
         )
-    if isinstance(level, bool) or not isinstance(level, int) or not 1 <= level <= 9:
-        raise InvalidArgumentError(f"level must be a whole number from 1 to 9; got {level!r}")
+    check_level(level)
     if options.get("precision") is not None:
         check_precision(options["precision"])
 

@@ -300,8 +300,12 @@ def _open_hdf5(path: str, inner: str) -> Store:
         if isinstance(node, h5py.Dataset) and node.ndim > 2:
             found[name] = node
 
-    file.visititems(visit)
-    return _of_array(path, _only(path, inner, found), "HDF5")
+    try:
+        file.visititems(visit)
+        return _of_array(path, _only(path, inner, found), "HDF5")
+    except BaseException:
+        file.close()  # whoever keeps the error would keep it from being written
+        raise
 
 
 def _only(path: str, inner: str, found: Mapping[str, Any]) -> tuple[str, Any]:
@@ -321,11 +325,7 @@ def _of_array(path: str, named: tuple[str, Any], kind: str) -> Store:
     """Return an array that stands by itself, with what its attributes say of its voxels."""
     name, array = named
     axes = _axis_names(array)
-    if axes[-3:] != ("z", "y", "x"):
-        raise UnsupportedError(
-            f"{path}::{name} has the axes {', '.join(axes)}: the last three must be z, y, x; give "
-            "pyvista_vdi.Volume a transposed dask array instead"
-        )
+    _check_axes(f"{path}::{name}", axes)
     attributes = dict(array.attrs)
     unit, spacing = "", attributes.get("spacing")
     if "element_size_um" in attributes:
@@ -340,10 +340,19 @@ def _of_array(path: str, named: tuple[str, Any], kind: str) -> Store:
     return Store(path, (Level(name, array, grid),), axes, unit, (), kind)
 
 
+def _check_axes(path: str, axes: tuple[str, ...]) -> None:
+    if axes[-3:] != ("z", "y", "x"):
+        raise UnsupportedError(
+            f"{path} has the axes {', '.join(axes)}: the last three must be z, y, x; give "
+            "pyvista_vdi.Volume a transposed dask array instead"
+        )
+
+
 def _axis_names(array: Any) -> tuple[str, ...]:
     """Return the names that zarr 3, xarray or HDF5 have for an array's axes, or OME's order."""
     names: Any = getattr(getattr(array, "metadata", None), "dimension_names", None)
-    names = names or array.attrs.get("_ARRAY_DIMENSIONS") or [d.label for d in _dims(array)]
+    names = names or array.attrs.get("_ARRAY_DIMENSIONS")
+    names = names or [dimension.label for dimension in getattr(array, "dims", ())]
     short = [{"time": "t", "channel": "c"}.get(str(n).lower(), str(n).lower()) for n in names]
     if len(short) == array.ndim and set(short) >= {"z", "y", "x"}:
         return tuple(short)
@@ -352,10 +361,6 @@ def _axis_names(array: Any) -> tuple[str, ...]:
             f"a volume has three axes, before them time and channel; got shape {array.shape}"
         )
     return _AXES[2:] if array.ndim == 3 else _AXES[-array.ndim :]
-
-
-def _dims(array: Any) -> Any:
-    return getattr(array, "dims", ())
 
 
 def _grid(shape: Sequence[int], spacing: Any = None, origin: Any = None) -> Grid:
@@ -399,8 +404,9 @@ def _open_zarr(path: str, inner: str) -> Store:
     if "plate" in described or "well" in described:
         raise UnsupportedError(f"{path} is a plate of many images: open one, such as {path}::A/1/0")
     if "multiscales" not in described:
-        arrays = {name: array for name, array in node.arrays() if array.ndim > 2}
-        return _of_array(path, _only(path, inner and "", arrays), "zarr")
+        before = f"{inner}/" if inner else ""
+        arrays = {before + name: array for name, array in node.arrays() if array.ndim > 2}
+        return _of_array(path, _only(path, "", arrays), "zarr")
     try:
         return _multiscale(path, node, described, "ome" in attributes)
     except _BROKEN as error:
@@ -422,24 +428,15 @@ def _multiscale(path: str, group: Any, described: Mapping[str, Any], in_ome: boo
         )
     kinds = {"time": "t", "channel": "c"}
     axes = tuple(kinds.get(axis.get("type"), axis["name"]) for axis in image["axes"])
-    if axes[-3:] != ("z", "y", "x"):
-        raise UnsupportedError(
-            f"{path} has the axes {', '.join(axes)}: the last three must be z, y, x; give "
-            "pyvista_vdi.Volume a transposed dask array instead"
-        )
+    _check_axes(path, axes)
     units = [axis.get("unit") for axis in image["axes"][-3:]]
     factors, unit = _to_one_unit(path, units)
     levels = []
     for entry in image["datasets"]:
         array = group[entry["path"]]
-        scale, translation = _placed(
-            path,
-            len(axes),
-            [
-                *entry["coordinateTransformations"],
-                *image.get("coordinateTransformations", ()),
-            ],
-        )
+        of_all = image.get("coordinateTransformations", ())
+        steps = [*entry["coordinateTransformations"], *of_all]
+        scale, translation = _placed(path, len(axes), steps)
         grid = _grid(array.shape[-3:], scale[-3:] * factors, translation[-3:] * factors)
         levels.append(Level(entry["path"], array, grid))
     names = [channel.get("label") for channel in described.get("omero", {}).get("channels", ())]

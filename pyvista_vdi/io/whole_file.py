@@ -48,7 +48,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         _sync_folder(target.parent)
     except BaseException as error:
         temporary.unlink(missing_ok=True)
-        if isinstance(error, OSError) and not isinstance(error, VDIFileError):
+        if isinstance(error, OSError):
             raise VDIFileError(f"{target} could not be written: {_reason(error)}") from error
         raise
 

@@ -107,13 +107,6 @@ class Codes:
         }
         return offsets, packed_8(self.step, offsets, stored, max(1, len(gaps)))
 
-    def same(self, other: Codes) -> bool:
-        """Whether all codes are equal."""
-        return self.step == other.step and all(
-            np.array_equal(getattr(self, name), getattr(other, name))
-            for name in ("counts", "origins", "strides", "front", "back", "tau", "color")
-        )
-
 
 @dataclass(frozen=True)
 class Tables:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVDIError
+from pyvista_vdi.io.vdi_file.chunks import smallest
 from pyvista_vdi.model.packing import TAU_CODES, Packed8
 from pyvista_vdi.series.codes import (
     ENTRIES,
@@ -132,7 +133,7 @@ def encoded(
     gap[1:] -= back[:-1]
     gap[view.first] = front[view.first]
     length = back - front
-    arrays["gap"], arrays["length"] = _narrow(gap[~kept]), _narrow(length[~kept])
+    arrays["gap"], arrays["length"] = smallest(gap[~kept]), smallest(length[~kept])
 
     # The last face: at a whole sample, or where it was
     guessed = _codes_at(back, unit, view)
@@ -173,10 +174,8 @@ def encoded(
         by_it = (how & HOW) >= PLACED
         base[by_it] = before.codes.counts[by_it]
     difference = codes.counts - base
-    arrays["counts"] = np.where(
-        how[coded] & 2, _folded(difference[coded], wide=True), difference[coded]
-    )
-    arrays["counts"] = _narrow(arrays["counts"])
+    written = difference[coded]
+    arrays["counts"] = smallest(np.where(how[coded] & 2, _folded(written), written))
     arrays["how"] = how
     read = media.put_into(codes, view, same, None if before is None else before.codes)
     return Stepped(read, step.tables, step.samples, step.window_size), arrays
@@ -654,22 +653,14 @@ def _opacities_near(one: Integers, other: Integers, tolerance: float) -> NDArray
 # -- numbers ---------------------------------------------------------------------------------------
 
 
-def _folded(values: Integers, wide: bool = False) -> NDArray[Any]:
+def _folded(values: Integers) -> NDArray[Any]:
     """Return 0, -1, 1, -2, 2 … as 0, 1, 2, 3, 4 …, in the shortest type."""
-    folded = values << 1 ^ values >> 63
-    return folded if wide else _narrow(folded)
+    return smallest(values << 1 ^ values >> 63)
 
 
 def unfolded(values: NDArray[Any]) -> NDArray[Any]:
     """Return 0, -1, 1, -2, 2 … of 0, 1, 2, 3, 4 …; of a signed type."""
     return values >> 1 ^ -(values & 1)
-
-
-def _narrow(values: Integers) -> NDArray[Any]:
-    """Return whole numbers >= 0 in the shortest unsigned type that holds them."""
-    largest = int(values.max(initial=0))
-    kind = next(k for k in ("|u1", "<u2", "<u4", "<u8") if largest <= np.iinfo(k).max)
-    return values.astype(kind)
 
 
 def _long(arrays: Arrays, name: str, n: Any) -> Integers:

@@ -126,6 +126,8 @@ class StepMaker:
         Name of the caller's function, for messages.
     camera, window_size, device
         As for :func:`generate_series`.
+    default_precision : str
+        Of the VDIs, unless it is given or a dial chooses it.
     **given
         The options, as there.
     """
@@ -135,6 +137,7 @@ class StepMaker:
         function: str,
         camera: Any,
         window_size: Sequence[int],
+        default_precision: str = "8-byte",
         *,
         device: Any = None,
         **given: Any,
@@ -151,7 +154,7 @@ class StepMaker:
         self._dial = Dial.of(*[dial.get(name) for name in _DIAL])  # type: ignore[arg-type]
         options = {n: given[n] for n in _OPTIONS if n in given}
         if self._dial is None:
-            options.setdefault("precision", "8-byte")
+            options.setdefault("precision", default_precision)
         self._options = GenerationOptions(**options)
         self._grid = {n: given[n] for n in _GRID if given.get(n) is not None}
         self._table: TransferFunction | None = None

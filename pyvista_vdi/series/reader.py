@@ -67,6 +67,7 @@ _CONTRADICTIONS = (
     IndexError,
     InvalidVDIError,
     KeyError,
+    RecursionError,
     TypeError,
     ValueError,
 )
@@ -180,11 +181,12 @@ class StepsReader(Sequence[VDI]):
                 if str(path).lower().endswith(_PAGE)
                 else self._path.open("rb")
             )
+            weakref.finalize(self, self._stream.close)
+            self._file_bytes = self._stream.seek(0, os.SEEK_END)
         except (OSError, ValueError, TypeError) as error:
             raise VDIFileError(
                 f"{path!s} cannot be read: {getattr(error, 'strerror', None) or error}"
             ) from error
-        weakref.finalize(self, self._stream.close)
         self._lock = Lock()
         self._steps = _Recent[Stepped](_KEPT_STEPS)
         self._vdis = _Recent[VDI](self._KEPT_VDIS)
@@ -193,7 +195,6 @@ class StepsReader(Sequence[VDI]):
         #: How many steps have been decoded so far.
         self.n_decoded = 0
         try:
-            self._file_bytes = self._stream.seek(0, os.SEEK_END)
             self._head, begin = self._read_head()
             self._codec = str(self._head["codec"])
             frames = self._indexed(begin)
@@ -206,9 +207,6 @@ class StepsReader(Sequence[VDI]):
                     f"{self._path} has no finished {self._PART}: it was cut off, or none is "
                     "written yet"
                 )
-        except OSError as error:
-            self._stream.close()
-            raise VDIFileError(f"{path!s} cannot be read: {error.strerror}") from error
         except BaseException:
             self._stream.close()
             raise
@@ -245,7 +243,7 @@ class StepsReader(Sequence[VDI]):
 
     def info(self) -> SeriesInfo:
         """Return what the file says about itself, without the steps' arrays."""
-        camera, window_size, bounds, metadata = self._checked(0, self._described(0))
+        camera, window_size, bounds, metadata, _ = self._checked(0)
         return SeriesInfo(
             path=self._path,
             format_version=self._version,
@@ -387,9 +385,12 @@ class StepsReader(Sequence[VDI]):
         )
 
     def _bytes_at(self, place: int, n: int) -> bytes:
-        with self._lock:
-            self._stream.seek(place)
-            return self._stream.read(n)
+        try:
+            with self._lock:
+                self._stream.seek(place)
+                return self._stream.read(n)
+        except OSError as error:
+            raise VDIFileError(f"{self._path} cannot be read: {error.strerror}") from error
 
     def _content(self, i: int) -> memoryview:
         known = self._contents.get(i)
@@ -412,14 +413,13 @@ class StepsReader(Sequence[VDI]):
         """Return a step, the steps that it is written by decoded where they are not at hand."""
         header = self._frames[i][1]
         try:
-            _, data = self._text(i)
             source = i
             while self._frames[source][1].kind == layout.AGAIN:
                 source = self._place_of(self._frames[source][1].by, header.number)
-            camera, window_size, bounds, metadata = self._checked(i, self._described(i))
-            origin = number(self._described(i)["depth_origin"])
+            camera, window_size, bounds, metadata, origin = self._checked(i)
             if self._frames[source][1].kind == layout.VDI_FILE:
-                vdi = self._vdi_in(source, data if source == i else self._content(source))
+                self.n_decoded += 1
+                vdi = vdi_reader.read(self._path, stream=self._file_in(source))
                 if source == i:
                     return vdi
                 again = VDI(
@@ -451,11 +451,9 @@ class StepsReader(Sequence[VDI]):
         except (*_CONTRADICTIONS, VDIError) as error:
             self._refuse(f"{self._PART} {header.number} holds no valid VDI: {error}")
 
-    def _vdi_in(self, i: int, data: memoryview) -> VDI:
-        """Return the VDI of a frame that holds a whole file."""
-        content = layout.read_arrays(data, "none")["vdi"]
-        self.n_decoded += 1
-        return vdi_reader.read(self._path, stream=BytesIO(content.tobytes()))
+    def _file_in(self, i: int) -> BytesIO:
+        """Return the whole .vdi file that a frame holds."""
+        return BytesIO(layout.read_arrays(self._content(i), "none")["vdi"].tobytes())
 
     def _step(self, i: int) -> Stepped:
         """Return a decoded step of lists: the ones that it needs first."""
@@ -477,9 +475,11 @@ class StepsReader(Sequence[VDI]):
     def _step_by(self, i: int, before: Stepped | None) -> Stepped:
         header, data = self._frames[i][1], self._content(i)
         if header.kind != layout.LISTS:
-            raise InvalidVDIError(f"step {header.number} is none that others are written by")
+            raise InvalidVDIError(
+                f"{self._PART} {header.number} is none that others are written by"
+            )
         text, arrays = layout.read_text(data)[0], layout.read_arrays(data, self._codec)
-        window_size = self._checked(i, self._described(i))[1]
+        window_size = self._checked(i)[1]
         if before is None:
             samples, tables = _samples(text["samples"]), _tables(arrays)
         else:
@@ -501,33 +501,29 @@ class StepsReader(Sequence[VDI]):
 
     def _place_of(self, step: int, needed_by: int) -> int:
         """Return where a step's frame stands among those that were found."""
-        numbers = [header.number for _, header in self._frames]
-        k = bisect_left(numbers, step)
-        if k == len(numbers) or numbers[k] != step:
+        k = bisect_left(self._frames, step, key=lambda frame: frame[1].number)
+        if k == len(self) or self._frames[k][1].number != step:
             self._refuse(
                 f"{self._PART} {needed_by} is written by {self._PART} {step}, which cannot be found"
             )
         return k
 
-    def _text(self, i: int) -> tuple[dict[str, Any], memoryview]:
-        data = self._content(i)
-        return layout.read_text(data)[0], data
-
     def _described(self, i: int) -> dict[str, Any]:
         """Return a step's description: its own, or that of the step that it is written by."""
-        passed = []
+        passed: list[int] = []
+        found: Any
         while i not in self._descriptions:
             passed.append(i)
             header = self._frames[i][1]
             try:
-                text, data = self._text(i)
                 if header.kind == layout.VDI_FILE:
-                    text["description"] = self._of_file(data)
-            except (DamagedChunkError, ValueError, KeyError) as error:
-                if isinstance(error, VDIFileError):
-                    raise
+                    found = self._of_file(i)
+                else:
+                    found = layout.read_text(self._content(i))[0].get("description")
+            except VDIFileError:
+                raise
+            except _CONTRADICTIONS as error:
                 self._refuse(f"{self._PART} {header.number}: {error}")
-            found = text.get("description")
             if found is not None:
                 if not isinstance(found, dict):
                     self._refuse(f"{self._PART} {header.number} is not described")
@@ -541,10 +537,9 @@ class StepsReader(Sequence[VDI]):
             self._descriptions[k] = found
         return found
 
-    def _of_file(self, data: memoryview) -> dict[str, Any]:
+    def _of_file(self, i: int) -> dict[str, Any]:
         """Return the description of a frame that holds a whole file."""
-        content = layout.read_arrays(data, "none")["vdi"]
-        info = vdi_reader.read_info(self._path, stream=BytesIO(content.tobytes()))
+        info = vdi_reader.read_info(self._path, stream=self._file_in(i))
         return {
             "window_size": info.window_size,
             "camera": info.camera.to_dict(),
@@ -554,9 +549,10 @@ class StepsReader(Sequence[VDI]):
         }
 
     def _checked(
-        self, i: int, found: dict[str, Any]
-    ) -> tuple[Camera, tuple[int, int], tuple[float, ...], dict[str, Any]]:
-        """Return camera, window, bounds and metadata of a description."""
+        self, i: int
+    ) -> tuple[Camera, tuple[int, int], tuple[float, ...], dict[str, Any], float]:
+        """Return a step's camera, window, bounds, metadata and depth origin."""
+        found = self._described(i)
         try:
             if not isinstance(found["metadata"], dict):
                 raise TypeError("metadata are a dictionary")
@@ -565,6 +561,7 @@ class StepsReader(Sequence[VDI]):
                 check_window_size(found["window_size"]),
                 tuple(number(bound) for bound in found["bounds"]),
                 found["metadata"],
+                number(found["depth_origin"]),
             )
         except (VDIError, KeyError, TypeError, ValueError, OverflowError) as error:
             self._refuse(

@@ -8,7 +8,6 @@ import os
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -18,7 +17,7 @@ from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import writer as vdi_writer
-from pyvista_vdi.io.vdi_file.chunks import CODECS
+from pyvista_vdi.io.vdi_file.chunks import CODECS, check_level
 from pyvista_vdi.io.vdi_file.description import describe
 from pyvista_vdi.io.whole_file import check_writable, whole_file, with_suffix
 from pyvista_vdi.model.packing import check_precision
@@ -111,10 +110,9 @@ class SeriesWriter:
                 "nor options of generation"
             )
         if camera is not None and window_size is not None:
-            options = {"precision": precision, **options}
-            if any(n in options for n in ("quality", "target_ssim", "target_fps", "max_bytes")):
-                del options["precision"]  # the dial's to choose
-            self._make = StepMaker("SeriesWriter", camera, window_size, device=device, **options)
+            self._make = StepMaker(
+                "SeriesWriter", camera, window_size, precision, device=device, **options
+            )
         self._steps = StepsWriter(precision, tolerance, key_every, compression, level)
         self.path = check_writable(with_suffix(Path(path), (layout.SUFFIX,), "a series"))
         with whole_file(self.path) as stream:
@@ -157,7 +155,6 @@ class SeriesWriter:
         begin = self._stream.tell()
         try:
             self._steps.write(self._stream, step, time)
-            self._stream.flush()
         except OSError as error:
             self._undo(begin)
             raise VDIFileError(
@@ -184,12 +181,7 @@ class SeriesWriter:
     def __enter__(self) -> SeriesWriter:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __len__(self) -> int:
@@ -283,12 +275,9 @@ class StepsWriter:
             raise InvalidArgumentError(
                 f"compression must be one of {', '.join(CODECS)} and none; got {compression!r}"
             )
-        if level is not None and (
-            isinstance(level, bool) or not isinstance(level, int) or not 1 <= level <= 9
-        ):
-            raise InvalidArgumentError(f"level must be a whole number from 1 to 9; got {level!r}")
+        check_level(level)
         self._tolerance, self._key_every = float(tolerance), key_every
-        self._codec = compression
+        self._codec, self._asked_level = compression, level
         self._level = _LEVELS[compression] if level is None else level
         self._entries: list[bytes] = []
         self._last_time: float | None = None
@@ -340,6 +329,7 @@ class StepsWriter:
         ).to_bytes()
         begin = stream.tell()
         stream.write(header + new.content)
+        stream.flush()  # what cannot be written is no step
         self._entries.append(layout.ENTRY.pack(begin) + header)
         self._last_time = time
         new.content = b""
@@ -402,7 +392,7 @@ class StepsWriter:
     def _file(self, new: _Known) -> _Known:
         """Return a step as a .vdi file within the file."""
         stream = io.BytesIO()
-        vdi_writer.write_to(stream, new.vdi, self._codec, coarse=False)
+        vdi_writer.write_to(stream, new.vdi, self._codec, self._asked_level, coarse=False)
         array: NDArray[Any] = np.frombuffer(stream.getbuffer(), np.uint8)
         return self._framed(new, None, {"vdi": array}, layout.VDI_FILE)
 

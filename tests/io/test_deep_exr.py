@@ -394,6 +394,8 @@ def test_samples_without_thickness(with_back, tmp_path):
     assert vdi.optical_depth[0] == pytest.approx(np.log(2))
     with pytest.raises(InvalidArgumentError, match="thickness must be a positive length"):
         pvdi.read(path, thickness=-1)
+    with pytest.raises(InvalidArgumentError, match="thickness must be .* got 'thin'"):
+        pvdi.read(path, thickness="thin")
 
 
 def test_unsorted_and_overlapping_samples_are_tidied(tmp_path):
@@ -591,6 +593,21 @@ def test_a_window_larger_than_the_file(file):
     assert _peak_of_refusal(file, "it ends within its header|scan line") < 2**21
     file.write_bytes(data.replace(box, struct.pack("<4i", 0, 0, 2**31 - 1, 2**31 - 1)))
     assert _peak_of_refusal(file, "its dataWindow is 2147483648 x 2147483648") < 2**21
+
+
+def test_a_line_that_does_not_unpack_is_named(tmp_path):
+    vdi = VDI(VIEW, (1, 3), [0, 0, 1, 99], np.arange(1.0, 100), np.arange(2.0, 101),
+              np.full((99, 3), 0.5), np.ones(99), BOX)  # fmt: skip
+    path = vdi.save(tmp_path / "a.exr", exact=False)
+    data = bytearray(path.read_bytes())
+    offset = exr_layout._Image(path)._at  # where the table of scan lines begins
+    (at,) = struct.unpack_from("<Q", data, offset)  # the upper line
+    sums, packed = struct.unpack_from("<QQ", data, at + 4)
+    begin = at + 28 + sums
+    data[begin : begin + packed] = bytes(packed)
+    path.write_bytes(data)
+    with pytest.raises(VDIFileError, match="scan line 0 does not hold"):
+        pvdi.read(path)
 
 
 def test_more_samples_than_the_file_can_hold(tmp_path):

@@ -120,6 +120,17 @@ def test_a_damaged_file_is_as_none(store, damage):
     assert_same(pvdi.open_volume(store).array.ranges(), VALUES)
 
 
+def test_no_changed_byte_keeps_a_store_from_being_opened(store):
+    pvdi.open_volume(store).finite_range()
+    (file,) = kept(store)
+    whole = file.read_bytes()
+    for place in range(0, len(whole), 3):
+        file.write_bytes(whole[:place] + bytes([whole[place] ^ 0x55]) + whole[place + 1 :])
+        found = pvdi.open_volume(store).array.ranges()
+        if found is not None:
+            assert_same(found, VALUES)
+
+
 def test_they_move_with_their_store(store, tmp_path):
     pvdi.open_volume(store).finite_range()
     shutil.move(store.parent, tmp_path / "moved")

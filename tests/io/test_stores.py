@@ -274,6 +274,11 @@ def test_zarr_array_and_group(tmp_path):
     group["b"].attrs["spacing"] = [3.0, 2.0, 1.0]
     with pytest.raises(InvalidVolumeError, match=r"holds several: open one of .*x\.zarr::a, "):
         pvdi.open_volume(tmp_path / "x.zarr")
+    deep = group.create_group("deep")
+    for name in ("c", "d"):
+        zarr.open(str(tmp_path / "x.zarr" / "deep" / name), mode="w", shape=(4, 4, 4), dtype="u2")
+    with pytest.raises(InvalidVolumeError, match=r"open one of .*x\.zarr::deep/c, .*::deep/d"):
+        pvdi.open_volume(f"{tmp_path}/x.zarr::{deep.path}")
     for path in (f"{tmp_path}/x.zarr::b", tmp_path / "x.zarr" / "b"):
         volume = pvdi.open_volume(path)
         assert volume.spacing == (1.0, 2.0, 3.0)
@@ -300,8 +305,10 @@ def test_hdf5(tmp_path):
         three = file.create_dataset("three", data=VALUES[:, 0])
         for label, dimension in zip("tzyx", three.dims, strict=True):
             dimension.label = label
-    with pytest.raises(InvalidVolumeError, match=r"holds several.*x\.h5::deep/one"):
+    with pytest.raises(InvalidVolumeError, match=r"holds several.*x\.h5::deep/one") as kept:
         pvdi.open_volume(path)
+    with h5py.File(path, "a"):
+        assert kept.value  # which holds no file open
     with pytest.raises(InvalidVolumeError, match=r"no array 'four'"):
         pvdi.open_volume(f"{path}::/four")
     with pytest.raises(UnsupportedError, match="z, t, y, x: the last three"):

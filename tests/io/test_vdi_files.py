@@ -171,6 +171,13 @@ def test_compression_makes_smaller_files(tmp_path):
     assert sizes[0] < 0.9 * sizes[1]
 
 
+@pytest.mark.parametrize("suffix", ["vdi", "exr", "html"])
+def test_no_level_is_the_usual_one(suffix, tmp_path):
+    path = tmp_path / f"a.{suffix}"
+    usual = small_vdi().save(path).read_bytes()
+    assert small_vdi().save(path, level=None).read_bytes() == usual
+
+
 def test_save_takes_text_and_overwrites(tmp_path):
     path = str(tmp_path / "a.vdi")
     small_vdi(1).save(path)

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 import warnings
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -207,6 +208,68 @@ def test_many_threads_read_at_once(steps, saved):
 
 
 # -- while it is written, and afterwards -----------------------------------------------------------
+
+
+def _of_frames(path, saved, kind, text, content=b""):
+    """A file with one frame, whose checksums fit whatever it says."""
+    begin = reader.StepsReader(saved)._frames[0][0]
+    packed = zlib.compress(text)
+    body = len(packed).to_bytes(4, "little") + bytes(4) + packed + content
+    header = layout.FrameHeader(layout.STEP, 0, kind, -1, 0.0, len(body), zlib.crc32(body))
+    path.write_bytes(saved.read_bytes()[:begin] + header.to_bytes() + body)
+    return path
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"[" * 100_000,
+        b'{"arrays": {"vdi": 5}}',
+        b'{"arrays": {"vdi": ["|u1", []]}}',
+        b'{"arrays": {}}',
+    ],
+    ids=["nested", "no array", "no length", "nothing"],
+)
+@pytest.mark.parametrize("kind", [layout.VDI_FILE, layout.LISTS])
+def test_frames_that_say_nonsense_are_refused(kind, text, saved, tmp_path):
+    with pytest.raises(VDIFileError, match="step 0"):
+        pvdi.read(_of_frames(tmp_path / "a.vdis", saved, kind, text))[0]
+
+
+def test_a_disk_that_fails_while_a_step_is_read_is_named(saved):
+    steps = reader.StepsReader(saved)
+
+    class Broken:
+        def seek(self, _):
+            raise OSError(5, "Input/output error")
+
+    steps._stream = Broken()
+    with pytest.raises(VDIFileError, match=r"a\.vdis cannot be read: Input/output error"):
+        steps[3]
+
+
+@pytest.mark.parametrize("precision", ["exact", "8-byte"])
+def test_the_level_is_that_of_whole_files_too(precision, tmp_path):
+    made = VDISeries.of([stepped_vdi(size=(64, 36))])
+    sizes = [
+        made.save(tmp_path / "a.vdis", precision=precision, compression="deflate", level=level)
+        .stat()
+        .st_size
+        for level in (1, 9)
+    ]
+    assert sizes[0] > sizes[1]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+def test_a_step_that_does_not_fit_is_not_counted(tmp_path):
+    steps = [stepped_vdi(step=k, size=(6, 4)).with_precision("8-byte") for k in range(2)]
+    with pvdi.SeriesWriter(tmp_path / "a.vdis") as out:
+        out.append(steps[0])
+        with out._stream, Path("/dev/full").open("r+b") as full:
+            out._stream = full
+            with pytest.raises(VDIFileError, match="its 1 steps can be read"):
+                out.append(steps[1])
+    assert len(out) == 1
 
 
 def test_what_was_appended_is_readable_at_once(steps, tmp_path):

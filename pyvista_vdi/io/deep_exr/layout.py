@@ -436,7 +436,8 @@ class _Image:
 
         def unpack(row: int) -> None:
             packed, size = chunks[row]
-            data, at = self._unpacked(packed, size, row), 0
+            y = self.attributes["dataWindow"][3] - row
+            data, at = self._unpacked(packed, size, y), 0
             first, last = ends[row - 1] if row else 0, ends[row]
             for name, kind in self._types.items():
                 end = at + (last - first) * kind.itemsize

@@ -90,18 +90,19 @@ def _image(part: Any, wanted: set[str]) -> DeepImage:
     header, pixels = part.header, {n: c.pixels for n, c in part.channels.items()}
     first = next(iter(pixels.values()))
     lengths = [0 if samples is None else len(samples) for samples in first[::-1].ravel()]
-    attributes = {name: header[name] for name in _ATTRIBUTES if name in header}
+    found = {name: header[name] for name in _ATTRIBUTES if name in header}
+    channels = {name: _joined(array) for name, array in pixels.items()}
     return DeepImage(
         attributes={
             name: value.astype(np.float64) if isinstance(value, np.ndarray) else value
-            for name, value in attributes.items()
+            for name, value in found.items()
         },
         data_window=_box(header["dataWindow"]),
         display_window=_box(header["displayWindow"]),
         compression=header["compression"].name,
-        channel_types={name: _joined(array).dtype for name, array in pixels.items()},
+        channel_types={name: array.dtype for name, array in channels.items()},
         counts=np.array(lengths, np.int64).reshape(first.shape),
-        channels={name: _joined(array) for name, array in pixels.items() if name in wanted},
+        channels={name: array for name, array in channels.items() if name in wanted},
     )
 
 

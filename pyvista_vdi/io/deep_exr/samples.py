@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, VDIWarning
+from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.compositing import optical_depth as optical_depth_of
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH
@@ -131,7 +132,7 @@ def _with_thickness(samples: Samples, thickness: float | None, name: str, half: 
             f"{name} has {int(flat.sum())} samples without a thickness, the first at depth "
             f"{samples.front[k]:g}: {why} them a thickness in world units: read(..., thickness=...)"
         )
-    if not 0 < thickness < np.inf:
+    if not 0 < as_float(thickness) < np.inf:
         raise InvalidArgumentError(f"thickness must be a positive length; got {thickness!r}")
     front = samples.front
     thick = np.maximum(front + np.float32(thickness), np.nextafter(front, np.float32(np.inf)))

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.io.vdi_file.layout import DEFLATE, Layout
 
 #: Compressors that files may name: two of Blosc, and zlib.
@@ -203,6 +204,19 @@ class PackedArray:
 
     def _damaged(self, why: str) -> DamagedChunkError:
         return DamagedChunkError(f"array {self._name!r}: {why}")
+
+
+def check_level(level: Any) -> None:
+    """Raise InvalidArgumentError unless a compressor's effort is None or 1 to 9."""
+    if level is not None and (type(level) is not int or not 1 <= level <= 9):
+        raise InvalidArgumentError(f"level must be a whole number from 1 to 9; got {level!r}")
+
+
+def smallest(values: NDArray[Any]) -> NDArray[Any]:
+    """Return whole numbers >= 0 in the shortest unsigned type that holds them."""
+    largest = int(values.max(initial=0))
+    kind = next(k for k in ("<u1", "<u2", "<u4", "<u8") if largest <= np.iinfo(k).max)
+    return values.astype(kind)
 
 
 def workers() -> ThreadPoolExecutor:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.io.progress import Pieces, Progress
-from pyvista_vdi.io.vdi_file.chunks import DEFAULT_LEVELS, write_chunks
+from pyvista_vdi.io.vdi_file.chunks import DEFAULT_LEVELS, smallest, write_chunks
 from pyvista_vdi.io.vdi_file.description import describe, to_json
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
@@ -96,7 +96,7 @@ def write_to(
     coarse : bool
         Whether a file of version 4 begins with a coarse level.
     """
-    counts = _smallest(np.diff(vdi.offsets))
+    counts = smallest(np.diff(vdi.offsets))
     arrays = layouts(
         vdi.window_size,
         vdi.n_supersegments,
@@ -137,13 +137,6 @@ def _member(name: str) -> zipfile.ZipInfo:
     info.create_system = 3  # the same bytes on every system
     info.external_attr = 0o644 << 16
     return info
-
-
-def _smallest(counts: NDArray[Any]) -> NDArray[Any]:
-    """Return whole numbers >= 0 in the shortest unsigned type that holds them."""
-    largest = int(counts.max(initial=0))
-    kind = next(k for k in ("<u1", "<u2", "<u4", "<u8") if largest <= np.iinfo(k).max)
-    return counts.astype(kind)
 
 
 def _described(vdi: VDI, arrays: Mapping[str, Layout], codec: str) -> str:
