@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+import operator
 import os
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.large.on_mpi import generate_on_mpi, mpi
+from pyvista_vdi.large.on_mpi import generate_on_mpi, mpi, together
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.options import GenerationOptions
@@ -91,11 +92,11 @@ class InSitu:
     ) -> None:
         if comm is None:
             comm = mpi().COMM_WORLD
-        if every < 1:
+        if not as_float(every) >= 1:
             raise InvalidArgumentError(f"every must be 1 or more steps; got {every!r}")
         self._path, self._comm, self._every, self._device = str(path), comm, every, device
-        self._series = self._path.endswith(".vdis")
-        if not self._series and self._path.format(0) == self._path.format(1):
+        self._series = self._path.lower().endswith(".vdis")
+        if not self._series and not _numbered(self._path):
             raise InvalidArgumentError(
                 f"{self._path!r} is neither a series (x.vdis) nor has it a place for the step's "
                 "number: step_{:04d}.vdi"
@@ -110,7 +111,12 @@ class InSitu:
         self._looks = Classification(looks, "InSitu", _OPTIONS)
         chosen = {name: value for name, value in options.items() if name in _OPTIONS}
         self._options = GenerationOptions(**{"precision": "8-byte", **chosen})
-        x, y, z = (int(n) for n in dimensions)
+        try:
+            x, y, z = (operator.index(n) for n in dimensions)
+        except (TypeError, ValueError) as error:
+            raise InvalidArgumentError(
+                f"dimensions must be three whole numbers, along x, y and z; got {dimensions!r}"
+            ) from error
         of = Volume(np.zeros((2, 2, 2), np.uint8), spacing, origin)  # checks them
         self._grid = Grid((x, y, z), of.spacing, of.origin, of.direction)
         self._function: TransferFunction | None = None
@@ -140,8 +146,9 @@ class InSitu:
             return
         start = time.perf_counter()
         if self._function is None:
-            own = Volume(values, self._grid.spacing, self._grid.origin)
-            self._function = self._looks.transfer_function(own)
+            with together(self._comm, "reading the values"):
+                own = Volume(values, self._grid.spacing, self._grid.origin)
+                self._function = self._looks.transfer_function(own)
         vdi = generate_on_mpi(
             values,
             first,
@@ -154,12 +161,12 @@ class InSitu:
             device=self._device,
             metadata={"classification": self._looks.describe(), "time": at},
         )
-        if vdi is not None:
-            if not self._series:
+        with together(self._comm, f"writing step {number}"):  # or the others would wait for ever
+            if vdi is not None and not self._series:
                 vdi.save(Path(self._path.format(number)))
-            else:
+            elif vdi is not None:
                 if self._writer is None:
-                    self._writer = SeriesWriter(self._path)
+                    self._writer = SeriesWriter(self._path, precision=self._options.precision)
                 self._writer.append(vdi, at)
         self.seconds.append(time.perf_counter() - start)
 
@@ -172,10 +179,13 @@ class InSitu:
     def __enter__(self) -> InSitu:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _numbered(path: str) -> bool:
+    """Whether a name has a place for the number of the step."""
+    try:
+        return path.format(0) != path.format(1)
+    except (IndexError, KeyError, ValueError):  # braces that are none, or more than one
+        return False

@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import math
 import os
-import shutil
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -104,7 +103,7 @@ def write(
                 table = csv.DictWriter(stream, rows[0], lineterminator="\n")
                 table.writeheader()
                 table.writerows(rows)
-            shutil.move(made, target)
+            made.rename(target)
     except OSError as error:
         raise VDIFileError(f"{target} cannot be written: {error.strerror or error}") from error
     return target

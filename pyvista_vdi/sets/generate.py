@@ -196,7 +196,7 @@ def generate_set(
         raise InvalidArgumentError(f"target_ssim must be between 0 and 1; got {target_ssim!r}")
     if max_bytes is not None and not as_float(max_bytes) > 0:
         raise InvalidArgumentError(f"max_bytes must be above 0; got {max_bytes!r}")
-    if not as_float(max_views) >= 1:
+    if not 1 <= as_float(max_views) < math.inf:
         raise InvalidArgumentError(f"max_views must be 1 or more; got {max_views!r}")
     if lists is not None and not 0.05 <= as_float(lists) <= 8:
         raise InvalidArgumentError(f"lists must be 0.05 to 8 per pixel; got {lists!r}")

@@ -46,14 +46,6 @@ def spiral(n: int) -> Floats:
     return np.stack([np.cos(turn) * across, np.sin(turn) * across, z], axis=1)
 
 
-def spacing(n: int) -> float:
-    """Return how far the farthest direction is from n that are spread, degrees."""
-    directions = spread(n)
-    return float(
-        np.degrees(np.arccos((spiral(20 * _POINTS_EACH * n) @ directions.T).max(axis=1).min()))
-    )
-
-
 def orbit(camera: Camera, bounds: Sequence[float], directions: Any) -> list[Camera]:
     """Return views of a volume from directions, world coordinates, as far from it as a view is.
 

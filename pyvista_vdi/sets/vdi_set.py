@@ -303,8 +303,9 @@ class VDISet(Sequence[VDI]):
                 f"set {self.bounds}"
             )
         self._added.append(vdi)
-        self._places = np.concatenate([self._places, self._places_of([vdi.camera])])
         self._cameras = (*self._cameras, vdi.camera)
+        # Last: threads that look for the nearest find no VDI that is not there yet
+        self._places = np.concatenate([self._places, self._places_of([vdi.camera])])
 
     # -- files -----------------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ from PIL import Image
 from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import DeviceError, InvalidArgumentError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.insitu import InSitu
 from pyvista_vdi.model.metrics import compare_images
@@ -132,14 +132,49 @@ def test_one_rank_is_one_piece(tmp_path, default_runtime):
     np.testing.assert_array_equal(found.front, expected.front)
 
 
+@pytest.mark.parametrize("precision", ["exact", "16-byte"])
+def test_a_series_has_the_precision_that_is_asked_for(precision, tmp_path, default_runtime):
+    volume = volume_of("uint8")
+    camera = VIEWS["all of it"](volume)
+    options = {"clim": (0, 200), "precision": precision}
+    path = tmp_path / "RUN.VDIS"
+    with InSitu(path, camera, WINDOW, volume.dimensions, comm=OneRank(), **options) as show:
+        show(volume.array, (0, 0, 0), 0.0)
+    found = pvdi.read(path)[0]
+    assert found.precision == precision
+    assert found.n_supersegments > 1000
+
+
+def test_a_step_that_cannot_be_written_is_told_to_all_ranks(tmp_path, default_runtime):
+    volume = volume_of("uint8")
+    camera = VIEWS["all of it"](volume)
+    told = []
+
+    class Told(OneRank):
+        def allgather(self, value):
+            told.append(value)
+            return [value]
+
+    show = InSitu(
+        tmp_path / "none" / "x.vdis", camera, WINDOW, volume.dimensions, comm=Told(), clim=(0, 200)
+    )
+    with pytest.raises(DeviceError, match=r"writing step 0 failed on 1 of 1 ranks.*does not exist"):
+        show(volume.array, (0, 0, 0), 0.0)
+    assert "does not exist" in told[-1]
+
+
 def test_what_is_missing_is_said(tmp_path):
     camera = VIEWS["all of it"](volume_of("uint8"))
     arguments = (camera, WINDOW, (8, 8, 8))
     with pytest.raises(InvalidArgumentError, match="clim"):
         InSitu(tmp_path / "x.vdis", *arguments, comm=OneRank())
-    with pytest.raises(InvalidArgumentError, match="place for the step"):
-        InSitu(tmp_path / "x.vdi", *arguments, comm=OneRank(), clim=(0, 1))
-    with pytest.raises(InvalidArgumentError, match="every"):
-        InSitu(tmp_path / "x.vdis", *arguments, comm=OneRank(), clim=(0, 1), every=0)
+    for name in ("x.vdi", "{}_{}.vdi", "{step}.vdi", "x{.vdi"):
+        with pytest.raises(InvalidArgumentError, match="place for the step"):
+            InSitu(tmp_path / name, *arguments, comm=OneRank(), clim=(0, 1))
+    for every in (0, "often"):
+        with pytest.raises(InvalidArgumentError, match="every"):
+            InSitu(tmp_path / "x.vdis", *arguments, comm=OneRank(), clim=(0, 1), every=every)
+    with pytest.raises(InvalidArgumentError, match="three whole numbers"):
+        InSitu(tmp_path / "x.vdis", camera, WINDOW, (8, 8), comm=OneRank(), clim=(0, 1))
     with pytest.raises(TypeError, match="colour"):
         InSitu(tmp_path / "x.vdis", *arguments, comm=OneRank(), clim=(0, 1), colour="red")
