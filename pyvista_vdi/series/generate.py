@@ -19,7 +19,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, warn_missed
 from pyvista_vdi.quality.probe import generate_by_dial
-from pyvista_vdi.series.series import VDISeries, checked_times
+from pyvista_vdi.series.series import Called, VDISeries, checked_times
 
 _OPTIONS = tuple(field.name for field in dataclasses.fields(GenerationOptions))
 _DIAL = ("quality", "target_ssim", "target_fps", "max_bytes", "target_angle")
@@ -109,7 +109,7 @@ def generate_series(
         warn_missed(vdis[-1], stacklevel=2)
     again: Sequence[Volume] | None = None
     if isinstance(steps, Sized) and hasattr(steps, "__getitem__"):
-        again = _Called(lambda i: make.volume(steps[i]), len(vdis))
+        again = Called(lambda i: make.volume(steps[i]), range(len(vdis)))
     if not vdis:
         raise InvalidArgumentError("there is no step: pass at least one volume")
     series = VDISeries(vdis, range(len(vdis)) if known_times is None else known_times, again)
@@ -234,7 +234,7 @@ def _steps(
             raise InvalidArgumentError(
                 "volumes is a function of the step's index: pass times, one for each step"
             )
-        volumes = _Called(volumes, len(known))
+        volumes = Called(volumes, range(len(known)))
     elif isinstance(volumes, Volume) or hasattr(volumes, "GetClassName"):
         raise InvalidArgumentError(
             "volumes are the steps of a series, got one volume: pass a list, or call generate"
@@ -246,21 +246,6 @@ def _steps(
     if known is not None and hasattr(volumes, "__len__") and len(volumes) != len(known):
         raise InvalidArgumentError(f"there are {len(volumes)} steps and {len(known)} times")
     return volumes, known
-
-
-class _Called(Sequence[Any]):
-    """What a function returns for each index."""
-
-    def __init__(self, function: Callable[[int], Any], n: int) -> None:
-        self._function, self._n = function, n
-
-    def __len__(self) -> int:
-        return self._n
-
-    def __getitem__(self, index: Any) -> Any:
-        if isinstance(index, slice):
-            return [self[i] for i in range(self._n)[index]]
-        return self._function(range(self._n)[index])
 
 
 def _part(progress: Progress | None, step: int, total: int | None) -> Progress | None:

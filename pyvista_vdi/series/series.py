@@ -114,8 +114,8 @@ class VDISeries(Sequence[VDI]):
     def __getitem__(self, index: int | slice) -> VDI | VDISeries:
         if isinstance(index, slice):
             chosen = range(len(self))[index]
-            volumes = None if self.volumes is None else _Chosen(self.volumes, chosen)
-            part = VDISeries(_Chosen(self._steps, chosen), self.times[index], volumes)
+            volumes = None if self.volumes is None else Called(self.volumes.__getitem__, chosen)
+            part = VDISeries(Called(self._steps.__getitem__, chosen), self.times[index], volumes)
             part._maker = self._maker
             return part
         return self._steps[range(len(self))[index]]
@@ -210,18 +210,20 @@ class VDISeries(Sequence[VDI]):
         )
 
 
-class _Chosen(Sequence[Any]):
-    """Some elements of a sequence, taken when they are asked for."""
+class Called(Sequence[Any]):
+    """What a function returns for each of some indices, when it is asked for."""
 
-    def __init__(self, whole: Sequence[Any], chosen: range) -> None:
-        self._whole, self._chosen = whole, chosen
+    def __init__(self, function: Callable[[int], Any], chosen: range) -> None:
+        self._function, self._chosen = function, chosen
 
     def __len__(self) -> int:
         return len(self._chosen)
 
     def __getitem__(self, index: Any) -> Any:
         chosen = self._chosen[index]
-        return _Chosen(self._whole, chosen) if isinstance(index, slice) else self._whole[chosen]
+        return (
+            Called(self._function, chosen) if isinstance(index, slice) else self._function(chosen)
+        )
 
 
 def checked_times(times: Iterable[float]) -> tuple[float, ...]:
