@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
+from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_of
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError
@@ -64,11 +64,6 @@ def test_four_ranks_make_the_vdi_of_the_same_blocks(tmp_path, default_runtime):
     assert np.abs(pictures[0] - pictures[1]).max() <= 1 / 255
     view = turned(camera, volume.bounds, 5)
     assert compare_images(*(pvdi.render(vdi, view) for vdi in (found, whole))).ssim > 0.99
-
-
-def ray_depths(vdi):
-    sums = np.concatenate([[0], np.cumsum(vdi.optical_depth, dtype=np.float64)])
-    return np.diff(sums[vdi.offsets.astype(np.int64)])
 
 
 @needs_mpi

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
+from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_of
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Shading, TransferFunction, Volume
@@ -22,12 +22,6 @@ from pyvista_vdi.quality.probe import turned
 
 HALOS = [Halo(0, 1), Halo(1, 3)]
 CUTS = [(16, 16, 16), (47, 9, 50), (20, 41, 13)]
-
-
-def ray_depths(vdi):
-    """Optical depth of each list."""
-    sums = np.concatenate([[0], np.cumsum(vdi.optical_depth, dtype=np.float64)])
-    return np.diff(sums[vdi.offsets.astype(np.int64)])
 
 
 # -- how a grid is cut ---------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import stepped_vdis
-from stepped_vdis import SIZE, stepped_vdi
+from stepped_vdis import SIZE, damaged, same, stepped_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, VDIWarning
@@ -23,10 +23,6 @@ from pyvista_vdi.series import layout, reader, writer
 from pyvista_vdi.series.series import VDISeries
 
 ARRAYS = ("offsets", "front", "back", "color", "optical_depth")
-
-
-def _same(one, other):
-    return one.equals(other) and one.precision == other.precision and one.metadata == other.metadata
 
 
 @pytest.fixture(scope="module")
@@ -41,14 +37,6 @@ def saved(steps, tmp_path_factory):
     return path
 
 
-def _damaged(path, change):
-    data = bytearray(path.read_bytes())
-    change(data)
-    other = path.with_name("damaged.vdis")
-    other.write_bytes(data)
-    return other
-
-
 # -- what is written is read ----------------------------------------------------------------------
 
 
@@ -59,9 +47,9 @@ def test_every_step_is_read_to_the_last_bit(steps, saved):
     assert (series.camera, series.window_size) == (steps[0].camera, SIZE)
     assert series.bounds == steps[0].bounds
     for read, vdi in zip(series, steps, strict=True):
-        assert _same(read, vdi)
+        assert same(read, vdi)
         assert np.array_equal(read.packing.words, vdi.packing.words)
-    assert _same(series[5:7][1], steps[6])
+    assert same(series[5:7][1], steps[6])
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "deflate", "none"])
@@ -73,7 +61,7 @@ def test_precisions_and_compressions(precision, compression, tmp_path):
     )
     series = pvdi.read(path)
     for read, vdi in zip(series, steps, strict=True):
-        assert _same(read, vdi.with_precision(precision))
+        assert same(read, vdi.with_precision(precision))
 
 
 @pytest.mark.parametrize(
@@ -94,7 +82,7 @@ def test_precisions_and_compressions(precision, compression, tmp_path):
 def test_guesses_that_are_wrong_cost_bytes_and_no_more(changes, tmp_path):
     steps = [stepped_vdi(step=k, **changes).with_precision("8-byte") for k in range(4)]
     series = pvdi.read(VDISeries.of(steps).save(tmp_path / "a.vdis", key_every=8))
-    assert all(_same(read, vdi) for read, vdi in zip(series, steps, strict=True))
+    assert all(same(read, vdi) for read, vdi in zip(series, steps, strict=True))
 
 
 def test_views_windows_and_metadata_may_change_from_step_to_step(tmp_path):
@@ -106,7 +94,7 @@ def test_views_windows_and_metadata_may_change_from_step_to_step(tmp_path):
     told = pvdi.VDI(first.camera, SIZE, **arrays, bounds=first.bounds, metadata={"told": True})
     steps = [v.with_precision("8-byte") for v in (first, moved, empty, empty, first, told, told)]
     series = pvdi.read(VDISeries.of(steps).save(tmp_path / "a.vdis"))
-    assert all(_same(read, vdi) for read, vdi in zip(series, steps, strict=True))
+    assert all(same(read, vdi) for read, vdi in zip(series, steps, strict=True))
 
 
 def test_depths_of_another_grid(tmp_path):
@@ -117,7 +105,7 @@ def test_depths_of_another_grid(tmp_path):
     steps = [v.with_precision("8-byte") for v in (near, far, near)]
     assert steps[0].packing.step != steps[1].packing.step
     series = pvdi.read(VDISeries.of(steps).save(tmp_path / "a.vdis"))
-    assert all(_same(read, vdi) for read, vdi in zip(series, steps, strict=True))
+    assert all(same(read, vdi) for read, vdi in zip(series, steps, strict=True))
 
 
 # -- bytes and seeks -------------------------------------------------------------------------------
@@ -157,7 +145,7 @@ def test_noise_costs_no_more_than_single_files(tmp_path):
         )
     path = VDISeries.of(steps).save(tmp_path / "a.vdis")
     assert path.stat().st_size <= 1.02 * sum(_single_bytes(steps, tmp_path))
-    assert all(_same(read, vdi) for read, vdi in zip(pvdi.read(path), steps, strict=True))
+    assert all(same(read, vdi) for read, vdi in zip(pvdi.read(path), steps, strict=True))
 
 
 def test_a_seek_decodes_three_steps_at_most(tmp_path):
@@ -282,7 +270,7 @@ def test_what_was_appended_is_readable_at_once(steps, tmp_path):
             series = pvdi.read(path)
             assert (len(out), len(series)) == (k + 1, k + 1)
             assert not reader.read_info(path).closed
-            assert all(_same(read, step) for read, step in zip(series, steps, strict=False))
+            assert all(same(read, step) for read, step in zip(series, steps, strict=False))
         with pytest.raises(InvalidArgumentError, match="ascend"):
             out.append(steps[0], 14.0)
         with pytest.raises(InvalidArgumentError, match="camera and window_size"):
@@ -306,7 +294,7 @@ def test_a_writer_takes_volumes(tmp_path, default_runtime):
         for volume in volumes:
             out.append(volume)
     made = pvdi.generate_series(volumes, camera, SIZE, transfer_function=table)
-    assert all(_same(a, b) for a, b in zip(pvdi.read(path), made, strict=True))
+    assert all(same(a, b) for a, b in zip(pvdi.read(path), made, strict=True))
 
 
 def test_every_cut_leaves_the_finished_steps(steps, tmp_path):
@@ -339,7 +327,7 @@ def test_flipped_bytes_are_noticed_and_cost_no_other_step(tmp_path):
     random = np.random.default_rng(0)
     head = reader.StepsReader(path)._frames[0][0]
     for place in random.integers(0, len(data), 150).tolist():
-        flipped = _damaged(path, lambda d, at=place: d.__setitem__(at, d[at] ^ 0x10))
+        flipped = damaged(path, lambda d, at=place: d.__setitem__(at, d[at] ^ 0x10))
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", VDIWarning)
@@ -382,7 +370,7 @@ def test_foreign_and_newer_files_are_named(tmp_path, saved):
         pvdi.read(foreign)
     with pytest.raises(VDIFileError, match="cannot be read"):
         pvdi.read(tmp_path / "absent.vdis")
-    newer = _damaged(saved, lambda d: d.__setitem__(8, 99))
+    newer = damaged(saved, lambda d: d.__setitem__(8, 99))
     with pytest.raises(VDIFileError, match="version 99.*upgrade"):
         pvdi.read(newer)
     foreign.write_bytes(b"")

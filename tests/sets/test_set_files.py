@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from stepped_vdis import stepped_vdi
+from stepped_vdis import damaged, same, stepped_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, VDIWarning
@@ -32,18 +32,6 @@ def saved(vdis, tmp_path_factory):
     return made.save(tmp_path_factory.mktemp("sets") / "a.vdiset")
 
 
-def _same(one, other):
-    return one.equals(other) and one.precision == other.precision and one.metadata == other.metadata
-
-
-def _damaged(path, change):
-    data = bytearray(path.read_bytes())
-    change(data)
-    other = path.with_name("damaged.vdiset")
-    other.write_bytes(data)
-    return other
-
-
 def test_every_view_is_read_to_the_last_bit(vdis, saved):
     read = pvdi.read(saved)
     assert isinstance(read, pvdi.VDISet)
@@ -52,7 +40,7 @@ def test_every_view_is_read_to_the_last_bit(vdis, saved):
     assert (read.window_size, read.bounds) == ((40, 30), vdis[0].bounds)
     assert read.about == {"target_ssim": 0.5}
     for one, other in zip(read, vdis, strict=True):
-        assert _same(one, other)
+        assert same(one, other)
     assert not read.can_grow
 
 
@@ -73,7 +61,7 @@ def test_precisions_and_compressions(precision, compression, vdis, tmp_path):
         tmp_path / "a.vdiset", precision=precision, compression=compression
     )
     for read, vdi in zip(pvdi.read(path), vdis, strict=False):
-        assert _same(read, vdi.with_precision(precision))
+        assert same(read, vdi.with_precision(precision))
 
 
 def test_a_set_that_has_grown_is_written_with_what_it_has(vdis, saved, tmp_path):
@@ -82,8 +70,8 @@ def test_a_set_that_has_grown_is_written_with_what_it_has(vdis, saved, tmp_path)
     read.add(more)
     again = pvdi.read(read.save(tmp_path / "b.vdiset"))
     assert len(again) == 7
-    assert _same(again[6], more)
-    assert _same(again[2], vdis[2])
+    assert same(again[6], more)
+    assert same(again[2], vdis[2])
     again.save(tmp_path / "b.vdiset")  # over what it is read from
 
 
@@ -93,35 +81,35 @@ def test_every_byte_counts(saved):
     rng = np.random.default_rng(0)
     before = list(pvdi.read(saved))
     for at in rng.integers(0, len(content), 60):
-        path = _damaged(saved, lambda data, at=int(at): data.__setitem__(at, data[at] ^ 0x55))
+        path = damaged(saved, lambda data, at=int(at): data.__setitem__(at, data[at] ^ 0x55))
         try:
             read = pvdi.read(path)
             vdis = list(read)
         except (VDIFileError, VDIWarning):
             continue
-        assert all(any(_same(vdi, old) for old in before) for vdi in vdis)
+        assert all(any(same(vdi, old) for old in before) for vdi in vdis)
 
 
 def test_a_file_that_is_cut_off_gives_the_views_that_are_whole(vdis, saved):
     size = saved.stat().st_size
-    path = _damaged(saved, lambda data: data.__delitem__(slice(size * 2 // 3, None)))
+    path = damaged(saved, lambda data: data.__delitem__(slice(size * 2 // 3, None)))
     read = pvdi.read(path)
     assert 1 <= len(read) < 6
     for one, other, camera in zip(read, vdis, read.cameras, strict=False):
-        assert _same(one, other)
+        assert same(one, other)
         assert one.camera == camera
 
 
 def test_a_damaged_view_is_named_and_the_others_are_read(vdis, saved):
     views = files.SetReader(saved)
     place, header = views._frames[3]
-    path = _damaged(
+    path = damaged(
         saved, lambda data: data.__setitem__(place + layout.HEADER_BYTES + header.n_bytes // 2, 7)
     )
     read = pvdi.read(path)
     with pytest.raises(VDIFileError, match="view 3"):
         read[3]
-    assert _same(read[4], vdis[4])
+    assert same(read[4], vdis[4])
 
 
 def _headed(saved, **changes):
@@ -187,4 +175,4 @@ def test_newer_versions_are_named(saved):
         data[8:12] = (layout.FORMAT_VERSION + 1).to_bytes(4, "little")
 
     with pytest.raises(VDIFileError, match="version 2"):
-        pvdi.read(_damaged(saved, newer))
+        pvdi.read(damaged(saved, newer))

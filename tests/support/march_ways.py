@@ -71,3 +71,9 @@ def both_ways(monkeypatch, runtime, name, make):
         patch.setattr(march_step, "_IN_BLOCKS", {})
         expected = make()
     return found, expected, (launches[GROUP // BLOCK_RAYS], launches[GROUP])
+
+
+def ray_depths(vdi):
+    """Optical depth of each list."""
+    sums = np.concatenate([[0], np.cumsum(vdi.optical_depth, dtype=np.float64)])
+    return np.diff(sums[vdi.offsets.astype(np.int64)])

@@ -55,3 +55,17 @@ def stepped_vdi(
         (-10, 10, -10, 10, -10, 10),
         metadata=known if metadata is None else metadata,
     )
+
+
+def same(one, other):
+    """Whether two VDIs are alike to the last bit, and in what they say of themselves."""
+    return one.equals(other) and one.precision == other.precision and one.metadata == other.metadata
+
+
+def damaged(path, change):
+    """Return a copy of a file in which ``change`` has changed the bytes."""
+    data = bytearray(path.read_bytes())
+    change(data)
+    other = path.with_name(f"damaged{path.suffix}")
+    other.write_bytes(data)
+    return other

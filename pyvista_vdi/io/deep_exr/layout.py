@@ -139,7 +139,7 @@ def write_image(
             "a row of lists holds more samples than an OpenEXR file can: 2147483647; write a .vdi"
         )
     names = sorted(channel_types)
-    window = _box(0, 0, width - 1, height - 1)
+    window = struct.pack("<4i", 0, 0, width - 1, height - 1)
     header = {
         "channels": ("chlist", _channel_list(channel_types)),
         "chunkCount": ("int", struct.pack("<i", height)),
@@ -200,10 +200,6 @@ def _channel_list(types: Mapping[str, Any]) -> bytes:
     return b"".join(entries) + b"\0"
 
 
-def _box(*values: int) -> bytes:
-    return struct.pack("<4i", *values)
-
-
 def _packed(data: bytes, compression: str, level: int) -> bytes:
     """Return bytes compressed, or as they are where that is not shorter (as OpenEXR does)."""
     if compression == "none" or not data:
@@ -245,11 +241,6 @@ def read_image(
         If it is a deep image in another form; the message says which.
     """
     return _Image(path).read(wanted, progress)
-
-
-def read_attributes(path: Path) -> dict[str, Any]:
-    """Return the attributes in the header of a deep scan line image; errors as read_image."""
-    return _Image(path).attributes
 
 
 class _Image:

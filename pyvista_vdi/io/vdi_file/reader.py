@@ -310,7 +310,7 @@ class _OpenFile:
                 depth_origin=number(d["depth_origin"]),
                 metadata=d["metadata"],
                 codec=d["codec"],
-                file_bytes=self._file_bytes(),
+                file_bytes=self._stream.seek(0, os.SEEK_END),
                 memory_bytes=(n_lists + 1) * 8 + n * 24 + packed_bytes[precision],
                 precision=precision,
                 depth_step=number(d["depth_step"]) if precision == "8-byte" else 1.0,
@@ -319,10 +319,6 @@ class _OpenFile:
             raise
         except (VDIError, KeyError, TypeError, ValueError, OverflowError) as error:
             self._refuse(f"its description is incomplete or wrong: {error!r}")
-
-    def _file_bytes(self) -> int:
-        """Return the bytes of the file, or of what lies within another."""
-        return self._stream.seek(0, os.SEEK_END)
 
     def _checked_layouts(self) -> dict[str, Layout]:
         """Return the arrays' layouts, which must be what window and length imply."""
