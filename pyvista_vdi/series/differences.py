@@ -413,9 +413,7 @@ def _guessed_origins(
 ) -> Integers:
     """Return origins as they were, moved, or that of the list before."""
     guessed = _moved(there, shift, there.strides if plain else unit)
-    alone = ~there.has
-    own = origins[alone]
-    guessed[alone] = np.concatenate([[0], own[:-1]])[: len(own)]
+    guessed[~there.has] = _each_before(origins[~there.has])
     return guessed
 
 
@@ -423,8 +421,7 @@ def _origins(
     left: Integers, there: _There, shift: Integers, unit: Floats | Integers, plain: bool
 ) -> Integers:
     origins = _moved(there, shift, there.strides if plain else unit) + left
-    alone = ~there.has
-    origins[alone] = np.cumsum(left[alone])
+    origins[~there.has] = np.cumsum(left[~there.has])
     return origins
 
 
@@ -433,9 +430,7 @@ def _guessed_strides(strides: Integers, spans: Floats, there: _There, plain: boo
     if not plain:
         return strides_for(spans)
     guessed = there.strides.copy()
-    alone = ~there.has
-    own = strides[alone]
-    guessed[alone] = np.concatenate([[0], own[:-1]])[: len(own)]
+    guessed[~there.has] = _each_before(strides[~there.has])
     return guessed
 
 
@@ -444,9 +439,13 @@ def _strides(left: Integers, spans: Floats, there: _There, plain: bool) -> Integ
         with np.errstate(all="ignore"):
             return strides_for(np.clip(spans, 0, 2.0**40)) + left
     strides = there.strides + left
-    alone = ~there.has
-    strides[alone] = np.cumsum(left[alone])
+    strides[~there.has] = np.cumsum(left[~there.has])
     return strides
+
+
+def _each_before(values: Integers) -> Integers:
+    """Return the value before each, 0 before the first."""
+    return np.concatenate([[0], values[:-1]])[: len(values)]
 
 
 def _guessed_media(
