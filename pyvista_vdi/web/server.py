@@ -20,7 +20,9 @@ import threading
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
-from urllib.parse import SplitResult, urlsplit
+from urllib.parse import SplitResult, quote, urlsplit
+
+import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
 from pyvista_vdi.model.classification import Classification
@@ -92,11 +94,17 @@ class Server:
         max_clients: int = MAX_CLIENTS,
         stalled: float = STALLED,
     ) -> None:
+        if token == "":
+            raise InvalidArgumentError(
+                "token is empty, which would let in whoever finds the port: "
+                "give another text, or None for a random one"
+            )
         self.token = secrets.token_urlsafe(16) if token is None else token
         self.host, self.port = host, port
         self.clients: set[Client] = set()
         self._source = source
-        self._hosts = {"localhost", *hosts} | ({host} if host else set())
+        # As browsers write names, in small letters
+        self._hosts = {name.lower() for name in ("localhost", host, *hosts) if name}
         self._below = below
         self._max_clients = max_clients
         self._stalled = stalled
@@ -111,7 +119,7 @@ class Server:
     def url(self) -> str:
         """What a browser is to open."""
         host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"http://{host}:{self.port}/?token={self.token}"
+        return f"http://{host}:{self.port}/?token={quote(self.token, safe='')}"
 
     def start(self) -> Server:
         """Listen, in a thread of its own; return when it does.
@@ -276,8 +284,8 @@ class Server:
                 _log.error("a client was sent away", exc_info=error)
                 code, reason = WSCloseCode.INTERNAL_ERROR, "the server has failed"
         with contextlib.suppress(asyncio.TimeoutError, ConnectionError):
-            # The protocol has 123 bytes for a reason
-            closing = connection.close(code=code, message=reason.encode()[:120])
+            # The protocol has 123 bytes for a reason, none of them a part of a letter
+            closing = connection.close(code=code, message=reason.encode("ascii", "replace")[:120])
             await asyncio.wait_for(closing, _GOODBYE)
 
     async def _hear(self, client: Client, connection: web.WebSocketResponse) -> None:
@@ -291,9 +299,10 @@ class Server:
         while True:
             await client.news.wait()
             client.news.clear()
-            while client.notes:
-                _, note = client.notes.popitem()
-                await put(json.dumps(note))
+            for kind in ("status", "error"):  # in this order: a page shows the last
+                note = client.notes.pop(kind, None)
+                if note is not None:
+                    await put(json.dumps(note))
             await self._send_picture(client, put)
             file = client.next_file()
             if file is not None:
@@ -389,7 +398,7 @@ def serve(
     port : int
         Port to listen at; 0 takes a free one.
     token : str, optional
-        What URLs must carry; a random one by default.
+        What URLs must carry, not empty; a random one by default.
     hosts : sequence of str
         Names, besides ``localhost`` and addresses, by which browsers may call this server.
     lists : int
@@ -453,8 +462,10 @@ _NAMES = tuple(name for name in inspect.signature(serve).parameters if name != "
 
 
 def _is_sequence(volume: Any) -> bool:
-    """Whether it is several volumes: VTK's data sets and arrays have a length or items, too."""
-    return isinstance(volume, Sequence) and not hasattr(volume, "GetClassName")
+    """Whether it is several volumes: texts, arrays and VTK's data sets have a length, too."""
+    if isinstance(volume, str | np.ndarray) or hasattr(volume, "GetClassName"):
+        return False
+    return hasattr(volume, "__len__") and hasattr(volume, "__getitem__")
 
 
 def _place(url: str) -> SplitResult:

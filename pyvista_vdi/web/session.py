@@ -69,6 +69,8 @@ class Client:
         self._woken = asyncio.Event()
         self._made: Made | None = None  # made last
         self._shown: Made | None = None  # sent last, and whole
+        self._latest: Made | None = None  # made last, also where nobody waits for it any more
+        self._closed = False
         self._judged: tuple[Made, Wish, float] | None = None
         self._stage = ""
         self._told: str | None = None
@@ -143,7 +145,8 @@ class Client:
         """Give up what is being made."""
         self._stop_settling()
         self._cancelled.set()
-        for made in (self._made, self._shown):
+        self._closed = True
+        for made in (self._made, self._shown, self._latest):
             self._source.forget(made)
 
     async def work(self) -> None:
@@ -242,8 +245,12 @@ class Client:
         wish = self._begun_for = self.wish
         level = self._source.first_level(wish) if stage == "first" else stage
         made, vdi = self._source.make(wish, level, cancelled.is_set)
+        self._latest = made
         try:
             return made, b"" if vdi is None else encoded(vdi)
         except BaseException:
             self._source.forget(made)
             raise
+        finally:
+            if self._closed:  # while it was being made
+                self._source.forget(made)

@@ -12,6 +12,8 @@ import re
 import signal
 import subprocess
 import sys
+import threading
+import urllib.request
 
 import aiohttp
 import numpy as np
@@ -245,6 +247,27 @@ def test_errors_of_the_engine_are_said_to_the_client(talk, monkeypatch):
     assert error["message"] == "too little"
 
 
+def test_what_is_wrong_is_said_after_what_is_done(server):
+    """A page shows the last: also where a status waits since before the error."""
+    said = []
+
+    async def story():
+        client = session.Client(server._source, server._threads, 0.95)
+        client._tell_doing("vdi")
+        client._tell("error", message="too little")
+        client._tell_doing(None)
+        sending = asyncio.ensure_future(server._send(client, put))
+        while len(said) < 3:
+            await asyncio.sleep(0)
+        sending.cancel()
+
+    async def put(text):
+        said.append(json.loads(text)["type"])
+
+    asyncio.run(story())
+    assert said == ["hello", "status", "error"]
+
+
 def test_a_busy_client_does_not_keep_another_waiting(talk):
     async def story(busy, quiet):
         await busy.look_from(CAMERA, SIZE, moving=True)
@@ -330,6 +353,20 @@ def test_pages_of_others_cannot_connect(server, origin):
     assert _get(server, "/socket", Origin=origin)[0] == 403
 
 
+def test_names_are_taken_as_browsers_write_them(own_server):
+    server = own_server(hosts=["MyBox"])
+    for host in ("mybox", "MYBOX:80"):
+        assert _get(server, "/nothing", Host=host)[0] == 404
+
+
+def test_any_text_is_a_token_but_none(own_server):
+    server = own_server(token="a+b c&d=é#")
+    with urllib.request.urlopen(server.url) as response:
+        assert response.status == 200
+    with pytest.raises(InvalidArgumentError, match="token is empty"):
+        own_server(token="")
+
+
 def test_our_page_can_connect(server, tmp_path):
     async def story():
         headers = {"Origin": f"http://127.0.0.1:{server.port}"}
@@ -380,6 +417,7 @@ BAD = [
     json.dumps({"type": "time", "step": -1}),
     json.dumps({"type": "clip", "planes": [[0, 0, 0, 0, 0, 0]]}),
     json.dumps({"type": "clip", "planes": [[0, 0, 0, 1, 0, 0]] * 7}),
+    json.dumps({"type": "é" * 40}),  # the reason, which has it, is cut
 ]
 
 
@@ -476,6 +514,30 @@ def test_a_client_that_stops_reading_is_dropped(own_server, tmp_path):
     assert asyncio.run(asyncio.wait_for(story(), PATIENCE)).n_supersegments > 0
 
 
+def test_what_is_made_for_a_client_that_has_left_is_let_go(own_server, tmp_path, monkeypatch):
+    server, encode = own_server(), session.encoded
+    making, gone = threading.Event(), threading.Event()
+
+    def slowly(vdi):
+        making.set()
+        assert gone.wait(PATIENCE)
+        return encode(vdi)
+
+    async def story():
+        async with WebClient(server, tmp_path) as client:
+            await client.look_from(CAMERA, SIZE, moving=True)
+            assert await asyncio.to_thread(making.wait, PATIENCE)
+            assert server._source._kept
+        while server.clients:
+            await asyncio.sleep(0.01)
+        gone.set()
+        while server._source._kept:
+            await asyncio.sleep(0.01)
+
+    monkeypatch.setattr(session, "encoded", slowly)
+    asyncio.run(asyncio.wait_for(story(), PATIENCE))
+
+
 @pytest.mark.slow
 def test_two_hundred_clients_at_once(own_server, tmp_path):
     server = own_server(max_clients=200)
@@ -536,6 +598,18 @@ def test_a_fixed_look_offers_no_other(own_server, default_runtime, tmp_path):
         hello, code = asyncio.run(story())
     assert hello["cmaps"] == hello["opacities"] == []
     assert code == 1008
+
+
+def test_steps_are_any_object_with_a_length_and_items(default_runtime):
+    class Steps:
+        def __len__(self):
+            return 2
+
+        def __getitem__(self, step):
+            return [HIGH, LOW][step]
+
+    with web.serve(Steps(), port=0, wait=False, announce=None, **LOOK) as server:
+        assert server._source.offer.steps == 2
 
 
 def test_the_command_serves_until_ctrl_c(tmp_path, default_runtime):
