@@ -54,7 +54,7 @@ window.pyvistaVDI = {
         this.$watch("file", async (file) => {
           if (!file) return;
           const bytes = new Uint8Array(await new Response(file).arrayBuffer());
-          if (file === this.file) this.$el.showBytes(bytes);
+          if (file === this.file) this.$el.showBytes(bytes).catch(() => {});
         }, { immediate: true });
       },
     });

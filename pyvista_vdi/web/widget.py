@@ -74,7 +74,7 @@ function render({ model, el }) {
     if (packed?.byteLength) viewer.scene = new Scene(bytesOf(packed));
   };
   const takeFile = () => {
-    viewer.showBytes(bytesOf(model.get("_file")));
+    viewer.showBytes(bytesOf(model.get("_file"))).catch(() => {}); // the viewer says what is wrong
   };
   el.replaceChildren(viewer);
   const taken = {

@@ -231,11 +231,89 @@ def test_a_view_that_shows_nothing_is_refused(data, open_page):
         ("{...viewer.camera, view_angle: 180}", "view_angle is a positive number below 180"),
         ("{...viewer.camera, view_angle: undefined, parallel_scale: -1}", "parallel_scale is"),
         ("{...viewer.camera, view_up: [0, 0, 0]}", "view_up"),
+        ("{...viewer.camera, window_center: [0, NaN]}", "window_center is two finite numbers"),
     ):
         tried = f"try {{ viewer.camera = {camera} }} catch (error) {{ return error.message }}"
         answer = page.evaluate(f"() => {{ {tried} }}")
         assert message in answer
         assert page.evaluate("viewer.camera") == before
+
+
+def test_planes_that_clip_nothing_or_all_are_refused(data, open_page):
+    page = open_page(SIZE)
+    page.load(data)
+    plane = "{ origin: [0, 0, 0], normal: [1, 0, 0] }"
+    page.evaluate(f"viewer.clippingPlanes = [{plane}]")
+    for planes, message in (
+        ("[{ origin: [0, 0, 0], normal: [0, 0, 0] }]", "normal is not zero"),
+        ("[{ origin: [0, NaN, 0], normal: [1, 0, 0] }]", "origin is three finite numbers"),
+        ("[{ normal: [1, 0, 0] }]", "origin is three finite numbers; got undefined"),
+        (f"Array(9).fill({plane})", "At most 8 planes clip a VDI; got 9"),
+    ):
+        tried = (
+            f"try {{ viewer.clippingPlanes = {planes} }} catch (error) {{ return error.message }}"
+        )
+        assert message in page.evaluate(f"() => {{ {tried} }}")
+        assert len(page.evaluate("viewer.clippingPlanes")) == 1
+
+
+#: A file of two pieces, the second of which comes when ``goOn()`` is called.
+IN_PIECES = """([text]) => {
+  const bytes = bytesOf(text), rest = Promise.withResolvers();
+  async function* pieces() {
+    yield bytes.subarray(0, 1000);
+    await rest.promise;
+    yield bytes.subarray(1000);
+  }
+  window.goOn = rest.resolve;
+  window.first = viewer.load({ [Symbol.asyncIterator]: pieces }).then(() => true);
+}"""
+
+
+@pytest.mark.parametrize("apart", ["", "await new Promise((done) => setTimeout(done));"])
+def test_an_element_that_is_moved_goes_on_loading(apart, vdi, data, open_page):
+    """Also one that has been off the page for a while."""
+    page = open_page(SIZE)
+    page.evaluate(IN_PIECES, [base64.b64encode(data).decode()])
+    page.evaluate(
+        f"""async () => {{
+          const {{ parentNode }} = viewer;
+          viewer.remove();
+          {apart}
+          parentNode.append(viewer);
+          goOn();
+          await Promise.all([first, viewer.ready]);
+        }}"""
+    )
+    assert worst(page.screenshot(vdi.camera, SIZE), vdi, vdi.camera) <= CLOSE
+
+
+def test_who_waits_for_what_is_given_up_waits_for_what_is_shown(data, open_page):
+    page = open_page(SIZE)
+    page.evaluate(IN_PIECES, [base64.b64encode(data).decode()])
+    page.evaluate("void (window.ready = viewer.ready)")
+    page.load(data)
+    assert page.evaluate("Promise.all([first, ready]).then(() => viewer.status.state)") == "full"
+
+
+def test_there_is_no_picture_of_an_element_off_the_page(data, open_page):
+    page = open_page(SIZE)
+    page.load(data)
+    message = "viewer.screenshot().catch(({ message }) => message)"
+    assert "off the page" in page.evaluate(f"viewer.remove(), {message}")
+
+
+def test_what_is_wrong_with_what_was_decoded_ends_the_load(open_page):
+    page = open_page(SIZE)
+    answer = page.evaluate(
+        """async () => {
+          const { askPort } = await import("./port.js");
+          const port = { postMessage() { port.onmessage({ data: { prepared: 1 } }); } };
+          const hear = () => { throw new Error("too large"); };
+          return askPort(port, {}, hear).catch(({ message }) => message);
+        }"""
+    )
+    assert answer == "too large"
 
 
 def test_what_is_no_vdi_is_said_on_the_page(data, open_page):

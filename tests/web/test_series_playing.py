@@ -263,6 +263,45 @@ def test_the_first_step_is_shown_while_the_rest_comes(series, data, frames, open
     assert page.page.locator("vdi-viewer input").get_attribute("max") == str(N - 1)
 
 
+def test_a_series_that_is_closed_starts_no_worker(data, playing):
+    """Neither for the step that was being fetched, nor for those that were to come."""
+    page = playing(script='import { Series } from "./series.js"; window.Series = Series;')
+    page.evaluate(READY)
+    answers = page.evaluate(
+        """async (text) => {
+          const bytes = bytesOf(text), opened = Promise.withResolvers();
+          async function* pieces() { yield bytes; }
+          await Series.ofPieces(pieces(), opened.resolve);
+          const series = await opened.promise, make = window.Worker;
+          window.made = 0;
+          window.Worker = class extends make { constructor(...rest) { super(...rest); ++made; } };
+          const asked = [series.prepared(0), series.prepared(1)];
+          await null; // the first has begun
+          series.close();
+          const names = asked.map((step) => step.then(() => "shown", ({ name }) => name));
+          return [...await Promise.all(names), made];
+        }""",
+        base64.b64encode(data).decode(),
+    )
+    assert answers == ["AbortError", "AbortError", 0]
+
+
+def test_a_step_that_was_given_up_comes_when_the_element_is_back(series, playing):
+    page = playing()
+    page.evaluate(READY)
+    page.evaluate(
+        """async () => {
+          const { parentNode } = viewer;
+          viewer.time = 3;
+          viewer.remove();
+          await new Promise((done) => setTimeout(done));
+          parentNode.append(viewer);
+        }"""
+    )
+    page.evaluate(READY)
+    assert worst(page.screenshot(series.camera, SIZE), series[6], series.camera) <= CLOSE
+
+
 @pytest.mark.slow
 def test_without_workers_the_page_plays(series, playing):
     page = playing(before=WITHOUT_WORKERS)

@@ -120,6 +120,36 @@ def test_a_view_at_rest_is_the_volumes_own_picture(page):
     assert page.evaluate(f"{over}.hidden")
 
 
+def test_a_view_that_goes_on_moving_is_shown_what_comes(open_page):
+    """None of its frames has all pixels, so no VDI is ever drawn to its end."""
+    page = open_page(
+        script='import { RemoteVDI } from "./remote.js"; window.RemoteVDI = RemoteVDI;'
+    )
+    shown = page.evaluate(
+        """async () => {
+          window.WebSocket = class { close() {} };
+          const viewer = document.createElement("div"), shown = [];
+          viewer.showBytes = (file) => {
+            shown.push(file[0]);
+            return new Promise(() => {});
+          };
+          const remote = new RemoteVDI(viewer, "");
+          for (const byte of [1, 2]) {
+            const head = { type: "vdi", level: "coarse", bytes: 1 };
+            remote._socket.onmessage({ data: JSON.stringify(head) });
+            remote._socket.onmessage({ data: Uint8Array.of(byte).buffer });
+          }
+          const before = [...shown];
+          const frame = { detail: { full: false, state: "full" } };
+          viewer.dispatchEvent(new CustomEvent("framedrawn", frame));
+          await new Promise((done) => setTimeout(done));
+          remote.close();
+          return [before, shown];
+        }"""
+    )
+    assert shown == [[1], [1, 2]]
+
+
 @pytest.mark.slow
 def test_look_clipping_and_time_are_changed_in_the_page(page):
     _wait(page, "remote.received.full === 1")

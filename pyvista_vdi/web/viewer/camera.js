@@ -12,15 +12,8 @@ const plus = (a, b, s = 1) => a.map((x, k) => x + s * b[k]);
  * @throws {TypeError} That names what is wrong.
  */
 export function checkedCamera(camera) {
-  const vector = (name) => {
-    const value = camera?.[name] && [...camera[name]];
-    if (value?.length !== 3 || !value.every(Number.isFinite)) {
-      throw new TypeError(`A camera's ${name} is three finite numbers; got ${camera?.[name]}.`);
-    }
-    return value;
-  };
   const checked = Object.fromEntries(["position", "focal_point", "view_up"]
-    .map((name) => [name, vector(name)]));
+    .map((name) => [name, checkedNumbers("camera", camera, name)]));
   if (!(Math.hypot(...minus(checked.focal_point, checked.position)) > 0)) {
     throw new TypeError("A camera's position and focal point differ; these are the same point.");
   }
@@ -32,11 +25,34 @@ export function checkedCamera(camera) {
       `got ${camera[name]}.`);
   }
   checked[name] = value;
-  if (camera.window_center) checked.window_center = [...camera.window_center];
+  if (camera.window_center) {
+    checked.window_center = checkedNumbers("camera", camera, "window_center", 2);
+  }
   if (!cameraAxes(checked).flat().every(Number.isFinite)) {
     throw new TypeError("A camera's view_up is not parallel to its direction; this one is.");
   }
   return checked;
+}
+
+/**
+ * Return a clipping plane as the viewer keeps it; refuse one that nothing is seen by.
+ *
+ * @param {object} plane origin and normal, three numbers each.
+ * @throws {TypeError} That names what is wrong.
+ */
+export function checkedPlane(plane) {
+  const [origin, normal] = ["origin", "normal"].map((name) => checkedNumbers("plane", plane, name));
+  if (!(Math.hypot(...normal) > 0)) throw new TypeError("A plane's normal is not zero; this one is.");
+  return { origin, normal };
+}
+
+function checkedNumbers(what, of, name, count = 3) {
+  const numbers = of?.[name] && Array.from(of[name]);
+  if (numbers?.length !== count || !numbers.every(Number.isFinite)) {
+    const many = count === 2 ? "two" : "three";
+    throw new TypeError(`A ${what}'s ${name} is ${many} finite numbers; got ${of?.[name]}.`);
+  }
+  return numbers;
 }
 
 // Turn a vector about an axis, degrees (Rodrigues).

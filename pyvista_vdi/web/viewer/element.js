@@ -1,11 +1,12 @@
 // <vdi-viewer src="brain.vdi">: a VDI that people turn. docs/web.md has its contract.
-import { checkedCamera } from "./camera.js";
+import { checkedCamera, checkedPlane } from "./camera.js";
 import { interact } from "./interaction.js";
 import { embedded, load } from "./loader.js";
 import { Pacer } from "./pacer.js";
 import { Player, playerControls } from "./player.js";
 import { Raycaster } from "./raycast.js";
 import { isParallel } from "./rays.js";
+import { MOST_CLIPPING_PLANES } from "./shader.js";
 import { Surround } from "./surround.js";
 
 const STYLE = `
@@ -48,6 +49,7 @@ export class VDIViewer extends HTMLElement {
   #status = { state: "empty", progress: 0 };
   #ready = resolvers();
   #loading = null; // an AbortController
+  #source = null; // of what is not yet loaded
   #connected = null; // another
   #moved = -Infinity;
   #drawing = false;
@@ -114,7 +116,11 @@ export class VDIViewer extends HTMLElement {
   }
 
   set clippingPlanes(planes) {
-    this.#planes = [...planes].map(({ origin, normal }) => ({ origin: [...origin], normal: [...normal] }));
+    const checked = [...planes].map(checkedPlane);
+    if (checked.length > MOST_CLIPPING_PLANES) {
+      throw new TypeError(`At most ${MOST_CLIPPING_PLANES} planes clip a VDI; got ${checked.length}.`);
+    }
+    this.#planes = checked;
     this.showStill(null);
     this.invalidate();
   }
@@ -176,26 +182,30 @@ export class VDIViewer extends HTMLElement {
    */
   async screenshot({ width = this.#parts.canvas.width, height = this.#parts.canvas.height } = {}) {
     await this.ready;
-    const gl = this.#gl;
+    const gl = this.#gl, pacer = this.#pacer, scene = this.#scene, camera = this.#camera;
+    const require = (good) => {
+      if (!good) throw new Error("A viewer whose graphics are lost, or off the page, has no picture.");
+    };
+    require(pacer);
     const largest = gl.getParameter(gl.MAX_RENDERBUFFER_SIZE);
     if (![width, height].every((edge) => Number.isInteger(edge) && edge > 0 && edge <= largest)) {
       throw new RangeError(`A screenshot is 1 to ${largest} pixels wide and high; ` +
         `got ${width} x ${height}.`);
     }
-    const target = this.#pacer.target(width, height);
+    const target = pacer.target(width, height);
     try {
-      await this.#pacer.inBands(target, width, height, this.#painter(this.#camera, width, height));
+      require(await pacer.inBands(target, width, height, this.#painter(camera, width, height)));
       const data = new Uint8ClampedArray(4 * width * height), row = 4 * width;
       const upsideDown = new Uint8Array(data.length);
       gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
-      this.#scene?.paintTexts(this.#camera, width, height);
+      scene?.paintTexts(camera, width, height);
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, upsideDown);
       for (let y = 0; y < height; ++y) {
         data.set(upsideDown.subarray((height - 1 - y) * row, (height - y) * row), y * row);
       }
       return { width, height, data };
     } finally {
-      this.#pacer.free(target);
+      pacer.free(target);
     }
   }
 
@@ -208,6 +218,7 @@ export class VDIViewer extends HTMLElement {
   async load(source) {
     this.#loading?.abort();
     const loading = (this.#loading = new AbortController());
+    this.#source = source;
     if (this.#status.state !== "empty") this.#renew();
     const { promise } = this.#ready;
     this.#tell({ state: "loading", progress: 0, message: undefined });
@@ -226,6 +237,7 @@ export class VDIViewer extends HTMLElement {
     } catch (error) {
       if (!loading.signal.aborted) this.#fail(error);
     }
+    if (!loading.signal.aborted) this.#source = null;
     return promise;
   }
 
@@ -418,6 +430,8 @@ export class VDIViewer extends HTMLElement {
     this.#context ??= gl.getExtension("WEBGL_lose_context"); // there is none of a lost one
     if (!gl.isContextLost()) this.#begin();
     else if (this.#lost) this.#restore(); // otherwise when it is said that it is lost
+    if (this.#source && this.#loading.signal.aborted) this.load(this.#source).catch(() => {});
+    this.#player?.resume();
     const viewer = this;
     interact(canvas, {
       get camera() { return viewer.#camera; },
@@ -444,9 +458,12 @@ export class VDIViewer extends HTMLElement {
 
   disconnectedCallback() {
     this.#connected?.abort();
-    this.#loading?.abort();
     this.pause();
-    this.#series?.close(); // its worker; another one starts when it is needed again
+    queueMicrotask(() => {
+      if (this.isConnected) return; // it was but moved
+      this.#loading?.abort();
+      this.#series?.close(); // its worker; another one starts when it is needed again
+    });
     this.#raycaster?.dispose();
     this.#pacer?.dispose();
     this.#scene?.dispose();
@@ -608,9 +625,11 @@ export class VDIViewer extends HTMLElement {
     this.dispatchEvent(new CustomEvent("error", { detail: { message } }));
   }
 
+  // Who still waits for what is shown no more waits for what is.
   #renew() {
+    const { resolve, reject } = this.#ready;
     this.#ready = resolvers();
-    this.#ready.promise.catch(() => {});
+    this.#ready.promise.then(resolve, reject);
   }
 }
 

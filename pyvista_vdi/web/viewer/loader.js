@@ -33,46 +33,44 @@ export async function load(
     signal?.addEventListener("abort", () => reject(signal.reason), { once: true });
   });
   aborted.catch(() => {});
+  const unlessAborted = (promise) => Promise.race([aborted, promise]);
   const began = decodingPort(); // it starts while the first bytes come
-  let port = null;
+  let working = false; // whether it has been told what it has not finished
+  let pieces = null;
   try {
     if (isSeriesAddress(source) && Series && onSeries) {
       const parts = await rangesOf(source, signal);
       const series = parts.read && await Series.ofParts(parts);
       signal?.throwIfAborted();
-      port = await began;
       if (series) {
-        releasePort(port);
         onSeries(series);
         onProgress(1);
         return;
       }
       source = parts.response ?? source;
     }
-    port ??= await began;
-    const pieces = piecesOf(source, onProgress, signal);
-    const first = await Promise.race([aborted, pieces.next()]);
+    pieces = piecesOf(source, onProgress, signal);
+    const first = await unlessAborted(pieces.next());
     const rest = following(first, pieces);
     if (Series && onSeries && !first.done && beginsAsSeries(first.value)) {
-      releasePort(port);
-      port = null;
-      await Promise.race([aborted, Series.ofPieces(rest, (series) => {
+      await unlessAborted(Series.ofPieces(rest, (series) => {
         if (!signal?.aborted) onSeries(series);
-      })]);
+      }));
       return;
     }
+    const port = await began;
+    working = true;
     const hear = ({ begun, prepared }) => {
       if (!signal?.aborted) begun ? onBegin(begun) : onLevel(prepared);
     };
-    const ask = (message) => Promise.race([aborted, askPort(port, message, hear)]);
-    for await (const piece of rest) await ask({ piece });
+    const ask = (message) => unlessAborted(askPort(port, message, hear));
+    for (let next; !(next = await unlessAborted(rest.next())).done;) await ask({ piece: next.value });
     await ask({ end: true });
-  } catch (error) {
-    if (port) port.terminate();
-    else began.then(releasePort);
-    throw error;
+    working = false;
+  } finally {
+    pieces?.return().catch(() => {});
+    began.then((port) => working ? port.terminate() : releasePort(port));
   }
-  releasePort(port);
 }
 
 async function* following(first, pieces) {
@@ -88,10 +86,12 @@ const EMBEDDED = 'script[type="application/vdi+base64"]';
  * page is read.
  *
  * @param {Element} element
- * @returns {AsyncGenerator<string>|null} For {@link load}; null where there is no such script yet.
+ * @returns {AsyncIterable<string>|null} For {@link load}, also once more; null where there is no
+ *   such script yet.
  */
 export function embedded(element) {
-  return element.querySelector(EMBEDDED) && embeddedTexts(element);
+  return element.querySelector(EMBEDDED) &&
+    { [Symbol.asyncIterator]: () => embeddedTexts(element) };
 }
 
 async function* embeddedTexts(element) {

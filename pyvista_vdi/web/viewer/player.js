@@ -100,6 +100,11 @@ export class Player {
     this.#changed();
   }
 
+  /** Go on with what was given up when the series was closed. */
+  resume() {
+    this.#seek();
+  }
+
   close() {
     this.#playing = false;
     this.#ready.clear();

@@ -45,7 +45,13 @@ export function askPort(port, message, hear, handed = []) {
     port.onmessage = ({ data }) => {
       if (data.error) reject(new VDIFileError(data.error));
       else if (data.done) resolve();
-      else hear(data);
+      else {
+        try {
+          hear(data);
+        } catch (error) { // what is wrong with what was decoded, not with the port
+          reject(error);
+        }
+      }
     };
     port.onerror = (event) => reject(new VDIFileError(`the VDI is not decoded: ${event.message}`));
     port.postMessage(message, handed);

@@ -33,7 +33,7 @@ export class RemoteVDI extends EventTarget {
     this.received = { coarse: 0, full: 0, pictures: 0, bytes: 0 };
     this._said = new Map(); // the last message of each kind, said again to a new connection
     this._retry = FIRST_RETRY;
-    this._showing = null;
+    this._showing = false;
     this._next = null;
     this._timer = 0;
     this._restTimer = 0;
@@ -136,22 +136,30 @@ export class RemoteVDI extends EventTarget {
     if (incoming.filled < incoming.file.length) return;
     this._incoming = null;
     this._next = incoming;
-    if (this._showing === null) this._show();
+    if (!this._showing) this._show();
   }
 
   /** Decode and swap what has come, one after the other: the last one counts. */
   async _show() {
+    this._showing = true;
     while (this._next !== null) {
-      this._showing = this._next;
+      const { file, level } = this._next, listening = new AbortController();
       this._next = null;
+      // Of a view that goes on moving no frame has all pixels: one of the new VDI is enough
+      const drawn = new Promise((resolve) => {
+        this.viewer.addEventListener("framedrawn", ({ detail }) => {
+          if (detail.state === "full") resolve();
+        }, { signal: listening.signal });
+      });
       try {
-        await this.viewer.showBytes(this._showing.file);
-        this.received[this._showing.level] += 1;
+        await Promise.race([this.viewer.showBytes(file), drawn]);
+        this.received[level] += 1;
       } catch (error) {
         this._status(null, error.message);
       }
+      listening.abort();
     }
-    this._showing = null;
+    this._showing = false;
   }
 
   _viewMoved() {

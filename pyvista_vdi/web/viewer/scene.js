@@ -76,7 +76,7 @@ export class Scene {
   #take(k, prepared) {
     const body = this.#bodies[k];
     body.prepared = prepared;
-    if (body.raycaster) body.raycaster.set(prepared);
+    if (body.raycaster && !this.#gl.isContextLost()) body.raycaster.set(prepared);
     this.changed();
   }
 
@@ -105,7 +105,10 @@ export class Scene {
   dispose() {
     const gl = this.#gl;
     if (!gl) return;
-    for (const { raycaster } of this.#bodies) raycaster?.dispose();
+    for (const body of this.#bodies) {
+      body.raycaster?.dispose();
+      body.raycaster = null;
+    }
     for (const shape of this.#all()) {
       for (const { drawn } of shape.parts) {
         gl.deleteVertexArray(drawn?.array ?? null);
@@ -146,7 +149,7 @@ export class Scene {
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     this.#drawVDIs(raycaster, view, depthTexture);
-    if (this.#marker) {
+    if (this.#marker?.shapes.length) { // others have but letters
       const [left, bottom, wide, high] = partOf(this.#marker.place, view);
       gl.viewport(left, bottom, wide, high);
       this.#cover(COPY_SHADER, { picture: this.#buffers.marker.texture }, [left, bottom]);

@@ -15,7 +15,8 @@ export class Series {
   #codec;
   #port = null; // a promise
   #last = Promise.resolve(); // of what was asked for
-  #closing = () => {};
+  #closing = () => {}; // rejects what is being decoded
+  #era = 0; // how often it was closed
 
   /** Whether all of the file's steps are known. */
   complete = false;
@@ -65,7 +66,11 @@ export class Series {
    * @throws {VDIFileError} A sentence that names the step.
    */
   prepared(i) {
-    const found = this.#last.then(() => this.#decoded(i));
+    const era = this.#era;
+    const found = this.#last.then(() => {
+      if (era !== this.#era) throw closedError();
+      return this.#decoded(i);
+    });
     this.#last = found.catch(() => {});
     return found;
   }
@@ -74,10 +79,14 @@ export class Series {
   close() {
     this.#port?.then((port) => port.terminate());
     this.#port = null;
-    this.#closing(new DOMException("The series is closed.", "AbortError"));
+    this.#era += 1;
+    this.#closing(closedError());
   }
 
   async #decoded(i) {
+    const closed = new Promise((_, reject) => (this.#closing = reject));
+    closed.catch(() => {});
+    const unlessClosed = (promise) => Promise.race([promise, closed]);
     const needed = new Set(this.#frames.map(({ by }) => by));
     const chain = [];
     for (let frame = this.#frames[i]; frame;) {
@@ -89,19 +98,17 @@ export class Series {
           `by step ${by}, which cannot be found; ${REMEDY}`);
       }
     }
-    const frames = await Promise.all(chain.map(async ({ number, kind, checksum, place, size }) => {
+    const read = chain.map(async ({ number, kind, checksum, place, size }) => {
       const content = (await this.#read(place, size)).slice(); // without the rest of its buffer
       return { number, kind, checksum, content, needed: needed.has(number) };
-    }));
-    const closed = new Promise((_, reject) => (this.#closing = reject));
-    closed.catch(() => {});
-    const port = await (this.#port ??= decodingPort());
+    });
+    const frames = await unlessClosed(Promise.all(read));
+    const port = await unlessClosed(this.#port ??= decodingPort());
     let prepared;
     const handed = frames.map(({ content }) => content.buffer);
-    const asked = askPort(port, { codec: this.#codec, frames }, (data) => {
+    await unlessClosed(askPort(port, { codec: this.#codec, frames }, (data) => {
       ({ prepared } = data);
-    }, handed);
-    await Promise.race([asked, closed]);
+    }, handed));
     return prepared;
   }
 
@@ -192,6 +199,10 @@ export class Series {
     series.complete = true;
     return series;
   }
+}
+
+function closedError() {
+  return new DOMException("The series is closed.", "AbortError");
 }
 
 function noStep() {

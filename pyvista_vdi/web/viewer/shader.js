@@ -9,8 +9,10 @@
 // OPAQUE               rays end at the opaque depth of their pixel
 import { STACK_SHIFT, TEXTURE_WIDTH } from "./prepare.js";
 
-/** Planes that a ray can be clipped to: box, viewport, eyes, and eight of the user's. */
-export const MOST_PLANES = 20;
+/** Planes of the user's that a ray can be clipped to. */
+export const MOST_CLIPPING_PLANES = 8;
+/** All of them: box, viewport and eyes, too. */
+export const MOST_PLANES = 12 + MOST_CLIPPING_PLANES;
 
 /** A triangle that covers the viewport. */
 export const VERTEX_SHADER = `#version 300 es

@@ -71,6 +71,11 @@ export class Surround {
 
   pause() {}
 
+  /** Go on with what was given up when the set was closed. */
+  resume() {
+    if (this.#here) this.#work();
+  }
+
   close() {
     this.#closed = true;
     this.#ready.clear();
