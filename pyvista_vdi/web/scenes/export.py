@@ -82,11 +82,12 @@ def drawn(plotter: Any) -> Any:
     hidden = not window.GetMapped() and not window.GetOffScreenRendering()
     if hidden:
         window.SetOffScreenRendering(1)
-    plotter.render()
-    picture = plotter.screenshot(return_img=True)
-    if hidden:
-        window.SetOffScreenRendering(0)
-    return picture[..., :3]
+    try:
+        plotter.render()
+        return plotter.screenshot(return_img=True)[..., :3]
+    finally:
+        if hidden:
+            window.SetOffScreenRendering(0)
 
 
 def part_of(picture: Any, renderer: Any) -> Any:

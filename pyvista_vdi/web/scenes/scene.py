@@ -180,9 +180,8 @@ def scene_of(
 
 def state_of(renderer: Any) -> tuple[Any, ...]:
     """Return what a scene depends on, but for its camera; another value asks for another scene."""
-    props = renderer.GetViewProps()
     states: list[Any] = []
-    for prop in [props.GetItemAsObject(i) for i in range(props.GetNumberOfItems())]:
+    for prop in renderer.GetViewProps():
         state: list[Any] = [prop.GetAddressAsString(""), bool(prop.GetVisibility())]
         if isinstance(prop, VDIActorMethods):
             # The mapper is modified in each frame
@@ -197,11 +196,9 @@ def state_of(renderer: Any) -> tuple[Any, ...]:
 
 def _props(renderer: Any) -> Iterator[tuple[Any, NDArray[np.float64]]]:
     """Give what is visible, the parts of assemblies by themselves, and where it is."""
-    props = renderer.GetViewProps()
-    for prop in [props.GetItemAsObject(i) for i in range(props.GetNumberOfItems())]:
-        if not prop.GetVisibility():
-            continue
-        yield from _paths(prop)
+    for prop in renderer.GetViewProps():
+        if prop.GetVisibility():
+            yield from _paths(prop)
 
 
 def _paths(prop: Any) -> Iterator[tuple[Any, NDArray[np.float64]]]:
@@ -260,13 +257,12 @@ def _marker(
 
 def _parts_of_marker(marker: Any) -> Iterator[tuple[Any, NDArray[np.float64]]]:
     if isinstance(marker, vtkPropAssembly):
-        parts = marker.GetParts()
-        for part in [parts.GetItemAsObject(i) for i in range(parts.GetNumberOfItems())]:
+        for part in marker.GetParts():
             yield from _parts_of_marker(part)
     elif isinstance(marker, vtkAxesActor):
         actors = vtkPropCollection()
         marker.GetActors(actors)
-        for actor in [actors.GetItemAsObject(i) for i in range(actors.GetNumberOfItems())]:
+        for actor in actors:
             yield actor, _array(actor.GetMatrix())
     else:
         whole = marker.GetAssembly() if isinstance(marker, vtkAnnotatedCubeActor) else marker
@@ -332,8 +328,7 @@ def _bounds(renderer: Any) -> list[float] | None:
 
 
 def _lights(renderer: Any) -> Iterator[dict[str, Any]]:
-    lights = renderer.GetLights()
-    for light in [lights.GetItemAsObject(i) for i in range(lights.GetNumberOfItems())]:
+    for light in renderer.GetLights():
         if not light.GetSwitch():
             continue
         kind = _LIGHTS[light.GetLightType()]

@@ -1,4 +1,5 @@
 // Which VDI of a set is shown: the one nearest to the view. Those that it heads for come ahead.
+import { isParallel } from "./rays.js";
 
 /** VDIs that are decoded, or being decoded, beside the one that is shown. */
 const AHEAD_OF_VIEW = 4;
@@ -13,8 +14,7 @@ const LENS = Math.tan(Math.PI / 12);
 function placeOf(camera, centre) {
   const arm = camera.position.map((x, k) => x - centre[k]);
   const length = Math.hypot(...arm) || 1;
-  const parallel = camera.parallel_projection ?? camera.parallel_scale !== undefined;
-  const away = parallel ? camera.parallel_scale / LENS : length;
+  const away = isParallel(camera) ? camera.parallel_scale / LENS : length;
   return { towards: arm.map((x) => x / length), away: Math.log(away) };
 }
 
