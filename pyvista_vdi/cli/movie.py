@@ -6,6 +6,7 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from pyvista_vdi.cli.inputs import (
     read_volume,
 )
 from pyvista_vdi.cli.text import mebibytes, printable
-from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
+from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDIError, VDIFileError
 from pyvista_vdi.io import check_writable, to_bytes, write_png
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
@@ -35,6 +36,8 @@ Frame = NDArray[np.uint8]
 _FILMS, _SUFFIXES = (".mp4", ".webm"), (".gif", ".mp4", ".webm", ".png")
 #: Frames of a path, from one of its views to the next, if not said otherwise: four seconds.
 _SECONDS_A_LEG = 4.0
+#: Rates of a GIF: its times are hundredths of a second, of which browsers take 1 for 10.
+_GIF_RATES = (0.01, 50.0)
 #: Views further than this from V_O see what its VDI was not made for, degrees.
 _SERVED = 60.0
 
@@ -43,7 +46,7 @@ def turntable(options: argparse.Namespace) -> int:
     """Turn what a file shows about the view's up direction, and write what is seen."""
 
     def views(first: Camera, _: int | None) -> list[Camera]:
-        frames = options.frames or round(4 * options.fps)
+        frames = options.frames or max(1, round(4 * options.fps))
         return [first.azimuth(options.degrees * k / frames) for k in range(frames)]
 
     return _write(options, views)
@@ -62,7 +65,7 @@ def movie(options: argparse.Namespace) -> int:
                 "give a path (--path A.json B.json), a turn (--turn DEGREES), or a series, .vdis"
             )
         legs = max(len(keys) - 1, 1)
-        frames = options.frames or steps or round(legs * _SECONDS_A_LEG * options.fps)
+        frames = options.frames or steps or max(1, round(legs * _SECONDS_A_LEG * options.fps))
         along = np.linspace(0, 1, frames)
         path = camera_path(keys, along) if keys else [first] * frames
         return [view.azimuth(options.turn * s) for view, s in zip(path, along, strict=True)]
@@ -126,11 +129,12 @@ def camera_path(
 
 def _write(options: argparse.Namespace, views: Callable[[Camera, int | None], list[Camera]]) -> int:
     """Draw each view and write all of them; the file appears whole or not at all."""
-    target = _checked_target(options.output)
+    target = _checked_target(options.output, options.fps)
     draw, own, steps, size = _shown(options)
     path = views(camera(options, own), steps)
     if target.suffix.lower() in _FILMS:
-        size = (size[0] - size[0] % 2, size[1] - size[1] % 2)  # films halve their colours' pixels
+        # Films halve their colours' pixels
+        size = (max(2, size[0] - size[0] % 2), max(2, size[1] - size[1] % 2))
     with (
         tempfile.TemporaryDirectory(prefix=".pyvista-vdi-", dir=target.parent) as folder,
         measuring("drawing") as bar,
@@ -142,10 +146,15 @@ def _write(options: argparse.Namespace, views: Callable[[Camera, int | None], li
                 yield to_bytes(draw(view, size, at), options.background)
                 bar((k + 1) / (len(path) + 1))
 
-        written = _encoded(Path(folder), target, frames(), options.fps)
-        size_on_disk = sum(file.stat().st_size for file in written)
-        for file in written:
-            file.replace(target.with_name(file.name))
+        try:
+            written = _encoded(Path(folder), target, frames(), len(path), options.fps)
+            size_on_disk = sum(file.stat().st_size for file in written)
+            for file in written:
+                file.replace(target.with_name(file.name))
+        except OSError as error:  # a full disk, or an encoder that has ended
+            if isinstance(error, VDIError):
+                raise
+            raise VDIFileError(f"{target} could not be written: {error}") from error
     name = target.name if len(written) == 1 else f"{written[0].name} to {written[-1].name}"
     print(
         f"{printable(name)}: {len(path)} frames of {size[0]} x {size[1]} pixels, "
@@ -193,8 +202,8 @@ def _angle(one: Camera, other: Camera) -> float:
     return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
 
 
-def _checked_target(name: str) -> Path:
-    """Return the file to write, after finding that it can be."""
+def _checked_target(name: str, fps: float) -> Path:
+    """Return the file to write, after finding that it can be, with so many frames a second."""
     target = Path(name)
     suffix = target.suffix.lower()
     numbered = suffix == ".png" and _numbered(target.name, 0) != _numbered(target.name, 1)
@@ -202,6 +211,11 @@ def _checked_target(name: str) -> Path:
         raise InvalidArgumentError(
             f"{printable(name)} is no moving picture: a name ends in .gif, .mp4 or .webm; or it "
             "has a place for the number of a picture, frame_{:04d}.png"
+        )
+    if suffix == ".gif" and not _GIF_RATES[0] <= fps <= _GIF_RATES[1]:
+        raise InvalidArgumentError(
+            f"a .gif shows {_GIF_RATES[0]:g} to {_GIF_RATES[1]:g} frames a second; got --fps "
+            f"{fps:g}: choose another, or write a .mp4"
         )
     if suffix in _FILMS:
         _film_writer()
@@ -228,8 +242,8 @@ def _film_writer() -> Any:
     return imageio_ffmpeg.write_frames
 
 
-def _encoded(folder: Path, target: Path, frames: Iterator[Frame], fps: float) -> list[Path]:
-    """Write frames into a folder, under the names that they are to have."""
+def _encoded(folder: Path, target: Path, frames: Iterator[Frame], n: int, fps: float) -> list[Path]:
+    """Write n frames into a folder, under the names that they are to have."""
     suffix = target.suffix.lower()
     if suffix == ".png":
         return [
@@ -238,9 +252,9 @@ def _encoded(folder: Path, target: Path, frames: Iterator[Frame], fps: float) ->
     file = folder / target.name
     if suffix == ".gif":
         images = (Image.fromarray(frame) for frame in frames)
-        next(images).save(
-            file, "GIF", save_all=True, append_images=images, duration=1000 / fps, loop=0
-        )
+        ends = [round(100 * k / fps) for k in range(n + 1)]  # so that the whole lasts as long
+        times = [10 * (end - begin) for begin, end in pairwise(ends)]
+        next(images).save(file, "GIF", save_all=True, append_images=images, duration=times, loop=0)
         return [file]
     first = next(frames)
     height, width = first.shape[:2]
@@ -250,7 +264,7 @@ def _encoded(folder: Path, target: Path, frames: Iterator[Frame], fps: float) ->
     )
     writer.send(None)
     try:
-        for frame in (first, *frames):
+        for frame in chain([first], frames):
             writer.send(np.ascontiguousarray(frame))
     finally:
         writer.close()

@@ -20,6 +20,10 @@ SIZE = (64, 48)
 #: A GIF has 256 colours: what a byte of a smooth picture may differ by (measured: 12).
 OF_A_PALETTE = 24
 
+needs_films = pytest.mark.skipif(
+    find_spec("imageio_ffmpeg") is None, reason="needs the extra: movie"
+)
+
 
 def run(capsys, *arguments, status=0):
     """Run the command and return what it prints, or says where it fails."""
@@ -121,7 +125,46 @@ def test_views_of_a_path_go_evenly_about_their_point():
         np.testing.assert_allclose(view.axes[1], (0, 0, 1), atol=1e-9)
 
 
-@pytest.mark.skipif(find_spec("imageio_ffmpeg") is None, reason="needs the extra: movie")
+def test_frames_of_a_gif_last_as_long_as_was_asked_for(saved, capsys, tmp_path):
+    """Its times are hundredths of a second: at 30 a second, frames of 3 and of 4 of them."""
+    target = tmp_path / "v.gif"
+    run(capsys, "turntable", saved, "-o", target, "--frames", 6, "--fps", 30)
+    with Image.open(target) as movie:
+        times = []
+        for k in range(6):
+            movie.seek(k)
+            times.append(movie.info["duration"])
+    assert times == [30, 40, 30, 30, 40, 30]
+
+
+def test_a_movie_has_a_frame_however_slow_it_is(saved, capsys, tmp_path):
+    run(capsys, "turntable", saved, "-o", tmp_path / "f_{}.png", "--fps", 0.1)
+    run(capsys, "turntable", saved, "-o", tmp_path / "v.gif", "--fps", 0.1)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["f_0.png", "v.gif"]
+
+
+@needs_films
+def test_frames_of_a_film_are_not_kept(saved, capsys, monkeypatch, tmp_path):
+    """Each is handed to the encoder before the next is drawn."""
+    done = []
+
+    def writer(*_, **__):
+        while (yield) is not None:
+            done.append("encoded")
+
+    def draw(*arguments, **options):
+        done.append("drawn")
+        return pvdi.render(*arguments, **options)
+
+    monkeypatch.setattr("pyvista_vdi.cli.movie.render", draw)
+    monkeypatch.setattr("imageio_ffmpeg.write_frames", writer)
+    arguments = ("movie", saved, "-o", tmp_path / "v.mp4", "--turn", 20, "--frames", 3)
+    assert "could not be written" in run(capsys, *arguments, status=1)  # nobody wrote it
+    assert done == ["drawn", "encoded"] * 3
+    assert not list(tmp_path.iterdir())
+
+
+@needs_films
 @pytest.mark.parametrize("suffix", ["mp4", "webm"])
 def test_a_film_has_its_frames(saved, capsys, tmp_path, suffix):
     import imageio_ffmpeg
@@ -148,6 +191,7 @@ def test_a_film_has_its_frames(saved, capsys, tmp_path, suffix):
         (["movie", "v.vdi", "-o", "v.gif", "--path", "a.json"], "two views at least"),
         (["movie", "v.vdi", "-o", "absent/v.gif", "--turn", "9"], "absent"),
         (["turntable", "v.vdi", "-o", "v.gif", "--fps", "0"], "above 0"),
+        (["turntable", "v.vdi", "-o", "v.gif", "--fps", "60"], "0.01 to 50 frames a second"),
     ],
 )
 def test_mistakes_are_said_before_anything_is_drawn(
@@ -155,7 +199,7 @@ def test_mistakes_are_said_before_anything_is_drawn(
 ):
     monkeypatch.chdir(saved.parent)
     before = sorted(saved.parent.iterdir())
-    assert said in run(capsys, *arguments, status=2 if "--fps" in arguments else 1)
+    assert said in run(capsys, *arguments, status=2 if said == "above 0" else 1)
     assert sorted(saved.parent.iterdir()) == before
 
 
