@@ -9,15 +9,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from pyvista_vdi.cli.inputs import (
+    OF_ANY_VOLUME,
     classification,
     measuring,
     output_files,
     read_volume,
+    refuse,
     require_new,
     say_written,
     volume_name,
 )
-from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.io import whole_file, write_png
 from pyvista_vdi.measure.compare import Settings, contact_sheet, measure, table
 from pyvista_vdi.measure.front import Plan, measure_front, summary
@@ -33,8 +34,7 @@ def compare(options: argparse.Namespace) -> int:
     """Compare a volume's pictures, or all volumes' fronts, and write what was found."""
     if options.front:
         return _front(options)
-    if options.quick or options.resume:
-        raise InvalidArgumentError("--quick and --resume are of --front: leave them out")
+    refuse(options, ("quick", "resume"), "--front")
     if options.tf is None and options.cmap is None and options.opacity is None:
         options.tf = _DEFAULT
     arguments = classification(options)
@@ -72,6 +72,8 @@ def compare(options: argparse.Namespace) -> int:
 
 def _front(options: argparse.Namespace) -> int:
     """Measure fronts of time and accuracy."""
+    of_one = (*OF_ANY_VOLUME, "sample_distance", "no_vtk")
+    refuse(options, of_one, "one volume, and --front measures all")
     from pyvista_vdi import examples
 
     files = output_files(options, "front", "json", "md")

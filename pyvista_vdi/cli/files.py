@@ -68,11 +68,11 @@ def convert(options: argparse.Namespace) -> int:
     if is_series(options):
         from pyvista_vdi.cli import series
 
-        return series.convert(options, series.file_arguments(options))
+        return series.convert(options)
     if is_set(options):
-        from pyvista_vdi.cli import series, sets
+        from pyvista_vdi.cli import sets
 
-        return sets.convert(options, series.file_arguments(options))
+        return sets.convert(options)
     target = checked_target(options.output)
     file_arguments = file_options(options)
     foreign = {

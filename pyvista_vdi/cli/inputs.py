@@ -31,19 +31,23 @@ _T = TypeVar("_T")
 #: Seconds between two looks of a bar at the clock.
 _PULSE = 0.5
 
-
 #: Options that are arguments of the same name, given only if the user gave them.
-_CLASSIFICATION = (
+CLASSIFICATION = (
     *("cmap", "opacity", "clim", "n_colors", "flip_scalars", "log_scale", "opacity_unit_distance"),
     *("interpolation", "shade", "ambient", "diffuse", "specular", "specular_power"),
 )
-
 
 #: Options that say how a volume's file is read.
 _OF_A_VOLUME = ("scalars", "preference", "spacing", "origin")
 
 #: Options that say what is taken of a store of chunks.
 _OF_A_STORE = ("level", "channel", "time_index")
+
+#: Options that say what is read, and how a volume looks.
+OF_ANY_VOLUME = (*_OF_A_VOLUME, *_OF_A_STORE, "tf", "transfer_function", *CLASSIFICATION)
+
+#: Options that say where the eye is, instead of turning the default view.
+PLACE = ("camera_json", "position", "focal_point", "view_up", "parallel_scale")
 
 
 def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volume:
@@ -55,19 +59,16 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
         volume: Any = _open_store(options)
         if not in_chunks:
             volume = _loaded(volume)
-    elif any(getattr(options, name) is not None for name in _OF_A_STORE):
-        name = next(n for n in _OF_A_STORE if getattr(options, n) is not None).replace("_", "-")
-        raise UnsupportedError(
-            f"--{name} is for stores of chunks, such as x.ome.zarr, and this is none: leave it out"
-        )
-    elif options.example is not None:
-        from pyvista_vdi import examples
-
-        volume = examples.load_data(options.example, as_volume=True)
     else:
-        from pyvista_vdi.measure.volumes import read_file
+        refuse(options, _OF_A_STORE, "stores of chunks, such as x.ome.zarr, and this is none")
+        if options.example is not None:
+            from pyvista_vdi import examples
 
-        volume = read_file(Path(options.file))
+            volume = examples.load_data(options.example, as_volume=True)
+        else:
+            from pyvista_vdi.measure.volumes import read_file
+
+            volume = read_file(Path(options.file))
     taken = as_volume(volume, options.scalars, options.preference or "point")
     if options.spacing is None and options.origin is None:
         return taken
@@ -115,13 +116,17 @@ def is_volume(options: argparse.Namespace) -> bool:
         return True
     if not (is_vdi_file(options.file) or is_series(options) or is_set(options)):
         return True
-    given = [n for n in (*_OF_A_VOLUME, *_OF_A_STORE) if getattr(options, n) is not None]
-    if given:
-        name = given[0].replace("_", "-")
-        raise UnsupportedError(
-            f"{printable(options.file)} is a VDI: --{name} is for volumes, leave it out"
-        )
+    is_vdi = f"{printable(options.file)} is a VDI: "
+    refuse(options, (*_OF_A_VOLUME, *_OF_A_STORE), "volumes", is_vdi)
     return False
+
+
+def refuse(options: argparse.Namespace, names: Iterable[str], what: str, why: str = "") -> None:
+    """Refuse options that were given and would mean nothing: they are for something else."""
+    for name in names:
+        value = getattr(options, name, None)
+        if value is not None and value is not False:
+            raise UnsupportedError(f"{why}--{name.replace('_', '-')} is for {what}: leave it out")
 
 
 def volume_name(options: argparse.Namespace) -> str:
@@ -132,7 +137,7 @@ def volume_name(options: argparse.Namespace) -> str:
 def classification(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments that say how the volume looks; which array it is, the volume says."""
     given = dict(TRANSFER_FUNCTIONS[options.tf]) if options.tf else {}
-    for name in _CLASSIFICATION:
+    for name in CLASSIFICATION:
         if getattr(options, name) is not None:
             given[name] = getattr(options, name)
     path = getattr(options, "transfer_function", None)
@@ -240,17 +245,17 @@ def given_camera(options: argparse.Namespace) -> Camera | None:
 def of_the_file(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments of a file that were given; ``--level`` is that of a volume's store."""
     names = {"compression": "compression", "compression_level": "level", "precision": "precision"}
-    values = {argument: getattr(options, name) for name, argument in names.items()}
-    return {argument: value for argument, value in values.items() if value is not None}
+    given = {argument: getattr(options, name) for name, argument in names.items()}
+    if getattr(options, "standard_channels", False):
+        given["exact"] = False
+    if getattr(options, "linear", False):
+        given["linear"] = True
+    return {argument: value for argument, value in given.items() if value is not None}
 
 
 def file_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments of ``VDI.save`` that the options stand for; refused now, not later."""
     given = of_the_file(options)
-    if options.standard_channels:
-        given["exact"] = False
-    if options.linear:
-        given["linear"] = True
     check_write_options(options.output, given)
     return given
 
@@ -266,8 +271,7 @@ def say_vdi(options: argparse.Namespace, vdi: VDI, more: str = "") -> None:
 
 def has_own_place(options: argparse.Namespace) -> bool:
     """Whether the options say where the eye is, instead of turning the default view."""
-    names = ("camera_json", "position", "focal_point", "view_up", "parallel_scale")
-    return any(getattr(options, name) is not None for name in names)
+    return any(getattr(options, name) is not None for name in PLACE)
 
 
 def from_json(path: str, build: Callable[[dict[str, Any]], _T], kind: str) -> _T:

@@ -16,12 +16,15 @@ from PIL import Image
 
 from pyvista_vdi.api import read, render, render_volume
 from pyvista_vdi.cli.inputs import (
+    OF_ANY_VOLUME,
+    PLACE,
     camera,
     classification,
     from_json,
     is_volume,
     measuring,
     read_volume,
+    refuse,
 )
 from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDIError, VDIFileError
@@ -56,6 +59,9 @@ def movie(options: argparse.Namespace) -> int:
     """Play a series, or fly along a path of views, and write what is seen."""
     if options.path is not None and len(options.path) < 2:
         raise InvalidArgumentError("a path has two views at least: --path A.json B.json ...")
+    if options.path is not None:
+        turned = [name for name in ("azimuth", "elevation") if getattr(options, name)]
+        refuse(options, (*PLACE, "view_angle", *turned), "movies without --path")
     keys = [from_json(file, Camera.from_dict, "camera") for file in options.path or ()]
 
     def views(first: Camera, steps: int | None) -> list[Camera]:
@@ -176,6 +182,7 @@ def _shown(
             None,
             size,
         )
+    refuse(options, OF_ANY_VOLUME, "volumes", f"{printable(options.file)} is a VDI: ")
     found = read(options.file)
     steps = len(found) if isinstance(found, VDISeries) else None
     first = found[0] if isinstance(found, VDISeries) else found

@@ -243,7 +243,7 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("series", "The space bar plays and pauses, a slider seeks.")
     declare.switch(group, "--play", "begin to play at once")
     text = "steps per second; what is not ready when its time comes is left out (default: 24)"
-    declare.option(group, "--rate", text, "RATE", float)
+    declare.option(group, "--rate", text, "RATE", declare.parse_frames_per_second)
     declare.time(group)
     group = parser.add_argument_group("while the view moves")
     rate = "frames per second to keep, by fewer pixels; 0: every frame is full (default: 30)"

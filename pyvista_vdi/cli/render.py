@@ -10,7 +10,16 @@ import numpy as np
 
 from pyvista_vdi.api import read
 from pyvista_vdi.api import render as render_vdi
-from pyvista_vdi.cli.inputs import camera, classification, is_volume, measuring, part, read_volume
+from pyvista_vdi.cli.inputs import (
+    camera,
+    classification,
+    is_series,
+    is_volume,
+    measuring,
+    part,
+    read_volume,
+    refuse,
+)
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
 from pyvista_vdi.io import checked_png_target, to_bytes, write_png
@@ -59,15 +68,15 @@ def view(options: argparse.Namespace) -> int:
         raise UnsupportedError(
             f"no window can be opened: {trouble}; write a picture instead: --screenshot FILE.png"
         )
+    if not is_series(options):
+        refuse(options, ("play", "rate", "time"), "series, .vdis")
     if is_volume(options):
         looks = classification(options)
         volume = read_volume(options)
-        _refuse_times(volume, options)
         size = options.size or WINDOW_SIZE
         _show(volume, filling_camera(volume.bounds, size), size, looks, options, screenshot)
     else:
         shown = read(options.file)
-        _refuse_times(shown, options)
         vdi = _at(shown, options.time)
         size = options.size or vdi.picture_size
         _show(shown, vdi.camera, size, classification(options), options, screenshot)
@@ -81,12 +90,6 @@ def _at(found: VDI | VDISeries | VDISet, time: float | None) -> VDI | VDISet:
     if isinstance(found, VDISeries):
         return found[0 if time is None else found.nearest(time)]
     return found
-
-
-def _refuse_times(shown: VDI | VDISeries | VDISet | Volume, options: argparse.Namespace) -> None:
-    if not isinstance(shown, VDISeries) and (options.play or options.time is not None):
-        name = "play" if options.play else "time"
-        raise UnsupportedError(f"--{name} is for series, .vdis: leave it out")
 
 
 def _show(

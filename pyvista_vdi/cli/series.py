@@ -15,6 +15,7 @@ from pyvista_vdi.cli.inputs import (
     of_the_file,
     part,
     read_volume,
+    refuse,
     say_written,
 )
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
@@ -30,6 +31,10 @@ from pyvista_vdi.series.layout import SUFFIX
 from pyvista_vdi.series.series import VDISeries
 from pyvista_vdi.series.writer import SeriesWriter
 
+#: Options of ``convert`` that are for deep images of other programs, and for those that it writes.
+OF_READ_IMAGES = ("camera_json", "thickness", "from_linear")
+OF_WRITTEN_IMAGES = ("standard_channels", "linear")
+
 
 def series(options: argparse.Namespace) -> int:
     """Write a series of the files that are named: VDIs, series of them, or volumes."""
@@ -44,7 +49,7 @@ def series(options: argparse.Namespace) -> int:
             if kinds[0] != "series"
             else "the series have their own times: leave out --times"
         )
-    arguments = file_arguments(options)
+    arguments = of_the_file(options)
     arguments |= {"tolerance": options.tolerance, "key_every": options.key_every}
     steps = _vdis(options.files) if kinds[0] != "volume" else None
     looks = classification(options)
@@ -150,16 +155,13 @@ def info(options: argparse.Namespace) -> int:
     return 0
 
 
-def file_arguments(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the options of the file that were given."""
-    return of_the_file(options)
-
-
-def convert(options: argparse.Namespace, arguments: dict[str, Any]) -> int:
+def convert(options: argparse.Namespace) -> int:
     """Write a series anew, as a page, or each of its steps to a file of its own."""
+    refuse(options, OF_READ_IMAGES, "deep images, .exr, and this is a series")
     steps: VDISeries = reader.read(options.file)
-    target = Path(options.output)
+    target, arguments = Path(options.output), of_the_file(options)
     if target.suffix.lower() in (SUFFIX, HTML_SUFFIX):
+        refuse(options, OF_WRITTEN_IMAGES, f"writing .exr, and not {target.suffix}")
         with measuring("converting") as bar:
             steps.save(target, progress=part(bar, 0.0, 1.0, "writing"), **arguments)
         say_written([target])

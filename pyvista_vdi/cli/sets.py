@@ -13,11 +13,13 @@ from pyvista_vdi.cli.inputs import (
     ambient_occlusion,
     classification,
     measuring,
+    of_the_file,
     part,
     read_volume,
+    refuse,
     say_written,
 )
-from pyvista_vdi.cli.series import write_each
+from pyvista_vdi.cli.series import OF_READ_IMAGES, OF_WRITTEN_IMAGES, write_each
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
 from pyvista_vdi.io.whole_file import check_writable, with_suffix
 from pyvista_vdi.model.classification import Classification
@@ -92,12 +94,16 @@ def info(options: argparse.Namespace) -> int:
     return 0
 
 
-def convert(options: argparse.Namespace, arguments: dict[str, Any]) -> int:
+def convert(options: argparse.Namespace) -> int:
     """Write a set anew, as a Cinema database, or each of its VDIs to a file of its own."""
+    refuse(options, OF_READ_IMAGES, "deep images, .exr, and this is a set")
     vdi_set, target = files.read(options.file), Path(options.output)
-    suffix = target.suffix.lower()
+    suffix, arguments = target.suffix.lower(), of_the_file(options)
     if suffix not in (files.SUFFIX, cinema.SUFFIX):
         return write_each(vdi_set, target, arguments)
+    refuse(options, OF_WRITTEN_IMAGES, f"writing .exr, and not {suffix}")
+    if suffix == cinema.SUFFIX:
+        refuse(options, ("compression", "compression_level", "precision"), "VDIs, not .cdb")
     with measuring("converting") as bar:
         if suffix == cinema.SUFFIX:
             cinema.write(vdi_set, target, progress=part(bar, 0.0, 1.0, "writing"))

@@ -108,11 +108,34 @@ def test_times_of_what_has_none(series, volumes, capsys, tmp_path):
     pytest.importorskip("pyvista")
     pvdi.read(series)[0].save(tmp_path / "step.vdi")
     for file in (tmp_path / "step.vdi", volumes[0]):
-        for option in (["--play"], ["--time", "1"]):
+        for option in (["--play"], ["--time", "1"], ["--rate", "5"]):
             target = tmp_path / "p.png"
             error = run(capsys, "view", file, "--screenshot", target, *option, status=1)
             assert f"{option[0]} is for series" in error
             assert not target.exists()
+
+
+def test_images_of_steps_are_written_as_asked_for(series, capsys, tmp_path):
+    pytest.importorskip("OpenEXR")
+    options = {"exact": ["--standard-channels"], "linear": ["--linear"]}
+    for name, option in options.items():
+        run(capsys, "convert", series, "-o", tmp_path / f"{name}.exr", *option)
+        alone = pvdi.read(series)[1].save(tmp_path / "alone.exr", **{name: name == "linear"})
+        assert (tmp_path / f"{name}_0001.exr").read_bytes() == alone.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("target", "options", "message"),
+    [
+        ("b.vdis", ["--camera-json", "absent"], "--camera-json is for deep images, .exr"),
+        ("b.vdis", ["--linear"], "--linear is for writing .exr, and not .vdis"),
+        ("b.html", ["--standard-channels"], "--standard-channels is for writing .exr"),
+        ("b.vdi", ["--linear"], "got linear"),
+    ],
+)
+def test_options_that_a_series_has_no_use_for(series, capsys, tmp_path, target, options, message):
+    assert message in run(capsys, "convert", series, "-o", tmp_path / target, *options, status=1)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_series_takes_the_place_of_one_that_it_is_made_of(series, capsys, tmp_path):
