@@ -200,15 +200,15 @@ def _file_or_example(
         "the folder that PYVISTA_VDI_DATA names",
         "NAME",
     )
+    grid(options)
+
+
+def grid(options: Options) -> None:
+    """Add where a volume's voxels lie, and what is taken of a store of chunks."""
     xyz = ("X", "Y", "Z")
     text = "between voxels, in place of what the volume's file says (1 where it says nothing)"
     option(options, "--spacing", text, xyz, float, nargs=3)
     option(options, "--origin", "of its first voxel, in the same way", xyz, float, nargs=3)
-    store(options)
-
-
-def store(options: Options) -> None:
-    """Add what is taken of a store of chunks."""
     text = "of a multi-scale store: 0 is the finest; auto (default): what the view requires"
     option(options, "--level", text, "auto|N", parse_level)
     option(options, "--channel", "of a store (default: 0)", "N|NAME", parse_channel)

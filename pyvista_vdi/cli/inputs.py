@@ -57,6 +57,9 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
     """
     if options.example is None and is_store(options.file):
         volume: Any = _open_store(options)
+        if len(volume.store.levels) > 1 and options.level in (None, "auto"):
+            # Of another level they are others
+            refuse(options, ("spacing", "origin"), "one level of a store, which --level chooses")
         if not in_chunks:
             volume = _loaded(volume)
     else:

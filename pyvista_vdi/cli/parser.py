@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import difflib
-import re
 from collections.abc import Sequence
 from importlib import import_module
 from typing import Any, NoReturn
@@ -97,7 +96,7 @@ def _check_option_names(verb: _Parser, arguments: Sequence[str]) -> None:
 
 
 def _option_names(verb: _Parser) -> list[str]:
-    return ["--help", *re.findall(r"--[\w-]+", verb.format_help())]
+    return [name for name in verb._option_string_actions if name.startswith("--")]
 
 
 def _refuse_argument(verb: _Parser, argument: str) -> NoReturn:
@@ -363,12 +362,7 @@ def _add_series(parser: argparse.ArgumentParser) -> None:
     declare.option(group, "--compression", text, choices=("zstd", "lz4", "deflate", "none"))
     declare.option(group, "--compression-level", "1 (fast) to 9 (small)", "N", int)
     group = parser.add_argument_group("volumes", "What VDIs are made of them; not for VDIs.")
-    xyz = ("X", "Y", "Z")
-    declare.option(
-        group, "--spacing", "between voxels, in place of the files'", xyz, float, nargs=3
-    )
-    declare.option(group, "--origin", "of the first voxel, likewise", xyz, float, nargs=3)
-    declare.store(group)
+    declare.grid(group)
     declare.size(group, WINDOW_SIZE)
     declare.longest(group, "longest list (default: 20)")
     declare.step(group, "step along the ray, model units (default: half the smallest spacing)")

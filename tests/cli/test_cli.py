@@ -23,21 +23,7 @@ from pyvista_vdi.cli import parser
 from pyvista_vdi.measure.volumes import read_file
 from pyvista_vdi.model.standard_cases import filling_camera
 
-VERBS = (
-    "devices",
-    "generate",
-    "render",
-    "view",
-    "serve",
-    "info",
-    "compare",
-    "benchmark",
-    "tradeoff",
-    "convert",
-    "series",
-    "set",
-    "paraview",
-)
+VERBS = tuple(parser._VERBS)
 
 
 @pytest.fixture(autouse=True)
@@ -152,6 +138,8 @@ def test_version(capsys):
         (["generate", "a", "-o", "b", "--memory-limit", "2 foo"], "a size such as 2GiB .* '2 foo'"),
         (["generate", "a", "-o", "b", "--max-bytes", "0"], "a size such as 2GiB or 800MB; got '0'"),
         (["generate", "a", "-o", "b", "-q"], "no argument '-q': see --help"),
+        (["devices", "--jso"], "no argument '--jso': did you mean '--json'?"),
+        (["devices", "--Q"], "no argument '--Q': known are --help, --json"),
         (["generate", "a", "-o", "b", "--size", "0x3"], "between 1 and 65536 pixels .* got 0 x 3"),
         (["generate", "a", "-o", "b", "--opacity", "0,x"], "numbers with commas .* got '0,x'"),
         (["generate", "a", "-o", "b", "--tf", "hard"], "invalid choice: 'hard'"),
@@ -167,8 +155,6 @@ def test_version(capsys):
     ],
 )
 def test_mistakes_in_the_arguments(arguments, message, capsys):
-    import re
-
     assert re.search(message.replace("?", r"\?"), complaint(capsys, *arguments, status=2))
 
 
@@ -232,8 +218,6 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
     ],
 )
 def test_mistakes_that_the_work_finds(arguments, message, folder, capsys, monkeypatch):
-    import re
-
     monkeypatch.chdir(folder)
     before = sorted(folder.iterdir())
     assert re.search(message, complaint(capsys, *arguments))
@@ -260,8 +244,6 @@ def test_mistakes_that_the_work_finds(arguments, message, folder, capsys, monkey
     ],
 )
 def test_mistakes_that_need_pyvista_to_be_found(arguments, message, folder, capsys, monkeypatch):
-    import re
-
     pytest.importorskip("pyvista")
     monkeypatch.chdir(folder)
     before = sorted(folder.iterdir())

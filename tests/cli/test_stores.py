@@ -103,9 +103,10 @@ def test_other_verbs_read_it_whole(image, tmp_path, default_runtime):
         (("--example", "brain", "--scheduler", "x"), "--scheduler is for stores"),
         (("none.ome.zarr",), "none.ome.zarr cannot be read as zarr"),
         (("x.zarr", "--level", "best"), "auto, or a level's number"),
+        (("x.ome.zarr", "--spacing", "1", "1", "1"), "--spacing is for one level of a store"),
     ],
 )
-def test_mistakes_are_named(arguments, message, tmp_path, capsys):
-    pytest.importorskip("zarr")
+def test_mistakes_are_named(arguments, message, image, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     assert main(["generate", *arguments, "-o", str(tmp_path / "x.vdi"), *LOOK]) in (1, 2)
     assert message in capsys.readouterr().err
