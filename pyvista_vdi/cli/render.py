@@ -23,7 +23,6 @@ from pyvista_vdi.cli.inputs import (
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
 from pyvista_vdi.io import checked_png_target, to_bytes, write_png
-from pyvista_vdi.measure.vtk_baselines import aim
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import VDI
@@ -105,6 +104,8 @@ def _show(
     No file is written where the picture cannot be drawn or is interrupted.
     """
     pv = import_pyvista()
+    from pyvista_vdi.vtk_pipeline.filters.view import aim
+
     with pv.vtk_verbosity("off"):
         plotter = pv.Plotter(off_screen=screenshot is not None, window_size=list(size))
     try:

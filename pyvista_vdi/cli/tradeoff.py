@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -75,9 +76,7 @@ def tradeoff(options: argparse.Namespace) -> int:
 
 def _settings(options: argparse.Namespace) -> tuple[Setting, ...]:
     """Return what the options ask to compare."""
-    usual: dict[str, tuple[Any, ...]] = {
-        name: QUICK_AXES.get(name, AXES[name]) if options.quick else AXES[name] for name in AXES
-    }
+    usual = {**AXES, **QUICK_AXES} if options.quick else AXES
     if options.sweep is None:
         axes = {n: usual[n] for n in (QUICK_AXES if options.quick else DEFAULT_AXES)}
     else:
@@ -86,7 +85,7 @@ def _settings(options: argparse.Namespace) -> tuple[Setting, ...]:
     return sweep(axes, pairs=pairs, product=options.product)
 
 
-def _axis(text: str, usual: dict[str, tuple[Any, ...]]) -> tuple[str, tuple[Any, ...]]:
+def _axis(text: str, usual: Mapping[str, tuple[Any, ...]]) -> tuple[str, tuple[Any, ...]]:
     """Return an axis and its values as ``--sweep`` has them: ``lists`` or ``lists=0.5,2``."""
     given, equals, values = text.partition("=")
     name = given.replace("-", "_")

@@ -101,6 +101,8 @@ class OffScreenVolume:
         self._window.Finalize()
 
     def _look(self, camera: Camera) -> None:
+        from pyvista_vdi.vtk_pipeline.filters.view import aim
+
         aim(self._renderer.GetActiveCamera(), camera)
         matrix = _vtk("vtkCommonMath").vtkMatrix4x4()
         matrix.DeepCopy(camera.model_transform.ravel().tolist())
@@ -148,18 +150,6 @@ class VTKBaseline(OffScreenVolume):
     def set_image_sample_distance(self, distance: float) -> None:
         """Cast a ray for every so many pixels along each edge."""
         self._mapper.SetImageSampleDistance(distance)
-
-
-def aim(theirs: Any, camera: Camera) -> None:
-    """Give a ``vtkCamera`` a view; a model transform is the prop's."""
-    theirs.SetPosition(camera.position)
-    theirs.SetFocalPoint(camera.focal_point)
-    theirs.SetViewUp(camera.view_up)
-    theirs.SetUseHorizontalViewAngle(camera.use_horizontal_view_angle)
-    theirs.SetViewAngle(camera.view_angle)
-    theirs.SetParallelProjection(camera.parallel_projection)
-    theirs.SetParallelScale(camera.parallel_scale)
-    theirs.SetWindowCenter(*camera.window_center)
 
 
 def _vtk(module: str) -> Any:

@@ -9,9 +9,9 @@ from typing import Any
 import pyvista as pv
 
 from pyvista_vdi.api import generate
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.filters.convert import require_image
+from pyvista_vdi.vtk_pipeline.filters.view import aim
 
 
 @pv.register_dataset_accessor("vdi", pv.DataSet)
@@ -136,44 +136,38 @@ def plot(
         arguments.setdefault("window_size", [*shown.picture_size])
     plotter = pv.Plotter(**_taken(arguments, pv.Plotter.__init__))
     showing = _taken(arguments, pv.Plotter.show, "jupyter_kwargs")
-    if plotter.theme.axes.show if show_axes is None else show_axes:
-        plotter.add_axes()
-    if background is not None:
-        plotter.set_background(background)
-    plotter.add_vdi(shown, **arguments)
-    if text:
-        plotter.add_text(text)
-    if show_grid:
-        plotter.show_grid()
-    elif show_bounds:
-        plotter.show_bounds()
-    if cpos is not None:
-        plotter.camera_position = cpos
-    elif isinstance(shown, VDI):
-        _look_as(plotter.camera, shown.camera)
-        plotter.camera_set = True
-        plotter.renderer.reset_camera_clipping_range()
-    if parallel_projection:
-        plotter.enable_parallel_projection()
-    if eye_dome_lighting:
-        plotter.enable_eye_dome_lighting()
-    if anti_aliasing is False:
-        plotter.disable_anti_aliasing()
-    elif anti_aliasing is not None:
-        plotter.enable_anti_aliasing("msaa" if anti_aliasing is True else anti_aliasing)
-    if zoom is not None:
-        plotter.camera.zoom(zoom)
-    return plotter.show(**showing)
-
-
-def _look_as(theirs: pv.Camera, view: Camera) -> None:
-    """Give a plotter's camera a view."""
-    theirs.position, theirs.focal_point, theirs.up = view.position, view.focal_point, view.view_up
-    theirs.SetUseHorizontalViewAngle(view.use_horizontal_view_angle)
-    theirs.view_angle = view.view_angle
-    theirs.parallel_projection = view.parallel_projection
-    theirs.parallel_scale = view.parallel_scale
-    theirs.SetWindowCenter(*view.window_center)
+    try:
+        if plotter.theme.axes.show if show_axes is None else show_axes:
+            plotter.add_axes()
+        if background is not None:
+            plotter.set_background(background)
+        plotter.add_vdi(shown, **arguments)
+        if text:
+            plotter.add_text(text)
+        if show_grid:
+            plotter.show_grid()
+        elif show_bounds:
+            plotter.show_bounds()
+        if cpos is not None:
+            plotter.camera_position = cpos
+        elif isinstance(shown, VDI):
+            aim(plotter.camera, shown.camera)
+            plotter.camera_set = True
+            plotter.renderer.reset_camera_clipping_range()
+        if parallel_projection:
+            plotter.enable_parallel_projection()
+        if eye_dome_lighting:
+            plotter.enable_eye_dome_lighting()
+        if anti_aliasing is False:
+            plotter.disable_anti_aliasing()
+        elif anti_aliasing is not None:
+            plotter.enable_anti_aliasing("msaa" if anti_aliasing is True else anti_aliasing)
+        if zoom is not None:
+            plotter.camera.zoom(zoom)
+        return plotter.show(**showing)
+    except BaseException:
+        plotter.close()  # PyVista keeps those that are not
+        raise
 
 
 def _taken(arguments: dict[str, Any], function: Any, *more: str) -> dict[str, Any]:

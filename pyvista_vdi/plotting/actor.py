@@ -52,6 +52,7 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
             other.painter.set_input(self.painter.input.shared())
         other.SetDevice(self.GetDevice())
         other.painter.take_settings(self.painter)
+        other.SetMaximumImageSampleDistance(self.GetMaximumImageSampleDistance())
         other.SetCropping(self.GetCropping())
         other.SetCroppingRegionPlanes(self.GetCroppingRegionPlanes())
         other.SetCroppingRegionFlags(self.GetCroppingRegionFlags())

@@ -264,7 +264,7 @@ def _apply_opacity(table: pv.LookupTable, opacity: Any, n_colors: int) -> None:
             hint = f": did you mean {near[0]!r}?" if near else f"; known are {', '.join(names)}"
         raise InvalidArgumentError(
             f"opacity={opacity!r} cannot be used{hint or f': {error}'}"
-        ) from (error)
+        ) from error
 
 
 def _opacity_names(error: Exception) -> list[str]:

@@ -14,10 +14,7 @@ from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet
 from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import (
-    InvalidArgumentTypeError,
-    UnsupportedError,
-)
+from pyvista_vdi.errors import InvalidArgumentTypeError, UnsupportedError
 from pyvista_vdi.model.classification import DEFAULTS, Classification, refuse_unknown
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.vdi import VDI
@@ -35,14 +32,17 @@ from pyvista_vdi.sets.vdi_set import VDISet
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
-from pyvista_vdi.vtk_pipeline.interaction.regeneration import (
-    Policy,
-    checked_policy,
-)
+from pyvista_vdi.vtk_pipeline.interaction.regeneration import Policy, checked_policy
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import checked_rate
 
 #: ``add_volume``'s aliases.
 _ALIASES = {"rng": "clim", "colormap": "cmap", "backface_culling": "culling"}
+
+#: Arguments that say nothing of a VDI, beside those of its looks and its generation.
+_OF_A_VOLUME = (
+    *("resolution", "categories", "camera", "coverage", "quality", "target_ssim", "full_fps"),
+    *("max_bytes", "target_angle"),
+)
 
 #: SSIM by which a view may fall below what was asked for before it regenerates.
 _BELOW_GOAL = 0.02
@@ -273,10 +273,10 @@ class AddVDI(Component):
         >>> actor = plotter.add_vdi(pyvista_vdi.examples.load_brain(), cmap="bone")
         >>> plotter.show()  # doctest: +SKIP
         """
-        arguments = {k: v for k, v in locals().items() if k in _DEFAULTS and k != "volume"}
         refuse_unknown(aliases, "add_vdi", (*_ALIASES, *_DEFAULTS))
         clim, cmap = aliases.get("rng", clim), aliases.get("colormap", cmap)
         culling = aliases.get("backface_culling", culling)
+        arguments = {k: v for k, v in locals().items() if k in _DEFAULTS and k != "volume"}
         plotter = self._plotter
         if mapper is not None:
             note_mapper(mapper)
@@ -285,7 +285,7 @@ class AddVDI(Component):
                 f"scalar_bar_args must be a dictionary; got {scalar_bar_args!r}"
             )
         if isinstance(volume, vtkMultiBlockDataSet):
-            return add_blocks(self, volume, {**arguments, **aliases})
+            return add_blocks(self, volume, arguments)
         if target_fps is not None:
             checked_rate("target_fps", target_fps)
         checked_policy(regenerate)
@@ -331,10 +331,7 @@ class AddVDI(Component):
         if several is not None:
             volume = several[0]  # which all steps, and all views, look like
         if isinstance(volume, VDI) or is_vdi_image(volume):
-            chosen = {"quality": quality, "target_ssim": target_ssim, "full_fps": full_fps}
-            chosen |= {"max_bytes": max_bytes, "target_angle": target_angle}
-            others = {"resolution": resolution, "categories": categories, "camera": camera}
-            others |= {"coverage": coverage, **chosen, **vars(options)}
+            others = {**{name: arguments[name] for name in _OF_A_VOLUME}, **vars(options)}
             extra = [*changed, *_changed(others, _DEFAULTS)]
             if extra:
                 raise UnsupportedError(

@@ -92,11 +92,13 @@ class _Watch(MetaPathFinder):
 
 
 def _offer(plotters: ModuleType) -> None:
-    base = getattr(plotters, "BasePlotter", None)  # a module that is being imported has none yet
+    base = getattr(plotters, "BasePlotter", None)
+    if base is None:  # it is being imported, by somebody else
+        return
     for name, home in COMPONENTS.items():
-        if base is not None and home not in sys.modules:
+        if home not in sys.modules:
             setattr(base, name, _Pending(name))
-    if base is not None and hasattr(base, "export_html"):
+    if hasattr(base, "export_html"):
         base.export_html = _with_vdis(base.export_html)
 
 

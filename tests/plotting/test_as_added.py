@@ -188,6 +188,27 @@ def test_a_copy_s_properties_are_its_own(plotter, change):
     np.testing.assert_array_equal(shown(plotter), changed)
 
 
+def test_a_copy_draws_colours_of_the_volume_s_own(plotter):
+    grid = ramp()
+    colors = np.uint8(255 * (grid.points / (N - 1)))
+    grid["rgba"] = np.column_stack([colors, np.full(len(colors), 90, np.uint8)])
+    actor = plotter.add_vdi(grid, scalars="rgba")
+    before = shown(plotter)
+    assert np.ptp(before) > SEEN
+    twin = actor.copy()
+    plotter.remove_actor(actor)
+    plotter.add_actor(twin, reset_camera=False)
+    np.testing.assert_array_equal(shown(plotter), before)
+
+
+def test_a_copy_draws_by_the_same_settings(plotter):
+    mapper = plotter.add_vdi(ramp(), **LOOKS).mapper
+    mapper.SetMaximumImageSampleDistance(8.0)
+    mapper.SetAutomaticView(False)
+    twin = plotter.volume.copy().mapper
+    assert (twin.GetMaximumImageSampleDistance(), twin.GetAutomaticView()) == (8.0, False)
+
+
 def test_a_shallow_copy_shares_its_property_until_it_is_given_another(plotter):
     actor = plotter.add_vdi(ramp(), **LOOKS)
     before = shown(plotter)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import LOOKS, add_judge, add_ours, assert_as_vtk, soft_ball
+from pyvista.plotting.plotter import _ALL_PLOTTERS
 
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
 from pyvista_vdi.plotting import classify
@@ -54,6 +55,14 @@ def test_blocks_are_those_that_are_added_one_by_one(plotter, multi_colors):
     assert len(vtks) == 2
     assert names == [name for name in judge.renderer.actors if name.startswith("balls")]
     judge.close()
+
+
+@pytest.mark.parametrize("name", ["cmap", "colormap"])
+def test_colours_of_their_own_go_before_a_colour_map(plotter, name):
+    actors = plotter.add_vdi(two_balls(), multi_colors=True, **{name: "bone"})
+    reds, greens = (actor.mapper.lookup_table.values[-1, :3] for actor in actors)
+    assert reds.argmax() == 0
+    assert greens.argmax() == 1
 
 
 def test_blocks_within_blocks_and_none(plotter):
@@ -150,8 +159,13 @@ def test_plot_of_a_grid_is_what_a_plotter_shows(plotter):
     )
     # The ball has 8 voxels along an edge; half-voxel steps of both begin elsewhere
     assert np.abs(picture.astype(int) - vtks).mean() < 4
+
+
+def test_a_plot_that_is_refused_leaves_no_plotter():
+    before = dict(_ALL_PLOTTERS)
     with pytest.raises(TypeError, match="'opcity': did you mean 'opacity'"):
-        volume.vdi.plot(off_screen=True, opcity=1)
+        soft_ball(8).vdi.plot(off_screen=True, opcity=1)
+    assert before == _ALL_PLOTTERS
 
 
 def test_help_is_the_method_s(plotter):

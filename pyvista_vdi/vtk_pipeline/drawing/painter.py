@@ -166,9 +166,11 @@ class Painter:
 
     def take_settings(self, other: Painter) -> None:
         """Take over how dense another draws, what it allows and when it regenerates."""
+        self.give_proxy(other.proxy.GetNumberOfScalarComponents())
         self.opacity_multiplier = other.opacity_multiplier
         self.image_distance = other.image_distance
         self.upkeep.draw = other.upkeep.draw
+        self.upkeep.automatic_view = other.upkeep.automatic_view
         self.transmittance_cutoff = other.transmittance_cutoff
         vars(self.interaction).update(vars(other.interaction))
         mine, theirs = self.selection, other.selection

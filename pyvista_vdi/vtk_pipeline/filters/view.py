@@ -21,6 +21,18 @@ def as_array(matrix: Any) -> NDArray[np.float64]:
     return np.array(elements).reshape(4, 4)
 
 
+def aim(theirs: Any, camera: Camera) -> None:
+    """Give a ``vtkCamera`` a view; a model transform is the prop's."""
+    theirs.SetPosition(camera.position)
+    theirs.SetFocalPoint(camera.focal_point)
+    theirs.SetViewUp(camera.view_up)
+    theirs.SetUseHorizontalViewAngle(camera.use_horizontal_view_angle)
+    theirs.SetViewAngle(camera.view_angle)
+    theirs.SetParallelProjection(camera.parallel_projection)
+    theirs.SetParallelScale(camera.parallel_scale)
+    theirs.SetWindowCenter(*camera.window_center)
+
+
 @dataclass(frozen=True)
 class View(model_view.View):
     """A view that a renderer shows."""
