@@ -458,16 +458,6 @@ def test_slices_that_do_not_say_where_they_lie(tmp_path):
 # -- names and damage ------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def vtk_may_complain(vtk_messages):
-    """What VTK writes about the test's files is seen by nobody."""
-    from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
-
-    vtkOutputWindow.SetInstance(vtkStringOutputWindow())
-    yield
-    vtkOutputWindow.SetInstance(vtk_messages)
-
-
 def test_a_vdi_is_no_volume(tmp_path):
     vdi = random_vdi(np.random.default_rng(1))
     for name in ("a.vdi", "a.exr"):
@@ -488,7 +478,7 @@ def test_a_folder_that_is_named_like_a_file(kind, tmp_path):
 
 @pytest.mark.parametrize("written", ["mha", "nii", "vti"])
 @pytest.mark.parametrize("named", ["mha", "nii", "nii.gz", "vti", "nrrd", "dat"])
-def test_another_formats_name(written, named, tmp_path, vtk_may_complain):
+def test_another_formats_name(written, named, tmp_path, expected_messages):
     if named.startswith(written):
         pytest.skip("the right name; whether a NIfTI is compressed is seen whatever it is called")
     path = tmp_path / f"b.{named}"

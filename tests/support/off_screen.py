@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import sys
@@ -13,7 +14,12 @@ if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 import pyvista as pv
-from vtkmodules.vtkCommonCore import vtkObjectBase, vtkStringOutputWindow, vtkVersion
+from vtkmodules.vtkCommonCore import (
+    vtkObjectBase,
+    vtkOutputWindow,
+    vtkStringOutputWindow,
+    vtkVersion,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -25,14 +31,26 @@ def off_screen(default_runtime, monkeypatch):
 @pytest.fixture(autouse=True)
 def vtk_messages(off_screen):
     """Fail on anything that VTK writes to its output window."""
-    from vtkmodules.vtkCommonCore import vtkOutputWindow
-
-    window = vtkStringOutputWindow()
-    before = vtkOutputWindow.GetInstance()
-    vtkOutputWindow.SetInstance(window)
-    yield window
-    vtkOutputWindow.SetInstance(before)
+    with _caught() as window:
+        yield
     assert window.GetOutput() == ""
+
+
+@pytest.fixture
+def expected_messages(vtk_messages):
+    """What VTK writes to its output window, which is no failure here."""
+    with _caught() as window:
+        yield window
+
+
+@contextlib.contextmanager
+def _caught():
+    window, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
+    vtkOutputWindow.SetInstance(window)
+    try:
+        yield window
+    finally:
+        vtkOutputWindow.SetInstance(before)
 
 
 @pytest.fixture

@@ -1,6 +1,15 @@
 """Windows off-screen, or watched; what VTK writes a failure: ``tests/support`` has the fixtures."""
 
-from off_screen import no_leaks, off_screen, vtk_messages
+from off_screen import expected_messages, no_leaks, off_screen, vtk_messages
 from watched_windows import coarsest, gate, no_estimates, plotter
 
-__all__ = ["coarsest", "gate", "no_estimates", "no_leaks", "off_screen", "plotter", "vtk_messages"]
+__all__ = [
+    "coarsest",
+    "expected_messages",
+    "gate",
+    "no_estimates",
+    "no_leaks",
+    "off_screen",
+    "plotter",
+    "vtk_messages",
+]

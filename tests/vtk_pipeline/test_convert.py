@@ -9,6 +9,7 @@ import pytest
 import pyvista as pv
 from hypothesis import example, given
 from hypothesis import strategies as st
+from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonCore import vtkMath
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
 from vtkmodules.vtkRenderingCore import (
@@ -22,6 +23,7 @@ from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVDIError,
     InvalidVolumeError,
+    UnknownArrayError,
     UnsupportedError,
 )
 from pyvista_vdi.model.camera import Camera
@@ -121,6 +123,16 @@ def test_scalars_that_cannot_be_used(change, error, message):
 def test_unknown_array_names_the_nearest():
     with pytest.raises(InvalidVolumeError, match=r"no array 'V': did you mean 'v'\? .*\['v'\]"):
         volume_from_vtk(some_grid(), "V")
+
+
+def test_an_array_without_a_name_is_taken_where_it_is_the_only_one():
+    image, values = vtkImageData(), np.arange(24.0)
+    image.SetDimensions(2, 3, 4)
+    image.GetPointData().AddArray(numpy_to_vtk(values))
+    volume = volume_from_vtk(image)
+    np.testing.assert_array_equal(volume.array.ravel(), values)
+    with pytest.raises(UnknownArrayError, match=r"no array 'v': its arrays are \[None\]"):
+        volume_from_vtk(image, "v")
 
 
 @pytest.mark.parametrize("dimensions", [(4, 3, 1), (1, 3, 4)])

@@ -12,7 +12,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from plugin_scenes import LOOKS, TOLERANCE, soft_ball, vdi_of_one_list
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
 from vtkmodules.vtkCommonExecutionModel import vtkTrivialProducer
 from vtkmodules.vtkFiltersCore import vtkCellDataToPointData
@@ -277,15 +276,12 @@ def test_source_checks_settings_when_they_are_set(call, error, message):
     source.Update()  # as before
 
 
-def test_problem_in_an_update_from_c_goes_to_vtks_output_window():
-    messages, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
-    vtkOutputWindow.SetInstance(messages)
+def test_problem_in_an_update_from_c_goes_to_vtks_output_window(expected_messages):
     source = ready_source(Camera=None)
     downstream = vtkCellDataToPointData()
     downstream.SetInputConnection(source.GetOutputPort())
     downstream.Update()
-    vtkOutputWindow.SetInstance(before)
-    assert "VDISource has no camera" in messages.GetOutput()
+    assert "VDISource has no camera" in expected_messages.GetOutput()
 
 
 # -- mapper and actor ------------------------------------------------------------------------------

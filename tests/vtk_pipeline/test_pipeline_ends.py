@@ -6,16 +6,23 @@ import numpy as np
 import pytest
 from plugin_scenes import soft_ball, vdi_of_one_list
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkImagingCore import vtkImageFlip
+from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 from vtkmodules.vtkRenderingCore import vtkCamera
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIFileError
 from pyvista_vdi.io import to_bytes
-from pyvista_vdi.vtk_pipeline import VDIReader, VDIToImage, VDIWriter, vdi_from_image, vdi_to_image
+from pyvista_vdi.vtk_pipeline import (
+    VDIReader,
+    VDIToDenseImage,
+    VDIToImage,
+    VDIWriter,
+    vdi_from_image,
+    vdi_to_image,
+)
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +43,24 @@ def pixels(image, name):
     assert depth == 1
     array = vtk_to_numpy(image.GetPointData().GetArray(name))
     return array.reshape(height, width, 4)[::-1]
+
+
+@pytest.mark.parametrize("kind", [VDIToImage, VDIToDenseImage, VDIWriter])
+def test_what_has_no_input_says_so(kind, expected_messages, tmp_path):
+    end = kind()
+    ask = end.Update
+    if kind is VDIWriter:
+        end.SetFileName(str(tmp_path / "a.vdi"))
+        ask = end.Write
+    with pytest.raises(InvalidVDIError, match=rf"{kind.__name__} has no input: call SetInputData"):
+        ask()
+    reader = vtkXMLImageDataReader()
+    reader.SetFileName(str(tmp_path / "none.vti"))
+    end.SetInputConnection(reader.GetOutputPort())
+    with pytest.raises(InvalidVDIError, match=r"VTK's output window says why"):
+        ask()
+    assert "none.vti" in expected_messages.GetOutput()
+    assert not list(tmp_path.iterdir())
 
 
 # -- VDIToImage ------------------------------------------------------------------------------------
@@ -118,7 +143,7 @@ def test_picture_is_made_again_only_if_something_changed(vdi):
     )
 
 
-def test_what_is_no_vdi_has_no_picture(vdi, vtk_messages):
+def test_what_is_no_vdi_has_no_picture(vdi, expected_messages):
     picture = to_image(vdi)
     picture.Update()
     volume = vtkImageData()
@@ -128,12 +153,11 @@ def test_what_is_no_vdi_has_no_picture(vdi, vtk_messages):
         picture.Update()
     assert picture.GetOutputDataObject(0).GetNumberOfPoints() == 0
 
+    assert expected_messages.GetOutput() == ""
+
     # VTK's own update cannot raise
-    said = vtkStringOutputWindow()
-    vtkOutputWindow.SetInstance(said)
     picture.GetExecutive().Update()
-    vtkOutputWindow.SetInstance(vtk_messages)
-    assert "VDIToImage: this vtkImageData is not a VDI" in said.GetOutput()
+    assert "VDIToImage: this vtkImageData is not a VDI" in expected_messages.GetOutput()
 
 
 # -- files -----------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import LOOKS, soft_ball
-from vtkmodules.vtkCommonCore import vtkObject, vtkOutputWindow, vtkStringOutputWindow
+from vtkmodules.vtkCommonCore import vtkObject
 from vtkmodules.vtkCommonExecutionModel import vtkTrivialProducer
 from vtkmodules.vtkFiltersCore import vtkCellDataToPointData, vtkContourFilter
 from vtkmodules.vtkFiltersGeneral import vtkMultiBlockDataGroupFilter
@@ -229,15 +229,6 @@ def test_only_a_part_is_asked_for_and_all_is_given():
     source = ready_source()
     source.UpdateExtent((0, 9, 0, 9, 0, 0))
     assert source.GetOutputDataObject(0).GetDimensions() == (*SIZE, 1)
-
-
-@pytest.fixture
-def expected_messages():
-    """What VTK writes to its output window, which is no failure here."""
-    window, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
-    vtkOutputWindow.SetInstance(window)
-    yield window
-    vtkOutputWindow.SetInstance(before)
 
 
 # -- what is no image ------------------------------------------------------------------------------

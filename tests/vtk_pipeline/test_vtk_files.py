@@ -12,7 +12,6 @@ import pyvista as pv
 import strategies
 from hypothesis import given, settings
 from plugin_scenes import soft_ball
-from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 from vtkmodules.vtkCommonExecutionModel import vtkTrivialProducer
 from vtkmodules.vtkImagingCore import vtkExtractVOI
 from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLImageDataWriter
@@ -26,7 +25,7 @@ from pyvista_vdi.errors import (
     InvalidVolumeError,
     VDIFileError,
 )
-from pyvista_vdi.io import read_info
+from pyvista_vdi.io import is_vdi_file, read_info
 from pyvista_vdi.model import host_memory
 from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.vdi import VDI
@@ -226,6 +225,18 @@ def test_files_that_hold_no_vdi(make, message, tmp_path):
         pvdi.read(path)
     with pytest.raises(VDIFileError, match=message):
         read_info(path)
+    assert not is_vdi_file(path)
+
+
+@pytest.mark.parametrize("make", [vdi_to_image, vdi_to_dense_image])
+@pytest.mark.parametrize("appended", [True, False])
+def test_files_that_hold_a_vdi_are_known_by_what_they_name(make, appended, tmp_path):
+    writer = vtkXMLImageDataWriter()
+    writer.SetInputData(make(some_vdi(3)))
+    writer.SetFileName(str(tmp_path / "v.vti"))
+    writer.SetDataMode(writer.Appended if appended else writer.Binary)
+    writer.Write()
+    assert is_vdi_file(tmp_path / "v.vti")
 
 
 def test_truncated_files_are_noticed(tmp_path):
@@ -421,15 +432,12 @@ def test_the_filter_in_a_pipeline():
             dense.SetMaxSupersegments(nonsense)
 
 
-def test_the_filter_refuses_what_is_no_vdi():
+def test_the_filter_refuses_what_is_no_vdi(expected_messages):
     dense = VDIToDenseImage()
     dense.SetInputDataObject(soft_ball(4))
     with pytest.raises(InvalidVDIError, match="is not a VDI"):
         dense.Update()
-    messages, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
-    vtkOutputWindow.SetInstance(messages)
     downstream = vtkExtractVOI()
     downstream.SetInputConnection(dense.GetOutputPort())
     downstream.Update()
-    vtkOutputWindow.SetInstance(before)
-    assert "VDIToDenseImage: this ImageData is not a VDI" in messages.GetOutput()
+    assert "VDIToDenseImage: this ImageData is not a VDI" in expected_messages.GetOutput()

@@ -12,7 +12,7 @@ from vtkmodules.vtkCommonCore import VTK_UNSIGNED_INT, vtkOutputWindow, vtkWeakR
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
-from pyvista_vdi.errors import Cancelled
+from pyvista_vdi.errors import Cancelled, InvalidVDIError, VDIError
 
 TIME_STEPS = vtkStreamingDemandDrivenPipeline.TIME_STEPS()
 TIME_RANGE = vtkStreamingDemandDrivenPipeline.TIME_RANGE()
@@ -34,6 +34,8 @@ class Algorithm(VTKPythonAlgorithmBase):
     """
 
     picture_size: tuple[int, int] | None = None
+    #: What an input is that is not there.
+    bad_input: type[VDIError] = InvalidVDIError
 
     def __init__(self, **ports: Any) -> None:
         super().__init__(**ports)
@@ -42,7 +44,15 @@ class Algorithm(VTKPythonAlgorithmBase):
 
     def Update(self, *args: Any) -> None:
         """Bring the output up to date, and raise what went wrong."""
-        self._update(*args)
+        if not self._updated(*args):
+            raise self.bad_input(
+                f"what is before {type(self).__name__} failed: VTK's output window says why"
+                if self.GetNumberOfInputConnections(0) > 0
+                else self._no_input()
+            )
+
+    def _no_input(self) -> str:
+        return f"{type(self).__name__} has no input: call SetInputDataObject or SetInputConnection"
 
     def UpdateTimeStep(self, time: float, *args: Any) -> None:
         """Bring the output up to date as of a time, and raise what went wrong.
@@ -54,8 +64,8 @@ class Algorithm(VTKPythonAlgorithmBase):
         self.GetOutputInformation(0).Set(UPDATE_TIME_STEP, float(time))
         self.Update()
 
-    def _update(self, *args: Any) -> bool:
-        """Do so, and return whether what is before this algorithm went well."""
+    def _updated(self, *args: Any) -> bool:
+        """Update, and return whether what is before this algorithm went well."""
         self._python_waits = True
         try:
             if args:

@@ -164,14 +164,17 @@ def scalars_of(image: vtkImageData, name: str | None, preference: str = "point")
             "show it as it is"
         )
     attributes = {"point": image.GetPointData(), "cell": image.GetCellData()}
-    order = sorted(attributes, key=lambda kind: kind != preference)
+    # Of text there is None, which cannot be rendered
+    arrays = {
+        kind: [a for i in range(data.GetNumberOfArrays()) if (a := data.GetArray(i)) is not None]
+        for kind, data in attributes.items()
+    }
+    names = list(dict.fromkeys(array.GetName() for found in arrays.values() for array in found))
     if name is None:
         # Active scalars: points first, whatever the preference, as pyvista's active_scalars
-        for kind in ("point", "cell"):
-            active = attributes[kind].GetScalars()
-            if active is not None:
-                return active
-        names = _array_names(attributes)
+        for data in attributes.values():
+            if data.GetScalars() is not None:
+                return data.GetScalars()
         if len(names) != 1:
             raise InvalidVolumeError(
                 f"the volume has no active scalars; its arrays are {names}: name one"
@@ -179,25 +182,14 @@ def scalars_of(image: vtkImageData, name: str | None, preference: str = "point")
                 else "the volume has no scalars: there is nothing to render"
             )
         name = names[0]
-    for kind in order:
-        array = attributes[kind].GetArray(name)
-        if array is not None:
-            return array
-    names = _array_names(attributes)
-    lower = {each.lower(): each for each in reversed(names)}
+    for kind in sorted(arrays, key=lambda kind: kind != preference):
+        for array in arrays[kind]:
+            if array.GetName() == name:
+                return array
+    lower = {each.lower(): each for each in reversed(names) if each}
     near = [lower[m] for m in difflib.get_close_matches(str(name).lower(), list(lower), n=1)]
     hint = f"did you mean {near[0]!r}? Its" if near else "its"
     raise UnknownArrayError(f"the volume has no array {name!r}: {hint} arrays are {names}")
-
-
-def _array_names(attributes: dict[str, Any]) -> list[str]:
-    names = []
-    for data in attributes.values():
-        for i in range(data.GetNumberOfArrays()):
-            array = data.GetArray(i)  # None for strings, which cannot be rendered
-            if array is not None and array.GetName() not in names:
-                names.append(array.GetName())
-    return names
 
 
 def _at_points(image: vtkImageData, array: vtkDataArray) -> vtkDataArray:

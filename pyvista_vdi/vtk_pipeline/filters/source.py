@@ -40,13 +40,9 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     vdi_to_image,
     volume_from_vtk,
 )
-from pyvista_vdi.vtk_pipeline.filters.properties import (
-    transfer_function_from_property,
-)
+from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 from pyvista_vdi.vtk_pipeline.filters.source_settings import SourceSettings
 from pyvista_vdi.vtk_pipeline.filters.view import View
-
-_NO_INPUT = "VDISource has no input: call SetInputDataObject(volume)"
 
 
 @dataclass(frozen=True)
@@ -99,6 +95,8 @@ class VDISource(SourceSettings):
     abort is of one execution.
     """
 
+    bad_input = InvalidVolumeError
+
     def __init__(self) -> None:
         super().__init__()
         self._volume: Volume | None = None
@@ -110,16 +108,11 @@ class VDISource(SourceSettings):
 
     # -- results ---------------------------------------------------------------------------------
 
-    def Update(self, *args: Any) -> Any:
+    def Update(self, *args: Any) -> None:
         """Bring the output up to date, and raise what went wrong."""
         self.CheckLights()
         self._check_input()
-        if not self._update(*args):
-            raise InvalidVolumeError(
-                "what is before VDISource failed: VTK's output window says why"
-                if self.GetNumberOfInputConnections(0) > 0
-                else _NO_INPUT
-            )
+        super().Update(*args)
 
     def CheckLights(self) -> None:
         """Be out of date if the renderer that lights the volume has other lights by now."""
@@ -213,7 +206,7 @@ class VDISource(SourceSettings):
             If there is no input.
         """
         if self.GetNumberOfInputConnections(0) == 0:
-            raise InvalidVolumeError(_NO_INPUT)
+            raise InvalidVolumeError(self._no_input())
         time = wanted_time(self.GetOutputInformation(0))
         if time is not None:  # else what others asked for is as good
             self.GetInputInformation(0, 0).Set(UPDATE_TIME_STEP, time)

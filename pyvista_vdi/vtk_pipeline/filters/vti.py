@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
@@ -93,12 +94,15 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
 
 def holds_vdi(path: str | os.PathLike[str]) -> bool:
     """Whether a ``.vti`` file's header names the arrays of a VDI; False where there is no file."""
-    try:
-        head = Path(path).read_bytes().partition(b"<AppendedData")[0]
-    except OSError:
-        return False
     names = f"{DESCRIPTION}|{DENSE_DESCRIPTION}".encode()
-    return re.search(rb'<Array type="String" Name="(?:%b)"' % names, head) is not None
+    wanted = re.compile(rb'<AppendedData|<Array type="String" Name="(?:%b)"' % names)
+    try:
+        # Not read: it may be a volume of any size
+        with Path(path).open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
+            found = wanted.search(content)
+            return found is not None and found[0] != b"<AppendedData"
+    except (OSError, ValueError):  # an empty one cannot be mapped
+        return False
 
 
 def _image(path: Any) -> Any:
