@@ -196,6 +196,7 @@ def generate(
         memory_limit=memory_limit,  # type: ignore[arg-type]  # a text becomes bytes
     )
     volume = as_volume(volume, looks.scalars, looks.preference)
+    metadata = {"classification": looks.describe(), "scalars": volume.name}
     if volume.chunked:
         from pyvista_vdi.large.entrance import generate_in_blocks
 
@@ -213,7 +214,7 @@ def generate(
             client=client,
             device=device,
             progress=progress,
-            metadata={"classification": looks.describe(), "scalars": volume.name},
+            metadata=metadata,
         )
     if client is not None:
         raise InvalidArgumentError(
@@ -231,7 +232,7 @@ def generate(
         options,
         device=device,
         progress=progress,
-        metadata={"classification": looks.describe(), "scalars": volume.name},
+        metadata=metadata,
     )
     warn_missed(vdi, stacklevel=2)
     return vdi

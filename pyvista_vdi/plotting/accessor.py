@@ -100,74 +100,48 @@ class VDIAccessor:
         >>> import pyvista as pv
         >>> pv.Wavelet().vdi.plot(cmap="bone", zoom=1.2)  # doctest: +SKIP
         """
-        return plot(
-            self._dataset,
-            cpos=cpos,
-            zoom=zoom,
-            background=background,
-            text=text,
-            show_axes=show_axes,
-            show_bounds=show_bounds,
-            show_grid=show_grid,
-            parallel_projection=parallel_projection,
-            eye_dome_lighting=eye_dome_lighting,
-            anti_aliasing=anti_aliasing,
-            **arguments,
-        )
+        shown = self._dataset
+        if isinstance(shown, VDI):
+            arguments.setdefault("window_size", [*shown.picture_size])
+        plotter = pv.Plotter(**_taken(arguments, pv.Plotter.__init__))
+        showing = _taken(arguments, pv.Plotter.show, "jupyter_kwargs")
+        try:
+            if plotter.theme.axes.show if show_axes is None else show_axes:
+                plotter.add_axes()
+            if background is not None:
+                plotter.set_background(background)
+            plotter.add_vdi(shown, **arguments)
+            if text:
+                plotter.add_text(text)
+            if show_grid:
+                plotter.show_grid()
+            elif show_bounds:
+                plotter.show_bounds()
+            if cpos is not None:
+                plotter.camera_position = cpos
+            elif isinstance(shown, VDI):
+                aim(plotter.camera, shown.camera)
+                plotter.camera_set = True
+                plotter.renderer.reset_camera_clipping_range()
+            if parallel_projection:
+                plotter.enable_parallel_projection()
+            if eye_dome_lighting:
+                plotter.enable_eye_dome_lighting()
+            if anti_aliasing is False:
+                plotter.disable_anti_aliasing()
+            elif anti_aliasing is not None:
+                plotter.enable_anti_aliasing("msaa" if anti_aliasing is True else anti_aliasing)
+            if zoom is not None:
+                plotter.camera.zoom(zoom)
+            return plotter.show(**showing)
+        except BaseException:
+            plotter.close()  # PyVista keeps those that are not
+            raise
 
 
-def plot(
-    shown: Any,
-    *,
-    cpos: Any = None,
-    zoom: Any = None,
-    background: Any = None,
-    text: str = "",
-    show_axes: bool | None = None,
-    show_bounds: bool = False,
-    show_grid: bool = False,
-    parallel_projection: bool = False,
-    eye_dome_lighting: bool = False,
-    anti_aliasing: Any = None,
-    **arguments: Any,
-) -> Any:
+def plot(shown: Any, **arguments: Any) -> Any:
     """Show what ``add_vdi`` takes in a window of its own; see :meth:`VDIAccessor.plot`."""
-    if isinstance(shown, VDI):
-        arguments.setdefault("window_size", [*shown.picture_size])
-    plotter = pv.Plotter(**_taken(arguments, pv.Plotter.__init__))
-    showing = _taken(arguments, pv.Plotter.show, "jupyter_kwargs")
-    try:
-        if plotter.theme.axes.show if show_axes is None else show_axes:
-            plotter.add_axes()
-        if background is not None:
-            plotter.set_background(background)
-        plotter.add_vdi(shown, **arguments)
-        if text:
-            plotter.add_text(text)
-        if show_grid:
-            plotter.show_grid()
-        elif show_bounds:
-            plotter.show_bounds()
-        if cpos is not None:
-            plotter.camera_position = cpos
-        elif isinstance(shown, VDI):
-            aim(plotter.camera, shown.camera)
-            plotter.camera_set = True
-            plotter.renderer.reset_camera_clipping_range()
-        if parallel_projection:
-            plotter.enable_parallel_projection()
-        if eye_dome_lighting:
-            plotter.enable_eye_dome_lighting()
-        if anti_aliasing is False:
-            plotter.disable_anti_aliasing()
-        elif anti_aliasing is not None:
-            plotter.enable_anti_aliasing("msaa" if anti_aliasing is True else anti_aliasing)
-        if zoom is not None:
-            plotter.camera.zoom(zoom)
-        return plotter.show(**showing)
-    except BaseException:
-        plotter.close()  # PyVista keeps those that are not
-        raise
+    return VDIAccessor(shown).plot(**arguments)
 
 
 def _taken(arguments: dict[str, Any], function: Any, *more: str) -> dict[str, Any]:

@@ -14,9 +14,10 @@ from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet
 from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.errors import InvalidArgumentTypeError, UnsupportedError, VDIError
 from pyvista_vdi.model.classification import DEFAULTS, Classification, refuse_unknown
 from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.blocks import add_blocks
@@ -487,11 +488,12 @@ def _matrix(plotter: Any, user_matrix: Any) -> NDArray[np.float64]:
 
 def _stored_table(vdi: VDI) -> pv.LookupTable | None:
     """Return the colours and opacities that a VDI was made with, if its metadata has them."""
-    stored = vdi.metadata.get("transfer_function")
-    if not isinstance(stored, dict) or not {"colors", "opacities", "scalar_range"} <= set(stored):
+    try:
+        stored = TransferFunction.from_dict(vdi.metadata["transfer_function"])
+    except (KeyError, VDIError):  # metadata may be anybody's
         return None
-    colors = np.column_stack([stored["colors"], stored["opacities"]])
+    colors = np.column_stack([stored.colors, stored.opacities])
     table = pv.LookupTable()
     table.values = np.round(colors * 255).astype(np.uint8)
-    table.scalar_range = tuple(stored["scalar_range"])
+    table.scalar_range = stored.scalar_range
     return table

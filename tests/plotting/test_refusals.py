@@ -265,8 +265,11 @@ def test_a_vdi_has_its_classification_already(plotter, arguments):
         plotter.add_vdi(vdi_of_one_list(), **arguments)
 
 
-def test_a_vdi_without_transfer_function_has_no_scalar_bar(plotter):
-    actor = plotter.add_vdi(vdi_of_one_list())
+@pytest.mark.parametrize("stored", [None, "ramp", {"colors": [1], "opacities": 0}])
+def test_a_vdi_without_transfer_function_has_no_scalar_bar(plotter, stored):
+    vdi = vdi_of_one_list()
+    vdi.metadata["transfer_function"] = stored
+    actor = plotter.add_vdi(vdi)
     assert not plotter.scalar_bars
     plotter.remove_actor(actor)
     with pytest.raises(errors.UnsupportedError, match="no transfer function.*show_scalar_bar"):

@@ -35,7 +35,12 @@ from pyvista_vdi.vtk_pipeline.drawing import few_lists
 from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, sampled
 from pyvista_vdi.vtk_pipeline.interaction import regeneration
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import HEADROOM, WindowClock, reduced
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import (
+    HEADROOM,
+    Met,
+    WindowClock,
+    reduced,
+)
 
 pytestmark = pytest.mark.gl
 
@@ -393,6 +398,18 @@ def test_few_frames_are_late_where_some_take_longer(plotter, counted):
     frames(400, 0.0)
     assert clock.aim(actor.mapper.painter.interaction) == pytest.approx(HEADROOM * 60)
     assert np.median(frames(20, 0.0)) == pytest.approx(1 / 60 / HEADROOM, rel=0.1)
+
+
+def test_another_renderer_at_the_address_of_one_that_is_gone_is_new():
+    class Here(vtkRenderer):
+        def GetAddressAsString(self, _):
+            return "here"
+
+    met, first = Met(), Here()
+    assert met.is_new(first)
+    assert not met.is_new(first)
+    del first
+    assert met.is_new(Here())
 
 
 def test_few_pixels_from_the_side_take_few_lists(plotter, counted):

@@ -590,6 +590,8 @@ def test_options_are_set_one_by_one_or_all_at_once():
     before = source.GetMTime()
     source.SetViewCone(30.0)
     assert source.GetMTime() == before
+    with pytest.raises(TypeError, match="sample_distance must be a positive length.*got 'far'"):
+        source.SetSampleDistance("far")
     for wrong in (lambda: source.SetViewCone(91), lambda: source.SetSampleDistance(0.0)):
         with pytest.raises(InvalidArgumentError, match=r"got (91|0\.0)"):
             wrong()

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk
 
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import Met
+
 _STYLES = ("vtkInteractorStyleTrackballActor", "vtkInteractorStyleJoystickActor")
 _BUTTONS = ("LeftButtonPressEvent", "MiddleButtonPressEvent", "RightButtonPressEvent")
 
@@ -25,15 +27,14 @@ class Grabbing:
 
     def __init__(self) -> None:
         self._painters: weakref.WeakSet[Any] = weakref.WeakSet()
-        self._watched: set[str] = set()
+        self._watched = Met()
         self._transparent: list[tuple[Any, Any]] = []  # point data and scalars of solid proxies
 
     def join(self, painter: Any, interactor: Any) -> None:
         """Note that a painter draws in the window; called in each of its frames."""
         self._painters.add(painter)
-        if interactor is None or interactor.GetAddressAsString("") in self._watched:
+        if interactor is None or not self._watched.is_new(interactor):
             return
-        self._watched.add(interactor.GetAddressAsString(""))
         weak = weakref.ref(self)
 
         def pressed(caller: Any, _: str) -> None:

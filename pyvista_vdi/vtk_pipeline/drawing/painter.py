@@ -42,7 +42,12 @@ from pyvista_vdi.vtk_pipeline.drawing.upkeep import Upkeep
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
 from pyvista_vdi.vtk_pipeline.interaction.browser import SceneAtHand
 from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus, Warnings
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import Interaction, WindowClock, reduced
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import (
+    Interaction,
+    Met,
+    WindowClock,
+    reduced,
+)
 
 #: Frames per second that stand-ins keep where no rate is asked for: changes are followed by eye.
 _STAND_IN_RATE = 30.0
@@ -70,7 +75,7 @@ class Painter:
         self.upkeep = Upkeep(self.interaction, self._warnings, self.texts)
         self._actor = vtkWeakReference()
         self._active = vtkWeakReference()
-        self._observed: set[str] = set()
+        self._observed = Met()
         self._texture = ImageTexture()
         self._no_depth = NoDepth()
         self._few_lists = FewLists()
@@ -469,10 +474,8 @@ class Painter:
 
     def _watch(self, renderer: Any) -> None:
         """From now on, know which renderer is between its StartEvent and EndEvent."""
-        address = renderer.GetAddressAsString("")
-        if address in self._observed:
+        if not self._observed.is_new(renderer):
             return
-        self._observed.add(address)
         active = self._active  # a VTK weak reference: no cycle through the observer
         renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
         renderer.AddObserver("EndEvent", lambda *_: active.Set(None))

@@ -19,8 +19,7 @@ class PlayingMethods:
         Another one that is set is shown from the next frame on, at the step nearest in time.
         """
         mapper = self.GetMapper()
-        player = None if mapper is None else mapper.painter.upkeep.player
-        return None if player is None else player.series  # type: ignore[no-any-return]
+        return None if mapper is None else mapper.GetSeries()  # type: ignore[no-any-return]
 
     @series.setter
     def series(self: Any, series: VDISeries) -> None:

@@ -21,12 +21,7 @@ from pyvista_vdi.series.player import Player
 from pyvista_vdi.sets.shower import SetShower
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
-from pyvista_vdi.vtk_pipeline.filters.inputs import (
-    Input,
-    SeriesInput,
-    SetInput,
-    SourceInput,
-)
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SeriesInput, SetInput, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.interaction import browser
@@ -243,13 +238,19 @@ class Upkeep:
         """Return the volume of a request, to be drawn for its own sake; None if it cannot be."""
         if self._lasting is not None and self._lasting.request.content != request.content:
             self._lasting = None  # its buffers go before others are taken
-        if self._lasting is None and request is not self._refused:
-            try:
-                self._lasting = StandIn(request, self._stand_in_rate, lasting=True)
-            except VDIError as error:
-                self._refused = request
-                _log.debug("the volume cannot be drawn in place of its VDI", exc_info=error)
+        if self._lasting is None:
+            self._lasting = self._drawn_itself(request, lasting=True)
         return self._lasting
+
+    def _drawn_itself(self, request: Request, *, lasting: bool) -> StandIn | None:
+        if request is self._refused:
+            return None
+        try:
+            return StandIn(request, self._stand_in_rate, lasting=lasting)
+        except VDIError as error:  # then the VDI is what can be drawn
+            self._refused = request
+            _log.debug("the volume cannot be drawn in place of its VDI", exc_info=error)
+            return None
 
     def _forget_volume(self) -> None:
         self._stand_in = self._lasting = self._refused = None
@@ -260,12 +261,8 @@ class Upkeep:
         wanted = self.regeneration.changed
         if self._stand_in is not None and self._stand_in.request is not wanted:
             self._stand_in = None  # its buffers go before others are taken
-        if self._stand_in is None and wanted is not None and wanted is not self._refused:
-            try:
-                self._stand_in = StandIn(wanted, self._stand_in_rate)
-            except VDIError as error:  # then the old VDI is what can be drawn
-                self._refused = wanted
-                _log.debug("the volume cannot stand in for its VDI", exc_info=error)
+        if self._stand_in is None and wanted is not None:
+            self._stand_in = self._drawn_itself(wanted, lasting=False)
         return self._stand_in
 
     def _updated(self, source: Input) -> VDI | None:

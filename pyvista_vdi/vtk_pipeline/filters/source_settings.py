@@ -15,6 +15,7 @@ from vtkmodules.vtkRenderingCore import vtkVolumeProperty
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.checks import as_float, not_taken
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial
@@ -267,8 +268,8 @@ class SourceSettings(Algorithm):
     def SetOptions(self, options: GenerationOptions) -> None:
         """Set how the VDI is made, all of it at once; lights are set by :meth:`SetLights`."""
         distance = options.sample_distance
-        if distance is not None and not (np.isfinite(distance) and distance > 0):
-            raise InvalidArgumentError(
+        if distance is not None and not 0 < as_float(distance) < np.inf:
+            raise not_taken(distance)(
                 f"sample_distance must be a positive length in model units; got {distance!r}"
             )
         self._change("_options", options)

@@ -69,6 +69,20 @@ def checked_image_distance(value: Any) -> float:
     return distance
 
 
+class Met:
+    """VTK's objects that were met before, held weakly: another may have an address later."""
+
+    def __init__(self) -> None:
+        self._met: dict[str, vtkWeakReference] = {}
+
+    def is_new(self, thing: Any) -> bool:
+        """Whether this is the first time; from now on it is not."""
+        known = self._met.setdefault(thing.GetAddressAsString(""), vtkWeakReference())
+        new = known.Get() is not thing
+        known.Set(thing)
+        return new
+
+
 @dataclass
 class Interaction:
     """What a mapper allows while a hand moves; VTK's names, and the meaning, are in the mapper."""
@@ -144,7 +158,7 @@ class WindowClock:
         self._window.Set(window)
         self._painters: weakref.WeakSet[Any] = weakref.WeakSet()
         self._shared: dict[type, Any] = {}
-        self._watched: set[str] = set()
+        self._watched = Met()
         self._known: list[vtkWeakReference] = []
         self._controllers: dict[Cost, FrameRateController] = {}
         self._cost: Cost = "vdi"  # of the last frame
@@ -180,9 +194,7 @@ class WindowClock:
     def join(self, painter: Any, renderer: Any) -> None:
         """Note that a painter draws in this window; called in each of its frames."""
         self._painters.add(painter)
-        address = renderer.GetAddressAsString("")
-        if address not in self._watched:
-            self._watched.add(address)
+        if self._watched.is_new(renderer):
             weak = weakref.ref(self)
 
             def camera_changed(*_: Any) -> None:
