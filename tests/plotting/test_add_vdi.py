@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 import pyvista as pv
-from plugin_scenes import LOOKS, WINDOW, soft_ball
+from plugin_scenes import LOOKS, WINDOW, shown, soft_ball
 from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 
@@ -20,13 +20,6 @@ from pyvista_vdi.vtk_pipeline.filters import source as source_module
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
 
 pytestmark = pytest.mark.gl
-
-
-@pytest.fixture
-def plotter():
-    plotter = pv.Plotter(window_size=WINDOW)
-    yield plotter
-    plotter.close()
 
 
 @pytest.fixture
@@ -48,14 +41,6 @@ def calls(monkeypatch):
     )
     monkeypatch.setattr(painter_module, "render_vdi", counting("render", painter_module.render_vdi))
     return counted
-
-
-def shown(plotter):
-    """What the plotter shows now: a screenshot alone draws the first frame only."""
-    if plotter.render_window.GetNeverRendered():
-        plotter.show(auto_close=False)
-    plotter.render()
-    return np.asarray(plotter.screenshot(return_img=True)).astype(int)
 
 
 def small_vdi(volume=None, size=(60, 50), **looks):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import pyvista as pv
+from plugin_scenes import shown
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import errors
@@ -72,12 +73,6 @@ def plotter():
     plotter.camera_position = "xz"
     yield plotter
     plotter.close()
-
-
-def shown(plotter):
-    plotter.show(auto_close=False)
-    plotter.render()
-    return np.asarray(plotter.screenshot(return_img=True)).astype(int)
 
 
 @pytest.mark.every(3)

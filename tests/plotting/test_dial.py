@@ -20,13 +20,6 @@ pytestmark = pytest.mark.gl
 SIZE = (60, 48)
 
 
-@pytest.fixture
-def plotter():
-    plotter = pv.Plotter(window_size=WINDOW)
-    yield plotter
-    plotter.close()
-
-
 def shown(plotter, **arguments):
     actor = plotter.add_vdi(soft_ball(12), **LOOKS, **arguments)
     plotter.show(auto_close=False)

@@ -8,7 +8,7 @@ import warnings
 import numpy as np
 import pytest
 import pyvista as pv
-from plugin_scenes import LOOKS, add_judge, add_ours, assert_as_vtk, soft_ball
+from plugin_scenes import LOOKS, add_judge, add_ours, assert_as_vtk, shown, soft_ball
 from pyvista.plotting.plotter import _ALL_PLOTTERS
 
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
@@ -16,20 +16,7 @@ from pyvista_vdi.plotting import classify
 
 pytestmark = pytest.mark.gl
 
-SIZE = (60, 50)
-
-
-@pytest.fixture
-def plotter():
-    plotter = pv.Plotter(window_size=SIZE, off_screen=True)
-    yield plotter
-    plotter.close()
-
-
-def shown(plotter):
-    plotter.show(auto_close=False)
-    plotter.render()
-    return np.asarray(plotter.screenshot(return_img=True)).astype(int)
+WINDOW = (60, 50)
 
 
 def two_balls():
@@ -45,7 +32,7 @@ def test_blocks_are_those_that_are_added_one_by_one(plotter, multi_colors):
     actors = plotter.add_vdi(blocks, multi_colors=multi_colors, name="balls", **looks)
     assert [type(each).__name__ for each in actors] == ["PlotterVDIActor"] * 2
     names = [name for name in plotter.renderer.actors if name.startswith("balls")]
-    judge = pv.Plotter(window_size=SIZE, off_screen=True)
+    judge = pv.Plotter(window_size=WINDOW, off_screen=True)
     for block, cmap in zip((blocks[0], blocks[2]), ("Reds", "Greens"), strict=True):
         judge.add_vdi(block, **{**looks, "cmap": cmap if multi_colors else looks["cmap"]})
     picture = shown(plotter)
@@ -128,35 +115,25 @@ def test_a_plane_widget_clips_as_it_clips_a_volume(given):
 
 def test_plot_of_a_grid_is_what_a_plotter_shows(plotter):
     volume = soft_ball(8)
-    picture = volume.vdi.plot(
-        off_screen=True,
-        window_size=SIZE,
-        return_img=True,
-        cpos="xy",
-        zoom=1.3,
-        parallel_projection=True,
-        background="tan",
-        show_axes=False,
+    arguments = {
+        "off_screen": True,
+        "window_size": WINDOW,
+        "return_img": True,
+        "cpos": "xy",
+        "zoom": 1.3,
+        "parallel_projection": True,
+        "background": "tan",
+        "show_axes": False,
         **LOOKS,
-    )
+    }
+    picture = volume.vdi.plot(**arguments)
     plotter.set_background("tan")
     plotter.add_vdi(volume, **LOOKS)
     plotter.camera_position = "xy"
     plotter.enable_parallel_projection()
     plotter.camera.zoom(1.3)
     np.testing.assert_array_equal(picture, shown(plotter))
-    vtks = volume.plot(
-        volume=True,
-        off_screen=True,
-        window_size=SIZE,
-        return_img=True,
-        cpos="xy",
-        zoom=1.3,
-        parallel_projection=True,
-        background="tan",
-        show_axes=False,
-        **LOOKS,
-    )
+    vtks = volume.plot(volume=True, **arguments)
     # The ball has 8 voxels along an edge; half-voxel steps of both begin elsewhere
     assert np.abs(picture.astype(int) - vtks).mean() < 4
 

@@ -17,13 +17,7 @@ from pyvista_vdi import errors
 pytestmark = pytest.mark.gl
 
 
-@pytest.fixture
-def plotter():
-    plotter = pv.Plotter(window_size=(60, 50))
-    yield plotter
-    plotter.close()
-
-
+WINDOW = (60, 50)
 VOLUME = soft_ball(8)
 N = VOLUME.n_points
 

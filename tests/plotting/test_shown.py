@@ -129,11 +129,7 @@ def test_parallel_projection_and_from_inside():
 # -- at once ---------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def plotter():
-    plotter = pv.Plotter(window_size=(120, 100), off_screen=True)
-    yield plotter
-    plotter.close()
+WINDOW = (120, 100)
 
 
 def shot(plotter):

@@ -54,6 +54,14 @@ def _caught():
 
 
 @pytest.fixture
+def plotter(request, vtk_messages):
+    """A plotter of the size that the test's module calls ``WINDOW``."""
+    plotter = pv.Plotter(window_size=request.module.WINDOW)
+    yield plotter
+    plotter.close()
+
+
+@pytest.fixture
 def no_leaks():
     """Fail if VTK objects that were made in the test outlive it; from VTK 9.7 on.
 

@@ -73,6 +73,13 @@ def opaque_sphere(plotter: pv.Plotter) -> None:
     plotter.add_mesh(pv.Sphere(radius=0.5, center=(0.4, 0.2, 0.5)), color="w", reset_camera=False)
 
 
+def shown(plotter: pv.Plotter) -> np.ndarray:
+    """What a plotter shows now: a screenshot alone draws the first frame only."""
+    plotter.show(auto_close=False)
+    plotter.render()
+    return np.asarray(plotter.screenshot(return_img=True)).astype(int)
+
+
 def draw(
     add: Callable[..., Any],
     scene: Callable[[pv.Plotter, Callable[..., Any]], Any],

@@ -18,13 +18,6 @@ from pyvista_vdi.vtk_pipeline.interaction.window_clock import HEADROOM
 pytestmark = pytest.mark.gl
 
 
-@pytest.fixture
-def plotter():
-    plotter = pv.Plotter(window_size=WINDOW)
-    yield plotter
-    plotter.close()
-
-
 def shot(plotter):
     plotter.render()
     return np.asarray(plotter.screenshot(return_img=True)).astype(int)

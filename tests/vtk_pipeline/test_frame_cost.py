@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import pyvista as pv
-from plugin_scenes import LOOKS, opaque_sphere, soft_ball
+from plugin_scenes import LOOKS, opaque_sphere, shown, soft_ball
 from vtkmodules.vtkCommonDataModel import vtkPlane
 from vtkmodules.vtkRenderingOpenGL2 import vtkTextureObject
 
@@ -74,12 +74,6 @@ def from_x(plotter):
     return plotter
 
 
-def picture(plotter):
-    plotter.show(auto_close=False)
-    plotter.render()
-    return np.asarray(plotter.screenshot(return_img=True)).astype(int)
-
-
 def fresh_picture(plotter, *others):
     """The picture of the same scene by a plotter that has kept nothing."""
     other = pv.Plotter(window_size=WINDOW)
@@ -87,7 +81,7 @@ def fresh_picture(plotter, *others):
     for add in others:
         add(other)
     other.camera = plotter.camera.copy()
-    image = picture(other)
+    image = shown(other)
     other.close()
     return image
 
@@ -118,7 +112,7 @@ def test_a_view_that_moves_allocates_nothing(plotter, counts):
         plotter.render()
     assert counts["render_vdi"] == raycasts + 6
     assert counts["aligned_empty"] == allocated == frame_module.KEPT + 1
-    np.testing.assert_array_equal(picture(plotter), fresh_picture(plotter))
+    np.testing.assert_array_equal(shown(plotter), fresh_picture(plotter))
 
 
 def test_a_mesh_that_moves_allocates_nothing(plotter, counts):
@@ -139,7 +133,7 @@ def test_images_that_are_kept_are_not_drawn_over(plotter):
     for view in [*views, *views[::-1], *views[::2], *views]:
         plotter.camera_position = ((4, 3, 2), (0, 0, 0), (0, 0, 1))
         plotter.camera.Azimuth(view)
-        image = picture(plotter)
+        image = shown(plotter)
         np.testing.assert_array_equal(pictures.setdefault(view, image), image)
     assert len({image.tobytes() for image in pictures.values()}) == len(views)
 
@@ -168,16 +162,16 @@ def test_depth_is_read_again_when_what_is_opaque_changes(plotter, counts):
     sphere = plotter.add_mesh(
         pv.Sphere(radius=0.5, center=(0.4, 0.2, 0.5)), color="w", reset_camera=False
     )
-    before = picture(plotter)
+    before = shown(plotter)
     for name, change in changes_of_what_is_opaque(plotter, sphere):
         reads = counts["opaque_z"]
         change()
-        after = picture(plotter)
+        after = shown(plotter)
         assert counts["opaque_z"] > reads, name
         assert (after != before).any(), f"{name} changes nothing"
         forget(plotter)  # nothing is known, and all of it is read
         plotter.volume.mapper.painter._images.clear()
-        np.testing.assert_array_equal(picture(plotter), after, err_msg=name)
+        np.testing.assert_array_equal(shown(plotter), after, err_msg=name)
         before = after
 
 
@@ -248,14 +242,14 @@ def test_an_actor_in_two_viewports():
     for column in (0, 1):
         sides.subplot(0, column)
         sides.camera_position = ((4, 3, 2), (0, 0, 0), (0, 0, 1))
-    both = picture(sides)
+    both = shown(sides)
     vdi = actor.vdi
     sides.close()
     for part, size in ((both[:, :120], (120, 90)), (both[:, 120:], (60, 90))):
         alone = pv.Plotter(window_size=size)
         alone.add_vdi(vdi, show_scalar_bar=False)
         alone.camera_position = ((4, 3, 2), (0, 0, 0), (0, 0, 1))
-        np.testing.assert_array_equal(picture(alone), part)
+        np.testing.assert_array_equal(shown(alone), part)
         assert np.ptp(part) > 40
         alone.close()
 
