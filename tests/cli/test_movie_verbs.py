@@ -8,10 +8,10 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from command_line import run
 from PIL import Image
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import cli
 from pyvista_vdi.cli.movie import camera_path
 from pyvista_vdi.io import to_bytes
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -23,13 +23,6 @@ OF_A_PALETTE = 24
 needs_films = pytest.mark.skipif(
     find_spec("imageio_ffmpeg") is None, reason="needs the extra: movie"
 )
-
-
-def run(capsys, *arguments, status=0):
-    """Run the command and return what it prints, or says where it fails."""
-    assert cli.main([str(argument) for argument in arguments]) == status
-    out, error = capsys.readouterr()
-    return out + error if status == 0 else error
 
 
 @pytest.fixture(scope="module")

@@ -7,19 +7,13 @@ import json
 
 import numpy as np
 import pytest
+from command_line import run
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
 from pyvista_vdi.sets import generate
 
 SIZE = (32, 24)
-
-
-def run(capsys, *arguments, status=0):
-    """Run the command and return what it prints, or says where it fails."""
-    assert cli.main([str(argument) for argument in arguments]) == status
-    out, error = capsys.readouterr()
-    return out if status == 0 else error
 
 
 @pytest.fixture(scope="module")
