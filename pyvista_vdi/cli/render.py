@@ -30,13 +30,19 @@ from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.imports import import_pyvista
 from pyvista_vdi.plotting.screen import why_no_window
 from pyvista_vdi.series.player import RATE
+from pyvista_vdi.series.reader import is_series_file
 from pyvista_vdi.series.series import VDISeries
 from pyvista_vdi.sets.vdi_set import VDISet
+
+#: What has times.
+_SERIES = "series, .vdis"
 
 
 def render(options: argparse.Namespace) -> int:
     """Render a VDI from a new view and write the picture."""
     target = checked_png_target(options.output)
+    if not any(is_series_file(file) for file in options.files):
+        refuse(options, ("time",), _SERIES)
     vdis, share = [], 0.5 / len(options.files)
     with measuring("rendering") as bar:
         for k, file in enumerate(options.files):
@@ -68,7 +74,7 @@ def view(options: argparse.Namespace) -> int:
             f"no window can be opened: {trouble}; write a picture instead: --screenshot FILE.png"
         )
     if not is_series(options):
-        refuse(options, ("play", "rate", "time"), "series, .vdis")
+        refuse(options, ("play", "rate", "time"), _SERIES)
     if is_volume(options):
         looks = classification(options)
         volume = read_volume(options)

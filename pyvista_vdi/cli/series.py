@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.cli.inputs import (
+    OF_ANY_VOLUME,
+    PLACE,
     classification,
     measuring,
     of_the_file,
@@ -41,6 +43,9 @@ def series(options: argparse.Namespace) -> int:
     kinds = [_kind(file) for file in options.files]
     if len(set(kinds)) > 1:
         raise InvalidArgumentError("the files are VDIs or volumes, and not some of each")
+    if kinds[0] != "volume":
+        of_volumes = (*OF_ANY_VOLUME, *PLACE, "view_angle", "sample_distance", "memory_limit")
+        refuse(options, of_volumes, "volumes")
     times = options.times
     if times is not None and (kinds[0] == "series" or len(times) != len(options.files)):
         raise InvalidArgumentError(

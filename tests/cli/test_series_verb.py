@@ -74,6 +74,7 @@ def test_to_single_files_and_back(series, capsys, tmp_path):
         (("{series}", "-o", "x.vdis", "--times", "1"), "own times"),
         (("{0}", "-o", "x.vdi"), ".vdis"),
         (("{0}", "-o", "x.vdis", "--tolerance", "2"), "tolerance"),
+        (("{series}", "-o", "x.vdis", "--cmap", "bone"), "--cmap is for volumes"),
     ],
 )
 def test_mistakes(arguments, message, series, volumes, capsys, tmp_path, monkeypatch):
@@ -107,6 +108,8 @@ def test_times_of_what_has_none(series, volumes, capsys, tmp_path):
             error = run(capsys, "view", file, "--screenshot", target, *option, status=1)
             assert f"{option[0]} is for series" in error
             assert not target.exists()
+    arguments = ("render", tmp_path / "step.vdi", "-o", target, "--time", "1")
+    assert "--time is for series" in run(capsys, *arguments, status=1)
 
 
 def test_images_of_steps_are_written_as_asked_for(series, capsys, tmp_path):

@@ -154,12 +154,11 @@ class VDIWriter(Algorithm):
         Raises
         ------
         InvalidArgumentError
-            If there is no file name, or it names no format; or that of a series, and the input has
-            no times.
+            If there is no file name; or it is that of a series, and the input has no times.
         InvalidVDIError
-            If the input is no VDI.
-        OSError
-            If it cannot be written.
+            If there is no input, or it is no VDI.
+        VDIFileError
+            If the file's name ends in no format's, or it cannot be written.
         """
         if is_series_file(self._path) and self.GetNumberOfInputConnections(0):
             images, times = steps_and_times(self.GetInputAlgorithm(0, 0))

@@ -105,6 +105,6 @@ def _pose(camera: Any) -> tuple[Any, ...]:
         camera.GetViewShear(),
         camera.GetUseOffAxisProjection(),
         camera.GetUseExplicitProjectionTransformMatrix(),
-        tuple(camera.GetModelTransformMatrix().GetData()),
+        as_array(camera.GetModelTransformMatrix()).tobytes(),
         0 if transform is None else transform.GetMTime(),
     )
