@@ -48,8 +48,40 @@ def infinite():
     return grid
 
 
+#: Arguments with a good volume that are out of range.
+ARGUMENTS = {
+    "cmap": ({"cmap": "viridi"}, "cmap='viridi' is no colour map.*did you mean 'viridis'"),
+    "cmap type": ({"cmap": 5}, "cmap=5 is no colour map"),
+    "opacity": ({"opacity": "sigmoit"}, "opacity='sigmoit'.*did you mean 'sigmoid'"),
+    "opacity above 1": ({"opacity": 1.5}, "opacity=1.5.*between 0 and 1"),
+    "opacity too long": ({"opacity": np.zeros(300)}, r"n_colors=256.*\(300,\)"),
+    "opacity beyond a byte": (
+        {"opacity": [0, 300], "n_colors": 2},
+        "0 to 255; got values from 0 to 300",
+    ),
+    "n_colors": ({"n_colors": 0}, "n_colors.*got 0"),
+    "clim": ({"clim": (3, 1)}, r"clim.*got \(3.0, 1.0\)"),
+    "clim of three": ({"clim": (1, 2, 3)}, "clim must be one"),
+    "unit distance": ({"opacity_unit_distance": -1.0}, "opacity_unit_distance.*got -1.0"),
+    "preference": ({"preference": "face"}, "preference.*'face'"),
+    "interpolation": ({"interpolation": "cubic"}, "'nearest' or 'linear'"),
+    "ambient occlusion": (
+        {"ambient_occlusion": "strong"},
+        "ambient_occlusion must be True, a radius.*got 'strong'",
+    ),
+    "occlusion's radius": ({"ambient_occlusion": 0.0}, "radius of ambient occlusion.*got 0"),
+    "mapper": ({"mapper": "cpu"}, "mapper='cpu' is none of"),
+    "no supersegments": ({"max_supersegments": 0}, "from 1 to 4096; got 0"),
+    "too many": ({"max_supersegments": 4097}, "1 to 4096; got 4097"),
+    "half a supersegment": ({"max_supersegments": 1.5}, "whole number.*got 1.5"),
+    "step": ({"sample_distance": 0.0}, "sample_distance.*got 0.0"),
+    "tolerance": ({"tolerance": -1}, "tolerance.*got -1"),
+    "cone": ({"view_cone": 91}, "view_cone.*got 91"),
+    "memory": ({"memory_limit": "lots"}, "memory_limit.*got 'lots'"),
+    "coverage": ({"coverage": "all"}, "coverage.*got 'all'"),
+}
+
 ROWS = {
-    # volumes
     "no scalars": (no_scalars(), {}, errors.InvalidVolumeError, "no scalars: there is nothing"),
     "one plane": (one_plane(), {}, errors.InvalidVolumeError, "only one plane.*at least two"),
     "empty": (empty_volume(), {}, errors.InvalidVolumeError, "the volume is empty"),
@@ -102,60 +134,6 @@ ROWS = {
     "blocks": (pv.MultiBlock([VOLUME, pv.Sphere()]), {}, errors.UnsupportedError, "no volume"),
     "surface": (pv.Sphere(), {}, errors.UnsupportedError, "a surface has no volume"),
     "a path": ("brain.nrrd", {}, errors.InvalidVolumeError, "pyvista.ImageData; got str"),
-    # classification
-    "cmap": (
-        VOLUME,
-        {"cmap": "viridi"},
-        errors.InvalidArgumentError,
-        "cmap='viridi' is no colour map.*did you mean 'viridis'",
-    ),
-    "cmap type": (VOLUME, {"cmap": 5}, errors.InvalidArgumentError, "cmap=5 is no colour map"),
-    "opacity": (
-        VOLUME,
-        {"opacity": "sigmoit"},
-        errors.InvalidArgumentError,
-        "opacity='sigmoit'.*did you mean 'sigmoid'",
-    ),
-    "opacity above 1": (
-        VOLUME,
-        {"opacity": 1.5},
-        errors.InvalidArgumentError,
-        "opacity=1.5.*between 0 and 1",
-    ),
-    "opacity too long": (
-        VOLUME,
-        {"opacity": np.zeros(300)},
-        errors.InvalidArgumentError,
-        r"n_colors=256.*\(300,\)",
-    ),
-    "opacity beyond a byte": (
-        VOLUME,
-        {"opacity": [0, 300], "n_colors": 2},
-        errors.InvalidArgumentError,
-        "0 to 255; got values from 0 to 300",
-    ),
-    "n_colors": (VOLUME, {"n_colors": 0}, errors.InvalidArgumentError, "n_colors.*got 0"),
-    "clim": (VOLUME, {"clim": (3, 1)}, errors.InvalidArgumentError, r"clim.*got \(3.0, 1.0\)"),
-    "clim of three": (VOLUME, {"clim": (1, 2, 3)}, errors.InvalidArgumentError, "clim must be one"),
-    "unit distance": (
-        VOLUME,
-        {"opacity_unit_distance": -1.0},
-        errors.InvalidArgumentError,
-        "opacity_unit_distance.*got -1.0",
-    ),
-    "preference": (
-        VOLUME,
-        {"preference": "face"},
-        errors.InvalidArgumentError,
-        "preference.*'face'",
-    ),
-    "interpolation": (
-        VOLUME,
-        {"interpolation": "cubic"},
-        errors.InvalidArgumentError,
-        "'nearest' or 'linear'",
-    ),
-    # what a VDI cannot honour
     "blending": (
         VOLUME,
         {"blending": "maximum"},
@@ -168,63 +146,14 @@ ROWS = {
         errors.UnsupportedError,
         "blending='minimum'.*composite.*add_volume",
     ),
-    "ambient occlusion": (
-        VOLUME,
-        {"ambient_occlusion": "strong"},
-        errors.InvalidArgumentError,
-        "ambient_occlusion must be True, a radius.*got 'strong'",
-    ),
-    "occlusion's radius": (
-        VOLUME,
-        {"ambient_occlusion": 0.0},
-        errors.InvalidArgumentError,
-        "radius of ambient occlusion.*got 0",
-    ),
-    "mapper": (VOLUME, {"mapper": "cpu"}, errors.InvalidArgumentError, "mapper='cpu' is none of"),
-    # generation
-    "no supersegments": (
-        VOLUME,
-        {"max_supersegments": 0},
-        errors.InvalidArgumentError,
-        "from 1 to 4096; got 0",
-    ),
-    "too many": (
-        VOLUME,
-        {"max_supersegments": 4097},
-        errors.InvalidArgumentError,
-        "1 to 4096; got 4097",
-    ),
-    "half a supersegment": (
-        VOLUME,
-        {"max_supersegments": 1.5},
-        errors.InvalidArgumentError,
-        "whole number.*got 1.5",
-    ),
-    "step": (
-        VOLUME,
-        {"sample_distance": 0.0},
-        errors.InvalidArgumentError,
-        "sample_distance.*got 0.0",
-    ),
-    "tolerance": (VOLUME, {"tolerance": -1}, errors.InvalidArgumentError, "tolerance.*got -1"),
-    "cone": (VOLUME, {"view_cone": 91}, errors.InvalidArgumentError, "view_cone.*got 91"),
-    "memory": (
-        VOLUME,
-        {"memory_limit": "lots"},
-        errors.InvalidArgumentError,
-        "memory_limit.*got 'lots'",
-    ),
-    "coverage": (VOLUME, {"coverage": "all"}, errors.InvalidArgumentError, "coverage.*got 'all'"),
     "camera": (VOLUME, {"camera": "xy"}, errors.InvalidCameraError, "vtkCamera.*got str"),
-    "device": (
-        VOLUME,
-        {"device": "no such device"},
-        errors.NoDeviceError,
-        "no such device",
-    ),
-    # keywords
+    "device": (VOLUME, {"device": "no such device"}, errors.NoDeviceError, "no such device"),
     "unknown keyword": (VOLUME, {"opcity": 1}, TypeError, "'opcity': did you mean 'opacity'"),
     "scalar": (VOLUME, {"scalar": "v"}, TypeError, "'scalar': did you mean 'scalars'"),
+    **{
+        name: (VOLUME, arguments, errors.InvalidArgumentError, message)
+        for name, (arguments, message) in ARGUMENTS.items()
+    },
 }
 
 
