@@ -1,7 +1,4 @@
-"""Picking in real plotters: what is under the cursor, and where it begins.
-
-Every test picks in the same scenes, which are drawn once: hence more than 500 lines.
-"""
+"""Picking in real plotters: what is under the cursor, and where it begins."""
 
 from __future__ import annotations
 
@@ -48,6 +45,13 @@ def slab(z=(-0.5, 0.5), color=(1, 0.5, 0), edge=16):
         np.full(n, 30.0),
         (-1, 1, -1, 1, -1, 1),
     )
+
+
+@pytest.fixture(autouse=True)
+def closed(vtk_messages):
+    """Plotters are closed, whatever becomes of the test."""
+    yield
+    pv.close_all()
 
 
 class Scene:
@@ -113,7 +117,6 @@ def test_what_is_in_front_is_picked():
     assert {place: scene.vdi.pick(*place) is not None for place in wanted} == {
         place: name == "vdi" for place, name in wanted.items()
     }
-    scene.plotter.close()
 
 
 @pytest.mark.parametrize("picker", [vtkPropPicker, vtkHardwarePicker])
@@ -124,7 +127,6 @@ def test_without_meshes_only_what_is_seen_is_picked(picker):
     scene.show()
     assert scene.under(*CENTRE, picker)[1] == "vdi"
     assert scene.under(*CORNER, picker)[1] is None
-    scene.plotter.close()
 
 
 def test_prop_picker_gives_the_place_of_the_first_hit():
@@ -139,7 +141,6 @@ def test_prop_picker_gives_the_place_of_the_first_hit():
         # VTK puts it on the ray through the pixel's corner, not through its centre
         apart = np.subtract(picker.GetPickPosition(), hit.position)
         assert np.abs(apart).max() <= 0.51 * pixel_at(scene, hit.depth)
-    scene.plotter.close()
 
 
 def test_the_place_is_on_the_face():
@@ -149,7 +150,6 @@ def test_the_place_is_on_the_face():
     hit = scene.vdi.pick(*CENTRE)
     assert hit.position[2] == pytest.approx(0.5, abs=1e-12)
     assert hit.color == (1, 0.5, 0)
-    scene.plotter.close()
 
 
 def test_from_another_view():
@@ -163,7 +163,6 @@ def test_from_another_view():
     face = np.abs(np.subtract(hit.position, (1, 1, 0.5)))
     assert face.min() < 1e-12
     assert scene.depth_of(picker.GetPickPosition()) == pytest.approx(hit.depth, abs=Z_BUFFER)
-    scene.plotter.close()
 
 
 def test_threshold():
@@ -182,7 +181,6 @@ def test_threshold():
     mapper.SetPickingAccumulated(False)
     assert scene.vdi.pick(*CENTRE) is None
     assert scene.under(*CENTRE)[1] == "backdrop"
-    scene.plotter.close()
 
 
 def test_copies_keep_the_threshold():
@@ -193,7 +191,6 @@ def test_copies_keep_the_threshold():
     copied = actor.copy(deep=False)
     assert copied.mapper.GetPickingOpacity() == 0.9
     assert copied.mapper.GetPickingAccumulated() is False
-    plotter.close()
 
 
 def test_a_selection_has_as_many_pixels_as_are_seen():
@@ -215,7 +212,6 @@ def test_a_selection_has_as_many_pixels_as_are_seen():
     seen = np.count_nonzero(np.isfinite(depth[::-1][50:150, 70:170]))
     assert counts == {scene.vdi: seen, scene.backdrop: 100 * 100 - seen}
     assert 2000 < seen < 100 * 100
-    scene.plotter.close()
 
 
 def test_points_of_other_props_can_be_selected():
@@ -229,7 +225,6 @@ def test_points_of_other_props_can_be_selected():
     props = [node.Get(vtkSelectionNode.PROP()) for node in nodes]
     assert scene.vdi not in props
     assert scene.front in props
-    scene.plotter.close()
 
 
 # -- scenes -------------------------------------------------------------------------------------
@@ -246,7 +241,6 @@ def test_flags_of_the_actor_are_honoured():
     assert scene.vdi.pick(*CENTRE) is None
     scene.vdi.SetVisibility(True)
     assert scene.under(*CENTRE)[1] == "vdi"
-    scene.plotter.close()
 
 
 def test_matrix_of_the_actor():
@@ -258,7 +252,6 @@ def test_matrix_of_the_actor():
     assert scene.vdi.pick(*CENTRE).position[2] == pytest.approx(0.0, abs=1e-12)
     place = scene.under(*CENTRE)[0].GetPickPosition()
     assert place[2] == pytest.approx(0.0, abs=Z_BUFFER)
-    scene.plotter.close()
 
 
 def test_clipping_planes():
@@ -272,7 +265,6 @@ def test_clipping_planes():
     plane.SetOrigin(0, 0, -2)
     assert scene.vdi.pick(*CENTRE) is None
     assert scene.under(*CENTRE)[1] == "backdrop"
-    scene.plotter.close()
 
 
 def test_parallel_projection():
@@ -285,7 +277,6 @@ def test_parallel_projection():
     hit = scene.vdi.pick(*CENTRE)
     half_pixel = 1.6 / WINDOW[1]
     assert hit.position == pytest.approx((half_pixel, half_pixel, 0.5), abs=1e-12)
-    scene.plotter.close()
 
 
 def test_camera_inside_the_box():
@@ -294,7 +285,6 @@ def test_camera_inside_the_box():
     scene.show()
     assert scene.under(*CENTRE)[1] == "vdi"
     assert scene.vdi.pick(*CENTRE).position[2] == pytest.approx(-0.25, abs=1e-12)
-    scene.plotter.close()
 
 
 def test_stereo():
@@ -304,7 +294,6 @@ def test_stereo():
     place = scene.under(*CENTRE)[0].GetPickPosition()
     assert place[2] == pytest.approx(0.5, abs=Z_BUFFER)
     assert scene.vdi.pick(*CENTRE).position[2] == pytest.approx(0.5, abs=1e-6)
-    scene.plotter.close()
 
 
 @pytest.mark.parametrize("kind", ["msaa", "ssaa", "eye dome lighting", "depth peeling"])
@@ -322,7 +311,6 @@ def test_pick_works_however_the_scene_is_drawn(kind):
     assert scene.vdi.pick(*CENTRE).position[2] == pytest.approx(0.5, abs=1e-12)
     assert scene.vdi.pick(150, 100) is None  # the sphere in front
     assert np.array_equal(scene.plotter.screenshot(return_img=True), before)
-    scene.plotter.close()
 
 
 def test_the_nearer_of_two_is_picked_in_either_order():
@@ -338,7 +326,6 @@ def test_the_nearer_of_two_is_picked_in_either_order():
         assert picker.GetPickPosition()[2] == pytest.approx(0.5, abs=Z_BUFFER)
         assert actors[id(near)].pick(*CENTRE).position[2] == pytest.approx(0.5, abs=1e-12)
         assert actors[id(far)].pick(*CENTRE) is None
-        plotter.close()
 
 
 def test_subplots():
@@ -352,7 +339,6 @@ def test_subplots():
     for actor, x, face in zip(actors, (60, 180), (0.5, 0.25), strict=True):
         assert actor.pick(x, 100).position[2] == pytest.approx(face, abs=1e-12)
         assert actor.pick(240 - x, 100) is None
-    plotter.close()
 
 
 def test_one_actor_in_two_renderers():
@@ -369,7 +355,6 @@ def test_one_actor_in_two_renderers():
     other = plotter.renderers[0]
     assert actor.pick(180, 100, renderer=other) is None
     assert np.array_equal(plotter.screenshot(return_img=True), before)
-    plotter.close()
 
 
 def test_the_picture_stays(no_leaks):
@@ -382,7 +367,6 @@ def test_the_picture_stays(no_leaks):
     assert scene.vdi.pick(*CENTRE) is not None
     assert np.array_equal(scene.plotter.screenshot(return_img=True), before)
     assert scene.vdi.mapper.painter._raycasts == raycasts  # the image is kept
-    scene.plotter.close()
 
 
 def test_copies_in_two_renderers_share_a_shader():
@@ -401,7 +385,6 @@ def test_copies_in_two_renderers_share_a_shader():
         assert actor.pick(60, 100).position[2] == pytest.approx(0.5, abs=1e-12)
         assert twin.pick(180, 100).position[2] == pytest.approx(-0.5, abs=1e-12)
         assert np.array_equal(plotter.screenshot(return_img=True), before)
-    plotter.close()
 
 
 def test_another_mapper_after_a_pick():
@@ -412,7 +395,6 @@ def test_another_mapper_after_a_pick():
     mapper.SetVDI(slab())
     scene.vdi.SetMapper(mapper)
     assert np.array_equal(scene.plotter.screenshot(return_img=True), before)
-    scene.plotter.close()
 
 
 # -- PyVista and VTK ----------------------------------------------------------------------------
@@ -430,7 +412,6 @@ def test_point_picking_in_a_plotter():
     assert len(points) == 1
     assert points[0][2] == pytest.approx(0.5, abs=Z_BUFFER)
     assert scene.plotter.picked_point == pytest.approx(points[0])
-    scene.plotter.close()
 
 
 def test_the_callback_can_ask_for_the_actor():
@@ -452,7 +433,6 @@ def test_the_callback_can_ask_for_the_actor():
     assert hit.position[2] == pytest.approx(0.5, abs=1e-12)
     assert beside_it is None
     assert nothing is None
-    scene.plotter.close()
 
 
 def test_pick_mouse_position():
@@ -460,7 +440,6 @@ def test_pick_mouse_position():
     scene.plotter.iren.picker = "prop"
     scene.plotter.mouse_position = CENTRE
     assert scene.plotter.pick_mouse_position()[2] == pytest.approx(0.5, abs=Z_BUFFER)
-    scene.plotter.close()
 
 
 def test_in_plain_vtk_and_before_the_first_frame():
@@ -505,4 +484,3 @@ def test_what_fails_is_said_once_and_picks_nothing(monkeypatch):
     with pytest.warns(VDIWarning, match="cannot be picked: DeviceError: the device is gone"):
         assert scene.vdi.pick(*CENTRE) is None
     assert scene.under(*CENTRE)[1] == "backdrop"
-    scene.plotter.close()
