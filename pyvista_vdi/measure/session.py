@@ -19,6 +19,7 @@ from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.clock import Step, Times, take_turns
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.checks import as_whole
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
@@ -77,9 +78,11 @@ def refusal(error: BaseException) -> str:
 
 
 def check_count(name: str, value: int, least: int = 1) -> None:
-    """Refuse a number of repetitions that makes no sense."""
-    if isinstance(value, bool) or not least <= value <= 1000:
-        raise InvalidArgumentError(f"{name} must be from {least} to 1000; got {value!r}")
+    """Refuse what is no number of repetitions, or makes no sense as one."""
+    if not (isinstance(value, int) and least <= as_whole(value) <= 1000):
+        raise InvalidArgumentError(
+            f"{name} must be a whole number from {least} to 1000; got {value!r}"
+        )
 
 
 def check_angles(angles: Sequence[float]) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.checks import as_number, as_whole
 from pyvista_vdi.model.grid import Geometry
 
 #: Radius by default, as a share of the bounds' diagonal.
@@ -63,21 +64,22 @@ class AmbientOcclusion:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
+        radius, strength = as_number(self.radius), as_number(self.strength)
         if self.radius is not None:
-            put(self, "radius", _number("radius", self.radius, "a positive length in model units"))
-            if not 0 < self.radius < math.inf:
+            if not 0 < radius < math.inf:
                 raise InvalidArgumentError(
                     "the radius of ambient occlusion must be a positive length in model units; "
-                    f"got {self.radius}"
+                    f"got {self.radius!r}"
                 )
-        put(self, "strength", _number("strength", self.strength, "a number from 0 to 1"))
-        if not 0 <= self.strength <= 1:
+            put(self, "radius", radius)
+        if not 0 <= strength <= 1:
             raise InvalidArgumentError(
-                f"the strength of ambient occlusion must be from 0 to 1; got {self.strength}"
+                f"the strength of ambient occlusion must be from 0 to 1; got {self.strength!r}"
             )
+        put(self, "strength", strength)
         least, most = DIRECTIONS
-        directions = _number("directions", self.directions, "a whole number")
-        if not (least <= directions <= most and directions % 1 == 0):
+        directions = as_whole(self.directions)
+        if not least <= directions <= most:
             raise InvalidArgumentError(
                 f"ambient occlusion takes a whole number of directions from {least} to {most}; "
                 f"got {self.directions!r}"
@@ -103,7 +105,7 @@ class AmbientOcclusion:
         if value is True:
             return cls()
         if isinstance(value, int | float | np.number):
-            return cls(float(value))
+            return cls(value)  # type: ignore[arg-type]
         if isinstance(value, cls):
             return value if value.strength > 0 else None
         raise InvalidArgumentError(
@@ -218,18 +220,6 @@ def spread_directions(n: int) -> NDArray[np.float64]:
     angle = i * math.pi * (3 - math.sqrt(5))
     radius = np.sqrt(1 - z**2)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
-
-
-def _number(name: str, value: Any, meaning: str) -> float:
-    try:
-        number = math.nan if isinstance(value, bool | str) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if math.isnan(number):
-        raise InvalidArgumentError(
-            f"the {name} of ambient occlusion must be {meaning}; got {value!r}"
-        )
-    return number
 
 
 def _triple(values: NDArray[Any]) -> tuple[int, int, int]:

@@ -32,6 +32,17 @@ def as_float(value: Any) -> float:
         return math.nan
 
 
+def as_number(value: Any) -> float:
+    """Return the same, NaN also for text and truth values."""
+    return math.nan if isinstance(value, str | bool | np.bool_) else as_float(value)
+
+
+def as_whole(value: Any) -> float:
+    """Return :func:`as_number` of a whole number, NaN where ``value`` is none."""
+    number = as_number(value)
+    return number if number % 1 == 0 else math.nan
+
+
 def not_taken(value: Any) -> type[InvalidArgumentError]:
     """Return the error by which ``value`` is refused where a number is wanted."""
     number = isinstance(value, int | float | np.number)

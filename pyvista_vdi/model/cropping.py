@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.checks import as_float, as_floats, as_whole
 
 #: Names of VTK's sets of regions, and their flags (VTK_CROP_SUBVOLUME ...).
 PRESETS = {
@@ -176,10 +177,7 @@ def checked_opacity_multiplier(multiplier: Any) -> float:
     InvalidArgumentError
         If it is no finite number, or below 0.
     """
-    try:
-        factor = float(multiplier)
-    except (TypeError, ValueError, OverflowError):
-        factor = np.nan
+    factor = as_float(multiplier)
     if not 0 <= factor < np.inf:
         raise InvalidArgumentError(
             "opacity_multiplier is a finite factor of the extinction, 0 (transparent) or above, "
@@ -189,10 +187,7 @@ def checked_opacity_multiplier(multiplier: Any) -> float:
 
 
 def _checked_planes(planes: Any) -> tuple[float, ...]:
-    try:
-        values = np.asarray(planes, dtype=np.float64)
-    except (TypeError, ValueError):
-        values = np.array(np.nan)
+    values = as_floats(planes)
     if values.shape != (6,) or np.isnan(values).any():
         raise InvalidArgumentError(
             "cropping takes six planes, x_low, x_high, y_low, y_high, z_low, z_high in the data's "
@@ -204,13 +199,10 @@ def _checked_planes(planes: Any) -> tuple[float, ...]:
 def _checked_regions(regions: Any) -> int:
     if isinstance(regions, str) and regions in PRESETS:
         return PRESETS[regions]
-    try:
-        flags = int(regions)
-    except (TypeError, ValueError):
-        flags = -1
-    if isinstance(regions, str | bool) or flags != regions or not 0 <= flags <= Cropping.ALL:
+    flags = as_whole(regions)
+    if not 0 <= flags <= Cropping.ALL:
         raise InvalidArgumentError(
             f"the regions of cropping are 27 flags, 0 to {Cropping.ALL:#x}, or one of "
             f"{', '.join(map(repr, PRESETS))}; got {regions!r}"
         )
-    return flags
+    return int(flags)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.checks import as_float, not_taken
+from pyvista_vdi.model.checks import as_float, as_floats, not_taken
 
 Vector: TypeAlias = tuple[float, float, float]
 
@@ -233,10 +233,8 @@ def _number(name: str, value: Any) -> float:
 
 
 def _vector(name: str, value: Any) -> Vector:
-    try:
-        x, y, z = (float(v) for v in value)
-    except (TypeError, ValueError, OverflowError):
-        x = y = z = math.nan
-    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+    vector = as_floats(value)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
         raise InvalidArgumentError(f"{name} must be three finite numbers; got {value!r}")
+    x, y, z = vector.tolist()
     return x, y, z

@@ -10,7 +10,7 @@ import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
-from pyvista_vdi.model.checks import as_float, memory_limit_bytes
+from pyvista_vdi.model.checks import as_float, as_whole, memory_limit_bytes
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.volume import Volume
@@ -139,7 +139,7 @@ class GenerationOptions(MediumOptions):
             )
         check_precision(self.precision)
         difference, angle = as_float(self.tolerance), as_float(self.view_cone)
-        if not (np.isfinite(difference) and difference >= 0):
+        if not 0 <= difference < np.inf:
             raise InvalidArgumentError(f"tolerance must be a number >= 0; got {self.tolerance!r}")
         if not 0 <= angle <= 90:
             raise InvalidArgumentError(
@@ -157,13 +157,10 @@ class GenerationOptions(MediumOptions):
 
 def check_max_supersegments(max_supersegments: int) -> int:
     """Return ``max_supersegments`` as an int between 1 and :data:`MAX_SUPERSEGMENTS`."""
-    try:
-        limit = int(max_supersegments)
-    except (TypeError, ValueError, OverflowError):
-        limit = 0
-    if limit != max_supersegments or not 1 <= limit <= MAX_SUPERSEGMENTS:
+    limit = as_whole(max_supersegments)
+    if not 1 <= limit <= MAX_SUPERSEGMENTS:
         raise InvalidArgumentError(
             f"max_supersegments must be a whole number from 1 to {MAX_SUPERSEGMENTS}; "
             f"got {max_supersegments!r}"
         )
-    return limit
+    return int(limit)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float
+from pyvista_vdi.model.checks import as_float, as_whole
 from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
 
 #: A ray ends where less transmittance than this is left, unless told otherwise: no channel loses
@@ -142,7 +142,7 @@ def checked_planes(planes: Any) -> Planes:
     wanted = "clipping_planes must be (k, 6) finite numbers, origin and normal of each plane"
     try:
         table = np.asarray(planes, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidArgumentError(f"{wanted}; got {planes!r}") from error
     if table.size == 0:
         return ()
@@ -155,8 +155,8 @@ def checked_planes(planes: Any) -> Planes:
 
 def checked_preview_samples(samples: int) -> int:
     """Return a number of samples per ray as an int between 1 and :data:`MAX_PREVIEW_SAMPLES`."""
-    number = as_float(samples)
-    if number != samples or number % 1 or not 1 <= number <= MAX_PREVIEW_SAMPLES:
+    number = as_whole(samples)
+    if not 1 <= number <= MAX_PREVIEW_SAMPLES:
         raise InvalidArgumentError(
             f"preview_samples must be a whole number from 1 to {MAX_PREVIEW_SAMPLES}; "
             f"got {samples!r}"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.checks import as_whole
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.packing import Packed8, Packed16
 from pyvista_vdi.model.vdi import VDI
@@ -43,12 +44,13 @@ def thinned(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
     InvalidArgumentError
         If a step is not a whole number from 1 to the window's edge.
     """
-    steps, camera = (along_x, along_y), vdi.camera
-    for step, edge in zip(steps, vdi.window_size, strict=True):
-        if isinstance(step, bool) or not isinstance(step, int) or not 1 <= step <= edge:
+    camera = vdi.camera
+    for step, edge in zip((along_x, along_y), vdi.window_size, strict=True):
+        if not 1 <= as_whole(step) <= edge:
             raise InvalidArgumentError(
                 f"every k-th list is taken, k a whole number from 1 to {edge}; got {step!r}"
             )
+    steps = int(along_x), int(along_y)
     x, y = (np.arange((k - 1) // 2, n, k) for k, n in zip(steps, vdi.window_size, strict=True))
     window = (len(x), len(y))
     # Viewport coordinates before: a times those after, plus b

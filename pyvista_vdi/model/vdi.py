@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.checks import as_float, as_floats
 from pyvista_vdi.model.packing import Packed8, Packing, check_precision, packing_of
 from pyvista_vdi.model.providers import provider
 
@@ -400,10 +401,7 @@ def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> N
 
 
 def _checked_depth_origin(depth_origin: Any) -> float:
-    try:
-        origin = float(depth_origin)
-    except (TypeError, ValueError, OverflowError):
-        origin = math.nan
+    origin = as_float(depth_origin)
     if not math.isfinite(origin):
         raise InvalidVDIError(f"depth_origin must be finite; got {depth_origin!r}")
     return origin
@@ -416,10 +414,7 @@ def _checked_metadata(metadata: Any) -> dict[str, Any]:
 
 
 def _checked_bounds(bounds: ArrayLike) -> tuple[float, float, float, float, float, float]:
-    try:
-        box = np.asarray(bounds, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        box = np.empty(0)
+    box = as_floats(bounds)
     if box.shape != (6,) or not np.isfinite(box).all() or (box[::2] > box[1::2]).any():
         raise InvalidVDIError(
             f"bounds must be six finite numbers x0 <= x1, y0 <= y1, z0 <= z1; got {bounds!r}"

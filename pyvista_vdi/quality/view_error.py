@@ -20,7 +20,7 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float
+from pyvista_vdi.model.checks import as_whole
 from pyvista_vdi.model.metrics import SSIM_WINDOW, over_background
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
@@ -453,7 +453,7 @@ def _of_window(name: str, values: ArrayLike | None, shape: tuple[int, ...]) -> N
 
 
 def _whole(name: str, value: Any, least: int) -> int:
-    number = as_float(value)
-    if not (number >= least and number % 1 == 0):
+    number = as_whole(value)
+    if not number >= least:
         raise InvalidArgumentError(f"{name} must be a whole number from {least} on; got {value!r}")
     return int(number)

@@ -172,7 +172,9 @@ def test_without_timings(volume, default_runtime):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"repeats": -1}, "repeats must be from 0 to 1000; got -1"),
+        ({"repeats": -1}, "repeats must be a whole number from 0 to 1000; got -1"),
+        ({"repeats": 2.5}, "repeats must be a whole number from 0 to 1000; got 2.5"),
+        ({"repeats": "3"}, "repeats must be a whole number from 0 to 1000; got '3'"),
         ({"angles": ()}, "angles must be one or more numbers"),
         ({"angles": (float("nan"),)}, "angles must be one or more numbers"),
     ],

@@ -356,7 +356,7 @@ def test_a_volume_that_is_not_seen_is_refused(default_runtime, tmp_path, capsys)
         (["--size", "8x8"], "a window of 8 x 8 has no SSIM: each edge must have 11 pixels"),
         (["--angles", "5,5"], "an angle is given twice"),
         (["--angles", "nan"], "angles must be one or more numbers of degrees"),
-        (["--repeats", "2000"], "repeats must be from 1 to 1000; got 2000"),
+        (["--repeats", "2000"], "repeats must be a whole number from 1 to 1000; got 2000"),
         (["--name", "a/b"], "--name becomes a file's, without a folder; got 'a/b'"),
         (["--out", "ball.npy"], "the folder ball.npy cannot be made"),
         (["--cmap", "bone", "--transfer-function", "none.json"], "none.json cannot be read"),

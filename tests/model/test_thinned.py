@@ -58,6 +58,11 @@ def test_steps_beyond_the_window_are_refused(steps):
         vdi_of({}, (8, 6)).thinned(*steps)
 
 
+def test_steps_may_be_numpys():
+    vdi = vdi_of({}, (8, 6))
+    assert vdi.thinned(np.int64(2), np.uint8(3)).equals(vdi.thinned(2, 3))
+
+
 @pytest.mark.parametrize("lens", range(2))
 def test_lists_are_crossed_along_the_edge_that_the_view_turns_along(lens):
     vdi = vdi_of(LENSES[lens], (64, 48))
