@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from contextlib import closing as closed_at_end
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any, ClassVar
@@ -257,7 +258,9 @@ def measure_front(
     for name in plan.volumes:
         if name not in there:
             found.data["left_out"][name] = f"not in {examples.DATA_VARIABLE}"
+            steps(finished=len(plan.looks) * len(plan.views))
             continue
+        found.data["left_out"].pop(name, None)  # of an earlier run, which had no such file
         volume = examples.load_data(name, as_volume=True)
         for look in plan.looks:
             case = f"{name}, {look}"
@@ -289,19 +292,18 @@ class _Everybody:
         self._view = view = filling_camera(volume.bounds, plan.window_size)
         looks, size = TRANSFER_FUNCTIONS[look], plan.window_size
         classified = Classification(looks, "a front").transfer_function(volume)
-        own = partial(OurVolume, volume, looks, size, view=view, device=device)
-        self._vdi = own(draw="vdi", sample_distance=FULL_STEP * voxel)
-        self._volumes = {
-            step: own(draw="volume", sample_distance=step * voxel) for step in (FULL_STEP, *STEPS)
-        }
+
+        def own(draw: str, step: float) -> OurVolume:
+            drawn = OurVolume(volume, looks, size, draw, step * voxel, view, device)
+            return stack.enter_context(closed_at_end(drawn))
+
+        self._vdi = own("vdi", FULL_STEP)
+        self._volumes = {step: own("volume", step) for step in (FULL_STEP, *STEPS)}
+        prop = property_from_transfer_function(volume, classified)
         self._theirs = {
-            name: VTKBaseline(
-                volume, property_from_transfer_function(volume, classified), size, name, voxel
-            )
+            name: stack.enter_context(closed_at_end(VTKBaseline(volume, prop, size, name, voxel)))
             for name in MAPPERS
         }
-        for each in (self._vdi, *self._volumes.values(), *self._theirs.values()):
-            stack.callback(each.close)
 
     @property
     def opengl(self) -> str:

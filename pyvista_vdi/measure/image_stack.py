@@ -112,7 +112,8 @@ def _grey(array: NDArray[Any], folder: Path) -> NDArray[Any]:
     if array.ndim == 3:
         return array
     n_colors = array.shape[3] - 1 + array.shape[3] % 2  # without opacity
-    opaque = n_colors == array.shape[3] or bool((array[..., -1] == np.iinfo(array.dtype).max).all())
+    most = 1 if array.dtype.kind == "f" else np.iinfo(array.dtype).max
+    opaque = n_colors == array.shape[3] or bool((array[..., -1] == most).all())
     if opaque and all((array[..., 0] == array[..., i]).all() for i in range(1, n_colors)):
         return np.ascontiguousarray(array[..., 0])
     if array.shape[3] == 4 and array.dtype == np.uint8 and not opaque:

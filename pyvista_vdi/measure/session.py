@@ -86,9 +86,11 @@ def check_count(name: str, value: int, least: int = 1) -> None:
 
 
 def check_angles(angles: Sequence[float]) -> None:
-    """Refuse angles that are none."""
+    """Refuse angles that are none, and those that are given twice."""
     if not angles or not all(math.isfinite(a) for a in angles):
         raise InvalidArgumentError(f"angles must be one or more numbers of degrees; got {angles!r}")
+    if len(set(angles)) < len(angles):
+        raise InvalidArgumentError(f"an angle is given twice: {angles!r}")
 
 
 def sizes_of(vdi: VDI) -> dict[str, Any]:

@@ -12,7 +12,8 @@ from typing import Any
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import Cancelled
 
-#: Does a job on a device; it is given what takes note of the fraction that is done.
+#: Does a job on a device, and returns what is not None; it is given what takes note of the fraction
+#: that is done.
 Work = Callable[[Runtime, Callable[[float], None]], Any]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -266,6 +267,8 @@ def test_what_holds_no_results_is_refused(tmp_path, content, message):
         (["--datasets", "nothing"], "no volume is called 'nothing', and there is no such file"),
         (["--datasets", "kingsnake_like@0"], "a whole number from 1 to 128 behind the @"),
         (["--datasets", "brain", "brain"], "'brain' is given twice"),
+        (["--datasets", "x" * 5000], "and there is no such file"),
+        (["--angles", "5,30,5"], "an angle is given twice: (5.0, 30.0, 5.0)"),
         (["--compare", "a.json", "b.json"], "a.json cannot be read"),
     ],
 )
@@ -381,6 +384,16 @@ def test_the_chance_is_scipys():
         assert rank_sum_chance(a.tolist(), b.tolist()) == pytest.approx(theirs, abs=1e-12)
 
 
+def test_as_many_repetitions_as_may_be_asked_for_have_a_chance():
+    stats = pytest.importorskip("scipy.stats")
+    a, b = np.arange(1000), np.arange(1000) + 70.5
+    theirs = stats.mannwhitneyu(a, b, method="asymptotic").pvalue
+    assert rank_sum_chance(a.tolist(), b.tolist()) == pytest.approx(theirs, rel=1e-3)
+    # Where one run has few, it is exact still
+    few = [-1.0, -2.0, -3.0]
+    assert rank_sum_chance(few, a.tolist()) == pytest.approx(2 / math.comb(1003, 3))
+
+
 # -- the paper's figures ---------------------------------------------------------------------------
 
 
@@ -471,6 +484,11 @@ def test_files_are_data_sets_too(tmp_path):
     assert (dataset.name, dataset.paper, dataset.source) == ("beechnut", "beechnut", "file")
     assert np.array_equal(dataset.load(None).array, array)
     assert find_dataset(str(raw)).paper is None
+    (tmp_path / "run=3").mkdir()
+    apart = raw.rename(tmp_path / "run=3" / raw.name)
+    for name, label in ((str(apart), "nut_4x3x2_uint16"), (f"beechnut={apart}", "beechnut")):
+        assert find_dataset(name).name == label
+        assert np.array_equal(find_dataset(name).load(None).array, array)
     nrrd = find_dataset(str(examples.path("brain")))
     assert nrrd.load(None).dimensions == (181, 217, 181)
     # The results name no folder

@@ -177,6 +177,7 @@ def test_without_timings(volume, default_runtime):
         ({"repeats": "3"}, "repeats must be a whole number from 0 to 1000; got '3'"),
         ({"angles": ()}, "angles must be one or more numbers"),
         ({"angles": (float("nan"),)}, "angles must be one or more numbers"),
+        ({"angles": (5, 5.0)}, "an angle is given twice"),
     ],
 )
 def test_settings_are_checked(options, message):

@@ -54,7 +54,7 @@ def measured(tmp_path_factory):
 
 
 @pytest.mark.gl
-def test_everybody_is_measured_and_resumed(measured, monkeypatch):
+def test_everybody_is_measured_and_resumed(measured):
     path, plan = measured
     seen = []
     found = measure_front(plan, path, progress=lambda share, *doing: seen.append((share, *doing)))
@@ -82,9 +82,13 @@ def test_everybody_is_measured_and_resumed(measured, monkeypatch):
     assert [line for line in lines if line.startswith("| all ")]
     assert [line for line in lines if line.startswith("| brain, soft ")]
     assert lines[-1].startswith("Measured from ")
-    # What is there is not measured again
+    assert seen[-1][0] == 1
+    # What is there is not measured again, nor left out any more
     before = path.read_text()
+    found.data["left_out"]["brain"] = "not there then"
+    found.save()
     again = measure_front(plan, path, resume=True)
+    assert list(again.data["left_out"]) == ["no_such"]
     assert again.data["cases"] == json.loads(before)["cases"]
     with pytest.raises(InvalidArgumentError, match="give the same options to --resume"):
         measure_front(Plan(("brain",)), path, resume=True)

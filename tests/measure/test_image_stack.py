@@ -47,11 +47,16 @@ def test_slices_become_what_pyvista_reads_of_each(suffix, dtype, tmp_path):
 
 def test_colours_that_are_grey_are_values_and_rgba_is_opacity(tmp_path):
     grey = scan(np.uint8)
-    for name, alpha in (("grey", 255), ("colour", 90)):
+    for name, values, alpha, suffix in (
+        ("grey", grey, 255, "png"),
+        ("colour", grey, 90, "png"),
+        ("floats", grey.astype(np.float32), 1.0, "tif"),
+    ):
         (tmp_path / name).mkdir()
-        rgba = np.stack([grey, grey, grey, np.full_like(grey, alpha)], axis=-1)
-        write(tmp_path / name, rgba, "png")
-    assert np.array_equal(read_file(tmp_path / "grey").array, grey[:, ::-1])
+        rgba = np.stack([values, values, values, np.full_like(values, alpha)], axis=-1)
+        write(tmp_path / name, rgba, suffix)
+    for name in ("grey", "floats"):
+        assert np.array_equal(read_file(tmp_path / name).array, grey[:, ::-1])
     volume = read_file(tmp_path / "colour")
     assert volume.rgba
     assert (volume.array[..., 3] == 90).all()
@@ -84,6 +89,10 @@ def _damaged(folder):
     (folder / "slice_3.png").write_bytes(b"\x89PNG\r\n\x1a\n")
 
 
+def _translucent(folder):
+    write(folder, np.full((3, 4, 5, 4), 0.5, np.float32))
+
+
 def _coloured(folder):
     write(folder, np.random.default_rng(1).integers(0, 255, (3, 4, 5, 3), np.uint8), "png")
 
@@ -97,6 +106,7 @@ def _coloured(folder):
         (_single, InvalidVolumeError, "one slice: a volume needs two"),
         (_pages, InvalidVolumeError, "12 x 5 x 7 uint16, not one slice"),
         (_damaged, InvalidVolumeError, "slice_3.png cannot be read as a picture"),
+        (_translucent, UnsupportedError, "are coloured"),
         (_coloured, UnsupportedError, "are coloured"),
     ],
 )

@@ -133,6 +133,13 @@ def test_two_phase_resamples_a_slab_across_v_o(runtime):
     np.testing.assert_allclose(right, (1 - share) * own[1], atol=1e-6)
 
 
+def test_frusta_have_no_more_tiles_than_their_numbers_can_tell(runtime):
+    camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))
+    none = VDI(camera, (1, 1), [0, 0], [], [], [], [], (-1, 1, -1, 1, -1, 1))
+    with pytest.raises(UnsupportedError, match="1920 x 1080 has 129600 tiles of 4 x 4 pixels"):
+        Frusta(runtime, none).image(camera, (1920, 1080))
+
+
 @pytest.mark.parametrize("way", WAYS)
 def test_an_empty_vdi_is_empty(runtime, way):
     camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))

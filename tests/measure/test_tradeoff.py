@@ -379,6 +379,13 @@ def test_mistakes_of_the_command_line(capsys):
     assert "a size is WIDTHxHEIGHT" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("size", [(32, 24, 3), (32.5, 24), 32])
+def test_a_window_that_is_none_is_refused(size):
+    table = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 1], (0, 1))
+    with pytest.raises(InvalidArgumentError, match=r"window_size must be \(width, height\)"):
+        measure_tradeoff(pvdi.Volume(shell()), window_size=size, transfer_function=table)
+
+
 def test_a_file_of_another_kind_is_refused(folder, capsys, tmp_path):
     (tmp_path / "tradeoff-ball.json").write_text('{"format": "pyvista-vdi benchmark"}')
     assert tradeoff(folder / "ball.npy", "--no-vtk", "--resume", "--out", tmp_path) == 1

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any
@@ -261,9 +261,7 @@ class _Bench:
         """Generate, draw and time; ``stack`` closes VTK's windows."""
         settings = self._settings
         if settings.vtk:
-            self._baselines = _baselines(self._volume, settings, self.step)
-            for baseline in self._baselines.values():
-                stack.callback(baseline.close)
+            self._baselines = _baselines(self._volume, settings, self.step, stack)
         vdi, generation, full_raycast = self._timed_generation()
         images = {angle: self._images(vdi, angle) for angle in settings.angles}
         results = [
@@ -377,7 +375,7 @@ class _Bench:
         }
 
 
-def _baselines(volume: Volume, settings: Settings, step: float) -> dict[str, Any]:
+def _baselines(volume: Volume, settings: Settings, step: float, stack: ExitStack) -> dict[str, Any]:
     """Return VTK's mappers, with the property that ``add_volume`` would give them."""
     from pyvista_vdi.measure.vtk_baselines import MAPPERS, VTKBaseline, add_volume_property
 
@@ -391,7 +389,10 @@ def _baselines(volume: Volume, settings: Settings, step: float) -> dict[str, Any
         arguments.pop(name, None)
     prop = arguments.get("volume_property") or add_volume_property(volume, arguments)
     size = settings.window_size
-    return {name: VTKBaseline(volume, prop, size, name, step) for name in MAPPERS}
+    return {
+        name: stack.enter_context(closing(VTKBaseline(volume, prop, size, name, step)))
+        for name in MAPPERS
+    }
 
 
 def _judged(angle: float, images: Images, seconds: dict[str, Timing]) -> AngleResult:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -117,14 +118,13 @@ def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
             None,
             lambda progress: examples.load_data(name, as_volume=True),
         )
-    file = Path(name.rpartition("=")[2])
-    if not file.exists():
+    label, file = _named_file(name)
+    if not os.path.exists(file):  # noqa: PTH110 - pathlib's raises for a name that is too long
         known = ", ".join([*sorted(examples.VOLUMES), *PROCEDURAL])
         raise InvalidArgumentError(
             f"no volume is called {name!r}, and there is no such file: choose one of {known}, or "
             "name a file"
         )
-    label = label_of(name)
     paper = label if label in {row["dataset"] for row in paper_tables()["table1"]} else None
     return Dataset(
         label,
@@ -141,8 +141,15 @@ def label_of(name: str) -> str:
     """Return what the results call a data set: its name, without the folder of a file."""
     if name.partition("@")[0] in PROCEDURAL or name in examples.VOLUMES:
         return name
-    label, _, path = name.rpartition("=")
-    return label or Path(path).name.split(".")[0]
+    return _named_file(name)[0]
+
+
+def _named_file(name: str) -> tuple[str, Path]:
+    """Return label and file of ``FILE`` or ``NAME=FILE``; a file's own name may have a = in it."""
+    label, equals, path = name.partition("=")
+    if not equals or os.path.exists(name):  # noqa: PTH110 - as above
+        label, path = "", name
+    return label or Path(path).name.split(".")[0], Path(path)
 
 
 def _procedural(name: str, kind: Procedural, factor: int, seed: int) -> Dataset:

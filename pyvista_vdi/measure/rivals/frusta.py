@@ -7,12 +7,15 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import Runtime, padded
 from pyvista_vdi.device.work_order import GROUP
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.measure.rivals.medium import DeviceMedium, Floats, Medium, view_of
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 
 #: Pixels along the edges of a tile, in which frusta are dealt to pixels.
 TILE = 4
+#: Tiles that a frame may have: their numbers have 16 bits, which are sorted several times as fast.
+_MOST_TILES = 2**16
 
 #: Least w of a corner in front of the eye, in the largest of all corners' magnitudes.
 _LEAST_W = 1e-4
@@ -36,12 +39,20 @@ class Frusta(DeviceMedium):
         )
 
     def image(self, camera: Camera, size: tuple[int, int]) -> NDArray[np.float32]:
-        """Draw a frame; premultiplied RGBA (H, W, 4)."""
+        """Draw a frame; premultiplied RGBA (H, W, 4).
+
+        A window of more than a million pixels raises UnsupportedError.
+        """
         runtime, (wide, high) = self.runtime, (-(-edge // TILE) for edge in size)
+        if wide * high > _MOST_TILES:
+            raise UnsupportedError(
+                f"a window of {size[0]} x {size[1]} has {wide * high} tiles of {TILE} x {TILE} "
+                f"pixels, and frusta are dealt to {_MOST_TILES} at most: take a smaller one"
+            )
         count, view = len(self.faces), view_of(self, camera, size)
         matrix = to_window(self, camera, size)
         least = _LEAST_W * np.abs(matrix[2] @ self._corners()).max(initial=0.0)
-        window = np.append(matrix.ravel(), 0.0 if not len(self.faces) else least)
+        window = np.append(matrix.ravel(), least if len(self.faces) else 0.0)
         with (
             self.upload(self.order(camera), np.int32) as order,
             self.upload(window, np.float32) as to,

@@ -68,9 +68,7 @@ class Plan:
         check_count("repeats", self.repeats)
         check_count("generations", self.generations)
         check_angles(self.angles)
-        if len(set(self.angles)) < len(self.angles):
-            raise InvalidArgumentError(f"an angle is given twice: {self.angles!r}")
-        if min(check_window_size(self.window_size)) < SSIM_WINDOW:
+        if min(self.window_size) < SSIM_WINDOW:
             raise InvalidArgumentError(
                 f"a window of {self.window_size[0]} x {self.window_size[1]} has no SSIM: each edge "
                 f"must have {SSIM_WINDOW} pixels or more"
@@ -191,16 +189,16 @@ def measure_tradeoff(
     """
     looks = Classification(classification, "measure_tradeoff", _KEYWORDS)
     volume = as_volume(volume, looks.scalars, looks.preference)
-    width, height = window_size
-    view = Camera.from_any(camera) if camera is not None else None
+    size = check_window_size(window_size)
+    view = filling_camera(volume.bounds, size) if camera is None else Camera.from_any(camera)
     plan = Plan(
         name=name,
         volume=volume,
         looks=looks.describe(),
         table=looks.transfer_function(volume),
-        camera=view or filling_camera(volume.bounds, (width, height)),
+        camera=view,
         settings=sweep() if settings is None else tuple(dict.fromkeys(settings)),
-        window_size=(int(width), int(height)),
+        window_size=size,
         angles=tuple(float(angle) for angle in angles),
         repeats=repeats,
         generations=generations,
