@@ -6,16 +6,15 @@ Writes ``ambient_occlusion_WxH.json`` and ``.md``, for the two volumes that are 
 from __future__ import annotations
 
 import argparse
-import statistics
 import sys
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from common import (  # beside this file
     add_size,
     new_parser,
+    results_file,
     save,
     subject_of,
 )
@@ -25,6 +24,7 @@ from pyvista_vdi import AmbientOcclusion
 from pyvista_vdi.api import render, render_volume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.clock import median, take_turns
 from pyvista_vdi.measure.report import table, write_text
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
 from pyvista_vdi.model.camera import Camera
@@ -63,8 +63,7 @@ def main() -> int:
         "device": get_runtime().info.name,
         "rows": [measured(*case, options) for case in tqdm(cases, unit="case")],
     }
-    width, height = options.size
-    target = options.out / f"ambient_occlusion_{width}x{height}.json"
+    target = results_file("ambient_occlusion", options)
     save(results, target)
     write_text(target.with_suffix(".md"), "\n".join([*described(results), ""]))
     return 0
@@ -130,24 +129,21 @@ def cost(
 ) -> dict[str, float]:
     """Return the ratios of generation with occlusion to without, in turns."""
     radius = AmbientOcclusion().radius_in(volume)
-    seconds: dict[str, list[float]] = {"plain": [], "anew": [], "kept": []}
+    kept = radius
 
-    def timed(name: str, work: Callable[[], object]) -> None:
-        start = time.process_time()
-        work()
-        seconds[name].append(time.process_time() - start)
+    def generate(occlusion: float | None) -> None:
+        generate_vdi(volume, view, options.size, classified, ambient_occlusion=occlusion)
 
-    for k in range(options.repeats):
-        other = radius * (1 + 1e-6 * (k + 1))  # nothing is kept of another radius
-        for name, occlusion in (("plain", None), ("anew", other), ("kept", other)):
-            timed(
-                name,
-                lambda occlusion=occlusion: generate_vdi(
-                    volume, view, options.size, classified, ambient_occlusion=occlusion
-                ),
-            )
-    median = {name: statistics.median(found) for name, found in seconds.items()}
-    return {f"{name}_ratio": median[name] / median["plain"] for name in ("anew", "kept")}
+    def anew() -> None:
+        nonlocal kept
+        kept += 1e-6 * radius  # nothing is kept of another radius
+        generate(kept)
+
+    work = {"plain": lambda: generate(None), "anew": anew, "kept": lambda: generate(kept)}
+    clocks = {"clock": time.process_time}
+    taken = take_turns(work, options.repeats, warm_up=False, clocks=clocks)
+    seconds = {name: median(times) for name, times in taken.items()}
+    return {f"{name}_ratio": seconds[name] / seconds["plain"] for name in ("anew", "kept")}
 
 
 def ssim(

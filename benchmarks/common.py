@@ -14,11 +14,12 @@ from typing import Any, NamedTuple
 from tqdm import tqdm
 
 from pyvista_vdi import examples
+from pyvista_vdi.cli.declare import parse_size
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.io import read, whole_file
 from pyvista_vdi.measure.clock import take_turns
-from pyvista_vdi.measure.report import describe_system, without_infinities, write_text
+from pyvista_vdi.measure.report import across, describe_system, without_infinities, write_text
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, WINDOW_SIZE, filling_camera
@@ -28,17 +29,11 @@ from pyvista_vdi.model.volume import Volume
 
 INTERPOLATIONS = ("nearest", "linear")
 
+#: Wall clock, and the process's CPU time, which a machine that does other work distorts less.
+BOTH_CLOCKS = {"wall": time.perf_counter, "cpu": time.process_time}
+
 #: Where results go by default.
 RESULTS = Path(__file__).parent / "results"
-
-
-def window_size(text: str) -> tuple[int, int]:
-    """Parse ``1280x720``."""
-    try:
-        width, height = (int(n) for n in text.split("x"))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT; got {text!r}") from None
-    return width, height
 
 
 class Subject(NamedTuple):
@@ -76,7 +71,7 @@ def new_parser(
 
 def add_size(parser: argparse.ArgumentParser, size: tuple[int, int] = WINDOW_SIZE) -> None:
     """Add ``--size``, V_O's window in pixels."""
-    parser.add_argument("--size", type=window_size, default=size, metavar="WxH")
+    parser.add_argument("--size", type=parse_size, default=size, metavar="WxH")
 
 
 def add_volumes(parser: argparse.ArgumentParser, volumes: Sequence[str] | None = None) -> None:
@@ -154,6 +149,11 @@ def at_hand(names: Iterable[str]) -> list[str]:
     return [name for name in names if name in there]
 
 
+def results_file(name: str, options: argparse.Namespace) -> Path:
+    """Return where results of a window's size go; tables and plots go beside it."""
+    return options.out / f"{name}_{across(options.size)}.json"
+
+
 def begun(target: Path, case: Mapping[str, Any], parts: str = "volumes") -> dict[str, Any]:
     """Return the results that an earlier run of the same case has left, or new ones.
 
@@ -208,9 +208,8 @@ def measure_missing(
     parts : str
         As for :func:`begun`.
     """
-    width, height = options.size
-    target = options.out / f"{name}_{width}x{height}.json"
-    head = {"window_size": [width, height], "system": describe_system(options.device), **case}
+    target = results_file(name, options)
+    head = {"window_size": list(options.size), "system": describe_system(options.device), **case}
     results = begun(target, head, parts)
     for part in tqdm(list(wanted), unit="part", disable=not sys.stderr.isatty()):
         if part not in results[parts] or options.redo:
@@ -262,6 +261,11 @@ def vdi_of(name: str, options: argparse.Namespace) -> VDI:
     return vdi
 
 
+def marked(text: str, reached: bool) -> str:
+    """Return a figure, bold where it is not what must be reached."""
+    return text if reached else f"**{text}**"
+
+
 def add_clock(parser: argparse.ArgumentParser) -> None:
     """Add ``--clock``: how a CPU is timed on a machine that others use as well."""
     parser.add_argument(
@@ -284,11 +288,10 @@ def clock_of(options: argparse.Namespace, runtime: Runtime) -> Callable[[], floa
 
 def timed(ways: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, dict[str, Any]]:
     """Time several ways in turns: seconds by wall clock and by CPU, with the spread."""
-    clocks = {"wall": time.perf_counter, "cpu": time.process_time}
     return {
         name: {
             clock: {"median": statistics.median(s), "least": min(s), "most": max(s)}
             for clock, s in taken.items()
         }
-        for name, taken in take_turns(ways, repeats, warm_up=False, clocks=clocks).items()
+        for name, taken in take_turns(ways, repeats, warm_up=False, clocks=BOTH_CLOCKS).items()
     }

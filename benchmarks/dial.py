@@ -16,6 +16,7 @@ import statistics
 import sys
 import time
 from collections.abc import Iterator
+from functools import partial
 from itertools import product
 from typing import Any, TypeAlias
 
@@ -25,6 +26,7 @@ from common import (  # beside this file
     add_volumes,
     at_hand,
     new_parser,
+    results_file,
     save,
 )
 from numpy.typing import NDArray
@@ -35,6 +37,7 @@ from pyvista_vdi import examples
 from pyvista_vdi.api import render, render_volume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.clock import median, take_turns
 from pyvista_vdi.measure.report import table, write_text
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
@@ -76,8 +79,7 @@ Case: TypeAlias = dict[str, Any]
 def main() -> int:
     """Measure what is missing, and write what was found."""
     options = parsed()
-    width, height = options.size
-    target = options.out / f"dial_{width}x{height}.json"
+    target = results_file("dial", options)
     cases: dict[str, Case] = json.loads(target.read_text()) if target.exists() else {}
     for name, look in tqdm(cases_of(options), unit="case"):
         entry = cases.setdefault(f"{name}/{look}", {})
@@ -215,17 +217,12 @@ def frames(
 ) -> list[float]:
     """Return what a frame of each of the first rungs takes, over one of the rough VDI."""
     view = turned(camera, volume.bounds, TARGET_ANGLE)
-    vdis = [
-        made_by(setting, volume, table, camera, options)
-        for setting in (ROUGH, *LADDER[:TIMED_RUNGS])
-    ]
-    seconds: list[list[float]] = [[] for _ in vdis]
-    for _ in range(FRAMES):
-        for of_one, vdi in zip(seconds, vdis, strict=True):
-            start = time.process_time()
-            render(vdi, view, options.size, device=options.device)
-            of_one.append(time.process_time() - start)
-    rough, *others = (statistics.median(of_one) for of_one in seconds)
+    work = {}
+    for k, setting in enumerate((ROUGH, *LADDER[:TIMED_RUNGS])):
+        vdi = made_by(setting, volume, table, camera, options)
+        work[str(k)] = partial(render, vdi, view, options.size, device=options.device)
+    taken = take_turns(work, FRAMES, warm_up=False, clocks={"clock": time.process_time})
+    rough, *others = map(median, taken.values())
     return [other / rough for other in others]
 
 

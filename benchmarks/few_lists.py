@@ -12,29 +12,17 @@ from typing import Any
 
 import numpy as np
 from common import add_looks, add_size, add_volumes, at_hand, new_parser, save, subject_of
-from numpy.typing import NDArray
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.measure.clock import median, take_turns
 from pyvista_vdi.measure.report import table
+from pyvista_vdi.measure.session import enlarged
 from pyvista_vdi.model.thinned import lists_crossed, thinned
 
 ANGLES = (15.0, 30.0, 60.0)
 LOOKS = ("soft", "steep")
 LISTS, PIXELS = (1, 2, 4), (1, 2, 4)
 VOLUMES = ("brain", "bonsai", "rayleigh_taylor", "tooth", "heptane", "visible_female_head")
-
-
-def enlarged(image: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
-    """Return a picture of more pixels, interpolated linearly as a texture is."""
-    for axis, n in ((0, size[1]), (1, size[0])):
-        m = image.shape[axis]
-        place = np.clip((np.arange(n) + 0.5) * m / n - 0.5, 0, m - 1)
-        first = np.minimum(place.astype(int), m - 2)
-        weight = (place - first).reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
-        below, above = image.take(first, axis), image.take(first + 1, axis)
-        image = below + weight * (above - below)
-    return image.astype(np.float32)
 
 
 def main() -> None:
@@ -67,7 +55,7 @@ def main() -> None:
                 taken = take_turns(work, options.repeats)
                 for key, draw in work.items():
                     k, step = map(int, key.split())
-                    picture = draw() if step == 1 else enlarged(draw(), size)
+                    picture = enlarged(draw(), size)
                     loss = 1 - float(pvdi.compare_images(picture, truth).ssim)
                     crossed = float(lists_crossed(few[k], camera).sum()) / step**2
                     row = (angle, k, step, loss, crossed, median(taken[key]))

@@ -26,9 +26,9 @@ from common import (  # beside this file
     add_vdi_cache,
     new_parser,
     vdi_of,
-    window_size,
 )
 
+from pyvista_vdi.cli.declare import parse_size
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.measure.report import describe_system
 from pyvista_vdi.model.vdi import VDI
@@ -284,7 +284,7 @@ def ratio(
 def parsed() -> argparse.Namespace:
     """Return the options."""
     parser = new_parser(__doc__, repeats=15, repeated="frames of each kind")
-    parser.add_argument("--frame", type=window_size, default=(1920, 1080), metavar="WxH")
+    parser.add_argument("--frame", type=parse_size, default=(1920, 1080), metavar="WxH")
     parser.add_argument("--volume", default="rayleigh_taylor")
     add_looks(parser, interpolation=None)
     add_size(parser)

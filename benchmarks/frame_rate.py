@@ -12,6 +12,7 @@ import statistics
 import sys
 import time
 from collections.abc import Iterable
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from common import (  # beside this file
     add_size,
     looks_of,
     new_parser,
+    results_file,
     save,
     subject_of,
 )
@@ -30,6 +32,7 @@ from tqdm import tqdm
 from pyvista_vdi import examples
 from pyvista_vdi.api import render
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.clock import median, take_turns
 from pyvista_vdi.measure.report import describe_system, new_figure, save_figure
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
@@ -76,8 +79,7 @@ def main() -> int:
             for (azimuth, elevation), frame in zip(path, frames, strict=True)
         ],
     }
-    width, height = options.size
-    target_file = options.out / f"frame_rate_{width}x{height}.json"
+    target_file = results_file("frame_rate", options)
     save(results, target_file)
     write_plot(results, target_file.with_suffix(".png"))
     print(f"{target:.1f} frames per second aimed at; {1 / full_seconds:.1f} in full quality")
@@ -144,12 +146,12 @@ class Drawing:
         shares = {"floor": FLOOR, "full": 1.0}
         limits: dict[str, Any] = {"frame": numbers, "floor": [], "full": []}
         for number in tqdm(numbers, desc="limits", unit="view"):
-            seconds: dict[str, list[float]] = {name: [] for name in shares}
-            for _ in range(3):
-                for name, share in shares.items():
-                    seconds[name].append(self._draw(number, round(self._full * share))[1])
-            for name in shares:
-                limits[name].append(statistics.median(seconds[name]))
+            work = {
+                name: partial(self._draw, number, round(self._full * share))
+                for name, share in shares.items()
+            }
+            for name, taken in take_turns(work, 3, warm_up=False).items():
+                limits[name].append(median(taken))
         return limits
 
     def interaction(self, controller: FrameRateController, repeats: int) -> list[dict[str, Any]]:

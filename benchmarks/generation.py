@@ -14,16 +14,15 @@ process's CPU time, which a machine that does other work distorts less. Writes
 from __future__ import annotations
 
 import argparse
-import os
 import statistics
 import sys
-import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
 from common import (  # beside this file
+    BOTH_CLOCKS,
     Subject,
     add_looks,
     add_redo,
@@ -64,8 +63,6 @@ Seconds = dict[str, list[dict[str, float]]]
 def main() -> int:
     """Measure what is missing, and write what was found."""
     options = parsed()
-    if not os.environ.get("VTK_DEFAULT_OPENGL_WINDOW") and not os.environ.get("DISPLAY"):
-        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
     case = {
         "transfer_function": options.tf,
         "interpolation": options.interpolation,
@@ -132,8 +129,7 @@ def measured(subject: Subject, options: argparse.Namespace) -> dict[str, Any]:
             peer = VTKBaseline(volume, prop, options.size, mapper, voxel)
             stack.callback(peer.close)
             candidates[mapper] = partial(peer.render, turned)
-        clocks = {"wall": time.perf_counter, "cpu": time.process_time}
-        taken = take_turns(candidates, options.repeats, clocks=clocks)
+        taken = take_turns(candidates, options.repeats, clocks=BOTH_CLOCKS)
     seconds: Seconds = {
         name: [{"wall": w, "cpu": c} for w, c in zip(t["wall"], t["cpu"], strict=True)]
         for name, t in taken.items()

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -36,14 +35,13 @@ from tqdm import tqdm
 
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.clock import median, take_turns
 from pyvista_vdi.measure.paper import find_dataset
 from pyvista_vdi.measure.paper.datasets import label_of, require_allocation
 from pyvista_vdi.measure.report import describe_system, system_line, table, write_text
-from pyvista_vdi.measure.session import CANDIDATES, Bench, VDIRenderer
+from pyvista_vdi.measure.session import CANDIDATES, WARM_UP_SIZE, Bench, VDIRenderer
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
-from pyvista_vdi.model.standard_cases import ANGLES, filling_camera
+from pyvista_vdi.model.standard_cases import ANGLES
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume
@@ -78,9 +76,6 @@ VOLUME_REACH = 1.0
 #: Who takes part: ours as users have them by default, and VTK's.
 _OURS, _OUR_VOLUME = "vdi_skipping", "volume_skipping"
 _PEERS = ("vtk_gpu", "vtk_fixed_point")
-
-#: Windows in which everything is made once before it is timed, pixels.
-_WARM_UP_SIZE = (64, 36)
 
 #: One block of rays is counted in so many pixels both ways.
 _EVERY = 64
@@ -151,9 +146,9 @@ def measured(
         return {"refused": f"{type(error).__name__}: {error}"}
     model = Model(runtime, rates, volume, function, tuple(options.size), _EVERY)
     try:
-        vdi, seconds = _generation(runtime, volume, function, options)
-        step = min(volume.spacing)
-        view = vdi.camera
+        clock = clock_of(options, runtime)
+        medium = DeviceVolume(runtime, volume, function, sample_distance=renderers.step)
+        vdi, seconds = _generation(renderers, medium, options, clock)
         found: dict[str, Any] = {
             "dimensions": list(volume.dimensions),
             "supersegments": vdi.n_supersegments,
@@ -164,10 +159,10 @@ def measured(
         draw = VDIRenderer(runtime, vdi, tuple(options.size))
         for angle in ANGLES:
             done(f"{name}: {angle:g} degrees")
-            camera = view.azimuth(angle)
+            camera = vdi.camera.azimuth(angle)
             frames = {**draw.frames(camera), **renderers.frames(camera)}
             steps = {n: frames[n] for n in (_OURS, _OUR_VOLUME, *_PEERS) if n in frames}
-            clocks = {"clock": clock_of(options, runtime)}
+            clocks = {"clock": clock}
             taken = take_turns(steps, options.repeats, runtime=runtime, clocks=clocks)
             found["angles"].append(
                 {
@@ -181,12 +176,12 @@ def measured(
                             n_bytes=prepared.list_bytes,
                             skips=prepared.occupancy.worthwhile,
                         ),
-                        _OUR_VOLUME: model.volume_frame(camera, step),
+                        _OUR_VOLUME: model.volume_frame(camera, renderers.voxel),
                         "around": model.floor(around_work(tuple(options.size), runtime)),
                     },
                 }
             )
-        found["model"] = _generation_model(model, runtime, vdi, step / 2)
+        found["model"] = _generation_model(model, runtime, vdi, renderers.step)
         found["left_out"] = dict(renderers.left_out)
         return found
     finally:
@@ -194,39 +189,23 @@ def measured(
 
 
 def _generation(
-    runtime: Runtime, volume: Any, function: Any, options: argparse.Namespace
+    bench: Bench, medium: DeviceVolume, options: argparse.Namespace, clock: Callable[[], float]
 ) -> tuple[VDI, dict[str, float | None]]:
     """Time generation and a volume raycast at the same step, neither stopping at opaque."""
-    size, step = tuple(options.size), min(volume.spacing) / 2
-    view = filling_camera(volume.bounds, size)
-    made: list[VDI] = []
-
-    def generate(size: tuple[int, int]) -> None:
-        made[:] = [
-            generate_vdi(
-                volume,
-                view,
-                size,
-                function,
-                max_supersegments=options.max_supersegments,
-                sample_distance=step,
-                device=runtime,
-            )
-        ]
-
-    medium = DeviceVolume(runtime, volume, function, sample_distance=step)
-
-    def raycast(size: tuple[int, int]) -> object:
-        options = RenderOptions(transmittance_cutoff=0)
-        return raycast_medium(medium, FrameRequest(view, size, options))
-
-    generate(_WARM_UP_SIZE)
-    raycast(_WARM_UP_SIZE)
-    steps = {"generation": partial(generate, size), "render_volume": partial(raycast, size)}
-    clocks = {"clock": clock_of(options, runtime)}
-    n = options.generations
-    taken = take_turns(steps, n, runtime=runtime, warm_up=False, clocks=clocks)
-    return made[0], {name: median(t) for name, t in taken.items()}
+    looks = RenderOptions(transmittance_cutoff=0)
+    raycast_medium(medium, FrameRequest(bench.view, WARM_UP_SIZE, looks))
+    frame = FrameRequest(bench.view, bench.size, looks)
+    made, taken = bench.generate(
+        bench.view,
+        bench.size,
+        options.generations,
+        before={"render_volume": partial(raycast_medium, medium, frame)},
+        clocks={"clock": clock},
+        max_supersegments=options.max_supersegments,
+        sample_distance=bench.step,
+    )
+    names = {"generation": "generate", "render_volume": "render_volume"}
+    return made["exact"], {name: median(taken[one]) for name, one in names.items()}
 
 
 def _generation_model(model: Model, runtime: Runtime, vdi: VDI, step: float) -> dict[str, Any]:
@@ -326,8 +305,6 @@ def worst(cells: Mapping[str, Cell]) -> tuple[str, Cell]:
 def main() -> int:
     """Measure what is missing, and write what was found."""
     options = parsed()
-    if not os.environ.get("VTK_DEFAULT_OPENGL_WINDOW") and not os.environ.get("DISPLAY"):
-        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
     runtime = get_runtime(options.device)
     rates = Rates.read_for(runtime, options.machine or options.out)
     width, height = options.size

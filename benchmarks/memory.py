@@ -22,9 +22,12 @@ from typing import Any
 
 import numpy as np
 from common import (  # beside this file
-    INTERPOLATIONS,
+    add_looks,
+    add_size,
+    add_volumes,
     at_hand,
-    window_size,
+    looks_of,
+    new_parser,
 )
 
 from pyvista_vdi import Volume, examples
@@ -34,7 +37,7 @@ from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.report import table
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.packing import PRECISIONS
-from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.model.standard_cases import filling_camera
 
 VOLUMES = ("visible_female_head", "heptane", "rayleigh_taylor")
 
@@ -59,15 +62,12 @@ def main() -> int:
 
 def parsed() -> argparse.Namespace:
     """Return the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    names = sorted(examples.VOLUMES)
-    parser.add_argument("--volumes", nargs="+", choices=names, default=VOLUMES, metavar="NAME")
-    parser.add_argument("--size", type=window_size, default=(1280, 720), metavar="WxH")
-    parser.add_argument("--tf", choices=TRANSFER_FUNCTIONS, default="soft")
-    parser.add_argument("--interpolation", choices=INTERPOLATIONS, default="nearest")
+    parser = new_parser(__doc__, writes=False)
+    add_volumes(parser, VOLUMES)
+    add_size(parser)
+    add_looks(parser, max_supersegments=None)
     parser.add_argument("--precision", choices=PRECISIONS, default="exact")
     parser.add_argument("--memory-limit", metavar="SIZE", help="as of pyvista-vdi generate")
-    parser.add_argument("--device", help="OpenCL device, see: pyvista-vdi devices")
     parser.add_argument("--json", action="store_true", help="print all figures")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
     return parser.parse_args()
@@ -88,8 +88,7 @@ def drawn(
 ) -> dict[str, Any]:
     """Generate a VDI and draw it from another view; return its bytes and the peaks."""
     runtime = get_runtime(options.device)
-    looks = {**TRANSFER_FUNCTIONS[options.tf], "interpolation": options.interpolation}
-    classified = Classification(looks, "a benchmark").transfer_function(volume)
+    classified = Classification(looks_of(options), "a benchmark").transfer_function(volume)
     view = filling_camera(volume.bounds, size)
     forget_peak()
     vdi = generate_vdi(

@@ -20,10 +20,10 @@ from common import (  # beside this file
     new_parser,
     timed,
     vdi_of,
-    window_size,
 )
 from files import DENSE_BYTES, mebibytes
 
+from pyvista_vdi.cli.declare import parse_size
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.measure.report import system_line
 from pyvista_vdi.model.metrics import compare_images
@@ -71,7 +71,7 @@ def parsed() -> argparse.Namespace:
     """Return the options."""
     parser = new_parser(__doc__, repeats=5, repeated="timed frames of each kind")
     add_vdi_options(parser)
-    parser.add_argument("--frame", type=window_size, metavar="WxH", help="of the pictures")
+    parser.add_argument("--frame", type=parse_size, metavar="WxH", help="of the pictures")
     return parser.parse_args()
 
 

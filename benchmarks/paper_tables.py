@@ -5,7 +5,6 @@ All options are the verb's: ``python benchmarks/paper_tables.py --profile full -
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
@@ -14,6 +13,4 @@ from pyvista_vdi.cli import main
 RESULTS = Path(__file__).parent / "results" / "paper_tables.json"
 
 if __name__ == "__main__":
-    if not os.environ.get("VTK_DEFAULT_OPENGL_WINDOW") and not os.environ.get("DISPLAY"):
-        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
     sys.exit(main(["benchmark", "--out", str(RESULTS), *sys.argv[1:]]))

@@ -10,7 +10,6 @@ import argparse
 import math
 import statistics
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from common import (  # beside this file
     add_volumes,
     at_hand,
     new_parser,
+    results_file,
     save,
     subject_of,
 )
@@ -31,11 +31,13 @@ from tqdm import tqdm
 from pyvista_vdi.api import render_volume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.clock import take_turns
 from pyvista_vdi.measure.report import describe_system, new_figure, save_figure, write_text
 from pyvista_vdi.measure.session import enlarged
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
+from pyvista_vdi.model.thinned import thinned
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.raycasting.raycast import draw
@@ -62,9 +64,8 @@ def main() -> int:
     rows = []
     for name in tqdm(at_hand(options.volumes), unit="volume"):
         rows += measured(name, options)
-    width, height = options.size
     results = {
-        "window_size": [width, height],
+        "window_size": list(options.size),
         "angle": options.angle,
         "max_supersegments": options.max_supersegments,
         "transfer_function": options.tf,
@@ -72,7 +73,7 @@ def main() -> int:
         "system": describe_system(options.device),
         "rows": rows,
     }
-    target = options.out / f"preview_{width}x{height}.json"
+    target = results_file("preview", options)
     save(results, target)
     write_text(target.with_suffix(".md"), report(results))
     write_plot(results, target.with_suffix(".png"))
@@ -112,16 +113,13 @@ def measured(name: str, options: argparse.Namespace) -> list[dict[str, Any]]:
         width, height = options.size
         coarse = generated((width // factor, height // factor))
         ways.append(("coarser VDI", 1 / factor, lambda vdi=coarse: draw(vdi)))
-        thinned = every_list(vdi, factor)
-        ways.append(("several lists at once", 1 / factor, lambda vdi=thinned: draw(vdi)))
+        few = thinned(vdi, factor, factor)
+        ways.append(("several lists at once", 1 / factor, lambda vdi=few: draw(vdi)))
 
-    times: list[list[float]] = [[] for _ in ways]
     pictures = [draw.whole(way()) for _, _, way in ways]  # builds and uploads what is needed
-    for _ in range(options.repeats):
-        for (_, _, way), taken in zip(ways, times, strict=True):
-            begin = time.perf_counter()
-            way()
-            taken.append(time.perf_counter() - begin)
+    work = {str(k): way for k, (_, _, way) in enumerate(ways)}
+    found = take_turns(work, options.repeats, warm_up=False)
+    times = [taken["clock"] for taken in found.values()]
     reference = render_volume(
         volume, camera, options.size, transfer_function=table, device=options.device
     )
@@ -185,30 +183,6 @@ def pixels(draw: Drawing, vdi: VDI, share: float) -> Callable[[], Image]:
 def sampled(draw: Drawing, vdi: VDI, samples: int) -> Callable[[], Image]:
     """Return what draws the paper's preview."""
     return lambda: draw(vdi, samples=samples)
-
-
-def every_list(vdi: VDI, factor: int) -> VDI:
-    """Return a VDI of every ``factor``-th list along both edges, each as wide as those left out."""
-    width, height = vdi.window_size
-    wide, high = width // factor, height // factor
-    columns = np.arange(wide) * factor + factor // 2
-    rows = np.arange(high) * factor + factor // 2
-    lists = (rows[:, None] * width + columns).ravel()
-    lengths = np.diff(vdi.offsets)[lists].astype(np.int64)
-    offsets = np.concatenate([[0], np.cumsum(lengths)])
-    kept = np.repeat(vdi.offsets[lists].astype(np.int64) - offsets[:-1], lengths)
-    kept += np.arange(offsets[-1])
-    return VDI(
-        vdi.camera,
-        (wide, high),
-        offsets.astype(np.uint64),
-        vdi.front[kept],
-        vdi.back[kept],
-        vdi.color[kept],
-        vdi.optical_depth[kept],
-        vdi.bounds,
-        depth_origin=vdi.depth_origin,
-    )
 
 
 # -- what was found --------------------------------------------------------------------------------

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from dataclasses import asdict, dataclass
 from itertools import product
@@ -54,8 +53,6 @@ class Case:
 def main(arguments: list[str] | None = None) -> int:
     """Measure what is missing, and write the tables and the plot anew."""
     options = parsed(arguments)
-    if not os.environ.get("VTK_DEFAULT_OPENGL_WINDOW") and not os.environ.get("DISPLAY"):
-        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
     width, height = options.size
     target = options.out / f"standard_{width}x{height}.json"
     results = json.loads(target.read_text()) if target.exists() else new_results(options)

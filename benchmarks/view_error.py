@@ -14,12 +14,11 @@ import json
 import math
 import statistics
 import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from common import (  # beside this file
@@ -27,7 +26,9 @@ from common import (  # beside this file
     add_redo,
     add_size,
     add_volumes,
+    at_hand,
     new_parser,
+    results_file,
     save,
     subject_of,
 )
@@ -36,6 +37,7 @@ from tqdm import tqdm
 
 from pyvista_vdi.api import render, render_volume
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.clock import median, take_turns
 from pyvista_vdi.measure.report import new_figure, save_figure, table, write_text
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
@@ -57,8 +59,6 @@ BOUNDS = (0.99, 0.98, 0.97, 0.95, 0.9)
 
 #: 1 - SSIM below which pictures are called equal: such views tell predictors nothing.
 EQUAL = 1e-5
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -101,11 +101,9 @@ def main() -> int:
     add_looks(parser, tf=None, max_supersegments=None)
     add_redo(parser)
     options = parser.parse_args()
-    options.out.mkdir(parents=True, exist_ok=True)
-    width, height = options.size
-    target = options.out / f"view_error_{width}x{height}.json"
+    target = results_file("view_error", options)
     cases: dict[str, Any] = json.loads(target.read_text()) if target.exists() else {}
-    for volume, look in tqdm(list(product(options.volumes, LOOKS)), unit="case"):
+    for volume, look in tqdm(list(product(at_hand(options.volumes), LOOKS)), unit="case"):
         key = "/".join((volume, look, options.interpolation))
         if key not in cases or options.redo:
             cases[key] = list(measured(volume, look, options))
@@ -163,17 +161,13 @@ def found(
         for variant, estimator in estimators.items()
     }
     alone = estimators[DEFAULT]
-    # The candidates take turns; the median of five
     candidates: dict[str, Callable[[], object]] = {
         "vdi": frame,
         "volume": reference,
         "estimate": lambda: alone.estimate(vdi, camera, size),
         "estimate with picture": lambda: alone.estimate(vdi, camera, size, picture=picture),
     }
-    seconds: dict[str, list[float]] = {name: [] for name in candidates}
-    for _ in range(5):
-        for name, candidate in candidates.items():
-            seconds[name].append(timed(candidate))
+    taken = take_turns(candidates, 5, warm_up=False)
     guess = alone.estimate(vdi, camera, size)
     return {
         "view": view.name,
@@ -186,7 +180,7 @@ def found(
             variant_name(variant): [e.ssim, e.standard_error] for variant, e in estimates.items()
         },
         "without_picture": guess.ssim,
-        "seconds": {name: statistics.median(times) for name, times in seconds.items()},
+        "seconds": {name: median(times) for name, times in taken.items()},
     }
 
 
@@ -194,13 +188,6 @@ def zoomed(camera: Camera, factor: float) -> Camera:
     """Return the camera with a longer lens: things look ``factor`` times as large."""
     tangent = math.tan(math.radians(camera.view_angle) / 2) / factor
     return camera.replace(view_angle=2 * math.degrees(math.atan(tangent)))
-
-
-def timed(candidate: Callable[[], object]) -> float:
-    """Return the seconds that it takes."""
-    start = time.perf_counter()
-    candidate()
-    return time.perf_counter() - start
 
 
 def anisotropy(vdi: VDI) -> float:

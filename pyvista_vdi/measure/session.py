@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.clock import Step, Times, take_turns
+from pyvista_vdi.measure.clock import WALL, Step, Times, take_turns
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_whole
 from pyvista_vdi.model.host_memory import require_free_memory
@@ -187,6 +187,7 @@ class Bench:
         *,
         before: Mapping[str, Step] | None = None,
         forms: Sequence[str] = (),
+        clocks: Mapping[str, Callable[[], float]] = WALL,
         **options: Any,
     ) -> tuple[dict[str, VDI], dict[str, Times]]:
         """Generate a VDI as often as is timed, in turn with other work; kernels are compiled first.
@@ -209,7 +210,8 @@ class Bench:
         generate(WARM_UP_SIZE)
         packing = {form: partial(pack, form) for form in forms if form != "exact"}
         work: dict[str, Step] = {**(before or {}), "generate": partial(generate, size), **packing}
-        return made, take_turns(work, repeats, runtime=self._runtime, warm_up=False)
+        taken = take_turns(work, repeats, runtime=self._runtime, warm_up=False, clocks=clocks)
+        return made, taken
 
     def image(self, camera: Camera) -> Image:
         """Draw at the accurate step, premultiplied RGBA (H, W, 4)."""
