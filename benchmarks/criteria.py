@@ -19,6 +19,7 @@ from common import (  # beside this file
     add_volumes,
     at_hand,
     begun,
+    marked,
     new_parser,
     save,
     subject_of,
@@ -27,7 +28,7 @@ from tqdm import tqdm
 
 from pyvista_vdi.api import render, render_volume
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.report import describe_system, write_text
+from pyvista_vdi.measure.report import describe_system, system_line, table, write_text
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
@@ -224,7 +225,7 @@ def report(results: dict[str, Any]) -> Iterator[str]:
     """Yield the tables as Markdown: the means, who is best, and every case at the same bytes."""
     width, height = results["window_size"]
     angles = results["angles"]
-    heads = " | ".join(f"{angle:g}°" for angle in angles)
+    heads = [f"{angle:g}°" for angle in angles]
     rows = [{**r, "case": case} for case, found in results["cases"].items() for r in found]
     n = len(results["cases"])
     yield (
@@ -236,8 +237,7 @@ def report(results: dict[str, Any]) -> Iterator[str]:
     )
     for way in (EQUALLY_MANY, EQUAL_BUDGET):
         yield from ("", f"**Mean SSIM, {way}**", "")
-        yield f"| N_S | criterion | supersegments | {heads} | best | least, 90° |"
-        yield "|---|---|---|" + "---|" * (len(angles) + 2)
+        means = []
         for budget in BUDGETS:
             for criterion in CRITERIA:
                 mine = chosen(rows, way, budget, criterion)
@@ -247,24 +247,26 @@ def report(results: dict[str, Any]) -> Iterator[str]:
                 )
                 least = min(r["ssim"][-1] for r in mine)
                 share = mean(r["share"] for r in mine)
-                cells = [str(budget), criterion, f"{share:.2f}", *ssim, best, f"{least:.4f}"]
-                yield "| " + " | ".join(cells) + " |"
+                means.append([budget, criterion, f"{share:.2f}", *ssim, best, f"{least:.4f}"])
+        titles = ("N_S", "criterion", "supersegments", *heads, "best", "least, 90°")
+        yield from table(titles, means)
     yield from ("", f"**SSIM, {EQUALLY_MANY}**; bold: the best", "")
-    yield f"| case | N_S | criterion | with N_S, tolerance | MiB | {heads} |"
-    yield "|---|---|---|---|---|" + "---|" * len(angles)
+    found = []
     for case in results["cases"]:
         for budget in BUDGETS:
             for criterion in CRITERIA:
                 (row,) = (
                     r for r in chosen(rows, EQUALLY_MANY, budget, criterion) if r["case"] == case
                 )
-                cells = [case, str(budget), criterion, settings(row), f"{row['bytes'] / 2**20:.1f}"]
-                for a in range(len(angles)):
-                    text = f"{row['ssim'][a]:.4f}"
-                    cells.append(f"**{text}**" if is_best(rows, row, a) else text)
-                yield "| " + " | ".join(cells) + " |"
-    system = ", ".join(f"{k} {v}" for k, v in results["system"].items())
-    yield from ("", system)
+                ssim = [
+                    marked(f"{row['ssim'][a]:.4f}", not is_best(rows, row, a))
+                    for a in range(len(angles))
+                ]
+                found.append(
+                    [case, budget, criterion, settings(row), f"{row['bytes'] / 2**20:.1f}", *ssim]
+                )
+    yield from table(("case", "N_S", "criterion", "with N_S, tolerance", "MiB", *heads), found)
+    yield from ("", system_line(results["system"]))
 
 
 def settings(row: dict[str, Any]) -> str:

@@ -20,6 +20,7 @@ import numpy as np
 from common import (  # beside this file
     add_vdi_options,
     at_hand,
+    marked,
     measure_missing,
     new_parser,
     timed,
@@ -27,7 +28,7 @@ from common import (  # beside this file
 )
 
 from pyvista_vdi.io import FORMAT_VERSION, read, read_info
-from pyvista_vdi.measure.report import describe_system, system_line
+from pyvista_vdi.measure.report import describe_system, system_line, table
 from pyvista_vdi.model.vdi import VDI
 
 #: Bytes of a supersegment in the dense form: two depths, four colour components, float32.
@@ -138,34 +139,33 @@ def report(results: dict[str, Any]) -> str:
     case = f"{results['transfer_function']}, {results['max_supersegments']} supersegments"
     volumes = sorted(results["volumes"].items(), key=lambda item: -item[1]["empty_lists"])
     lines = [f"# Files, {width}x{height}, {case}", "", LEGEND]
-    lines += [
-        "",
-        "| volume | empty lists | arrays, MiB | .vdi, MiB | dense / size | save | synced | load |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+    rows = []
     for name, found in volumes:
         shrinking = found["dense_bytes"] / found["file_bytes"]["lz4"]
         cells = [
+            name,
             f"{found['empty_lists']:.0%}",
             mebibytes(found["array_bytes"]),
             mebibytes(found["file_bytes"]["lz4"]),
-            f"{shrinking:.1f}" if shrinking >= LEAST_SHRINKING else f"**{shrinking:.1f}**",
+            marked(f"{shrinking:.1f}", shrinking >= LEAST_SHRINKING),
             ratio(found, "lz4 save", "numpy save", MOST_SAVING),
             ratio(found, "lz4 save", "numpy save, synced", MOST_SAVING),
             ratio(found, "lz4 load", "numpy load", MOST_LOADING),
         ]
-        lines.append(f"| {name} | {' | '.join(cells)} |")
+        rows.append(cells)
+    heads = ["volume", "empty lists", "arrays, MiB", ".vdi, MiB", "dense / size"]
     lines += [
+        "",
+        *table((*heads, "save", "synced", "load"), rows),
         "",
         "## Other compressions",
         "",
         "Dense form over file, then save and load as above. `npz`: `numpy.savez_compressed`.",
         "",
-        "| volume | zstd | save | load | none | save | load | npz | save | load |",
-        "|---|---|---|---|---|---|---|---|---|---|",
     ]
+    rows = []
     for name, found in volumes:
-        cells = []
+        cells = [name]
         for kind in COMPRESSIONS[1:]:
             cells.append(f"{found['dense_bytes'] / found['file_bytes'][kind]:.1f}")
             cells += [ratio(found, f"{kind} {a}", f"numpy {a}") for a in ("save", "load")]
@@ -175,7 +175,9 @@ def report(results: dict[str, Any]) -> str:
             f"{npz[a]['wall']['median'] / found['seconds'][f'numpy {a}']['wall']['median']:.0f}"
             for a in ("save", "load")
         ]
-        lines.append(f"| {name} | {' | '.join(cells)} |")
+        rows.append(cells)
+    heads = [head for kind in (*COMPRESSIONS[1:], "npz") for head in (kind, "save", "load")]
+    lines += table(("volume", *heads), rows)
     infos = [1e3 * found["seconds"]["info"]["wall"]["median"] for _, found in volumes]
     spreads = [
         (wall["most"] - wall["least"]) / wall["median"]
@@ -199,8 +201,7 @@ def ratio(found: dict[str, Any], ours: str, theirs: str, most: float = np.inf) -
         seconds[ours][clock]["median"] / seconds[theirs][clock]["median"]
         for clock in ("wall", "cpu")
     )
-    text = f"{wall:.1f}" if wall <= most else f"**{wall:.1f}**"
-    return f"{text} ({cpu:.1f})"
+    return f"{marked(f'{wall:.1f}', wall <= most)} ({cpu:.1f})"
 
 
 def mebibytes(n: int) -> str:

@@ -25,12 +25,13 @@ from common import (  # beside this file
     add_size,
     add_vdi_cache,
     new_parser,
+    save,
     vdi_of,
 )
 
 from pyvista_vdi.cli.declare import parse_size
 from pyvista_vdi.device import Runtime, get_runtime
-from pyvista_vdi.measure.report import describe_system
+from pyvista_vdi.measure.report import describe_system, table, write_text
 from pyvista_vdi.model.vdi import VDI
 
 #: Degrees by which the camera turns from frame to frame where it moves.
@@ -113,9 +114,9 @@ def main() -> None:
         "first_pictures": first,
     }
     target = options.out / f"frame_{width}x{height}.json"
-    target.write_text(json.dumps(results, indent=1) + "\n")
+    save(results, target)
     text = tables(results)
-    target.with_suffix(".md").write_text(text)
+    write_text(target.with_suffix(".md"), text)
     print(text)
 
 
@@ -246,8 +247,7 @@ def tables(results: dict[str, Any]) -> str:
     """Return the figures as Markdown: ratios."""
     width, height = results["frame"]
     lines = [f"# Around the raycast, {width} x {height}", "", LEGEND, ""]
-    lines += ["| samples | scene | | around | around / empty | whole / empty |"]
-    lines += ["|---|---|---|---|---|---|"]
+    rows = []
     for found in results["frames"].values():
         for name, peer in (("VDI", "empty"), ("VDI and sphere", "sphere")):
             for mode, said in (("rest", "at rest"), ("move", "moving")):
@@ -255,16 +255,17 @@ def tables(results: dict[str, Any]) -> str:
                 empty = found[f"empty, {mode}"]
                 cells = [ratio(around, row, base) for base in (other, empty)]
                 whole = ratio(lambda x, key: x[key], row, empty)
-                lines.append(
-                    f"| {found['samples']} | {name} | {said} | {cells[0]} | {cells[1]} | {whole} |"
-                )
+                rows.append([found["samples"], name, said, *cells, whole])
+    heads = ("samples", "scene", "", "around", "around / empty", "whole / empty")
+    lines += table(heads, rows)
     if results["first_pictures"]:
         lines += ["", "First picture of a process, over PyVista's import and an empty one:", ""]
-        lines += ["| what | CPU time | wall clock |", "|---|---|---|"]
         empty = results["first_pictures"]["empty"]
-        for name, row in results["first_pictures"].items():
-            cpu, wall = (row[key] / empty[key] for key in ("cpu_s", "wall_s"))
-            lines.append(f"| {name} | {cpu:.2f} | {wall:.2f} |")
+        rows = [
+            [name, *(f"{row[key] / empty[key]:.2f}" for key in ("cpu_s", "wall_s"))]
+            for name, row in results["first_pictures"].items()
+        ]
+        lines += table(("what", "CPU time", "wall clock"), rows)
     return "\n".join(lines) + "\n"
 
 

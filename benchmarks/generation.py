@@ -40,6 +40,7 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.clock import take_turns
 from pyvista_vdi.measure.compare.bounds import FRAME_RATIO_ANGLE
+from pyvista_vdi.measure.report import system_line, table
 from pyvista_vdi.measure.vtk_baselines import MAPPERS, VTKBaseline, add_volume_property
 
 #: Ratios: title, what is divided, and by which candidate or by the fastest of which.
@@ -164,14 +165,13 @@ def report(results: dict[str, Any]) -> str:
         "",
         LEGEND,
         "",
-        f"| volume | {' | '.join(title for title, _, _ in RATIOS.values())} |",
-        f"|---|{'---|' * len(RATIOS)}",
     ]
-    for name, found in sorted(results["volumes"].items()):
-        cells = [f"{r['wall']:.2f} ({r['cpu']:.2f})" for r in found["ratios"].values()]
-        lines.append(f"| {name} | {' | '.join(cells)} |")
-    system = ", ".join(f"{k} {v}" for k, v in results["system"].items())
-    return "\n".join([*lines, "", system, ""])
+    rows = [
+        [name, *(f"{r['wall']:.2f} ({r['cpu']:.2f})" for r in found["ratios"].values())]
+        for name, found in sorted(results["volumes"].items())
+    ]
+    lines += table(("volume", *(title for title, _, _ in RATIOS.values())), rows)
+    return "\n".join([*lines, "", system_line(results["system"]), ""])
 
 
 if __name__ == "__main__":

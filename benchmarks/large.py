@@ -16,7 +16,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import add_size, add_volumes, at_hand, begun, new_parser, save  # beside this file
+from common import (  # beside this file
+    add_size,
+    add_volumes,
+    at_hand,
+    begun,
+    marked,
+    new_parser,
+    save,
+)
 from tqdm import tqdm
 
 import pyvista_vdi as pvdi
@@ -24,7 +32,7 @@ from pyvista_vdi import examples
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.large.blocks import Blocks
 from pyvista_vdi.large.generate import generate_chunked
-from pyvista_vdi.measure.report import describe_system, system_line, write_text
+from pyvista_vdi.measure.report import describe_system, system_line, table, write_text
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
@@ -58,10 +66,6 @@ LEGEND = (
     "SSIM of the picture of a VDI made in blocks against that of one made in one piece; the worst "
     "pixel in 255ths; the mean difference near blocks' edges over that elsewhere. Linear. Bold: "
     "what must be reached is not."
-)
-HEAD = (
-    "| volume, look | blocks | supersegments | V_O: SSIM | worst | 5 degrees: SSIM | seam "
-    "| 30 degrees: SSIM | seam |"
 )
 
 
@@ -348,16 +352,21 @@ def report(results: dict[str, Any]) -> str:
     parts = results["parts"]
     lines = ["# Volumes in blocks", ""]
     if "accuracy" in parts:
-        lines += [LEGEND, "", HEAD, "|---" * 9 + "|"]
+        heads, rows = ["volume, look", "blocks", "supersegments", "V_O: SSIM", "worst"], []
+        for angle in ANGLES[1:]:
+            heads += [f"{angle} degrees: SSIM", "seam"]
         for name, cells in parts["accuracy"].items():
             for n, cell in cells.items():
+                at = {angle: cell[str(angle)] for angle in ANGLES}
                 row = [name, n, f"{cell['supersegments']:.4f}"]
-                row += [bold(cell["0"]["ssim"], LEAST_SSIM[0], "{:.6f}")]
-                row += [bold(-cell["0"]["worst"], -1, "{:.3f}").replace("-", "")]
+                row += [marked(f"{at[0]['ssim']:.6f}", at[0]["ssim"] >= LEAST_SSIM[0])]
+                row += [marked(f"{at[0]['worst']:.3f}", at[0]["worst"] <= 1)]
                 for angle in ANGLES[1:]:
-                    row += [bold(cell[str(angle)]["ssim"], LEAST_SSIM[angle], "{:.5f}")]
-                    row += [f"{cell[str(angle)]['seam']:.2f}"]
-                lines.append(f"| {' | '.join(row)} |")
+                    ssim = at[angle]["ssim"]
+                    row += [marked(f"{ssim:.5f}", ssim >= LEAST_SSIM[angle])]
+                    row += [f"{at[angle]['seam']:.2f}"]
+                rows.append(row)
+        lines += [LEGEND, "", *table(heads, rows)]
     if "large" in parts:
         found = parts["large"]
         peaks = ", ".join(f"{peak / 1e6:.0f}" for peak in found["worker_peaks"])
@@ -377,11 +386,6 @@ def report(results: dict[str, Any]) -> str:
         )
         lines += ["", text]
     return "\n".join([*lines, "", system_line(results["system"]), ""])
-
-
-def bold(value: float, least: float, form: str) -> str:
-    """Return a figure, bold where it is too little."""
-    return form.format(value) if value >= least else f"**{form.format(value)}**"
 
 
 if __name__ == "__main__":

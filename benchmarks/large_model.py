@@ -18,9 +18,10 @@ from common import add_size, new_parser  # beside this file
 
 from pyvista_vdi.large.on_dask import RANGES_PER_WORKER
 from pyvista_vdi.large.rows import ROWS
-from pyvista_vdi.measure.report import write_text
+from pyvista_vdi.measure.report import table, write_text
 
 WORKERS = (1, 2, 4, 16, 64, 256, 1000, 4000, 10_000)
+PHASES = ("first pass", "light", "second pass", "exchange", "merging")
 #: Bytes of a run, of a ray's optical depth, and of the light that enters a block along a ray.
 RUN_BYTES, DEPTH_BYTES, LIGHT_BYTES = 32, 2, 2
 #: Blocks that a ray meets, over those along an edge of the grid: from a corner's view.
@@ -150,18 +151,20 @@ def report(systems: list[System], options: Any) -> str:
     )
     lines = [costs]
     for system in systems:
-        lines += ["", f"**{system.name}**", "", HEAD, "|---" * 8 + "|"]
-        alone = None
+        alone, rows = None, []
         for workers in WORKERS:
             phases = simulated(system, options.points, options.size, workers)
             seconds = sum(phases.values())
             alone = seconds if alone is None else alone
             cells = [f"{workers}", text(seconds), f"{alone / seconds / workers:.0%}"]
-            lines.append(f"| {' | '.join([*cells, *(text(s) for s in phases.values())])} |")
+            rows.append([*cells, *map(text, phases.values())])
+        lines += [
+            "",
+            f"**{system.name}**",
+            "",
+            *table(("workers", "time", "efficiency", *PHASES), rows),
+        ]
     return "\n".join([*lines, ""])
-
-
-HEAD = "| workers | time | efficiency | first pass | light | second pass | exchange | merging |"
 
 
 def text(seconds: float) -> str:

@@ -25,7 +25,7 @@ from files import DENSE_BYTES, mebibytes
 
 from pyvista_vdi.cli.declare import parse_size
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.measure.report import system_line
+from pyvista_vdi.measure.report import system_line, table
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.render_options import FrameRequest
@@ -142,9 +142,8 @@ def report(results: dict[str, Any]) -> str:
         "",
         f"{LEGEND} Pictures of {results['frame'][0]}x{results['frame'][1]}.",
         "",
-        "| volume | form | loss | PSNR | worst | time 5° | time 30° | MiB | dense / file |",
-        "|---|---|---|---|---|---|---|---|---|",
     ]
+    rows = []
     for name, found in results["volumes"].items():
         for form in PRECISIONS:
             cells = [name if form == PRECISIONS[0] else "", form]
@@ -164,7 +163,10 @@ def report(results: dict[str, Any]) -> str:
             size = found["file_bytes"][form]
             cells.append(f"{mebibytes(found['device_bytes'][form])} / {mebibytes(size)}")
             cells.append(f"{found['dense_bytes'] / size:.1f}")
-            lines.append(f"| {' | '.join(cells)} |")
+            rows.append(cells)
+    times = [f"time {angle}°" for angle in ANGLES if angle]
+    heads = ("volume", "form", "loss", "PSNR", "worst", *times, "MiB", "dense / file")
+    lines += table(heads, rows)
     lines += ["", f"Largest loss of SSIM: {most_loss(results):.6f} (allowed: {MOST_LOSS})."]
     return "\n".join([*lines, "", system_line(results["system"]), ""])
 

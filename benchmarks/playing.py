@@ -18,7 +18,13 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from common import add_redo, add_size, measure_missing, new_parser  # beside this file
+from common import (  # beside this file
+    add_redo,
+    add_size,
+    marked,
+    measure_missing,
+    new_parser,
+)
 from series import LOOKS
 from series_data import SERIES, series_at_hand
 from tqdm import tqdm
@@ -212,7 +218,7 @@ def report(results: dict[str, Any]) -> str:
 
 def figure(value: float, reached: bool, digits: int = 2) -> str:
     """Return a figure, bold where it is not what must be reached."""
-    return f"{value:.{digits}f}" if reached else f"**{value:.{digits}f}**"
+    return marked(f"{value:.{digits}f}", reached)
 
 
 if __name__ == "__main__":

@@ -32,7 +32,14 @@ from pyvista_vdi.api import render_volume
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.clock import take_turns
-from pyvista_vdi.measure.report import describe_system, new_figure, save_figure, write_text
+from pyvista_vdi.measure.report import (
+    describe_system,
+    new_figure,
+    save_figure,
+    system_line,
+    table,
+    write_text,
+)
 from pyvista_vdi.measure.session import enlarged
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
@@ -218,22 +225,22 @@ def report(results: dict[str, Any]) -> str:
         "",
         LEGEND,
         "",
-        f"| volume | way | {' | '.join(heads)} |",
-        f"|---|---|{'---|' * len(heads)}",
     ]
+    rows: list[list[str]] = []
     for volume in dict.fromkeys(row["volume"] for row in results["rows"]):
         of_volume = [row for row in results["rows"] if row["volume"] == volume]
         full = next(row for row in of_volume if row["way"] == "full frame")
-        lines.append(f"| {volume} | full frame | {full['ssim_to_volume']:.4f} to the volume |||")
+        whole = f"{full['ssim_to_volume']:.4f} to the volume"
+        rows.append([volume, "full frame", whole, *[""] * (len(heads) - 1)])
         for way in dict.fromkeys(row["way"] for row in of_volume if row is not full):
             chosen = [full, *(row for row in of_volume if row["way"] == way)]
             cells = []
             for speed in SPEEDS:
                 pair = [at_speed(chosen, speed, f"ssim_to_{k}") for k in ("full", "volume")]
                 cells.append(" / ".join("-" if v is None else f"{v:.4f}" for v in pair))
-            lines.append(f"| {volume} | {way} | {' | '.join(cells)} |")
-    system = ", ".join(f"{k} {v}" for k, v in results["system"].items())
-    return "\n".join([*lines, "", system, ""])
+            rows.append([volume, way, *cells])
+    lines += table(("volume", "way", *heads), rows)
+    return "\n".join([*lines, "", system_line(results["system"]), ""])
 
 
 def write_plot(results: dict[str, Any], target: Path) -> None:

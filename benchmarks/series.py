@@ -14,12 +14,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import add_redo, add_size, measure_missing, new_parser  # beside this file
+from common import (  # beside this file
+    add_redo,
+    add_size,
+    marked,
+    measure_missing,
+    new_parser,
+)
 from series_data import SERIES, series_at_hand
 from tqdm import tqdm
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.measure.report import system_line
+from pyvista_vdi.measure.report import system_line, table
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.series import reader
@@ -163,11 +169,11 @@ def report(results: dict[str, Any]) -> str:
         "",
         LEGEND,
         "",
-        "| series | steps | exact | worst step | keys | decoded for a seek | "
-        + " | ".join(f"tolerance {t}: bytes | SSIM" for t in TOLERANCES)
-        + " |",
-        "|---" * (6 + 2 * len(TOLERANCES)) + "|",
     ]
+    heads = ["series", "steps", "exact", "worst step", "keys", "decoded for a seek"]
+    for tolerance in TOLERANCES:
+        heads += [f"tolerance {tolerance}: bytes", "SSIM"]
+    rows = []
     for name, found in results["series"].items():
         share = found["bytes"] / found["single_bytes"]
         cells = [
@@ -182,7 +188,8 @@ def report(results: dict[str, Any]) -> str:
             cells.append(figure(lost["bytes"] / found["single_bytes"], True))
             ssim = min(lost["ssim"].values())
             cells.append(figure(ssim, ssim >= LEAST_SSIM, "{:.4f}"))
-        lines.append(f"| {' | '.join(cells)} |")
+        rows.append(cells)
+    lines += table(heads, rows)
     timed = {n: f["generation"] for n, f in results["series"].items() if f["generation"]}
     if timed:
         lines += ["", "Generation of a step in a series over alone (median of turns):", ""]
@@ -192,8 +199,7 @@ def report(results: dict[str, Any]) -> str:
 
 def figure(value: float, reached: bool, form: str = "{:.3f}") -> str:
     """Return a figure, bold where it is not what must be reached."""
-    text = form.format(value)
-    return text if reached else f"**{text}**"
+    return marked(form.format(value), reached)
 
 
 if __name__ == "__main__":

@@ -24,6 +24,7 @@ from common import (  # beside this file
     at_hand,
     begun,
     looks_of,
+    marked,
     new_parser,
     save,
 )
@@ -318,8 +319,7 @@ def report(results: dict[str, Any]) -> str:
 
 def figure(value: float, good: bool, form: str = "{:.2f}") -> str:
     """Return a figure, bold where it must be another."""
-    text = form.format(value)
-    return text if good else f"**{text}**"
+    return marked(form.format(value), good)
 
 
 if __name__ == "__main__":

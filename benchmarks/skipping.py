@@ -14,6 +14,7 @@ import numpy as np
 from common import (  # beside this file
     add_vdi_options,
     at_hand,
+    marked,
     measure_missing,
     new_parser,
     timed,
@@ -22,7 +23,7 @@ from common import (  # beside this file
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import Runtime, get_runtime
-from pyvista_vdi.measure.report import system_line
+from pyvista_vdi.measure.report import system_line, table
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
@@ -160,28 +161,27 @@ class Drawing:
 def report(results: dict[str, Any]) -> str:
     """Return the table: a line per volume."""
     width, height = results["window_size"]
-    heads = " | ".join(f"{angle:g}°" for angle in ANGLES)
     case = f"{results['transfer_function']}, {results['max_supersegments']} supersegments"
     lines = [
         f"# Skipping empty space, {width}x{height}, {case}",
         "",
         LEGEND,
         "",
-        f"| volume | occupied | skips | {heads} | bits | grid |",
-        f"|---|---|---|{'---|' * len(ANGLES)}---|---|",
     ]
-    spreads = []
+    rows, spreads = [], []
     for name, found in sorted(results["volumes"].items(), key=lambda item: item[1]["occupied"]):
         cells = [f"{a['wall_ratio']:.2f} ({a['cpu_ratio']:.2f})" for a in found["angles"]]
         same = all(a["identical"] for a in found["angles"])
-        cells.append("the same" if same else "**differ**")
+        cells.append("the same" if same else marked("differ", False))
         cells.append(f"{1e3 * found['grid_seconds']:.0f} ms, {found['grid_bytes'] / 2**20:.2f} MiB")
         skips = "yes" if found["skips"] else "no"
-        lines.append(f"| {name} | {found['occupied']:.2f} | {skips} | {' | '.join(cells)} |")
+        rows.append([name, f"{found['occupied']:.2f}", skips, *cells])
         for angle in found["angles"]:
             for way in ("plain", "skipping"):
                 wall = angle[way]["wall"]
                 spreads.append((wall["most"] - wall["least"]) / wall["median"])
+    angles = [f"{angle:g}°" for angle in ANGLES]
+    lines += table(("volume", "occupied", "skips", *angles, "bits", "grid"), rows)
     if spreads:
         spread = statistics.median(spreads)
         lines += ["", f"Spread of the repeated frames, (most - least) / median: {spread:.0%}."]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.measure.compare.bounds import CONVERGED_STEPS, SSIM_FROM_NEW_VIEWS
-from pyvista_vdi.measure.report import new_figure, save_figure
+from pyvista_vdi.measure.report import new_figure, save_figure, system_line, table, write_text
 
 Results = dict[str, Any]
 
@@ -51,7 +51,7 @@ def write_tables(results: Results, target: Path) -> None:
     lines += _missed(results)
     lines += _failed(results)
     lines += _systems(results)
-    target.write_text("\n".join(lines).rstrip() + "\n")
+    write_text(target, "\n".join(lines).rstrip() + "\n")
 
 
 def write_plot(results: Results, target: Path) -> None:
@@ -91,17 +91,16 @@ def _plot_panel(axes: Any, cases: list[Any], names: list[str], angle: float) -> 
     axes.grid(axis="y", alpha=0.3)
 
 
-def _vdi_table(cases: list[Any]) -> Iterator[str]:
-    yield (
-        "| volume | transfer function | V_O SSIM | V_O worst /255 | 5° SSIM (reach) | 5° PSNR "
-        "| 30° SSIM (reach) | 30° PSNR | brightness 5°, 30° | per list | VDI MiB | volume MiB |"
-    )
-    yield "|---|---|---|---|---|---|---|---|---|---|---|---|"
+def _vdi_table(cases: list[Any]) -> list[str]:
+    heads = ["volume", "transfer function", "V_O SSIM", "V_O worst /255"]
+    heads += ["5° SSIM (reach)", "5° PSNR", "30° SSIM (reach)", "30° PSNR"]
+    heads += ["brightness 5°, 30°", "per list", "VDI MiB", "volume MiB"]
+    rows = []
     for entry in cases:
         part, held = entry["accuracy"], _held(entry["accuracy"])
         start, near, far = (_at(part, a)["vdi_to_raycaster"] for a in (0, 5, 30))
         sizes = part["sizes"]
-        yield _row(
+        cells = [
             *_names(entry),
             _marked(f"{start['ssim']:.5f}", held.get("SSIM at V_O")),
             _marked(f"{start['worst_pixel']:.3f}", held.get("worst pixel at V_O")),
@@ -119,18 +118,16 @@ def _vdi_table(cases: list[Any]) -> Iterator[str]:
             f"{sizes['supersegments'] / max(1, sizes['occupied_lists']):.1f}",
             f"{sizes['vdi_bytes'] / 2**20:.1f}",
             f"{sizes['volume_bytes'] / 2**20:.1f}",
-        )
+        ]
+        rows.append(cells)
+    return table(heads, rows)
 
 
-def _vtk_table(cases: list[Any], part: str) -> Iterator[str]:
-    yield (
-        "| volume | transfer function | 0° SSIM | 5° SSIM | 30° SSIM "
-        "| 0° PSNR | 5° PSNR | 30° PSNR |"
-    )
-    yield "|---|---|---|---|---|---|---|---|"
+def _vtk_table(cases: list[Any], part: str) -> list[str]:
+    rows = []
     for entry in cases:
         held = _held(entry[part])
-        cells = []
+        cells = [*_names(entry)]
         for figure in ("ssim", "psnr"):
             for angle in (0, 5, 30):
                 found = _at(entry[part], angle)
@@ -142,19 +139,20 @@ def _vtk_table(cases: list[Any], part: str) -> Iterator[str]:
                 cells.append(
                     _marked(text.format(_number(ours[figure]), _number(theirs[figure])), check)
                 )
-        yield _row(*_names(entry), *cells)
+        rows.append(cells)
+    heads = [f"{angle}° {figure}" for figure in ("SSIM", "PSNR") for angle in (0, 5, 30)]
+    return table(("volume", "transfer function", *heads), rows)
 
 
-def _timing_table(cases: list[Any]) -> Iterator[str]:
-    yield (
-        "| volume | transfer function | generation / full raycast | 5° frame / faster VTK mapper "
-        "| frame / our raycaster | VDI ms | raycaster ms | VTK GPU ms | VTK fixed-point ms |"
-    )
-    yield "|---|---|---|---|---|---|---|---|---|"
+def _timing_table(cases: list[Any]) -> list[str]:
+    heads = ["volume", "transfer function", "generation / full raycast"]
+    heads += ["5° frame / faster VTK mapper", "frame / our raycaster"]
+    heads += ["VDI ms", "raycaster ms", "VTK GPU ms", "VTK fixed-point ms"]
+    rows = []
     for entry in cases:
         part, held = entry["timings"], _held(entry["timings"])
         (found,) = part["angles"]
-        yield _row(
+        cells = [
             *_names(entry),
             _marked(f"{part['generation_ratio']:.2f}", held.get("generation / raycast")),
             _marked(f"{found['ratio_to_vtk']:.2f}", held.get("frame / VTK at 5 degrees")),
@@ -163,7 +161,9 @@ def _timing_table(cases: list[Any]) -> Iterator[str]:
                 f"{found['seconds'][name]['median'] * 1e3:.0f}"
                 for name in ("vdi", "raycaster", "gpu", "fixed_point")
             ),
-        )
+        ]
+        rows.append(cells)
+    return table(heads, rows)
 
 
 def _missed(results: Results) -> Iterator[str]:
@@ -200,7 +200,7 @@ def _systems(results: Results) -> Iterator[str]:
     for entry in results["cases"].values():
         for part in _PARTS:
             if system := entry.get(part, {}).get("system"):
-                text = ", ".join(f"{name} {value}" for name, value in system.items())
+                text = system_line(system)
                 seen[text] = seen.get(text, 0) + 1
     for text, n in seen.items():
         yield f"Measured ({n} runs) on: {text}."
@@ -248,7 +248,3 @@ def _number(value: float | None) -> float:
 
 def _decibels(value: float | None) -> str:
     return f"{_number(value):.1f}"
-
-
-def _row(*cells: str) -> str:
-    return "| " + " | ".join(cells) + " |"

@@ -237,6 +237,12 @@ PREDICTORS = {
 }
 
 
+PREDICTOR_HEADS = (
+    *("predictor", "mean", "90 %", "worst", "bias", "relative"),
+    "within 2 standard errors",
+)
+
+
 # -- tables and plot -------------------------------------------------------------------------------
 
 
@@ -250,19 +256,20 @@ def tables(rows: list[dict[str, Any]], size: tuple[int, int]) -> Iterator[str]:
         true = np.array([row["ssim"] for row in some])
         spread = f"true SSIM {true.min():.3f} to {true.max():.3f}"
         yield f"\n**{kind.capitalize()} views** ({len(some)}; {spread})\n"
-        yield "| predictor | mean | 90 % | worst | bias | relative | within 2 standard errors |"
-        yield "|---|---|---|---|---|---|---|"
-        for name in PREDICTORS:
-            yield row_of(name, 1 - predicted(some, PREDICTORS[name]) - true, 1 - true, None)
+        found = [
+            row_of(name, 1 - predicted(some, features) - true, 1 - true, None)
+            for name, features in PREDICTORS.items()
+        ]
         for variant in sorted({*VARIANTS, DEFAULT}):
             pairs = np.array([row["estimates"][variant_name(variant)] for row in some])
             held = np.abs(pairs[:, 0] - true) <= 2 * pairs[:, 1]
-            yield row_of(f"{variant_name(variant)} tiles", pairs[:, 0] - true, 1 - true, held)
+            tiles = f"{variant_name(variant)} tiles"
+            found.append(row_of(tiles, pairs[:, 0] - true, 1 - true, held))
+        yield from table(PREDICTOR_HEADS, found)
     yield "\n**Decisions**: views on the wrong side of a bound, of all whose pictures differ\n"
     yield from decisions(telling(rows, "turned") + telling(rows, "moved"))
     yield "\n**Truth and estimate by view** (mean over the cases)\n"
-    yield "| view | true SSIM | least | estimate | from the angle |"
-    yield "|---|---|---|---|---|"
+    found = []
     some = telling(rows, "turned") + telling(rows, "moved")
     by_angle = dict(zip(map(id, some), 1 - predicted(some, from_angle), strict=True))
     for view in dict.fromkeys(row["view"] for row in rows):
@@ -270,20 +277,20 @@ def tables(rows: list[dict[str, Any]], size: tuple[int, int]) -> Iterator[str]:
         true = [row["ssim"] for row in some]
         estimates = [row["estimates"][variant_name(DEFAULT)][0] for row in some]
         angles = [by_angle.get(id(row), 1.0) for row in some]
-        yield (
-            f"| {view} | {np.mean(true):.4f} | {min(true):.4f} | {np.mean(estimates):.4f} "
-            f"| {np.mean(angles):.4f} |"
-        )
+        ssim = (np.mean(true), min(true), np.mean(estimates), np.mean(angles))
+        found.append([view, *(f"{value:.4f}" for value in ssim)])
+    yield from table(("view", "true SSIM", "least", "estimate", "from the angle"), found)
     yield "\n**Cost** (median over all views; ratios within one run)\n"
-    yield "| | over a volume frame | over a VDI frame | milliseconds |"
-    yield "|---|---|---|---|"
+    found = []
     for name in ("estimate", "estimate with picture"):
         seconds = [row["seconds"] for row in rows]
-        cells = [
-            statistics.median(s[name] / s[peer] for s in seconds) for peer in ("volume", "vdi")
+        ratios = [
+            f"{statistics.median(s[name] / s[peer] for s in seconds):.2f}"
+            for peer in ("volume", "vdi")
         ]
         milliseconds = 1e3 * statistics.median(s[name] for s in seconds)
-        yield f"| {name} | {cells[0]:.2f} | {cells[1]:.2f} | {milliseconds:.0f} |"
+        found.append([name, *ratios, f"{milliseconds:.0f}"])
+    yield from table(("", "over a volume frame", "over a VDI frame", "milliseconds"), found)
 
 
 def decisions(rows: list[dict[str, Any]]) -> Iterator[str]:
@@ -301,14 +308,12 @@ def decisions(rows: list[dict[str, Any]]) -> Iterator[str]:
     yield from table(("SSIM at least", "truly below", *predictions), rows_below)
 
 
-def row_of(name: str, errors: NDArray[Any], losses: NDArray[Any], held: Any) -> str:
+def row_of(name: str, errors: NDArray[Any], losses: NDArray[Any], held: Any) -> list[str]:
     """Return one predictor's row."""
     size = np.abs(errors)
     share = "" if held is None else f"{np.mean(held):.0%}"
-    return (
-        f"| {name} | {size.mean():.4f} | {np.quantile(size, 0.9):.4f} | {size.max():.4f} "
-        f"| {errors.mean():+.4f} | {size.mean() / losses.mean():.0%} | {share} |"
-    )
+    cells = [f"{value:.4f}" for value in (size.mean(), np.quantile(size, 0.9), size.max())]
+    return [name, *cells, f"{errors.mean():+.4f}", f"{size.mean() / losses.mean():.0%}", share]
 
 
 def telling(rows: list[dict[str, Any]], kind: str) -> list[dict[str, Any]]:
