@@ -20,6 +20,7 @@ from common import (  # beside this file
     add_looks,
     add_size,
     add_volumes,
+    at_hand,
     new_parser,
     save,
     subject_of,
@@ -66,7 +67,7 @@ def main() -> int:
         "system": describe_system(options.device),
         "volumes": {},
     }
-    for name in tqdm(options.volumes, unit="volume"):
+    for name in tqdm(at_hand(options.volumes), unit="volume"):
         bench = Bench(name, options)
         rounds = [bench.regenerate() for _ in range(options.rounds)]
         results["volumes"][name] = {"judged": judged(rounds), "rounds": rounds}

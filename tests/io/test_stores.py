@@ -18,6 +18,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
 )
 from pyvista_vdi.io.stores import is_store
+from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.standard_cases import filling_camera
 
 VALUES = np.random.default_rng(5).integers(0, 250, (2, 3, 8, 16, 24)).astype(np.uint16)
@@ -117,6 +118,8 @@ def test_opacities_of_all_levels_refer_to_the_finest(image):
     )
     for volume in (coarsest, coarsest.load(), pickle.loads(pickle.dumps(coarsest))):
         assert volume.default_unit_distance == finest.default_unit_distance
+    other = as_volume(coarsest, scalars=np.zeros(coarsest.array.size))
+    assert other.default_unit_distance == finest.default_unit_distance
 
 
 def test_three_axes_alone(tmp_path):

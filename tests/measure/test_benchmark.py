@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fresh_python import run_python
+from fresh_python import run_bare
 from json_schema import read_checked
 
 from pyvista_vdi import cli, examples
@@ -140,13 +140,7 @@ def test_vtk_gets_the_same_transfer_function():
 def test_the_engine_alone_can_run_it(default_runtime, tmp_path):
     out = tmp_path / "bare.json"
     arguments = ["benchmark", *TINY_RUN, "--angles", "5", "--out", str(out)]
-    blocked = ("matplotlib", "pyvista", "vtk", "vtkmodules")
-    result = run_python(
-        "import sys\n"
-        f"sys.modules.update(dict.fromkeys({blocked!r}))\n"
-        "from pyvista_vdi.cli import main\n"
-        f"sys.exit(main({arguments!r}))\n"
-    )
+    result = run_bare(arguments)
     assert result.returncode == 0, result.stderr
     assert "VTK is not installed: its mappers are left out" in result.stderr
     data = checked(out)

@@ -185,6 +185,11 @@ def test_settings_are_checked(options, message):
         Settings(LOOKS, **options)
 
 
+def test_a_step_of_nothing_is_refused(volume, default_runtime):
+    with pytest.raises(InvalidArgumentError, match="sample_distance must be .*; got 0"):
+        measure(volume, Settings(LOOKS, SIZE, vtk=False, sample_distance=0))
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -40,6 +40,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume.classified_volume import checked_sample_distance
 from pyvista_vdi.volume.render import raycast_volume
 
 #: What takes part, by the keys of :attr:`AngleResult.seconds` and of the pictures.
@@ -248,7 +249,7 @@ class _Bench:
         self._table = looks.transfer_function(volume)
         self._looks = looks.describe()
         self.voxel = min(volume.spacing)
-        self.step = settings.sample_distance or self.voxel / 2
+        self.step = checked_sample_distance(volume, settings.sample_distance)
         self.view = filling_camera(volume.bounds, settings.window_size)
         self._device = get_runtime(settings.device)
         self._baselines: dict[str, Any] = {}
