@@ -21,6 +21,7 @@ from common import (  # beside this file
     begun,
     marked,
     new_parser,
+    results_file,
     save,
     subject_of,
 )
@@ -51,10 +52,9 @@ EQUAL_BUDGET = "same N_S"
 def main() -> int:
     """Measure what is missing, and write what was found."""
     options = parsed()
-    width, height = options.size
-    target = options.out / f"criteria_{width}x{height}.json"
+    target = results_file("criteria", options)
     case = {
-        "window_size": [width, height],
+        "window_size": list(options.size),
         "interpolation": options.interpolation,
         "angles": list(ANGLES),
         "system": describe_system(options.device),

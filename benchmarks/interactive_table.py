@@ -26,6 +26,7 @@ from common import (  # beside this file
     begun,
     clock_of,
     new_parser,
+    results_file,
     save,
 )
 from machine import Rates
@@ -307,10 +308,9 @@ def main() -> int:
     options = parsed()
     runtime = get_runtime(options.device)
     rates = Rates.read_for(runtime, options.machine or options.out)
-    width, height = options.size
-    target = options.out / f"interactive{'_quick' if options.quick else ''}_{width}x{height}.json"
+    target = results_file(f"interactive{'_quick' if options.quick else ''}", options)
     case = {
-        "window_size": [width, height],
+        "window_size": list(options.size),
         "max_supersegments": options.max_supersegments,
         "interpolation": options.interpolation,
         "repeats": options.repeats,

@@ -20,6 +20,7 @@ from common import (  # beside this file
     add_volumes,
     at_hand,
     new_parser,
+    results_file,
     save,
     subject_of,
 )
@@ -76,8 +77,7 @@ def main() -> int:
     parser.add_argument("--pictures", action="store_true", help="write them beside the results")
     parser.set_defaults(interpolation="linear")
     options = parser.parse_args()
-    width, height = options.size
-    target = options.out / f"lighting_{options.tf}_{width}x{height}.json"
+    target = results_file(f"lighting_{options.tf}", options)
     results: dict[str, Any] = {"window_size": list(options.size), "look": options.tf, "rows": []}
     if target.exists() and not options.redo:
         results = json.loads(target.read_text())

@@ -16,6 +16,7 @@ from common import (  # beside this file
     add_volumes,
     at_hand,
     new_parser,
+    results_file,
     save,
     subject_of,
 )
@@ -54,10 +55,9 @@ def main() -> int:
             for row in measured(name, options):
                 rows.append(row)
                 bar.update()
-    width, height = options.size
-    target = options.out / f"parameters_{width}x{height}.json"
+    target = results_file("parameters", options)
     results = {
-        "window_size": [width, height],
+        "window_size": list(options.size),
         "transfer_function": options.tf,
         "interpolation": options.interpolation,
         "rows": rows,

@@ -22,6 +22,7 @@ from common import (  # beside this file
     add_volumes,
     at_hand,
     new_parser,
+    results_file,
     save,
     subject_of,
 )
@@ -74,8 +75,7 @@ def main() -> int:
         bench.close()
     if options.times:
         results["row"] = row(options)
-    width, height = options.size
-    target = options.out / f"regeneration_{width}x{height}.json"
+    target = results_file("regeneration", options)
     save(results, target)
     write_plot(results, target.with_suffix(".png"))
     report(results)

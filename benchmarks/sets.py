@@ -26,6 +26,7 @@ from common import (  # beside this file
     looks_of,
     marked,
     new_parser,
+    results_file,
     save,
 )
 from tqdm import tqdm
@@ -86,10 +87,9 @@ def main() -> int:
     )
     parser.add_argument("--sets", type=Path, metavar="FOLDER", help="where files of sets are kept")
     options = parser.parse_args()
-    width, height = options.size
-    target = options.out / f"sets_{width}x{height}.json"
+    target = results_file("sets", options)
     case = {
-        "window_size": [width, height],
+        "window_size": list(options.size),
         "look": looks_of(options),
         "target_ssim": options.target_ssim,
         "max_bytes": options.max_bytes,

@@ -21,6 +21,7 @@ from common import (  # beside this file
     add_volumes,
     at_hand,
     new_parser,
+    results_file,
     save,
 )
 from standard_report import write_plot, write_tables
@@ -53,8 +54,7 @@ class Case:
 def main(arguments: list[str] | None = None) -> int:
     """Measure what is missing, and write the tables and the plot anew."""
     options = parsed(arguments)
-    width, height = options.size
-    target = options.out / f"standard_{width}x{height}.json"
+    target = results_file("standard", options)
     results = json.loads(target.read_text()) if target.exists() else new_results(options)
     if results["max_supersegments"] != options.max_supersegments:
         sys.exit(

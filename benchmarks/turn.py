@@ -20,13 +20,13 @@ from common import (
     at_hand,
     looks_of,
     new_parser,
+    results_file,
     save,
     subject_of,
 )
 
-from pyvista_vdi.io import whole_file
 from pyvista_vdi.measure.front import OurVolume
-from pyvista_vdi.measure.report import table
+from pyvista_vdi.measure.report import table, write_text
 from pyvista_vdi.measure.vtk_baselines import VTKBaseline, property_from_transfer_function
 from pyvista_vdi.model.metrics import compare_images
 
@@ -108,10 +108,9 @@ def main() -> None:
         tables.append(report(name, results[name]))
         print(tables[-1], flush=True)
     given = {n: getattr(options, n) for n in ("size", "tf", "target_fps", "interpolation")}
-    target = options.out / f"turn_{options.size[0]}x{options.size[1]}.json"
+    target = results_file("turn", options)
     save({"options": given, "volumes": results}, target)
-    with whole_file(target.with_suffix(".md")) as stream:
-        stream.write("\n".join(tables).encode())
+    write_text(target.with_suffix(".md"), "\n".join(tables))
 
 
 def own(subject: Subject, options: Any, draw: str, regenerate: str) -> OurVolume:
