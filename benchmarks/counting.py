@@ -3,7 +3,7 @@
 Two walks, both for many rays at once in NumPy and independent of the kernels: through the lists of
 a VDI, and through a volume step by step. ``model.py`` turns the counts into bytes and operations.
 
-Both walks share their steps, so they stay in one file.
+Both walks share their steps: hence more than 500 lines.
 """
 
 from __future__ import annotations

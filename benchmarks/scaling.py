@@ -3,7 +3,7 @@
 Writes ``scaling.json`` (all figures), ``.md`` (fitted exponents) and ``.png`` (plot). See README.md
 in this folder.
 
-Four scalings share volumes, cameras and one fit: one file.
+Four scalings share volumes, cameras and one fit: hence more than 500 lines.
 """
 
 from __future__ import annotations

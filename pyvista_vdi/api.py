@@ -2,7 +2,8 @@
 
 Converters are imported only where an argument needs them: for a :class:`Volume`, a
 :class:`Camera` and a :class:`TransferFunction` neither VTK nor PyVista is loaded. More than half of
-these lines document arguments: ``help(pyvista_vdi.generate)`` is complete by itself.
+these lines document arguments, as ``help(pyvista_vdi.generate)`` is complete by itself: hence more
+than 500 lines.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """One device with its context, queues, programs and buffers: what the engine launches through.
 
-Launches, copies and turns share one queue and one lock each, so they are methods of one class; half
-of the lines say what each takes and raises.
+Launches, copies and turns share one queue and one lock each, so they are methods of one class, and
+half of the lines say what each takes and raises: hence more than 500 lines.
 """
 
 from __future__ import annotations

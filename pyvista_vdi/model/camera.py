@@ -1,6 +1,6 @@
 """The camera: the only place that knows world, view and list coordinates (DESIGN section 3).
 
-One class, a third of whose lines document public arguments and frames.
+One class, a third of which documents public arguments and frames: hence more than 500 lines.
 """
 
 from __future__ import annotations

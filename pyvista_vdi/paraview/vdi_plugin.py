@@ -2,8 +2,8 @@
 
 ParaView loads this file by its path (``pyvista-vdi paraview`` prints it): Tools > Manage
 Plugins, ``paraview.simple.LoadPlugin`` or ``PV_PLUGIN_PATH``. Nothing else imports it. It declares
-ParaView's properties over VTK algorithms that know nothing of ParaView. It is one file, however
-long: ParaView knows a plugin by one path.
+ParaView's properties over VTK algorithms that know nothing of ParaView. ParaView
+knows a plugin by one path: hence more than 500 lines.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """From a volume to samples, to an image and to a plain VDI, in float64 (DESIGN section 3).
 
-The whole way stands in one file, so that it can be read against the conventions from top to bottom.
+The whole way can be read against the conventions from top to bottom: hence more than 500 lines.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ Exact whatever is guessed: a guess changes how small the numbers are that are le
 and not what is read. All guesses are computed from what a reader has, in operations that every
 machine rounds alike. ``docs/decisions/series.md`` says what follows Fernandes et al. (2014), and
 what does not.
+
+Writing and reading mirror each other, line for line: hence more than 500 lines.
 """
 
 from __future__ import annotations

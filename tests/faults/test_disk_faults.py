@@ -1,4 +1,7 @@
-"""Disks that fill, processes that are killed or race while they save: whole files or old ones."""
+"""Disks that fill, processes that are killed or race while they save: whole files or old ones.
+
+All faults are held to one promise, by the same files: hence more than 500 lines.
+"""
 
 from __future__ import annotations
 

@@ -23,6 +23,9 @@ NOT_IN_SDIST = {".gitattributes"}
 #: Bytes of the largest file that is tracked, volumes that are shipped apart, and of the sdist.
 LARGEST_FILE, LARGEST_SDIST = 5_000_000, 14_000_000
 
+#: Lines of a source that need no reason, and those in which a longer one gives it.
+LONGEST_SOURCE, HEAD = 500, 16
+
 #: What editors, tools and broken-off runs leave behind; and the folders in which tools keep things.
 TEMPORARY = {".tmp", ".orig", ".rej", ".swp", ".log", ".pyc", ".bak"}
 CACHES = {".cache", "__pycache__", ".hypothesis", ".mypy_cache", ".pytest_cache", ".ruff_cache"}
@@ -76,6 +79,16 @@ def test_nothing_temporary_is_tracked(source):
         for path in paths
         if path.suffix in TEMPORARY or path.name.endswith("~") or CACHES & set(path.parts)
     ]
+
+
+def test_long_sources_say_why(source):
+    folder, names = source
+    for name in sorted(names):
+        if name.endswith((".py", ".js", ".cl")):
+            lines = (folder / name).read_text(encoding="utf-8").splitlines()
+            head = " ".join(lines[:HEAD])
+            long_without = len(lines) > LONGEST_SOURCE and "more than 500 lines" not in head
+            assert not long_without, f"{name}: {len(lines)} lines, and its head does not say why"
 
 
 def _build(source, kind, target):

@@ -1,4 +1,7 @@
-"""VTK's images and properties to and from the engine's objects."""
+"""VTK's images and properties to and from the engine's objects.
+
+Volumes, VDIs and properties each have their refusals: hence more than 500 lines.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""VDIs in notebooks: the widget, what IPython shows, PyVista's backend, and the view in a page."""
+"""VDIs in notebooks: the widget, what IPython shows, PyVista's backend, and the view in a page.
+
+One widget, in all the places where it shows itself: hence more than 500 lines.
+"""
 
 from __future__ import annotations
 

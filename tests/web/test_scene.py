@@ -1,4 +1,7 @@
-"""Scenes in a page: what is seen among VDIs is what VTK draws of the same plotter."""
+"""Scenes in a page: what is seen among VDIs is what VTK draws of the same plotter.
+
+Plotters and pages are compared by the same helpers: hence more than 500 lines.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Served VDIs: what clients get, whom the server lets in, and that none can harm another."""
+"""Served VDIs: what clients get, whom the server lets in, and that none can harm another.
+
+All tests talk to servers by the same client: hence more than 500 lines.
+"""
 
 from __future__ import annotations
 

@@ -8,6 +8,8 @@ the line, and then the samples, channel by channel.
 The OpenEXR package is not in the place of this: it makes an array object of each pixel and channel,
 about a hundred bytes each, and takes memory for what a header merely declares. It reads the forms
 that are not read here (``package.py``). Reading and writing share one file, as one layout.
+
+Writing and reading share one layout: hence more than 500 lines.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Raycasts a VDI for exactly the frame that VTK is drawing, and hands VTK the image."""
+"""Raycasts a VDI for exactly the frame that VTK is drawing, and hands VTK the image.
+
+One class holds all that a frame leaves for the next: hence more than 500 lines.
+"""
 
 from __future__ import annotations
 

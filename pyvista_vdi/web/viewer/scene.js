@@ -1,5 +1,5 @@
 // What a plotter shows beside a VDI: meshes, lines, points, texts and other VDIs, as web/scenes/scene.py
-// packs them.
+// packs them. Layers, meshes and VDIs share one context and its targets: hence more than 500 lines.
 import { annotate } from "./annotations.js";
 import { cornersOf, difference, inner, layersOf } from "./layers.js";
 import { load } from "./loader.js";
