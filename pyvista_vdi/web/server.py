@@ -22,8 +22,6 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from urllib.parse import SplitResult, quote, urlsplit
 
-import numpy as np
-
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
@@ -463,7 +461,7 @@ _NAMES = tuple(name for name in inspect.signature(serve).parameters if name != "
 
 def _is_sequence(volume: Any) -> bool:
     """Whether it is several volumes: texts, arrays and VTK's data sets have a length, too."""
-    if isinstance(volume, str | np.ndarray) or hasattr(volume, "GetClassName"):
+    if isinstance(volume, str) or hasattr(volume, "dtype") or hasattr(volume, "GetClassName"):
         return False
     return hasattr(volume, "__len__") and hasattr(volume, "__getitem__")
 
