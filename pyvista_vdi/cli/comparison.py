@@ -43,7 +43,6 @@ def compare(options: argparse.Namespace) -> int:
     if options.tf and any(arguments[n] != v for n, v in TRANSFER_FUNCTIONS[options.tf].items()):
         looks = "custom"
     stem = f"{volume_name(options)}-{looks}"
-    files = output_files(options, stem, "vdi", "png", "json")
     settings = Settings(
         classification=arguments,
         window_size=options.size,
@@ -56,6 +55,7 @@ def compare(options: argparse.Namespace) -> int:
         device=options.device,
         name=stem,
     )
+    files = output_files(options, stem, "vdi", "png", "json")
     volume = read_volume(options)
     with measuring("comparing") as bar:
         report, vdi, images = measure(volume, settings, bar)

@@ -63,6 +63,14 @@ def movie(options: argparse.Namespace) -> int:
         turned = [name for name in ("azimuth", "elevation") if getattr(options, name)]
         refuse(options, (*PLACE, "view_angle", *turned), "movies without --path")
     keys = [from_json(file, Camera.from_dict, "camera") for file in options.path or ()]
+    if len({key.parallel_projection for key in keys}) > 1:
+        raise InvalidArgumentError(
+            "views of a path are all parallel or all perspective; got "
+            + ", ".join(
+                f"{printable(file)}: {'parallel' if key.parallel_projection else 'perspective'}"
+                for file, key in zip(options.path, keys, strict=True)
+            )
+        )
 
     def views(first: Camera, steps: int | None) -> list[Camera]:
         if steps is None and not (keys or options.turn):

@@ -15,11 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidVolumeError, MissingDependencyError, UnsupportedError
+from pyvista_vdi.errors import (
+    InvalidVolumeError,
+    MissingDependencyError,
+    UnsupportedError,
+    VDIWarning,
+)
 from pyvista_vdi.model.host_memory import require_free_memory
 
 #: What is read of a header, by DICOM's keywords.
 _WANTED = [
+    "SOPClassUID",
     "SeriesDescription",
     "SliceThickness",
     "SeriesInstanceUID",
@@ -53,11 +59,27 @@ class Slice:
 def slices_of(folder: Path) -> list[Slice]:
     """Return the slices in a folder, which must be those of one series, not compressed."""
     files = sorted(path for path in folder.iterdir() if path.is_file())
-    found = [each for each in (read_slice(path) for path in files) if each is not None]
+    found, damaged = [], []
+    for path in files:
+        try:
+            one = read_slice(path)
+        except InvalidVolumeError as error:
+            damaged.append(error)
+        else:
+            found += [] if one is None else [one]
     if not found:
+        if damaged:
+            raise damaged[0]
         raise InvalidVolumeError(
             f"the folder {folder} holds no slices ({len(files)} files, no DICOM, TIFF or PNG among "
             "them): give the folder that holds the slices themselves"
+        )
+    if damaged:
+        warnings.warn(
+            f"{len(damaged)} of {len(files)} files in the folder {folder} are left out, as they "
+            f"are damaged; the first: {damaged[0]}",
+            VDIWarning,
+            stacklevel=5,
         )
     series = Counter(each.series for each in found)
     if len(series) > 1:
@@ -82,13 +104,22 @@ def require_uncompressed(one: Slice) -> None:
 
 
 def read_slice(path: Path) -> Slice | None:
-    """Return what a file says of its slice, or None where it is no DICOM image."""
-    dcmread = _pydicom().dcmread
+    """Return what a file says of its slice, or None where it is no DICOM image.
+
+    Raises
+    ------
+    InvalidVolumeError
+        If it is a damaged one.
+    """
+    pydicom = _pydicom()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of values that break a rule
-            header = dcmread(path, stop_before_pixels=True, specific_tags=_WANTED)
+            header = pydicom.dcmread(path, stop_before_pixels=True, specific_tags=_WANTED)
             if "Rows" not in header:  # a directory, a report, a plan ...
+                kind = getattr(header.get("SOPClassUID"), "name", "")
+                if kind.endswith("Image Storage"):
+                    raise EOFError("it ends within its header")
                 return None
             thickness = _numbers(header, "SliceThickness", ())
             return Slice(
@@ -102,8 +133,10 @@ def read_slice(path: Path) -> Slice | None:
                 _numbers(header, "PixelSpacing", (2,)),
                 int(header.get("InstanceNumber") or 0),
             )
-    except Exception:  # damage shows at whatever pydicom comes to first
+    except pydicom.errors.InvalidDicomError:  # it does not begin as one
         return None
+    except Exception as error:  # damage shows at whatever pydicom comes to first
+        raise InvalidVolumeError(f"{path} cannot be read as a DICOM slice: {error}") from error
 
 
 def values_of(slices: list[Slice]) -> NDArray[Any]:

@@ -42,8 +42,9 @@ def read_volume(path: str | os.PathLike[str]) -> pv.ImageData:
     A file in any format of ``pyvista.read`` that holds a uniform grid (MetaImage, NIfTI, .vti,
     .vtk, TIFF, ...), or a folder of DICOM slices, gives the grid in the file's own coordinates:
     those of NIfTI grow to the right, the front and the head, those of DICOM and of most MetaImages
-    to the left, the back and the head; millimetres. What cannot be read is refused with a remedy,
-    and slices that do not say where they lie, or not at equal distances, bring a ``VDIWarning``.
+    to the left, the back and the head; millimetres. What cannot be read is refused with a remedy;
+    slices that are damaged, do not say where they lie, or are not at equal distances bring a
+    ``VDIWarning``.
     """
     file = Path(path)
     if not os.path.exists(file):  # noqa: PTH110 - pathlib's raises for a name that is too long

@@ -152,7 +152,7 @@ class SeriesWriter:
                     "SeriesWriter, so that VDIs can be made of volumes"
                 )
             step = self._make(step)
-        begin = self._stream.tell()
+        begin, before = self._stream.tell(), len(self._steps)
         try:
             self._steps.write(self._stream, step, time)
         except OSError as error:
@@ -161,6 +161,11 @@ class SeriesWriter:
                 f"{self.path} could not be written: {error.strerror}; "
                 f"its {len(self._steps)} steps can be read"
             ) from error
+        except BaseException:  # Ctrl-C, as others: half a step would part the index from the steps
+            if len(self._steps) == before:
+                self._stream.seek(begin)
+                self._stream.truncate()
+            raise
         return step  # type: ignore[no-any-return]
 
     def close(self) -> None:

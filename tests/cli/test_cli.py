@@ -206,6 +206,7 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
             "both say how good pictures are to be",
         ),
         (["compare", "v.nrrd", "--out", "v.nrrd"], "the folder v.nrrd cannot be made"),
+        (["compare", "v.nrrd", "--out", "new", "--angles", "5,5"], "an angle is given twice"),
         (["compare", "v.nrrd", "--resume"], "--resume is for --front: leave it out"),
         (["compare", "--front", "--cmap", "bone"], "--cmap is for one volume"),
         (["info", "x" * 300], "x does not exist: check the volume's path"),

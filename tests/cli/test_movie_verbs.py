@@ -198,6 +198,16 @@ def test_mistakes_are_said_before_anything_is_drawn(
     assert sorted(saved.parent.iterdir()) == before
 
 
+def test_a_path_has_one_projection(saved, capsys, tmp_path):
+    first = pvdi.read(saved).camera
+    for name, key in (("a", first), ("b", first.replace(parallel_projection=True))):
+        (tmp_path / name).write_text(json.dumps(key.to_dict()))
+    names = tmp_path / "a", tmp_path / "b"
+    said = run(capsys, "movie", saved, "-o", tmp_path / "v.gif", "--path", *names, status=1)
+    assert f"{names[0]}: perspective, {names[1]}: parallel" in said
+    assert sorted(tmp_path.iterdir()) == sorted(names)
+
+
 def test_a_movie_that_fails_leaves_what_was_there(saved, capsys, monkeypatch, tmp_path):
     target = tmp_path / "v.gif"
     target.write_bytes(b"what was there")

@@ -379,6 +379,27 @@ def test_other_files_beside_the_slices(tmp_path):
     np.testing.assert_allclose(marked(read(folder)), ORIGIN + SPACING * MARK, atol=1e-5)
 
 
+@pytest.mark.parametrize("damage", ["ends early", "no number"])
+def test_a_damaged_slice_is_said(damage, tmp_path):
+    folder = dicom_folder(tmp_path)
+    last = folder / "06.dcm"  # without which those that are left are evenly apart
+    content = last.read_bytes()
+    rows = content.index(b"\x28\0\x10\0")  # the tag (0028,0010) of how many there are
+    if damage == "ends early":
+        last.write_bytes(content[:rows])
+    else:
+        at = content.index(f"{ORIGIN[0]:g}".encode())
+        last.write_bytes(content[:at] + b"?" + content[at + 1 :])
+    said = rf"1 of 5 files in the folder .*scan are left out.*{last.name} cannot be read"
+    with pytest.warns(VDIWarning, match=said):
+        volume = read(folder)
+    assert volume.dimensions == (7, 6, 4)
+    for path in folder.iterdir():
+        path.write_bytes(content[:rows])
+    with pytest.raises(InvalidVolumeError, match=r"\.dcm cannot be read .* ends within its header"):
+        read(folder)
+
+
 @pytest.mark.parametrize("files", [{}, {"a.jpg": b"no slice"}, {"b.dcm": bytes(128) + b"DICM"}])
 def test_a_folder_without_slices(files, tmp_path, capsys):
     (tmp_path / "scan").mkdir()

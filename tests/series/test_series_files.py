@@ -260,6 +260,34 @@ def test_a_step_that_does_not_fit_is_not_counted(tmp_path):
     assert len(out) == 1
 
 
+def test_an_interrupt_leaves_no_half_step(steps, tmp_path):
+    """Half of one before the index would part it from the steps."""
+
+    class Interrupted:
+        def __init__(self, stream):
+            self.stream = stream
+
+        def __getattr__(self, name):
+            return getattr(self.stream, name)
+
+        def write(self, data):
+            self.stream.write(data[: len(data) // 2])
+            raise KeyboardInterrupt
+
+    path = tmp_path / "a.vdis"
+    with pvdi.SeriesWriter(path) as out:
+        out.append(steps[0])
+        stream = out._stream
+        out._stream = Interrupted(stream)
+        with pytest.raises(KeyboardInterrupt):
+            out.append(steps[1])
+        out._stream = stream
+        out.append(steps[2])
+    assert reader.read_info(path).closed
+    read = pvdi.read(path)
+    assert all(same(a, b) for a, b in zip(read, (steps[0], steps[2]), strict=True))
+
+
 def test_what_was_appended_is_readable_at_once(steps, tmp_path):
     path = tmp_path / "a.vdis"
     with pvdi.SeriesWriter(path) as out:

@@ -92,6 +92,15 @@ def test_picture_is_what_render_returns(vdi):
     )
 
 
+@pytest.mark.parametrize("degrees", ["x", None, np.nan, np.inf])
+def test_a_picture_is_turned_by_a_finite_angle(degrees, vdi):
+    picture = to_image(vdi)
+    for turn in (picture.SetAzimuth, picture.SetElevation):
+        with pytest.raises(InvalidArgumentError, match=f"finite angle, degrees; got {degrees!r}"):
+            turn(degrees)
+    assert (picture.GetAzimuth(), picture.GetElevation()) == (0, 0)
+
+
 def test_extent_is_known_before_the_picture(vdi):
     picture = to_image(vdi)
     for size in (None, (7, 5)):

@@ -13,6 +13,7 @@ from vtkmodules.vtkCommonDataModel import vtkImageData
 from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.io import to_bytes
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.checks import as_number, not_taken
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI, picture_size
 from pyvista_vdi.raycasting.raycast import render_vdi
@@ -38,6 +39,14 @@ STRAIGHT = "RGBA"
 SCALARS = (VTK_UNSIGNED_CHAR, 4)
 #: Its other point array: what was rendered, premultiplied RGBA, float32.
 PREMULTIPLIED = "premultiplied"
+
+
+def _checked_degrees(value: Any) -> float:
+    """Return an angle as a float, or raise InvalidArgumentError."""
+    degrees = as_number(value)
+    if not np.isfinite(degrees):
+        raise not_taken(value)(f"a view is turned by a finite angle, degrees; got {value!r}")
+    return degrees
 
 
 class VDIToImage(Algorithm):
@@ -96,7 +105,7 @@ class VDIToImage(Algorithm):
         "degrees",
         "Turn the view about its up direction through the focal point, as VTK's ``Azimuth``.",
         "Return by how much the view is turned, degrees.",
-        float,
+        _checked_degrees,
     )
     SetElevation, GetElevation = accessors(
         "Elevation",
@@ -104,7 +113,7 @@ class VDIToImage(Algorithm):
         "degrees",
         "Lift the view through the focal point, after turning it, as VTK's ``Elevation``.",
         "Return by how much the view is lifted, degrees.",
-        float,
+        _checked_degrees,
     )
     SetDevice, GetDevice = accessors("Device", "_device", "device", *DEVICE)
 
