@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import operator
 import os
 import time
@@ -19,12 +18,10 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.grid import Grid
-from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.series.writer import SeriesWriter
-
-_OPTIONS = tuple(field.name for field in dataclasses.fields(GenerationOptions))
 
 
 class InSitu:
@@ -103,13 +100,13 @@ class InSitu:
             )
         self._camera = Camera.from_any(camera)
         self._size = check_window_size(window_size)
-        looks = {name: value for name, value in options.items() if name not in _OPTIONS}
+        looks = {name: value for name, value in options.items() if name not in GENERATION_NAMES}
         if looks.get("clim") is None and "transfer_function" not in looks:
             raise InvalidArgumentError(
                 "clim=(low, high) is missing: no step knows the range of the others"
             )
-        self._looks = Classification(looks, "InSitu", _OPTIONS)
-        chosen = {name: value for name, value in options.items() if name in _OPTIONS}
+        self._looks = Classification(looks, "InSitu", GENERATION_NAMES)
+        chosen = {name: value for name, value in options.items() if name in GENERATION_NAMES}
         self._options = GenerationOptions(**{"precision": "8-byte", **chosen})
         try:
             x, y, z = (operator.index(n) for n in dimensions)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -153,6 +153,10 @@ class GenerationOptions(MediumOptions):
     def hidden_weight(self) -> float:
         """Weight of what V_O cannot see at all when neighbours are merged, 0 to 1."""
         return float(1 - np.cos(np.radians(self.view_cone)))
+
+
+#: The names of what :class:`GenerationOptions` takes, which tell it from a classification.
+GENERATION_NAMES = tuple(each.name for each in fields(GenerationOptions))
 
 
 def check_max_supersegments(max_supersegments: int) -> int:

@@ -326,24 +326,14 @@ class AddVDI(Component):
         blending = blending_name(blending)
         classified = {"scalars": scalars, "preference": preference, "blending": blending}
         changed = _changed({**classified, **vars(looks)}, DEFAULTS)
-        shown: VDI | VDISource
-        prop: Any = None
         several = volume if isinstance(volume, VDISeries | VDISet) else None
         if several is not None:
             volume = several[0]  # which all steps, and all views, look like
+        shown: VDI | VDISource
+        prop: Any = None
         if isinstance(volume, VDI) or is_vdi_image(volume):
             others = {**{name: arguments[name] for name in _OF_A_VOLUME}, **vars(options)}
-            extra = [*changed, *_changed(others, _DEFAULTS)]
-            if extra:
-                raise UnsupportedError(
-                    f"{', '.join(sorted(extra))} cannot be given with a VDI: its classification, "
-                    "view and lists were fixed when it was generated; generate another from the "
-                    "volume"
-                )
-            if draw == "volume":
-                raise UnsupportedError(
-                    "draw='volume' draws the volume, and this is a VDI without one: leave draw out"
-                )
+            _refuse_with_a_vdi([*changed, *_changed(others, _DEFAULTS)], draw)
             shown = volume if isinstance(volume, VDI) else vdi_from_image(volume)
             title = str(shown.metadata.get("scalars") or "Data")
             table = _stored_table(shown)
@@ -397,27 +387,7 @@ class AddVDI(Component):
             regenerate_below = min(regenerate_below, max(0.0, dial.ssim - _BELOW_GOAL))
         vdi_mapper.SetRegenerateBelow(regenerate_below)
         vdi_mapper.SetDraw(draw)
-        actor = PlotterVDIActor()
-        if prop is not None:
-            actor.prop = prop
-            if not prop.independent_components:
-                vdi_mapper.painter.give_proxy(4)
-        if isinstance(several, VDISeries):
-            vdi_mapper.SetSeries(several)
-        elif several is not None:
-            vdi_mapper.SetVDISet(several)
-        elif isinstance(shown, VDI):
-            vdi_mapper.SetVDI(shown)
-        else:
-            vdi_mapper.SetInputConnection(shown.GetOutputPort())
-        actor.mapper = vdi_mapper
-        actor.user_matrix = np.eye(4) if user_matrix is None else user_matrix
-
-        # Into the scene, as add_volume does
-        weak = vtkWeakReference()
-        weak.Set(actor)
-        self._actors.append(weak)
-        plotter.mapper, plotter.volume = vdi_mapper, actor
+        actor = self._actor(vdi_mapper, shown if several is None else several, prop, user_matrix)
         plotter.add_actor(
             actor,
             reset_camera=reset_camera,
@@ -432,6 +402,29 @@ class AddVDI(Component):
         if status:
             actor.show_status(plotter)
         plotter.renderer.Modified()
+        return actor
+
+    def _actor(self, mapper: Any, shown: Any, prop: Any, user_matrix: Any) -> PlotterVDIActor:
+        """Return an actor for what is shown, which the plotter takes for its own."""
+        actor = PlotterVDIActor()
+        if prop is not None:
+            actor.prop = prop
+            if not prop.independent_components:
+                mapper.painter.give_proxy(4)
+        if isinstance(shown, VDISeries):
+            mapper.SetSeries(shown)
+        elif isinstance(shown, VDISet):
+            mapper.SetVDISet(shown)
+        elif isinstance(shown, VDI):
+            mapper.SetVDI(shown)
+        else:
+            mapper.SetInputConnection(shown.GetOutputPort())
+        actor.mapper = mapper
+        actor.user_matrix = np.eye(4) if user_matrix is None else user_matrix
+        weak = vtkWeakReference()
+        weak.Set(actor)
+        self._actors.append(weak)
+        self._plotter.mapper, self._plotter.volume = mapper, actor  # as add_volume does
         return actor
 
     def __plotter_close__(self) -> None:
@@ -468,6 +461,19 @@ def _changed(given: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str,
         for name, default in defaults.items()
         if name in given and not _is_default(given[name], default)
     }
+
+
+def _refuse_with_a_vdi(changed: list[str], draw: str) -> None:
+    """Refuse what only a volume can honour, of the arguments that are not their defaults."""
+    if changed:
+        raise UnsupportedError(
+            f"{', '.join(sorted(changed))} cannot be given with a VDI: its classification, view "
+            "and lists were fixed when it was generated; generate another from the volume"
+        )
+    if draw == "volume":
+        raise UnsupportedError(
+            "draw='volume' draws the volume, and this is a VDI without one: leave draw out"
+        )
 
 
 def _is_default(value: Any, default: Any) -> bool:

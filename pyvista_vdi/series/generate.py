@@ -12,7 +12,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions
 from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
@@ -21,7 +21,6 @@ from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, warn_missed
 from pyvista_vdi.quality.probe import generate_by_dial
 from pyvista_vdi.series.series import Called, VDISeries, checked_times
 
-_OPTIONS = tuple(field.name for field in dataclasses.fields(GenerationOptions))
 _DIAL = ("quality", "target_ssim", "target_fps", "max_bytes", "target_angle")
 _GRID = ("spacing", "origin")
 
@@ -145,14 +144,14 @@ class StepMaker:
         self._camera = Camera.from_any(camera)
         self._size = check_window_size(window_size)
         self._device = device
-        looks = {n: v for n, v in given.items() if n not in (*_OPTIONS, *_DIAL, *_GRID)}
-        self._looks = Classification(looks, function, (*_OPTIONS, *_DIAL, *_GRID))
+        looks = {n: v for n, v in given.items() if n not in (*GENERATION_NAMES, *_DIAL, *_GRID)}
+        self._looks = Classification(looks, function, (*GENERATION_NAMES, *_DIAL, *_GRID))
         dial: dict[str, Any] = {
             "target_angle": TARGET_ANGLE,
             **{n: given[n] for n in _DIAL if n in given},
         }
         self._dial = Dial.of(*[dial.get(name) for name in _DIAL])  # type: ignore[arg-type]
-        options = {n: given[n] for n in _OPTIONS if n in given}
+        options = {n: given[n] for n in GENERATION_NAMES if n in given}
         if self._dial is None:
             options.setdefault("precision", default_precision)
         self._options = GenerationOptions(**options)

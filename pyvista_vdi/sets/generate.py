@@ -25,7 +25,7 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.metrics import SSIM_WINDOW, compare_images
-from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions
 from pyvista_vdi.model.packing import Packed8
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -41,9 +41,8 @@ from pyvista_vdi.sets.vdi_set import VDISet
 
 _log = logging.getLogger(__name__)
 
-_OPTIONS = tuple(
-    field.name for field in dataclasses.fields(GenerationOptions) if field.name != "precision"
-)
+#: What a set takes of generation: its precision is always "8-byte".
+_OPTIONS = tuple(name for name in GENERATION_NAMES if name != "precision")
 
 #: SSIM that every direction is to have.
 TARGET_SSIM = 0.98
