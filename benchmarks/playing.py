@@ -35,13 +35,13 @@ from pyvista_vdi.measure.report import system_line, table
 from pyvista_vdi.measure.vtk_baselines import (
     MAPPERS,
     VTKBaseline,
-    aim,
     property_from_transfer_function,
 )
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
+from pyvista_vdi.vtk_pipeline.filters.view import aim
 
 ANGLES = (0.0, 5.0)
 

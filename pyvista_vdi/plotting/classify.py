@@ -18,6 +18,7 @@ from pyvista_vdi.errors import (
     InvalidArgumentTypeError,
     InvalidVolumeError,
     MissingDependencyError,
+    VDIError,
     VDIWarning,
 )
 from pyvista_vdi.model.checks import as_float, not_taken
@@ -25,6 +26,7 @@ from pyvista_vdi.model.classification import BLENDINGS
 from pyvista_vdi.model.lighting import Shading
 from pyvista_vdi.model.presets import presets
 from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.filters.properties import (
     RGBA_OPACITY,
     transfer_function_from_property,
@@ -195,6 +197,19 @@ def note_mapper(mapper: str) -> None:
         VDIWarning,
         stacklevel=3,
     )
+
+
+def stored_table(vdi: VDI) -> pv.LookupTable | None:
+    """Return the colours and opacities that a VDI was made with, if its metadata has them."""
+    try:
+        stored = TransferFunction.from_dict(vdi.metadata["transfer_function"])
+    except (KeyError, VDIError):  # metadata may be anybody's
+        return None
+    colors = np.column_stack([stored.colors, stored.opacities])
+    table = pv.LookupTable()
+    table.values = np.round(colors * 255).astype(np.uint8)
+    table.scalar_range = stored.scalar_range
+    return table
 
 
 def blending_name(mode: Any) -> str:

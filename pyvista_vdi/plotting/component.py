@@ -14,14 +14,13 @@ from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet
 from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import InvalidArgumentTypeError, UnsupportedError, VDIError
+from pyvista_vdi.errors import InvalidArgumentTypeError, UnsupportedError
 from pyvista_vdi.model.classification import DEFAULTS, Classification, refuse_unknown
 from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.blocks import add_blocks
-from pyvista_vdi.plotting.classify import Looks, blending_name, note_mapper
+from pyvista_vdi.plotting.classify import Looks, blending_name, note_mapper, stored_table
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.registration import Component
 from pyvista_vdi.plotting.volumes import as_image, held
@@ -336,7 +335,7 @@ class AddVDI(Component):
             _refuse_with_a_vdi([*changed, *_changed(others, _DEFAULTS)], draw)
             shown = volume if isinstance(volume, VDI) else vdi_from_image(volume)
             title = str(shown.metadata.get("scalars") or "Data")
-            table = _stored_table(shown)
+            table = stored_table(shown)
             if table is None:
                 if show_scalar_bar or scalar_bar_args or annotations:
                     raise UnsupportedError(
@@ -490,16 +489,3 @@ def _matrix(plotter: Any, user_matrix: Any) -> NDArray[np.float64]:
     if user_matrix is not None:
         stand_in.SetUserMatrix(pv.vtkmatrix_from_array(np.asarray(user_matrix, dtype=float)))
     return as_array(stand_in.GetMatrix())
-
-
-def _stored_table(vdi: VDI) -> pv.LookupTable | None:
-    """Return the colours and opacities that a VDI was made with, if its metadata has them."""
-    try:
-        stored = TransferFunction.from_dict(vdi.metadata["transfer_function"])
-    except (KeyError, VDIError):  # metadata may be anybody's
-        return None
-    colors = np.column_stack([stored.colors, stored.opacities])
-    table = pv.LookupTable()
-    table.values = np.round(colors * 255).astype(np.uint8)
-    table.scalar_range = stored.scalar_range
-    return table

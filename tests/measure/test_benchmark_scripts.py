@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import importlib
 import os
 import shlex
 import shutil
@@ -74,6 +76,17 @@ def test_every_script_is_run():
     assert scripts == set(RUNS)
     about = (BENCHMARKS / "README.md").read_text(encoding="utf-8")
     assert [name for name in scripts if f"`{name}.py`" not in about] == []
+
+
+@pytest.mark.parametrize("path", sorted(BENCHMARKS.glob("*.py")), ids=lambda path: path.stem)
+def test_what_a_script_imports_of_the_package_is_there(path):
+    """Scripts run in the nightly alone: a name that has moved is found here."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("pyvista_vdi"):
+            module = importlib.import_module(node.module)
+            for alias in node.names:
+                if not hasattr(module, alias.name):  # a module in it
+                    importlib.import_module(f"{node.module}.{alias.name}")
 
 
 @pytest.fixture(scope="module")

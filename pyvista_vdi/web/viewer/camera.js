@@ -1,8 +1,6 @@
 // Views as VTK's vtkCamera has them, and its movements: pure functions of plain objects.
 import { cameraAxes, isParallel } from "./rays.js";
-
-const minus = (a, b) => a.map((x, k) => x - b[k]);
-const plus = (a, b, s = 1) => a.map((x, k) => x + s * b[k]);
+import { add, dot, subtract, unit } from "./vectors.js";
 
 /**
  * Return a view as the viewer keeps it; refuse one that shows nothing.
@@ -14,7 +12,7 @@ const plus = (a, b, s = 1) => a.map((x, k) => x + s * b[k]);
 export function checkedCamera(camera) {
   const checked = Object.fromEntries(["position", "focal_point", "view_up"]
     .map((name) => [name, checkedNumbers("camera", camera, name)]));
-  if (!(Math.hypot(...minus(checked.focal_point, checked.position)) > 0)) {
+  if (!(Math.hypot(...subtract(checked.focal_point, checked.position)) > 0)) {
     throw new TypeError("A camera's position and focal point differ; these are the same point.");
   }
   const parallel = isParallel(camera);
@@ -57,9 +55,9 @@ function checkedNumbers(what, of, name, count = 3) {
 
 // Turn a vector about an axis, degrees (Rodrigues).
 function turned(vector, axis, degrees) {
-  const length = Math.hypot(...axis), [x, y, z] = axis.map((c) => c / length);
+  const [x, y, z] = unit(axis);
   const angle = (degrees * Math.PI) / 180, c = Math.cos(angle), s = Math.sin(angle);
-  const along = (x * vector[0] + y * vector[1] + z * vector[2]) * (1 - c);
+  const along = dot([x, y, z], vector) * (1 - c);
   const [u, v, w] = vector;
   return [
     u * c + (y * w - z * v) * s + x * along,
@@ -70,8 +68,8 @@ function turned(vector, axis, degrees) {
 
 const around = (camera, axis, degrees) => ({
   ...camera,
-  position: plus(camera.focal_point,
-    turned(minus(camera.position, camera.focal_point), axis, degrees)),
+  position: add(camera.focal_point,
+    turned(subtract(camera.position, camera.focal_point), axis, degrees)),
 });
 
 const upright = (camera) => ({ ...camera, view_up: cameraAxes(camera)[1] });
@@ -92,16 +90,16 @@ export function rolled(camera, degrees) {
 /** Come nearer by a factor: Dolly, or in parallel projection a smaller scale. */
 export function nearer(camera, factor) {
   if (isParallel(camera)) return { ...camera, parallel_scale: camera.parallel_scale / factor };
-  const from = minus(camera.position, camera.focal_point);
-  return { ...camera, position: plus(camera.focal_point, from, 1 / factor) };
+  const from = subtract(camera.position, camera.focal_point);
+  return { ...camera, position: add(camera.focal_point, from, 1 / factor) };
 }
 
 /** Move with what is in the focal plane: by parts of the viewport's height, right and up. */
 export function panned(camera, right, up) {
   const axes = cameraAxes(camera);
-  const distance = Math.hypot(...minus(camera.focal_point, camera.position));
+  const distance = Math.hypot(...subtract(camera.focal_point, camera.position));
   const height = 2 * (isParallel(camera) ? camera.parallel_scale
     : distance * Math.tan((camera.view_angle * Math.PI) / 360));
-  const move = (point) => plus(plus(point, axes[0], -right * height), axes[1], -up * height);
+  const move = (point) => add(add(point, axes[0], -right * height), axes[1], -up * height);
   return { ...camera, position: move(camera.position), focal_point: move(camera.focal_point) };
 }

@@ -4,18 +4,13 @@
 // is cut into thin slabs by depth, and within each slab one is drawn over the other: which one,
 // alternates, so that what that gets wrong cancels from slab to slab.
 import { cameraAxes, isParallel } from "./rays.js";
+import { cross, dot, subtract } from "./vectors.js";
 
 /** Slabs over the depths at which VDIs overlap. With more of them the roundings to 8 bits add up. */
 export const THIN_SLABS = 32;
 
-/** The scalar product of two vectors. */
-export const inner = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-
-/** a - b, of two vectors. */
-export const difference = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-
 const normalTo = (a, b) => {
-  const n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const n = cross(a, b);
   const length = Math.hypot(...n);
   return length > 1e-12 * Math.hypot(...a) * Math.hypot(...b) ? n.map((x) => x / length) : null;
 };
@@ -31,7 +26,7 @@ const normalTo = (a, b) => {
 export function cornersOf(bounds, matrix) {
   return Array.from({ length: 8 }, (_, k) => {
     const p = [bounds[k & 1], bounds[2 + (k >> 1 & 1)], bounds[4 + (k >> 2)]];
-    return [0, 1, 2].map((i) => inner(matrix[i], p) + matrix[i][3]);
+    return [0, 1, 2].map((i) => dot(matrix[i], p) + matrix[i][3]);
   });
 }
 
@@ -39,14 +34,14 @@ export function cornersOf(bounds, matrix) {
  * Which of two boxes is nearer: -1 the first, 1 the second, 0 either, and NaN where they overlap.
  */
 export function nearerOf(a, b, camera) {
-  const edges = [a, b].map((c) => [1, 2, 4].map((k) => difference(c[k], c[0])));
+  const edges = [a, b].map((c) => [1, 2, 4].map((k) => subtract(c[k], c[0])));
   const axes = edges.flatMap(([x, y, z]) => [normalTo(y, z), normalTo(z, x), normalTo(x, y)]);
   for (const one of edges[0]) for (const other of edges[1]) axes.push(normalTo(one, other));
   const [, , forward] = cameraAxes(camera);
   let separated = false;
   for (const axis of axes.filter(Boolean)) {
     const [[lowA, highA], [lowB, highB]] = [a, b].map((corners) => {
-      const along = corners.map((p) => inner(axis, p));
+      const along = corners.map((p) => dot(axis, p));
       return [Math.min(...along), Math.max(...along)];
     });
     const rounding = 1e-9 * (highA - lowA + highB - lowB);
@@ -54,7 +49,7 @@ export function nearerOf(a, b, camera) {
     if (!aIsLow && highB > lowA + rounding) continue;
     separated = true;
     const middle = aIsLow ? (highA + lowB) / 2 : (highB + lowA) / 2;
-    const side = isParallel(camera) ? -inner(axis, forward) : inner(axis, camera.position) - middle;
+    const side = isParallel(camera) ? -dot(axis, forward) : dot(axis, camera.position) - middle;
     // A plane that the eye is in tells nothing
     if (Math.abs(side) > rounding * 1e-3) return (side < 0) === aIsLow ? -1 : 1;
   }
@@ -96,7 +91,7 @@ export function layersOf(boxes, camera, slabs = THIN_SLABS) {
   if (whole) return whole.map((body) => ({ body, near: -Infinity, far: Infinity }));
   const [, , forward] = cameraAxes(camera);
   const depths = boxes.map((corners) => {
-    const along = corners.map((p) => inner(forward, difference(p, camera.position)));
+    const along = corners.map((p) => dot(forward, subtract(p, camera.position)));
     const least = isParallel(camera) ? -Infinity : 0;
     return [Math.max(Math.min(...along), least), Math.max(...along)];
   });

@@ -7,17 +7,10 @@
 //
 // All is done in a frame of its own, in which the VDI's bounds are about 1 large and at the origin:
 // model' = (model - centre) / diagonal, world' = world * scale.
+import { add, cross, dot, subtract, times, unit } from "./vectors.js";
 
 const NEAREST_DEPTH = 1e-6; // before it nothing is looked up in perspective, in diagonals
 
-const add = (a, b) => a.map((x, k) => x + b[k]);
-const subtract = (a, b) => a.map((x, k) => x - b[k]);
-const times = (a, s) => a.map((x) => x * s);
-const dot = (a, b) => a.reduce((sum, x, k) => sum + x * b[k], 0);
-const cross = (a, b) => [
-  a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0],
-];
-const unit = (a) => times(a, 1 / Math.hypot(...a));
 const column = (m, k) => m.map((row) => row[k]);
 const product = (a, b) => a.map((row) => b[0].map((_, k) => dot(row, column(b, k))));
 

@@ -1,7 +1,7 @@
 // What a plotter shows beside a VDI: meshes, lines, points, texts and other VDIs, as web/scenes/scene.py
 // packs them. Layers, meshes and VDIs share one context and its targets: hence more than 500 lines.
 import { annotate } from "./annotations.js";
-import { cornersOf, difference, inner, layersOf } from "./layers.js";
+import { cornersOf, layersOf } from "./layers.js";
 import { load } from "./loader.js";
 import {
   COPY_SHADER, LAYERS_SHADER, MOST_LIGHTS, PICTURE_SHADER, meshFragmentShader, meshVertexShader,
@@ -9,14 +9,13 @@ import {
 import { Raycaster, linked } from "./raycast.js";
 import { cameraAxes, halfExtent, isParallel } from "./rays.js";
 import { VERTEX_SHADER } from "./shader.js";
+import { cross, dot, subtract, times } from "./vectors.js";
 
 /** Samples of a pixel where meshes are drawn, as in PyVista's windows. */
 const SAMPLES = 4;
 
 /** Slabs in which VDIs that overlap are drawn while a view moves. */
 const FEW_SLABS = 12;
-
-const normalized = (a) => a.map((x) => x / (Math.hypot(...a) || 1));
 
 /** A scene: `viewer.scene = new Scene(bytes)`. */
 export class Scene {
@@ -597,8 +596,8 @@ function viewOf({ camera, width, height, density }, { bounds, lights }) {
 // vtkRenderer::ResetCameraClippingRange
 function clippingRange(camera, bounds, back) {
   const box = bounds ?? [-1, 1, -1, 1, -1, 1];
-  const depths = Array.from({ length: 8 }, (_, k) => -inner(back,
-    difference([box[k & 1], box[2 + (k >> 1 & 1)], box[4 + (k >> 2)]], camera.position)));
+  const depths = Array.from({ length: 8 }, (_, k) => -dot(back,
+    subtract([box[k & 1], box[2 + (k >> 1 & 1)], box[4 + (k >> 2)]], camera.position)));
   let near = Math.min(...depths), far = Math.max(...depths, 1e-18);
   const parallel = isParallel(camera);
   const least = parallel ? 0.1 * camera.parallel_scale
@@ -618,20 +617,21 @@ function lightIn(light, camera, axes) {
   const { kind, positional, cone, exponent, color, attenuation } = light;
   let ends = [light.position, light.focalPoint];
   if (kind === "scene") {
-    ends = ends.map((p) => axes.map((axis) => inner(axis, difference(p, camera.position))));
+    ends = ends.map((p) => axes.map((axis) => dot(axis, subtract(p, camera.position))));
   } else {
-    const distance = Math.hypot(...difference(camera.focal_point, camera.position));
+    const distance = Math.hypot(...subtract(camera.focal_point, camera.position));
     ends = ends.map(([x, y, z]) => [x * distance, y * distance, (z - 1) * distance]);
   }
-  return { color, position: ends[0], direction: normalized(difference(ends[1], ends[0])),
+  const towards = subtract(ends[1], ends[0]), length = Math.hypot(...towards) || 1;
+  return { color, position: ends[0], direction: times(towards, 1 / length),
     shape: [Number(positional), cone, exponent, 0], fading: attenuation };
 }
 
 // Where a point of the world is seen: parts of the window, and depth; null if behind the eye.
 function projected(point, camera, extent) {
-  const from = difference(point, camera.position), half = halfExtent(camera, extent);
+  const from = subtract(point, camera.position), half = halfExtent(camera, extent);
   const [cx, cy] = camera.window_center ?? [0, 0];
-  const [x, y, z] = cameraAxes(camera).map((axis) => inner(axis, from));
+  const [x, y, z] = cameraAxes(camera).map((axis) => dot(axis, from));
   const w = isParallel(camera) ? 1 : z;
   return w > 0 ? [(x / half[0] / w - cx + 1) / 2, (y / half[1] / w - cy + 1) / 2, z] : null;
 }
@@ -654,21 +654,19 @@ function partOf([x0, y0, x1, y1], { width, height }) {
 function toView({ matrix, origin, planes }, { axes, eye }) {
   const rotation = matrix.slice(0, 3).map((row) => row.slice(0, 3));
   const columns = [0, 1, 2].map((k) => rotation.map((row) => row[k]));
-  const placed = matrix.slice(0, 3).map((row) => inner(row, origin) + row[3]);
-  const linear = axes.map((axis) => columns.map((column) => inner(axis, column)));
+  const placed = matrix.slice(0, 3).map((row) => dot(row, origin) + row[3]);
+  const linear = axes.map((axis) => columns.map((column) => dot(axis, column)));
   const [a, b, c] = linear;
-  const cross = (u, v) => [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
-    u[0] * v[1] - u[1] * v[0]];
   const cofactors = [cross(b, c), cross(c, a), cross(a, b)];
-  const sense = Math.sign(inner(a, cofactors[0])) || 1;
+  const sense = Math.sign(dot(a, cofactors[0])) || 1;
   return {
-    linear, offset: axes.map((axis) => inner(axis, difference(placed, eye))),
+    linear, offset: axes.map((axis) => dot(axis, subtract(placed, eye))),
     normals: cofactors.map((row) => row.map((x) => sense * x)),
     planes: Array.from({ length: 6 }, (_, k) => {
       if (!planes[k]) return [0, 0, 0, 1];
       const from = planes[k].slice(0, 3), normal = planes[k].slice(3);
-      return [...columns.map((column) => inner(normal, column)),
-        inner(normal, difference(placed, from))];
+      return [...columns.map((column) => dot(normal, column)),
+        dot(normal, subtract(placed, from))];
     }).flat(),
   };
 }

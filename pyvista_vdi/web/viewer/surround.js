@@ -1,5 +1,6 @@
 // Which VDI of a set is shown: the one nearest to the view. Those that it heads for come ahead.
 import { isParallel } from "./rays.js";
+import { add, cross, dot, subtract, times } from "./vectors.js";
 
 /** VDIs that are decoded, or being decoded, beside the one that is shown. */
 const AHEAD_OF_VIEW = 4;
@@ -12,17 +13,16 @@ const LENS = Math.tan(Math.PI / 12);
 
 // Direction of an eye from a centre, and the logarithm of its distance.
 function placeOf(camera, centre) {
-  const arm = camera.position.map((x, k) => x - centre[k]);
+  const arm = subtract(camera.position, centre);
   const length = Math.hypot(...arm) || 1;
   const away = isParallel(camera) ? camera.parallel_scale / LENS : length;
-  return { towards: arm.map((x) => x / length), away: Math.log(away) };
+  return { towards: times(arm, 1 / length), away: Math.log(away) };
 }
 
 // As VDISet.distances: the angle between two eyes and the logarithm of the ratio of distances.
 function apart(a, b) {
-  const [x, y, z] = a.towards, [u, v, w] = b.towards;
-  const sine = Math.hypot(y * w - z * v, z * u - x * w, x * v - y * u);
-  return Math.hypot(Math.atan2(sine, x * u + y * v + z * w), a.away - b.away);
+  const sine = Math.hypot(...cross(a.towards, b.towards));
+  return Math.hypot(Math.atan2(sine, dot(a.towards, b.towards)), a.away - b.away);
 }
 
 /** Shows of a set what was made nearest to the view. */
@@ -126,9 +126,9 @@ export class Surround {
   #ahead() {
     if (!this.#before) return this.#here;
     const { towards, away } = this.#here;
-    const on = towards.map((x, k) => x + HEADING * (x - this.#before.towards[k]));
+    const on = add(towards, subtract(towards, this.#before.towards), HEADING);
     const length = Math.hypot(...on) || 1;
-    return { towards: on.map((x) => x / length),
+    return { towards: times(on, 1 / length),
       away: away + HEADING * (away - this.#before.away) };
   }
 
