@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from plugin_scenes import soft_ball, vdi_of_one_list
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkImagingCore import vtkImageFlip
 from vtkmodules.vtkIOXML import vtkXMLImageDataReader
@@ -99,6 +99,16 @@ def test_a_picture_is_turned_by_a_finite_angle(degrees, vdi):
         with pytest.raises(InvalidArgumentError, match=f"finite angle, degrees; got {degrees!r}"):
             turn(degrees)
     assert (picture.GetAzimuth(), picture.GetElevation()) == (0, 0)
+
+
+def test_a_picture_holds_none_of_its_input(vdi):
+    """VTK before 9.7 frees memory twice where an attribute of a filter is the last to hold data."""
+    picture = to_image(vdi)
+    picture.Update()
+    held = [*vars(picture).values()]
+    held += [part for each in held if isinstance(each, tuple | list) for part in each]
+    assert held
+    assert not [each for each in held if isinstance(each, vtkDataObject)]
 
 
 def test_extent_is_known_before_the_picture(vdi):

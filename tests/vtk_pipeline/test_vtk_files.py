@@ -12,8 +12,9 @@ import pyvista as pv
 import strategies
 from hypothesis import given, settings
 from plugin_scenes import soft_ball
+from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonExecutionModel import vtkTrivialProducer
-from vtkmodules.vtkImagingCore import vtkExtractVOI
+from vtkmodules.vtkImagingCore import vtkExtractVOI, vtkImageFlip
 from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLImageDataWriter
 
 import pyvista_vdi as pvdi
@@ -30,6 +31,7 @@ from pyvista_vdi.model import host_memory
 from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline import (
+    VDIReader,
     VDIToDenseImage,
     vdi_from_dense_image,
     vdi_from_image,
@@ -430,6 +432,37 @@ def test_the_filter_in_a_pipeline():
     for nonsense in (0, 1.5, "two"):
         with pytest.raises(InvalidArgumentError, match="max_supersegments must be a whole number"):
             dense.SetMaxSupersegments(nonsense)
+
+
+@pytest.mark.parametrize("given", ["data", "file"])
+@pytest.mark.parametrize("exact", [False, True])
+@pytest.mark.parametrize("limit", [None, 40])
+def test_filters_behind_the_dense_form_see_all_of_it(given, exact, limit, tmp_path):
+    """They write as many components, and along z as many points, as they were told."""
+    vdi = strategies.random_vdi(np.random.default_rng(11))
+    dense = VDIToDenseImage()
+    dense.SetExact(exact)
+    dense.SetMaxSupersegments(limit)
+    if given == "data":
+        dense.SetInputDataObject(vdi_to_image(vdi))
+    else:
+        vdi.save(tmp_path / "a.vdi")
+        reader = VDIReader()
+        reader.SetFileName(tmp_path / "a.vdi")
+        dense.SetInputConnection(reader.GetOutputPort())
+    behind = vtkImageFlip()
+    behind.SetInputConnection(dense.GetOutputPort())
+    behind.SetFilteredAxis(2)
+    behind.Update()
+    expected = vdi_to_dense_image(vdi, exact=exact, max_supersegments=limit)
+    found = behind.GetOutput()
+    assert found.GetDimensions() == expected.GetDimensions()
+    one, other = (
+        vtk_to_numpy(image.GetPointData().GetScalars()).reshape(image.GetDimensions()[2], -1)
+        for image in (found, expected)
+    )
+    assert one.dtype == other.dtype
+    np.testing.assert_array_equal(one, other[::-1])
 
 
 def test_the_filter_refuses_what_is_no_vdi(expected_messages):

@@ -187,16 +187,19 @@ def whole_extent(information: Any) -> tuple[int, ...] | None:
 
 
 def announce(
-    outputs: Any, window_size: tuple[int, int], scalars: tuple[int, int] = (VTK_UNSIGNED_INT, 1)
+    outputs: Any,
+    window_size: tuple[int, int],
+    scalars: tuple[int, int] = (VTK_UNSIGNED_INT, 1),
+    depth: int = 1,
 ) -> None:
-    """Tell the pipeline that an image of one point per pixel will come.
+    """Tell the pipeline that an image of one point per pixel, or ``depth`` of them, will come.
 
     ``scalars`` are VTK's number of a type, and components: those of the form of a VDI by default.
     VTK's filters of images write as many as they were told into what they allocate.
     """
     width, height = window_size
     information = outputs.GetInformationObject(0)
-    extent = (0, width - 1, 0, height - 1, 0, 0)
+    extent = (0, width - 1, 0, height - 1, 0, depth - 1)
     information.Set(vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT(), extent, 6)
     information.Set(vtkImageData.SPACING(), (1.0, 1.0, 1.0), 3)
     information.Set(vtkImageData.ORIGIN(), (0.0, 0.0, 0.0), 3)

@@ -7,19 +7,26 @@ for first.
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from vtkmodules.vtkCommonCore import VTK_FLOAT, VTK_UNSIGNED_CHAR
 from vtkmodules.vtkCommonDataModel import vtkImageData
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, accessors, whole_extent
+from pyvista_vdi.vtk_pipeline.filters.algorithm import (
+    Algorithm,
+    accessors,
+    announce,
+    ask_for_all,
+    whole_extent,
+)
 from pyvista_vdi.vtk_pipeline.filters.convert import (
     as_numpy,
     description_of,
@@ -36,6 +43,9 @@ DESCRIPTION = "vdi_dense"
 COUNT = "count"
 
 _COLOR, _DEPTH, _OPTICAL_DEPTH = "color", "depth", "optical_depth"
+
+#: VTK's number of the type of ``color``, and components; of bytes and exact.
+SCALARS = {False: (VTK_UNSIGNED_CHAR, 4), True: (VTK_FLOAT, 3)}
 
 #: Bytes of a point: two depths and an optical depth, float32, and RGBA bytes or RGB float32.
 _BYTES = {False: 16, True: 24}
@@ -79,7 +89,7 @@ def vdi_to_dense_image(
     """
     vdi = as_vdi(vdi)
     counts = vdi.counts.ravel()
-    longest = max(1, int(counts.max(initial=0)))
+    longest = longest_list(counts)
     if max_supersegments is not None:
         if max_supersegments < longest:
             raise InvalidArgumentError(
@@ -224,12 +234,20 @@ class VDIToDenseImage(Algorithm):
     )
 
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Announce the lists; how long the longest is, only the data tell."""
+        """Announce the points; how many along z, only the data tell: they are made for that."""
         extent = whole_extent(inputs[0].GetInformationObject(0))
         if extent is not None:
-            whole = (*extent[:4], 0, (self._max_supersegments or 1) - 1)
-            key = vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
-            outputs.GetInformationObject(0).Set(key, whole, 6)
+            size = (extent[1] - extent[0] + 1, extent[3] - extent[2] + 1)
+            announce(outputs, size, SCALARS[self._exact], self._points_along_z(inputs))
+        return 1
+
+    def _points_along_z(self, inputs: Any) -> int:
+        if self._max_supersegments is not None:
+            return self._max_supersegments
+        port = self.GetInputConnection(0, 0)
+        port.GetProducer().GetExecutive().Update(port.GetIndex())
+        with contextlib.suppress(InvalidVDIError):  # _execute says it
+            return longest_list(vdi_from_image(vtkImageData.GetData(inputs[0], 0)).counts)
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
@@ -237,7 +255,15 @@ class VDIToDenseImage(Algorithm):
         dense = vdi_to_dense_image(
             vdi, exact=self._exact, max_supersegments=self._max_supersegments
         )
+        width, height, depth = dense.GetDimensions()
+        announce(outputs, (width, height), SCALARS[self._exact], depth)
+        ask_for_all([outputs])
         vtkImageData.GetData(outputs, 0).ShallowCopy(dense)
+
+
+def longest_list(counts: NDArray[Any]) -> int:
+    """Return the supersegments of the longest list, at least 1."""
+    return max(1, int(counts.max(initial=0)))
 
 
 def _rgba_bytes(vdi: VDI) -> NDArray[np.uint8]:

@@ -75,7 +75,7 @@ class VDIToImage(Algorithm):
         self._window_size: tuple[int, int] | None = None
         self._device: Any = None
         self._vdi: VDI | None = None
-        self._vdi_of: tuple[Any, int] | None = None
+        self._vdi_of: tuple[str, int] | None = None
 
     def SetCamera(self, camera: Any, model_transform: ArrayLike | None = None) -> None:
         """Set the new view V_N.
@@ -172,7 +172,9 @@ class VDIToImage(Algorithm):
 
     def _read(self, image: vtkImageData) -> VDI:
         """Return the VDI; the same object as long as it is the same (it is on the device)."""
-        key = (image, image.GetMTime()) if is_vdi_image(image) else None
+        # Not the image itself: before 9.7 VTK frees a node of its table of wrappers twice where an
+        # algorithm's last attribute goes that is data (vtkPythonUtil::FindObject)
+        key = (image.GetAddressAsString(""), image.GetMTime()) if is_vdi_image(image) else None
         if self._vdi is None or key is None or key != self._vdi_of:
             self._vdi = vdi_from_image(image)
             self._vdi_of = key
