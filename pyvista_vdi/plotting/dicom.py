@@ -62,11 +62,10 @@ def slices_of(folder: Path) -> list[Slice]:
     found, damaged = [], []
     for path in files:
         try:
-            one = read_slice(path)
+            if (one := read_slice(path)) is not None:
+                found.append(one)
         except InvalidVolumeError as error:
             damaged.append(error)
-        else:
-            found += [] if one is None else [one]
     if not found:
         if damaged:
             raise damaged[0]

@@ -326,7 +326,7 @@ def vdi_from_image(image: Any) -> VDI:
         )
     field = image.GetFieldData()
     about = view_from_description(image, DESCRIPTION)
-    offsets = offsets_of(_counts(image))
+    offsets = offsets_of(counts_of(image))
     arrays: dict[str, Any] = {name: _ragged(field, name, int(offsets[-1])) for name in _RAGGED}
     return VDI(window_size=image.GetDimensions()[:2], offsets=offsets, **arrays, **about)
 
@@ -358,7 +358,7 @@ def offsets_of(counts: NDArray[Any]) -> NDArray[np.uint64]:
     return offsets
 
 
-def _counts(image: vtkImageData) -> NDArray[Any]:
+def counts_of(image: vtkImageData) -> NDArray[Any]:
     """Return the supersegments of each list, checked; nothing is allocated for a window alone."""
     array = image.GetPointData().GetArray(COUNT)
     if array is None:

@@ -24,11 +24,11 @@ from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     Algorithm,
     accessors,
     announce,
-    ask_for_all,
     whole_extent,
 )
 from pyvista_vdi.vtk_pipeline.filters.convert import (
     as_numpy,
+    counts_of,
     description_of,
     has_description,
     offsets_of,
@@ -247,7 +247,7 @@ class VDIToDenseImage(Algorithm):
         port = self.GetInputConnection(0, 0)
         port.GetProducer().GetExecutive().Update(port.GetIndex())
         with contextlib.suppress(InvalidVDIError):  # _execute says it
-            return longest_list(vdi_from_image(vtkImageData.GetData(inputs[0], 0)).counts)
+            return longest_list(counts_of(vtkImageData.GetData(inputs[0], 0)))
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
@@ -255,9 +255,6 @@ class VDIToDenseImage(Algorithm):
         dense = vdi_to_dense_image(
             vdi, exact=self._exact, max_supersegments=self._max_supersegments
         )
-        width, height, depth = dense.GetDimensions()
-        announce(outputs, (width, height), SCALARS[self._exact], depth)
-        ask_for_all([outputs])
         vtkImageData.GetData(outputs, 0).ShallowCopy(dense)
 
 
