@@ -10,6 +10,7 @@ import pytest
 
 pytest.importorskip("distributed", reason="dask.distributed is not installed (extra: dask)")
 
+import dask
 import dask.array as da
 from distributed import Client, LocalCluster
 from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
@@ -20,6 +21,8 @@ from pyvista_vdi.large.generate import generate_chunked
 from pyvista_vdi.large.on_dask import generate_on_dask
 from pyvista_vdi.large.rows import balanced
 
+#: Seconds within which a worker starts on the busiest machine; more is a worker that never does.
+STARTED = 120
 ARRAYS = ("offsets", "front", "back", "color", "optical_depth")
 
 
@@ -27,6 +30,9 @@ ARRAYS = ("offsets", "front", "back", "color", "optical_depth")
 def client(tmp_path_factory):
     folder = tmp_path_factory.mktemp("dask")
     with (
+        # Else a worker that is missing this long after it was killed once, 15 seconds, is given up
+        # for good, even where it was back in between and was killed again
+        dask.config.set({"distributed.deploy.lost-worker-timeout": "1 hour"}),
         LocalCluster(
             n_workers=2,
             threads_per_worker=1,
@@ -123,10 +129,10 @@ def kill_at(client, fraction):
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes are killed by SIGKILL")
 def test_a_killed_worker_changes_nothing(client, scene, expected, fraction):
     arguments, options = scene
-    client.wait_for_workers(2)
+    client.wait_for_workers(2, timeout=STARTED)
     vdi = generate_on_dask(*arguments, client=client, progress=kill_at(client, fraction), **options)
     check_same(vdi, expected)
-    client.wait_for_workers(2)
+    client.wait_for_workers(2, timeout=STARTED)
 
 
 def test_cancelled_at_once(client, scene):
@@ -185,7 +191,7 @@ def test_workers_without_a_device_are_named(client, scene, expected):
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes are killed by SIGKILL")
 def test_nobody_waits_for_workers_that_are_gone(client, scene):
     arguments, options = scene
-    client.wait_for_workers(2)
+    client.wait_for_workers(2, timeout=STARTED)
     one = list(client.scheduler_info()["workers"])[:1]
     pid = next(iter(client.run(os.getpid, workers=one).values()))
     alive = [True]
@@ -197,7 +203,7 @@ def test_nobody_waits_for_workers_that_are_gone(client, scene):
 
     with pytest.raises(DeviceError, match=f"are gone: {one[0]}"):
         generate_on_dask(*arguments, client=client, workers=one, progress=progress, **options)
-    client.wait_for_workers(2)
+    client.wait_for_workers(2, timeout=STARTED)
 
 
 def test_rows_are_balanced_by_what_is_in_them():

@@ -606,3 +606,20 @@ def test_methods_from_a_table_say_what_they_do():
         assert method.__name__ == name
         assert list(inspect.signature(method).parameters) == arguments
         assert method.__doc__.startswith(doc)
+
+
+def test_a_source_holds_properties_and_cameras_in_vtk_alone():
+    """VTK before 9.7 frees memory twice where a gone source's attributes are the last to."""
+    prop, camera = red_property(), camera_at(5, 4, 3)
+    source = ready_source(camera=camera)
+    source.SetVolumeProperty(prop)
+    source.TrackCameraOn()
+    held = vars(source), vars(source._given), *source._observed
+    for thing in (prop, camera, prop.GetScalarOpacity()):
+        assert not any(by is each for by in gc.get_referrers(thing) for each in held)
+    address = prop.GetAddressAsString("")
+    del prop, camera, thing
+    gc.collect()
+    assert isinstance(source.GetVolumeProperty(), pv.VolumeProperty)
+    assert source.GetVolumeProperty().GetAddressAsString("") == address
+    assert source.GetVDI() is not None

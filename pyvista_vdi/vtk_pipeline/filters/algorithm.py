@@ -8,7 +8,12 @@ from operator import attrgetter
 from typing import Any
 
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
-from vtkmodules.vtkCommonCore import VTK_UNSIGNED_INT, vtkOutputWindow, vtkWeakReference
+from vtkmodules.vtkCommonCore import (
+    VTK_UNSIGNED_INT,
+    vtkCollection,
+    vtkOutputWindow,
+    vtkWeakReference,
+)
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
@@ -160,6 +165,23 @@ def pair(
         method.__doc__ = doc
     set_it.__signature__ = signature  # type: ignore[attr-defined]
     return set_it, get_it
+
+
+class Held:
+    """A VTK object that an attribute keeps alive in C++ alone: what the user hands to an algorithm.
+
+    Before 9.7 VTK frees a node of its table of wrappers twice (``vtkPythonUtil::FindObject``)
+    where the attributes of an algorithm that is gone are the last in Python to hold an object
+    of a Python class, such as a ``pyvista.VolumeProperty``, that lives on in C++.
+    """
+
+    def __init__(self, thing: Any) -> None:
+        self._holder = vtkCollection()
+        self._holder.AddItem(thing)
+
+    def get(self) -> Any:
+        """Return the object."""
+        return self._holder.GetItemAsObject(0)
 
 
 def watch(

@@ -280,7 +280,7 @@ class VDISource(SourceSettings):
             for what, setter, value in (
                 ("camera", "SetCamera", camera),
                 ("window size", "SetWindowSize", window_size),
-                ("volume property", "SetVolumeProperty", self._property),
+                ("volume property", "SetVolumeProperty", self.GetVolumeProperty()),
             )
             if value is None
         ]
@@ -289,7 +289,7 @@ class VDISource(SourceSettings):
         assert camera is not None
         assert window_size is not None
         volume = self._read(image)
-        table = transfer_function_from_property(self._property, rgba=volume.rgba)
+        table = transfer_function_from_property(self.GetVolumeProperty(), rgba=volume.rgba)
         lights = self.GetLights() if table.shading else Lights()
         options = replace(self._options, lights=lights)
         return Request(

@@ -19,7 +19,14 @@ from pyvista_vdi.model.checks import as_float, not_taken
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial
-from pyvista_vdi.vtk_pipeline.filters.algorithm import DEVICE, Algorithm, accessors, pair, watch
+from pyvista_vdi.vtk_pipeline.filters.algorithm import (
+    DEVICE,
+    Algorithm,
+    Held,
+    accessors,
+    pair,
+    watch,
+)
 from pyvista_vdi.vtk_pipeline.filters.convert import require_image, require_image_port
 from pyvista_vdi.vtk_pipeline.filters.properties import (
     color_function,
@@ -89,8 +96,8 @@ class SourceSettings(Algorithm):
         self._device: Any = None
         self._lights: Lights | None = None
         self._lit_by = vtkWeakReference()
-        self._property: vtkVolumeProperty | None = None
-        self._observed: list[tuple[Any, int]] = []
+        self._property: Held | None = None
+        self._observed: list[tuple[Held, int]] = []
         self._progress: Progress | None = None
         self._metadata: dict[str, Any] = {}
 
@@ -234,14 +241,14 @@ class SourceSettings(Algorithm):
         """
         if prop is not None:
             transfer_function_from_property(prop, rgba=not prop.GetIndependentComponents())
-        if prop is not self._property:
-            self._property = prop
+        if prop is not self.GetVolumeProperty():
+            self._property = None if prop is None else Held(prop)
             self._observe_property()
             self.Modified()
 
     def GetVolumeProperty(self) -> vtkVolumeProperty | None:
         """Return the volume property."""
-        return self._property
+        return None if self._property is None else self._property.get()
 
     def SetLights(self, lights: Any) -> None:
         """Set what a shaded volume is lit by.
@@ -371,9 +378,9 @@ class SourceSettings(Algorithm):
     def _observe_property(self) -> None:
         """Let changes to the property or its functions reach this algorithm's time stamp."""
         for watched, tag in self._observed:
-            watched.RemoveObserver(tag)
+            watched.get().RemoveObserver(tag)
         self._observed = []
-        prop = self._property
+        prop = self.GetVolumeProperty()
         if prop is None:
             return
         functions = [color_function(prop), prop.GetScalarOpacity()]
@@ -384,5 +391,6 @@ class SourceSettings(Algorithm):
             source._observe_property()  # its functions may be others now
             source.Modified()
 
-        self._observed = [(prop, watch(prop, self, changed))]
-        self._observed += [(each, watch(each, self, Algorithm.Modified)) for each in functions]
+        self._observed = [(Held(prop), watch(prop, self, changed))]
+        for each in functions:
+            self._observed.append((Held(each), watch(each, self, Algorithm.Modified)))

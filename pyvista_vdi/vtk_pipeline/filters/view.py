@@ -12,6 +12,7 @@ from vtkmodules.vtkCommonCore import vtkWeakReference
 
 from pyvista_vdi.model import view as model_view
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.vtk_pipeline.filters.algorithm import Held
 
 
 def as_array(matrix: Any) -> NDArray[np.float64]:
@@ -53,12 +54,17 @@ class TrackedCamera:
     """
 
     def __init__(self, camera: Any, model_transform: ArrayLike | None, source: Any) -> None:
-        self.camera = camera
+        self._held = Held(camera)
         self.model_transform = model_transform
         self._pose = _pose(camera)
         self._source = vtkWeakReference()
         self._source.Set(source)
         self._tag: int | None = None
+
+    @property
+    def camera(self) -> Any:
+        """The ``vtkCamera``."""
+        return self._held.get()
 
     def watch(self, moved: Callable[[Any], None] | None) -> None:
         """Call ``moved(source)`` whenever the camera has moved; ``None`` ends it."""
