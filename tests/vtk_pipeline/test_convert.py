@@ -32,7 +32,13 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.lighting import Light, Lights, Shading
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image, volume_from_vtk
+from pyvista_vdi.vtk_pipeline.filters.convert import (
+    as_numpy,
+    to_vtk,
+    vdi_from_image,
+    vdi_to_image,
+    volume_from_vtk,
+)
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 
 
@@ -526,3 +532,27 @@ def test_what_is_no_property_is_refused():
         transfer_function_from_property(vtkMath())
     with pytest.raises(InvalidArgumentError, match="opacity function has no points"):
         transfer_function_from_property(linear_property(nodes=()))
+
+
+def test_values_do_not_keep_an_array_of_vtk_that_has_attributes():
+    """VTK before 9.7 frees memory twice where a gone filter's attributes are the last to."""
+    numbers = np.arange(12, dtype=np.float32).reshape(4, 3)
+    array = to_vtk("values", numbers)
+    values = as_numpy(array)
+    values.flags.writeable = False
+    assert numbers.flags.writeable
+    assert np.shares_memory(values, numbers)
+    assert values.shape == numbers.shape
+    if vars(array):
+        assert not any(held is array for held in bases(values))
+    array.SetNumberOfTuples(2)  # of the same memory
+    np.testing.assert_array_equal(as_numpy(array), numbers[:2])
+    array.SetNumberOfTuples(40)  # of other memory
+    assert as_numpy(array).shape == (40, 3)
+
+
+def bases(values):
+    """What an array of NumPy keeps alive."""
+    while values is not None:
+        yield values
+        values = values.obj if isinstance(values, memoryview) else getattr(values, "base", None)

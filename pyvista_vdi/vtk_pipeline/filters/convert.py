@@ -206,12 +206,17 @@ def _at_points(image: vtkImageData, array: vtkDataArray) -> vtkDataArray:
 def as_numpy(array: vtkDataArray) -> NDArray[Any]:
     """Return the values of VTK's array, sharing its memory where it has one."""
     try:
-        return vtk_to_numpy(array)  # type: ignore[no-any-return]
+        values: NDArray[Any] = vtk_to_numpy(array)
     except (AttributeError, TypeError, ValueError):
         # Implicit arrays (constant, affine, ...) have no memory of their own
         plain = vtkDataArray.CreateDataArray(array.GetDataType())
         plain.DeepCopy(array)
         return vtk_to_numpy(plain)  # type: ignore[no-any-return]
+    # NumPy's own array rather than one that keeps VTK's, which has an attribute: see Held
+    lent = getattr(array, "_numpy_reference", None)
+    if lent is not None and lent.dtype == values.dtype and lent.ctypes.data == values.ctypes.data:
+        return lent.reshape(values.shape) if lent.size == values.size else values
+    return values
 
 
 def volume_to_image(volume: Volume, name: str | None = None) -> vtkImageData:
