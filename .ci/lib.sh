@@ -302,28 +302,30 @@ run_documented_code() {
         --ignore-glob='/*/pyvista_vdi/paraview/*' --pyargs pyvista_vdi
 }
 
-# The commands of the README, to the letter and in full, in a clone of their own.
-run_readme_commands() {
-    copy_checkout_to_clone "$work/clone"
-    cd "$work/clone"
-    readme_command "main command" >"$work/main-command"
-    readme_command "test command" >"$work/test-command"
-    cat "$work/main-command"
-    bash -euo pipefail "$work/main-command"
+# The README's first command, to the letter, in a clone of its own.
+run_main_command() {
+    run_readme_command "main command"
     [[ -n $(find out -type f -size +0) ]] || {
         log "the README's first command wrote nothing into out/"
         return 1
     }
     ls -l out
-    rm -rf .venv
-    cat "$work/test-command"
-    # To the letter and in full: tests that find the installed package elsewhere may not in a checkout
-    bash -euo pipefail "$work/test-command"
 }
 
-copy_checkout_to_clone() {
-    mkdir -p "$1"
-    cp -r "$work/source/." "$1"
+# And its second, in full: tests that find the installed package elsewhere may not in a checkout.
+run_test_command() {
+    run_readme_command "test command"
+}
+
+# run_readme_command NAME: in a new clone, where it stays.
+run_readme_command() {
+    local clone="$work/${1// /-}" command
+    mkdir -p "$clone"
+    cp -r "$work/source/." "$clone"
+    cd "$clone"
+    command=$(readme_command "$1")
+    log "$command"
+    bash -euo pipefail -c "$command"
 }
 
 # Print the fenced block that follows the line  <!-- NAME -->  in README.md.
@@ -337,6 +339,10 @@ readme_command() {
         log "README.md has no fenced block after <!-- $1 -->" >&2
         return 1
     }
+}
+
+create_test_environment() {
+    create_environment "$work/venv" "$python" "[test,dev]"
 }
 
 # The oldest interpreter with, of every dependency, the oldest version that pyproject.toml allows.
