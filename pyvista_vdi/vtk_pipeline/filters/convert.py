@@ -213,10 +213,13 @@ def as_numpy(array: vtkDataArray) -> NDArray[Any]:
         plain.DeepCopy(array)
         return vtk_to_numpy(plain)  # type: ignore[no-any-return]
     # NumPy's own array rather than one that keeps VTK's, which has an attribute: see Held
-    lent = getattr(array, "_numpy_reference", None)
-    if lent is not None and lent.dtype == values.dtype and lent.ctypes.data == values.ctypes.data:
-        return lent.reshape(values.shape) if lent.size == values.size else values
-    return values
+    lent = getattr(array, "_numpy_reference", values)
+    same = (lent.dtype, lent.size, lent.ctypes.data) == (
+        values.dtype,
+        values.size,
+        values.ctypes.data,
+    )
+    return lent.reshape(values.shape) if same else values
 
 
 def volume_to_image(volume: Volume, name: str | None = None) -> vtkImageData:
