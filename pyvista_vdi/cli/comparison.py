@@ -55,8 +55,8 @@ def compare(options: argparse.Namespace) -> int:
         device=options.device,
         name=stem,
     )
-    files = output_files(options, stem, "vdi", "png", "json")
     volume = read_volume(options)
+    files = output_files(options, stem, "vdi", "png", "json")
     with measuring("comparing") as bar:
         report, vdi, images = measure(volume, settings, bar)
     vdi.save(files["vdi"], compression=options.compression)

@@ -44,9 +44,9 @@ def tradeoff(options: argparse.Namespace) -> int:
     name = options.name or volume_name(options)
     if Path(name).name != name:
         raise InvalidArgumentError(f"--name becomes a file's, without a folder; got {name!r}")
+    volume = read_volume(options)
     files = output_files(options, f"tradeoff-{name}", "json", "md", "png")
     require_new(files["json"], options)
-    volume = read_volume(options)
     vtk = has_vtk(options)
     with measuring("tradeoff", files["json"]) as bar:
         found = measure_tradeoff(

@@ -255,6 +255,12 @@ def test_mistakes_that_need_pyvista_to_be_found(arguments, message, folder, caps
     assert sorted(folder.iterdir()) == before
 
 
+@pytest.mark.parametrize("verb", ["compare", "tradeoff"])
+def test_a_volume_that_is_not_there_leaves_no_folder(verb, tmp_path, capsys):
+    assert "none.nrrd" in complaint(capsys, verb, tmp_path / "none.nrrd", "--out", tmp_path / "out")
+    assert not [*tmp_path.iterdir()]
+
+
 def test_a_device_that_is_absent(folder, capsys, default_runtime):
     message = complaint(
         capsys, "render", folder / "a.vdi", "-o", folder / "x.png", "--device", "no such"
