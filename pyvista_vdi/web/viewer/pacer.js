@@ -12,6 +12,10 @@ const FEW_BELOW = 0.25, FEW_ABOVE = 0.45;
 const FEW_COST = 0.8;
 /** Share of a frame by which its size may miss the goal before it is changed. */
 const DEAD_BAND = 0.25;
+/** How many times as high as the band before a band may be. */
+const MOST_GROWTH = 4;
+/** A pixel's time above so many times that of the frame before held something else: compiling. */
+const STALE = 2;
 
 /** Targets to draw into, and how many pixels they can have. */
 export class Pacer {
@@ -60,24 +64,27 @@ export class Pacer {
    */
   async inBands(target, width, height, paint, goesOn = () => true) {
     const { gl } = this;
-    const rows = this.#perPixel === null ? height
-      : Math.max(1, Math.floor(BAND_SECONDS / (this.#perPixel * width)));
+    let rows = this.#perPixel === null ? height : BAND_SECONDS / (this.#perPixel * width);
     let seconds = 0;
-    for (let row = 0; row < height; row += rows) {
+    for (let row = 0, high; row < height; row += high) {
       if (gl.isContextLost() || (row > 0 && !goesOn())) return false;
+      high = Math.min(Math.max(1, Math.floor(rows)), height - row);
       const began = performance.now();
       gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
       gl.enable(gl.SCISSOR_TEST);
-      gl.scissor(0, row, width, Math.min(rows, height - row));
+      gl.scissor(0, row, width, high);
       gl.clearColor(0, 0, 0, 0);
       gl.clear(gl.COLOR_BUFFER_BIT);
       paint(target, row === 0);
       gl.disable(gl.SCISSOR_TEST);
       await finished(gl);
-      seconds += (performance.now() - began) / 1000;
+      const took = (performance.now() - began) / 1000;
+      seconds += took;
+      // By this band's time: the frame before may have waited for a compiler
+      rows = high * Math.min(BAND_SECONDS / took, MOST_GROWTH);
     }
-    const perPixel = seconds / (width * height);
-    this.#perPixel = this.#perPixel === null ? perPixel : 0.5 * (this.#perPixel + perPixel);
+    const perPixel = seconds / (width * height), before = this.#perPixel ?? Infinity;
+    this.#perPixel = before > STALE * perPixel ? perPixel : 0.5 * (before + perPixel);
     return true;
   }
 
