@@ -265,6 +265,7 @@ def test_a_volume_too_large_is_named(runtime, make, draw, monkeypatch):
     assert runtime.allocated == before
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 def test_working_memory_too_small_is_named(runtime, make, monkeypatch, share):
     """Wherever the memory ends, the message names a buffer and a remedy, and all is given back."""
@@ -307,6 +308,7 @@ def test_a_window_beyond_memory_is_refused_before_anything_is_drawn(
     assert runtime.allocated == before
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.float32, np.float64])
 @pytest.mark.parametrize(("window", "limit"), [((64, 48), 20), ((37, 5), 1), ((16, 16), 300)])
 def test_the_estimate_bounds_what_is_taken(runtime, make, monkeypatch, dtype, window, limit):
@@ -360,6 +362,7 @@ def test_only_false_cancels(make, answer):
     assert isinstance(make(progress=lambda fraction: answer), VDI)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("last", "percent"), [(1, "0%"), (2, "44%"), (4, "100%")])
 def test_cancelling(runtime, make, sliced, last, percent):
     make()
@@ -377,6 +380,7 @@ def test_cancelling(runtime, make, sliced, last, percent):
     assert runtime.allocated == before
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
 @pytest.mark.parametrize("at", [0.0, 4 / 9, 1.0])
 def test_an_interrupt_leaves_nothing_allocated(runtime, make, sliced, at, error):

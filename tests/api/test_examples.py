@@ -105,6 +105,7 @@ def test_same_grid_as_pyvista_reads(name):
     _compare_with_pyvista(name)
 
 
+@pytest.mark.every(3)
 @pytest.mark.real_data
 @pytest.mark.parametrize(
     "name",

@@ -102,6 +102,7 @@ print(test_determinism.digest(get_runtime(info)))
 """
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("threads", ["all", "1"])
 def test_across_processes_and_thread_counts(runtime, threads):
     """CPU drivers start a thread per processor that they may run on."""
@@ -127,6 +128,7 @@ def test_across_processes_and_thread_counts(runtime, threads):
     assert run.stdout.strip() == digest(runtime)
 
 
+@pytest.mark.slow
 def test_across_implementations(runtime, worst):
     """Each of two drivers' images is within the bound of the oracle's range; so are they of each
     other, but for pixels whose ray runs along a border.

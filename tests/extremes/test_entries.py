@@ -56,6 +56,7 @@ def test_the_border(reach, points, far):
     assert bool(numerics.entries(reach, points)) is far
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("lit", [False, True])
 @pytest.mark.parametrize(("thinness", "far"), [(123, False), (125, True)])
 def test_the_bound_holds_on_both_sides_of_the_border(runtime, worst, thinness, far, lit):
@@ -96,6 +97,7 @@ def test_needles(runtime, worst):
     check_views(runtime, worst, vdi, turned(camera, volume, (8,), zoom=True), least_drawn=0)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("criterion", strategies.criteria())
 def test_supersegments_of_far_entries_are_ordered_and_have_a_thickness(runtime, worst, criterion):
     """Steps of few units in the last place of their depth, which rounding could make nothing."""
@@ -173,7 +175,7 @@ def thin_slab(thickness, optical_depth=1.0, parallel=False):
     )  # fmt: skip
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("precision", ["exact", "16-byte"])
 @pytest.mark.parametrize("parallel", [False, True])
 @pytest.mark.parametrize(
@@ -202,6 +204,7 @@ def test_lists_far_away_but_not_thin_are_computed_in_float32_alone(runtime):
     assert "DOUBLE_FLOAT_RAYS" not in PreparedVDI(runtime, vdi).defines
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("precision", ["exact", "16-byte", "8-byte"])
 @pytest.mark.parametrize("kind", ["near", "around", "parallel"])
 def test_any_vdi_may_be_drawn_by_depths_relative_to_the_ray(

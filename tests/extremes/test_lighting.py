@@ -62,6 +62,7 @@ WORLDS = [(1e-9, 0), (1e9, 0), (1, 1e7), (1e-9, 1e7), (1e9, 1e7)]
 QUICK = {(1e-9, 1e7), (1e9, 1e7)}
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("look", LOOKS)
 @pytest.mark.parametrize("lit_by", ["headlight", "lamps"])
 @pytest.mark.parametrize(
@@ -76,7 +77,7 @@ def test_worlds(runtime, worst, scale, offset, lit_by, look):
     check(runtime, worst, volume, function, None if lit_by == "headlight" else lamps(volume))
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(8)
 @pytest.mark.parametrize(
     ("lit_by", "look"),
     [
@@ -129,7 +130,7 @@ def test_a_light_inside_the_volume(runtime, worst, attenuation):
     check(runtime, worst, volume, transfer(shading=SHINY), Lights((bulb,)))
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("look", ["plain", *LOOKS])
 @pytest.mark.parametrize(
     ("scale", "offset"), [(1e-9, 1e7), pytest.param(1e9, 1e7, marks=pytest.mark.slow)]
@@ -152,6 +153,7 @@ def test_rgba_of_one_opacity(runtime, worst):
         check(runtime, worst, Volume(rgba), function)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("power", [0.0, 1e-3, 1e3, 1e6])
 def test_specular_powers(runtime, worst, power):
     """From a highlight everywhere to one that hardly a sample is in."""

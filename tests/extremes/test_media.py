@@ -128,6 +128,7 @@ def table(kind):
     )
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
 @pytest.mark.parametrize("kind", ["one entry", "step at a bin edge", "all zero", "all one"])
 def test_transfer_functions(runtime, worst, kind, interpolation):
@@ -222,6 +223,7 @@ def test_several_vdis_of_nearly_transparent_supersegments(runtime, worst):
     assert error <= 2e-6
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("opacity", [1e-6, 0.01, 0.5, 0.9])
 @pytest.mark.parametrize(
     "steps", [1000, 8000, 10_000, pytest.param(MOST_STEPS, marks=pytest.mark.slow)]

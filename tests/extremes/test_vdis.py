@@ -83,7 +83,7 @@ def test_touching_supersegments_leave_no_gap(runtime, worst, parallel):
         np.testing.assert_allclose(*images, atol=2e-5)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("origin", [9.0, 0.0])
 @pytest.mark.parametrize("parallel", [False, True])
 @pytest.mark.parametrize(

@@ -102,6 +102,7 @@ def test_rays_along_axes_borders_and_corners(runtime, worst, parallel):
         check_views(runtime, worst, vdi, [along(vdi, first, last)], size=(1, 1), least_drawn=1)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("roll", [0, 90, 33])
 @pytest.mark.parametrize("parallels", list(itertools.product([False, True], repeat=2)), ids=str)
 def test_parallel_in_both_roles_right_angles_and_roll(runtime, worst, parallels, roll):

@@ -98,6 +98,7 @@ SCALARS = {
 }
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", SCALARS)
 def test_scalars(runtime, worst, name):
     """Every type's whole range, and ranges that float32 has few digits for."""
@@ -112,6 +113,7 @@ def outlying(dtype, value):
     return Volume(array)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
 @pytest.mark.parametrize(
@@ -150,7 +152,7 @@ def test_a_range_of_one_scalar(runtime, worst, at, dtype):
     check(runtime, worst, Volume(cube), function)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("dtype", ["float32", "float64", "int32"])
 @pytest.mark.parametrize("look", ["plain", "gradient", "shaded"])
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])

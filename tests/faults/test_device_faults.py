@@ -77,6 +77,7 @@ def test_memory_that_runs_out_at_each_allocation(runtime, driver, operation, cod
     assert same(operation(runtime), expected)
 
 
+@pytest.mark.every(4)
 @every_operation
 @pytest.mark.parametrize(
     ("code", "error", "remedy"),
@@ -259,6 +260,7 @@ class _LineInterrupt:
 LONG = [pytest.mark.slow, pytest.mark.timeout(3600)]
 
 
+@pytest.mark.every(3)
 @every_operation
 @pytest.mark.parametrize("samples", [8, pytest.param(1000, marks=LONG)])
 def test_ctrl_c_at_lines_of_the_package(default_runtime, operation, samples):

@@ -130,6 +130,7 @@ def disk(monkeypatch):
     return Disk
 
 
+@pytest.mark.every(3)
 @formats
 @pytest.mark.parametrize("old", [True, False])
 def test_a_disk_that_fills_at_each_write(suffix, old, disk, tmp_path):
@@ -172,6 +173,7 @@ def test_a_disk_that_fails_at_the_last_steps(suffix, step, monkeypatch, tmp_path
     assert names_in(tmp_path) == [path.name]
 
 
+@pytest.mark.every(3)
 @posix
 @formats
 def test_a_limit_of_the_size_of_files(suffix, tmp_path):
@@ -289,6 +291,7 @@ def killed_at(moment, path):
     return said
 
 
+@pytest.mark.every(3)
 @posix
 @formats_in_processes
 @pytest.mark.parametrize(
@@ -330,6 +333,7 @@ while not select.select([sys.stdin], [], [], 0)[0]:
 """
 
 
+@pytest.mark.every(3)
 @formats_in_processes
 def test_two_processes_that_save_to_one_name(suffix, tmp_path):
     """Whoever reads meanwhile finds one of their files, whole."""

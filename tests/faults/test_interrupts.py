@@ -87,6 +87,7 @@ def check_interrupted(capsys, status):
     assert "Exception ignored" not in err
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("verb", ON_A_DEVICE)
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_ctrl_c_at_a_use_of_the_device(verb, share, here, driver, capsys, default_runtime):
@@ -176,6 +177,7 @@ for moment in json.loads(moments):
 """
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("verb", "moments"),
     [

@@ -132,6 +132,7 @@ print("the same")
 """
 
 
+@pytest.mark.slow
 def test_two_plotters_in_two_threads(default_runtime):
     """Each thread makes, uses and closes its own window; the VDI is shared."""
     pytest.importorskip("pyvista")

@@ -77,6 +77,7 @@ def check_kept(before, after, limit, name):
     assert np.abs(seen[0] - seen[1]).max() <= 8 * n * EPS, name
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("limit", [1, 2, 5, 20])
 @pytest.mark.parametrize("criterion", EQUAL)
 def test_equal_shares_are_the_references(call, criterion, limit):
@@ -128,6 +129,7 @@ def test_empty_stretches_make_no_supersegment(call):
     np.testing.assert_array_equal(after[:, [FRONT, BACK]], [[0, 1], [19.5, 20]])
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("limit", [1, 2, 5, 20])
 def test_homogeneity_is_the_references(call, limit):
     records = [as_runs(s) for s in random_records(72, 64, 60)]

@@ -33,6 +33,7 @@ def check(monkeypatch, runtime):
     return checked
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("dtype", [np.uint8, np.int8, np.uint16, np.int16])
 @pytest.mark.parametrize("view", VIEWS)
 def test_views_and_types(check, dtype, view):
@@ -40,6 +41,7 @@ def test_views_and_types(check, dtype, view):
     assert vdi.n_supersegments > (100 if view == "past it" else 5000)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.float32])
 @pytest.mark.parametrize("step", [0.5, 1.0])
 def test_linear_samples(check, dtype, step):

@@ -175,6 +175,7 @@ def errors(call, a, b, per_reference=1.0, hidden_weight=0.5):
     )  # fmt: skip
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("per_reference", [0.02, 1.0, 50.0])
 @pytest.mark.parametrize("hidden_weight", [0.0, 0.5, 1.0])
 def test_merge_error_is_the_growth_of_the_sum_of_squares(call, per_reference, hidden_weight):
@@ -332,7 +333,7 @@ def test_make_room(call, limit):
         assert np.mean(long) > limit / 4
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(5)
 @pytest.mark.parametrize("hidden_weight", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("limit", [1, 2, 5, 20])
 def test_merge_to_limit_is_greedy(call, limit, hidden_weight):

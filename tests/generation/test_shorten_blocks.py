@@ -75,6 +75,7 @@ def check_the_same(runtime, records, limit, exactly, **options):
     return expected
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("exactly", [False, True], ids=["room", "exactly"])
 @pytest.mark.parametrize("limit", [1, 2, 7, 20, 52])
 def test_records_of_all_lengths(runtime, limit, exactly):

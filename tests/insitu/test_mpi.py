@@ -71,6 +71,7 @@ def test_what_fails_on_one_rank_is_said_by_all(tmp_path):
     run("failing", tmp_path)
 
 
+@pytest.mark.slow
 @needs_mpi
 def test_a_simulation_writes_a_series_and_single_files(tmp_path):
     run("series", tmp_path)

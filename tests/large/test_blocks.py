@@ -129,6 +129,7 @@ def test_rays_meet_blocks_in_their_order_and_windows(view):
 # -- what is made ---------------------------------------------------------------------------------
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize(
     "cuts", [CUTS[0], *(pytest.param(c, marks=pytest.mark.slow) for c in CUTS[1:])], ids=str
@@ -167,7 +168,7 @@ KINDS = {
 }
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("kind", KINDS)
 def test_pictures_are_those_of_one_piece(runtime, kind):
     """At V_O to the rounding of float32; elsewhere lists are merged a little otherwise at faces.
@@ -196,6 +197,7 @@ def test_pictures_are_those_of_one_piece(runtime, kind):
             assert np.abs(expected - drawn).max() <= 1 / 255
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("criterion", CRITERIA)
 def test_every_criterion(criterion):
     volume = volume_of("uint8")

@@ -97,6 +97,7 @@ def test_four_workers_make_the_same_bytes(scene, expected):
         check_same(generate_on_dask(*arguments, client=four, **options), expected)
 
 
+@pytest.mark.slow
 def test_occlusion_is_the_same_by_workers(client, scene, default_device):
     arguments, options = scene
     options = {**options, "ambient_occlusion": 8.0}

@@ -165,6 +165,7 @@ def test_walk_counts_as_occupied_every_list_in_which_something_is_met(scene):
     assert (walk.occupied < walk.lists).any()  # half of the volume is empty
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("angle", [0.0, 30.0, 170.0])
 def test_a_walk_ends_where_no_light_is_left(scene, angle):
     volume, _, view, _ = scene

@@ -90,7 +90,7 @@ def coloured(volume):
     return Volume(colors, volume.spacing, volume.origin, volume.direction)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(8)
 @pytest.mark.gl
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LIKE_OTHERS)) for n in CASES]

@@ -41,7 +41,7 @@ def cases(kind, number=N_CASES):
         yield f"seed {seed}, view {kind!r}", vdi, *strategies.random_view(rng, vdi, kind)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 @pytest.mark.parametrize("way", WAYS)
 def test_pictures_are_the_oracles(runtime, way, kind):

@@ -222,6 +222,7 @@ def compare(runtime, precision, kind):
     return total(parts)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("precision", PACKED)
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 def test_every_pixel_is_that_of_the_unpacked_vdi(runtime, precision, kind):
@@ -230,7 +231,7 @@ def test_every_pixel_is_that_of_the_unpacked_vdi(runtime, precision, kind):
     assert result.drawn > result.pixels / 10
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(5)
 @pytest.mark.parametrize("precision", PACKED)
 @pytest.mark.parametrize("kind", ["near", "beside", "parallel", "inside"])
 def test_every_mode_draws_as_with_the_unpacked_vdi(runtime, precision, kind):

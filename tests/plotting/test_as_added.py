@@ -75,7 +75,7 @@ def plotter():
     plotter.close()
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize(("arguments", "change"), CHANGES.values(), ids=CHANGES)
 def test_changes_of_the_grid_show_where_add_volume_s_show(arguments, change):
     differences = []
@@ -162,6 +162,7 @@ PROPERTIES = {
 }
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("change", PROPERTIES.values(), ids=PROPERTIES)
 def test_a_copy_s_properties_are_its_own(plotter, change):
     actor = plotter.add_vdi(ramp(), **LOOKS)

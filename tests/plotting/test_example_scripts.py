@@ -103,6 +103,7 @@ def test_dial_example_writes_a_picture_of_three_qualities(tmp_path):
     assert 0 < np.abs(good - balanced).mean() < np.abs(good - fast).mean()
 
 
+@pytest.mark.slow
 def test_interactive_example_writes_an_animation_with_a_new_vdi(tmp_path):
     said, target = run_example("interactive.py", tmp_path)
     # One more where the device is fast enough to make another on the way

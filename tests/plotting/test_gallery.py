@@ -33,6 +33,7 @@ def scripts():
         yield pytest.param(script.stem, marks=marks)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", [*scripts()])
 def test_a_script_writes_its_picture(name, tmp_path, monkeypatch, default_runtime):
     pyvista = pytest.importorskip("pyvista")

@@ -28,7 +28,7 @@ def display():
         yield name
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("case", [case.__name__ for case in plugin_on_screen.CASES])
 def test_on_screen(display, case):
     script = Path(plugin_on_screen.__file__)

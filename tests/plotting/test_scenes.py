@@ -41,6 +41,7 @@ def test_opaque_sphere_half_inside():
     assert_as_vtk(ball_and_sphere)
 
 
+@pytest.mark.slow
 def test_opaque_sphere_that_moves_through_in_50_frames():
     """From before the ball to behind it; nothing else changes, so only the rays' ends do.
 
@@ -414,6 +415,7 @@ def test_other_lights_make_another_vdi():
     plotter.close()
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("shade", [False, True])
 def test_rgba_scalars(shade):
     def coloured_ball():

@@ -226,6 +226,7 @@ def test_a_tilted_gantry_shears_the_volume(tmp_path):
     np.testing.assert_allclose(marked(read(folder)), expected, atol=1e-5)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("kind", [k for k in FORMATS if k != "vti"])
 def test_pictures_of_all_formats_are_the_same(kind, tmp_path, capsys, default_runtime):
     """Through the verbs: generate from the file, render from the side."""

@@ -532,6 +532,7 @@ def resident_bytes():
 RAM_TOLERANCE = 40 * 2**20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [8, pytest.param(200, marks=pytest.mark.slow, id="200-in-a-row")])
 def test_many_regenerations_leave_nothing(runtime, generator, times):
     """Frames of the old VDI meanwhile, and each new one takes its place."""

@@ -95,7 +95,7 @@ def test_which_frames_are_drawn_as_the_aligned_view(runtime, monkeypatch):
     assert drawn_by(first_hit=FirstHit.of(0.5, True)) == "raycast"
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(8)
 @pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize("window", WINDOWS, ids=lambda window: f"{window[0]}x{window[1]}")
 def test_every_pixel_is_its_own_list(runtime, window, precision, monkeypatch):

@@ -30,6 +30,7 @@ def views(vdi):
     yield pvdi.Camera((24, 20, 23), (24, 60, 23), (0, 0, 1))  # from inside
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("n", [2, 5])
 def test_bands_are_the_picture(vdi, n):
     for camera in views(vdi):

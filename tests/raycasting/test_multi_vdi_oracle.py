@@ -125,7 +125,7 @@ def compare_cases(runtime, kind):
     return said, moved, seen, pixels
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("dealt", DEALT)
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 def test_every_pixel_is_within_the_range_of_the_moved_rays(runtime, kind, dealt):
@@ -134,6 +134,7 @@ def test_every_pixel_is_within_the_range_of_the_moved_rays(runtime, kind, dealt)
     assert seen > pixels / 10  # a comparison of nothing with nothing proves nothing
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("dealt", DEALT)
 def test_few_pixels_need_moved_rays(runtime, dealt):
     results = {kind: compare(runtime, kind, dealt) for kind in strategies.VIEWS}
@@ -164,6 +165,7 @@ def test_opaque_depth_and_each_vdi_s_own_clipping_planes(runtime, case):
     assert seen
 
 
+@pytest.mark.every(3)
 @pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize("case", range(4))
 def test_each_vdi_s_own_cropping_and_density(runtime, case):
@@ -217,6 +219,7 @@ def test_the_order_of_the_vdis_changes_no_bit(runtime, count):
     assert len(set(images)) == 1
 
 
+@pytest.mark.every(3)
 @pytest.mark.usefixtures("_dealt")
 def test_passing_by_what_is_empty_changes_no_bit(runtime, monkeypatch):
     monkeypatch.setattr("pyvista_vdi.raycasting.occupancy._WORTHWHILE", np.inf)
@@ -256,6 +259,7 @@ def with_lists(vdi, keep, share=1.0):
     )
 
 
+@pytest.mark.every(5)
 @pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 def test_a_vdi_in_parts_is_the_whole(runtime, kind):
@@ -357,7 +361,7 @@ def side_by_side(rng, count, precisions=("exact",)):
     return placed, (323, 187)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("dealt", strategies.DEALT)
 @pytest.mark.parametrize("precisions", [("exact",), ("exact", "16-byte", "8-byte")])
 def test_where_no_two_are_met_each_is_drawn_as_by_itself(runtime, dealt, precisions, monkeypatch):

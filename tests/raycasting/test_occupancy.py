@@ -109,6 +109,7 @@ def any_matrix(rng, bounds):
     return strategies.camera_around(rng, bounds, transform)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     "view", [perspective, parallel, long_lens, very_long_lens, inside, any_matrix]
 )
@@ -286,7 +287,7 @@ def only_within(rng, vdi):
     )
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 def test_nothing_is_seen_beside_the_occupied_cells(runtime, kind):
     """Pictures by all rays, and where the cells' corners are: V_O in all the ways of above."""

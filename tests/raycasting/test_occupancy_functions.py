@@ -100,6 +100,7 @@ def test_the_form_of_the_depth_coordinate_costs_no_digits(runtime, distance, ori
         assert grid.margin * grid.slabs_per_depth < 1e-3
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("away", [True, False])
 @pytest.mark.parametrize("parallel", [False, True])
 @pytest.mark.parametrize(("distance", "origin"), LENSES)

@@ -156,6 +156,7 @@ def test_the_epipole_is_where_the_eye_of_the_generating_view_is_seen():
     assert u != 0
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     "kind", ["near", "around", "inside", "beside", "behind", "axis", "parallel"]
 )

@@ -50,7 +50,7 @@ def overheard(monkeypatch, vdi, camera, size, pixel):
     return heard[-1]
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(5)
 @pytest.mark.parametrize("kind", VIEWS)
 def test_the_hit_is_the_first_that_the_oracle_meets(kind, monkeypatch):
     hits = 0

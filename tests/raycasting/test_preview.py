@@ -49,6 +49,7 @@ def view_of_solid(parallel):
     return camera.replace(parallel_projection=True, parallel_scale=2.5) if parallel else camera
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("parallel", [False, True])
 @pytest.mark.parametrize("samples", [1, 2, 7, 64])
 @pytest.mark.parametrize("turn", [0.0, 35.0, 90.0, 180.0])

@@ -47,7 +47,7 @@ def compare_cases(runtime, kind):
     return total(parts)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("dealt", strategies.DEALT)
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind, dealt):
@@ -56,6 +56,7 @@ def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind, dealt):
     assert result.drawn > result.pixels / 10  # a comparison of nothing with nothing proves nothing
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("dealt", strategies.DEALT)
 def test_few_pixels_need_a_moved_ray(runtime, dealt, record_property):
     results = {kind: compare(runtime, kind, dealt) for kind in strategies.VIEWS}
@@ -154,6 +155,7 @@ EXTREMES = (
 )
 
 
+@pytest.mark.every(3)
 @pytest.mark.extremes
 @pytest.mark.parametrize("dealt", strategies.DEALT)
 @pytest.mark.parametrize("make", EXTREMES, ids=lambda make: make.__name__)

@@ -389,7 +389,7 @@ def pairs_of_views():
         yield pytest.param(own, new, marks=() if quick else pytest.mark.slow)
 
 
-@pytest.mark.every(5)
+@pytest.mark.every(12)
 @pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize(("generating_view", "name"), list(pairs_of_views()))
 def test_sparse_vdis(runtime, generating_view, name):
@@ -402,7 +402,7 @@ def test_sparse_vdis(runtime, generating_view, name):
         assert passed.drawn > MIN_DRAWN
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("generating_view", GENERATING_VIEWS)
 def test_rays_that_end_early(runtime, generating_view):
     """At opaque geometry, at clipping planes, and where nothing more can be seen."""
@@ -533,6 +533,7 @@ def volumes_and_looks():
             yield pytest.param(name, "soft", (1280, 720), marks=marks)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("name", "look", "size"), [*volumes_and_looks()])
 def test_real_volumes(runtime, name, look, size):
     pytest.importorskip("pyvista")

@@ -47,7 +47,7 @@ def _by_numpy(path, monkeypatch):
         return [(vdi.offsets, vdi.packing, vdi) for vdi in pvdi.read(path)]
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(5)
 @pytest.mark.parametrize("tolerance", [0.0, 0.03])
 @pytest.mark.parametrize("case", CASES)
 def test_kernel_and_numpy_give_the_same_bits(case, tolerance, made, monkeypatch, tmp_path):
@@ -79,7 +79,7 @@ def test_without_the_arrays_in_one_memory(made, tmp_path, monkeypatch):
     assert made[True] == 6
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("seed", range(40))
 def test_numbers_that_contradict_each_other_are_refused_alike(seed, made, tmp_path, monkeypatch):
     """A frame's numbers are changed, its checksums are not looked at."""

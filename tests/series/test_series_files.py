@@ -52,6 +52,7 @@ def test_every_step_is_read_to_the_last_bit(steps, saved):
     assert same(series[5:7][1], steps[6])
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "deflate", "none"])
 @pytest.mark.parametrize("precision", ["8-byte", "16-byte", "exact"])
 def test_precisions_and_compressions(precision, compression, tmp_path):
@@ -64,6 +65,7 @@ def test_precisions_and_compressions(precision, compression, tmp_path):
         assert same(read, vdi.with_precision(precision))
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     "changes",
     [

@@ -139,6 +139,7 @@ def case(seed, **options):
     return volume, camera, function.replace(**options), AmbientOcclusion(radius, 0.3, 20)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("seed", range(6))
 def test_pictures_are_the_reference_s(runtime, seed):
     """Any spacing, direction matrix, voxel type, radius and view."""
@@ -162,7 +163,7 @@ def test_pictures_are_the_reference_s(runtime, seed):
     np.testing.assert_allclose(reference.render(own, camera), expected, atol=1e-5)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("more", ["nearest", "gradient opacity", "shading", "RGBA", "opaque"])
 def test_with_everything_else_as_well(runtime, more):
     """The extinction is that of the marches; lit colours are darkened as unlit ones are."""

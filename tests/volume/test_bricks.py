@@ -84,7 +84,7 @@ def make(runtime, volume, camera, function, **options):
 # -- the same bytes -------------------------------------------------------------------------------
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("name", VIEWS)
 @pytest.mark.parametrize(
     ("dtype", "interpolation"),
@@ -108,6 +108,7 @@ def test_same_bytes_as_in_one_piece(runtime, used, name, dtype, interpolation):
     assert np.array_equal(limited, image)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("shift", [3, 4, 5, 6])
 @pytest.mark.parametrize("slots", [1, 2, 7])
 def test_same_bytes_whatever_the_bricks(runtime, used, monkeypatch, shift, slots):
@@ -123,6 +124,7 @@ def test_same_bytes_whatever_the_bricks(runtime, used, monkeypatch, shift, slots
     assert few.equals(whole)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("looks", "interpolation"),
     [
@@ -293,7 +295,7 @@ def test_what_was_used_longest_ago_makes_room(runtime):
     assert rounds() == ([], 0)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("limit", [2.45, 2.6, 3.0, 4.0])
 def test_the_limit_is_kept_and_the_estimate_says_so(runtime, used, monkeypatch, limit):
     volume = volume_of(np.float32)
@@ -338,6 +340,7 @@ def test_progress_can_end_it_and_nothing_stays(runtime, used):
     assert runtime.allocated == before
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("buffer", ["samples of steps", "recorded runs", "wanted bricks"])
 def test_an_error_that_is_kept_keeps_no_bricks(runtime, used, monkeypatch, buffer):
     volume = volume_of(np.uint8)

@@ -112,6 +112,7 @@ def test_shaded_pictures_are_the_reference_s(runtime, name, seed):
     np.testing.assert_allclose(image, expected, atol=TOLERANCE)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("shaded", [False, True])
 @pytest.mark.parametrize("dtype", ["float32", "uint8", "float64", "int32"])
 def test_gradient_opacity_is_the_reference_s(runtime, dtype, shaded):
@@ -124,7 +125,7 @@ def test_gradient_opacity_is_the_reference_s(runtime, dtype, shaded):
     np.testing.assert_allclose(image, expected, atol=TOLERANCE)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
 @pytest.mark.parametrize("name", [*LIGHTS, None])
 def test_blocks_of_rays_are_lit_as_one_ray_is(monkeypatch, runtime, name, interpolation):

@@ -42,6 +42,7 @@ def check(monkeypatch, runtime):
     return checked
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("dtype", [np.uint8, np.int8, np.uint16, np.int16, np.float32, np.float64])
 @pytest.mark.parametrize("interpolation", INTERPOLATIONS)
 def test_types(check, dtype, interpolation):
@@ -91,6 +92,7 @@ def test_projections(check, dtype, blending, interpolation):
     check(volume_of(dtype), interpolation=interpolation, kernel="project", blending=blending)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     "options",
     [

@@ -85,6 +85,7 @@ def image_of(columns, weights, blending, volume):
 ENDS_HALVED = np.array([0.5, *[1.0] * (NZ - 2), 0.5])
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("blending", BLENDINGS)
 @pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.float32, np.float64])
 def test_columns_of_voxels_are_numpy_s(runtime, blending, dtype):
@@ -132,6 +133,7 @@ def test_what_is_cut_off_has_no_part(runtime, blending, way):
     np.testing.assert_allclose(got, want, atol=TOLERANCE)
 
 
+@pytest.mark.every(3)
 @pytest.mark.gl
 @pytest.mark.parametrize("blending", BLENDINGS)
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])

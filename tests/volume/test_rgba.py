@@ -23,6 +23,7 @@ def rgba_volume(rng, **options):
     return Volume(np.stack([*colors, alpha], axis=-1).astype(np.uint8), **options)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("more", ["plain", "shaded", "gradient"])
 def test_pictures_are_the_reference_s(runtime, more, seed):

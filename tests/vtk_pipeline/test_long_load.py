@@ -19,6 +19,7 @@ def drawn(frames):
         return Load(frames).run()
 
 
+@pytest.mark.slow
 def test_a_hundred_and_twenty_frames(default_runtime):
     """Short: what is left on the device, files, and the error; memory says nothing so early."""
     outcome = drawn(120)

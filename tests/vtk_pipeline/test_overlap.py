@@ -158,6 +158,7 @@ def test_any_order_of_three(raycasts):
         assert np.array_equal(image, images[0])
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("tiled", [False, True])
 def test_pictures_of_twice_the_size(tiled, raycasts):
     def shot(plotter):
@@ -204,6 +205,7 @@ def multi_volume(scene=nothing_else):
     return image
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("scene", [nothing_else, lambda plotter, _: opaque_sphere(plotter)])
 def test_as_vtk_marches_both_volumes_together(scene):
     """The outside opinion: seen are an SSIM of .998 and 4 of 255."""

@@ -374,6 +374,7 @@ def test_frames_keep_the_rate_where_rays_get_dearer_as_views_turn_away(plotter, 
     assert min(rates) > 60 / 1.2, rates
 
 
+@pytest.mark.slow
 def test_few_frames_are_late_where_some_take_longer(plotter, counted):
     """Each tenth half as long again: of an aim at 1.15 times the rate they would all be late."""
     rng = np.random.default_rng(5)

@@ -468,6 +468,7 @@ def regenerate_repeatedly(times):
     return grown / (times - times // 4), size, allocated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [12, pytest.param(200, marks=pytest.mark.slow)])
 def test_regenerating_does_not_take_more_and_more_memory(times):
     grown, size, allocated = regenerate_repeatedly(times)

@@ -72,7 +72,7 @@ def large_vdi():
     )  # fmt: skip
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("codec", ["lz4", "zstd", "deflate", "none"])
 @pytest.mark.parametrize("precision", ["exact", "16-byte", "8-byte"])
 def test_arrays_are_python_s(codec, precision, page, tmp_path):

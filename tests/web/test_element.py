@@ -239,6 +239,7 @@ def test_a_view_that_shows_nothing_is_refused(data, open_page):
         assert page.evaluate("viewer.camera") == before
 
 
+@pytest.mark.slow
 def test_planes_that_clip_nothing_or_all_are_refused(data, open_page):
     page = open_page(SIZE)
     page.load(data)
@@ -270,6 +271,7 @@ IN_PIECES = """([text]) => {
 }"""
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("apart", ["", "await new Promise((done) => setTimeout(done));"])
 def test_an_element_that_is_moved_goes_on_loading(apart, vdi, data, open_page):
     """Also one that has been off the page for a while."""
@@ -288,6 +290,7 @@ def test_an_element_that_is_moved_goes_on_loading(apart, vdi, data, open_page):
     assert worst(page.screenshot(vdi.camera, SIZE), vdi, vdi.camera) <= CLOSE
 
 
+@pytest.mark.slow
 def test_who_waits_for_what_is_given_up_waits_for_what_is_shown(data, open_page):
     page = open_page(SIZE)
     page.evaluate(IN_PIECES, [base64.b64encode(data).decode()])
@@ -296,6 +299,7 @@ def test_who_waits_for_what_is_given_up_waits_for_what_is_shown(data, open_page)
     assert page.evaluate("Promise.all([first, ready]).then(() => viewer.status.state)") == "full"
 
 
+@pytest.mark.slow
 def test_there_is_no_picture_of_an_element_off_the_page(data, open_page):
     page = open_page(SIZE)
     page.load(data)
@@ -303,6 +307,7 @@ def test_there_is_no_picture_of_an_element_off_the_page(data, open_page):
     assert "off the page" in page.evaluate(f"viewer.remove(), {message}")
 
 
+@pytest.mark.slow
 def test_what_is_wrong_with_what_was_decoded_ends_the_load(open_page):
     page = open_page(SIZE)
     answer = page.evaluate(

@@ -76,6 +76,7 @@ def test_the_picture_is_python_s(vdi, from_disk, tmp_path):
     assert (status["state"], status["supersegments"]) == ("full", vdi.n_supersegments)
 
 
+@pytest.mark.slow
 def test_where_workers_are_forbidden_the_page_decodes(vdi, from_disk, tmp_path):
     path = tmp_path / "a.html"
     content = page_of(vdi)

@@ -204,6 +204,7 @@ def test_random_vdis_in_numbers(raycaster, precision):
     check_views(raycaster, precision, range(3, 40))
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_every_second_list_is_drawn_as_a_vdi_of_those(raycaster, precision):
     """The shader's thinning against the oracle's picture of ``vdi.thinned``; odd windows, too."""

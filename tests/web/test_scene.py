@@ -201,6 +201,7 @@ def overlapping(plotter):
 slow = pytest.mark.slow
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     "scene",
     [
@@ -285,6 +286,7 @@ def test_vdis_that_overlap_are_mixed_as_by_render(open_page):
     assert np.abs(picture - pvdi.render(vdis[0], camera, size) * 255).max() > 40
 
 
+@pytest.mark.slow
 def test_layers_have_an_order_wherever_the_eye_is(open_page):
     page = open_page(SMALL)
     got = page.evaluate(
@@ -368,6 +370,7 @@ def test_letters_of_axes_stand_where_vtk_has_them(plotter, open_page):
     assert np.abs(np.subtract(*centres)).max() < 3, centres
 
 
+@pytest.mark.slow
 def test_labels_stand_at_their_points_and_nearer_ones_before_others(plotter, open_page):
     ball(plotter, opacity=[0, 0])
     points = np.array([[0.8, 0, 0], [-0.8, 0, 0], [-0.8, 0, -0.5]])

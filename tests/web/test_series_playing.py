@@ -128,6 +128,7 @@ def test_it_begins_anew_turns_meanwhile_and_pauses(series, playing):
     assert worst(page.screenshot(turned, SIZE), series[step], turned) <= CLOSE
 
 
+@pytest.mark.slow
 def test_steps_that_are_not_ready_are_left_out(playing):
     page = playing()
     page.evaluate(READY)
@@ -193,6 +194,7 @@ def test_a_damaged_step_is_named_and_skipped(series, data, frames, playing):
     assert shown(page)[-1] == N - 1
 
 
+@pytest.mark.slow
 def test_a_file_that_is_cut_off_plays_to_its_last_step(series, data, frames, playing):
     place, size, _ = frames[4]
     page = playing(data[: place + size + 9], in_parts=["ball.vdis"])
@@ -265,6 +267,7 @@ def test_the_first_step_is_shown_while_the_rest_comes(series, data, frames, open
     assert page.page.locator("vdi-viewer input").get_attribute("max") == str(N - 1)
 
 
+@pytest.mark.slow
 def test_a_series_that_is_closed_starts_no_worker(data, playing):
     """Neither for the step that was being fetched, nor for those that were to come."""
     page = playing(script='import { Series } from "./series.js"; window.Series = Series;')
@@ -288,6 +291,7 @@ def test_a_series_that_is_closed_starts_no_worker(data, playing):
     assert answers == ["AbortError", "AbortError", 0]
 
 
+@pytest.mark.slow
 def test_a_step_that_was_given_up_comes_when_the_element_is_back(series, playing):
     page = playing()
     page.evaluate(READY)

@@ -500,6 +500,7 @@ def own_server(default_runtime):
         yield make
 
 
+@pytest.mark.slow
 def test_a_client_that_stops_reading_is_dropped(own_server, tmp_path):
     server = own_server(stalled=0.5)
 

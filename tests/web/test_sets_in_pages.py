@@ -82,6 +82,7 @@ def test_each_view_is_drawn_by_the_vdi_nearest_to_it(vdis, turning):
         page.evaluate("viewer.play()")
 
 
+@pytest.mark.slow
 def test_views_are_fetched_as_it_turns(vdis, turning):
     page = turning(in_parts=("lumps.vdiset",))
     page.evaluate(READY)
