@@ -55,12 +55,16 @@ step() {
     fi
 }
 
-# Steps that use one core each, side by side: NAME:FUNCTION ... What they print comes one by one.
+# Steps that use one core each, side by side: NAME:FUNCTION ... What the last one prints comes at once,
+# what the others print after it, one by one.
 steps_together() {
-    local pair name start wanted=()
+    local pair name start last wanted=()
     for pair in "$@"; do
         [[ -z ${CI_ONLY:-} || " $CI_ONLY " == *" ${pair%%:*} "* ]] && wanted+=("$pair")
     done
+    ((${#wanted[@]})) || return 0
+    last=${wanted[-1]}
+    unset 'wanted[-1]'
     for pair in ${wanted[@]+"${wanted[@]}"}; do
         name=${pair%%:*}
         (
@@ -70,6 +74,7 @@ steps_together() {
             printf '%d %d' $? $((SECONDS - start)) >"$work/$name.status"
         ) &
     done
+    run_step "${last%%:*}" "${last#*:}"
     wait
     for pair in ${wanted[@]+"${wanted[@]}"}; do
         name=${pair%%:*}
