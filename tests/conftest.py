@@ -106,15 +106,18 @@ LENGTHY = {
     "faults": "device_faults",
     "generation": "criterion_functions generation_oracle march_blocks run_functions",
     "io": "deep_exr packed_files vdi_files",
-    "measure": "benchmark_model",
+    "large": "blocks",
+    "measure": "benchmark_model rivals",
     "model": "packing",
     "plotting": "add_vdi as_added dial shown volume_files",
     "quality": "view_error",
     "raycasting": "aligned_view cropping multi_vdi_oracle occupancy packets picking_oracle preview "
     "raycast_oracle skipping",
     "reference": "reference",
-    "volume": "ambient_occlusion bricks lighting",
-    "vtk_pipeline": "overlap picking pipeline source vtk_files",
+    "series": "on_device series_files",
+    "volume": "ambient_occlusion bricks lighting picture_blocks projections sampling_functions "
+    "volume_ends",
+    "vtk_pipeline": "picking pipeline source vtk_files",
 }
 
 #: And those of which it runs none.
@@ -123,11 +126,13 @@ LENGTHIEST = {
     "extremes": "determinism",
     "faults": "disk_faults interrupts threads_and_forks",
     "fuzz": "fuzz",
-    "measure": "benchmark compare lighting_against_vtk real_volumes tradeoff",
+    "large": "dask",
+    "measure": "benchmark compare front lighting_against_vtk real_volumes tradeoff",
     "packaging": "distributions documentation",
-    "plotting": "example_scripts on_screen scenes",
+    "plotting": "example_scripts in_browser on_screen scenes",
     "quality": "background dial",
-    "vtk_pipeline": "interactive long_load",
+    "vtk_pipeline": "interactive long_load overlap previews regeneration",
+    "web": "notebook server",
 }
 
 #: Names in a function that starts a process.
@@ -153,7 +158,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         another_case = item.function in seen and name in LENGTHY.get(room, "").split()
         seen.add(item.function)
         left_out = another_case or name in LENGTHIEST.get(room, "").split()
-        if not left_out and not starts_a_process(item.function):
+        in_a_browser = "chromium" in getattr(item, "fixturenames", ())
+        if not left_out and not in_a_browser and not starts_a_process(item.function):
             item.add_marker("fast")
 
 

@@ -74,10 +74,9 @@ def run_example(name, folder):
     [
         "plotter.py",
         "pipeline.py",
-        "files.py",
         *(
             pytest.param(f"{name}.py", marks=pytest.mark.slow)
-            for name in ("overlap", "picking", "occlusion", "large_volume")
+            for name in ("files", "overlap", "picking", "occlusion", "large_volume")
         ),
     ],
 )
