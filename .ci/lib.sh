@@ -238,11 +238,19 @@ run_tests() {
     ((result == 0 || (result == 5 && $# > 0)))
 }
 
-# Tests that use a device, chosen by markers, on the implementation that the README's test command
-# has not used.
+# run_tests_on_second_implementation MARKERS [folders]: those tests that use a device, on the
+# implementation that the README's test command does not use.
 run_tests_on_second_implementation() {
+    local markers=$1
+    shift
     export PYVISTA_VDI_TEST_DEVICES=${PYVISTA_VDI_SECOND_IMPLEMENTATION:-portable computing language}
-    run_tests -m "$1"
+    run_tests -m "$markers" "$@"
+}
+
+# Of those the fast ones of the rooms that are about kernels.
+run_kernel_tests_on_second_implementation() {
+    run_tests_on_second_implementation "device and fast" \
+        tests/{device,model,volume,generation,raycasting,extremes}
 }
 
 # Those that are slow, on every implementation.
