@@ -452,7 +452,7 @@ def tests_fail(mutant: Mutant | None, rooms: tuple[str, ...], options: argparse.
         raise SystemExit(f"pytest ends with {done.returncode}:\n{done.stdout[-2000:]}{done.stderr}")
     if mutant is None and done.returncode:
         print(done.stdout[-3000:])
-    return done.returncode == 1
+    return done.returncode != 0  # a kernel that reads beyond its memory may crash: below 0
 
 
 def main() -> None:

@@ -286,9 +286,10 @@ def test_slabs_behind_a_clipping_plane_and_before_opaque_geometry(runtime, camer
 def test_generated_slabs_are_the_slabs(runtime):
     """Planes of points, nearest neighbour: each list's supersegments are the voxels' own layers.
 
-    A step of half a spacing fits the layers, whose outer ones are half as thick.
+    A step of half a spacing fits the layers, whose outer ones are half as thick. A gap ends a
+    supersegment where the medium behind it is the same, too.
     """
-    values = np.array([3, 3, 0, 1, 2], dtype=np.uint8)
+    values = np.array([1, 1, 0, 1, 2], dtype=np.uint8)
     volume = Volume(np.broadcast_to(values[:, None, None], (5, 4, 4)).copy())
     opacities = np.array([0.0, 0.2, 0.6, 0.9])
     colors = np.eye(4)[:, :3]
@@ -297,9 +298,9 @@ def test_generated_slabs_are_the_slabs(runtime):
         (1.5, 1.5, 9), (1.5, 1.5, 2), (0, 1, 0), parallel_projection=True, parallel_scale=1.4
     )
     vdi = generate_vdi(volume, camera, (3, 3), transfer_function, device=runtime)
-    # From z = 4 down: value 2 to 3.5, value 1 to 2.5, nothing to 1.5, value 3 to 0
+    # From z = 4 down: value 2 to 3.5, value 1 to 2.5, nothing to 1.5, value 1 to 0
     front, back = [5, 5.5, 7.5], [5.5, 6.5, 9]
-    sigma = -np.log1p(-opacities[[2, 1, 3]])
+    sigma = -np.log1p(-opacities[[2, 1, 1]])
     for x, y in itertools.product(range(3), repeat=2):
         part = vdi.list_at(x, y)
         np.testing.assert_allclose(vdi.front[part] + vdi.depth_origin, front, atol=2e-6)
@@ -307,4 +308,24 @@ def test_generated_slabs_are_the_slabs(runtime):
         np.testing.assert_allclose(
             vdi.optical_depth[part], sigma * np.subtract(back, front), rtol=2e-6
         )
-        np.testing.assert_allclose(vdi.color[part], colors[[2, 1, 3]], atol=1e-6)
+        np.testing.assert_allclose(vdi.color[part], colors[[2, 1, 1]], atol=1e-6)
+
+
+@pytest.mark.parametrize(("view_cone", "expected"), [(90.0, 3), (0.0, 2)])
+def test_what_v_o_hardly_sees_differs_by_as_little(runtime, view_cone, expected):
+    """Green and blue behind dense red: unlike by far, but a thousandth of their light is seen.
+
+    A voxel of each: the sum of squares grows by half a voxel of (0.5^2 + 0.5^2) = 0.25, above the
+    tolerance's 0.01; weighted by the transmittance of 1.5 voxels of red, 3e-5, it lies below.
+    """
+    values = np.array([2, 2, 1, 0, 0], dtype=np.uint8)
+    volume = Volume(np.broadcast_to(values[:, None, None], (5, 4, 4)).copy())
+    looks = TransferFunction(np.eye(3)[::-1], (0.5, 0.5, 0.999), (0, 2), unit_distance=1.0)
+    camera = Camera(
+        (1.5, 1.5, 9), (1.5, 1.5, 2), (0, 1, 0), parallel_projection=True, parallel_scale=1.4
+    )
+    vdi = generate_vdi(
+        volume, camera.azimuth(180), (3, 3), looks, tolerance=0.1, view_cone=view_cone,
+        device=runtime,
+    )  # fmt: skip
+    np.testing.assert_array_equal(vdi.counts, expected)

@@ -258,13 +258,17 @@ def test_the_first_pass_finds_the_light():
         np.testing.assert_allclose(depths[deep], whole[deep], rtol=0.15)
 
 
-@pytest.mark.parametrize(("colours", "expected"), [((100, 100), 1), ((100, 200), 2)])
-def test_runs_are_joined_at_faces_where_they_are_alike(colours, expected):
-    values = np.full((16, 16, 16), colours[0], np.uint8)
-    values[8:] = colours[1]
+@pytest.mark.parametrize(
+    ("interpolation", "behind", "expected"),
+    [("nearest", 100, 1), ("nearest", 200, 2), ("linear", 200, 4)],
+)
+def test_runs_are_joined_at_faces_where_they_are_alike(interpolation, behind, expected):
+    """Blocks meet at z = 8. The medium changes before it, or by two steps of half a cell at it."""
+    values = np.full((16, 16, 16), 100, np.uint8)
+    values[9 if interpolation == "linear" else 8 :] = behind
     volume = Volume(values)
     table = np.linspace([1, 0, 0], [0, 1, 1], 256)
-    function = TransferFunction(table, np.full(256, 0.2), (0, 255), interpolation="nearest")
+    function = TransferFunction(table, np.full(256, 0.2), (0, 255), interpolation=interpolation)
     camera = VIEWS["along an axis"](volume).replace(
         position=(7.5, 7.5, 60), focal_point=(7.5, 7.5, 7.5), parallel_scale=6
     )

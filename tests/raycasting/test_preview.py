@@ -104,6 +104,28 @@ def test_samples_go_where_the_supersegments_are(runtime):
     assert (drawn[..., 3] > 0.3).all()
 
 
+def test_a_sample_stands_in_the_middle_of_its_part(runtime):
+    """One is taken in the middle of three layers, which weigh as much on either side of it."""
+    camera = Camera((0, -10, 0), (0, 0, 0), (0, 0, 1), parallel_projection=True, parallel_scale=1)
+    n = 16 * 16
+    vdi = VDI(
+        camera,
+        (16, 16),
+        3 * np.arange(n + 1, dtype=np.uint64),
+        np.tile([0.0, 0.5, 1.5], n),
+        np.tile([0.5, 1.5, 2.0], n),
+        np.tile(np.eye(3), (n, 1)),
+        np.tile([0.1, 0.4, 0.2], n),
+        BOUNDS,
+        depth_origin=9.0,
+    )
+    opacity = -np.expm1(-0.4 * 2.0)  # of green, 0.4 a unit, all the way
+    drawn = render_vdi(vdi, camera, preview_samples=1, device=runtime)
+    np.testing.assert_allclose(
+        drawn, np.broadcast_to([0, opacity, 0, opacity], drawn.shape), rtol=0, atol=ROUNDING
+    )
+
+
 def test_opaque_depth_and_clipping_planes_end_the_ray(runtime):
     camera = view_of_solid(parallel=False)
     vdi = solid_vdi(camera)
