@@ -131,15 +131,15 @@ describe_machine() {
     log "volumes that are not shipped: ${PYVISTA_VDI_DATA:-none (PYVISTA_VDI_DATA is not set)}"
 }
 
-# Install what a bare Debian lacks: a second OpenCL implementation, off-screen OpenGL, a browser, git,
-# and the packages given as arguments.
+# Install what a bare Debian lacks: a second OpenCL implementation, off-screen OpenGL, git, and the
+# packages given as arguments, of which a browser is one.
 install_system_packages() {
     if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
         log "not a Debian: taking the system as it is"
         return 0
     fi
     local package missing=()
-    for package in pocl-opencl-icd libegl1 libgl1-mesa-dri xvfb libgl1 chromium "$@"; do
+    for package in pocl-opencl-icd libegl1 libgl1-mesa-dri xvfb libgl1 "$@"; do
         dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
             missing+=("$package")
     done
