@@ -59,6 +59,20 @@ def check_window_size(window_size: Sequence[int], *, name: str = "window_size") 
     return size
 
 
+#: What a camera is made of and described by.
+_STATE = (
+    "focal_point",
+    "model_transform",
+    "parallel_projection",
+    "parallel_scale",
+    "position",
+    "use_horizontal_view_angle",
+    "view_angle",
+    "view_up",
+    "window_center",
+)
+
+
 class Camera:
     """A view, with VTK's names and meanings.
 
@@ -93,19 +107,7 @@ class Camera:
         parallel to the direction of projection, or ``model_transform`` cannot be inverted.
     """
 
-    __slots__ = (
-        "_axes",
-        "_key",
-        "focal_point",
-        "model_transform",
-        "parallel_projection",
-        "parallel_scale",
-        "position",
-        "use_horizontal_view_angle",
-        "view_angle",
-        "view_up",
-        "window_center",
-    )
+    __slots__ = ("_axes", "_key", "_model_to_view", *_STATE)
 
     position: tuple[float, float, float]
     focal_point: tuple[float, float, float]
@@ -204,22 +206,21 @@ class Camera:
     @classmethod
     def from_dict(cls, state: Mapping[str, Any]) -> Camera:
         """Return the camera that :meth:`to_dict` described."""
-        names = cls.__slots__[2:]
         if not isinstance(state, Mapping):
             raise InvalidCameraError(
                 f"a camera's description is a dictionary; got {type(state).__name__}"
             )
-        unknown = sorted(set(state) - set(names))
+        unknown = sorted(set(state) - set(_STATE))
         missing = sorted({"position", "focal_point", "view_up"} - set(state))
         if unknown or missing:
             raise InvalidCameraError(
                 f"a camera's description has unknown entries {unknown}, lacks {missing}"
             )
-        return cls(**{name: state[name] for name in names if name in state})
+        return cls(**state)
 
     def to_dict(self) -> dict[str, Any]:
         """Return all arguments of the constructor, as plain numbers and lists (for JSON)."""
-        state: dict[str, Any] = {name: getattr(self, name) for name in self.__slots__[2:]}
+        state: dict[str, Any] = {name: getattr(self, name) for name in _STATE}
         for name in ("position", "focal_point", "view_up", "window_center"):
             state[name] = list(state[name])
         state["model_transform"] = self.model_transform.tolist()
@@ -227,7 +228,7 @@ class Camera:
 
     def replace(self, **changes: Any) -> Camera:
         """Return a copy with some arguments of the constructor changed."""
-        state = {name: getattr(self, name) for name in self.__slots__[2:]}
+        state = {name: getattr(self, name) for name in _STATE}
         unknown = sorted(set(changes) - set(state))
         if unknown:
             raise InvalidCameraError(f"a Camera has no {', '.join(unknown)}")
@@ -310,16 +311,20 @@ class Camera:
 
     @property
     def model_to_view(self) -> Matrix:
-        """Model frame to view space, float64 (4, 4).
+        """Model frame to view space, float64 (4, 4), read-only.
 
         The eye is subtracted before the rotation, so that an origin far from zero costs no digits
         beyond those of the coordinates themselves.
         """
-        axes = self.axes
-        matrix = np.eye(4)
-        matrix[:3, :3] = axes @ self.model_transform[:3, :3]
-        matrix[:3, 3] = axes @ (self.model_transform[:3, 3] - np.asarray(self.position))
-        return matrix
+        known: Matrix | None = getattr(self, "_model_to_view", None)
+        if known is None:
+            axes = self.axes
+            known = np.eye(4)
+            known[:3, :3] = axes @ self.model_transform[:3, :3]
+            known[:3, 3] = axes @ (self.model_transform[:3, 3] - np.asarray(self.position))
+            known.setflags(write=False)
+            object.__setattr__(self, "_model_to_view", known)
+        return known
 
     def half_extent(self, window_size: Sequence[int]) -> tuple[float, float]:
         """Return half the viewport's width and height.

@@ -8,6 +8,7 @@ and what is met is composited front to back.
 from __future__ import annotations
 
 import copy
+import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -114,8 +115,13 @@ def near_limit(vdi: VDI) -> float:
     :data:`NEAR_LIMIT` times the diagonal of the bounds, carried into the world by the model
     transform's largest stretch.
     """
-    extent = np.subtract(vdi.bounds[1::2], vdi.bounds[::2])
-    stretch = float(np.linalg.norm(vdi.camera.model_transform[:3, :3], ord=2))
+    return _near_limit(vdi.camera, vdi.bounds)
+
+
+@functools.lru_cache(64)
+def _near_limit(camera: Camera, bounds: tuple[float, ...]) -> float:
+    extent = np.subtract(bounds[1::2], bounds[::2])
+    stretch = float(np.linalg.norm(camera.model_transform[:3, :3], ord=2))
     return NEAR_LIMIT * stretch * float(np.linalg.norm(extent))
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -55,8 +56,13 @@ def pixel_ray(camera: Camera, window_size: Sequence[int], x: float, y: float) ->
     v = (2 * y + 1) / window_size[1] - 1
     origin, direction = camera.ray_coefficients(window_size)
     at = np.array([1.0, u, v])
-    inverse = np.linalg.inv(camera.model_to_view)
+    inverse = _view_to_model(camera)
     return Ray(inverse[:3, :3] @ (at @ origin) + inverse[:3, 3], inverse[:3, :3] @ (at @ direction))
+
+
+@functools.lru_cache(64)
+def _view_to_model(camera: Camera) -> NDArray[np.floating[Any]]:
+    return np.linalg.inv(camera.model_to_view)
 
 
 def clip(half_spaces: Iterable[HalfSpace]) -> tuple[float, float] | None:
