@@ -289,8 +289,8 @@ def test_generated_slabs_are_the_slabs(runtime):
     A step of half a spacing fits the layers, whose outer ones are half as thick. A gap ends a
     supersegment where the medium behind it is the same, too.
     """
-    values = np.array([1, 1, 0, 1, 2], dtype=np.uint8)
-    volume = Volume(np.broadcast_to(values[:, None, None], (5, 4, 4)).copy())
+    values = np.array([3, 3, 1, 0, 1, 2], dtype=np.uint8)
+    volume = Volume(np.broadcast_to(values[:, None, None], (6, 4, 4)).copy())
     opacities = np.array([0.0, 0.2, 0.6, 0.9])
     colors = np.eye(4)[:, :3]
     transfer_function = TransferFunction(colors, opacities, (0, 3), unit_distance=1.0)
@@ -298,9 +298,9 @@ def test_generated_slabs_are_the_slabs(runtime):
         (1.5, 1.5, 9), (1.5, 1.5, 2), (0, 1, 0), parallel_projection=True, parallel_scale=1.4
     )
     vdi = generate_vdi(volume, camera, (3, 3), transfer_function, device=runtime)
-    # From z = 4 down: value 2 to 3.5, value 1 to 2.5, nothing to 1.5, value 1 to 0
-    front, back = [5, 5.5, 7.5], [5.5, 6.5, 9]
-    sigma = -np.log1p(-opacities[[2, 1, 1]])
+    # From z = 5 down: value 2 to 4.5, 1 to 3.5, nothing to 2.5, value 1 to 1.5, value 3 to 0
+    front, back = [4, 4.5, 6.5, 7.5], [4.5, 5.5, 7.5, 9]
+    sigma = -np.log1p(-opacities[[2, 1, 1, 3]])
     for x, y in itertools.product(range(3), repeat=2):
         part = vdi.list_at(x, y)
         np.testing.assert_allclose(vdi.front[part] + vdi.depth_origin, front, atol=2e-6)
@@ -308,15 +308,16 @@ def test_generated_slabs_are_the_slabs(runtime):
         np.testing.assert_allclose(
             vdi.optical_depth[part], sigma * np.subtract(back, front), rtol=2e-6
         )
-        np.testing.assert_allclose(vdi.color[part], colors[[2, 1, 1]], atol=1e-6)
+        np.testing.assert_allclose(vdi.color[part], colors[[2, 1, 1, 3]], atol=1e-6)
 
 
 @pytest.mark.parametrize(("view_cone", "expected"), [(90.0, 3), (0.0, 2)])
 def test_what_v_o_hardly_sees_differs_by_as_little(runtime, view_cone, expected):
-    """Green and blue behind dense red: unlike by far, but a thousandth of their light is seen.
+    """Green and blue behind dense red: unlike by far, but hardly any of their light is seen.
 
-    A voxel of each: the sum of squares grows by half a voxel of (0.5^2 + 0.5^2) = 0.25, above the
-    tolerance's 0.01; weighted by the transmittance of 1.5 voxels of red, 3e-5, it lies below.
+    Half a voxel of blue behind a voxel of green, each of density ln 2 / (ln 2 + 1) = 0.41: the sum
+    of squares grows by (1 x 0.5 / 1.5) x 2 x 0.41^2 = 0.11, above the tolerance's 0.1^2. Weighted
+    by the transmittance of 1.5 voxels of red, 3e-5, it lies below.
     """
     values = np.array([2, 2, 1, 0, 0], dtype=np.uint8)
     volume = Volume(np.broadcast_to(values[:, None, None], (5, 4, 4)).copy())

@@ -56,7 +56,7 @@ def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind, dealt):
     assert result.drawn > result.pixels / 10  # a comparison of nothing with nothing proves nothing
 
 
-@pytest.mark.slow
+@pytest.mark.every(3)
 @pytest.mark.parametrize("dealt", strategies.DEALT)
 def test_few_pixels_need_a_moved_ray(runtime, dealt, record_property):
     results = {kind: compare(runtime, kind, dealt) for kind in strategies.VIEWS}

@@ -215,10 +215,10 @@ def test_pictures_with_all_that_ends_a_ray(runtime, used):
 
 
 def test_a_file_larger_than_the_bricks(runtime, used, tmp_path):
-    volume = volume_of(np.uint8)
-    function, camera = transfer_for(volume), VIEWS["perspective"]
+    volume = volume_of(np.uint16)
+    function, camera = transfer_for(volume, "nearest"), VIEWS["perspective"]
     whole = make(runtime, volume, camera, function)
-    array = np.memmap(tmp_path / "voxels", np.uint8, "w+", shape=volume.array.shape)
+    array = np.memmap(tmp_path / "voxels", np.uint16, "w+", shape=volume.array.shape)
     array[...] = volume.array
     mapped = Volume(array)
     assert np.shares_memory(mapped.array, array)
