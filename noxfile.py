@@ -1,0 +1,105 @@
+"""What a developer runs: ``nox -s NAME``; ``nox -l`` lists the names.
+
+Each session makes an environment of its own; ``.ci/run`` runs them in one that has the built wheel
+(``nox --no-venv --no-install``).
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import nox
+
+nox.needs_version = ">=2024.4.15"
+nox.options.default_venv_backend = "venv"
+nox.options.reuse_existing_virtualenvs = True
+nox.options.sessions = ["lint", "fast"]
+
+CHECKOUT = Path(__file__).parent
+
+
+@nox.session
+def fast(session: nox.Session) -> None:
+    """Run the fast tests: two minutes; arguments go to pytest."""
+    session.install("-e", ".[test]")
+    session.run("pytest", "-m", "fast", *session.posargs)
+
+
+@nox.session
+def tests(session: nox.Session) -> None:
+    """Run the tests that every change must pass; arguments go to pytest."""
+    session.install("-e", ".[test]")
+    session.run("pytest", *session.posargs)
+
+
+@nox.session
+def coverage(session: nox.Session) -> None:
+    """Run them and report the branch coverage of the package, all its processes counted."""
+    session.install(".[test]", "coverage>=7.10")
+    folder = Path(session.create_tmp())
+    settings = folder / "coveragerc"
+    settings.write_text(
+        "[run]\nbranch = true\nparallel = true\nsource_pkgs = pyvista_vdi\npatch = subprocess\n"
+        f"data_file = {folder / 'data'}\n"
+    )
+    rc = f"--rcfile={settings}"
+    session.run("coverage", "run", rc, "-m", "pytest", *session.posargs)
+    session.run("coverage", "combine", "-q", rc)
+    session.run("coverage", "report", rc, "--skip-covered", "--sort=miss")
+
+
+@nox.session
+def lint(session: nox.Session) -> None:
+    """Check style and formatting, as pre-commit does."""
+    session.install("ruff>=0.15")
+    session.run("ruff", "check", "--no-cache", ".")
+    session.run("ruff", "format", "--no-cache", "--check", ".")
+
+
+@nox.session
+def types(session: nox.Session) -> None:
+    """Check types."""
+    session.install("-e", ".[dev]")
+    session.run("mypy", f"--cache-dir={session.create_tmp()}")
+
+
+@nox.session
+def docs(session: nox.Session) -> None:
+    """Build the documentation, warnings as errors, and turn the VDIs on its pages in a browser."""
+    session.install("-e", ".[dev]")
+    site = Path(os.environ.get("PYVISTA_VDI_SITE") or CHECKOUT / "docs" / "_build")
+    session.run("sphinx-build", "-W", "--keep-going", "-q", "-b", "html", "docs", str(site))
+    live = ("-n", "0", "-m", "slow or not slow", "tests/web/test_live_docs.py")
+    session.run("pytest", "-q", *live, env={"PYVISTA_VDI_SITE": str(site)})
+
+
+@nox.session
+def snippets(session: nox.Session) -> None:
+    """Run the Python of the pages and of the docstrings."""
+    session.install("-e", ".[dev]")
+    folder = Path(session.create_tmp()) / "documented"
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(CHECKOUT / "docs", folder / "docs", ignore=shutil.ignore_patterns("_build"))
+    shutil.copy(CHECKOUT / "README.md", folder / "docs" / "readme.md")
+    shutil.copy(CHECKOUT / "pyproject.toml", folder)
+    with session.chdir(folder):
+        session.run("pytest", "-q", "docs")
+    # ParaView's plugin can be imported only in ParaView
+    plugin = "--ignore-glob=*/pyvista_vdi/paraview/*"
+    session.run("pytest", "-q", "--doctest-modules", plugin, "--pyargs", "pyvista_vdi")
+
+
+@nox.session
+def bench(session: nox.Session) -> None:
+    """Measure whole frames beside VTK's, as a sample; arguments go to the script."""
+    session.install("-e", ".[cpu,plot]")
+    session.run("python", "benchmarks/frames.py", *session.posargs)
+
+
+@nox.session
+def mutants(session: nox.Session) -> None:
+    """Try which mistakes the tests notice; arguments go to tools/mutants.py."""
+    session.install("-e", ".[test]")
+    session.run("python", "tools/mutants.py", *session.posargs)

@@ -1,0 +1,611 @@
+"""Wrong lines of kernels, of Python and of the viewer's JavaScript, for `tools/mutants.py`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+#: Rooms whose tests are run for kernels of a folder.
+ROOMS = {
+    "lib": ("raycasting", "generation"),
+    "generation": ("generation",),
+    "volume": ("volume", "generation"),
+    "raycasting": ("raycasting", "model"),
+    "multi_vdi": ("raycasting",),
+    "series": ("series",),
+    "large": ("large",),
+}
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A piece of a file that occurs once in it, and what stands there instead."""
+
+    name: str
+    file: str  # in the checkout
+    old: str
+    new: str
+    rooms: tuple[str, ...]  # of tests/, that must notice
+
+    def changed(self, text: str) -> str:
+        """Return the file's text with the mutation; ValueError if it does not occur once."""
+        if text.count(self.old) != 1:
+            raise ValueError(f"{self.name}: {self.file} has {text.count(self.old)} of {self.old!r}")
+        return text.replace(self.old, self.new)
+
+
+def _m(name: str, file: str, old: str, new: str, rooms: tuple[str, ...] = ()) -> Mutant:
+    return Mutant(name, file, old, new, rooms or ROOMS[file.split("/")[1]])
+
+
+MARCH, MARCH_LISTS = "opencl/volume/march.cl", "opencl/generation/march_lists.cl"
+RUNS, SHORTEN = "opencl/generation/runs.cl", "opencl/generation/shorten_lists.cl"
+CRITERIA = "opencl/generation/criteria.cl"
+LISTS, RAYS = "opencl/raycasting/lists.cl", "opencl/raycasting/list_rays.cl"
+DECODE = "opencl/series/decode.cl"
+LARGE, OPTICAL_DEPTHS, LARGE_RUNS = (
+    ("large",),
+    "opencl/large/optical_depths.cl",
+    "opencl/large/runs.cl",
+)
+
+KERNEL_MUTANTS = (
+    _m(
+        "march: the last step is as long as the others",
+        MARCH,
+        "fmin(fma(TO_REAL(k), march->step, march->t0), march->t1)",
+        "fma(TO_REAL(k), march->step, march->t0)",
+    ),
+    _m("march: one step less", MARCH, "TO_INT(ceil(", "TO_INT(floor("),
+    _m(
+        "march: opacity unit distance multiplies",
+        MARCH,
+        "speed / unit_distance",
+        "speed * unit_distance",
+    ),
+    _m("skipping: two steps too far", MARCH, "march->per_step - 0.51f", "march->per_step + 1.49f"),
+    _m(
+        "march: a gap does not end a run",
+        MARCH_LISTS,
+        "visible & (run_back == group_front) & (error",
+        "visible & (error",
+    ),
+    _m(
+        "march: errors are not weighted by what is seen",
+        MARCH_LISTS,
+        "square_of(difference) * seen_weight(run, hidden_weight)",
+        "square_of(difference)",
+    ),
+    _m(
+        "march: steps at a chunk's end stay ungrouped",
+        MARCH_LISTS,
+        "(left == 0) | (empty > 0) | (k >= end)",
+        "(left == 0) | (empty > 0)",
+    ),
+    _m(
+        "merge: optical depth of the second run only",
+        RUNS,
+        "run.TAU = a.TAU + b.TAU;",
+        "run.TAU = b.TAU;",
+    ),
+    _m(
+        "merge: green is added, not composited",
+        RUNS,
+        "a.GREEN + through * b.GREEN",
+        "a.GREEN + b.GREEN",
+    ),
+    _m(
+        "merge error: density does not saturate",
+        RUNS,
+        "run.TAU / (run.TAU + length)",
+        "run.TAU / length",
+    ),
+    _m("merge error: opacity is no feature", RUNS, "(v.z * v.z + v.w * v.w)", "(v.z * v.z)"),
+    _m(
+        "merge error: gap's term divided by less",
+        RUNS,
+        "square_of(mean) / (both + gap)",
+        "square_of(mean) / both",
+    ),
+    _m(
+        "shortening: < for <= of a threshold",
+        SHORTEN,
+        "<= (Row)(thresholds)",
+        "< (Row)(thresholds)",
+    ),
+    _m(
+        "shortening: of equal errors the last",
+        SHORTEN,
+        "const RowPlaces less = error < least;",
+        "const RowPlaces less = error <= least;",
+    ),
+    _m(
+        "shortening: one run more than the limit",
+        SHORTEN,
+        "const Int chosen = alive > limit;",
+        "const Int chosen = alive > limit + 1;",
+    ),
+    _m(
+        "shortening: the error before is not renewed",
+        SHORTEN,
+        "if (earlier.each[lane] >= 0)",
+        "if (earlier.each[lane] > 0)",
+    ),
+    _m(
+        "criteria: shares for one more supersegment",
+        CRITERIA,
+        "at.y / (float)limit;",
+        "at.y / (float)(limit + 1);",
+    ),
+    _m(
+        "criteria: homogeneity's threshold is not squared",
+        CRITERIA,
+        "const float most = threshold * threshold;",
+        "const float most = threshold;",
+    ),
+    _m(
+        "packing: colours stay premultiplied",
+        "opencl/generation/pack_lists.cl",
+        "run.COLOR / run.OPACITY",
+        "run.COLOR",
+    ),
+    _m(
+        "packing: opacity for optical depth",
+        "opencl/generation/pack_lists.cl",
+        "optical_depths[begin + k] = run.TAU;",
+        "optical_depths[begin + k] = run.OPACITY;",
+    ),
+    _m(
+        "offsets: a list's own length counts before it",
+        "opencl/generation/offsets.cl",
+        "return sums[item] - value;",
+        "return sums[item];",
+    ),
+    _m(
+        "offsets: the block's own sum counts before it",
+        "opencl/generation/offsets.cl",
+        "block < item / items",
+        "block <= item / items",
+    ),
+    _m(
+        "ambient occlusion: wrong weight along z",
+        "opencl/volume/ambient_occlusion.cl",
+        "shares[3 * k + 2]",
+        "shares[3 * k + 1]",
+    ),
+    _m(
+        "bricks: no margin",
+        "opencl/volume/bricks.cl",
+        "<< BRICK_SHIFT) - BRICK_MARGIN;",
+        "<< BRICK_SHIFT);",
+    ),
+    _m(
+        "render_volume: opacity multiplier is added",
+        "opencl/volume/render_volume.cl",
+        "step.w *= opacity_multiplier;",
+        "step.w += opacity_multiplier;",
+    ),
+    _m(
+        "cropping: a wrong region",
+        "opencl/lib/cropping.cl",
+        "region = 3 * region +",
+        "region = 2 * region +",
+    ),
+    _m(
+        "compositing: what is in front does not hide",
+        "opencl/lib/compositing.cl",
+        "SELECT((Real)(0.0f), seen->sums.w * ",
+        "SELECT((Real)(0.0f), 1.0f * ",
+    ),
+    _m(
+        "compositing: green by red",
+        "opencl/lib/compositing.cl",
+        "ADD_TO_SUM(y, weight * color.y)",
+        "ADD_TO_SUM(y, weight * color.x)",
+    ),
+    _m(
+        "list search: the guess before is one too far",
+        LISTS,
+        "search->beyond), search->n + 1, onwards)",
+        "search->beyond), search->n + 2, onwards)",
+    ),
+    _m(
+        "list search: halves forget what lies behind",
+        LISTS,
+        "SELECT(search->high, search->n - 1,",
+        "SELECT(search->high, search->n - 2,",
+    ),
+    _m(
+        "list ray: enters at the far face",
+        RAYS,
+        "(near - sense->deep) * sense->inverse",
+        "(far - sense->deep) * sense->inverse",
+    ),
+    _m(
+        "list ray: not clipped where it leaves the list",
+        RAYS,
+        "LOWER_OF(HIGHER_OF(r_leaves, *from), r_next)",
+        "HIGHER_OF(r_leaves, *from)",
+    ),
+    _m(
+        "list ray: length by one end's depth",
+        RAYS,
+        " * reciprocal_depth_at(rays, to, depths));",
+        " * reciprocal_depth_at(rays, from, depths));",
+    ),
+    _m(
+        "stepping: v before u",
+        "opencl/raycasting/raycast.cl",
+        "const Int in_u = r_u <= r_v;",
+        "const Int in_u = r_u >= r_v;",
+    ),
+    _m(
+        "blocks: a supersegment is left too early",
+        "opencl/raycasting/raycast.cl",
+        "stays = meets && face.far <= next_depth;",
+        "stays = meets && face.far > next_depth;",
+    ),
+    _m(
+        "occupancy: less than the faces",
+        "opencl/raycasting/occupancy.cl",
+        "slab_of(front - margin,",
+        "slab_of(front + 64 * margin,",
+    ),
+    _m(
+        "occupancy: supersegments end a slab too early",
+        "opencl/raycasting/occupancy.cl",
+        "atomic_dec(cells + last + 1);",
+        "atomic_dec(cells + last);",
+    ),
+    _m(
+        "skipping: a face too far",
+        "opencl/raycasting/stepping.cl",
+        "TO_REAL(sense->away ? nearest : nearest + 1)",
+        "TO_REAL(sense->away ? nearest + 1 : nearest)",
+    ),
+    _m(
+        "preview: samples at the ends of their parts",
+        "opencl/raycasting/preview.cl",
+        "if (halves & 1) {",
+        "if (!(halves & 1)) {",
+    ),
+    _m(
+        "preview: weights without counts",
+        "opencl/raycasting/preview.cl",
+        "const float half_part = weight / (2.0f * (float)samples);",
+        "const float half_part = weight / (float)samples;",
+    ),
+    _m(
+        "packets: a ray's list is left by the other axis",
+        "opencl/raycasting/packets.cl",
+        "const Int steps_p = here && r_p <= r_q;",
+        "const Int steps_p = here && r_p >= r_q;",
+    ),
+    _m(
+        "packets: what waits is forgotten at the end",
+        "opencl/raycasting/packets.cl",
+        "met.waits = met.waits || meet;",
+        "met.waits = meet;",
+    ),
+    _m(
+        "aligned view: not clipped where the ray begins",
+        "opencl/raycasting/aligned_view.cl",
+        "HIGHER_OF(at.front, begin)",
+        "at.front",
+    ),
+    _m(
+        "aligned view: a supersegment less",
+        "opencl/raycasting/aligned_view.cl",
+        "going && k < lists.list.count &&",
+        "going && k + 1 < lists.list.count &&",
+    ),
+    _m(
+        "packed supersegments: red for blue",
+        "opencl/raycasting/supersegments.cl",
+        "LIST_TO_REAL(second >> 16 & 255)",
+        "LIST_TO_REAL(second >> 8 & 255)",
+    ),
+    _m(
+        "prepare: thickness in view depth, not along the ray",
+        "opencl/raycasting/prepare.cl",
+        "(back - front) * per_depth",
+        "(back - front)",
+    ),
+    _m(
+        "multi_vdi: the last medium's optical depth only",
+        "opencl/multi_vdi/merge.cl",
+        "optical_depth += part;",
+        "optical_depth = part;",
+    ),
+    _m(
+        "multi_vdi: owned by the last that covers",
+        "opencl/multi_vdi/merge.cl",
+        "meets > grades",
+        "meets >= grades",
+    ),
+    _m(
+        "packed lists: the scale lacks the stride",
+        "opencl/raycasting/prepare_packed.cl",
+        "length(direction) * (float)stride * step",
+        "length(direction) * step",
+    ),
+    _m("series: lists have not moved", DECODE, "rounded(shift * moved_by, 1.0, &tame)", "0"),
+    _m(
+        "series: kept ones that are left over do not matter",
+        DECODE,
+        "tame = tame && !bit_at(kept_there, place[THERE_BIT] + old);",
+        ";",
+    ),
+    _m("series: last faces are as the others", DECODE, "if (k == count - 1) {", "if (false) {"),
+    _m("series: numbers are rounded down", DECODE, "rint(value / unit)", "floor(value / unit)"),
+    _m("series: colours are the table's", DECODE, "if (same >= 0 && left == 0) {", "if (false) {"),
+    _m(
+        "large: a step that is sampled stands for itself alone",
+        OPTICAL_DEPTHS,
+        "of_step * (float)stride",
+        "of_step",
+    ),
+    _m(
+        "large: which steps are sampled depends on the block",
+        OPTICAL_DEPTHS,
+        "(march.begin + (stride - 1)) / stride * stride",
+        "march.begin",
+    ),
+    _m("large: runs that touch are not joined", LARGE_RUNS, "run.FRONT == last.BACK", "false"),
+    _m(
+        "large: runs are joined whatever they look like",
+        LARGE_RUNS,
+        "hidden_weight) <= finest)",
+        "hidden_weight) <= INFINITY)",
+    ),
+    _m(
+        "large: each block begins with all the light",
+        LARGE_RUNS,
+        "transmittance = last.TRANSMITTANCE - last.TRANSMITTANCE * last.OPACITY;",
+        "",
+    ),
+    _m("large: rows of a block are not its window's", LARGE_RUNS, "* window.z + x", "* window.z"),
+    _m(
+        "large: a step at a face belongs to two blocks",
+        MARCH,
+        "WHILE((end > begin) & behind_part(march, medium, end - 1), end -= COUNT(moves))",
+        "",
+        LARGE,
+    ),
+    _m(
+        "large: macrocells are the whole grid's",
+        MARCH,
+        "TO_REAL(((n) << MACROCELL_SHIFT) + FIRST_OF_PART(axis))",
+        "TO_REAL((n) << MACROCELL_SHIFT)",
+        LARGE,
+    ),
+    _m(
+        "large: occlusion by samples in a neighbour's cells",
+        "opencl/volume/ambient_occlusion.cl",
+        "(position) < part_upper.axis)",
+        "true)",
+        LARGE,
+    ),
+    _m(
+        "large: occlusion by the part's first nodes",
+        "opencl/volume/ambient_occlusion.cl",
+        "(node + first_node.xyz) * cell.xyz",
+        "node * cell.xyz",
+        LARGE,
+    ),
+)
+
+OPTIONS, RENDER = "pyvista_vdi/model/options.py", "pyvista_vdi/model/render_options.py"
+SCENE, STRATEGIES = "pyvista_vdi/raycasting/scene.py", "pyvista_vdi/raycasting/strategies.py"
+PACKING = "pyvista_vdi/model/packing.py"
+REGENERATION = "pyvista_vdi/vtk_pipeline/interaction/regeneration.py"
+WHEN, WAYS = "pyvista_vdi/quality/when_anew.py", "pyvista_vdi/quality/ways.py"
+SET, SHOWER = "pyvista_vdi/sets/vdi_set.py", "pyvista_vdi/sets/shower.py"
+PLAYER, SERIES = "pyvista_vdi/series/player.py", "pyvista_vdi/series/series.py"
+
+PYTHON_MUTANTS = (
+    _m(
+        "options: what V_O cannot see weighs the cosine of the view cone",
+        OPTIONS,
+        "float(1 - np.cos(np.radians(self.view_cone)))",
+        "float(np.cos(np.radians(self.view_cone)))",
+        ("model", "generation"),
+    ),
+    _m(
+        "options: a view cone of 180 degrees is accepted",
+        OPTIONS,
+        "if not 0 <= angle <= 90:",
+        "if not 0 <= angle <= 180:",
+        ("model", "api", "generation"),
+    ),
+    _m(
+        "options: the tolerance is dropped",
+        OPTIONS,
+        'self._put("tolerance", difference)',
+        'self._put("tolerance", 0.0)',
+        ("model", "generation"),
+    ),
+    _m(
+        "options: changes of given options are lost",
+        OPTIONS,
+        "if options is None else replace(options, **changes)",
+        "if options is None else options",
+        ("model", "api", "generation", "plotting"),
+    ),
+    _m(
+        "options: a preview of no samples is accepted",
+        RENDER,
+        "if not 1 <= number <= MAX_PREVIEW_SAMPLES:",
+        "if not 0 <= number <= MAX_PREVIEW_SAMPLES:",
+        ("model", "api", "raycasting"),
+    ),
+    _m(
+        "options: clipping planes may have no direction",
+        RENDER,
+        "if not table[:, 3:].any(axis=1).all():",
+        "if False:",
+        ("model", "api", "raycasting"),
+    ),
+    _m(
+        "variant: the aligned view's kernel draws what is cropped",
+        STRATEGIES,
+        "supports=lambda scene: scene.plain and scene.aligned is not None",
+        "supports=lambda scene: scene.in_vectors and scene.aligned is not None",
+        ("raycasting",),
+    ),
+    _m(
+        "variant: packed lists are drawn in blocks",
+        SCENE,
+        "return self.in_vectors and not self.prepared.packed and not self.prepared.long_offsets",
+        "return self.in_vectors and not self.prepared.long_offsets",
+        ("raycasting", "model"),
+    ),
+    _m(
+        "variant: every view is taken for V_O's",
+        SCENE,
+        "return same and not self.segments",
+        "return not self.segments",
+        ("raycasting",),
+    ),
+    _m(
+        "variant: previews are drawn ray by ray in full",
+        STRATEGIES,
+        "supports=lambda scene: scene.options.preview_samples is not None",
+        "supports=lambda scene: False",
+        ("raycasting",),
+    ),
+    _m(
+        "variant: segments end at a transmittance, not at its optical depth",
+        SCENE,
+        "np.float32(-math.log(cutoff) if self.segments else cutoff)",
+        "np.float32(cutoff)",
+        ("raycasting",),
+    ),
+    _m(
+        "packing: optical depths are rounded down",
+        PACKING,
+        "upper = (bits + 0x7FFF + (bits >> 16 & 1)) >> 16",
+        "upper = bits >> 16",
+        ("model", "raycasting"),
+    ),
+    _m(
+        "packing: faces that rounding made equal stay equal",
+        PACKING,
+        "codes = _kept_apart(np.maximum(codes, 0), own, first, lengths)",
+        "codes = np.maximum(codes, 0)",
+        ("model", "raycasting"),
+    ),
+    _m(
+        "packing: green has as few steps as blue",
+        PACKING,
+        "_COLOR_16 = ((2047, 0), (2047, 11), (1023, 22))",
+        "_COLOR_16 = ((2047, 0), (1023, 11), (1023, 22))",
+        ("model", "raycasting"),
+    ),
+    _m(
+        "packing: what is in front of the eye may end up behind it",
+        PACKING,
+        "np.maximum(faces, np.ceil(max(-vdi.depth_origin / step, -(2.0**30))), out=faces)",
+        "pass",
+        ("model", "raycasting"),
+    ),
+    _m(
+        "packing: a code is too few steps long",
+        PACKING,
+        "stride = np.maximum(1, np.ceil(span / DEPTH_CODES))",
+        "stride = np.maximum(1, np.floor(span / DEPTH_CODES))",
+        ("model", "raycasting"),
+    ),
+    _m(
+        "regeneration: what changes while a VDI is made is not noticed",
+        REGENERATION,
+        "elif self._target is None or self._target.content != wanted.content:",
+        "elif self._target is None:",
+        ("vtk_pipeline",),
+    ),
+    _m(
+        "regeneration: a VDI of a view that was left is kept in the making",
+        REGENERATION,
+        "if away > OUT_OF_DATE or away > self._apart(made.screen):",
+        "if False:",
+        ("vtk_pipeline",),
+    ),
+    _m(
+        "regeneration: what has failed is tried again and again",
+        REGENERATION,
+        "return self._failed_at is not None and self._failed_at == self._stamp",
+        "return False",
+        ("vtk_pipeline",),
+    ),
+    _m(
+        "regeneration: patience is for views at rest",
+        WHEN,
+        "(_PATIENCE_IN_MOTION if moving else 1)",
+        "(1 if moving else _PATIENCE_IN_MOTION)",
+        ("quality", "vtk_pipeline"),
+    ),
+    _m(
+        "regeneration: a view at rest is estimated as rarely as one that moves",
+        WHEN,
+        "(_ANOTHER_ESTIMATE_IN_MOTION if moving else _ANOTHER_ESTIMATE)",
+        "_ANOTHER_ESTIMATE_IN_MOTION",
+        ("quality", "vtk_pipeline"),
+    ),
+    _m(
+        "view selection: what the VDI loses counts nothing",
+        WAYS,
+        'losses["vdi"] += own',
+        "pass",
+        ("quality",),
+    ),
+    _m(
+        "view selection: at rest the VDI is drawn however poor",
+        WAYS,
+        "if seconds is None and own > 1 - bound:",
+        "if False:",
+        ("quality",),
+    ),
+    _m(
+        "view selection: a set's views come in abruptly",
+        SET,
+        "reach = min(self._blend, beyond[-1]) if len(order) > MOST_BLENDED else self._blend",
+        "reach = self._blend",
+        ("sets",),
+    ),
+    _m(
+        "view selection: the view before stays the nearest",
+        SHOWER,
+        "self._weights = self.vdi_set.weights(camera)",
+        "pass",
+        ("sets", "vtk_pipeline", "plotting"),
+    ),
+    _m(
+        "series: steps that were left out are not counted",
+        PLAYER,
+        "self.dropped += place - self._place - 1",
+        "self.dropped += 0",
+        ("series",),
+    ),
+    _m(
+        "series: what was played to its end does not begin anew",
+        PLAYER,
+        "if not loop and self._place == n - 1:",
+        "if False:",
+        ("series",),
+    ),
+    _m(
+        "series: the nearest time is the one after",
+        SERIES,
+        "return min(candidates, key=lambda i: abs(self.times[i] - time))",
+        "return candidates[-1]",
+        ("series",),
+    ),
+    _m(
+        "series: optical depths that are told apart are rounded down",
+        "pyvista_vdi/series/codes.py",
+        "(bits + 0x8000 >> 16) - TAU_BASE + 1, 0, TAU_CODES)",
+        "(bits >> 16) - TAU_BASE + 1, 0, TAU_CODES)",
+        ("series",),
+    ),
+)
+
+MUTANTS = KERNEL_MUTANTS + PYTHON_MUTANTS
