@@ -22,7 +22,7 @@ import numpy as np
 from pyvista_vdi import examples
 from pyvista_vdi.measure.clock import median, take_turns
 from pyvista_vdi.measure.report import ABSENT, closing, describe_system, table
-from pyvista_vdi.measure.results import ResultsFile
+from pyvista_vdi.measure.results_file import ResultsFile
 from pyvista_vdi.measure.session import Steps, check_count
 from pyvista_vdi.measure.vtk_baselines import (
     MAPPERS,

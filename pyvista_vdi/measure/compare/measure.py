@@ -21,7 +21,8 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.clock import Step, Times, take_turns
-from pyvista_vdi.measure.report import describe_system, without_infinities
+from pyvista_vdi.measure.report import describe_system
+from pyvista_vdi.measure.results import rounded as without_infinities
 from pyvista_vdi.measure.session import (
     WARM_UP_SIZE,
     Image,

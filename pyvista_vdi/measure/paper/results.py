@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from pyvista_vdi.measure.paper.plan import Plan
 from pyvista_vdi.measure.report import across
-from pyvista_vdi.measure.results import ResultsFile
+from pyvista_vdi.measure.results_file import ResultsFile
 
 
 def _cell_name(dataset: str, size: tuple[int, int], limit: int) -> str:

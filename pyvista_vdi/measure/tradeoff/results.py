@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.measure.report import save_figure
-from pyvista_vdi.measure.results import ResultsFile
+from pyvista_vdi.measure.results_file import ResultsFile
 from pyvista_vdi.measure.tradeoff.findings import COSTS, Point, best, dominated, points_of
 from pyvista_vdi.measure.tradeoff.plot import draw
 from pyvista_vdi.measure.tradeoff.report import describe
