@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from pyvista_vdi import _moved, errors
+from pyvista_vdi import errors
 from pyvista_vdi._version import __version__
 from pyvista_vdi.model import providers
 from pyvista_vdi.plotting import registration
@@ -82,7 +82,6 @@ _HOMES = {
 __all__ = ["__version__", "errors", "examples", *sorted(_HOMES)]
 
 
-_moved.install()
 registration.install()
 # The composition root: what lower rooms need of upper ones, by name and loaded when asked for
 providers.provide(

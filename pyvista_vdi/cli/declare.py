@@ -27,8 +27,6 @@ VOLUME_FILE = (
     "chunks (.ome.zarr, .zarr, x.h5::/path)"
 )
 
-# -- types of options ------------------------------------------------------------------------------
-
 
 def parse_size(text: str) -> tuple[int, int]:
     """Return width and height, pixels, from ``1280x720``."""
@@ -129,9 +127,6 @@ def parse_color(text: str) -> tuple[float, ...]:
             f"{text!r} is no colour: give a name, #rrggbb or R,G,B from 0 to 1"
         ) from error
     return red / 255, green / 255, blue / 255
-
-
-# -- options ---------------------------------------------------------------------------------------
 
 
 def option(

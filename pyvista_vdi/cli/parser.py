@@ -1,7 +1,4 @@
-"""The verbs and their options; imports nothing but the standard library and plain constants.
-
-All verbs and options are declared here, a few lines each: hence more than 500 lines.
-"""
+"""The verbs and their options; imports nothing but the standard library and plain constants."""
 
 from __future__ import annotations
 
@@ -149,9 +146,6 @@ def _make_parser() -> tuple[_Parser, dict[str, _Parser]]:
         add_options(verbs[name])
         verbs[name].set_defaults(run=run_verb, module=module)
     return parser, verbs
-
-
-# -- the verbs' options ----------------------------------------------------------------------------
 
 
 def _add_devices(parser: argparse.ArgumentParser) -> None:

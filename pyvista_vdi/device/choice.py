@@ -153,9 +153,6 @@ def _device_lines(info: DeviceInfo, is_default: bool) -> list[str]:
     ]
 
 
-# -- choosing ----------------------------------------------------------------------------------
-
-
 def _default() -> Runtime:
     candidates, notes = devices.find_candidates()
     for candidate in sorted(candidates, key=lambda c: devices.preference(c.info)):
@@ -230,9 +227,6 @@ def _sharing(context: Any, candidate: Candidate) -> Runtime:
         # The runtime keeps the context alive, so that its address cannot be given to another.
         _shared_contexts[key] = Runtime(candidate, context)
     return _shared_contexts[key]
-
-
-# -- probing -----------------------------------------------------------------------------------
 
 
 def _probe(candidate: Candidate) -> tuple[DeviceInfo, Runtime | None]:

@@ -225,8 +225,6 @@ def no_device_message(infos: Sequence[DeviceInfo], notes: Sequence[str]) -> str:
     return f"no usable OpenCL device: {found}{details}. Remedy: {REMEDY}"
 
 
-# -- what the drivers list ---------------------------------------------------------------------
-
 _lock = threading.RLock()
 _found: tuple[list[Candidate], list[str]] | None = None
 #: Whether this process was forked from one that had loaded drivers.

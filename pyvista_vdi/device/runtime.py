@@ -1,8 +1,4 @@
-"""One device with its context, queues, programs and buffers: what the engine launches through.
-
-Launches, copies and turns share one queue and one lock each, so they are methods of one class, and
-half of the lines say what each takes and raises: hence more than 500 lines.
-"""
+"""One device with its context, queues, programs and buffers: what the engine launches through."""
 
 from __future__ import annotations
 
@@ -92,8 +88,6 @@ class Runtime:
 
     def __repr__(self) -> str:
         return f"<Runtime on {self.info.full_name}>"
-
-    # -- kernels -------------------------------------------------------------------------------
 
     def kernel(
         self, path: str | Path, name: str, defines: Mapping[str, Define] | None = None
@@ -227,8 +221,6 @@ class Runtime:
             self._queue.finish()
             worker.took(kernel.name, size * row_items, time.perf_counter() - began)
             done += size
-
-    # -- buffers -------------------------------------------------------------------------------
 
     def buffer(
         self,
@@ -691,8 +683,6 @@ class Runtime:
             )
         return buffer.memory
 
-    # -- queues --------------------------------------------------------------------------------
-
     def finish(self) -> None:
         """Wait until all that was enqueued on the calling thread's queue is done.
 
@@ -769,8 +759,6 @@ class Runtime:
             for queue in queues:
                 queue.finish()
 
-    # -- frames and background work --------------------------------------------------------------
-
     def foreground(self) -> contextlib.AbstractContextManager[None]:
         """Draw a frame that a person waits for inside the ``with`` block.
 
@@ -833,8 +821,6 @@ class Runtime:
         finds it taken leaves either until it gets it.
         """
         return self._turns.holding(lock)
-
-    # -- profiling and errors ------------------------------------------------------------------
 
     def profile(self) -> list[KernelTime]:
         """Device time per kernel so far; empty unless ``PYVISTA_VDI_PROFILE`` was set.

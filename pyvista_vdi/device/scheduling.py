@@ -83,8 +83,6 @@ class Turns:
         self._owed = False  # a frame has ended while background work waited
         self._recent: deque[float] = deque(maxlen=RECENT_FRAMES)
 
-    # -- frames --------------------------------------------------------------------------------
-
     @contextlib.contextmanager
     def foreground(self) -> Iterator[None]:
         """See :meth:`pyvista_vdi.device.Runtime.foreground`."""
@@ -120,8 +118,6 @@ class Turns:
             self._frames -= 1
             self._owed = bool(self._waiting)
             self._changed.notify_all()
-
-    # -- background work -----------------------------------------------------------------------
 
     @property
     def worker(self) -> Worker | None:
@@ -211,8 +207,6 @@ class Turns:
                 worker.worked += time.perf_counter() - worker.turn_began
                 self._holder = None
                 self._changed.notify_all()
-
-    # -- waiting for something else --------------------------------------------------------------
 
     @contextlib.contextmanager
     def aside(self) -> Iterator[None]:

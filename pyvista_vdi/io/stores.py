@@ -280,9 +280,6 @@ def _chosen(
     return required_level(grids, Camera.from_any(camera), window_size, store.unit)
 
 
-# -- HDF5 ------------------------------------------------------------------------------------------
-
-
 def _open_hdf5(path: str, inner: str) -> Store:
     try:
         import h5py
@@ -370,9 +367,6 @@ def _grid(shape: Sequence[int], spacing: Any = None, origin: Any = None) -> Grid
     (x, y, z), (at_x, at_y, at_z) = along
     nz, ny, nx = shape
     return Grid((nx, ny, nz), (x, y, z), (at_x, at_y, at_z), np.eye(3))
-
-
-# -- zarr ------------------------------------------------------------------------------------------
 
 
 def _open_zarr(path: str, inner: str) -> Store:

@@ -4,8 +4,6 @@ The first pass finds each ray's optical depth in each block. Behind the sums of 
 in which V_O sees the blocks, the second pass knows the light that enters a block, and makes lists
 whose merge errors count as they do in one piece. Rows of all blocks' lists are then put behind each
 other, and merged to the budget.
-
-Both passes and merging share one task and its records: hence more than 500 lines.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""The camera: the only place that knows world, view and list coordinates (DESIGN section 3).
-
-One class, a third of which documents public arguments and frames: hence more than 500 lines.
-"""
+"""The camera: the only place that knows world, view and list coordinates (DESIGN section 3)."""
 
 from __future__ import annotations
 
@@ -149,8 +146,6 @@ class Camera:
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a Camera cannot be changed (tried to set {name!r}): use replace()")
 
-    # -- making one ------------------------------------------------------------------------------
-
     @classmethod
     def from_any(cls, camera: Any, *, model_transform: ArrayLike | None = None) -> Camera:
         """Return ``camera`` as a :class:`Camera`.
@@ -293,8 +288,6 @@ class Camera:
             window_center=around * window / tile,
         )
 
-    # -- frames ----------------------------------------------------------------------------------
-
     @property
     def axes(self) -> Matrix:
         """Unit vectors right, up and forward in world coordinates, float64 (3, 3), as rows."""
@@ -401,8 +394,6 @@ class Camera:
         if self.parallel_projection:
             return slope, forward
         return np.zeros((3, 3)), slope + forward
-
-    # -- the rest --------------------------------------------------------------------------------
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Camera) and self._key == other._key  # type: ignore[attr-defined]

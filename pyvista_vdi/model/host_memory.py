@@ -5,12 +5,10 @@ from __future__ import annotations
 import contextlib
 import math
 import mmap
-import os
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 from numpy.typing import DTypeLike, NDArray
 
 from pyvista_vdi.errors import DeviceMemoryError
@@ -70,24 +68,14 @@ def _in_huge_pages(nbytes: int) -> tuple[NDArray[np.uint8], int]:
     return raw, start
 
 
-def physical_memory() -> int | None:
-    """Return the host's memory in bytes, or None where the system does not say."""
-    if sys.platform == "win32":
-        return _windows_memory()
-    try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, OSError, ValueError):
-        return None
+def physical_memory() -> int:
+    """Return the host's memory, bytes."""
+    return int(psutil.virtual_memory().total)
 
 
-def free_memory() -> int | None:
-    """Return the bytes that can be had without swapping, or None where the system does not say."""
-    try:
-        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
-    except OSError:
-        return None
-    found = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
-    return int(found[0]) * 1024 if found else None
+def free_memory() -> int:
+    """Return the bytes that can be had without swapping."""
+    return int(psutil.virtual_memory().available)
 
 
 def require_free_memory(nbytes: int, what: str, remedy: str) -> None:
@@ -100,7 +88,7 @@ def require_free_memory(nbytes: int, what: str, remedy: str) -> None:
     """
     require_host_memory(nbytes, what, remedy)
     free = free_memory()
-    if free is not None and nbytes > free:
+    if nbytes > free:
         raise DeviceMemoryError(
             f"{what} needs {nbytes / 2**30:.2f} GiB on the host, of which {free / 2**30:.2f} GiB "
             f"are free: close other programs, or {remedy}"
@@ -125,24 +113,8 @@ def require_host_memory(nbytes: int, what: str, remedy: str) -> None:
         If the host has less memory in all.
     """
     available = physical_memory()
-    if available is not None and nbytes > available:
+    if nbytes > available:
         raise DeviceMemoryError(
             f"{what} needs {nbytes / 2**30:.2f} GiB on the host, which has "
             f"{available / 2**30:.2f} GiB: {remedy}"
         )
-
-
-def _windows_memory() -> int | None:
-    import ctypes
-
-    class _Status(ctypes.Structure):
-        _fields_ = (
-            ("dwLength", ctypes.c_ulong),
-            ("dwMemoryLoad", ctypes.c_ulong),
-            ("ullTotalPhys", ctypes.c_ulonglong),
-            ("rest", ctypes.c_ulonglong * 6),
-        )
-
-    status = _Status(dwLength=ctypes.sizeof(_Status))
-    kernel = getattr(ctypes, "windll").kernel32  # noqa: B009 (unknown to type checkers elsewhere)
-    return int(status.ullTotalPhys) if kernel.GlobalMemoryStatusEx(ctypes.byref(status)) else None

@@ -146,8 +146,6 @@ class VDI:
             return self.packing.media_at(rows, lists, *names)
         return {name: getattr(self, name)[rows] for name in names}
 
-    # -- what is in it ---------------------------------------------------------------------------
-
     @property
     def n_supersegments(self) -> int:
         """Number of supersegments in all lists."""
@@ -200,8 +198,6 @@ class VDI:
             and all(np.array_equal(getattr(self, n), getattr(other, n)) for n in names)
         )
 
-    # -- precision -------------------------------------------------------------------------------
-
     def with_precision(self, precision: str) -> VDI:
         """Return the VDI with supersegments of fewer bytes, on devices and in ``.vdi`` files.
 
@@ -249,16 +245,12 @@ class VDI:
         vdi.packing = packing
         return vdi
 
-    # -- fewer lists -----------------------------------------------------------------------------
-
     def thinned(self, along_x: int = 1, along_y: int = 1) -> VDI:
         """Return a VDI of every k-th list along the window's width and height.
 
         See :func:`pyvista_vdi.model.thinned.thinned`.
         """
         return provider("thinned")(self, along_x, along_y)  # type: ignore[no-any-return]
-
-    # -- files -----------------------------------------------------------------------------------
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write a ``.vdi``, ``.exr``, ``.vti`` or ``.html`` file that `pyvista_vdi.read` opens.
@@ -312,8 +304,6 @@ class VDI:
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
         """Return what a notebook shows: a viewer, or a picture."""
         return provider("notebook_bundle")(self, include, exclude)
-
-    # -- rules -----------------------------------------------------------------------------------
 
     def _check_lists(self) -> None:
         width, height = self.window_size

@@ -2,8 +2,7 @@
 
 ParaView loads this file by its path (``pyvista-vdi paraview`` prints it): Tools > Manage
 Plugins, ``paraview.simple.LoadPlugin`` or ``PV_PLUGIN_PATH``. Nothing else imports it. It declares
-ParaView's properties over VTK algorithms that know nothing of ParaView. ParaView
-knows a plugin by one path: hence more than 500 lines.
+ParaView's properties over VTK algorithms that know nothing of ParaView.
 """
 
 from __future__ import annotations
@@ -379,8 +378,6 @@ class VDISource(_Looking, RanksVDISource):
             client.proxy.GetProperty(prop).RemoveAllProxies()
             client.proxy.GetProperty(prop).AddProxy(function)
         client.proxy.UpdateVTKObjects()
-
-    # -- the pipeline's requests -----------------------------------------------------------------
 
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the output's extent, which the view decides."""

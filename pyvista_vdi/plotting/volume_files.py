@@ -142,9 +142,6 @@ def _place(data: pv.ImageData, to_world: NDArray[np.float64], file: Path) -> pv.
     return data
 
 
-# -- NIfTI -----------------------------------------------------------------------------------------
-
-
 def _nifti(file: Path) -> pv.ImageData:
     """Read NIfTI: VTK leaves out its two maps to the world, and the scale of its values."""
     reader = vtkNIFTIImageReader()
@@ -169,9 +166,6 @@ def _nifti(file: Path) -> pv.ImageData:
     return data
 
 
-# -- MetaImage -------------------------------------------------------------------------------------
-
-
 def _meta_image(file: Path) -> pv.ImageData:
     """Read MetaImage: VTK takes its matrix row by row where the axes lie one after the other."""
     with file.open("rb") as stream:
@@ -191,9 +185,6 @@ def _meta_image(file: Path) -> pv.ImageData:
     if len(numbers) == 9:
         data.direction_matrix = numbers.reshape(3, 3).T
     return data
-
-
-# -- DICOM -----------------------------------------------------------------------------------------
 
 
 def _dicom_file(file: Path) -> pv.ImageData:

@@ -53,8 +53,6 @@ class BackgroundGeneration:
         self._finalizer = weakref.finalize(self, self._worker.clear)
         self._finalizer.atexit = False  # the workers' own end waits for the threads as well
 
-    # -- what to make --------------------------------------------------------------------------
-
     def start(
         self,
         volume: Volume,
@@ -131,8 +129,6 @@ class BackgroundGeneration:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    # -- what has become of it -----------------------------------------------------------------
 
     def take(self) -> VDI | None:
         """Return the VDI that was finished, once; None where there is none.

@@ -319,9 +319,6 @@ def warn_missed(vdi: VDI, *, stacklevel: int) -> None:
         warnings.warn(missed, VDIWarning, stacklevel=stacklevel + 1)
 
 
-# -- choosing --------------------------------------------------------------------------------------
-
-
 def chosen(
     dial: Dial, ladder: Sequence[Prediction], window_size: tuple[int, int], least: float = 0.0
 ) -> Choice:
@@ -381,9 +378,6 @@ def chosen(
             "window"
         )
     return Choice(dial, rung, tuple(missed), window_size)
-
-
-# -- predicting ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

@@ -231,8 +231,6 @@ class FrameRateController:
         self._doubtful = None
         self._full_excess, self._trial = 1.0, 0
 
-    # -- the estimate ------------------------------------------------------------------------------
-
     def _learn(self, frame: _Frame) -> None:
         """Keep the frames that tell what the next one will cost."""
         # Set a stall aside until the next frame confirms it
@@ -267,8 +265,6 @@ class FrameRateController:
         # that of the mean.
         ahead = mean + slope * (n + 1) / 2
         return _Cost(overhead, max(ahead, mean / _STALL), 2 * error)
-
-    # -- the choice --------------------------------------------------------------------------------
 
     def _aim(self, cost: _Cost) -> float:
         """Return the time that the next frame shall take, seconds."""

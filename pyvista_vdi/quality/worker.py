@@ -70,8 +70,6 @@ class Worker:
         with self._lock:
             return self.job is not None and self._made is None and self._error is None
 
-    # -- the drawing thread --------------------------------------------------------------------
-
     def put(self, job: Job) -> None:
         """Replace the job, and see to it that a thread works."""
         if self._closed:
@@ -112,8 +110,6 @@ class Worker:
         thread = self._thread
         if thread is not None and thread is not threading.current_thread():
             thread.join()
-
-    # -- the worker thread ---------------------------------------------------------------------
 
     def _run(self) -> None:
         while (job := self._next_job()) is not None:

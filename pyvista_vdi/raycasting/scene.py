@@ -93,8 +93,6 @@ class Scene:
             segments,
         )
 
-    # -- what strategies ask ---------------------------------------------------------------------
-
     @cached_property
     def defines(self) -> Defines:
         """``-D`` names that every kernel which draws the scene has."""
@@ -181,8 +179,6 @@ class Scene:
             self.prepared.lit,
             or_blocks=self.in_blocks,
         )
-
-    # -- what kernels take -----------------------------------------------------------------------
 
     @contextlib.contextmanager
     def on_device(self) -> Iterator[OnDevice]:

@@ -1,7 +1,4 @@
-"""From a volume to samples, to an image and to a plain VDI, in float64 (DESIGN section 3).
-
-The whole way can be read against the conventions from top to bottom: hence more than 500 lines.
-"""
+"""From a volume to samples, to an image and to a plain VDI, in float64 (DESIGN section 3)."""
 
 from __future__ import annotations
 
@@ -259,9 +256,6 @@ def near_depth(bounds: Sequence[float], camera: Camera) -> float:
     return near if near > 0 or camera.parallel_projection else 0.0
 
 
-# -- the medium ------------------------------------------------------------------------------------
-
-
 def medium_at(
     volume: Volume,
     transfer_function: TransferFunction,
@@ -480,9 +474,6 @@ def _steps(start: Array, slope: Array, volume: Volume, parallel: bool, stride: f
     # A last step shorter than rounding is none
     count = max(1, math.ceil((t1 - t0) / stride - 1e-9))
     return np.append(t0 + np.arange(count) * stride, t1)
-
-
-# -- merging ---------------------------------------------------------------------------------------
 
 
 def _cut(

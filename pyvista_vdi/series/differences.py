@@ -4,8 +4,6 @@ Exact whatever is guessed: a guess changes how small the numbers are that are le
 and not what is read. All guesses are computed from what a reader has, in operations that every
 machine rounds alike. ``docs/decisions/series.md`` says what follows Fernandes et al. (2014), and
 what does not.
-
-Writing and reading mirror each other, line for line: hence more than 500 lines.
 """
 
 from __future__ import annotations
@@ -318,9 +316,6 @@ def lengths_of(codes: Codes, samples: Samples | None, window_size: tuple[int, in
     return (view.samples(codes.back, unit) - view.samples(codes.front, unit)).astype(np.float64)
 
 
-# -- guesses, the same for writer and reader ------------------------------------------------------
-
-
 class _View:
     """Some lists that are not empty, and their supersegments one behind the other."""
 
@@ -494,9 +489,6 @@ def _running(
     return total - base + np.where(at_kept, known[begins], 0)
 
 
-# -- what the writer chooses ----------------------------------------------------------------------
-
-
 def _same_lists(codes: Codes, old: Codes, tolerance: float) -> NDArray[np.bool_]:
     """Return which lists are what they were, their colours and opacities within the tolerance."""
     same = (
@@ -649,9 +641,6 @@ def _opacities_near(one: Integers, other: Integers, tolerance: float) -> NDArray
     for length in (1, _LONGEST):
         near &= np.abs(np.exp(-length * a) - np.exp(-length * b)) <= tolerance
     return near
-
-
-# -- numbers ---------------------------------------------------------------------------------------
 
 
 def _folded(values: Integers) -> NDArray[Any]:

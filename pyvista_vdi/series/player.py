@@ -88,8 +88,6 @@ class Player:
         self._seconds = 0.0  # that a step takes to be ready
         self._worker = Worker("pyvista-vdi series")
 
-    # -- one step --------------------------------------------------------------------------------
-
     @property
     def step(self) -> int:
         """Index of the step that is shown."""
@@ -142,8 +140,6 @@ class Player:
         """Show another VDI of the step that is shown, as long as it is."""
         with self._lock:
             self._instead = vdi
-
-    # -- playing ---------------------------------------------------------------------------------
 
     @property
     def playing(self) -> bool:
@@ -228,8 +224,6 @@ class Player:
         self._ready.clear()
         self._bytes.clear()
 
-    # -- places ----------------------------------------------------------------------------------
-
     def _due_at(self, now: float) -> int:
         """Return the place whose time has come at a moment."""
         since = now if self._since is None else self._since
@@ -275,8 +269,6 @@ class Player:
         while len(last) > _AHEAD + 1 and sum(self._bytes.values()) > self.memory:
             step = last.pop()
             del self._ready[step], self._bytes[step]
-
-    # -- behind the frames -----------------------------------------------------------------------
 
     def _wanted(self) -> int | None:
         """Return the next step to be decoded; None where enough are."""

@@ -1,7 +1,4 @@
-"""Reads .vdis files, step by step, trusting nothing that they say before it is checked.
-
-Each kind of frame has its checks, and its words where they fail: hence more than 500 lines.
-"""
+"""Reads .vdis files, step by step, trusting nothing that they say before it is checked."""
 
 from __future__ import annotations
 
@@ -265,8 +262,6 @@ class StepsReader(Sequence[VDI]):
             file_bytes=self._file_bytes,
         )
 
-    # -- the file --------------------------------------------------------------------------------
-
     def _read_head(self) -> tuple[dict[str, Any], int]:
         magic = self._MAGIC
         head = self._bytes_at(0, len(magic) + layout.HEAD.size)
@@ -409,8 +404,6 @@ class StepsReader(Sequence[VDI]):
 
     def _refuse(self, why: str) -> NoReturn:
         raise VDIFileError(f"{self._path} is damaged: {why}; {_REMEDY}")
-
-    # -- steps -----------------------------------------------------------------------------------
 
     def _decoded(self, i: int) -> VDI:
         """Return a step, the steps that it is written by decoded where they are not at hand."""

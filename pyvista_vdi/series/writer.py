@@ -353,8 +353,6 @@ class StepsWriter:
         stream.write(header.to_bytes() + content)
         stream.write(layout.TRAILER.pack(begin, layout.TRAILER_MAGIC))
 
-    # -- how a step is written -------------------------------------------------------------------
-
     def _written(self, vdi: VDI) -> _Known:
         number = len(self._entries)
         description = describe(vdi, layout.FORMAT_VERSION)

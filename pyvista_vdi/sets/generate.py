@@ -1,7 +1,4 @@
-"""Makes the VDIs of a set: as many, and from where, as pictures of all directions need.
-
-Placing views, judging them and growing are parts of one search: hence more than 500 lines.
-"""
+"""Makes the VDIs of a set: as many, and from where, as pictures of all directions need."""
 
 from __future__ import annotations
 

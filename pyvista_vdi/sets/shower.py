@@ -58,8 +58,6 @@ class SetShower:
         self._grower = Worker("pyvista-vdi set's growth")
         self._grown_for: Camera | None = None
 
-    # -- in a frame ------------------------------------------------------------------------------
-
     def look(self, camera: Camera) -> None:
         """Look from a view, whose model transform places the set, and decode what is near it."""
         self._view = camera
@@ -94,8 +92,6 @@ class SetShower:
             known = self.vdi_set[i]
             self._keep(i, known)
         return known
-
-    # -- behind the frames -----------------------------------------------------------------------
 
     @property
     def growing(self) -> bool:

@@ -148,8 +148,6 @@ class VDISet(Sequence[VDI]):
         """:attr:`window_size`, by the name that it has for a VDI."""
         return self.window_size
 
-    # -- a sequence ------------------------------------------------------------------------------
-
     @property
     def cameras(self) -> tuple[Camera, ...]:
         """The generating view V_O of each VDI."""
@@ -170,8 +168,6 @@ class VDISet(Sequence[VDI]):
 
     def __iter__(self) -> Iterator[VDI]:
         return (self[i] for i in range(len(self)))
-
-    # -- which of them ---------------------------------------------------------------------------
 
     @property
     def blend(self) -> float:
@@ -244,8 +240,6 @@ class VDISet(Sequence[VDI]):
         shares = np.append(1.0, shares[shares > 0])
         return [(int(i), float(w)) for i, w in zip(order, shares / shares.sum(), strict=False)]
 
-    # -- growing ---------------------------------------------------------------------------------
-
     @property
     def can_grow(self) -> bool:
         """Whether the volume is at hand, so that :meth:`generate` works: of files it is not."""
@@ -306,8 +300,6 @@ class VDISet(Sequence[VDI]):
         self._cameras = (*self._cameras, vdi.camera)
         # Last: threads that look for the nearest find no VDI that is not there yet
         self._places = np.concatenate([self._places, self._places_of([vdi.camera])])
-
-    # -- files -----------------------------------------------------------------------------------
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write a ``.vdiset`` file that :func:`pyvista_vdi.read` opens; whole or not at all.

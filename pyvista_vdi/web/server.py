@@ -111,8 +111,6 @@ class Server:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ended: asyncio.Event | None = None
 
-    # -- life ------------------------------------------------------------------------------------
-
     @property
     def url(self) -> str:
         """What a browser is to open."""
@@ -195,8 +193,6 @@ class Server:
         for client in list(self.clients):
             client.left.set()
 
-    # -- who is let in ---------------------------------------------------------------------------
-
     @web.middleware
     async def _guard(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
         """Let in who knows the token, from a page of ours, by a name of ours."""
@@ -218,8 +214,6 @@ class Server:
         except ValueError:
             return name in self._hosts
         return True
-
-    # -- what is served --------------------------------------------------------------------------
 
     async def _page(self, request: web.Request) -> web.Response:
         nonce = secrets.token_urlsafe(16)

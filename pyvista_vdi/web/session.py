@@ -230,8 +230,6 @@ class Client:
         self.notes[kind] = {"type": kind, **entries}
         self.news.set()
 
-    # -- in a thread of the server -----------------------------------------------------------------
-
     def _estimate(self, _: str, cancelled: threading.Event) -> tuple[Made, Wish, float]:
         wish, made = self.wish, self._made
         assert made is not None

@@ -153,8 +153,6 @@ class Source:
         started = self.started_with.get(name)
         return tuple(dict.fromkeys((*_NAMED[name], *filter(None, [started])))) if free else ()
 
-    # -- content -----------------------------------------------------------------------------------
-
     def volume(self, step: int) -> Volume:
         """Return a time step."""
         looks = self._looks
@@ -173,8 +171,6 @@ class Source:
             return self._looks.changed(changes).transfer_function(volume)
 
         return self._contents.get(wish.content, build)
-
-    # -- VDIs --------------------------------------------------------------------------------------
 
     def first_level(self, wish: Wish) -> str:
         """Return what is to be made first for a view: ``"coarse"``, or ``"full"`` of few lists."""

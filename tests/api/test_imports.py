@@ -42,7 +42,7 @@ OWNERS = {
 #: Rooms and loose modules from the lowest to the highest; what stands in one line may not import
 #: each other. Only ``__init__``, which hands in what lower rooms need of upper ones, has no place.
 LEVELS = (
-    ("errors", "_version", "_moved"),
+    ("errors", "_version"),
     ("model",),
     ("reference", "device", "io"),
     ("volume",),

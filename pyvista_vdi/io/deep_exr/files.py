@@ -172,9 +172,6 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
         return _File(path).info()
 
 
-# -- writing ---------------------------------------------------------------------------------------
-
-
 def _depth_offset(vdi: VDI) -> float:
     """Return what is added to front and back for Z, which the standard wants not to be negative.
 
@@ -225,9 +222,6 @@ def _depth(relative: NDArray[np.float32], offset: float) -> NDArray[np.float32]:
         return np.maximum(relative.astype(np.float64) + offset, 0).astype(np.float32)
 
 
-# -- reading ---------------------------------------------------------------------------------------
-
-
 class _File:
     """A deep image that has been read; says what it holds."""
 
@@ -271,8 +265,6 @@ class _File:
             memory_bytes=vdi.nbytes,
         )
 
-    # -- what is in the file ---------------------------------------------------------------------
-
     def _read_image(self, progress: Progress | None) -> DeepImage:
         wanted = {*STANDARD, *OURS}
         try:
@@ -309,8 +301,6 @@ class _File:
             raise
         except ValueError as error:
             self._refuse(f"its attribute {ATTRIBUTE} is incomplete or wrong: {error}")
-
-    # -- what still holds of what we wrote -------------------------------------------------------
 
     def _frame(self) -> Box:
         """Return the pixels of the view; both windows of a file of ours are alike."""
@@ -357,8 +347,6 @@ class _File:
             VDIWarning,
             stacklevel=5,
         )
-
-    # -- VDIs ------------------------------------------------------------------------------------
 
     def _exact_vdi(self, record: Record) -> VDI:
         channels = self._image.channels

@@ -8,8 +8,6 @@ the line, and then the samples, channel by channel.
 The OpenEXR package is not in the place of this: it makes an array object of each pixel and channel,
 about a hundred bytes each, and takes memory for what a header merely declares. It reads the forms
 that are not read here (``package.py``). Reading and writing share one file, as one layout.
-
-Writing and reading share one layout: hence more than 500 lines.
 """
 
 from __future__ import annotations
@@ -97,9 +95,6 @@ class DeepImage:
     channel_types: dict[str, np.dtype[Any]]
     counts: NDArray[np.int64]
     channels: dict[str, NDArray[Any]]
-
-
-# -- writing ---------------------------------------------------------------------------------------
 
 
 def write_image(
@@ -213,9 +208,6 @@ def _packed(data: bytes, compression: str, level: int) -> bytes:
     return packed if len(packed) < len(data) else data
 
 
-# -- reading ---------------------------------------------------------------------------------------
-
-
 def read_image(
     path: Path, wanted: Callable[[str], bool], progress: Progress | None = None
 ) -> DeepImage:
@@ -280,8 +272,6 @@ class _Image:
             counts=counts,
             channels=self._read_channels(counts, chunks, names, progress),
         )
-
-    # -- header ----------------------------------------------------------------------------------
 
     def _checked_start(self) -> int:
         start = bytes(self._data[:8])
@@ -368,8 +358,6 @@ class _Image:
         if not types or at != len(entries) - 1:
             self._refuse("its list of channels is missing or incomplete")
         return types
-
-    # -- chunks ----------------------------------------------------------------------------------
 
     def _read_counts(self) -> tuple[NDArray[np.int64], list[tuple[memoryview, int]]]:
         """Return the samples per pixel, and each row's packed samples with their unpacked size.

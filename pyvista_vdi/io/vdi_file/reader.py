@@ -1,7 +1,4 @@
-"""Reads .vdi files, trusting nothing that they say before it is checked.
-
-Each member has its checks, and its words where they fail: hence more than 500 lines.
-"""
+"""Reads .vdi files, trusting nothing that they say before it is checked."""
 
 from __future__ import annotations
 
@@ -230,8 +227,6 @@ class _OpenFile:
         except InvalidVDIError as error:
             self._refuse(f"it holds no valid VDI: {error}")
 
-    # -- archive and description -----------------------------------------------------------------
-
     def _opened_archive(self) -> zipfile.ZipFile:
         head = self._stream.read(_NAME_AT + len(DESCRIPTION))
         if not head:
@@ -350,8 +345,6 @@ class _OpenFile:
                     f"{info.n_supersegments} supersegments need {layout.to_dict()}"
                 )
         return wanted
-
-    # -- arrays ----------------------------------------------------------------------------------
 
     def _decoded_counts(self, packed: PackedArray) -> NDArray[np.uint64]:
         """Return the offsets that the lists' lengths add up to."""

@@ -68,8 +68,6 @@ class _Run:
                 self._dataset(dataset)
         self._results.save()
 
-    # -- what is left to do ------------------------------------------------------------------------
-
     def _cells(self, name: str) -> list[tuple[tuple[int, int], int]]:
         return list(self._plan.cells()) if name in self._measured else []
 
@@ -82,8 +80,6 @@ class _Run:
 
     def _preview_missing(self, name: str) -> bool:
         return name == self._previewed and not self._results.data["previews"]
-
-    # -- a data set --------------------------------------------------------------------------------
 
     def _dataset(self, dataset: Dataset) -> None:
         """Measure a data set, or mark its rows as refused."""
@@ -142,8 +138,6 @@ class _Run:
                 except (VDIError, MemoryError) as error:
                     self._refuse(name, [(size, limit)], error)
 
-    # -- a VDI -------------------------------------------------------------------------------------
-
     def _cell(self, name: str, limit: int, bench: Bench) -> None:
         doing = f"{name}, {across(bench.size)}, N_S {limit}"
         self._step(f"{doing}: generating")
@@ -185,8 +179,6 @@ class _Run:
             "volume_to_vtk_gpu": vtk_accuracy,
             "seconds": take_turns(frames, self._plan.repeats, runtime=self._runtime),
         }
-
-    # -- Table 2 -----------------------------------------------------------------------------------
 
     def _table2(self, name: str, volume: Volume, table: TransferFunction) -> None:
         assert self._plan.preview is not None

@@ -260,8 +260,6 @@ class _Run:
                 data["points"].sort(key=lambda point: order[point["name"]])
                 self._results.save()
 
-    # -- what all is compared with -----------------------------------------------------------------
-
     def _baseline(self, angle: float) -> dict[str, Any]:
         """Time the volume renderers, and compare ours with VTK's."""
         self._step(f"volume rendering at {angle:g} degrees")
@@ -273,8 +271,6 @@ class _Run:
             "volume_to_vtk_gpu": near,
             "seconds": take_turns(steps, self._plan.repeats, runtime=self._runtime),
         }
-
-    # -- a VDI, and the settings that share it -----------------------------------------------------
 
     def _group(self, generated: Setting, settings: list[Setting]) -> list[dict[str, Any]]:
         self._step(f"{generated.name}: generating")

@@ -125,8 +125,6 @@ class Frame:
         """Return a frame of no renderer, for what its view shows."""
         return cls(size, (0, 0), camera, np.eye(4), np.eye(4)[2:], full_size=size)
 
-    # -- whose ---------------------------------------------------------------------------------
-
     @property
     def painter(self) -> Any:
         """What draws the VDI."""
@@ -149,8 +147,6 @@ class Frame:
             return View.of(self.renderer, self.model_transform)
         except UnsupportedError:  # a shear, an off-axis projection: drawn all the same
             return View(self.camera, self.size)
-
-    # -- what is seen --------------------------------------------------------------------------
 
     def showing(self, seen: VDI | StandIn) -> Frame:
         """Return the frame of this VDI, with all that its mapper says of its looks."""
@@ -276,8 +272,6 @@ class Frame:
             return 0.0
         low, high = np.clip(rectangle, 0, self.size)
         return float(np.prod(high - low))
-
-    # -- depth ---------------------------------------------------------------------------------
 
     def view_depth(self, z: NDArray[Any], *, background: bool = True) -> NDArray[Any]:
         """Convert window depth, 0 (near) to 1 (far), to view depth in world units.

@@ -66,8 +66,6 @@ class VDIMapperMethods:
         assert self._painter is not None
         return self._painter
 
-    # -- input -----------------------------------------------------------------------------------
-
     def SetInputConnection(self, *args: Any) -> None:
         """Draw what a :class:`VDISource` (or a reader of canonical images) makes."""
         port = args[-1]
@@ -167,8 +165,6 @@ class VDIMapperMethods:
         modifies=False,
     )
 
-    # -- how it is drawn -------------------------------------------------------------------------
-
     SetOpacityMultiplier, GetOpacityMultiplier = accessors(
         "OpacityMultiplier",
         "painter.opacity_multiplier",
@@ -232,8 +228,6 @@ class VDIMapperMethods:
         "Return for how many pixels along each edge a ray is cast.",
         checked_image_distance,
     )
-
-    # -- while a hand moves ----------------------------------------------------------------------
 
     # In VTK's GPU mapper the following would draw VTK's own volume into a smaller framebuffer, so
     # its own switch stays off and these methods, called from Python, keep ours.
@@ -335,8 +329,6 @@ class VDIMapperMethods:
         modifies=False,
     )
 
-    # -- picking ---------------------------------------------------------------------------------
-
     SetPickingOpacity, GetPickingOpacity = accessors(
         "PickingOpacity",
         "painter.selection.opacity",
@@ -363,8 +355,6 @@ class VDIMapperMethods:
     def _set_input(self: Any, source: Input | None) -> None:
         self.painter.set_input(source)
         self.Modified()
-
-    # -- what a VDI cannot honour ----------------------------------------------------------------
 
     def SetBlendMode(self: Any, mode: int) -> None:
         """Accept composite blending only."""

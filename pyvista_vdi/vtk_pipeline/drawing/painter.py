@@ -1,7 +1,4 @@
-"""Raycasts a VDI for exactly the frame that VTK is drawing, and hands VTK the image.
-
-One class holds all that a frame leaves for the next: hence more than 500 lines.
-"""
+"""Raycasts a VDI for exactly the frame that VTK is drawing, and hands VTK the image."""
 
 from __future__ import annotations
 
@@ -92,8 +89,6 @@ class Painter:
         self._scene: tuple[Camera, weakref.ref[WindowClock]] | None = None
         self._trouble: BaseException | None = None
         self._scene_at_hand = SceneAtHand(self._say_not_exported)
-
-    # -- what is drawn ---------------------------------------------------------------------------
 
     def set_actor(self, actor: Any) -> None:
         """Remember whose matrix and renderers count."""
@@ -209,8 +204,6 @@ class Painter:
             drawn=last.way,
             time=None if self.upkeep.player is None else self.upkeep.player.time,
         )
-
-    # -- a frame ---------------------------------------------------------------------------------
 
     def before_frame(self) -> None:
         """Take a VDI that was made in the background; between two frames of a window only."""
@@ -453,8 +446,6 @@ class Painter:
         wanted = size[0] * size[1] * 4
         free, self._free = self._free, None
         return aligned_empty(wanted, np.float32) if free is None or free.size < wanted else free
-
-    # -- which renderer --------------------------------------------------------------------------
 
     def renderer(self) -> Any:
         """Return the renderer that is drawing the actor; ``None`` if it has none."""

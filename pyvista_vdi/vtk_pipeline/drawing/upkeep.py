@@ -126,8 +126,6 @@ class Upkeep:
         self._preparation.join()
         self._forget_volume()
 
-    # -- in a frame ------------------------------------------------------------------------------
-
     def current(
         self, frame: Frame, ask: Callable[[], VDIStatus], *, only: bool
     ) -> VDI | StandIn | None:
@@ -333,8 +331,6 @@ class Upkeep:
                 f"serve {served:.0f}: {why} and less of what was hidden; regenerate='never' takes "
                 "this as it is"
             )
-
-    # -- between frames --------------------------------------------------------------------------
 
     def collect(self) -> bool:
         """Take what was made in the background; whether there is another VDI to be drawn."""

@@ -56,9 +56,6 @@ _REMEDIES = {
 }
 
 
-# -- volumes ---------------------------------------------------------------------------------------
-
-
 def require_image(data: Any) -> vtkImageData:
     """Return ``data`` if it is a uniform grid, and say how to make one of anything else."""
     if isinstance(data, vtkImageData):
@@ -233,9 +230,6 @@ def volume_to_image(volume: Volume, name: str | None = None) -> vtkImageData:
     flat = volume.array.reshape((-1, 4) if volume.rgba else -1)
     image.GetPointData().SetScalars(to_vtk(volume.name if name is None else name, flat))
     return image
-
-
-# -- VDIs ------------------------------------------------------------------------------------------
 
 
 def vdi_to_image(vdi: VDI) -> vtkImageData:

@@ -131,9 +131,6 @@ def _gradient_opacity(prop: vtkVolumeProperty) -> dict[str, Any]:
     return {"gradient_opacities": np.clip(opacities, 0, 1), "gradient_range": (low, high)}
 
 
-# -- tables ----------------------------------------------------------------------------------------
-
-
 def _nodes(function: Any) -> NDArray[np.float64]:
     """Return a function's nodes as rows: x, values, midpoint, sharpness."""
     width = 6 if isinstance(function, vtkColorTransferFunction) else 4

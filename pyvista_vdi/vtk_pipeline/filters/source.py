@@ -106,8 +106,6 @@ class VDISource(SourceSettings):
         self.AddObserver("EndEvent", _end_abort)
         self.inputs: weakref.WeakSet[Any] = weakref.WeakSet()  # mappers' inputs that draw this
 
-    # -- results ---------------------------------------------------------------------------------
-
     def Update(self, *args: Any) -> None:
         """Bring the output up to date, and raise what went wrong."""
         self.CheckLights()
@@ -218,8 +216,6 @@ class VDISource(SourceSettings):
         image = self._input_grid()
         return None if image is None else tuple(image.GetBounds())
 
-    # -- the pipeline's requests -----------------------------------------------------------------
-
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the output's extent: one point per list."""
         width, height = 1, 1
@@ -240,8 +236,6 @@ class VDISource(SourceSettings):
         if self._error is not None:  # aborted, the next update tries again
             self.SetAbortOutput(isinstance(self._error, Cancelled))
         return 1
-
-    # -- how -------------------------------------------------------------------------------------
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
         if self._aborted():

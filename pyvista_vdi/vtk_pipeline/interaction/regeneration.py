@@ -76,8 +76,6 @@ class Regeneration:
         self._moving = False
         self._shown = True
 
-    # -- what goes on ----------------------------------------------------------------------------
-
     @property
     def progress(self) -> float | None:
         """Share done of the VDI that is being made, 0 to 1; ``None`` if none is."""
@@ -105,8 +103,6 @@ class Regeneration:
         """Return the last estimate for this VDI."""
         estimate = self._estimate
         return estimate.error.ssim if estimate is not None and estimate.vdi is vdi else None
-
-    # -- in a frame ------------------------------------------------------------------------------
 
     def look(
         self,
@@ -168,8 +164,6 @@ class Regeneration:
         else:
             self._for_view = False  # it is needed whatever the view does
 
-    # -- between frames --------------------------------------------------------------------------
-
     def collect(self) -> bool:
         """Take what the workers have finished, or raise why not; whether a VDI was swapped."""
         source = self._source()
@@ -190,8 +184,6 @@ class Regeneration:
         if self.policy == "auto":
             self._decide(source)
         return False
-
-    # -- "auto" ----------------------------------------------------------------------------------
 
     def _decide(self, source: VDISource) -> None:
         """Estimate the view's error, and begin a VDI of the view if it is too large."""
@@ -239,8 +231,6 @@ class Regeneration:
         if self._view is None or bounds is None:
             return math.inf
         return self._view.distance(other, bounds)
-
-    # -- the worker ------------------------------------------------------------------------------
 
     def _start(self, request: Request, *, for_view: bool = False) -> None:
         """Have a VDI made: because of the view alone, or whatever the view does meanwhile."""

@@ -307,8 +307,6 @@ class WindowClock:
         """Note that a VDI of this frame is a preview, or not."""
         self._frame.preview = self._frame.preview or preview
 
-    # -- the window's events ---------------------------------------------------------------------
-
     def _start(self) -> None:
         self._started = time.perf_counter()
         self._frame = _Frame()
@@ -377,8 +375,6 @@ class WindowClock:
                 controller.record(*self._resting[cost])
         self._controllers[cost].target_fps = target
         return self._controllers[cost]
-
-    # -- pictures --------------------------------------------------------------------------------
 
     def takes_picture(self, renderer: Any) -> bool:
         """Whether this frame is drawn to be kept: such a frame is always full.

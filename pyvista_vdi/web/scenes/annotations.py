@@ -173,9 +173,6 @@ def _corner_font(annotation: Any, texts: list[str], renderer: Any) -> int:
     return min(int(scaled), annotation.GetMaximumFontSize())
 
 
-# -- scalar bars: the names are those of vtkScalarBarActor.cxx ------------------------------------
-
-
 def _scalar_bar(bar: Any, renderer: Any, left_out: list[str]) -> Iterator[dict[str, Any]]:
     table = bar.GetLookupTable()
     if table is None:
