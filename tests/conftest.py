@@ -107,7 +107,7 @@ LENGTHY = {
     "generation": "criterion_functions generation_oracle march_blocks run_functions",
     "io": "deep_exr packed_files vdi_files",
     "large": "blocks",
-    "measure": "benchmark_model rivals",
+    "measure": "benchmark_scripts baselines",
     "model": "packing",
     "plotting": "add_vdi as_added dial shown volume_files",
     "quality": "view_error",

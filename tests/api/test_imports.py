@@ -72,7 +72,7 @@ LEVELS_WITHIN = {
 }
 
 #: Rooms that need VTK or PyVista in order to be imported.
-WITH_VTK = ("vtk_pipeline", "plotting", "paraview", "web.scenes", "measure.rivals.opengl")
+WITH_VTK = ("vtk_pipeline", "plotting", "paraview", "web.scenes")
 
 #: Slow to import, or optional: never loaded by ``import pyvista_vdi``.
 HEAVY = (

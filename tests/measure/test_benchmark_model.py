@@ -30,7 +30,6 @@ pytest.importorskip("tqdm")
 sys.path.insert(0, str(BENCHMARKS))
 
 import counting  # noqa: E402
-import interactive_table  # noqa: E402
 import machine  # noqa: E402
 import model  # noqa: E402
 import scaling  # noqa: E402
@@ -414,55 +413,6 @@ def test_two_cores_must_bring_a_factor():
     assert scaling.verdict(1.79) == "missed"
 
 
-# -- judging ---------------------------------------------------------------------------------------
-
-
-def frame_row(vdi, peers, floor):
-    """Return a row of the interactive table, all of whose floor is the raycast's."""
-    counts = {"lists": 2.0, "occupied": 1.0, "met": 3.0, "skips": False, "lanes in step": 0.5}
-    entry = {"per ray": counts, "floor": {"seconds": floor, "bound": "memory"}}
-    around = {"per ray": {}, "floor": {"seconds": 0.0, "bound": "memory"}}
-    model = {"vdi_skipping": entry, "around": around}
-    return {"angle": 5.0, "seconds": {"vdi_skipping": vdi, **peers}, "model": model}
-
-
-def test_a_frame_is_held_against_the_faster_of_the_mappers():
-    row = frame_row(0.02, {"vtk_gpu": 1.0, "vtk_fixed_point": 0.4}, 0.001)
-    cell = interactive_table.frame_cell(row, 1 / 10)
-    assert cell.ratio == pytest.approx(1 / 20)
-    assert cell.verdict == "met"
-    assert str(cell) == "1/20 (≤ 1/10), met"
-    row = frame_row(0.02, {"vtk_gpu": 1.0}, 0.001)
-    assert interactive_table.frame_cell(row, 1 / 10).ratio == pytest.approx(1 / 50)
-
-
-def test_what_is_missed_has_the_models_reason():
-    peers = {"vtk_gpu": 1.0, "vtk_fixed_point": 0.4}
-    above = interactive_table.frame_cell(frame_row(0.2, peers, 0.01), 1 / 10)
-    assert above.verdict == "missed"
-    assert above.reason.startswith("20.0 times its floor (1/40, bound by memory); 2.0 lists")
-    beyond = interactive_table.frame_cell(frame_row(0.2, peers, 0.1), 1 / 10)
-    assert beyond.reason.startswith("out of reach: the floor alone is 1/4, bound by memory")
-
-
-def test_cells_without_vtk_or_without_a_reach_are_no_verdicts():
-    assert interactive_table.frame_cell(frame_row(0.2, {}, 0.1), 1.0).verdict == "not measured"
-    reported = interactive_table.frame_cell(frame_row(0.2, {"vtk_gpu": 0.1}, 0.1), None)
-    assert (reported.verdict, str(reported)) == ("reported", "2.00")
-
-
-def test_a_group_is_as_good_as_its_worst_volume():
-    cells = {n: interactive_table.Cell(r, 0.2) for n, r in (("a", 0.1), ("b", 0.3), ("c", None))}
-    assert interactive_table.worst(cells)[0] == "b"
-    assert interactive_table.worst({})[1].verdict == "not measured"
-
-
-def test_the_reaches_are_those_of_every_group_and_standard_angle():
-    assert set(interactive_table.REACHES) == set(interactive_table.GROUPS)
-    for reaches in interactive_table.REACHES.values():
-        assert tuple(reaches) == interactive_table.ANGLES
-
-
 @pytest.mark.parametrize(
     ("interpolation", "voxels", "entries"), [("nearest", 1, 1), ("linear", 8, 2)]
 )
@@ -485,51 +435,6 @@ def test_the_work_of_a_march_is_a_voxel_and_an_entry_a_sample(
     recorded = model.march_work(march, volume, function, SIZE, blocks.mean(), records=True)
     assert recorded.write == 0
     assert recorded.operations.divide > work.operations.divide
-
-
-def measured_volume(ratio):
-    """Return what the interactive table finds of a volume whose frames take ``ratio`` of VTK's."""
-    rows = []
-    for angle in interactive_table.ANGLES:
-        row = {**frame_row(0.4 * ratio, {"vtk_fixed_point": 0.4}, 0.001), "angle": angle}
-        counts = {"looked": 9.0, "lanes busy": 0.9}
-        row["seconds"]["volume_skipping"] = 0.5
-        floor = {"seconds": 0.01, "bound": "memory"}
-        row["model"]["volume_skipping"] = {"per ray": counts, "floor": floor}
-        rows.append(row)
-    floor = {"seconds": 0.1, "bound": "gathers (L1)"}
-    shorten = {"per ray": {"runs": 9.0, "supersegments": 3.0}, "floor": floor}
-    return {
-        "angles": rows,
-        "generation": {"generation": 1.1, "render_volume": 1.0},
-        "model": {"generation": {"shorten": shorten}},
-        "left_out": {"vtk_gpu": "no memory"},
-    }
-
-
-def test_the_report_names_the_worst_volumes_what_is_missed_and_what_is_not_there():
-    results = {
-        "window_size": [64, 36],
-        "max_supersegments": 20,
-        "interpolation": "nearest",
-        "clock": "wall",
-        "system": {"device": "a / b"},
-        "groups": {"large": ["one", "two", "three"], "medium": [], "solid": ["four"]},
-        "volumes": {
-            "one": measured_volume(1 / 40),
-            "two": measured_volume(1 / 20),
-            "three": {"refused": "DeviceMemoryError: too large"},
-            "four": measured_volume(1 / 4),
-        },
-    }
-    text = interactive_table.report(results, None)
-    assert "| at V_O | 1/20 (≤ 1/30), **missed**, two | - | 1/4 (≤ 1/2), met, four |" in text
-    assert "| at 30° | 1/20 (≤ 1/4), met, two | - | 1/4, four |" in text
-    assert "| three | DeviceMemoryError: too large |" in text
-    assert "- two, VDI at 0 degrees: 20.0 times its floor" in text
-    assert "- four, render_volume: " in text
-    assert "- VTK GPU with one: no memory" in text
-    assert "1.10 (≤ 1.20), met" in text
 
 
 def test_scalings_report_has_exponents_and_says_what_is_not_measured():

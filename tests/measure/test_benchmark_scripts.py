@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import importlib
-import os
 import shlex
 import shutil
 import subprocess
@@ -15,8 +14,6 @@ import pytest
 from browsers import NAMES, missing
 from watched_windows import small_vdi
 
-from pyvista_vdi import examples
-
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 if not BENCHMARKS.is_dir():
     pytest.skip("the benchmarks are not beside the tests", allow_module_level=True)
@@ -26,43 +23,20 @@ SMALL = f"{SIZE} --out {{here}}"
 ON_BRAIN = f"{SMALL} --volumes brain"
 #: The least that reaches each script's end; {here} is the run's own folder, {rates} the device's.
 RUNS = {
-    "ambient_occlusion": f"{SMALL} --repeats 1",
-    "bricks": f"{SIZE} --volumes brain --repeats 1 --limits 8MiB",
-    "criteria": f"{ON_BRAIN} --tf soft",
-    "dial": ON_BRAIN,
-    "few_lists": f"{ON_BRAIN} --repeats 1",
     "files": f"{ON_BRAIN} --repeats 1",
-    "frame": f"{SMALL} --volume brain --frame 48x27 --repeats 1 --first-repeats 1",
-    "frame_rate": f"{SMALL} --volume brain --repeats 1 --frames 12",
     "generation": f"{ON_BRAIN} --repeats 1",
-    "interactive_table": f"{SMALL} --volumes aneurism --repeats 1 --machine {{rates}}",
     "large": f"{ON_BRAIN} --parts accuracy",
-    "large_model": f"{SMALL} --points 1e9",
-    "lighting": ON_BRAIN,
     "machine": "--quick --out {rates}",
     "memory": f"{SIZE} --volumes brain",
     "model": f"{ON_BRAIN} --repeats 1 --machine {{rates}}",
-    "multi_vdi": f"{SIZE} --volumes brain brain --repeats 1",
     "packed": f"{ON_BRAIN} --frame 48x27 --repeats 1",
     "page": f"{ON_BRAIN} --repeats 1",
-    "paper_tables": "--sizes 48x27 --datasets brain --repeats 1 --out {here}/paper.json",
-    "parameters": ON_BRAIN,
     "playing": f"{SMALL} --series plume --seconds 1",
-    "preview": f"{ON_BRAIN} --repeats 1",
-    "projections": "brain",
-    "raycast_trees": "--other .. --vdis {here}/ball.vdi --repeats 1",
-    "regeneration": f"{ON_BRAIN} --rounds 1 --times 1",
-    "rivals": f"{SMALL} --repeats 1",
+    "trees": "--other .. --vdis {here}/ball.vdi --repeats 1",
     "scaling": f"{SMALL} --volume brain --repeats 1 --quick",
     "series": f"{SMALL} --series plume",
     "series_data": "plume --out {here}",
     "sets": f"{ON_BRAIN} --directions 2 --target-ssim .8",
-    "skipping": f"{ON_BRAIN} --repeats 1",
-    "standard_table": f"{ON_BRAIN} --tf soft --interpolation nearest --repeats 1 --timings",
-    "store_levels": f"{SIZE} brain",
-    "tradeoff": "--help",  # it has no small form; test_tradeoff.py runs the verb
-    "turn": f"{ON_BRAIN} --every 40",
-    "view_error": ON_BRAIN,
     "web": f"{ON_BRAIN} --seconds 6",
 }
 
@@ -91,7 +65,7 @@ def test_what_a_script_imports_of_the_package_is_there(path):
 
 @pytest.fixture(scope="module")
 def rates(tmp_path_factory):
-    """A folder of what the device can do, from which ``model`` and ``interactive_table`` reckon."""
+    """A folder of what the device can do, from which ``model`` reckons."""
     folder = tmp_path_factory.mktemp("rates")
     run("machine", RUNS["machine"].format(rates=folder))
     return folder
@@ -114,13 +88,9 @@ def run(name, arguments):
 @pytest.mark.gl
 @pytest.mark.parametrize("name", RUNS)
 def test_a_script_runs_to_its_end(name, request, tmp_path, default_runtime):
-    if name == "interactive_table" and not os.environ.get(examples.DATA_VARIABLE):
-        pytest.skip(f"aneurism is not at hand: {examples.DATA_VARIABLE} is not set")
     if name in ("page", "web") and not any(map(shutil.which, NAMES)):
         missing("no Chromium is in the path: install the system's package 'chromium'")
-    if name == "large_model":  # of what was measured
-        shutil.copy(BENCHMARKS / "results" / "large.json", tmp_path)
-    if name == "raycast_trees":
+    if name == "trees":
         small_vdi().save(tmp_path / "ball.vdi")
     folders = {"here": tmp_path}
     if "{rates}" in RUNS[name]:
