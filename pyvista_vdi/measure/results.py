@@ -82,10 +82,9 @@ class Results:
         system = describe_system(device)
         if resume and path is not None and Path(path).exists():
             return cls.read(path, kind)._checked(plan, system, extent)
-        now = _now()
         head = {"format": FORMAT, "version": VERSION, "kind": kind, "plan": plan, "system": system}
         code = {"measured": provenance(rooms), "extent": extent}
-        data = {**head, **code, "begun": now, "changed": now, "rows": []}
+        data = {**head, **code, "begun": now(), "changed": now(), "rows": []}
         return cls(data, path)
 
     @classmethod
@@ -169,7 +168,7 @@ class Results:
 
     def save(self) -> None:
         """Write the file, if there is one; a run that is stopped meanwhile leaves the old one."""
-        self.data["changed"] = _now()
+        self.data["changed"] = now()
         if self._path is None:
             return
         head = [f"{json.dumps(n)}: {json.dumps(v)}" for n, v in self.data.items() if n != "rows"]
@@ -212,6 +211,6 @@ def rounded(value: Any) -> Any:
     return value
 
 
-def _now() -> str:
+def now() -> str:
     """Return the date and time, UTC."""
     return datetime.now(timezone.utc).isoformat(timespec="seconds")

@@ -17,6 +17,7 @@ from json_schema import read_checked
 from pyvista_vdi import cli, examples
 from pyvista_vdi.cli import parser
 from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError, InvalidVolumeError
+from pyvista_vdi.io.volumes import read_file
 from pyvista_vdi.measure.clock import rank_sum_chance
 from pyvista_vdi.measure.compare.bounds import SSIM_TO_VTK
 from pyvista_vdi.measure.paper import (
@@ -33,7 +34,6 @@ from pyvista_vdi.measure.paper import (
 )
 from pyvista_vdi.measure.paper.procedural import PROCEDURAL, make
 from pyvista_vdi.measure.paper.published import paper_tables, paper_targets
-from pyvista_vdi.measure.volumes import read_file
 
 SCHEMA = Path(__file__).parents[2] / "docs" / "benchmark_schema.json"
 

@@ -9,6 +9,7 @@ are now faster and now slower leave alone. What repeats exactly is held to fixed
 
 from __future__ import annotations
 
+import json
 import math
 import statistics
 from collections.abc import Iterator
@@ -16,7 +17,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from pyvista_vdi.measure.clock import CHANCE, rank_sum_chance, ratios
-from pyvista_vdi.measure.session import CANDIDATES
+from pyvista_vdi.measure.harness import CANDIDATES
+from pyvista_vdi.measure.paper.report import measured, name_of
+from pyvista_vdi.measure.results import Results
 
 #: Relative change of a median below which nothing counts as changed.
 LEAST_CHANGE = 0.05
@@ -114,19 +117,11 @@ def describe_changes(before: dict[str, Any], after: dict[str, Any]) -> str:
 
 
 def _changes(before: dict[str, Any], after: dict[str, Any]) -> Iterator[Change]:
-    others = {cell["name"]: cell for cell in after["cells"]}
-    for cell in before["cells"]:
-        other = others.get(cell["name"])
-        if other is None:
-            continue
-        name = cell["name"]
-        if cell["vdi"] is not None and other["vdi"] is not None:
-            yield from _vdi_changes(name, cell["vdi"], other["vdi"])
-        rows = {row["angle"]: row for row in other["angles"]}
-        for row in cell["angles"]:
-            if row["angle"] in rows:
-                at = f"{name} at {row['angle']:g} degrees"
-                yield from _row_changes(at, row, rows[row["angle"]])
+    others = {json.dumps(row["case"]): row for row in after["rows"] if "refused" not in row}
+    for what, changes in (("vdi", _vdi_changes), ("view", _row_changes)):
+        for row in measured(before, what):
+            if (other := others.get(json.dumps(row["case"]))) is not None:
+                yield from changes(name_of(row["case"]), row, other)
 
 
 def _vdi_changes(name: str, before: dict[str, Any], after: dict[str, Any]) -> Iterator[Change]:
@@ -168,13 +163,16 @@ def _exact(cell: str, figure: str, before: float, after: float, limit: float) ->
 
 
 def _only_in_one(before: dict[str, Any], after: dict[str, Any]) -> Iterator[str]:
-    """Name cells that one run lacks, or has refused."""
-    runs = [{cell["name"]: cell for cell in run["cells"]} for run in (before, after)]
+    """Name VDIs that one run lacks, or has refused."""
+    runs = [
+        {name_of(row["case"]): row.get("refused") for row in Results(run).rows(what="vdi")}
+        for run in (before, after)
+    ]
     for name in dict.fromkeys([*runs[0], *runs[1]]):
-        states = ["missing" if name not in run else _state(run[name]) for run in runs]
+        states = [_state(run[name]) if name in run else "missing" for run in runs]
         if states[0] != states[1]:
             yield f"{name}: {states[0]} -> {states[1]}"
 
 
-def _state(cell: dict[str, Any]) -> str:
-    return "measured" if cell["refused"] is None else f"refused ({cell['refused']})"
+def _state(refused: str | None) -> str:
+    return "measured" if refused is None else f"refused ({refused})"

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyvista_vdi import examples
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.measure.paper.procedural import PROCEDURAL, Procedural, Progress, make
+from pyvista_vdi.io.volumes import read_file
+from pyvista_vdi.measure.paper.procedural import PROCEDURAL, Procedural, make
 from pyvista_vdi.measure.paper.published import paper_tables
-from pyvista_vdi.measure.volumes import look, read_file
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -27,12 +28,43 @@ DEFAULT_SEED = 1
 #: Noise and planes while a procedural volume is made, bytes: at most.
 _WORKING_BYTES = 2**30
 
+#: Entries of the transfer functions, as ``add_volume`` has them by default.
+_ENTRIES = 256
+
+#: Opacity at equidistant scalars, by look.
+_OPACITIES: Mapping[str, tuple[float, ...]] = {
+    # What add_volume's opacity="linear" is
+    "ramp": (0.0, 1.0),
+    # Air and its noise are transparent; tissue is translucent, bone is not
+    "empty below a fifth": (0.0, 0.0, 0.02, 0.05, 0.3, 0.8),
+    # One fluid is transparent, the other translucent
+    "one of two fluids": (0.0, 0.0, 0.0, 0.01, 0.05, 0.15, 0.05, 0.01, 0.005),
+}
+
+#: RGB at equidistant scalars: black, blue-grey, white.
+_COLORS = ((0.0, 0.0, 0.0), (0.25, 0.3, 0.45), (0.7, 0.7, 0.6), (1.0, 1.0, 1.0))
+
 #: Looks of the paper's data sets.
 _LOOKS = {
     "kingsnake": "empty below a fifth",
     "beechnut": "empty below a fifth",
     "richtmyer_meshkov": "one of two fluids",
 }
+
+
+def look(name: str, scalar_range: tuple[float, float], interpolation: str) -> TransferFunction:
+    """Return a transfer function by its name: a key of the opacities above."""
+    return TransferFunction(
+        np.stack([_resampled(channel) for channel in zip(*_COLORS, strict=True)], axis=1),
+        _resampled(_OPACITIES[name]),
+        scalar_range,
+        interpolation=interpolation,
+    )
+
+
+def _resampled(nodes: tuple[float, ...]) -> NDArray[np.float64]:
+    at = np.linspace(0, len(nodes) - 1, _ENTRIES)
+    return np.interp(at, np.arange(len(nodes)), nodes)
 
 
 @dataclass(frozen=True)
@@ -54,7 +86,7 @@ class Dataset:
     nbytes : int or None
         Bytes of the volume, where they are known before it is there.
     load : callable
-        ``load(progress)`` returns the volume.
+        Returns the volume.
     """
 
     name: str
@@ -63,7 +95,7 @@ class Dataset:
     description: str
     look: str
     nbytes: int | None
-    load: Callable[[Progress | None], Volume]
+    load: Callable[[], Volume]
 
     def transfer_function(self, volume: Volume, interpolation: str) -> TransferFunction:
         """Return its transfer function; it needs no PyVista, so that every run has the same."""
@@ -116,7 +148,7 @@ def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
             examples.VOLUMES[name].description,
             "ramp",
             None,
-            lambda progress: examples.load_data(name, as_volume=True),
+            lambda: examples.load_data(name, as_volume=True),
         )
     label, file = _named_file(name)
     if not os.path.exists(file):  # noqa: PTH110 - pathlib's raises for a name that is too long
@@ -133,7 +165,7 @@ def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
         file.name,
         _LOOKS.get(label, "ramp"),
         None,
-        lambda progress: as_volume(read_file(file), None, "point"),
+        lambda: as_volume(read_file(file), None, "point"),
     )
 
 
@@ -156,14 +188,14 @@ def _procedural(name: str, kind: Procedural, factor: int, seed: int) -> Dataset:
     nbytes = kind.nbytes(factor)
     size = " x ".join(str(n) for n in kind.reduced(factor))
 
-    def load(progress: Progress | None) -> Volume:
+    def load() -> Volume:
         smaller = f"{name.partition('@')[0]}@{2 * factor}"
         require_free_memory(
             nbytes + _WORKING_BYTES,
             f"making the volume {name!r}, {size} of {kind.dtype},",
             f"take {smaller!r}, half as large along each edge, or another machine",
         )
-        return make(kind, factor, seed, name, progress)
+        return make(kind, factor, seed, name)
 
     return Dataset(
         name,

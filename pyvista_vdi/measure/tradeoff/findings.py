@@ -10,8 +10,9 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.measure.clock import ratios, spread
+from pyvista_vdi.measure.results import Results
 from pyvista_vdi.measure.tradeoff.dominance import Figure, find_dominated, front, told_apart
-from pyvista_vdi.measure.tradeoff.settings import Setting
+from pyvista_vdi.measure.tradeoff.settings import AXES, Setting
 
 #: What SSIM is traded for, by the keys of the findings, and how tables call it.
 COSTS: Mapping[str, str] = {
@@ -98,8 +99,15 @@ class Point:
 
 
 def points_of(data: dict[str, Any]) -> list[Point]:
-    """Return every setting that was measured."""
-    return [_point(entry) for entry in data["points"] if entry["refused"] is None]
+    """Return every setting that was measured, in the order of the plan."""
+    order = {Setting(**values).name: i for i, values in enumerate(data["plan"]["settings"])}
+    rows = (row for row in Results(data).rows(what="setting") if "refused" not in row)
+    return sorted((_point(row) for row in rows), key=lambda one: order[one.name])
+
+
+def setting_of(row: dict[str, Any]) -> Setting:
+    """Return the setting that a row is about."""
+    return Setting(**{n: value for n, value in row["case"].items() if n in AXES})
 
 
 def best(points: Sequence[Point], kind: str) -> list[Point]:
@@ -131,63 +139,61 @@ def dominated(points: Sequence[Point]) -> dict[str, list[str]]:
     return find_dominated({one.name: [one.figures[kind] for kind in kinds] for one in points})
 
 
-def _point(entry: dict[str, Any]) -> Point:
-    rows, generation = entry["angles"], entry["generation"]
+def _point(row: dict[str, Any]) -> Point:
+    views, generation, vdi = row["angles"], row["generation"], row["vdi"]
+    setting = setting_of(row)
     at = {
-        row["angle"]: ratios(row["seconds"]["clock"], row["volume_seconds"]["clock"])
-        for row in rows
+        view["angle"]: ratios(view["seconds"]["clock"], view["volume_seconds"]["clock"])
+        for view in views
     }
-    frames = [math.exp(_mean([math.log(r) for r in one])) for one in zip(*at.values(), strict=True)]
-    ssims = {row["angle"]: row["to_volume"]["ssim"] for row in rows}
+    frames = [statistics.geometric_mean(one) for one in zip(*at.values(), strict=True)]
+    ssims = {view["angle"]: view["to_volume"]["ssim"] for view in views}
+    ssim = statistics.fmean(ssims.values())
     made = generation["seconds"]["clock"]
     if generation["packing"] is not None:
         made = [a + b for a, b in zip(made, generation["packing"]["clock"], strict=True)]
     generations = ratios(made, generation["volume_seconds"]["clock"])
-    vdi = entry["vdi"]
     figures = {
         "frame": Figure.of_times(frames, TIME_TOLERANCE),
-        "loss": Figure(1 - _mean(list(ssims.values())), SSIM_TOLERANCE),
+        "loss": Figure(1 - ssim, SSIM_TOLERANCE),
         "memory": Figure(math.log(vdi["bytes_memory"]), BYTES_TOLERANCE),
         "generation": Figure.of_times(generations, TIME_TOLERANCE),
     }
-    if vdi["bytes_file"] is not None:
-        figures["file"] = Figure(math.log(vdi["bytes_file"]), BYTES_TOLERANCE)
+    if vdi["bytes_saved"] is not None:
+        figures["file"] = Figure(math.log(vdi["bytes_saved"]), BYTES_TOLERANCE)
     for angle, paired in at.items():
         figures[f"frame {angle:g}"] = Figure.of_times(paired, TIME_TOLERANCE)
         figures[f"loss {angle:g}"] = Figure(1 - ssims[angle], SSIM_TOLERANCE)
     return Point(
-        name=entry["name"],
-        setting=entry["setting"],
+        name=setting.name,
+        setting=setting.to_dict(),
         frame=statistics.median(frames),
         frame_spread=spread(frames),
         frames={angle: statistics.median(paired) for angle, paired in at.items()},
-        ssim=_mean(list(ssims.values())),
+        ssim=ssim,
         ssims=ssims,
         # Equal pictures: JSON has no infinity
-        psnr=min(math.inf if (p := row["to_volume"]["psnr"]) is None else p for row in rows),
-        worst_pixel=max(row["to_volume"]["worst_pixel"] for row in rows),
+        psnr=min(math.inf if (p := v["to_volume"]["psnr"]) is None else p for v in views),
+        worst_pixel=max(view["to_volume"]["worst_pixel"] for view in views),
         bytes_memory=vdi["bytes_memory"],
-        bytes_file=vdi["bytes_file"],
+        bytes_file=vdi["bytes_saved"],
         generation=statistics.median(generations),
         generation_seconds=statistics.median(made),
         figures=figures,
     )
 
 
-def _mean(values: list[float]) -> float:
-    return math.fsum(values) / len(values)
-
-
 def volume_renderers(data: dict[str, Any]) -> dict[float, dict[str, float]]:
     """Return by angle what volume renderers take, over ``render_volume``; medians of pairs."""
-    found = {}
-    for row in data["baselines"]:
-        base = row["seconds"]["volume_skipping"]
-        found[row["angle"]] = {
-            name: statistics.median(ratios(taken["clock"], base["clock"]))
+    return {
+        row["case"]["angle"]: {
+            name: statistics.median(
+                ratios(taken["clock"], row["seconds"]["volume_skipping"]["clock"])
+            )
             for name, taken in row["seconds"].items()
         }
-    return found
+        for row in Results(data).rows(what="volume rendering")
+    }
 
 
 def faster_vtk(data: dict[str, Any]) -> dict[float, float]:

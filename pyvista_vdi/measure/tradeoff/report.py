@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from pyvista_vdi.measure.clock import CHANCE
+from pyvista_vdi.measure.harness import CANDIDATES
 from pyvista_vdi.measure.report import (
     ABSENT,
     METRICS,
@@ -17,7 +18,7 @@ from pyvista_vdi.measure.report import (
     section,
     table,
 )
-from pyvista_vdi.measure.session import CANDIDATES
+from pyvista_vdi.measure.results import Results
 from pyvista_vdi.measure.tradeoff.findings import (
     BYTES_TOLERANCE,
     COSTS,
@@ -27,6 +28,7 @@ from pyvista_vdi.measure.tradeoff.findings import (
     best,
     dominated,
     faster_vtk,
+    setting_of,
     volume_renderers,
 )
 
@@ -107,11 +109,12 @@ def _dominated(points: Sequence[Point]) -> Iterator[str]:
 
 def _volumes(data: dict[str, Any], points: Sequence[Point]) -> Iterator[str]:
     """Say what volume renderers take, and which settings are no faster."""
+    baselines = list(Results(data).rows(what="volume rendering"))
     others = {
         name: "without skipping" if name == "volume" else label
         for name, label in CANDIDATES.items()
         if name not in ("vdi", "vdi_skipping", "volume_skipping")
-        and any(name in row["seconds"] for row in data["baselines"])
+        and any(name in row["seconds"] for row in baselines)
     }
     yield from section(
         "Volume rendering",
@@ -122,8 +125,8 @@ def _volumes(data: dict[str, Any], points: Sequence[Point]) -> Iterator[str]:
     default = next((one for one in points if one.name == "default"), None)
 
     def rows() -> Iterator[list[str]]:
-        for row in data["baselines"]:
-            angle, near = row["angle"], row["volume_to_vtk_gpu"]
+        for row in baselines:
+            angle, near = row["case"]["angle"], row["volume_to_vtk_gpu"]
             yield [
                 f"{angle:g}",
                 f"{1e3 * statistics.median(row['seconds']['volume_skipping']['clock']):.3g}",
@@ -138,7 +141,8 @@ def _volumes(data: dict[str, Any], points: Sequence[Point]) -> Iterator[str]:
     last = "slower than VTK's faster"
     yield from table(("angle", "render_volume, ms", *others.values(), *heads, last), rows())
     yield ""
-    for name, reason in sorted(data["left_out"].items()):
+    left_out = {n: reason for row in baselines for n, reason in row["left_out"].items()}
+    for name, reason in sorted(left_out.items()):
         yield from (f"- {CANDIDATES[name]} took no part: {reason}", "")
 
 
@@ -146,7 +150,7 @@ def _settings(data: dict[str, Any], points: Sequence[Point]) -> Iterator[str]:
     angles, vtk = data["plan"]["angles"], faster_vtk(data)
     better = dominated(points)
     fronts = {kind: {one.name for one in best(points, kind)} for kind in COSTS}
-    entries = {entry["name"]: entry for entry in data["points"]}
+    entries = {setting_of(row).name: row for row in Results(data).rows(what="setting")}
     degrees = [f"{angle:g}°" for angle in angles]
     heads = (
         *("setting", "frame / render_volume", *degrees, "/ faster VTK", "SSIM", *degrees),
@@ -177,10 +181,10 @@ def _settings(data: dict[str, Any], points: Sequence[Point]) -> Iterator[str]:
 
 
 def _refused(data: dict[str, Any]) -> Iterator[str]:
-    refused = [entry for entry in data["points"] if entry["refused"] is not None]
+    refused = [row for row in Results(data).rows(what="setting") if "refused" in row]
     if refused:
         yield from section("Not measured")
-        yield from (f"- {entry['name']}: {entry['refused']}" for entry in refused)
+        yield from (f"- {setting_of(row).name}: {row['refused']}" for row in refused)
         yield ""
 
 
