@@ -24,9 +24,7 @@ COSTS: Mapping[str, str] = {
 
 #: Differences that do not count: of SSIM, what devices that round differently may differ by; of
 #: times and bytes, relative.
-SSIM_TOLERANCE = 0.0005
-TIME_TOLERANCE = 0.05
-BYTES_TOLERANCE = 0.01
+SSIM_TOLERANCE, TIME_TOLERANCE, BYTES_TOLERANCE = 0.0005, 0.05, 0.01
 
 
 @dataclass(frozen=True)
@@ -39,30 +37,22 @@ class Point:
         The setting.
     setting : dict
         Its values, see :class:`Setting`.
-    frame : float
-        Frame time over that of ``render_volume``: the geometric mean over the angles, of
-        repetitions in the same round; the median of the repetitions.
-    frame_spread : float
-        Half of what lies between its least and its most repetition, over the median.
+    frame, frame_spread : float
+        Frame time over that of ``render_volume``: the median of repetitions, each the geometric
+        mean over the angles; and half of what lies between the least and the most, over it.
     frames : dict of float to float
-        The same by angle.
+        The median by angle.
     ssim : float
         SSIM to ``render_volume``: the mean over the angles.
     ssims : dict of float to float
         By angle.
-    psnr : float
-        The least of all angles, dB; infinite for equal pictures.
-    worst_pixel : float
-        Of all angles, in 1/255.
-    bytes_memory : int
-        Of the lists on the device.
-    bytes_file : int or None
-        Of the ``.vdi``; ``None`` where there was no room for it.
-    generation : float
-        Time of generation, with packing, over that of a frame of ``render_volume`` at steps of
-        half a voxel; the median.
-    generation_seconds : float
-        The median by the clock.
+    psnr, worst_pixel : float
+        The least of all angles, dB, infinite for equal pictures; the most, in 1/255.
+    bytes_memory, bytes_file : int
+        Of the lists on the device, and of the ``.vdi``: ``None`` where there was no room for it.
+    generation, generation_seconds : float
+        Time of generation, with packing, the median: over that of a frame of ``render_volume`` at
+        steps of half a voxel, and by the clock.
     figures : dict of str to Figure
         What settings are judged by: ``"frame"``, ``"memory"``, ``"file"``, ``"generation"`` and
         ``"loss"`` over all angles, ``"frame 5"`` and ``"loss 5"`` at each.
@@ -90,12 +80,8 @@ class Point:
 
     def cost(self, kind: str) -> float | None:
         """Return what tables and plots have for a key of :data:`COSTS`."""
-        return {
-            "frame": self.frame,
-            "memory": self.bytes_memory,
-            "file": self.bytes_file,
-            "generation": self.generation,
-        }[kind]
+        value: float | None = getattr(self, f"bytes_{kind}", getattr(self, kind, None))
+        return value
 
 
 def points_of(data: dict[str, Any]) -> list[Point]:
@@ -114,18 +100,14 @@ def best(points: Sequence[Point], kind: str) -> list[Point]:
     """Return the front of SSIM and a kind of cost, see :meth:`.Tradeoff.front`."""
     if kind not in COSTS:
         raise InvalidArgumentError(f"kind must be one of {', '.join(COSTS)}; got {kind!r}")
-    judged = {
-        one.name: [one.figures[kind], one.figures["loss"]] for one in points if kind in one.figures
-    }
+    judged = {p.name: [p.figures[kind], p.figures["loss"]] for p in points if kind in p.figures}
     on_front = front(judged)
     simplest_first = sorted(
         (one for one in points if one.name in on_front), key=lambda one: len(one.changes)
     )
     kept = told_apart([one.name for one in simplest_first], judged)
-    return sorted(
-        (one for one in simplest_first if one.name in kept),
-        key=lambda one: one.cost(kind) or math.inf,
-    )
+    found = (one for one in simplest_first if one.name in kept)
+    return sorted(found, key=lambda one: one.cost(kind) or math.inf)
 
 
 def dominated(points: Sequence[Point]) -> dict[str, list[str]]:
@@ -142,10 +124,7 @@ def dominated(points: Sequence[Point]) -> dict[str, list[str]]:
 def _point(row: dict[str, Any]) -> Point:
     views, generation, vdi = row["angles"], row["generation"], row["vdi"]
     setting = setting_of(row)
-    at = {
-        view["angle"]: ratios(view["seconds"]["clock"], view["volume_seconds"]["clock"])
-        for view in views
-    }
+    at = {v["angle"]: ratios(v["seconds"]["clock"], v["volume_seconds"]["clock"]) for v in views}
     frames = [statistics.geometric_mean(one) for one in zip(*at.values(), strict=True)]
     ssims = {view["angle"]: view["to_volume"]["ssim"] for view in views}
     ssim = statistics.fmean(ssims.values())
@@ -185,15 +164,12 @@ def _point(row: dict[str, Any]) -> Point:
 
 def volume_renderers(data: dict[str, Any]) -> dict[float, dict[str, float]]:
     """Return by angle what volume renderers take, over ``render_volume``; medians of pairs."""
-    return {
-        row["case"]["angle"]: {
-            name: statistics.median(
-                ratios(taken["clock"], row["seconds"]["volume_skipping"]["clock"])
-            )
-            for name, taken in row["seconds"].items()
-        }
-        for row in Results(data).rows(what="volume rendering")
-    }
+    found: dict[float, dict[str, float]] = {}
+    for row in Results(data).rows(what="volume rendering"):
+        base = row["seconds"]["volume_skipping"]["clock"]
+        taken = {name: ratios(times["clock"], base) for name, times in row["seconds"].items()}
+        found[row["case"]["angle"]] = {n: statistics.median(r) for n, r in taken.items()}
+    return found
 
 
 def faster_vtk(data: dict[str, Any]) -> dict[float, float]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.measure.clock import Step, take_turns
+from pyvista_vdi.measure.clock import take_turns
 from pyvista_vdi.measure.harness import (
     ROOMS,
     Bench,
@@ -28,7 +28,7 @@ from pyvista_vdi.measure.harness import (
 )
 from pyvista_vdi.measure.report import save_figure
 from pyvista_vdi.measure.results import Results
-from pyvista_vdi.measure.tradeoff.findings import best, dominated, points_of
+from pyvista_vdi.measure.tradeoff.findings import Point, best, dominated, points_of
 from pyvista_vdi.measure.tradeoff.plot import draw
 from pyvista_vdi.measure.tradeoff.report import describe
 from pyvista_vdi.measure.tradeoff.settings import Setting, sweep
@@ -37,6 +37,7 @@ from pyvista_vdi.model.classification import IN_PLACE, Classification
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.metrics import SSIM_WINDOW
 from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 
 if TYPE_CHECKING:
@@ -53,8 +54,6 @@ class Tradeoff:
 
     Attributes
     ----------
-    data : dict
-        The same.
     points : list of Point
         Every setting that was measured.
     """
@@ -65,30 +64,16 @@ class Tradeoff:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Tradeoff:
-        """Read the JSON of an earlier run.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it cannot be read, or is something else.
-        """
+        """Read the JSON of an earlier run; anything else raises InvalidArgumentError."""
         return cls(Results.read(path, "tradeoff").data)
 
-    def point(self, name: str) -> Any:
-        """Return a setting's figures, a :class:`Point`, by its name.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If no setting of that name was measured.
-        """
+    def point(self, name: str) -> Point:
+        """Return a setting's figures; a name that was not measured raises InvalidArgumentError."""
         for one in self.points:
             if one.name == name:
                 return one
-        raise InvalidArgumentError(
-            f"no setting {name!r} was measured: there are "
-            + "; ".join(repr(one.name) for one in self.points)
-        )
+        known = "; ".join(repr(one.name) for one in self.points)
+        raise InvalidArgumentError(f"no setting {name!r} was measured: there are {known}")
 
     def front(self, kind: str) -> list[str]:
         """Return the settings that no other dominates in SSIM and one kind of cost.
@@ -108,16 +93,11 @@ class Tradeoff:
         return [one.name for one in best(self.points, kind)]
 
     def dominated(self) -> dict[str, list[str]]:
-        """Return the settings that nobody should choose, and those that are better.
+        """Return the names of settings that nobody should choose, and of those that are better.
 
         Of each there is another that is nowhere worse by what counts, in the frame time and the
         SSIM at any angle, in memory, file and generation, and somewhere better beyond the measured
         noise: see :func:`dominates`.
-
-        Returns
-        -------
-        dict of str to list of str
-            Names.
         """
         return dominated(self.points)
 
@@ -128,17 +108,13 @@ class Tradeoff:
     def plot(self) -> Figure:
         """Draw the fronts of frame time, bytes and generation time against SSIM.
 
+        Without Matplotlib MissingDependencyError is raised, and InvalidArgumentError if nothing was
+        measured.
+
         Returns
         -------
         matplotlib.figure.Figure
             Which notebooks show as it is.
-
-        Raises
-        ------
-        MissingDependencyError
-            If Matplotlib is not installed.
-        InvalidArgumentError
-            If nothing was measured.
         """
         return draw(self.data, self.points)
 
@@ -185,10 +161,8 @@ def measure_tradeoff(
         Of all frames, pixels.
     angles : sequence of float
         The new views, degrees of ``Azimuth`` from V_O.
-    repeats : int
-        Timed frames of each setting at each angle.
-    generations : int
-        Timed generations of each VDI.
+    repeats, generations : int
+        Timed frames of each setting at each angle, and timed generations of each VDI.
     vtk : bool, optional
         Whether VTK's mappers are timed beside; by default where VTK is installed.
     name : str
@@ -211,15 +185,11 @@ def measure_tradeoff(
 
     Raises
     ------
-    TypeError
-        If a keyword is unknown.
     InvalidArgumentError
         If an argument cannot be used, nothing is to be seen, or the file to go on with is of
         another run.
-    MissingDependencyError
-        If a colour map or an opacity is named and PyVista is not installed.
-    NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
-        If there is no device, or it fails. A setting whose own VDI does not fit is marked as
+    VDIError
+        As :func:`pyvista_vdi.generate` does. A setting whose own VDI does not fit is marked as
         refused, with the reason.
 
     Examples
@@ -274,10 +244,10 @@ def measure_tradeoff(
         lambda: Bench(volume, table, size, device=device, vtk=plan["vtk"], view=view)
     ) as bench:
         rows = _Rows(results, bench, settings)
-        for case in rows.baselines():  # without them nothing is worth measuring
+        for case in rows.baselines:  # without them nothing is worth measuring
             if results.row(case.to_dict()) is None:
                 results.add(case.to_dict(), **rows.baseline(case))
-        run(rows.cases(), rows.figures, results, progress)
+        run(rows.cases.values(), rows.figures, results, progress)
     return Tradeoff(results.data)
 
 
@@ -291,23 +261,16 @@ class _Rows:
         self, results: Results, bench: Latest[Bench], settings: tuple[Setting, ...]
     ) -> None:
         self._results, self._bench, self._plan = results, bench, results.plan
-        self._groups: Latest[dict[Setting, dict[str, Any]]] = Latest(self._group)
-        self._settings = settings
-
-    def baselines(self) -> Iterator[Case]:
-        """Yield the views at which the volume itself is drawn."""
-        for angle in self._plan["angles"]:
-            yield Case(self._plan["volume"]["name"], angle=angle, what="volume rendering")
-
-    def cases(self) -> Iterator[Case]:
-        """Yield the settings; those that differ in what is chosen after generation together."""
-        order = {setting.generated: i for i, setting in reversed([*enumerate(self._settings)])}
-        for setting in sorted(self._settings, key=lambda setting: order[setting.generated]):
-            yield self._case(setting)
-
-    def _case(self, setting: Setting) -> Case:
-        options = tuple(setting.changes.items())
-        return Case(self._plan["volume"]["name"], options=options, what="setting")
+        self._groups = Latest(self._group)
+        name, angles = results.plan["volume"]["name"], results.plan["angles"]
+        self.baselines = [Case(name, angle=angle, what="volume rendering") for angle in angles]
+        # Those that differ in what is chosen after generation follow each other
+        first = {setting.generated: i for i, setting in reversed([*enumerate(settings)])}
+        settings = tuple(sorted(settings, key=lambda setting: first[setting.generated]))
+        self.cases = {
+            setting: Case(name, options=tuple(setting.changes.items()), what="setting")
+            for setting in settings
+        }
 
     def baseline(self, case: Case) -> dict[str, Any]:
         """Time the volume renderers, and compare ours with VTK's."""
@@ -329,32 +292,29 @@ class _Rows:
         return self._groups(setting.generated)[setting]
 
     def _group(self, generated: Setting) -> dict[Setting, dict[str, Any]]:
+        """Measure the settings of a VDI that the results lack."""
+        bench = self._bench()
         settings = [
             setting
-            for setting in self._settings
-            if setting.generated == generated
-            and self._results.row(self._case(setting).to_dict()) is None
+            for setting, case in self.cases.items()
+            if setting.generated == generated and self._results.row(case.to_dict()) is None
         ]
-        bench = self._bench()
-        forms, seconds = bench.timed_generation(
+        precisions = tuple(dict.fromkeys(setting.precision for setting in settings))
+        made, seconds = bench.timed_generation(
             self._plan["generations"],
             _share(bench.size, generated.lists),
             before={"volume": partial(bench.image, bench.view)},
-            forms=tuple(dict.fromkeys(setting.precision for setting in settings)),
+            forms=precisions,
             max_supersegments=generated.max_supersegments,
             criterion=generated.criterion,
             sample_distance=generated.sample_distance * bench.voxel,
             tolerance=generated.tolerance,
             view_cone=generated.view_cone,
         )
-        found: dict[Setting, dict[str, Any]] = {}
-        for setting in settings:
-            vdi = forms[setting.precision]
-            found[setting] = {
-                "vdi": {
-                    "window_size": vdi.window_size,
-                    "bytes_memory": prepared_vdi(bench.runtime, vdi).list_bytes,
-                },
+        sizes = {precision: _sizes(bench, made[precision]) for precision in precisions}
+        found: dict[Setting, dict[str, Any]] = {
+            setting: {
+                "vdi": sizes[setting.precision],
                 "generation": {
                     "seconds": seconds["generate"],
                     "packing": seconds.get(setting.precision),
@@ -362,36 +322,40 @@ class _Rows:
                 },
                 "angles": [],
             }
-        sizes = {precision: sizes_of(vdi) for precision, vdi in forms.items()}
-        for setting, row in found.items():
-            names = ("supersegments", "mean_length", "longest_list", "bytes_saved")
-            row["vdi"] |= {n: sizes[setting.precision][n] for n in names}
+            for setting in settings
+        }
         for angle in self._plan["angles"]:
             camera = bench.view.azimuth(angle)
-            frames: dict[str, Step] = {"volume": bench.frames(camera)["volume_skipping"]}
-            for setting in settings:
-                frames[setting.name] = partial(
+            drawn: dict[str, Callable[[], Any]] = {
+                setting.name: partial(
                     bench.draw,
-                    forms[setting.precision],
+                    made[setting.precision],
                     camera,
                     _share(bench.size, setting.preview),
                     skip_empty=setting.skip_empty,
                 )
-            near = {}
-            for setting in settings:
-                image: Any = frames[setting.name]()
-                near[setting] = accuracy(enlarged(image, bench.size), bench.reference(camera))
-            taken = take_turns(frames, self._plan["repeats"], runtime=bench.runtime)
-            for setting in settings:
-                found[setting]["angles"].append(
+                for setting in settings
+            }
+            pictures = {name: enlarged(draw(), bench.size) for name, draw in drawn.items()}
+            volume = {"volume": bench.frames(camera)["volume_skipping"]}
+            taken = take_turns({**volume, **drawn}, self._plan["repeats"], runtime=bench.runtime)
+            for setting, row in found.items():
+                row["angles"].append(
                     {
                         "angle": angle,
-                        "to_volume": near[setting],
+                        "to_volume": accuracy(pictures[setting.name], bench.reference(camera)),
                         "seconds": taken[setting.name],
                         "volume_seconds": taken["volume"],
                     }
                 )
         return found
+
+
+def _sizes(bench: Bench, vdi: VDI) -> dict[str, Any]:
+    names = ("supersegments", "mean_length", "longest_list", "bytes_saved")
+    found = {name: value for name, value in sizes_of(vdi).items() if name in names}
+    memory = prepared_vdi(bench.runtime, vdi).list_bytes
+    return {"window_size": vdi.window_size, "bytes_memory": memory, **found}
 
 
 def _share(size: tuple[int, int], edge: float) -> tuple[int, int]:
