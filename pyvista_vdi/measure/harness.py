@@ -359,10 +359,8 @@ class Bench:
 
     Parameters
     ----------
-    volume : Volume
-        The scalars.
-    table : TransferFunction
-        How they look.
+    volume, table : Volume, TransferFunction
+        The scalars, and how they look.
     window_size : (int, int)
         Of all frames, pixels.
     device : optional
@@ -380,10 +378,9 @@ class Bench:
     ----------
     voxel, step : float
         Steps of timed frames, and of comparisons and generation; model units.
-    vtk : dict of str to VTKBaseline
-        VTK's mappers that take part, by the keys of :data:`CANDIDATES`.
-    left_out : dict of str to VDIError
-        Those that cannot, and why.
+    vtk, left_out : dict
+        VTK's mappers by the keys of :data:`CANDIDATES`: those that take part, and the errors of
+        those that cannot.
     """
 
     def __init__(

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.measure.clock import Step, Times, take_turns
+from pyvista_vdi.measure.clock import Times, take_turns
 from pyvista_vdi.measure.harness import (
     ROOMS,
     WARM_UP_SIZE,
@@ -64,10 +64,8 @@ class Settings:
         Of the VDI and of all frames, pixels.
     angles : tuple of float
         New views, degrees of ``Azimuth`` from V_O.
-    max_supersegments : int
-        Longest list.
-    precision : str
-        Of the supersegments, see :meth:`VDI.with_precision`.
+    max_supersegments, precision : int, str
+        Longest list, and form of its supersegments, see :meth:`VDI.with_precision`.
     sample_distance : float, optional
         The accuracy step, model units; half the smallest spacing by default.
     repeats : int
@@ -119,10 +117,9 @@ class AngleResult:
         Degrees from V_O.
     vdi_to_raycaster : Comparison
         The VDI against our volume raycaster.
-    raycaster_to_gpu : Comparison, optional
-        Our volume raycaster against VTK's GPU mapper; ``None`` without VTK.
-    fixed_point_to_gpu : Comparison, optional
-        VTK's fixed-point mapper against VTK's GPU mapper.
+    raycaster_to_gpu, fixed_point_to_gpu : Comparison, optional
+        Our volume raycaster, and VTK's fixed-point mapper, against VTK's GPU mapper; ``None``
+        without VTK.
     seconds : dict of str to Timing
         Frame times at steps of one voxel, by the keys of :data:`NAMES`; empty if not timed.
     """
@@ -136,15 +133,16 @@ class AngleResult:
     @property
     def ratio_to_vtk(self) -> float | None:
         """VDI's frame time over that of the faster of VTK's mappers."""
-        peers = [t.median for name, t in self.seconds.items() if name in ("gpu", "fixed_point")]
-        return self.seconds["vdi"].median / min(peers) if peers else None
+        return self._over("gpu", "fixed_point")
 
     @property
     def ratio_to_raycaster(self) -> float | None:
         """VDI's frame time over that of our volume raycaster."""
-        if not self.seconds:
-            return None
-        return self.seconds["vdi"].median / self.seconds["raycaster"].median
+        return self._over("raycaster")
+
+    def _over(self, *names: str) -> float | None:
+        peers = [self.seconds[name].median for name in names if name in self.seconds]
+        return self.seconds["vdi"].median / min(peers) if peers else None
 
 
 @dataclass(frozen=True)
@@ -186,25 +184,19 @@ class Report:
 
     def results(self, path: str | os.PathLike[str] | None = None) -> Results:
         """Return everything as the JSON has it: a row of the VDI, and one of each view."""
-        plan = {name: value for name, value in self.case.items() if name != "name"}
+        described = asdict(self)
+        plan, angles = described["case"], described["angles"]
         results = Results.begun("compare", plan, rooms=ROOMS, path=path)
         results.data |= {"system": self.system, "begun": self.begun or results.data["begun"]}
-        volume, size = self.case["name"], tuple(self.case["window_size"])
-        times = {
-            "generation_seconds": self.generation_seconds,
-            "full_raycast_seconds": self.full_raycast_seconds,
-        }
-        results.add(
-            Case(volume, window_size=size, what="vdi").to_dict(),
-            **self.sizes,
-            **{name: found and asdict(found) for name, found in times.items()},
-            generation_ratio=self.generation_ratio,
-        )
-        for result in self.angles:
-            case = Case(volume, window_size=size, angle=result.angle, what="view")
+        case = partial(Case, plan["name"], window_size=tuple(plan["window_size"]))
+        names = ("generation_seconds", "full_raycast_seconds")
+        times = {name: described[name] for name in names}
+        ratio = {"generation_ratio": self.generation_ratio}
+        results.add(case(what="vdi").to_dict(), **self.sizes, **times, **ratio)
+        for result, figures in zip(self.angles, angles, strict=True):
             ratios = {n: getattr(result, n) for n in ("ratio_to_vtk", "ratio_to_raycaster")}
-            figures = {n: v for n, v in asdict(result).items() if n != "angle"}
-            results.add(case.to_dict(), **figures, **ratios)
+            view = case(angle=figures.pop("angle"), what="view")
+            results.add(view.to_dict(), **figures, **ratios)
         return results
 
     def to_dict(self) -> dict[str, Any]:
@@ -259,19 +251,19 @@ def measure(
             raise error
         vdi, times = _generated(bench, settings)
         steps()
-        images: dict[float, Images] = {}
+        images, seconds = {}, {}
         for angle in settings.angles:
             images[angle] = _images(bench, vdi, angle)
             steps()
-        results = []
         for angle in settings.angles:
-            results.append(_judged(angle, images[angle], _frame_times(bench, vdi, angle, settings)))
+            seconds[angle] = _frame_times(bench, vdi, angle, settings.repeats)
             steps()
         system = describe_system(settings.device)
         if bench.opengl is not None:
             system["opengl"] = bench.opengl
-        sizes = _sizes(bench, vdi, settings)
         case = {**_case(bench, settings), "classification": looks.describe()}
+        results = [_judged(angle, images[angle], seconds[angle]) for angle in settings.angles]
+        sizes = _sizes(bench, vdi, settings)
         return Report(case, system, sizes, *times, results, begun), vdi, images
 
 
@@ -279,23 +271,24 @@ def _property(volume: Volume, settings: Settings) -> Any:
     """Return how VTK's mappers see the volume: the property that ``add_volume`` would make."""
     from pyvista_vdi.measure.vtk_baselines import add_volume_property
 
-    arguments = dict(settings.classification)
+    # Which array it is, has been chosen
+    arguments = {
+        name: value
+        for name, value in settings.classification.items()
+        if name not in ("scalars", "preference")
+    }
     if "transfer_function" in arguments:
         raise InvalidArgumentError(
             "VTK's mappers take no transfer_function: give add_volume's arguments or a "
             "volume_property, or leave VTK out"
         )
-    for name in ("scalars", "preference"):  # the array has been chosen
-        arguments.pop(name, None)
     return arguments.get("volume_property") or add_volume_property(volume, arguments)
 
 
 def _generated(bench: Bench, settings: Settings) -> tuple[VDI, tuple[Timing | None, Timing | None]]:
     """Generate the VDI, in turn with a full raycast at the same step where that is timed."""
-    options: dict[str, Any] = {
-        "max_supersegments": settings.max_supersegments,
-        "precision": settings.precision,
-    }
+    limit, precision = settings.max_supersegments, settings.precision
+    options: dict[str, Any] = {"max_supersegments": limit, "precision": precision}
     if settings.repeats == 0:
         return bench.generate(**options), (None, None)
     # Without skipping: the plain baseline that the paper compares with
@@ -319,24 +312,23 @@ def _images(bench: Bench, vdi: VDI, angle: float) -> Images:
     return images
 
 
-def _frame_times(bench: Bench, vdi: VDI, angle: float, settings: Settings) -> dict[str, Timing]:
+def _frame_times(bench: Bench, vdi: VDI, angle: float, repeats: int) -> dict[str, Timing]:
     """Time frames at steps of one voxel."""
-    if settings.repeats == 0:
+    if repeats == 0:
         return {}
     frames = bench.frames(bench.view.azimuth(angle), vdi)
-    chosen: dict[str, Step] = {"vdi": frames["vdi_skipping"], "raycaster": frames["volume"]}
-    chosen |= {name.removeprefix("vtk_"): frames[name] for name in bench.vtk}
-    taken = take_turns(chosen, settings.repeats)
+    chosen = {"vdi": "vdi_skipping", "raycaster": "volume"}
+    chosen |= {name.removeprefix("vtk_"): name for name in bench.vtk}
+    taken = take_turns({name: frames[frame] for name, frame in chosen.items()}, repeats)
     return {name: Timing.of(times) for name, times in taken.items()}
 
 
 def _case(bench: Bench, settings: Settings) -> dict[str, Any]:
-    volume = bench.volume
     return {
         "name": settings.name,
-        "dimensions": list(volume.dimensions),
-        "spacing": list(volume.spacing),
-        "dtype": str(volume.array.dtype),
+        "dimensions": list(bench.volume.dimensions),
+        "spacing": list(bench.volume.spacing),
+        "dtype": str(bench.volume.array.dtype),
         "window_size": list(settings.window_size),
         "max_supersegments": settings.max_supersegments,
         "precision": settings.precision,
@@ -365,10 +357,6 @@ def _judged(angle: float, images: Images, seconds: dict[str, Timing]) -> AngleRe
         both = one in images and other in images
         return compare_images(images[one], images[other]) if both else None
 
-    return AngleResult(
-        angle=angle,
-        vdi_to_raycaster=compare_images(images["vdi"], images["raycaster"]),
-        raycaster_to_gpu=compared("raycaster", "gpu"),
-        fixed_point_to_gpu=compared("fixed_point", "gpu"),
-        seconds=seconds,
-    )
+    vdi_to_raycaster = compare_images(images["vdi"], images["raycaster"])
+    to_gpu = compared("raycaster", "gpu"), compared("fixed_point", "gpu")
+    return AngleResult(angle, vdi_to_raycaster, *to_gpu, seconds)

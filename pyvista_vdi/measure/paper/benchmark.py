@@ -9,6 +9,7 @@ import statistics
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -39,7 +40,6 @@ from pyvista_vdi.measure.paper.datasets import (
 )
 from pyvista_vdi.measure.paper.published import paper_targets
 from pyvista_vdi.measure.results import Results
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.frame_rate import FrameRateController
@@ -62,7 +62,7 @@ _MOST_SAMPLES = 64
 
 @dataclass(frozen=True)
 class Plan:
-    """What a run measures.
+    """What a run measures; numbers out of their range raise InvalidArgumentError.
 
     Parameters
     ----------
@@ -70,16 +70,10 @@ class Plan:
         Name of what the rest began as.
     datasets : tuple of str
         Names that :func:`pyvista_vdi.measure.paper.find_dataset` knows.
-    sizes : tuple of (int, int)
-        Windows, pixels.
-    limits : tuple of int
-        Longest lists, the paper's N_S.
-    angles : tuple of float
-        Degrees of ``Azimuth`` from V_O.
-    repeats : int
-        Timed frames of each candidate at each view.
-    generations : int
-        Timed generations of each VDI.
+    sizes, limits, angles : tuple
+        Windows, pixels; longest lists, the paper's N_S; degrees of ``Azimuth`` from V_O.
+    repeats, generations : int
+        Timed frames of each candidate at each view, and timed generations of each VDI.
     interpolation : {"nearest", "linear"}
         Of all volume renderers, and of generation.
     preview : tuple of (str, (int, int), int, float), optional
@@ -88,11 +82,6 @@ class Plan:
         Whether VTK's mappers take part.
     seed : int
         Of the procedural volumes.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If a number is out of its range.
     """
 
     profile: str
@@ -127,18 +116,18 @@ class Plan:
 
     def cases(self) -> Iterator[Case]:
         """Yield what the rows are about: volumes, VDIs, views, and Table 2."""
+
+        def case(what: str, size: tuple[int, int], limit: int, angle: float | None = None) -> Case:
+            return Case(label, None, size, angle, 1.0, (("max_supersegments", limit),), (), what)
+
         measured = [label_of(name) for name in self.datasets]
         for label in self.found():
             yield Case(label, what="volume")
             for size, limit in product(self.sizes, self.limits) if label in measured else ():
-                options = (("max_supersegments", limit),)
-                yield Case(label, None, size, options=options, what="vdi")
-                for angle in self.angles:
-                    yield Case(label, None, size, angle, options=options, what="view")
+                yield case("vdi", size, limit)
+                yield from (case("view", size, limit, angle) for angle in self.angles)
             if self.preview is not None and label == label_of(self.preview[0]):
-                _, size, limit, angle = self.preview
-                options = (("max_supersegments", limit),)
-                yield Case(label, None, size, angle, options=options, what="preview")
+                yield case("preview", *self.preview[1:])
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything in values that JSON can hold; files without their folders."""
@@ -183,13 +172,7 @@ def open_results(
 
 
 def read_results(path: str | os.PathLike[str]) -> Results:
-    """Read a file of results.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If it cannot be read, or is something else.
-    """
+    """Read a file of results; anything else raises InvalidArgumentError."""
     return Results.read(path, "benchmark")
 
 
@@ -230,12 +213,8 @@ class _Rows:
 
     def figures(self, case: Case) -> dict[str, Any]:
         """Return the figures of a case."""
-        return {
-            "volume": self._volume_row,
-            "vdi": self._vdi_row,
-            "view": self._view_row,
-            "preview": self._preview_row,
-        }[case.what or ""](case)
+        figures: dict[str, Any] = getattr(self, f"_{case.what}_row")(case)
+        return figures
 
     def close(self) -> None:
         """Release VTK's windows, and what lies on the device."""
@@ -293,53 +272,46 @@ class _Rows:
         bench, vdi, _ = self._made(case)
         camera = case.camera(bench.view)
         reference, whole = bench.reference(camera), bench.draw(vdi, camera)
-        frame = {"full": lambda: bench.draw(vdi, camera)}
+        frame = {"full": partial(bench.draw, vdi, camera)}
         full = take_turns(frame, self._plan.repeats, runtime=self._runtime)["full"]
+        width, height = bench.size
+
+        def fewer_pixels(pixels: int) -> Image:
+            edge = math.sqrt(pixels / (width * height))
+            size = max(1, round(width * edge)), max(1, round(height * edge))
+            return bench.draw(vdi, camera, size)
+
+        def fewer_samples(samples: int) -> Image:
+            return bench.draw(vdi, camera, preview_samples=samples)
+
+        ways = {
+            "fewer pixels": (fewer_pixels, width * height),
+            "samples per ray": (fewer_samples, _MOST_SAMPLES),
+        }
         rows = []
-        for speed_up, ssim in paper_targets():
-            for name, (way, most) in _ways(bench, vdi, camera).items():
-                # Multiples of the full frame's rate ask the same of every device
-                target = speed_up / statistics.median(full["clock"])
-                samples, taken, image = _kept(way, most, target)
-                shown = enlarged(image, bench.size)
-                rows.append(
-                    {
-                        "way": name,
-                        "target_speed_up": speed_up,
-                        "samples": samples,
-                        "share": samples / most,
-                        "seconds": {"clock": taken, "device": []},
-                        "to_full": accuracy(shown, whole),
-                        "to_volume": accuracy(shown, reference),
-                        "paper_ssim": ssim,
-                    }
-                )
+        for (speed_up, ssim), (name, (way, most)) in product(paper_targets(), ways.items()):
+            # Multiples of the full frame's rate ask the same of every device
+            target = speed_up / statistics.median(full["clock"])
+            samples, taken, image = _kept(way, most, target)
+            shown = enlarged(image, bench.size)
+            rows.append(
+                {
+                    "way": name,
+                    "target_speed_up": speed_up,
+                    "paper_ssim": ssim,
+                    "samples": samples,
+                    "share": samples / most,
+                    "seconds": {"clock": taken, "device": []},
+                    "to_full": accuracy(shown, whole),
+                    "to_volume": accuracy(shown, reference),
+                }
+            )
         return {"seconds": full, "to_volume": accuracy(whole, reference), "ways": rows}
 
 
-#: Draws a frame with so many samples in all.
-_Way = Callable[[int], Image]
-
-
-def _ways(bench: Bench, vdi: VDI, camera: Camera) -> dict[str, tuple[_Way, int]]:
-    """Return the two ways to draw a frame faster, and the samples that a full frame has."""
-    width, height = bench.size
-
-    def fewer_pixels(pixels: int) -> Image:
-        edge = math.sqrt(pixels / (width * height))
-        size = max(1, round(width * edge)), max(1, round(height * edge))
-        return bench.draw(vdi, camera, size)
-
-    def fewer_samples(samples: int) -> Image:
-        return bench.draw(vdi, camera, preview_samples=samples)
-
-    return {
-        "fewer pixels": (fewer_pixels, width * height),
-        "samples per ray": (fewer_samples, _MOST_SAMPLES),
-    }
-
-
-def _kept(way: _Way, most: int, target_fps: float) -> tuple[int, list[float], Image]:
+def _kept(
+    way: Callable[[int], Image], most: int, target_fps: float
+) -> tuple[int, list[float], Image]:
     """Let the controller find its choice; return it, the frames' times and the last picture."""
     way(most)  # not counted: its kernel may have to be compiled
     controller = FrameRateController(target_fps, floor=1 / most)

@@ -36,10 +36,8 @@ class Change:
 
     Parameters
     ----------
-    cell : str
-        Which row.
-    figure : str
-        Which figure of it.
+    cell, figure : str
+        Which row, and which figure of it.
     before, after : float
         Medians, or the figures themselves.
     chance : float or None
@@ -63,17 +61,9 @@ class Change:
 
 
 def compare_results(before: dict[str, Any], after: dict[str, Any]) -> list[Change]:
-    """Return every figure that is in both runs.
+    """Return every figure that is in both runs, in the order of `before`.
 
-    Parameters
-    ----------
-    before, after : dict
-        What two files hold, see :func:`pyvista_vdi.measure.paper.read_results`.
-
-    Returns
-    -------
-    list of Change
-        In the order of `before`.
+    They are what two files hold, see :func:`pyvista_vdi.measure.paper.read_results`.
     """
     return list(_changes(before, after))
 
@@ -126,11 +116,11 @@ def _changes(before: dict[str, Any], after: dict[str, Any]) -> Iterator[Change]:
 
 def _vdi_changes(name: str, before: dict[str, Any], after: dict[str, Any]) -> Iterator[Change]:
     for figure in ("supersegments", "bytes_raw", "bytes_saved"):
-        old, new = before[figure], after[figure]
-        if old is not None and new is not None:
-            yield _exact(name, figure, old, new, _SIZE_LIMIT * old)
-    old, new = (vdi["generation_seconds"]["clock"] for vdi in (before, after))
-    yield _timed(name, "generation, s", old, new)
+        if None not in (both := (before[figure], after[figure])):
+            yield _exact(name, figure, *both, _SIZE_LIMIT * both[0])
+    yield _timed(
+        name, "generation, s", *(v["generation_seconds"]["clock"] for v in (before, after))
+    )
 
 
 def _row_changes(at: str, before: dict[str, Any], after: dict[str, Any]) -> Iterator[Change]:
@@ -138,17 +128,13 @@ def _row_changes(at: str, before: dict[str, Any], after: dict[str, Any]) -> Iter
     if None not in ssim:  # windows below 11 pixels have none
         yield _exact(at, "SSIM", ssim[0], ssim[1], _SSIM_LIMIT)
     for name, label in CANDIDATES.items():
-        if name not in before["seconds"] or name not in after["seconds"]:
-            continue
-        old, new = (row["seconds"][name]["clock"] for row in (before, after))
-        yield _timed(at, f"{label}, s", old, new)
-        if name != "volume":
-            # Each repetition over that of render_volume beside it
-            old, new = (
-                ratios(row["seconds"][name]["clock"], row["seconds"]["volume"]["clock"])
-                for row in (before, after)
-            )
-            yield _timed(at, f"{label} / render_volume", old, new)
+        if name in before["seconds"] and name in after["seconds"]:
+            taken = [row["seconds"][name]["clock"] for row in (before, after)]
+            yield _timed(at, f"{label}, s", *taken)
+            if name != "volume":
+                # Each repetition over that of render_volume beside it
+                beside = [row["seconds"]["volume"]["clock"] for row in (before, after)]
+                yield _timed(at, f"{label} / render_volume", *map(ratios, taken, beside))
 
 
 def _timed(cell: str, figure: str, before: list[float], after: list[float]) -> Change:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,7 @@ from pyvista_vdi import examples
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.io.volumes import read_file
-from pyvista_vdi.measure.paper.procedural import PROCEDURAL, Procedural, make
-from pyvista_vdi.measure.paper.published import paper_tables
+from pyvista_vdi.measure.paper.procedural import PROCEDURAL, make
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -73,14 +73,12 @@ class Dataset:
 
     Parameters
     ----------
-    name : str
-        What the results call it.
+    name, description : str
+        What the results call it, and one phrase.
     source : {"example", "procedural", "file"}
         Where it is from.
     paper : str or None
         The paper's data set that it is, or stands in for.
-    description : str
-        One phrase.
     look : str
         Name of its transfer function.
     nbytes : int or None
@@ -120,7 +118,7 @@ class Dataset:
 
 
 def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
-    """Return a data set by its name.
+    """Return a data set by its name; what nothing is called raises InvalidArgumentError.
 
     Parameters
     ----------
@@ -131,25 +129,13 @@ def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
         ``beechnut`` or ``richtmyer_meshkov`` says which of the paper's it is.
     seed : int
         Of a procedural volume.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If nothing has that name.
     """
-    base = name.partition("@")[0]
-    if base in PROCEDURAL:
-        return _procedural(name, PROCEDURAL[base], _factor(name), seed)
+    if name.partition("@")[0] in PROCEDURAL:
+        return _procedural(name, seed)
     if name in examples.VOLUMES:
-        return Dataset(
-            name,
-            "example",
-            None,
-            examples.VOLUMES[name].description,
-            "ramp",
-            None,
-            lambda: examples.load_data(name, as_volume=True),
-        )
+        described = examples.VOLUMES[name].description
+        load = partial(examples.load_data, name, as_volume=True)
+        return Dataset(name, "example", None, described, "ramp", None, load)
     label, file = _named_file(name)
     if not os.path.exists(file):  # noqa: PTH110 - pathlib's raises for a name that is too long
         known = ", ".join([*sorted(examples.VOLUMES), *PROCEDURAL])
@@ -157,16 +143,13 @@ def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
             f"no volume is called {name!r}, and there is no such file: choose one of {known}, or "
             "name a file"
         )
-    paper = label if label in {row["dataset"] for row in paper_tables()["table1"]} else None
-    return Dataset(
-        label,
-        "file",
-        paper,
-        file.name,
-        _LOOKS.get(label, "ramp"),
-        None,
-        lambda: as_volume(read_file(file), None, "point"),
-    )
+    paper = label if label in _LOOKS else None
+    looks = _LOOKS.get(label, "ramp")
+
+    def read() -> Volume:
+        return as_volume(read_file(file), None, "point")
+
+    return Dataset(label, "file", paper, file.name, looks, None, read)
 
 
 def label_of(name: str) -> str:
@@ -184,40 +167,27 @@ def _named_file(name: str) -> tuple[str, Path]:
     return label or Path(path).name.split(".")[0], Path(path)
 
 
-def _procedural(name: str, kind: Procedural, factor: int, seed: int) -> Dataset:
+def _procedural(name: str, seed: int) -> Dataset:
+    base, at, text = name.partition("@")
+    if at and not (text.isdecimal() and 1 <= int(text) <= 128):
+        raise InvalidArgumentError(
+            f"{name!r} does not say how much smaller: write a whole number from 1 to 128 behind "
+            "the @, as in kingsnake_like@4"
+        )
+    kind, factor = PROCEDURAL[base], int(text or 1)
     nbytes = kind.nbytes(factor)
     size = " x ".join(str(n) for n in kind.reduced(factor))
 
     def load() -> Volume:
-        smaller = f"{name.partition('@')[0]}@{2 * factor}"
         require_free_memory(
             nbytes + _WORKING_BYTES,
             f"making the volume {name!r}, {size} of {kind.dtype},",
-            f"take {smaller!r}, half as large along each edge, or another machine",
+            f"take '{base}@{2 * factor}', half as large along each edge, or another machine",
         )
         return make(kind, factor, seed, name)
 
-    return Dataset(
-        name,
-        "procedural",
-        kind.paper,
-        f"{kind.description} (made from seed {seed})",
-        _LOOKS[kind.paper],
-        nbytes,
-        load,
-    )
-
-
-def _factor(name: str) -> int:
-    _, at, text = name.partition("@")
-    if not at:
-        return 1
-    if text.isdecimal() and 1 <= int(text) <= 128:
-        return int(text)
-    raise InvalidArgumentError(
-        f"{name!r} does not say how much smaller: write a whole number from 1 to 128 behind the @, "
-        "as in kingsnake_like@4"
-    )
+    description = f"{kind.description} (made from seed {seed})"
+    return Dataset(name, "procedural", kind.paper, description, _LOOKS[kind.paper], nbytes, load)
 
 
 def require_allocation(runtime: Runtime, dataset: Dataset) -> None:
