@@ -55,18 +55,9 @@ SLACK = 0.002
 class Point:
     """A way to draw, what it takes and how near it comes to the own full picture.
 
-    Parameters
-    ----------
-    who : {"vdi", "volume", "gpu", "fixed_point"}
-        Our VDI, our volume raycaster, or one of VTK's mappers.
-    distance : float
-        Pixels along each edge for a ray.
-    step : float
-        Voxels along the ray; of a VDI what it was generated with.
-    seconds : float
-        Of a frame, the median.
-    ssim : float
-        To the own full picture.
+    ``who`` is our "vdi" or "volume" raycaster, or VTK's "gpu" or "fixed_point" mapper; it casts a
+    ray for ``distance`` pixels along each edge, in steps of ``step`` voxels, of a VDI those that it
+    was generated with. ``seconds`` are the median of a frame.
     """
 
     who: str
@@ -77,7 +68,7 @@ class Point:
 
     @property
     def ours(self) -> bool:
-        """Whether it is ours."""
+        """Whether it is none of VTK's."""
         return self.who in ("vdi", "volume")
 
 
@@ -122,19 +113,7 @@ def cost_alone(points: Sequence[Point]) -> list[float]:
 
 @dataclass(frozen=True)
 class Plan:
-    """Which cases are measured, and how.
-
-    Parameters
-    ----------
-    volumes, looks : tuple of str
-        Names of volumes (:data:`pyvista_vdi.examples.VOLUMES`) and transfer functions.
-    views : tuple of (float, float)
-        Degrees from V_O and zoom.
-    window_size : (int, int)
-        Pixels.
-    repeats : int
-        Timed frames of each way and view.
-    """
+    """Which cases are measured: volumes and transfer functions by name, angles and zooms."""
 
     volumes: tuple[str, ...]
     looks: tuple[str, ...] = tuple(TRANSFER_FUNCTIONS)
@@ -211,30 +190,10 @@ def measure_front(
     device: Any = None,
     progress: Progress | None = None,
 ) -> Results:
-    """Measure, and write what there is after each view.
+    """Measure, and write what there is to a JSON file after each view: see :func:`points_of`.
 
-    Parameters
-    ----------
-    plan : Plan
-        The cases.
-    path : path-like, optional
-        A JSON file to write.
-    resume : bool
-        Go on with that file, if it is there, which an earlier run of the same plan has left.
-    device : optional
-        OpenCL device of ours.
-    progress : callable, optional
-        Called with the finished fraction, 0 to 1, and what is being done.
-
-    Returns
-    -------
-    Results
-        A row for each view: ``points``, the values of a :class:`Point` each.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If the file to go on with is none, or of another plan or device.
+    ``resume`` goes on with the file, if it is there, which an earlier run of the same plan has
+    left. ``progress`` is called with the finished fraction and what is being done.
     """
     extent = "whole" if set(examples.WHOLE) <= set(plan.volumes) else "sample"
     more = {"rooms": (*ROOMS, "vtk_pipeline"), "extent": extent, "device": device}

@@ -75,16 +75,12 @@ class Case:
 
     Parameters
     ----------
-    volume : str
-        Name of the volume.
-    look : str, optional
-        Name of the transfer function.
+    volume, look : str
+        Names of the volume and of the transfer function.
     window_size : (int, int), optional
         Pixels.
-    angle : float, optional
-        Degrees of ``Azimuth`` from V_O.
-    zoom : float
-        By what the view is zoomed in.
+    angle, zoom : float
+        Degrees of ``Azimuth`` from V_O, and by what the view is zoomed in.
     options : tuple of (str, object)
         What else was chosen, such as ``(("max_supersegments", 15),)``.
     candidates : tuple of str
@@ -159,16 +155,9 @@ def sample(
 
 @dataclass(frozen=True)
 class Estimate:
-    """A mean over all cases, estimated from a sample.
+    """A mean over all cases from those that were measured, ``count`` of ``of``.
 
-    Parameters
-    ----------
-    mean : float
-        The estimate.
-    error : float
-        Its standard error: 0 where all cases were measured.
-    count, of : int
-        Cases that were measured, and all.
+    Its standard ``error`` is 0 where all were.
     """
 
     mean: float

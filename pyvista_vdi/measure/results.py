@@ -58,25 +58,17 @@ class Results:
 
         Parameters
         ----------
-        kind : str
-            What is measured, such as ``"benchmark"``.
-        plan : mapping
-            All that was chosen, in values that JSON can hold.
+        kind, plan : str, mapping
+            What is measured, such as ``"benchmark"``, and all that was chosen.
         path : path-like, optional
-            The file to write.
+            The file to write, or with ``resume`` to go on with where there is one; it raises
+            InvalidArgumentError if it is none, or of another plan, device or code.
         rooms : iterable of str
             Whose code decides the figures, see :func:`.provenance.provenance`.
         extent : {"whole", "sample"}
             Whether all cases are measured, or some drawn from them.
         device : optional
             The OpenCL device that measures.
-        resume : bool
-            Go on with the file where there is one.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If the file to go on with is none, or of another plan, device or code.
         """
         plan = json.loads(json.dumps(plan))
         system = describe_system(device)
@@ -91,10 +83,7 @@ class Results:
     def read(cls, path: str | os.PathLike[str], kind: str | None = None) -> Results:
         """Read a file, which must be of a kind if one is given.
 
-        Raises
-        ------
-        InvalidArgumentError
-            If it cannot be read, or is something else.
+        What cannot be read, or is something else, raises InvalidArgumentError.
         """
         what = f"pyvista-vdi {kind}" if kind else "a measurement"
         try:

@@ -18,7 +18,6 @@ from json_schema import faults, read_checked
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
-from pyvista_vdi.cli import parser
 from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.measure import harness
 from pyvista_vdi.measure.paper.datasets import look
@@ -87,13 +86,8 @@ def test_the_default_sweep_changes_one_thing_or_a_pair():
 
 def test_pairs_need_both_axes():
     settings = sweep({"lists": (2.0,), "precision": ("8-byte",), "tolerance": (0.1,)})
-    assert [setting.name for setting in settings] == [
-        "default",
-        "lists x2",
-        "8-byte",
-        "tolerance 0.1",
-        "lists x2, 8-byte",
-    ]
+    names = ["default", "lists x2", "8-byte", "tolerance 0.1", "lists x2, 8-byte"]
+    assert [setting.name for setting in settings] == names
     assert len(sweep({"lists": (2.0,), "precision": ("8-byte",)}, pairs=False)) == 3
 
 
@@ -103,8 +97,6 @@ def test_a_product_has_every_combination():
     assert combinations == set(itertools.product((20, 5, 10), (True, False)))
     base = Setting(lists=2.0, precision="8-byte")
     assert sweep({"tolerance": (0.1,)}, base=base)[1].name == "tolerance 0.1, lists x2, 8-byte"
-    with pytest.raises(InvalidArgumentError, match="has 1001 settings, more than 500"):
-        sweep({"tolerance": [i / 1000 for i in range(1, 1001)]})
 
 
 def test_what_is_chosen_after_generation_shares_a_vdi():
@@ -113,25 +105,26 @@ def test_what_is_chosen_after_generation_shares_a_vdi():
 
 
 @pytest.mark.parametrize(
-    ("values", "message"),
+    ("make", "values", "message"),
     [
-        ({"max_supersegments": 0}, "from 1 to 4096; got 0"),
-        ({"precision": "4-byte"}, "precision must be one of exact, 16-byte, 8-byte"),
-        ({"criterion": "depth"}, "criterion must be one of least-error"),
-        ({"lists": 0.0}, "lists must be from 0.05 to 8; got 0.0"),
-        ({"preview": 1.5}, "preview must be from 0.02 to 1; got 1.5"),
-        ({"tolerance": math.nan}, "tolerance must be from 0 to 1e"),
-        ({"view_cone": 91.0}, "view_cone must be from 0 to 90"),
+        (Setting, {"max_supersegments": 0}, "from 1 to 4096; got 0"),
+        (Setting, {"precision": "4-byte"}, "precision must be one of exact, 16-byte, 8-byte"),
+        (Setting, {"criterion": "depth"}, "criterion must be one of least-error"),
+        (Setting, {"lists": 0.0}, "lists must be from 0.05 to 8; got 0.0"),
+        (Setting, {"preview": 1.5}, "preview must be from 0.02 to 1; got 1.5"),
+        (Setting, {"tolerance": math.nan}, "tolerance must be from 0 to 1e"),
+        (Setting, {"view_cone": 91.0}, "view_cone must be from 0 to 90"),
+        (sweep, {"axes": ["size"]}, "no axis 'size': known are max_supersegments"),
+        (
+            sweep,
+            {"axes": {"tolerance": np.linspace(0.001, 1, 1000)}},
+            "has 1001 settings, more than 500",
+        ),
     ],
 )
-def test_settings_are_checked(values, message):
+def test_settings_and_sweeps_are_checked(make, values, message):
     with pytest.raises(InvalidArgumentError, match=message):
-        Setting(**values)
-
-
-def test_unknown_axes_are_named():
-    with pytest.raises(InvalidArgumentError, match="no axis 'size': known are max_supersegments"):
-        sweep(["size"])
+        make(**values)
 
 
 def test_a_tiny_run_writes_what_the_schema_says(runtime, folder, tmp_path, capsys):
@@ -317,15 +310,6 @@ def test_a_vdi_beyond_the_device_is_a_refused_row(default_runtime, folder, tmp_p
     assert "- N_S 3: DeviceMemoryError: the lists need 9 GiB" in text
 
 
-def test_a_volume_that_is_not_seen_is_refused(default_runtime, tmp_path, capsys):
-    np.save(tmp_path / "zero.npy", np.zeros((4, 4, 4), np.uint8))
-    table = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 0], (0, 1))
-    (tmp_path / "tf.json").write_text(json.dumps(table.to_dict()))
-    looks = ("--transfer-function", tmp_path / "tf.json", "--no-vtk", "--out", tmp_path)
-    assert tradeoff(tmp_path / "zero.npy", *TINY_RUN, *looks) == 1
-    assert "nothing is to be seen: the transfer function leaves" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -341,16 +325,24 @@ def test_a_volume_that_is_not_seen_is_refused(default_runtime, tmp_path, capsys)
         (["--name", "a/b"], "--name becomes a file's, without a folder; got 'a/b'"),
         (["--out", "ball.npy"], "the folder ball.npy cannot be made"),
         (["--cmap", "bone", "--transfer-function", "none.json"], "none.json cannot be read"),
+        (["--resume"], "is of version None; this program reads version 2"),
+        ([*TINY_RUN, "--transfer-function", "blank.json"], "nothing is to be seen: the transfer"),
     ],
 )
-def test_mistakes_are_one_line(arguments, message, folder, capsys, monkeypatch, default_runtime):
-    monkeypatch.chdir(folder)
-    before = sorted(folder.iterdir())
-    assert tradeoff("ball.npy", "--no-vtk", *arguments) == 1
+def test_mistakes_are_one_line(arguments, message, tmp_path, capsys, monkeypatch, default_runtime):
+    monkeypatch.chdir(tmp_path)
+    np.save("ball.npy", shell())
+    blank = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 0], (0, 1))
+    Path("blank.json").write_text(json.dumps(blank.to_dict()))
+    if "--resume" in arguments:
+        Path("tradeoff-ball.json").write_text('{"format": "pyvista-vdi benchmark"}')
+    assert tradeoff("ball.npy", "--no-vtk", "--out", ".", *arguments) == 1
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
-    assert sorted(folder.iterdir()) == before
+    # Nothing is written before all is checked; what cannot be seen is known when it is drawn
+    left = {"tradeoff-ball.json"} if {"--resume", "blank.json"} & set(arguments) else set()
+    assert {path.name for path in tmp_path.iterdir()} == {"ball.npy", "blank.json", *left}
 
 
 def test_mistakes_of_the_command_line(capsys):
@@ -365,12 +357,6 @@ def test_a_window_that_is_none_is_refused(size):
     table = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 1], (0, 1))
     with pytest.raises(InvalidArgumentError, match=r"window_size must be \(width, height\)"):
         measure_tradeoff(pvdi.Volume(shell()), window_size=size, transfer_function=table)
-
-
-def test_a_file_of_another_kind_is_refused(folder, capsys, tmp_path):
-    (tmp_path / "tradeoff-ball.json").write_text('{"format": "pyvista-vdi benchmark"}')
-    assert tradeoff(folder / "ball.npy", "--no-vtk", "--resume", "--out", tmp_path) == 1
-    assert "is of version None; this program reads version 2" in capsys.readouterr().err
 
 
 HEADER = b"\x93NUMPY\x01\x00\x28\x00"
@@ -393,15 +379,36 @@ def test_what_is_no_array_is_refused(content, tmp_path, capsys):
     assert "a.npy cannot be read as an array" in capsys.readouterr().err
 
 
-def test_the_options_reach_the_sweep():
-    options = parser.parse(["tradeoff", "a.npy", "--quick", "--window-size", "64x36"])
-    assert options.size == (64, 36)
-    from pyvista_vdi.cli.tradeoff import _settings
+@pytest.mark.parametrize(
+    ("options", "names"),
+    [
+        (["--sweep", "lists=0.5,2"], ["default", "lists x0.5", "lists x2"]),
+        (["--sweep", "view-cone"], ["default", *(f"view cone {n}" for n in (0, 30, 90))]),
+        (
+            ["--sweep", "lists=2", "precision=8-byte", "--alone"],
+            ["default", "lists x2", "8-byte"],
+        ),
+        (
+            ["--sweep", "lists=2", "skip-empty=off", "--product"],
+            ["default", "no skipping", "lists x2", "lists x2, no skipping"],
+        ),
+        (["--quick"], [setting.name for setting in sweep(QUICK_AXES, pairs=False)]),
+        ([], [setting.name for setting in sweep()]),
+    ],
+)
+def test_the_options_reach_the_sweep(options, names, folder, tmp_path, monkeypatch):
+    asked = []
 
-    assert {name for s in _settings(options) for name in s.changes} == set(QUICK_AXES)
-    options = parser.parse(["tradeoff", "a.npy", "--sweep", "lists=0.5,2", "view-cone"])
-    expected = ["default", "lists x0.5", "lists x2", "view cone 0", "view cone 30", "view cone 90"]
-    assert [setting.name for setting in _settings(options)] == expected
+    def measure(volume, settings, **others):
+        asked.append((settings, others["window_size"]))
+        return Tradeoff(made_up())
+
+    monkeypatch.setattr("pyvista_vdi.cli.tradeoff.measure_tradeoff", measure)
+    size = ("--window-size", "64x36", "--no-vtk", "--out", tmp_path)
+    assert tradeoff(folder / "ball.npy", *options, *size) == 0
+    ((settings, window),) = asked
+    assert window == (64, 36)
+    assert [setting.name for setting in settings] == names
 
 
 def made_up(*points, angles=(5.0, 30.0)):
@@ -489,6 +496,10 @@ FOUR = (
 )
 
 
+#: One that is slower than the volume.
+SLOW = (Setting(lists=4.0), 1.5, 0.995, 64_000_000, 80.0)
+
+
 def test_made_up_figures_are_of_the_schema():
     schema = json.loads(SCHEMA.read_text())
     assert faults(made_up(*FOUR), schema) == []
@@ -549,8 +560,7 @@ def test_a_slower_machine_in_one_round_changes_nothing():
 def test_packing_is_part_of_generation():
     data = made_up(*FOUR)
     setting_rows(data)[0]["generation"]["packing"] = {"clock": [0.5] * 5, "device": []}
-    found = Tradeoff(data).point("default")
-    assert found.generation == pytest.approx(5.5, rel=0.01)
+    assert Tradeoff(data).point("default").generation == pytest.approx(5.5, rel=0.01)
 
 
 def test_a_file_that_had_no_room_leaves_the_rest():
@@ -569,13 +579,12 @@ def test_the_table_says_where_volumes_win():
     # Without skipping twice as slow, VTK three times; nobody is slower than either
     assert "| 5 | 10 | 2.00 | 3.00 | - | 0.50 | 0 of 4 | 0 of 4 |" in text
     assert "- tolerance 0.1: by default" in text
-    slow = (Setting(lists=4.0), 1.5, 0.995, 64_000_000, 80.0)
-    text = Tradeoff(made_up(*FOUR, slow)).table()
+    text = Tradeoff(made_up(*FOUR, SLOW)).table()
     assert "| 0.50 | 1 of 5 | 0 of 5 |" in text
     rows = [line for line in text.splitlines() if line.startswith("| N_S 5 | 0.40")]
-    header = next(line for line in text.splitlines() if line.startswith("| setting | frame /"))
+    heads = [line for line in text.splitlines() if line.startswith("| setting | frame /")]
     assert len(rows) == 2  # in the front, and among all
-    assert max(row.count("|") for row in rows) == max(header.count("|"), rows[-1].count("|"))
+    assert [row.count("|") for row in rows] == [head.count("|") for head in heads]
 
 
 def labels(figure):
@@ -597,15 +606,10 @@ def test_the_plot_names_the_front_and_no_names_overlap():
     pytest.importorskip("matplotlib")
     rng = np.random.default_rng(5)
     # A front of fifteen settings close together, as a full sweep has it
+    dense = [Setting(max_supersegments=n, lists=2.0, precision="8-byte") for n in range(2, 17)]
     crowd = [
-        (
-            Setting(max_supersegments=n, lists=2.0, precision="8-byte"),
-            0.3 * 1.06**i,
-            0.97 + 0.0011 * i,
-            int(1e6 * 1.1**i),
-            4 * 1.06**i,
-        )
-        for i, n in enumerate(range(2, 17))
+        (setting, 0.3 * 1.06**i, 0.97 + 0.0011 * i, int(1e6 * 1.1**i), 4 * 1.06**i)
+        for i, setting in enumerate(dense)
     ]
     dominated = [
         (Setting(tolerance=float(t)), 1.0, 0.96, 9_000_000, 9.0) for t in rng.uniform(0, 1, 6)
@@ -613,21 +617,21 @@ def test_the_plot_names_the_front_and_no_names_overlap():
     found = Tradeoff(made_up(*crowd, *dominated))
     figure = found.plot()
     figure.canvas.draw()
-    for panel, kind in zip(labels(figure), ("frame", "memory", "generation"), strict=True):
-        assert list(panel) == found.front(kind)
-        assert len(panel) == 15
-        for (a, one), (b, other) in itertools.combinations(panel.items(), 2):
+    kinds = ("frame", "memory", "generation")
+    for panel, boxes, kind in zip(figure.axes, labels(figure), kinds, strict=True):
+        assert list(boxes) == found.front(kind)
+        assert len(boxes) == 15
+        for (a, one), (b, other) in itertools.combinations(boxes.items(), 2):
             assert not one.overlaps(other), (kind, a, b)
-    for panel in figure.axes:
         inside = panel.get_window_extent()
-        for box in labels(figure)[figure.axes.index(panel)].values():
+        for box in boxes.values():
             assert inside.x0 <= box.x0 <= box.x1 <= inside.x1
             assert inside.y0 <= box.y0 <= box.y1 <= inside.y1
 
 
 def test_the_limits_do_not_overlap_either():
     pytest.importorskip("matplotlib")
-    data = made_up(*FOUR, (Setting(lists=4.0), 1.5, 0.995, 64_000_000, 80.0))
+    data = made_up(*FOUR, SLOW)
     for row in Results(data).rows(
         what="volume rendering"
     ):  # VTK is nearly as fast as render_volume
