@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import platform
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -54,9 +53,12 @@ def system_line(system: Mapping[str, str]) -> str:
 
 
 def closing(data: Mapping[str, Any]) -> list[str]:
-    """Return the last lines of a report: when it was measured, and on what."""
-    system = system_line(data["system"])
-    return ["", f"Measured from {data['begun']} to {data['changed']} on: {system}."]
+    """Return the last lines of a report: when it was measured, of what code, and on what."""
+    commit = data["measured"]["commit"]
+    code = f", commit {commit}" if commit else ""
+    part = " of a sample of the cases" if data["extent"] == "sample" else ""
+    times = f"Measured from {data['begun']} to {data['changed']}{part}{code}"
+    return ["", f"{times} on: {system_line(data['system'])}."]
 
 
 def section(title: str, *paragraphs: str) -> Iterator[str]:
@@ -99,17 +101,6 @@ def mebibytes(n: float | None) -> str:
 def across(sizes: Iterable[int], between: str = "x") -> str:
     """Return sizes with something between them: ``1280x720``."""
     return between.join(str(n) for n in sizes)
-
-
-def without_infinities(value: Any) -> Any:
-    """Return a value with null for numbers that JSON does not have."""
-    if isinstance(value, Mapping):
-        return {key: without_infinities(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [without_infinities(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def new_figure(size: tuple[float, float], **options: Any) -> Figure:

@@ -30,16 +30,8 @@ _WINDOW_REMEDY = (
 class OffScreenVolume:
     """A ``vtkVolume``, or what is one, in an off-screen window, over black.
 
-    Without VTK or an off-screen window MissingDependencyError names the system packages.
-
-    Parameters
-    ----------
-    name : str
-        Who draws it, for messages.
-    actor : vtkVolume
-        With its mapper and property.
-    window_size : (int, int)
-        Pixels.
+    ``name`` says in messages who draws it. Without VTK or an off-screen window
+    MissingDependencyError names the system packages.
     """
 
     def __init__(self, name: str, actor: Any, window_size: tuple[int, int]) -> None:

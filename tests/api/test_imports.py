@@ -64,8 +64,8 @@ LEVELS = (
 LEVELS_WITHIN = {
     "io": (
         ("whole_file", "progress"),
-        ("png", "ranges", "vdi_file"),
-        ("deep_exr", "stores"),
+        ("image_stack", "png", "ranges", "vdi_file"),
+        ("deep_exr", "stores", "volumes"),
         ("files",),
     ),
     "vtk_pipeline": (("filters",), ("interaction",), ("drawing",)),

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
+from json_schema import faults, read_checked
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
@@ -13,6 +15,8 @@ from pyvista_vdi.errors import DeviceError, InvalidArgumentError, MissingDepende
 from pyvista_vdi.measure.compare import Settings, contact_sheet, measure, table
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import filling_camera
+
+SCHEMA = Path(__file__).parents[2] / "docs" / "results_schema.json"
 
 SIZE = (96, 64)
 LOOKS = {"cmap": "viridis", "opacity": "linear", "interpolation": "linear"}
@@ -77,9 +81,10 @@ def test_the_report_holds_every_figure(measured):
 def test_the_report_becomes_json_and_text(measured):
     report, _, images, _ = measured
     state = json.loads(json.dumps(report.to_dict(), allow_nan=False))
-    assert state["angles"][1]["angle"] == 20
-    assert state["case"]["sample_distance"] == 0.2
-    assert state["case"]["timing_sample_distance"] == 0.9
+    assert faults(state, json.loads(SCHEMA.read_text())) == []
+    assert [row["case"].get("angle") for row in state["rows"]] == [None, 0, 20]
+    assert state["plan"]["sample_distance"] == 0.2
+    assert state["plan"]["timing_sample_distance"] == 0.9
     text = table(report)
     assert f"{report.angles[1].vdi_to_raycaster.ssim:.5f}" in text
     assert "VTK fixed-point" in text
@@ -160,9 +165,9 @@ def test_without_timings(volume, default_runtime):
     assert report.angles[0].vdi_to_raycaster == compare_images(
         images[5]["vdi"], images[5]["raycaster"]
     )
-    state = report.to_dict()
-    assert state["generation_ratio"] is None
-    assert state["angles"][0]["ratio_to_vtk"] is None
+    vdi_row, view_row = report.to_dict()["rows"]
+    assert vdi_row["generation_ratio"] is None
+    assert view_row["ratio_to_vtk"] is None
     text = table(report)
     assert "Frames" not in text
     assert "Generation" not in text
@@ -247,12 +252,11 @@ def test_the_command_writes_a_table_a_picture_figures_and_the_vdi(
     assert sorted(p.name for p in out.iterdir()) == [
         f"brain-steep.{kind}" for kind in ("json", "png", "vdi")
     ]
-    figures = json.loads((out / "brain-steep.json").read_text())
-    assert figures["sizes"]["file_bytes"] == (out / "brain-steep.vdi").stat().st_size
-    assert [entry["angle"] for entry in figures["angles"]] == [-10, 0]
+    figures, *views = read_checked(out / "brain-steep.json", SCHEMA)["rows"]
+    assert figures["file_bytes"] == (out / "brain-steep.vdi").stat().st_size
+    assert [row["case"]["angle"] for row in views] == [-10, 0]
     vdi = io.read(out / "brain-steep.vdi")
     assert (vdi.precision, io.read_info(out / "brain-steep.vdi").codec) == ("8-byte", "zstd")
     # 8 bytes a supersegment and their lists' headers, of the arrays' 24 and the packed form
-    sizes = figures["sizes"]
-    assert sizes["device_bytes"] < 0.5 * sizes["vdi_bytes"]
+    assert figures["device_bytes"] < 0.5 * figures["vdi_bytes"]
     assert vdi.camera == filling_camera(vdi.bounds, (80, 48))

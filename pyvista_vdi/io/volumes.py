@@ -1,10 +1,9 @@
-"""Volumes in files that need no PyVista to be read, and how volumes look without it."""
+"""Volumes in files: raw, NumPy's and folders of pictures here, others by who can read them."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from tokenize import TokenError
 from typing import Any
@@ -13,45 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError
-from pyvista_vdi.examples import read_nrrd
-from pyvista_vdi.measure import image_stack
+from pyvista_vdi.io import image_stack
 from pyvista_vdi.model.host_memory import require_free_memory
-from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
-
-#: Entries of the transfer functions, as ``add_volume`` has them by default.
-_ENTRIES = 256
-
-#: Opacity at equidistant scalars, by look.
-_OPACITIES: Mapping[str, tuple[float, ...]] = {
-    # What add_volume's opacity="linear" is
-    "ramp": (0.0, 1.0),
-    # Air and its noise are transparent; tissue is translucent, bone is not
-    "empty below a fifth": (0.0, 0.0, 0.02, 0.05, 0.3, 0.8),
-    # One fluid is transparent, the other translucent
-    "one of two fluids": (0.0, 0.0, 0.0, 0.01, 0.05, 0.15, 0.05, 0.01, 0.005),
-}
-
-#: RGB at equidistant scalars: black, blue-grey, white.
-_COLORS = ((0.0, 0.0, 0.0), (0.25, 0.3, 0.45), (0.7, 0.7, 0.6), (1.0, 1.0, 1.0))
 
 #: What NumPy raises for files that are no arrays: their header is a Python expression.
 _BAD_ARRAY = (ValueError, TypeError, SyntaxError, OverflowError, RecursionError, TokenError)
-
-
-def look(name: str, scalar_range: tuple[float, float], interpolation: str) -> TransferFunction:
-    """Return a transfer function by its name: a key of the opacities above."""
-    return TransferFunction(
-        np.stack([_resampled(channel) for channel in zip(*_COLORS, strict=True)], axis=1),
-        _resampled(_OPACITIES[name]),
-        scalar_range,
-        interpolation=interpolation,
-    )
-
-
-def _resampled(nodes: tuple[float, ...]) -> NDArray[np.float64]:
-    at = np.linspace(0, len(nodes) - 1, _ENTRIES)
-    return np.interp(at, np.arange(len(nodes)), nodes)
 
 
 def read_file(file: Path) -> Any:
@@ -74,13 +41,8 @@ def read_file(file: Path) -> Any:
     if suffix in (".nrrd", ".nhdr"):
         # By pynrrd: VTK takes the first axis for components in files that do not say what their
         # axes are
-        return read_nrrd(file, "values")
-    from pyvista_vdi.plotting.imports import import_pyvista
-
-    import_pyvista()
-    from pyvista_vdi.plotting.volume_files import read_volume
-
-    return read_volume(file)
+        return provider("read_nrrd")(file, "values")
+    return provider("read_by_pyvista")(file)
 
 
 def _read_raw(file: Path) -> Volume:

@@ -7,7 +7,7 @@ import pytest
 from skimage.io import imsave
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIWarning
-from pyvista_vdi.measure.volumes import read_file
+from pyvista_vdi.io.volumes import read_file
 
 
 def scan(dtype=np.uint16):

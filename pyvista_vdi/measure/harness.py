@@ -1,0 +1,569 @@
+"""What every measurement shares: cases, a draw of them, who draws them, and the run over them."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import statistics
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.errors import DeviceError, InvalidArgumentError, VDIError
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.measure.clock import WALL, Step, Times, take_turns
+from pyvista_vdi.measure.report import across
+from pyvista_vdi.measure.results import Results
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.checks import as_whole
+from pyvista_vdi.model.host_memory import require_free_memory
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.options import MediumOptions
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
+from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.volume.classified_volume import DeviceVolume, checked_sample_distance
+from pyvista_vdi.volume.render import raycast_medium, raycast_volume
+
+#: Who draws, by the keys of the results, and what tables call them.
+CANDIDATES: Mapping[str, str] = {
+    "vdi": "VDI, f",
+    "vdi_skipping": "VDI, f_e",
+    "volume": "render_volume",
+    "volume_skipping": "render_volume, skipping",
+    "vtk_gpu": "VTK GPU",
+    "vtk_fixed_point": "VTK fixed point",
+}
+
+#: Rooms whose code decides the figures of a VDI beside volume rendering.
+ROOMS = ("generation", "raycasting", "volume")
+
+#: Window in which everything is generated once before anything is timed, pixels.
+WARM_UP_SIZE = (64, 36)
+
+#: Copies of the volume that VTK's GPU mapper makes on the host where there is no GPU: the texture,
+#: and what it is filled from.
+_VTK_COPIES = 2
+
+#: What makes a row that says why it has no figures.
+REFUSALS = (VDIError, MemoryError)
+
+Image = NDArray[np.float32]
+
+#: Called with the finished fraction, 0 to 1, and what is being done.
+Progress = Callable[..., object]
+
+_Made = TypeVar("_Made")
+
+
+@dataclass(frozen=True)
+class Case:
+    """What one row of a measurement is about.
+
+    Parameters
+    ----------
+    volume, look : str
+        Names of the volume and of the transfer function.
+    window_size : (int, int), optional
+        Pixels.
+    angle, zoom : float
+        Degrees of ``Azimuth`` from V_O, and by what the view is zoomed in.
+    options : tuple of (str, object)
+        What else was chosen, such as ``(("max_supersegments", 15),)``.
+    candidates : tuple of str
+        Who draws, if not all do.
+    what : str, optional
+        What is measured of it, where a run measures several things.
+    """
+
+    volume: str
+    look: str | None = None
+    window_size: tuple[int, int] | None = None
+    angle: float | None = None
+    zoom: float = 1.0
+    options: tuple[tuple[str, Any], ...] = ()
+    candidates: tuple[str, ...] = ()
+    what: str | None = None
+
+    @property
+    def chosen(self) -> dict[str, Any]:
+        """The options by name."""
+        return dict(self.options)
+
+    @property
+    def name(self) -> str:
+        """What people call it: ``"brain, soft, 1280x720, max_supersegments 15, 5 degrees"``."""
+        parts = [
+            self.volume,
+            self.look,
+            self.window_size and across(self.window_size),
+            *(f"{name} {value}" for name, value in self.options),
+            None if self.angle is None else f"{self.angle:g} degrees",
+            None if self.zoom == 1 else f"zoomed by {self.zoom:g}",
+            *self.candidates,
+            self.what,
+        ]
+        return ", ".join(part for part in parts if part)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what tells it from others, as results have it: only what was given."""
+        found: dict[str, Any] = {"what": self.what, "volume": self.volume, "look": self.look}
+        found |= {"window_size": self.window_size, **self.chosen, "angle": self.angle}
+        found |= {"zoom": None if self.zoom == 1 else self.zoom}
+        found |= {"candidates": self.candidates or None}
+        return {name: value for name, value in found.items() if value is not None}
+
+    def camera(self, view: Camera) -> Camera:
+        """Return its view, where V_O is another."""
+        turned = view.azimuth(self.angle or 0.0)
+        return turned.replace(view_angle=turned.view_angle / self.zoom)
+
+
+def sample(
+    cases: Iterable[Case], count: int, key: Callable[[Case], Hashable] = lambda case: case.volume
+) -> list[Case]:
+    """Draw cases so that they speak for all: the same ones in every run, in their order.
+
+    Every stratum, a volume's cases unless ``key`` says otherwise, has one case drawn while there
+    are enough, and then as many as its share. Which ones, a hash of their names decides.
+    """
+    cases = list(cases)
+    strata: dict[Hashable, list[Case]] = defaultdict(list)
+    for case in sorted(cases, key=lambda case: hashlib.sha256(case.name.encode()).digest()):
+        strata[key(case)].append(case)
+    order = [
+        (rank > 0, (rank + 0.5) / len(members), case)
+        for members in strata.values()
+        for rank, case in enumerate(members)
+    ]
+    drawn = {case for *_, case in sorted(order, key=lambda entry: entry[:2])[:count]}
+    return [case for case in cases if case in drawn]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean over all cases from those that were measured, ``count`` of ``of``.
+
+    Its standard ``error`` is 0 where all were.
+    """
+
+    mean: float
+    error: float
+    count: int
+    of: int
+
+    def __str__(self) -> str:
+        if self.count == self.of:
+            return f"{self.mean:.3g}"
+        return f"{self.mean:.3g} ± {self.error:.1g} ({self.count} of {self.of} cases)"
+
+
+def estimate(values: Mapping[Hashable, Sequence[float]], sizes: Mapping[Hashable, int]) -> Estimate:
+    """Return the mean of all cases by a stratified sample of them, with its standard error.
+
+    ``values`` holds what was measured by stratum, ``sizes`` how many cases a stratum has; one of
+    which nothing was measured is left out. Where a single case was, it is taken that its stratum
+    varies as all that was measured does.
+    """
+    measured = {stratum: list(found) for stratum, found in values.items() if len(found)}
+    every = [value for found in measured.values() for value in found]
+    everywhere = statistics.variance(every) if len(every) > 1 else math.nan
+    total = sum(sizes[stratum] for stratum in measured)
+    mean = variance = 0.0
+    for stratum, found in measured.items():
+        n, size = len(found), sizes[stratum]
+        mean += size / total * statistics.fmean(found)
+        if n < size:
+            within = statistics.variance(found) if n > 1 else everywhere
+            variance += (size / total) ** 2 * (1 - n / size) * within / n
+    return Estimate(mean, math.sqrt(variance), len(every), sum(sizes.values()))
+
+
+def run(
+    cases: Iterable[Case],
+    measure: Callable[[Case], Mapping[str, Any]],
+    results: Results,
+    progress: Progress | None = None,
+) -> None:
+    """Measure the cases that the results lack, and write the file after every one.
+
+    What cannot be measured becomes a row with ``refused``, the reason. Cases that share a volume, a
+    bench or a VDI should follow each other: see :class:`Latest`.
+
+    ``measure`` returns a case's figures, in values that JSON can hold. ``progress`` is called with
+    the finished fraction and the case's name.
+    """
+    missing = [case for case in cases if results.row(case.to_dict()) is None]
+    steps = Steps(progress, len(missing))
+    for case in missing:
+        steps.begin(case.name)
+        try:
+            figures = measure(case)
+        except REFUSALS as error:
+            figures = {"refused": refusal(error)}
+        results.add(case.to_dict(), **figures)
+    steps()
+
+
+def refusal(error: BaseException) -> str:
+    """Return why something was not measured."""
+    return f"{type(error).__name__}: {error}"
+
+
+class Steps:
+    """Counts pieces of work and reports their share."""
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self._progress, self._total, self._done = progress, max(1, total), 0
+
+    def __call__(self, *doing: str) -> None:
+        """Say that a piece is finished, and what is being done now."""
+        self._done += 1
+        self._say(*doing)
+
+    def begin(self, doing: str) -> None:
+        """Say what is being done: a piece, finished by the time of the next call."""
+        self._say(doing)
+        self._done += 1
+
+    def _say(self, *doing: str) -> None:
+        if self._progress is not None:
+            self._progress(min(1.0, self._done / self._total), *doing)
+
+
+class Latest(Generic[_Made]):
+    """Keeps what was made for the latest key; for another it is closed, and made anew.
+
+    What making it raised is kept as well, and raised again for the same key. ``make`` is called
+    with the parts of a key.
+    """
+
+    def __init__(self, make: Callable[..., _Made]) -> None:
+        self._make = make
+        self._key: Any = None
+        self._found: list[_Made] = []
+        self._error: BaseException | None = None
+
+    def __call__(self, *key: Any) -> _Made:
+        """Return what belongs to a key."""
+        if key != self._key:
+            self.close()
+            self._key = key
+            try:
+                self._found.append(self._make(*key))
+            except REFUSALS as error:
+                self._error = error
+        if self._error is not None:
+            raise self._error
+        return self._found[0]
+
+    def close(self) -> None:
+        """Give up what is kept, and close it if it can be closed."""
+        for one in self._found:
+            getattr(one, "close", lambda: None)()
+        self._found.clear()
+        self._key = self._error = None
+
+    def __enter__(self) -> Latest[_Made]:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+
+def check_count(name: str, value: int, least: int = 1) -> None:
+    """Refuse what is no number of repetitions, or makes no sense as one."""
+    if not (isinstance(value, int) and least <= as_whole(value) <= 1000):
+        raise InvalidArgumentError(
+            f"{name} must be a whole number from {least} to 1000; got {value!r}"
+        )
+
+
+def check_angles(angles: Sequence[float]) -> None:
+    """Refuse angles that are none, and those that are given twice."""
+    if not angles or not all(math.isfinite(a) for a in angles):
+        raise InvalidArgumentError(f"angles must be one or more numbers of degrees; got {angles!r}")
+    if len(set(angles)) < len(angles):
+        raise InvalidArgumentError(f"an angle is given twice: {angles!r}")
+
+
+def sizes_of(vdi: VDI) -> dict[str, Any]:
+    """Return how large a VDI is, on the host and as a ``.vdi`` in the default compression."""
+    counts = vdi.counts
+    occupied = int(np.count_nonzero(counts))
+    saved: int | None = None
+    with tempfile.TemporaryDirectory() as folder:
+        begin = time.perf_counter()
+        with suppress(VDIError):  # no room for it: nothing else is lost
+            saved = vdi.save(Path(folder) / "vdi.vdi").stat().st_size
+        seconds = time.perf_counter() - begin
+    return {
+        "lists": int(counts.size),
+        "occupied_lists": occupied,
+        "supersegments": vdi.n_supersegments,
+        "mean_length": vdi.n_supersegments / occupied if occupied else 0.0,
+        "longest_list": int(counts.max()),
+        "bytes_raw": vdi.nbytes,
+        "bytes_saved": saved,
+        "save_seconds": seconds if saved is not None else None,
+    }
+
+
+def accuracy(image: Image, reference: Image) -> dict[str, float]:
+    """Return what tables say of a picture beside another; the settings are those of ``metrics``."""
+    found = compare_images(image, reference)
+    return {"ssim": found.ssim, "psnr": found.psnr, "worst_pixel": found.worst_pixel}
+
+
+def enlarged(image: Image, size: tuple[int, int]) -> Image:
+    """Return an image in the window's size, by linear interpolation as the texture unit's."""
+    from skimage.transform import resize  # loads SciPy
+
+    width, height = size
+    if image.shape[:2] == (height, width):
+        return image
+    # Pixel centres keep their places and edges are extended, as GL_LINEAR and CLAMP_TO_EDGE do
+    whole: Image = resize(image, (height, width, 4), order=1, mode="edge", anti_aliasing=False)
+    return whole
+
+
+class Bench:
+    """One volume with one transfer function in one window: VDIs of it, our raycaster and VTK's.
+
+    Frames are timed with steps of one voxel. Pictures are compared with those of our raycaster at
+    shorter steps, which are also those that VDIs are generated with.
+
+    Parameters
+    ----------
+    volume, table : Volume, TransferFunction
+        The scalars, and how they look.
+    window_size : (int, int)
+        Of all frames, pixels.
+    device : optional
+        OpenCL device of ours.
+    vtk : bool
+        Whether VTK's mappers take part ("raycast alone": their own windows, no multisampling).
+    view : Camera, optional
+        V_O; the view that the volume fills unless given.
+    sample_distance : float, optional
+        The step of comparisons and generation, model units; half a voxel unless given.
+    volume_property : vtkVolumeProperty, optional
+        How the volume looks to VTK; as `table` says unless given.
+
+    Attributes
+    ----------
+    voxel, step : float
+        Steps of timed frames, and of comparisons and generation; model units.
+    vtk, left_out : dict
+        VTK's mappers by the keys of :data:`CANDIDATES`: those that take part, and the errors of
+        those that cannot.
+    """
+
+    def __init__(
+        self,
+        volume: Volume,
+        table: TransferFunction,
+        window_size: tuple[int, int],
+        *,
+        device: Any = None,
+        vtk: bool = True,
+        view: Camera | None = None,
+        sample_distance: float | None = None,
+        volume_property: Any = None,
+    ) -> None:
+        self.volume, self.table, self.size = volume, table, window_size
+        self.runtime = get_runtime(device)
+        self.view = view or filling_camera(volume.bounds, window_size)
+        self.voxel = min(volume.spacing)
+        self.step = checked_sample_distance(volume, sample_distance)
+        self.vtk: dict[str, Any] = {}
+        self.left_out: dict[str, VDIError] = {}
+        self._media: dict[tuple[float, bool], DeviceVolume] = {}
+        self._references: dict[Camera, Image] = {}
+        self._near: dict[Camera, dict[str, float]] = {}
+        self._open = ExitStack()
+        if vtk:
+            self._open_vtk(volume_property)
+
+    @property
+    def opengl(self) -> str | None:
+        """OpenGL renderer and version of VTK's GPU mapper, if it takes part."""
+        return self.vtk["vtk_gpu"].opengl if "vtk_gpu" in self.vtk else None
+
+    def generate(
+        self, window_size: tuple[int, int] | None = None, view: Camera | None = None, **options: Any
+    ) -> VDI:
+        """Generate a VDI, by default from V_O in the bench's window and step."""
+        options = {"sample_distance": self.step, **options}
+        return generate_vdi(
+            self.volume,
+            view or self.view,
+            window_size or self.size,
+            self.table,
+            device=self.runtime,
+            **options,
+        )
+
+    def timed_generation(
+        self,
+        repeats: int,
+        window_size: tuple[int, int] | None = None,
+        *,
+        before: Mapping[str, Step] | None = None,
+        forms: Sequence[str] = (),
+        clocks: Mapping[str, Callable[[], float]] = WALL,
+        **options: Any,
+    ) -> tuple[dict[str, VDI], dict[str, Times]]:
+        """Generate a VDI as often as is timed, in turn with other work; kernels are compiled first.
+
+        Returns it as ``exact``, and in packed ``forms`` under their precisions; and the times of
+        ``generate``, of packing, and of the other work.
+        """
+        made: dict[str, VDI] = {}
+
+        def generate() -> None:
+            made.clear()
+            made["exact"] = self.generate(window_size, **options)
+
+        def pack(precision: str) -> None:
+            made[precision] = made["exact"].with_precision(precision)
+
+        self.generate(WARM_UP_SIZE, **options)
+        packing = {form: partial(pack, form) for form in forms if form != "exact"}
+        work: dict[str, Step] = {**(before or {}), "generate": generate, **packing}
+        taken = take_turns(work, repeats, runtime=self.runtime, warm_up=False, clocks=clocks)
+        return made, taken
+
+    def raycast(
+        self,
+        camera: Camera,
+        window_size: tuple[int, int] | None = None,
+        sample_distance: float | None = None,
+        **options: Any,
+    ) -> Image:
+        """Draw the volume as ``render_volume`` does, by default at the step of comparisons."""
+        looks = RenderOptions(**options)
+        frame = FrameRequest(camera, window_size or self.size, looks, device=self.runtime)
+        sampling = MediumOptions(sample_distance=sample_distance or self.step)
+        return raycast_volume(self.volume, self.table, frame, sampling)
+
+    def image(self, camera: Camera) -> Image:
+        """Draw the volume at the step of comparisons, premultiplied RGBA (H, W, 4)."""
+        return raycast_medium(self._medium(self.step, True), FrameRequest(camera, self.size))
+
+    def reference(self, camera: Camera) -> Image:
+        """Return the same picture, kept for other VDIs; a black one raises InvalidArgumentError."""
+        if camera not in self._references:
+            image = self.image(camera)
+            if not image.any():
+                raise InvalidArgumentError(
+                    "nothing is to be seen: the transfer function leaves the whole volume "
+                    "transparent"
+                )
+            self._references[camera] = image
+        return self._references[camera]
+
+    def vtk_image(self, camera: Camera, name: str = "vtk_gpu") -> Image:
+        """Draw by one of VTK's mappers at the step of comparisons, RGB (H, W, 3)."""
+        self.vtk[name].set_sample_distance(self.step)
+        image: Image = self.vtk[name].image(camera)
+        return image
+
+    def near_vtk(self, camera: Camera) -> dict[str, float] | None:
+        """Return how near our reference and VTK's GPU mapper are; ``None`` where it draws not."""
+        if "vtk_gpu" in self.vtk and camera not in self._near:
+            try:
+                self._near[camera] = accuracy(self.reference(camera), self.vtk_image(camera))
+            except DeviceError as error:
+                self.left_out["vtk_gpu"] = error
+                del self.vtk["vtk_gpu"]
+        return self._near.get(camera)
+
+    def draw(
+        self, vdi: VDI, camera: Camera, window_size: tuple[int, int] | None = None, **options: Any
+    ) -> Image:
+        """Draw a VDI; premultiplied RGBA (H, W, 4) on the host."""
+        looks = RenderOptions(**options)
+        frame = FrameRequest(camera, window_size or self.size, looks, device=self.runtime)
+        return render_vdi(vdi, frame)
+
+    def frames(self, camera: Camera, vdi: VDI | None = None) -> dict[str, Step]:
+        """Return what draws a frame, by the keys of :data:`CANDIDATES`.
+
+        Ours end with the picture on the host, VTK's in its framebuffer.
+        """
+        steps: dict[str, Step] = {}
+        if vdi is not None:
+            steps["vdi"] = partial(self.draw, vdi, camera, skip_empty=False)
+            steps["vdi_skipping"] = partial(self.draw, vdi, camera)
+        for name, skipping in (("volume", False), ("volume_skipping", True)):
+            medium = self._medium(self.voxel, skipping)
+            steps[name] = partial(raycast_medium, medium, FrameRequest(camera, self.size))
+        for name, baseline in self.vtk.items():
+            steps[name] = partial(self._vtk_frame, baseline, camera)
+        return steps
+
+    def _vtk_frame(self, baseline: Any, camera: Camera) -> None:
+        baseline.set_sample_distance(self.voxel)
+        baseline.render(camera)
+
+    def _medium(self, step: float, skip_empty: bool) -> DeviceVolume:
+        """Return the volume on the device; it stays there with the bench."""
+        if (step, skip_empty) not in self._media:
+            self._media[step, skip_empty] = DeviceVolume(
+                self.runtime,
+                self.volume,
+                self.table,
+                sample_distance=step,
+                skip_empty=skip_empty,
+            )
+        return self._media[step, skip_empty]
+
+    def _open_vtk(self, volume_property: Any) -> None:
+        from pyvista_vdi.measure.vtk_baselines import (
+            MAPPERS,
+            VTKBaseline,
+            property_from_transfer_function,
+        )
+
+        volume = self.volume
+        for mapper in MAPPERS:
+            try:
+                if mapper == "gpu":
+                    require_free_memory(
+                        _VTK_COPIES * volume.array.nbytes,
+                        f"the volume {volume.name!r} in VTK's GPU mapper as well, beside ours,",
+                        "take a smaller one, or a machine with more memory",
+                    )
+                prop = volume_property or property_from_transfer_function(volume, self.table)
+                baseline = VTKBaseline(volume, prop, self.size, mapper, self.voxel)
+            except VDIError as error:
+                self.left_out[f"vtk_{mapper}"] = error
+                continue
+            self._open.callback(baseline.close)
+            self.vtk[f"vtk_{mapper}"] = baseline
+
+    def close(self) -> None:
+        """Release VTK's windows, and what lies on the device."""
+        self._open.close()
+        self.vtk.clear()
+        self._media.clear()
+
+    def __enter__(self) -> Bench:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
