@@ -1,127 +1,201 @@
-"""The raycaster of this tree against that of another one: CPU time of frames, in turns.
+"""Two trees, the one that this file is in and another: frames, generation, first pictures, bits.
 
-    python benchmarks/trees.py --other ../other-worktree --vdis brain.vdi heptane.vdi
+    python benchmarks/trees.py --other ../other-worktree
 
-Each tree runs in a process of its own, which loads every VDI and then draws one frame at a time
-when told to; the two take turns. Frames stay on the device, in one image, as a plotter's do.
-Compared are the medians of CPU time, which other work on the machine disturbs least on a CPU
-device, and the pictures' bits. Ratios are the other tree's over this one's, those of preparation
-time and device bytes too.
+Each tree runs in a process of its own that does one thing when told to; the two take turns, and the
+pictures' bits are compared. A ratio is this tree's time over the other one's, turn by turn; times
+are CPU time, which other work on the machine disturbs least, and wall clock. Chance: that noise
+separates the two as much (rank sum).
 """
 
 from __future__ import annotations
 
-import argparse
+import json
 import os
 import statistics
 import subprocess
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
+from shared import execute, mean_of, parser_of  # beside this file
+
+from pyvista_vdi.measure.clock import rank_sum_chance, ratios
+from pyvista_vdi.measure.harness import Case
+from pyvista_vdi.measure.report import table
+from pyvista_vdi.measure.results import Results
+
+#: A sample has these, which differ most in what their rays meet.
+VOLUMES = ("brain", "heptane", "rayleigh_taylor", "visible_female_head")
+ANGLES = (0.0, 5.0, 30.0, 90.0)
+CLOCKS = ("cpu", "wall")
+
+#: Reads orders, a JSON a line: what, volume, look, size, angle, options. By public names alone.
 WORKER = """
-import hashlib, sys, time
-import pyvista_vdi
-from pyvista_vdi.model.render_options import FrameRequest
-from pyvista_vdi.raycasting.raycast import draw
-from pyvista_vdi.device import get_runtime
-from pyvista_vdi.raycasting.prepared import PreparedVDI
+import hashlib, json, sys, time
+import pyvista_vdi as pvdi
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 
-runtime = get_runtime(sys.argv[1] or None)
-size = None
+made, key = {}, None
 for line in sys.stdin:
-    order, _, rest = line.strip().partition(" ")
-    if order == "load":
-        precision, _, path = rest.partition(" ")
-        vdi = pyvista_vdi.read(path).with_precision(precision)
-        size = vdi.window_size
-        prepared = PreparedVDI(runtime, vdi)  # builds the kernels, too
-        began = time.process_time()
-        prepared = PreparedVDI(runtime, vdi)
-        print(time.process_time() - began, prepared.list_bytes, flush=True)
-        image = runtime.buffer((size[1], size[0], 4), name="image")
-        continue
-    camera = vdi.camera.azimuth(float(rest))
-    began = time.process_time()
-    draw(prepared, FrameRequest(camera, size), image)
-    took = time.process_time() - began
-    bits = ""
-    if order == "bits":
-        bits = hashlib.sha1(runtime.download(image).tobytes()).hexdigest()
-    print(took, bits, flush=True)
+    order = json.loads(line)
+    now = order["volume"], order["look"], order["precision"]
+    if now != key:
+        made.clear()
+        key = now
+        made["volume"] = pvdi.examples.load_data(order["volume"], as_volume=True)
+        made["look"] = TRANSFER_FUNCTIONS[order["look"]]
+    size, device = order["size"], order["device"]
+    view = filling_camera(made["volume"].bounds, size)
+    def generate():
+        return pvdi.generate(made["volume"], view, size, precision=order["precision"],
+                             device=device, **made["look"])
+    if order["what"] == "frame":
+        if "vdi" not in made:
+            made["vdi"] = generate()
+        camera = view.azimuth(order["angle"])
+        def work():
+            return pvdi.render(made["vdi"], camera, size, device=device)
+    elif order["what"] == "render_volume":
+        camera = view.azimuth(order["angle"])
+        def work():
+            return pvdi.render_volume(made["volume"], camera, size, device=device, **made["look"])
+    else:
+        work = generate
+    cpu, wall = time.process_time(), time.perf_counter()
+    found = work()
+    times = {"cpu": time.process_time() - cpu, "wall": time.perf_counter() - wall}
+    arrays = [found] if hasattr(found, "tobytes") else [
+        getattr(found, name) for name in ("offsets", "front", "back", "color", "optical_depth")]
+    bits = hashlib.sha1(b"".join(array.tobytes() for array in arrays)).hexdigest()
+    print(json.dumps({**times, "bits": bits}), flush=True)
+"""
+
+#: A process's first picture: the shipped brain in a plotter.
+FIRST = """
+import json, sys, time
+wall = time.perf_counter()
+import pyvista as pv
+import pyvista_vdi as pvdi
+plotter = pv.Plotter(off_screen=True, window_size=json.loads(sys.argv[1]))
+plotter.add_vdi(pvdi.examples.load_brain(), cmap="bone")
+bits = plotter.screenshot(return_img=True).tobytes()
+import hashlib
+print(json.dumps({"cpu": time.process_time(), "wall": time.perf_counter() - wall,
+                  "bits": hashlib.sha1(bits).hexdigest()}))
 """
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the benchmark and print a table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--other", type=Path, required=True, help="root of the other tree")
-    parser.add_argument("--vdis", type=Path, nargs="+", required=True)
-    parser.add_argument("--angles", type=float, nargs="+", default=[0, 5, 30, 90])
-    parser.add_argument("--precision", default="exact")
-    parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--device", default="")
-    options = parser.parse_args(arguments)
-    trees = {
-        "other": Worker(options.other, options.device),
-        "this": Worker(Path(__file__).resolve().parent.parent, options.device),
-    }
-    angles = " | ".join(f"{angle:g}°" for angle in options.angles)
-    print(f"| VDI | {angles} | bits | preparation | bytes |")
-    print("|---" * (len(options.angles) + 4) + "|")
-    for path in options.vdis:
-        loads = {
-            name: [float(x) for x in tree.ask(f"load {options.precision} {path.resolve()}")]
-            for name, tree in trees.items()
-        }
-        cells, same = [], True
-        for angle in options.angles:
-            bits = {name: tree.ask(f"bits {angle}")[1] for name, tree in trees.items()}
-            same = same and bits["this"] == bits["other"]
-            times: dict[str, list[float]] = {name: [] for name in trees}
-            for _ in range(options.repeats):
-                for name, tree in trees.items():
-                    times[name].append(float(tree.ask(f"time {angle}")[0]))
-            medians = {name: statistics.median(taken) for name, taken in times.items()}
-            cells.append(f"{medians['other'] / medians['this']:.2f}")
-        cells.append("the same" if same else "**differ**")
-        cells += [f"{loads['other'][k] / loads['this'][k]:.2f}" for k in (0, 1)]
-        print(f"| {path.stem} | {' | '.join(cells)} |", flush=True)
-    return 0
+def importable(tree: Path, folder: Path) -> dict[str, Any]:
+    """Return where and with what a process runs the package of a tree, kernels in their place."""
+    package = folder / "pyvista_vdi"
+    package.mkdir(parents=True)
+    for path in (*(tree / "pyvista_vdi").resolve().iterdir(), (tree / "opencl").resolve()):
+        if not (package / path.name).exists():
+            (package / path.name).symlink_to(path)
+    return {"cwd": folder, "env": {**os.environ, "PYTHONPATH": str(folder)}, "text": True}
 
 
 class Worker:
-    """A process that draws with the package of a tree.
+    """A process that works with the package of a tree."""
 
-    Parameters
-    ----------
-    tree : pathlib.Path
-        Root of the tree.
-    device : str
-        As for :func:`pyvista_vdi.list_devices`; empty for the default.
-    """
+    def __init__(self, where: dict[str, Any]) -> None:
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        self._process = subprocess.Popen([sys.executable, "-c", WORKER], **pipes, **where)
 
-    def __init__(self, tree: Path, device: str) -> None:
-        environment = {**os.environ, "PYTHONPATH": str(tree.resolve())}
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", WORKER, device],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env=environment,
-            cwd=tree.resolve(),
-        )
-
-    def ask(self, order: str) -> list[str]:
-        """Give an order and return the words of the answer, a missing one as an empty string."""
+    def ask(self, **order: Any) -> dict[str, Any]:
+        """Give an order and return the answer."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        print(order, file=self._process.stdin, flush=True)
+        print(json.dumps(order), file=self._process.stdin, flush=True)
         answer = self._process.stdout.readline()
         if not answer:
-            raise RuntimeError(f"the process ended at {order!r}")
-        first, _, second = answer.rstrip("\n").partition(" ")
-        return [first, second]
+            raise RuntimeError(f"the process ended at {order}")
+        return dict(json.loads(answer))
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.communicate()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure, and write what was found."""
+    parser = parser_of(__doc__, size=(1280, 720), volumes=VOLUMES, repeats=5)
+    parser.add_argument("--other", type=Path, required=True, help="root of the other tree")
+    parser.add_argument("--precision", default="exact")
+    options = parser.parse_args(arguments)
+    roots = {"this": Path(__file__).resolve().parents[1], "other": options.other}
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        where = {name: importable(root, folder / name) for name, root in roots.items()}
+        trees = {name: Worker(of) for name, of in where.items()}
+        for worker in trees.values():
+            stack.callback(worker.close)
+
+        def once(name: str, case: Case) -> dict[str, Any]:
+            if case.what == "first picture":
+                size = json.dumps(list(options.size))
+                command = [sys.executable, "-c", FIRST, size]
+                done = subprocess.run(command, stdout=subprocess.PIPE, check=True, **where[name])
+                return dict(json.loads(done.stdout.splitlines()[-1]))
+            given = {"size": list(options.size), "device": options.device}
+            kept = {"volume": case.volume, "look": case.look, "precision": options.precision}
+            return trees[name].ask(what=case.what, angle=case.angle, **kept, **given)
+
+        def measure(case: Case) -> dict[str, Any]:
+            bits = {name: once(name, case)["bits"] for name in roots}  # caches are filled
+            times: dict[str, dict[str, list[float]]] = {n: {c: [] for c in CLOCKS} for n in roots}
+            for _ in range(options.repeats):
+                for name in roots:
+                    found = once(name, case)
+                    for clock in CLOCKS:
+                        times[name][clock].append(found[clock])
+            return {"times": times, "same": bits["this"] == bits["other"]}
+
+        execute("trees", options, cases_of(options), measure, report, count=16)
+    return 0
+
+
+def cases_of(options: Any) -> Iterator[Case]:
+    """Yield every case."""
+    size = tuple(options.size)
+    for volume in options.volumes:
+        for look in ("soft", "steep"):
+            yield Case(volume, look, size, what="generation")
+            yield Case(volume, look, size, 5.0, what="render_volume")
+            for angle in ANGLES:
+                yield Case(volume, look, size, angle, what="frame")
+    yield Case("brain", None, size, what="first picture")
+
+
+def ratio(row: dict[str, Any], clock: str = "cpu") -> float:
+    """Return the median over the turns of this tree's time over the other's."""
+    times = row["times"]
+    return statistics.median(ratios(times["this"][clock], times["other"][clock]))
+
+
+def report(results: Results, every: list[Case]) -> Iterator[str]:
+    """Yield a line for each case, and the means."""
+    yield f"This tree's time over that of {results.plan['other']}, medians of turns."
+    yield ""
+    rows = []
+    for row in results.rows():
+        if "refused" in row:
+            continue
+        case, times = row["case"], row["times"]
+        chance = rank_sum_chance(times["this"]["cpu"], times["other"]["cpu"])
+        cells = [case["what"], case["volume"], case.get("look", ""), case.get("angle", "")]
+        cells += [f"{ratio(row, clock):.3f}" for clock in CLOCKS]
+        rows.append([*cells, f"{chance:.1%}", "the same" if row["same"] else "**differ**"])
+    heads = ("what", "volume", "look", "degrees", "CPU time", "wall clock", "chance", "bits")
+    yield from table(heads, rows)
+    yield ""
+    kinds = dict.fromkeys(case.what for case in every)
+    means = [[what, str(mean_of(results, every, ratio, what=what) or "-")] for what in kinds]
+    yield from table(("mean of all cases", "CPU time"), means)
 
 
 if __name__ == "__main__":

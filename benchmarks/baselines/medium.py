@@ -25,14 +25,8 @@ KERNELS = Path(__file__).with_name("baselines.cl")
 class Eye(NamedTuple):
     """The eye of a new view, as V_O sees it.
 
-    Attributes
-    ----------
-    i, j : int
-        List in which its image lies, the epipole; beyond the lists at most by one.
-    depth : float
-        View depth less the depth origin.
-    behind : bool
-        Whether it is behind V_O's: rays come towards the epipole then, in place of from it.
+    The list in which its image lies, the epipole, beyond the lists at most by one; view depth less
+    the depth origin; whether it is behind V_O's, so that rays come towards the epipole.
     """
 
     i: int
@@ -44,19 +38,10 @@ class Eye(NamedTuple):
 class Medium:
     """A VDI's lists, one after the other: faces in depth and extinctions, and no list space.
 
-    Attributes
-    ----------
-    offsets : numpy.ndarray
-        int32 (lists + 1,).
-    list_of : numpy.ndarray
-        int32 (n,), list of each supersegment.
-    faces : numpy.ndarray
-        float32 (n, 2), view depths less the depth origin; nothing behind V_O's eye.
-    media : numpy.ndarray
-        float32 (n, 4), straight RGB and extinction per model length.
-    to_lists : numpy.ndarray
-        float64 (4, 4), model frame to (U d, V d, Z less the depth origin, d), where list (i, j) is
-        i <= U < i + 1, j <= V < j + 1, and d is Z, or 1 in parallel projection.
+    ``faces``: view depths less the depth origin, nothing behind V_O's eye. ``media``: straight RGB
+    and extinction per model length. ``to_lists``: model frame to (U d, V d, Z less the depth
+    origin, d), where list (i, j) is i <= U < i + 1, j <= V < j + 1, and d is Z, or 1 in parallel
+    projection.
     """
 
     def __init__(self, vdi: VDI) -> None:
@@ -94,11 +79,6 @@ class Medium:
         to_view = camera.model_to_view @ rays.inverse_affine(own.model_to_view)
         matrix: Floats = to_view @ np.stack([x, y, depth, one])
         return matrix
-
-    def is_mirrored(self, camera: Camera) -> bool:
-        """Whether left and right change sides from V_O's view to a new one, both in front."""
-        change = camera.model_to_view @ rays.inverse_affine(self.vdi.camera.model_to_view)
-        return bool(np.linalg.det(change[:3, :3]) < 0)
 
     def eye(self, camera: Camera) -> Eye:
         """Return where the eye of a new view is; at infinity in parallel projection."""

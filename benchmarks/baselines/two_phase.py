@@ -15,14 +15,7 @@ from pyvista_vdi.model.vdi import VDI
 class TwoPhase(DeviceMedium):
     """A VDI's medium in levels of equal depth, each a picture on a rectangle across V_O.
 
-    Parameters
-    ----------
-    runtime : Runtime
-        The device.
-    vdi : VDI
-        The medium that phase one composites; theirs is a volume.
-    levels : int
-        How many.
+    The medium is what phase one composites; theirs is a volume.
     """
 
     def __init__(self, runtime: Runtime, vdi: VDI, levels: int) -> None:

@@ -15,14 +15,8 @@ from pyvista_vdi.model.vdi import VDI
 class WorldRays(DeviceMedium):
     """A VDI drawn by rays of the new view, every supersegment intersected as a pyramid's part.
 
-    Parameters
-    ----------
-    runtime : Runtime
-        The device.
-    vdi : VDI
-        Of any criterion; theirs is ``criterion="transmittance"``.
-    binary : bool
-        Whether a list's first supersegment is found by halving, not by looking from its beginning.
+    Theirs is of ``criterion="transmittance"``. ``binary``: whether a list's first supersegment is
+    found by halving, not by looking from its beginning.
     """
 
     def __init__(self, runtime: Runtime, vdi: VDI, *, binary: bool = True) -> None:

@@ -29,10 +29,6 @@ from baselines.world_rays import WorldRays  # noqa: E402
 #: t = 0 has few digits; list space keeps 2e-5 (tests/support/oracle.py).
 TOLERANCE = 1e-3
 
-#: Of the pixels of OpenGL, those that may be farther off: corners are rounded to 1/256 of a pixel,
-#: so that a ray may miss a frustum that it crosses so close to its border. Of 3600 pixels .1 % are.
-MOST_ROUNDED = 0.01
-
 N_CASES = 6
 
 WAYS = {
@@ -61,43 +57,6 @@ def test_pictures_are_the_oracles(runtime, way, kind):
     result = total(parts)
     assert not result.failures, "\n".join(result.failures)
     assert result.drawn > result.pixels / 10
-
-
-def by_opengl(vdi, size):
-    from baselines.opengl import OpenGLFrusta
-
-    try:
-        return OpenGLFrusta(vdi, size)
-    except UnsupportedError as error:  # an old VTK
-        pytest.skip(str(error))
-
-
-@pytest.mark.slow
-@pytest.mark.gl
-def test_opengl_draws_the_same_but_for_rounded_corners():
-    off, pixels = 0, 0
-    for kind in strategies.VIEWS:
-        if kind == "half":
-            continue
-        for _, vdi, camera, size in cases(kind, 4):
-            drawn = by_opengl(vdi, size)
-            error = np.abs(drawn.image(camera) - reference.render(vdi, camera, size)).max(axis=-1)
-            drawn.close()
-            off += int((~(error <= TOLERANCE)).sum())
-            pixels += error.size
-    assert off <= MOST_ROUNDED * pixels
-
-
-@pytest.mark.gl
-def test_opengl_draws_all_lists_of_a_wide_window():
-    """Points carry lists' numbers, which VTK would take for places that no camera sees."""
-    rng = np.random.default_rng(7)
-    vdi = strategies.random_vdi(rng, window=(400, 3), max_supersegments=2)
-    drawn = by_opengl(vdi, vdi.window_size)
-    image = drawn.image(vdi.camera)
-    drawn.close()
-    np.testing.assert_allclose(image, reference.render(vdi, vdi.camera), atol=TOLERANCE)
-    assert drawn.nbytes == vdi.n_supersegments * (12 + 8 + 16 + 4)
 
 
 @pytest.mark.parametrize("kind", strategies.VIEWS)
