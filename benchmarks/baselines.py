@@ -101,16 +101,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "bytes": {name: way.nbytes for name, way in ways.items()},
         }
 
-    cases = list(cases_of(options))
-    execute("baselines", options, cases, measure, report, count=len(cases))
+    drawn = list(cases_of(options, SAMPLED))
+    execute("baselines", options, cases_of(options), measure, report, drawn=drawn)
     return 0
 
 
-def cases_of(options: Any) -> Iterator[Case]:
-    """Yield the points of every axis, and SSIM by angle."""
+def cases_of(options: Any, points: int | None = None) -> Iterator[Case]:
+    """Yield the points of every axis, or so many of them, and SSIM by angle."""
     size = tuple(options.size)
     for axis, (names, values) in AXES.items():
-        for value in values if options.whole else values[:SAMPLED]:
+        for value in values[:points]:
             if axis == "angle":
                 yield Case(options.volume, None, size, value, what=axis)
                 continue

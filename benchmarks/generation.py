@@ -25,7 +25,6 @@ ANGLE = 5.0
 #: What each column divides.
 RATIOS = {
     "march": "generation / the same march as a picture",
-    "march_all": "that without skipping",
     "vtk": "render_volume / the faster of VTK's mappers",
 }
 
@@ -55,7 +54,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             work = {
                 "generation": partial(bench.generate, max_supersegments=options.max_supersegments),
                 "march": march,
-                "march_all": partial(march, skip_empty=False),
                 **dict([volume, *vtk]),
             }
             taken = take_turns(work, options.repeats, runtime=bench.runtime)
@@ -65,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 pairs = ratios(taken[ours]["clock"], taken[theirs]["clock"])
                 return statistics.median(pairs)
 
-            found = {name: over("generation", name) for name in ("march", "march_all")}
+            found = {"march": over("generation", "march")}
             if vtk:
                 faster = min((name for name, _ in vtk), key=lambda name: seconds[name])
                 found["vtk"] = over("volume_skipping", faster)

@@ -89,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--volume", default="heptane", metavar="NAME", help="of all axes but one")
     parser.add_argument("--procedural", default="beechnut_like", metavar="NAME")
     options = parser.parse_args(arguments)
-    points = dict(cases_of(options, options.whole))
+    points, drawn = dict(cases_of(options, True)), list(dict(cases_of(options, False)))
     volumes = Latest(load)
 
     def bench_of(volume: str, size: tuple[int, int]) -> Bench:
@@ -113,7 +113,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             seconds = {name: statistics.median(times["clock"]) for name, times in taken.items()}
             return {"value": points[case], "seconds": seconds}
 
-        execute("scaling", options, points, measure, report, count=len(points))
+        execute("scaling", options, points, measure, report, drawn=drawn)
     return 0
 
 

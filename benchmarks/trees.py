@@ -42,7 +42,7 @@ from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 made, key = {}, None
 for line in sys.stdin:
     order = json.loads(line)
-    now = order["volume"], order["look"], order["precision"]
+    now = order["volume"], order["look"]
     if now != key:
         made.clear()
         key = now
@@ -51,8 +51,7 @@ for line in sys.stdin:
     size, device = order["size"], order["device"]
     view = filling_camera(made["volume"].bounds, size)
     def generate():
-        return pvdi.generate(made["volume"], view, size, precision=order["precision"],
-                             device=device, **made["look"])
+        return pvdi.generate(made["volume"], view, size, device=device, **made["look"])
     if order["what"] == "frame":
         if "vdi" not in made:
             made["vdi"] = generate()
@@ -125,7 +124,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, and write what was found."""
     parser = parser_of(__doc__, size=(1280, 720), volumes=VOLUMES, repeats=5)
     parser.add_argument("--other", type=Path, required=True, help="root of the other tree")
-    parser.add_argument("--precision", default="exact")
     options = parser.parse_args(arguments)
     roots = {"this": Path(__file__).resolve().parents[1], "other": options.other}
     with ExitStack() as stack:
@@ -142,8 +140,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 done = subprocess.run(command, stdout=subprocess.PIPE, check=True, **where[name])
                 return dict(json.loads(done.stdout.splitlines()[-1]))
             given = {"size": list(options.size), "device": options.device}
-            kept = {"volume": case.volume, "look": case.look, "precision": options.precision}
-            return trees[name].ask(what=case.what, angle=case.angle, **kept, **given)
+            given |= {"volume": case.volume, "look": case.look, "what": case.what}
+            return trees[name].ask(angle=case.angle, **given)
 
         def measure(case: Case) -> dict[str, Any]:
             bits = {name: once(name, case)["bits"] for name in roots}  # caches are filled

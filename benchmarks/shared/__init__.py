@@ -25,9 +25,6 @@ RESULTS = Path(__file__).parents[1] / "results"
 #: Helpers of the tests: browsers, a slow line, random VDIs.
 SUPPORT = Path(__file__).parents[2] / "tests" / "support"
 
-#: Yields the lines of the tables, of the results and of all cases.
-Report = Callable[[Results, list[Case]], Iterable[str]]
-
 
 def parser_of(
     doc: str | None,
@@ -67,20 +64,28 @@ def execute(
     options: argparse.Namespace,
     cases: Iterable[Case],
     measure: Callable[[Case], Mapping[str, Any]],
-    report: Report,
+    report: Callable[[Results, list[Case]], Iterable[str]],
     *,
-    count: int,
-    key: Callable[[Case], Hashable] = lambda case: case.volume,
+    count: int = 0,
+    drawn: Sequence[Case] = (),
+    key: Callable[[Case], Hashable] | None = lambda case: case.volume,
     rooms: Sequence[str] = ROOMS,
 ) -> Results:
     """Measure a sample of the cases, or all, and write ``KIND.json`` and ``.md`` (``_sample``).
 
-    Cases whose volume is not at hand are left out and named. A sample has ``count`` of them, by the
-    strata of ``key``. ``rooms`` are those whose code decides the figures; ``report`` yields the
-    lines of the tables, of the results and of all cases.
+    Cases whose volume is not at hand are left out and named. A sample is ``drawn``, or has
+    ``count`` of them by the strata of ``key``, or without a key all cases of so many scenes (volume
+    and look), which can be compared. ``rooms`` are those whose code decides the figures; ``report``
+    yields the lines of the tables, of the results and of all cases.
     """
     every = at_hand(cases)
-    chosen = every if options.whole else sample(every, count, key)
+    if options.whole or drawn:
+        chosen = every if options.whole else list(drawn)
+    elif key is not None:
+        chosen = sample(every, count, key)
+    else:
+        scenes = sample(dict.fromkeys(Case(case.volume, case.look) for case in every), count)
+        chosen = [case for case in every if Case(case.volume, case.look) in scenes]
     name = kind + ("" if options.whole else "_sample")
     given = {k: v for k, v in vars(options).items() if k not in ("out", "redo", "device", "whole")}
     options.out.mkdir(parents=True, exist_ok=True)
@@ -123,7 +128,7 @@ def load(name: str) -> Volume:
     """Return a volume by its name: an example, or one that is made (``beechnut_like@8``)."""
     if name in examples.VOLUMES:
         return examples.load_data(name, as_volume=True)
-    return find_dataset(name).load(None)
+    return find_dataset(name).load()
 
 
 def table_of(volume: Volume, look: str | None, **more: Any) -> Any:

@@ -157,6 +157,16 @@ def test_a_sample_is_measured_once_and_the_whole_is_another_file(no_data, tmp_pa
     assert (tmp_path / "asked.md").read_text().startswith("# asked\n\n12 of 12 cases.\n\n2.5\n")
 
 
+def test_a_sample_of_scenes_has_all_cases_of_each(no_data, tmp_path):
+    cases = [Case("brain", look, what=f"case {k}") for k in range(3) for look in "abcdef"]
+    found = shared.execute(
+        "asked", options(tmp_path), cases, lambda _: {}, lambda *_: [], count=2, key=None
+    )
+    looks = [row["case"]["look"] for row in found.rows()]
+    assert len(looks) == 6
+    assert {looks.count(look) for look in looks} == {3}
+
+
 # Counts and floors
 
 
