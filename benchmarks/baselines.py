@@ -204,7 +204,7 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
         ]
         yield from table(("", *titles), lines)
     yield from ("", "## SSIM to the volume, each with lists by its own criterion", "")
-    found = list(results.rows(what="ssim"))
+    found = [row for row in results.rows(what="ssim") if "ssim" in row]
     by_way = [[WAYS[way], *(f"{row['ssim'][way]:.4f}" for row in found)] for way in OWN]
     yield from table(("", *(f"{row['case']['angle']:g} degrees" for row in found)), by_way)
 

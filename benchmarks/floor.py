@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         cases = [Case(name, "soft", tuple(options.size), what="stages") for name in options.volumes]
         key = lambda case: case.what  # noqa: E731
-        execute("floor", options, [DEVICE, *cases], measure, report, count=3, key=key)
+        execute("floor", options, [DEVICE, *cases], measure, report, count=5, key=key)
     return 0
 
 
@@ -144,7 +144,8 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
     for row in results.rows(what="rates"):
         yield from table(("what", "rate, 10^9 a second"), rate_rows(row))
         yield ""
-    found = {row["case"]["volume"]: row["stages"] for row in results.rows(what="stages")}
+    rows = [row for row in results.rows(what="stages") if "stages" in row]
+    found = {row["case"]["volume"]: row["stages"] for row in rows}
     names = dict.fromkeys(name for stages in found.values() for name in stages)
     yield from section("Gaps", "Measured over floor, and what bounds the floor.")
     yield from table(
