@@ -69,10 +69,6 @@ class OffScreenVolume:
         A blank one, in which VTK has drawn nothing, raises DeviceError.
         """
         self.render(camera)
-        return self.pixels()
-
-    def pixels(self) -> NDArray[np.float32]:
-        """Return what the window shows, as :meth:`image` does."""
         width, height = self._window.GetSize()
         pixels = _vtk("vtkCommonCore").vtkUnsignedCharArray()
         front_buffer = 0  # what has been drawn lies in the back buffer, off-screen as well
@@ -134,10 +130,6 @@ class VTKBaseline(OffScreenVolume):
     def set_sample_distance(self, sample_distance: float) -> None:
         """Set the length of a step along the ray, world units."""
         self._mapper.SetSampleDistance(sample_distance)
-
-    def adjust_by_rate(self) -> None:
-        """Let VTK choose fewer rays by the window's desired update rate."""
-        self._mapper.SetAutoAdjustSampleDistances(True)
 
     def set_image_sample_distance(self, distance: float) -> None:
         """Cast a ray for every so many pixels along each edge."""

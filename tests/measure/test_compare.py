@@ -138,40 +138,29 @@ def test_a_blank_picture_is_an_error(volume, default_runtime):
         measure(volume, settings)
 
 
-def test_nothing_to_see_is_an_error_without_vtk_too(volume, default_runtime):
-    blank = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 0], (0, 1))
-    settings = Settings({"transfer_function": blank}, SIZE, angles=(0,), repeats=1, vtk=False)
-    with pytest.raises(InvalidArgumentError, match="nothing is to be seen at 0 degrees"):
-        measure(volume, settings)
-
-
-def test_without_vtk(volume, default_runtime):
+@pytest.mark.parametrize("repeats", [0, 1])
+def test_without_vtk_and_timings(repeats, volume, default_runtime):
     shade = pvdi.TransferFunction([(0, 0, 0), (1, 0.5, 0)], [0, 0.5], volume.finite_range())
-    settings = Settings({"transfer_function": shade}, SIZE, angles=(5,), repeats=1, vtk=False)
-    report, _, images = measure(volume, settings)
+    looks, heard = {"transfer_function": shade}, []
+    settings = Settings(looks, SIZE, angles=(5,), repeats=repeats, vtk=False)
+    report, _, images = measure(volume, settings, heard.append)
+    assert heard[-1] == 1
     assert set(images[5]) == {"raycaster", "vdi"}
-    assert report.angles[0].ratio_to_vtk is None
-    assert report.angles[0].raycaster_to_gpu is None
-    assert "VTK fixed-point" not in table(report)
+    (found,) = report.angles
+    assert found.vdi_to_raycaster == compare_images(images[5]["vdi"], images[5]["raycaster"])
+    assert (found.ratio_to_vtk, found.raycaster_to_gpu) == (None, None)
+    vdi_row, view_row = report.to_dict()["rows"]
+    assert (vdi_row["generation_ratio"] is None) == (repeats == 0)
+    assert (view_row["ratio_to_raycaster"] is None) == (repeats == 0)
+    assert view_row["ratio_to_vtk"] is None
+    text = table(report)
+    assert "VTK fixed-point" not in text
+    assert "Sizes" in text
+    assert ("Frames" in text, "Generation" in text) == (repeats > 0, repeats > 0)
     assert contact_sheet(report, images).shape[1] == pytest.approx(3 * SIZE[0], abs=12)
 
 
-def test_without_timings(volume, default_runtime):
-    shade = pvdi.TransferFunction([(0, 0, 0), (1, 0.5, 0)], [0, 0.5], volume.finite_range())
-    settings = Settings({"transfer_function": shade}, SIZE, angles=(5,), repeats=0, vtk=False)
-    heard = []
-    report, _, images = measure(volume, settings, heard.append)
-    assert heard[-1] == 1
-    assert report.angles[0].vdi_to_raycaster == compare_images(
-        images[5]["vdi"], images[5]["raycaster"]
-    )
-    vdi_row, view_row = report.to_dict()["rows"]
-    assert vdi_row["generation_ratio"] is None
-    assert view_row["ratio_to_vtk"] is None
-    text = table(report)
-    assert "Frames" not in text
-    assert "Generation" not in text
-    assert "Sizes" in text
+BLANK = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 0], (0, 1))
 
 
 @pytest.mark.parametrize(
@@ -183,16 +172,13 @@ def test_without_timings(volume, default_runtime):
         ({"angles": ()}, "angles must be one or more numbers"),
         ({"angles": (float("nan"),)}, "angles must be one or more numbers"),
         ({"angles": (5, 5.0)}, "an angle is given twice"),
+        ({"sample_distance": 0}, "sample_distance must be .*; got 0"),
+        ({"classification": {"transfer_function": BLANK}}, "nothing is to be seen at 0 degrees"),
     ],
 )
-def test_settings_are_checked(options, message):
+def test_settings_are_checked(options, message, volume, default_runtime):
     with pytest.raises(InvalidArgumentError, match=message):
-        Settings(LOOKS, **options)
-
-
-def test_a_step_of_nothing_is_refused(volume, default_runtime):
-    with pytest.raises(InvalidArgumentError, match="sample_distance must be .*; got 0"):
-        measure(volume, Settings(LOOKS, SIZE, vtk=False, sample_distance=0))
+        measure(volume, Settings(**{"classification": LOOKS, "vtk": False, **options}))
 
 
 @pytest.mark.parametrize(

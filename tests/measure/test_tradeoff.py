@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 import json
 import math
@@ -13,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fresh_python import PATIENCE, run_bare
-from json_schema import faults, read_checked
+from fresh_python import PATIENCE
+from json_schema import faults
+from measured import SCHEMA, checked, made_up_results
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
@@ -24,8 +26,6 @@ from pyvista_vdi.measure.paper.datasets import look
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.measure.tradeoff import AXES, Setting, Tradeoff, measure_tradeoff, sweep
 from pyvista_vdi.measure.tradeoff.settings import DEFAULT_AXES, ON_REQUEST, PAIRS, QUICK_AXES
-
-SCHEMA = Path(__file__).parents[2] / "docs" / "results_schema.json"
 
 TINY_SWEEP = ("max-supersegments=2", "precision=8-byte", "preview=0.5", "skip-empty")
 TINY_RUN = ("--size", "32x24", "--angles", "0,30", "--repeats", "2", "--generations", "1")
@@ -45,11 +45,6 @@ def folder(tmp_path_factory):
     np.save(path / "ball.npy", shell())
     (path / "ball_20x18x14_uint8.raw").write_bytes(shell().tobytes())
     return path
-
-
-def checked(path):
-    """Read results after holding them to the schema."""
-    return Results(read_checked(path, SCHEMA))
 
 
 def settings_of(results):
@@ -203,17 +198,6 @@ def test_vtk_takes_part(default_runtime, folder, tmp_path):
     assert "VTK GPU | VTK fixed point" in (tmp_path / "tradeoff-ball.md").read_text()
 
 
-def test_the_engine_alone_can_run_it(default_runtime, folder, tmp_path):
-    for file in ("ball.npy", "ball_20x18x14_uint8.raw"):
-        out = ["--out", str(tmp_path), "--sweep", "precision=8-byte"]
-        result = run_bare(["tradeoff", str(folder / file), *TINY_RUN, *out])
-        assert result.returncode == 0, result.stderr
-        assert "VTK is not installed: its mappers are left out" in result.stderr
-        stem = f"tradeoff-{file.split('.')[0]}"
-        assert checked(tmp_path / f"{stem}.json").plan["vtk"] is False
-        assert not (tmp_path / f"{stem}.png").exists()
-
-
 @pytest.fixture
 def generated(monkeypatch):
     """Lets generation of some VDIs fail; holds what was asked for."""
@@ -354,29 +338,8 @@ def test_mistakes_of_the_command_line(capsys):
 
 @pytest.mark.parametrize("size", [(32, 24, 3), (32.5, 24), 32])
 def test_a_window_that_is_none_is_refused(size):
-    table = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 1], (0, 1))
     with pytest.raises(InvalidArgumentError, match=r"window_size must be \(width, height\)"):
-        measure_tradeoff(pvdi.Volume(shell()), window_size=size, transfer_function=table)
-
-
-HEADER = b"\x93NUMPY\x01\x00\x28\x00"
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"",
-        b"no array",
-        b"PK\x03\x04",  # an .npz
-        HEADER + b"{'descr': '|u1', 'shape': (3,           ",  # a bracket that is not closed
-        HEADER + b"{'descr': '|u1', b'shape': (3, 4), 2: 1}",  # keys that cannot be sorted
-        HEADER + b"{'descr': '|O', 'fortran_order': 0}     ",
-    ],
-)
-def test_what_is_no_array_is_refused(content, tmp_path, capsys):
-    (tmp_path / "a.npy").write_bytes(content)
-    assert tradeoff(tmp_path / "a.npy", "--no-vtk", "--out", tmp_path) == 1
-    assert "a.npy cannot be read as an array" in capsys.readouterr().err
+        measure_tradeoff(pvdi.Volume(shell()), window_size=size)
 
 
 @pytest.mark.parametrize(
@@ -411,76 +374,42 @@ def test_the_options_reach_the_sweep(options, names, folder, tmp_path, monkeypat
     assert [setting.name for setting in settings] == names
 
 
+STEADY = np.array([1.0, 1.01, 0.99, 1.02, 0.98])
+
+
+def times(median):
+    return {"clock": (median * STEADY).tolist(), "device": []}
+
+
 def made_up(*points, angles=(5.0, 30.0)):
     """Return results of settings given as (setting, frame ratio, SSIM, bytes, generation ratio)."""
-    steady = np.array([1.0, 1.01, 0.99, 1.02, 0.98])
-
-    def times(median):
-        return {"clock": (median * steady).tolist(), "device": []}
-
-    volume = {"name": "ball", "dimensions": [2, 2, 2], "spacing": [1, 1, 1], "dtype": "uint8"}
-    baselines = [
-        {
-            "case": {"what": "volume rendering", "volume": "ball", "angle": angle},
-            "volume_to_vtk_gpu": None,
-            "seconds": {
-                n: times(t)
-                for n, t in (("volume", 0.02), ("volume_skipping", 0.01), ("vtk_gpu", 0.03))
-            },
-            "left_out": {},
-        }
-        for angle in angles
-    ]
-    rows = [
-        {
-            "case": {"what": "setting", "volume": "ball", **setting.changes},
-            "vdi": {
-                "window_size": [64, 36],
-                "supersegments": 10,
-                "mean_length": 2.0,
-                "longest_list": 4,
-                "bytes_memory": size,
-                "bytes_saved": size // 2,
-            },
-            "generation": {
-                "seconds": times(made),
-                "packing": None,
-                "volume_seconds": times(1.0),
-            },
-            "angles": [
-                {
-                    "angle": angle,
-                    "to_volume": {"ssim": ssim, "psnr": 30.0, "worst_pixel": 9.0},
-                    "seconds": times(frame * 0.01),
-                    "volume_seconds": times(0.01),
-                }
-                for angle in angles
-            ],
-        }
-        for setting, frame, ssim, size, made in points
-    ]
-    plan = {
-        "volume": {**volume, "bytes": 3 * 10**6},
-        "looks": {"cmap": "bone"},
-        "interpolation": "nearest",
-        "window_size": [64, 36],
-        "angles": list(angles),
-        "repeats": 5,
-        "generations": 5,
-        "settings": [setting.to_dict() for setting, *_ in points],
-    }
-    return {
-        "format": "pyvista-vdi results",
-        "version": 2,
-        "kind": "tradeoff",
-        "plan": plan,
-        "system": {"device": "a", "driver": "1", "python": "3", "system": "b"},
-        "measured": {"commit": None, "sources": {}},
-        "extent": "whole",
-        "begun": "x",
-        "changed": "y",
-        "rows": [*baselines, *rows],
-    }
+    rows = []
+    taken = {"volume": times(0.02), "volume_skipping": times(0.01), "vtk_gpu": times(0.03)}
+    for angle in angles:
+        case = {"what": "volume rendering", "volume": "ball", "angle": angle}
+        found = {"volume_to_vtk_gpu": None, "seconds": copy.deepcopy(taken), "left_out": {}}
+        rows.append({"case": case, **found})
+    for setting, frame, ssim, size, made in points:
+        near = {"ssim": ssim, "psnr": 30.0, "worst_pixel": 9.0}
+        lists = {"window_size": [64, 36], "supersegments": 10, "mean_length": 2.0}
+        views = [
+            {
+                "angle": angle,
+                "to_volume": {**near},
+                "seconds": times(frame * 0.01),
+                "volume_seconds": times(0.01),
+            }
+            for angle in angles
+        ]
+        generation = {"seconds": times(made), "packing": None, "volume_seconds": times(1.0)}
+        vdi = {**lists, "longest_list": 4, "bytes_memory": size, "bytes_saved": size // 2}
+        case = {"what": "setting", "volume": "ball", **setting.changes}
+        rows.append({"case": case, "vdi": vdi, "generation": generation, "angles": views})
+    volume = {"name": "ball", "dimensions": [2, 2, 2], "dtype": "uint8", "bytes": 3 * 10**6}
+    plan = {"volume": volume, "looks": {"cmap": "bone"}, "interpolation": "nearest"}
+    plan |= {"window_size": [64, 36], "angles": list(angles), "repeats": 5, "generations": 5}
+    plan |= {"settings": [setting.to_dict() for setting, *_ in points]}
+    return made_up_results("tradeoff", plan, rows)
 
 
 def setting_rows(data):
@@ -520,14 +449,13 @@ def test_fronts_and_dominated_settings():
 
 def test_worse_at_one_angle_is_worse():
     data = made_up(*FOUR)
-    (_, row) = setting_rows(data)[3]["angles"]
-    row["to_volume"]["ssim"] = 0.9815  # less than the default at 5 degrees, more at 30
+    # Less than the default at 5 degrees, more at 30
+    setting_rows(data)[3]["angles"][1]["to_volume"]["ssim"] = 0.9815
     assert Tradeoff(data).dominated() == {}
 
 
 def test_equal_settings_are_named_once():
-    twin = (Setting(skip_empty=False), *FOUR[0][1:])
-    found = Tradeoff(made_up(*FOUR, twin))
+    found = Tradeoff(made_up(*FOUR, (Setting(skip_empty=False), *FOUR[0][1:])))
     assert "no skipping" not in found.front("memory")
     assert "no skipping" not in found.dominated()
 

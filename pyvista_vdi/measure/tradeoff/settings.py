@@ -68,10 +68,8 @@ class Setting:
 
     Parameters
     ----------
-    max_supersegments : int
-        Longest list, the paper's N_S.
-    tolerance : float
-        Error per list that may be traded for shorter lists.
+    max_supersegments, tolerance : int, float
+        Longest list, the paper's N_S, and error per list that may be traded for shorter ones.
     lists : float
         Lists along each edge of the VDI over pixels along that edge of the frame.
     precision : {"exact", "16-byte", "8-byte"}
@@ -81,10 +79,8 @@ class Setting:
     preview : float
         Share of the frame's edges that is drawn, 0 to 1, before it is brought to size: what a
         plotter does while the view moves.
-    criterion : str
-        What decides where lists are cut.
-    view_cone : float
-        Half angle of the cone of new views to serve, degrees.
+    criterion, view_cone : str, float
+        What decides where lists are cut, and for which new views: half an angle, degrees.
     sample_distance : float
         Step of generation over the volume's smallest spacing.
     """
