@@ -22,7 +22,7 @@ WALL: Mapping[str, Callable[[], float]] = {"clock": time.perf_counter}
 #: Chance of a separation by noise up to which times count as different.
 CHANCE = 0.01
 
-#: Samples up to which the chance is exact; SciPy's takes long beyond.
+#: Samples of either up to which the chance is exact; SciPy's takes long beyond.
 EXACT = 40
 
 

@@ -18,7 +18,7 @@ from itertools import product
 from typing import Any
 
 from pyvista_vdi import examples
-from pyvista_vdi.errors import DataNotFoundError
+from pyvista_vdi.errors import DataNotFoundError, DeviceMemoryError
 from pyvista_vdi.measure import report
 from pyvista_vdi.measure.clock import median, take_turns
 from pyvista_vdi.measure.harness import ROOMS, Case, Latest, Progress, check_count, run
@@ -212,7 +212,8 @@ def measure_front(
             found.data["system"].setdefault("opengl", drawn.opengl)
             return {"points": [list(asdict(point).values()) for point in drawn.points(case)]}
 
-        run((case for case in plan.cases() if case.volume in there), measured, found, progress)
+        cases = (case for case in plan.cases() if case.volume in there)
+        run(cases, measured, found, progress, (DeviceMemoryError, MemoryError))
     found.save()
     return found
 

@@ -181,10 +181,11 @@ def run(
     measure: Callable[[Case], Mapping[str, Any]],
     results: Results,
     progress: Progress | None = None,
+    refused: tuple[type[BaseException], ...] = REFUSALS,
 ) -> None:
     """Measure the cases that the results lack, and write the file after every one.
 
-    What cannot be measured becomes a row with ``refused``, the reason. Cases that share a volume, a
+    Errors that are ``refused`` become rows with that, the reason. Cases that share a volume, a
     bench or a VDI should follow each other: see :class:`Latest`.
 
     ``measure`` returns a case's figures, in values that JSON can hold. ``progress`` is called with
@@ -196,7 +197,7 @@ def run(
         steps.begin(case.name)
         try:
             figures = measure(case)
-        except REFUSALS as error:
+        except refused as error:
             figures = {"refused": refusal(error)}
         results.add(case.to_dict(), **figures)
     steps()

@@ -71,9 +71,8 @@ class OffScreenVolume:
         self.render(camera)
         width, height = self._window.GetSize()
         pixels = _vtk("vtkCommonCore").vtkUnsignedCharArray()
-        front_buffer = 0  # what has been drawn lies in the back buffer, off-screen as well
-        right_eye = 0
-        self._window.GetPixelData(0, 0, width - 1, height - 1, front_buffer, pixels, right_eye)
+        # Of the left eye; what has been drawn lies in the back buffer, off-screen as well
+        self._window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
         bottom_up = _vtk("util.numpy_support").vtk_to_numpy(pixels).reshape(height, width, 3)
         if not bottom_up.any():
             raise DeviceError(
@@ -116,13 +115,12 @@ class VTKBaseline(OffScreenVolume):
     ) -> None:
         if mapper not in MAPPERS:
             raise InvalidArgumentError(f"mapper must be one of {MAPPERS}; got {mapper!r}")
-        core = _vtk("vtkRenderingCore")
+        actor = _vtk("vtkRenderingCore").vtkVolume()
         from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
 
         self._mapper = _make_mapper(mapper)
         self._mapper.SetInputData(volume_to_image(volume))
         self.set_sample_distance(sample_distance)
-        actor = core.vtkVolume()
         actor.SetMapper(self._mapper)
         actor.SetProperty(volume_property)
         super().__init__(f"VTK's {mapper} mapper", actor, window_size)
@@ -159,8 +157,7 @@ def property_from_transfer_function(volume: Volume, table: TransferFunction) -> 
     prop.SetColor(color)
     prop.SetScalarOpacity(opacity)
     prop.SetScalarOpacityUnitDistance(table.unit_distance or volume.default_unit_distance)
-    if table.interpolation == "linear":
-        prop.SetInterpolationTypeToLinear()
+    prop.SetInterpolationType(table.interpolation == "linear")  # VTK_NEAREST_INTERPOLATION is 0
     return prop
 
 
@@ -179,25 +176,19 @@ def add_volume_property(volume: Volume, arguments: Mapping[str, Any]) -> Any:
         prop = plotter.add_volume(grid, show_scalar_bar=False, render=False, **arguments).prop
     finally:
         plotter.close()
-    if interpolation == "linear":
-        prop.SetInterpolationTypeToLinear()
-    else:
-        prop.SetInterpolationTypeToNearest()
+    prop.SetInterpolationType(interpolation == "linear")  # VTK_NEAREST_INTERPOLATION is 0
     return prop
 
 
 def _make_mapper(name: str) -> Any:
-    gpu = name == "gpu"
-    mapper = (
-        _vtk("vtkRenderingVolumeOpenGL2").vtkOpenGLGPUVolumeRayCastMapper()
-        if gpu
-        else _vtk("vtkRenderingVolume").vtkFixedPointVolumeRayCastMapper()
-    )
+    if name == "gpu":
+        mapper = _vtk("vtkRenderingVolumeOpenGL2").vtkOpenGLGPUVolumeRayCastMapper()
+        mapper.SetUseJittering(False)
+    else:
+        mapper = _vtk("vtkRenderingVolume").vtkFixedPointVolumeRayCastMapper()
     mapper.SetAutoAdjustSampleDistances(False)
     mapper.SetLockSampleDistanceToInputSpacing(False)
     mapper.SetImageSampleDistance(1.0)
-    if gpu:
-        mapper.SetUseJittering(False)
     return mapper
 
 

@@ -203,9 +203,22 @@ def test_a_vtk_that_cannot_be_loaded_names_the_package(text, message):
 
 
 def test_a_machine_without_opengl_names_the_packages(volume, peer_property, monkeypatch):
-    from vtkmodules import vtkRenderingOpenGL2
-
+    from pyvista_vdi.measure.front import Plan, measure_front
     from pyvista_vdi.measure.vtk_baselines import VTKBaseline
+
+    take_opengl_away(monkeypatch)
+    message = "VTK finds no OpenGL .* 'libegl1 libgl1-mesa-dri' or 'libosmesa6'.* --no-vtk"
+    with pytest.raises(MissingDependencyError, match=message):
+        VTKBaseline(volume, peer_property, SIZE, "gpu", 0.5)
+    with pytest.raises(MissingDependencyError, match=message):
+        measure(volume, Settings(LOOKS, SIZE))
+    with pytest.raises(MissingDependencyError, match=message):
+        measure_front(Plan(("brain",), ("soft",), ((0.0, 1.0),), SIZE, 1))
+
+
+def take_opengl_away(monkeypatch):
+    """Let VTK find no window that can draw, as on a machine without EGL and OSMesa."""
+    from vtkmodules import vtkRenderingOpenGL2
 
     class NoWindow:
         def __getattr__(self, name):
@@ -216,11 +229,6 @@ def test_a_machine_without_opengl_names_the_packages(volume, peer_property, monk
     monkeypatch.setattr("sys.platform", "linux")
     for name in ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow"):
         monkeypatch.setattr(vtkRenderingOpenGL2, name, NoWindow, raising=False)
-    with pytest.raises(
-        MissingDependencyError,
-        match="VTK finds no OpenGL .* 'libegl1 libgl1-mesa-dri' or 'libosmesa6'.* --no-vtk",
-    ):
-        VTKBaseline(volume, peer_property, SIZE, "gpu", 0.5)
 
 
 @pytest.mark.gl
