@@ -192,15 +192,16 @@ def run(
     the finished fraction and the case's name.
     """
     missing = [case for case in cases if results.row(case.to_dict()) is None]
-    steps = Steps(progress, len(missing))
-    for case in missing:
-        steps.begin(case.name)
+    for done, case in enumerate(missing):
+        if progress is not None:
+            progress(done / len(missing), case.name)
         try:
             figures = measure(case)
         except refused as error:
             figures = {"refused": refusal(error)}
         results.add(case.to_dict(), **figures)
-    steps()
+    if progress is not None:
+        progress(1.0)
 
 
 def refusal(error: BaseException) -> str:
@@ -217,14 +218,6 @@ class Steps:
     def __call__(self, *doing: str) -> None:
         """Say that a piece is finished, and what is being done now."""
         self._done += 1
-        self._say(*doing)
-
-    def begin(self, doing: str) -> None:
-        """Say what is being done: a piece, finished by the time of the next call."""
-        self._say(doing)
-        self._done += 1
-
-    def _say(self, *doing: str) -> None:
         if self._progress is not None:
             self._progress(min(1.0, self._done / self._total), *doing)
 
@@ -440,13 +433,11 @@ class Bench:
     def reference(self, camera: Camera) -> Image:
         """Return the same picture, kept for other VDIs; a black one raises InvalidArgumentError."""
         if camera not in self._references:
-            image = self.image(camera)
-            if not image.any():
-                raise InvalidArgumentError(
-                    "nothing is to be seen: the transfer function leaves the whole volume "
-                    "transparent"
-                )
-            self._references[camera] = image
+            self._references[camera] = self.image(camera)
+        if not self._references[camera].any():
+            raise InvalidArgumentError(
+                "nothing is to be seen: the transfer function leaves the whole volume transparent"
+            )
         return self._references[camera]
 
     def vtk_image(self, camera: Camera, name: str = "vtk_gpu") -> Image:
