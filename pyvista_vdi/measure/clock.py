@@ -89,7 +89,7 @@ def rank_sum_chance(a: Sequence[float], b: Sequence[float]) -> float:
     return _rank_sum_chance(tuple(a), tuple(b))
 
 
-@lru_cache(maxsize=4096)  # fronts compare the same samples again and again
+@lru_cache(maxsize=2**16)  # fronts compare the same samples again and again
 def _rank_sum_chance(a: tuple[float, ...], b: tuple[float, ...]) -> float:
     from scipy.stats import mannwhitneyu  # takes a second to load
 

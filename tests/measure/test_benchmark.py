@@ -1,4 +1,4 @@
-"""The benchmark: tiny runs end to end, going on, comparing, refusing, and the paper's figures."""
+"""The benchmark: tiny runs, the changes between two, data sets, and the paper's figures."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fresh_python import run_bare
 from json_schema import faults
 from measured import SCHEMA, checked, made_up_results
 
 from pyvista_vdi import cli, examples
 from pyvista_vdi.cli import parser
 from pyvista_vdi.errors import DeviceMemoryError
-from pyvista_vdi.measure import harness
 from pyvista_vdi.measure.compare.bounds import SSIM_TO_VTK
 from pyvista_vdi.measure.paper import (
     PROFILES,
@@ -117,52 +115,6 @@ def test_vtk_gets_the_same_transfer_function():
         np.testing.assert_allclose(resampled, theirs, atol=1e-6)
 
 
-@pytest.mark.parametrize("verb", ["benchmark", "tradeoff"])
-def test_the_engine_alone_can_run_it(verb, default_runtime, tmp_path):
-    out = tmp_path / "bare.json"
-    arguments = (*TINY_RUN, "--angles", "5", "--out", out)
-    if verb == "tradeoff":
-        np.save(tmp_path / "ball.npy", np.arange(1000, dtype=np.uint16).reshape(10, 10, 10))
-        out = tmp_path / "tradeoff-ball.json"
-        sizes = ("--size", "32x24", "--angles", "5", "--repeats", "1", "--generations", "1")
-        arguments = (tmp_path / "ball.npy", *sizes, "--sweep", "precision", "--out", tmp_path)
-    result = run_bare([verb, *map(str, arguments)])
-    assert result.returncode == 0, result.stderr
-    assert "VTK is not installed: its mappers are left out" in result.stderr
-    assert checked(out).plan["vtk"] is False
-    assert not out.with_suffix(".png").exists()
-
-
-def test_an_interrupted_run_can_be_gone_on_with(default_runtime, tmp_path, monkeypatch, capsys):
-    out = tmp_path / "a.json"
-    run = (*TINY_RUN, "--angles", "0,5,30", "--no-vtk", "--tables", "1", "--out", out)
-    timed, asked = harness.Bench.frames, []
-
-    def interrupted(*arguments):
-        asked.append(arguments)
-        if len(asked) == 3:
-            raise KeyboardInterrupt
-        return timed(*arguments)
-
-    monkeypatch.setattr(harness.Bench, "frames", interrupted)
-    assert benchmark(*run) == 130
-    assert "--resume goes on" in capsys.readouterr().err
-    first = checked(out).data["rows"]
-    assert [row["case"].get("angle") for row in first] == [None, None, 0, 5]
-    assert benchmark(*run) == 1
-    assert "--resume goes on with it, or choose another --out" in capsys.readouterr().err
-    assert benchmark(*run, "--resume") == 0
-    second = checked(out).data["rows"]
-    assert second[:4] == first
-    assert [row["case"].get("angle") for row in second] == [None, None, 0, 5, 30]
-    # Nothing is left to do: nothing is measured
-    before = len(asked)
-    assert benchmark(*run, "--resume") == 0
-    assert (len(asked), checked(out).data["rows"]) == (before, second)
-    assert benchmark(*run, "--resume", "--angles", "0") == 1
-    assert "holds results for angles = [0.0, 5.0, 30.0], not [0.0]" in capsys.readouterr().err
-
-
 def test_a_volume_beyond_the_device_is_a_refused_row(default_runtime, tmp_path, monkeypatch):
     # 32 TiB: no device allows that in one buffer. It is refused before anything is made
     huge = replace(PROCEDURAL["kingsnake_like"], dimensions=(2**15,) * 3)
@@ -207,26 +159,6 @@ def test_vtk_is_left_out_by_name_where_memory_is_short(default_runtime, tmp_path
     assert "needs 0.00 GiB on the host" in row["left_out"]["vtk_gpu"]
     assert "vtk_fixed_point" in row["seconds"]
     assert f"- VTK GPU with {TINY}: " in out.with_suffix(".md").read_text()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--out", "a.txt"], "--out must name a .json file"),
-        (["--datasets", "nothing"], "no volume is called 'nothing', and there is no such file"),
-        (["--datasets", "kingsnake_like@0"], "a whole number from 1 to 128 behind the @"),
-        (["--datasets", "brain", "brain"], "'brain' is given twice"),
-        (["--datasets", "x" * 5000], "and there is no such file"),
-        (["--angles", "5,30,5"], "an angle is given twice: (5.0, 30.0, 5.0)"),
-        (["--compare", "a.json", "b.json"], "a.json cannot be read"),
-    ],
-)
-def test_mistakes_are_one_line(arguments, message, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert benchmark("--no-vtk", *arguments) == 1
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1
 
 
 def test_the_parser_offers_the_profiles():

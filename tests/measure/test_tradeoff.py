@@ -1,4 +1,4 @@
-"""The tradeoff: sweeps, tiny runs end to end, going on, refusing, and what figures come to."""
+"""The tradeoff: sweeps, tiny runs, and what is made of their figures."""
 
 from __future__ import annotations
 
@@ -6,22 +6,15 @@ import copy
 import itertools
 import json
 import math
-import os
-import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from fresh_python import PATIENCE
 from json_schema import faults
 from measured import SCHEMA, checked, made_up_results
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
-from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
-from pyvista_vdi.measure import harness
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.measure.paper.datasets import look
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.measure.tradeoff import AXES, Setting, Tradeoff, measure_tradeoff, sweep
@@ -196,137 +189,6 @@ def test_vtk_takes_part(default_runtime, folder, tmp_path):
         assert row["volume_to_vtk_gpu"]["ssim"] > 0.95
     assert results.data["system"]["opengl"]
     assert "VTK GPU | VTK fixed point" in (tmp_path / "tradeoff-ball.md").read_text()
-
-
-@pytest.fixture
-def generated(monkeypatch):
-    """Lets generation of some VDIs fail; holds what was asked for."""
-    whole, asked, errors = harness.generate_vdi, [], {}
-
-    def generate(*arguments, max_supersegments, **others):
-        asked.append(max_supersegments)
-        if max_supersegments in errors:
-            raise errors[max_supersegments]
-        return whole(*arguments, max_supersegments=max_supersegments, **others)
-
-    monkeypatch.setattr(harness, "generate_vdi", generate)
-    return asked, errors
-
-
-def test_an_interrupted_run_can_be_gone_on_with(
-    default_runtime, folder, tmp_path, generated, capsys
-):
-    asked, errors = generated
-    sweep_two = ("--sweep", "max-supersegments=2,3", "precision=8-byte", "--name", "two")
-    run = (folder / "ball.npy", *TINY_RUN, *sweep_two, "--no-vtk", "--out", tmp_path)
-    out = tmp_path / "tradeoff-two.json"
-    errors[3] = KeyboardInterrupt()
-    assert tradeoff(*run) == 130
-    assert "--resume goes on" in capsys.readouterr().err
-    first = checked(out).data["rows"]
-    assert set(settings_of(checked(out))) == {"", "2", "8-byte"}
-    assert [path.name for path in tmp_path.iterdir()] == [out.name]
-
-    errors.clear()
-    assert tradeoff(*run) == 1
-    assert "--resume goes on with it, or choose another --out" in capsys.readouterr().err
-    asked.clear()
-    assert tradeoff(*run, "--resume") == 0
-    second = checked(out).data["rows"]
-    assert second[:-1] == first
-    assert set(asked) == {3}
-
-    # Nothing is left to do: nothing is measured
-    asked.clear()
-    assert tradeoff(*run, "--resume") == 0
-    assert (asked, checked(out).data["rows"]) == ([], second)
-
-    assert tradeoff(*run, "--resume", "--angles", "0") == 1
-    assert "holds results for angles = [0.0, 30.0], not [0.0]" in capsys.readouterr().err
-    assert tradeoff(*run, "--resume", "--interpolation", "linear") == 1
-    assert "holds results for interpolation = nearest, not linear" in capsys.readouterr().err
-
-
-@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
-def test_ctrl_c_leaves_no_half_file(folder, default_runtime, tmp_path):
-    """The interrupt comes while the results are written: those of the row before stay."""
-    code = (
-        "import sys, time\n"
-        "from pyvista_vdi.cli import main\n"
-        "from pyvista_vdi.measure.results import Results\n"
-        "save = Results.save\n"
-        "def slow(self):\n"
-        "    if len(self.data['rows']) > 2:\n"
-        "        print('writing', flush=True); time.sleep(60)\n"
-        "    save(self)\n"
-        "Results.save = slow\n"
-        "sys.exit(main(sys.argv[1:]))\n"
-    )
-    arguments = (str(folder / "ball.npy"), *TINY_RUN, "--no-vtk", "--out", str(tmp_path))
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, "tradeoff", *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert process.stdout.readline() == "writing\n"
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=PATIENCE)
-    finally:
-        process.kill()
-    assert process.returncode == 130
-    assert err.splitlines()[-1] == "pyvista-vdi: error: interrupted; nothing was left half done"
-    assert "Traceback" not in err
-    assert [path.name for path in tmp_path.iterdir()] == ["tradeoff-ball.json"]
-    rows = checked(tmp_path / "tradeoff-ball.json").data["rows"]
-    assert [row["case"]["what"] for row in rows] == ["volume rendering"] * 2
-
-
-def test_a_vdi_beyond_the_device_is_a_refused_row(default_runtime, folder, tmp_path, generated):
-    generated[1][3] = DeviceMemoryError("the lists need 9 GiB; 'X' allows 1 GiB")
-    run = (*TINY_RUN, "--sweep", "max-supersegments=2,3", "--no-vtk", "--out", tmp_path)
-    assert tradeoff(folder / "ball.npy", *run) == 0
-    rows = settings_of(checked(tmp_path / "tradeoff-ball.json"))
-    assert rows["3"]["refused"] == "DeviceMemoryError: the lists need 9 GiB; 'X' allows 1 GiB"
-    assert "refused" not in rows[""]
-    text = (tmp_path / "tradeoff-ball.md").read_text()
-    assert "- N_S 3: DeviceMemoryError: the lists need 9 GiB" in text
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--sweep", "size"], "--sweep knows no 'size': known are max-supersegments, tolerance"),
-        (["--sweep", "lists=a"], "--sweep lists takes a number; got 'a'"),
-        (["--sweep", "max-supersegments=1.5"], "takes a whole number; got '1.5'"),
-        (["--sweep", "skip-empty=no"], "--sweep skip-empty takes on or off; got 'no'"),
-        (["--sweep", "precision=4-byte"], "precision must be one of exact, 16-byte, 8-byte"),
-        (["--size", "8x8"], "a window of 8 x 8 has no SSIM: each edge must have 11 pixels"),
-        (["--angles", "5,5"], "an angle is given twice"),
-        (["--angles", "nan"], "angles must be one or more numbers of degrees"),
-        (["--repeats", "2000"], "repeats must be a whole number from 1 to 1000; got 2000"),
-        (["--name", "a/b"], "--name becomes a file's, without a folder; got 'a/b'"),
-        (["--out", "ball.npy"], "the folder ball.npy cannot be made"),
-        (["--cmap", "bone", "--transfer-function", "none.json"], "none.json cannot be read"),
-        (["--resume"], "is of version None; this program reads version 2"),
-        ([*TINY_RUN, "--transfer-function", "blank.json"], "nothing is to be seen: the transfer"),
-    ],
-)
-def test_mistakes_are_one_line(arguments, message, tmp_path, capsys, monkeypatch, default_runtime):
-    monkeypatch.chdir(tmp_path)
-    np.save("ball.npy", shell())
-    blank = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 0], (0, 1))
-    Path("blank.json").write_text(json.dumps(blank.to_dict()))
-    if "--resume" in arguments:
-        Path("tradeoff-ball.json").write_text('{"format": "pyvista-vdi benchmark"}')
-    assert tradeoff("ball.npy", "--no-vtk", "--out", ".", *arguments) == 1
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1
-    # Nothing is written before all is checked; what cannot be seen is known when it is drawn
-    left = {"tradeoff-ball.json"} if {"--resume", "blank.json"} & set(arguments) else set()
-    assert {path.name for path in tmp_path.iterdir()} == {"ball.npy", "blank.json", *left}
 
 
 def test_mistakes_of_the_command_line(capsys):
