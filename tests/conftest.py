@@ -127,7 +127,7 @@ LENGTHIEST = {
     "faults": "disk_faults interrupts threads_and_forks",
     "fuzz": "fuzz",
     "large": "dask",
-    "measure": "benchmark compare front lighting_against_vtk real_volumes tradeoff",
+    "measure": "benchmark compare front lighting_against_vtk real_volumes runs tradeoff",
     "packaging": "distributions documentation",
     "plotting": "example_scripts in_browser on_screen scenes",
     "quality": "background dial",

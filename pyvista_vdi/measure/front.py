@@ -18,7 +18,7 @@ from itertools import product
 from typing import Any
 
 from pyvista_vdi import examples
-from pyvista_vdi.errors import DataNotFoundError
+from pyvista_vdi.errors import DataNotFoundError, DeviceMemoryError
 from pyvista_vdi.measure import report
 from pyvista_vdi.measure.clock import median, take_turns
 from pyvista_vdi.measure.harness import ROOMS, Case, Latest, Progress, check_count, run
@@ -212,7 +212,8 @@ def measure_front(
             found.data["system"].setdefault("opengl", drawn.opengl)
             return {"points": [list(asdict(point).values()) for point in drawn.points(case)]}
 
-        run((case for case in plan.cases() if case.volume in there), measured, found, progress)
+        cases = (case for case in plan.cases() if case.volume in there)
+        run(cases, measured, found, progress, (DeviceMemoryError, MemoryError))
     found.save()
     return found
 
@@ -246,7 +247,6 @@ class _Everybody:
         """Yield every way to draw a view."""
         camera = case.camera(self._view)
         ways: dict[tuple[str, float, float], tuple[OffScreenVolume, Callable[[], object]]] = {}
-        put: Callable[[], object]
         full = {}
         for name, baseline in self._theirs.items():
             _set(baseline, 1.0, FULL_STEP * self._voxel)
@@ -258,29 +258,29 @@ class _Everybody:
         exact.mapper.SetImageSampleDistance(1)
         full["vdi"] = full["volume"] = exact.image(camera)
         ways["volume", 1.0, FULL_STEP] = exact, lambda: None
-        for distance in _OWN_DISTANCES:
-            put = partial(self._vdi.mapper.SetImageSampleDistance, distance)
-            ways["vdi", distance, FULL_STEP] = self._vdi, put
-            for step in STEPS:
-                drawn = self._volumes[step]
-                put = partial(drawn.mapper.SetImageSampleDistance, distance)
-                ways["volume", distance, step] = drawn, put
-        pictures = {}
-        for way, (drawn_by, put) in ways.items():
+        ours = [("vdi", FULL_STEP, self._vdi)]
+        ours += [("volume", step, self._volumes[step]) for step in STEPS]
+        for distance, (name, step, drawn) in product(_OWN_DISTANCES, ours):
+            ways[name, distance, step] = (
+                drawn,
+                partial(drawn.mapper.SetImageSampleDistance, distance),
+            )
+
+        def frame(drawn: OffScreenVolume, put: Callable[[], object]) -> None:
             put()
+            drawn.render(camera)
+
+        pictures = {}
+        for way, (drawn_by, put_way) in ways.items():
+            put_way()
             pictures[way] = drawn_by.image(camera)
         with ThreadPoolExecutor(os.cpu_count()) as pool:  # before anything is timed
             compared = pool.map(compare_images, pictures.values(), (full[w[0]] for w in ways))
-            ssim = {way: float(found.ssim) for way, found in zip(ways, compared, strict=True)}
-
-        def frame(drawn_by: OffScreenVolume, put: Callable[[], object]) -> None:
-            put()
-            drawn_by.render(camera)
-
+            near = [float(found.ssim) for found in compared]
         work = {str(way): partial(frame, *both) for way, both in ways.items()}
         taken = take_turns(work, self._plan.repeats)
-        for way in ways:
-            yield Point(*way, median(taken[str(way)]) or 0.0, ssim[way])
+        for way, ssim in zip(ways, near, strict=True):
+            yield Point(*way, median(taken[str(way)]) or 0.0, ssim)
 
 
 def _set(baseline: VTKBaseline, distance: float, step: float) -> None:

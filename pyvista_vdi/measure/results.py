@@ -147,11 +147,9 @@ class Results:
 
         Numbers are rounded to :data:`DIGITS`, and infinite ones become null.
         """
-        found = self.row(case)
-        if found is not None:
-            self.data["rows"].remove(found)
         row: dict[str, Any] = json.loads(json.dumps({"case": dict(case), **rounded(figures)}))
-        self.data["rows"].append(row)
+        others = [other for other in self.data["rows"] if other["case"] != row["case"]]
+        self.data["rows"] = [*others, row]
         self.save()
         return row
 

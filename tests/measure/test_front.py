@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from measured import checked
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.measure.front import (
@@ -20,7 +21,6 @@ from pyvista_vdi.measure.front import (
     points_of,
     summary,
 )
-from pyvista_vdi.measure.results import Results
 
 
 def point(who, seconds, ssim):
@@ -79,7 +79,7 @@ def test_everybody_is_measured_and_resumed(tmp_path):
     assert [row for row in again.rows() if "refused" not in row] == rows
     with pytest.raises(InvalidArgumentError, match="give the same options to --resume"):
         measure_front(Plan(("brain",)), path, resume=True)
-    assert Results.read(path, "front").data == again.data
+    assert checked(path).data == again.data
 
 
 def test_a_short_run_has_24_cases():

@@ -1,31 +1,24 @@
-"""The tradeoff: sweeps, tiny runs end to end, going on, refusing, and what figures come to."""
+"""The tradeoff: sweeps, tiny runs, and what is made of their figures."""
 
 from __future__ import annotations
 
+import copy
 import itertools
 import json
 import math
-import os
-import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from fresh_python import PATIENCE, run_bare
-from json_schema import faults, read_checked
+from json_schema import faults
+from measured import SCHEMA, checked, made_up_results
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
-from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
-from pyvista_vdi.measure import harness
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.measure.paper.datasets import look
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.measure.tradeoff import AXES, Setting, Tradeoff, measure_tradeoff, sweep
 from pyvista_vdi.measure.tradeoff.settings import DEFAULT_AXES, ON_REQUEST, PAIRS, QUICK_AXES
-
-SCHEMA = Path(__file__).parents[2] / "docs" / "results_schema.json"
 
 TINY_SWEEP = ("max-supersegments=2", "precision=8-byte", "preview=0.5", "skip-empty")
 TINY_RUN = ("--size", "32x24", "--angles", "0,30", "--repeats", "2", "--generations", "1")
@@ -45,11 +38,6 @@ def folder(tmp_path_factory):
     np.save(path / "ball.npy", shell())
     (path / "ball_20x18x14_uint8.raw").write_bytes(shell().tobytes())
     return path
-
-
-def checked(path):
-    """Read results after holding them to the schema."""
-    return Results(read_checked(path, SCHEMA))
 
 
 def settings_of(results):
@@ -203,148 +191,6 @@ def test_vtk_takes_part(default_runtime, folder, tmp_path):
     assert "VTK GPU | VTK fixed point" in (tmp_path / "tradeoff-ball.md").read_text()
 
 
-def test_the_engine_alone_can_run_it(default_runtime, folder, tmp_path):
-    for file in ("ball.npy", "ball_20x18x14_uint8.raw"):
-        out = ["--out", str(tmp_path), "--sweep", "precision=8-byte"]
-        result = run_bare(["tradeoff", str(folder / file), *TINY_RUN, *out])
-        assert result.returncode == 0, result.stderr
-        assert "VTK is not installed: its mappers are left out" in result.stderr
-        stem = f"tradeoff-{file.split('.')[0]}"
-        assert checked(tmp_path / f"{stem}.json").plan["vtk"] is False
-        assert not (tmp_path / f"{stem}.png").exists()
-
-
-@pytest.fixture
-def generated(monkeypatch):
-    """Lets generation of some VDIs fail; holds what was asked for."""
-    whole, asked, errors = harness.generate_vdi, [], {}
-
-    def generate(*arguments, max_supersegments, **others):
-        asked.append(max_supersegments)
-        if max_supersegments in errors:
-            raise errors[max_supersegments]
-        return whole(*arguments, max_supersegments=max_supersegments, **others)
-
-    monkeypatch.setattr(harness, "generate_vdi", generate)
-    return asked, errors
-
-
-def test_an_interrupted_run_can_be_gone_on_with(
-    default_runtime, folder, tmp_path, generated, capsys
-):
-    asked, errors = generated
-    sweep_two = ("--sweep", "max-supersegments=2,3", "precision=8-byte", "--name", "two")
-    run = (folder / "ball.npy", *TINY_RUN, *sweep_two, "--no-vtk", "--out", tmp_path)
-    out = tmp_path / "tradeoff-two.json"
-    errors[3] = KeyboardInterrupt()
-    assert tradeoff(*run) == 130
-    assert "--resume goes on" in capsys.readouterr().err
-    first = checked(out).data["rows"]
-    assert set(settings_of(checked(out))) == {"", "2", "8-byte"}
-    assert [path.name for path in tmp_path.iterdir()] == [out.name]
-
-    errors.clear()
-    assert tradeoff(*run) == 1
-    assert "--resume goes on with it, or choose another --out" in capsys.readouterr().err
-    asked.clear()
-    assert tradeoff(*run, "--resume") == 0
-    second = checked(out).data["rows"]
-    assert second[:-1] == first
-    assert set(asked) == {3}
-
-    # Nothing is left to do: nothing is measured
-    asked.clear()
-    assert tradeoff(*run, "--resume") == 0
-    assert (asked, checked(out).data["rows"]) == ([], second)
-
-    assert tradeoff(*run, "--resume", "--angles", "0") == 1
-    assert "holds results for angles = [0.0, 30.0], not [0.0]" in capsys.readouterr().err
-    assert tradeoff(*run, "--resume", "--interpolation", "linear") == 1
-    assert "holds results for interpolation = nearest, not linear" in capsys.readouterr().err
-
-
-@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
-def test_ctrl_c_leaves_no_half_file(folder, default_runtime, tmp_path):
-    """The interrupt comes while the results are written: those of the row before stay."""
-    code = (
-        "import sys, time\n"
-        "from pyvista_vdi.cli import main\n"
-        "from pyvista_vdi.measure.results import Results\n"
-        "save = Results.save\n"
-        "def slow(self):\n"
-        "    if len(self.data['rows']) > 2:\n"
-        "        print('writing', flush=True); time.sleep(60)\n"
-        "    save(self)\n"
-        "Results.save = slow\n"
-        "sys.exit(main(sys.argv[1:]))\n"
-    )
-    arguments = (str(folder / "ball.npy"), *TINY_RUN, "--no-vtk", "--out", str(tmp_path))
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, "tradeoff", *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert process.stdout.readline() == "writing\n"
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=PATIENCE)
-    finally:
-        process.kill()
-    assert process.returncode == 130
-    assert err.splitlines()[-1] == "pyvista-vdi: error: interrupted; nothing was left half done"
-    assert "Traceback" not in err
-    assert [path.name for path in tmp_path.iterdir()] == ["tradeoff-ball.json"]
-    rows = checked(tmp_path / "tradeoff-ball.json").data["rows"]
-    assert [row["case"]["what"] for row in rows] == ["volume rendering"] * 2
-
-
-def test_a_vdi_beyond_the_device_is_a_refused_row(default_runtime, folder, tmp_path, generated):
-    generated[1][3] = DeviceMemoryError("the lists need 9 GiB; 'X' allows 1 GiB")
-    run = (*TINY_RUN, "--sweep", "max-supersegments=2,3", "--no-vtk", "--out", tmp_path)
-    assert tradeoff(folder / "ball.npy", *run) == 0
-    rows = settings_of(checked(tmp_path / "tradeoff-ball.json"))
-    assert rows["3"]["refused"] == "DeviceMemoryError: the lists need 9 GiB; 'X' allows 1 GiB"
-    assert "refused" not in rows[""]
-    text = (tmp_path / "tradeoff-ball.md").read_text()
-    assert "- N_S 3: DeviceMemoryError: the lists need 9 GiB" in text
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--sweep", "size"], "--sweep knows no 'size': known are max-supersegments, tolerance"),
-        (["--sweep", "lists=a"], "--sweep lists takes a number; got 'a'"),
-        (["--sweep", "max-supersegments=1.5"], "takes a whole number; got '1.5'"),
-        (["--sweep", "skip-empty=no"], "--sweep skip-empty takes on or off; got 'no'"),
-        (["--sweep", "precision=4-byte"], "precision must be one of exact, 16-byte, 8-byte"),
-        (["--size", "8x8"], "a window of 8 x 8 has no SSIM: each edge must have 11 pixels"),
-        (["--angles", "5,5"], "an angle is given twice"),
-        (["--angles", "nan"], "angles must be one or more numbers of degrees"),
-        (["--repeats", "2000"], "repeats must be a whole number from 1 to 1000; got 2000"),
-        (["--name", "a/b"], "--name becomes a file's, without a folder; got 'a/b'"),
-        (["--out", "ball.npy"], "the folder ball.npy cannot be made"),
-        (["--cmap", "bone", "--transfer-function", "none.json"], "none.json cannot be read"),
-        (["--resume"], "is of version None; this program reads version 2"),
-        ([*TINY_RUN, "--transfer-function", "blank.json"], "nothing is to be seen: the transfer"),
-    ],
-)
-def test_mistakes_are_one_line(arguments, message, tmp_path, capsys, monkeypatch, default_runtime):
-    monkeypatch.chdir(tmp_path)
-    np.save("ball.npy", shell())
-    blank = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 0], (0, 1))
-    Path("blank.json").write_text(json.dumps(blank.to_dict()))
-    if "--resume" in arguments:
-        Path("tradeoff-ball.json").write_text('{"format": "pyvista-vdi benchmark"}')
-    assert tradeoff("ball.npy", "--no-vtk", "--out", ".", *arguments) == 1
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1
-    # Nothing is written before all is checked; what cannot be seen is known when it is drawn
-    left = {"tradeoff-ball.json"} if {"--resume", "blank.json"} & set(arguments) else set()
-    assert {path.name for path in tmp_path.iterdir()} == {"ball.npy", "blank.json", *left}
-
-
 def test_mistakes_of_the_command_line(capsys):
     assert tradeoff("a.npy", "--alone", "--product") == 2
     assert "--product: not allowed with argument --alone" in capsys.readouterr().err
@@ -354,29 +200,8 @@ def test_mistakes_of_the_command_line(capsys):
 
 @pytest.mark.parametrize("size", [(32, 24, 3), (32.5, 24), 32])
 def test_a_window_that_is_none_is_refused(size):
-    table = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 1], (0, 1))
     with pytest.raises(InvalidArgumentError, match=r"window_size must be \(width, height\)"):
-        measure_tradeoff(pvdi.Volume(shell()), window_size=size, transfer_function=table)
-
-
-HEADER = b"\x93NUMPY\x01\x00\x28\x00"
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"",
-        b"no array",
-        b"PK\x03\x04",  # an .npz
-        HEADER + b"{'descr': '|u1', 'shape': (3,           ",  # a bracket that is not closed
-        HEADER + b"{'descr': '|u1', b'shape': (3, 4), 2: 1}",  # keys that cannot be sorted
-        HEADER + b"{'descr': '|O', 'fortran_order': 0}     ",
-    ],
-)
-def test_what_is_no_array_is_refused(content, tmp_path, capsys):
-    (tmp_path / "a.npy").write_bytes(content)
-    assert tradeoff(tmp_path / "a.npy", "--no-vtk", "--out", tmp_path) == 1
-    assert "a.npy cannot be read as an array" in capsys.readouterr().err
+        measure_tradeoff(pvdi.Volume(shell()), window_size=size)
 
 
 @pytest.mark.parametrize(
@@ -411,76 +236,42 @@ def test_the_options_reach_the_sweep(options, names, folder, tmp_path, monkeypat
     assert [setting.name for setting in settings] == names
 
 
+STEADY = np.array([1.0, 1.01, 0.99, 1.02, 0.98])
+
+
+def times(median):
+    return {"clock": (median * STEADY).tolist(), "device": []}
+
+
 def made_up(*points, angles=(5.0, 30.0)):
     """Return results of settings given as (setting, frame ratio, SSIM, bytes, generation ratio)."""
-    steady = np.array([1.0, 1.01, 0.99, 1.02, 0.98])
-
-    def times(median):
-        return {"clock": (median * steady).tolist(), "device": []}
-
-    volume = {"name": "ball", "dimensions": [2, 2, 2], "spacing": [1, 1, 1], "dtype": "uint8"}
-    baselines = [
-        {
-            "case": {"what": "volume rendering", "volume": "ball", "angle": angle},
-            "volume_to_vtk_gpu": None,
-            "seconds": {
-                n: times(t)
-                for n, t in (("volume", 0.02), ("volume_skipping", 0.01), ("vtk_gpu", 0.03))
-            },
-            "left_out": {},
-        }
-        for angle in angles
-    ]
-    rows = [
-        {
-            "case": {"what": "setting", "volume": "ball", **setting.changes},
-            "vdi": {
-                "window_size": [64, 36],
-                "supersegments": 10,
-                "mean_length": 2.0,
-                "longest_list": 4,
-                "bytes_memory": size,
-                "bytes_saved": size // 2,
-            },
-            "generation": {
-                "seconds": times(made),
-                "packing": None,
-                "volume_seconds": times(1.0),
-            },
-            "angles": [
-                {
-                    "angle": angle,
-                    "to_volume": {"ssim": ssim, "psnr": 30.0, "worst_pixel": 9.0},
-                    "seconds": times(frame * 0.01),
-                    "volume_seconds": times(0.01),
-                }
-                for angle in angles
-            ],
-        }
-        for setting, frame, ssim, size, made in points
-    ]
-    plan = {
-        "volume": {**volume, "bytes": 3 * 10**6},
-        "looks": {"cmap": "bone"},
-        "interpolation": "nearest",
-        "window_size": [64, 36],
-        "angles": list(angles),
-        "repeats": 5,
-        "generations": 5,
-        "settings": [setting.to_dict() for setting, *_ in points],
-    }
-    return {
-        "format": "pyvista-vdi results",
-        "version": 2,
-        "kind": "tradeoff",
-        "plan": plan,
-        "system": {"device": "a", "driver": "1", "python": "3", "system": "b"},
-        "measured": {"commit": None, "sources": {}},
-        "extent": "whole",
-        "begun": "x",
-        "changed": "y",
-        "rows": [*baselines, *rows],
-    }
+    rows = []
+    taken = {"volume": times(0.02), "volume_skipping": times(0.01), "vtk_gpu": times(0.03)}
+    for angle in angles:
+        case = {"what": "volume rendering", "volume": "ball", "angle": angle}
+        found = {"volume_to_vtk_gpu": None, "seconds": copy.deepcopy(taken), "left_out": {}}
+        rows.append({"case": case, **found})
+    for setting, frame, ssim, size, made in points:
+        near = {"ssim": ssim, "psnr": 30.0, "worst_pixel": 9.0}
+        lists = {"window_size": [64, 36], "supersegments": 10, "mean_length": 2.0}
+        views = [
+            {
+                "angle": angle,
+                "to_volume": {**near},
+                "seconds": times(frame * 0.01),
+                "volume_seconds": times(0.01),
+            }
+            for angle in angles
+        ]
+        generation = {"seconds": times(made), "packing": None, "volume_seconds": times(1.0)}
+        vdi = {**lists, "longest_list": 4, "bytes_memory": size, "bytes_saved": size // 2}
+        case = {"what": "setting", "volume": "ball", **setting.changes}
+        rows.append({"case": case, "vdi": vdi, "generation": generation, "angles": views})
+    volume = {"name": "ball", "dimensions": [2, 2, 2], "dtype": "uint8", "bytes": 3 * 10**6}
+    plan = {"volume": volume, "looks": {"cmap": "bone"}, "interpolation": "nearest"}
+    plan |= {"window_size": [64, 36], "angles": list(angles), "repeats": 5, "generations": 5}
+    plan |= {"settings": [setting.to_dict() for setting, *_ in points]}
+    return made_up_results("tradeoff", plan, rows)
 
 
 def setting_rows(data):
@@ -520,14 +311,13 @@ def test_fronts_and_dominated_settings():
 
 def test_worse_at_one_angle_is_worse():
     data = made_up(*FOUR)
-    (_, row) = setting_rows(data)[3]["angles"]
-    row["to_volume"]["ssim"] = 0.9815  # less than the default at 5 degrees, more at 30
+    # Less than the default at 5 degrees, more at 30
+    setting_rows(data)[3]["angles"][1]["to_volume"]["ssim"] = 0.9815
     assert Tradeoff(data).dominated() == {}
 
 
 def test_equal_settings_are_named_once():
-    twin = (Setting(skip_empty=False), *FOUR[0][1:])
-    found = Tradeoff(made_up(*FOUR, twin))
+    found = Tradeoff(made_up(*FOUR, (Setting(skip_empty=False), *FOUR[0][1:])))
     assert "no skipping" not in found.front("memory")
     assert "no skipping" not in found.dominated()
 

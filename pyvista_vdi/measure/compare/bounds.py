@@ -64,14 +64,7 @@ FRAME_RATIO_VOXELS = 256**3
 class Check:
     """One figure beside its bound.
 
-    Parameters
-    ----------
-    name : str
-        What is bounded.
-    value, bound : float
-        What was measured, and what it is held to.
-    sense : {">=", "<=", "<"}
-        How the value must stand to the bound.
+    ``sense`` says how the value must stand to the bound.
     """
 
     name: str
@@ -94,19 +87,9 @@ class Check:
 def judge_vdi(report: Report, volume: str, transfer_function: str) -> list[Check]:
     """Hold the VDI's pictures, against our volume raycaster's, to the bounds of a standard case.
 
-    Parameters
-    ----------
-    report : Report
-        What :func:`pyvista_vdi.measure.compare.measure` found, with or without VTK and timings.
-    volume : str
-        Name of the volume, a key of :data:`pyvista_vdi.examples.VOLUMES`.
-    transfer_function : str
-        A key of :data:`pyvista_vdi.model.standard_cases.TRANSFER_FUNCTIONS`.
-
-    Returns
-    -------
-    list of Check
-        The bounds that apply to what was measured; other angles have none.
+    The case is named by keys of :data:`pyvista_vdi.examples.VOLUMES` and
+    :data:`pyvista_vdi.model.standard_cases.TRANSFER_FUNCTIONS`. Returns the bounds that apply to
+    what was measured; other angles have none.
     """
     checks = []
     for result in report.angles:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.measure.clock import Times, take_turns
+from pyvista_vdi.measure.clock import Step, Times, take_turns
 from pyvista_vdi.measure.harness import (
     ROOMS,
     WARM_UP_SIZE,
@@ -60,20 +60,16 @@ class Settings:
     ----------
     classification : mapping
         Classification arguments, those of :func:`pyvista_vdi.generate`.
-    window_size : (int, int)
-        Of the VDI and of all frames, pixels.
-    angles : tuple of float
-        New views, degrees of ``Azimuth`` from V_O.
+    window_size, angles : tuple
+        Of the VDI and of all frames, pixels; new views, degrees of ``Azimuth`` from V_O.
     max_supersegments, precision : int, str
         Longest list, and form of its supersegments, see :meth:`VDI.with_precision`.
     sample_distance : float, optional
         The accuracy step, model units; half the smallest spacing by default.
     repeats : int
         Timed frames of each candidate and view; 0 compares pictures and times nothing.
-    vtk : bool
-        Whether VTK's mappers take part.
-    device : optional
-        OpenCL device of ours.
+    vtk, device : optional
+        Whether VTK's mappers take part, and the OpenCL device of ours.
     name : str
         What the volume and the transfer function are called in the report.
     """
@@ -109,19 +105,11 @@ class Timing:
 
 @dataclass(frozen=True)
 class AngleResult:
-    """What was found at one view.
+    """What was found at one view, degrees from V_O.
 
-    Parameters
-    ----------
-    angle : float
-        Degrees from V_O.
-    vdi_to_raycaster : Comparison
-        The VDI against our volume raycaster.
-    raycaster_to_gpu, fixed_point_to_gpu : Comparison, optional
-        Our volume raycaster, and VTK's fixed-point mapper, against VTK's GPU mapper; ``None``
-        without VTK.
-    seconds : dict of str to Timing
-        Frame times at steps of one voxel, by the keys of :data:`NAMES`; empty if not timed.
+    The VDI is compared with our volume raycaster; this one, and VTK's fixed-point mapper, with
+    VTK's GPU mapper, ``None`` without VTK. ``seconds`` are frame times at steps of one voxel, by
+    the keys of :data:`NAMES`; empty if not timed.
     """
 
     angle: float
@@ -149,22 +137,11 @@ class AngleResult:
 class Report:
     """All that was found, ready for JSON by :meth:`to_dict`.
 
-    Parameters
-    ----------
-    case : dict
-        Volume, classification, window, limits, steps.
-    system : dict
-        Device, driver, OpenGL, versions.
-    sizes : dict of str to int
-        Supersegments, lists, and bytes: of the volume, of the VDI in the process's memory
-        and on the device, of its dense form.
-    generation_seconds, full_raycast_seconds : Timing, optional
-        Generation, and our volume raycaster at the same step without early termination; ``None``
-        where nothing was timed.
-    angles : list of AngleResult
-        By view.
-    begun : str, optional
-        When the measurement began.
+    ``case`` holds volume, classification, window, limits and steps; ``system`` device, driver,
+    OpenGL and versions; ``sizes`` supersegments, lists, and bytes: of the volume, of the VDI in the
+    process's memory and on the device, of its dense form. ``full_raycast_seconds`` are those of our
+    volume raycaster at the step of generation without early termination; ``None`` where nothing was
+    timed. ``angles`` has the results by view, ``begun`` says when the measurement began.
     """
 
     case: dict[str, Any]
@@ -209,14 +186,7 @@ def measure(
 ) -> tuple[Report, VDI, dict[float, Images]]:
     """Render one volume in every way, compare the pictures and time the frames.
 
-    Parameters
-    ----------
-    volume : Volume
-        What is rendered.
-    settings : Settings
-        How.
-    progress : callable, optional
-        Called with the finished fraction, 0 to 1.
+    ``progress`` is called with the finished fraction, 0 to 1.
 
     Returns
     -------
@@ -229,10 +199,8 @@ def measure(
 
     Raises
     ------
-    MissingDependencyError
-        If VTK takes part and cannot be loaded, or finds no OpenGL.
-    DeviceError
-        If VTK draws nothing, or the OpenCL device fails.
+    MissingDependencyError, DeviceError
+        If VTK takes part and cannot be loaded, or draws nothing; or the OpenCL device fails.
     InvalidArgumentError
         If the transfer function leaves nothing to see.
     """
@@ -316,10 +284,12 @@ def _frame_times(bench: Bench, vdi: VDI, angle: float, repeats: int) -> dict[str
     """Time frames at steps of one voxel."""
     if repeats == 0:
         return {}
-    frames = bench.frames(bench.view.azimuth(angle), vdi)
-    chosen = {"vdi": "vdi_skipping", "raycaster": "volume"}
-    chosen |= {name.removeprefix("vtk_"): name for name in bench.vtk}
-    taken = take_turns({name: frames[frame] for name, frame in chosen.items()}, repeats)
+    camera = bench.view.azimuth(angle)
+    frames = bench.frames(camera, vdi)
+    raycast = partial(bench.raycast, camera, None, bench.voxel, skip_empty=False)
+    chosen: dict[str, Step] = {"vdi": frames["vdi_skipping"], "raycaster": raycast}
+    chosen |= {name.removeprefix("vtk_"): frames[name] for name in bench.vtk}
+    taken = take_turns(chosen, repeats)
     return {name: Timing.of(times) for name, times in taken.items()}
 
 

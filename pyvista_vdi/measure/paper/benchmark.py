@@ -182,16 +182,7 @@ def run(plan: Plan, results: Results, device: Any = None, progress: Progress | N
     A volume or VDI that the host or the device cannot hold gives rows that are marked as refused,
     with the reason.
 
-    Parameters
-    ----------
-    plan : Plan
-        What is measured.
-    results : Results
-        Where it goes; rows that are there are not measured again.
-    device : optional
-        See :func:`pyvista_vdi.list_devices`.
-    progress : callable, optional
-        Called with the finished fraction and what is being done.
+    ``progress`` is called with the finished fraction and what is being done.
     """
     rows = _Rows(plan, results, device)
     try:

@@ -34,17 +34,8 @@ _SIZE_LIMIT = 0.001  # relative
 class Change:
     """A figure in two runs.
 
-    Parameters
-    ----------
-    cell, figure : str
-        Which row, and which figure of it.
-    before, after : float
-        Medians, or the figures themselves.
-    chance : float or None
-        Chance that noise alone would separate the repetitions as much; ``None`` for what repeats
-        exactly.
-    changed : bool
-        Whether it is beyond noise.
+    ``cell`` says which row, ``figure`` which of its figures, a median or what repeats exactly;
+    ``chance`` of the former is that of noise alone to separate the repetitions as much.
     """
 
     cell: str

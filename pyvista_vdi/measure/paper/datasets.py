@@ -71,20 +71,9 @@ def _resampled(nodes: tuple[float, ...]) -> NDArray[np.float64]:
 class Dataset:
     """A volume to be measured, and how it looks.
 
-    Parameters
-    ----------
-    name, description : str
-        What the results call it, and one phrase.
-    source : {"example", "procedural", "file"}
-        Where it is from.
-    paper : str or None
-        The paper's data set that it is, or stands in for.
-    look : str
-        Name of its transfer function.
-    nbytes : int or None
-        Bytes of the volume, where they are known before it is there.
-    load : callable
-        Returns the volume.
+    ``source`` is "example", "procedural" or "file"; ``paper`` the paper's data set that it is, or
+    stands in for; ``look`` the name of its transfer function; ``nbytes`` is ``None`` where it is
+    not known before the volume is there, which ``load`` returns.
     """
 
     name: str
@@ -120,15 +109,10 @@ class Dataset:
 def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
     """Return a data set by its name; what nothing is called raises InvalidArgumentError.
 
-    Parameters
-    ----------
-    name : str
-        A name of :data:`pyvista_vdi.examples.VOLUMES`; ``kingsnake_like``, ``beechnut_like`` or
-        ``richtmyer_meshkov_like``, made at the paper's size or with ``@4`` at a quarter of it
-        along each edge; or a file, as ``FILE`` or as ``NAME=FILE``, where a NAME of ``kingsnake``,
-        ``beechnut`` or ``richtmyer_meshkov`` says which of the paper's it is.
-    seed : int
-        Of a procedural volume.
+    They are names of :data:`pyvista_vdi.examples.VOLUMES`; ``kingsnake_like``, ``beechnut_like`` or
+    ``richtmyer_meshkov_like``, made from a seed at the paper's size or with ``@4`` at a quarter of
+    it along each edge; or a file, as ``FILE`` or as ``NAME=FILE``, where a NAME of ``kingsnake``,
+    ``beechnut`` or ``richtmyer_meshkov`` says which of the paper's it is.
     """
     if name.partition("@")[0] in PROCEDURAL:
         return _procedural(name, seed)

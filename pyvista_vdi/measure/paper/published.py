@@ -14,14 +14,8 @@ from typing import Any
 class PaperCell:
     """One cell of the paper's Table 1: frames per second, and SSIM to volume rendering.
 
-    Parameters
-    ----------
-    volume_fps : float
-        Of the paper's volume rendering at this angle.
-    fps, fps_skipping : float
-        Of the VDI without and with skipping of empty space.
-    ssim : float
-        Of the VDI's picture.
+    ``volume_fps`` are the paper's volume rendering's at this angle, ``fps`` and ``fps_skipping``
+    the VDI's without and with skipping of empty space.
     """
 
     volume_fps: float

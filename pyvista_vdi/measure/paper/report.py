@@ -6,23 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from pyvista_vdi.measure import report
 from pyvista_vdi.measure.clock import Times, median, spread
 from pyvista_vdi.measure.harness import CANDIDATES
 from pyvista_vdi.measure.paper.published import PaperCell, paper_cell, paper_tables
-from pyvista_vdi.measure.report import (
-    ABSENT,
-    METRICS,
-    across,
-    closing,
-    mebibytes,
-    milliseconds,
-    new_figure,
-    number,
-    ratio,
-    save_figure,
-    section,
-    table,
-)
+from pyvista_vdi.measure.report import across, milliseconds, number, ratio, section, table
 from pyvista_vdi.measure.results import Results
 
 #: What a row is of; a VDI has no angle.
@@ -45,22 +33,11 @@ _TAKEN = (
 
 
 def describe(data: dict[str, Any]) -> str:
-    """Return the tables as Markdown.
-
-    Parameters
-    ----------
-    data : dict
-        What the JSON holds.
-
-    Returns
-    -------
-    str
-        Ends with a newline.
-    """
+    """Return the tables of what the JSON holds as Markdown, ending with a newline."""
+    plan = data["plan"]
     lines = [
-        f"# Benchmark, profile {data['plan']['profile']}",
-        "",
-        *_explanation(data["plan"]),
+        *(f"# Benchmark, profile {plan['profile']}", ""),
+        *(line for text in _explanation(plan) for line in (text, "")),
         *section("Table 1"),
         *table((*_ROW, *CANDIDATES.values(), *_FIGURES), _table1(data)),
         "",
@@ -80,7 +57,7 @@ def describe(data: dict[str, Any]) -> str:
         *_table2(data),
         *_refused(data),
         *_datasets(data),
-        *closing(data),
+        *report.closing(data),
     ]
     return "\n".join(lines) + "\n"
 
@@ -94,9 +71,10 @@ def _explanation(plan: dict[str, Any]) -> Iterator[str]:
         "over `render_volume` without skipping; the paper's, over its own volume rendering "
         f"({paper_tables()['device']})."
     )
-    yield ""
-    yield f"SSIM, PSNR (dB) and worst pixel (in 1/255) are of the VDI's picture against {METRICS}"
-    yield ""
+    yield (
+        "SSIM, PSNR (dB) and worst pixel (in 1/255) are of the VDI's picture against "
+        f"{report.METRICS}"
+    )
 
 
 def _table1(data: dict[str, Any]) -> Iterator[list[str]]:
@@ -140,8 +118,8 @@ def _vdis(data: dict[str, Any]) -> Iterator[list[str]]:
             f"{row['occupied_lists'] / row['lists']:.0%}",
             f"{row['mean_length']:.1f}",
             str(row["longest_list"]),
-            mebibytes(row["bytes_raw"]),
-            mebibytes(row["bytes_saved"]),
+            report.mebibytes(row["bytes_raw"]),
+            report.mebibytes(row["bytes_saved"]),
             number(median(row["generation_seconds"]), ".2f"),
             number(median(row["generation_seconds"], "device"), ".2f"),
             number(row["save_seconds"], ".2f"),
@@ -237,7 +215,7 @@ def _named(row: dict[str, Any]) -> Iterator[str]:
 def _with_spread(taken: Times | None) -> str:
     middle = None if taken is None else median(taken)
     if taken is None or not middle:
-        return ABSENT
+        return report.ABSENT
     return f"{milliseconds(middle)} ±{spread(taken['clock']):.0%}"
 
 
@@ -253,7 +231,7 @@ def write_plot(data: dict[str, Any], target: Path) -> bool:
         column.setdefault(case["volume"], []).append((row, paper))
     if not columns:
         return False
-    figure = new_figure((1.5 + 3.6 * len(columns), 6.0), layout="constrained")
+    figure = report.new_figure((1.5 + 3.6 * len(columns), 6.0), layout="constrained")
     panels = figure.subplots(2, len(columns), squeeze=False, sharex=True, sharey="row")
     names = list(dict.fromkeys(name for column in columns.values() for name in column))
     for (speed, ssim), ((size, limit), column) in zip(panels.T, columns.items(), strict=True):
@@ -267,7 +245,7 @@ def write_plot(data: dict[str, Any], target: Path) -> bool:
     panels[1][0].set_ylabel("SSIM to render_volume")
     handles, labels = panels[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize="small")
-    save_figure(figure, target)
+    report.save_figure(figure, target)
     return True
 
 

@@ -29,14 +29,8 @@ from pyvista_vdi.measure.clock import CHANCE, rank_sum_chance
 class Figure:
     """One figure of a setting; the smaller, the better.
 
-    Parameters
-    ----------
-    value : float
-        What counts.
-    tolerance : float
-        Differences that do not, above 0 and the same in all figures of a kind.
-    repetitions : tuple of float
-        What `value` is the median of; none where it repeats exactly.
+    ``tolerance``, above 0 and the same in all figures of a kind, are differences that do not count;
+    ``repetitions`` what ``value`` is the median of, none where it repeats exactly.
     """
 
     value: float

@@ -31,31 +31,15 @@ SSIM_TOLERANCE, TIME_TOLERANCE, BYTES_TOLERANCE = 0.0005, 0.05, 0.01
 class Point:
     """One setting's figures over all angles.
 
-    Parameters
-    ----------
-    name : str
-        The setting.
-    setting : dict
-        Its values, see :class:`Setting`.
-    frame, frame_spread : float
-        Frame time over that of ``render_volume``: the median of repetitions, each the geometric
-        mean over the angles; and half of what lies between the least and the most, over it.
-    frames : dict of float to float
-        The median by angle.
-    ssim : float
-        SSIM to ``render_volume``: the mean over the angles.
-    ssims : dict of float to float
-        By angle.
-    psnr, worst_pixel : float
-        The least of all angles, dB, infinite for equal pictures; the most, in 1/255.
-    bytes_memory, bytes_file : int
-        Of the lists on the device, and of the ``.vdi``: ``None`` where there was no room for it.
-    generation, generation_seconds : float
-        Time of generation, with packing, the median: over that of a frame of ``render_volume`` at
-        steps of half a voxel, and by the clock.
-    figures : dict of str to Figure
-        What settings are judged by: ``"frame"``, ``"memory"``, ``"file"``, ``"generation"`` and
-        ``"loss"`` over all angles, ``"frame 5"`` and ``"loss 5"`` at each.
+    ``frame`` is its frame time over that of ``render_volume``: the median of repetitions, each the
+    geometric mean over the angles, with half of what lies between the least and the most as
+    ``frame_spread``; ``frames`` has the medians by angle. ``ssim`` to ``render_volume`` is the mean
+    over the angles, ``ssims`` by angle; ``psnr`` (dB, infinite for equal pictures) and
+    ``worst_pixel`` (in 1/255) are the worst of all. ``bytes_memory`` are those of the lists on the
+    device, ``bytes_file`` of the ``.vdi``, ``None`` where there was no room for it. ``generation``,
+    with packing, is over the time of a frame of ``render_volume`` at steps of half a voxel.
+    ``figures`` are what settings are judged by: "frame", "memory", "file", "generation" and "loss"
+    over all angles, "frame 5" and "loss 5" at each.
     """
 
     name: str

@@ -15,37 +15,22 @@ from pyvista_vdi.model.packing import PRECISIONS
 #: Most settings of one sweep: each is drawn many times from every angle.
 MOST_SETTINGS = 500
 
-#: Least and most of the numbers; finer steps than the engine takes are refused by it.
-_RANGES: Mapping[str, tuple[float, float]] = {
-    "tolerance": (0.0, 1e6),
-    "lists": (0.05, 8.0),
-    "preview": (0.02, 1.0),
-    "view_cone": (0.0, 90.0),
-    "sample_distance": (1e-3, 100.0),
-}
-
-#: How values of an axis are spelled; those of the others speak for themselves.
-_FORMS: Mapping[str, str] = {
-    "max_supersegments": "N_S {:g}",
-    "tolerance": "tolerance {:g}",
-    "lists": "lists x{:g}",
-    "preview": "preview x{:g}",
-    "view_cone": "view cone {:g}",
-    "sample_distance": "steps {:g}",
+#: How values of an axis are spelled, the least and the most of numbers (finer steps than the engine
+#: takes are refused by it), and what a sweep takes beside the default.
+_AXES: Mapping[str, tuple[str, tuple[float, float] | None, tuple[Any, ...]]] = {
+    "max_supersegments": ("N_S {:g}", None, (5, 10, 15, 30, 40)),
+    "tolerance": ("tolerance {:g}", (0.0, 1e6), (0.01, 0.1)),
+    "lists": ("lists x{:g}", (0.05, 8.0), (0.5, 1.5, 2.0)),
+    "precision": ("{}", None, ("16-byte", "8-byte")),
+    "skip_empty": ("{}", None, (False,)),
+    "preview": ("preview x{:g}", (0.02, 1.0), (0.7, 0.5, 0.35)),
+    "criterion": ("{}", None, ("homogeneity", "length", "transmittance", "optical-depth")),
+    "view_cone": ("view cone {:g}", (0.0, 90.0), (0.0, 30.0, 90.0)),
+    "sample_distance": ("steps {:g}", (1e-3, 100.0), (0.25, 1.0)),
 }
 
 #: Values of each axis in a sweep, beside the default.
-AXES: Mapping[str, tuple[Any, ...]] = {
-    "max_supersegments": (5, 10, 15, 30, 40),
-    "tolerance": (0.01, 0.1),
-    "lists": (0.5, 1.5, 2.0),
-    "precision": ("16-byte", "8-byte"),
-    "skip_empty": (False,),
-    "preview": (0.7, 0.5, 0.35),
-    "criterion": ("homogeneity", "length", "transmittance", "optical-depth"),
-    "view_cone": (0.0, 30.0, 90.0),
-    "sample_distance": (0.25, 1.0),
-}
+AXES: Mapping[str, tuple[Any, ...]] = {name: values for name, (_, _, values) in _AXES.items()}
 
 #: Axes that are swept by default; the others have a right value for each scene, or compare methods.
 DEFAULT_AXES, ON_REQUEST = tuple(AXES)[:6], tuple(AXES)[6:]
@@ -68,10 +53,8 @@ class Setting:
 
     Parameters
     ----------
-    max_supersegments : int
-        Longest list, the paper's N_S.
-    tolerance : float
-        Error per list that may be traded for shorter lists.
+    max_supersegments, tolerance : int, float
+        Longest list, the paper's N_S, and error per list that may be traded for shorter ones.
     lists : float
         Lists along each edge of the VDI over pixels along that edge of the frame.
     precision : {"exact", "16-byte", "8-byte"}
@@ -81,10 +64,8 @@ class Setting:
     preview : float
         Share of the frame's edges that is drawn, 0 to 1, before it is brought to size: what a
         plotter does while the view moves.
-    criterion : str
-        What decides where lists are cut.
-    view_cone : float
-        Half angle of the cone of new views to serve, degrees.
+    criterion, view_cone : str, float
+        What decides where lists are cut, and for which new views: half an angle, degrees.
     sample_distance : float
         Step of generation over the volume's smallest spacing.
     """
@@ -106,22 +87,21 @@ class Setting:
                 raise InvalidArgumentError(
                     f"{name} must be one of {', '.join(choices)}; got {value!r}"
                 )
-        for name, (least, most) in _RANGES.items():
-            value = getattr(self, name)
-            if not (math.isfinite(value) and least <= value <= most):
-                raise InvalidArgumentError(
-                    f"{name} must be from {least:g} to {most:g}; got {value!r}"
-                )
+        for name, (_, limits, _) in _AXES.items():
+            if limits is not None:
+                value, (least, most) = getattr(self, name), limits
+                if not (math.isfinite(value) and least <= value <= most):
+                    raise InvalidArgumentError(
+                        f"{name} must be from {least:g} to {most:g}; got {value!r}"
+                    )
 
     @property
     def name(self) -> str:
         """What differs from the defaults: ``"N_S 10, lists x2"``, or ``"default"``."""
-        skipping = {True: "skipping", False: "no skipping"}
-        spelled = [
-            skipping[value] if name == "skip_empty" else _FORMS.get(name, "{}").format(value)
-            for name, value in self.changes.items()
-        ]
-        return ", ".join(spelled) or "default"
+        changes = self.changes
+        if "skip_empty" in changes:
+            changes["skip_empty"] = "no skipping"
+        return ", ".join(_AXES[n][0].format(value) for n, value in changes.items()) or "default"
 
     @property
     def changes(self) -> dict[str, Any]:

@@ -50,12 +50,8 @@ class Tradeoff:
     Parameters
     ----------
     data : dict
-        What the JSON holds, see ``docs/results_schema.json``.
-
-    Attributes
-    ----------
-    points : list of Point
-        Every setting that was measured.
+        What the JSON holds, see ``docs/results_schema.json``; ``points``, an attribute, are the
+        settings that were measured.
     """
 
     def __init__(self, data: dict[str, Any]) -> None:
@@ -78,17 +74,8 @@ class Tradeoff:
     def front(self, kind: str) -> list[str]:
         """Return the settings that no other dominates in SSIM and one kind of cost.
 
-        Of those that cannot be told apart the one with the fewest changes is returned.
-
-        Parameters
-        ----------
-        kind : {"frame", "memory", "file", "generation"}
-            The cost.
-
-        Returns
-        -------
-        list of str
-            Names, the cheapest first.
+        Of those that cannot be told apart the one with the fewest changes is returned. ``kind`` is
+        "frame", "memory", "file" or "generation"; the cheapest is the first.
         """
         return [one.name for one in best(self.points, kind)]
 
@@ -108,13 +95,8 @@ class Tradeoff:
     def plot(self) -> Figure:
         """Draw the fronts of frame time, bytes and generation time against SSIM.
 
-        Without Matplotlib MissingDependencyError is raised, and InvalidArgumentError if nothing was
-        measured.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Which notebooks show as it is.
+        Returns a Matplotlib figure, which notebooks show as it is. Without Matplotlib
+        MissingDependencyError is raised, and InvalidArgumentError if nothing was measured.
         """
         return draw(self.data, self.points)
 
@@ -157,20 +139,16 @@ def measure_tradeoff(
     camera : pyvista.Camera or vtkCamera or Camera, optional
         The generating view V_O; the view that the volume fills, from 20 degrees above, unless
         given.
-    window_size : (int, int)
-        Of all frames, pixels.
-    angles : sequence of float
-        The new views, degrees of ``Azimuth`` from V_O.
+    window_size, angles : sequence
+        Of all frames, pixels; the new views, degrees of ``Azimuth`` from V_O.
     repeats, generations : int
         Timed frames of each setting at each angle, and timed generations of each VDI.
     vtk : bool, optional
         Whether VTK's mappers are timed beside; by default where VTK is installed.
     name : str
         What the volume is called.
-    path : path-like, optional
-        A JSON file, written whole after every VDI; without one nothing is written.
-    resume : bool
-        Go on with what the file holds, if it is there, instead of replacing it.
+    path, resume : path-like, bool
+        A JSON file, written whole after every VDI, and whether to go on with what it holds.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     progress : callable, optional
@@ -181,16 +159,14 @@ def measure_tradeoff(
     Returns
     -------
     Tradeoff
-        The figures, with a table, a plot, the fronts and the dominated settings.
+        The figures, with a table, a plot, the fronts and the dominated settings. A setting whose
+        own VDI does not fit is marked as refused.
 
     Raises
     ------
     InvalidArgumentError
         If an argument cannot be used, nothing is to be seen, or the file to go on with is of
         another run.
-    VDIError
-        As :func:`pyvista_vdi.generate` does. A setting whose own VDI does not fit is marked as
-        refused, with the reason.
 
     Examples
     --------

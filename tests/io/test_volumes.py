@@ -1,4 +1,4 @@
-"""Folders of TIFF and PNG as volumes: values, order, direction, and what is refused."""
+"""Folders of TIFF and PNG, raw and NumPy files as volumes: values, order, what is refused."""
 
 from __future__ import annotations
 
@@ -132,3 +132,26 @@ def test_a_picture_beside_dicom_slices_changes_nothing(tmp_path):
     write_dicom(tmp_path, scan(np.int16)[:9], np.ones(3), np.zeros(3), np.eye(3))
     write(tmp_path, scan(np.uint8)[:2], "png")
     assert read_file(tmp_path).dimensions == (7, 5, 9)
+
+
+HEADER = b"\x93NUMPY\x01\x00\x28\x00"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("nut.raw", b"12345", "does not say what it holds"),
+        ("nut_4x3x2_uint16.raw", b"12345", "has 5 bytes; 4 x 3 x 2 of uint16 are 48"),
+        ("a.npy", b"", "cannot be read as an array"),
+        ("a.npy", b"no array", "cannot be read as an array"),
+        ("a.npy", b"PK\x03\x04", "cannot be read as an array"),  # an .npz
+        # A bracket that is not closed, keys that cannot be sorted, objects
+        ("a.npy", HEADER + b"{'descr': '|u1', 'shape': (3,           ", "cannot be read as an ar"),
+        ("a.npy", HEADER + b"{'descr': '|u1', b'shape': (3, 4), 2: 1}", "cannot be read as an ar"),
+        ("a.npy", HEADER + b"{'descr': '|O', 'fortran_order': 0}     ", "cannot be read as an ar"),
+    ],
+)
+def test_raw_and_numpy_files_are_checked(name, content, message, tmp_path):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InvalidVolumeError, match=message):
+        read_file(tmp_path / name)
