@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         size = tuple(options.size)
         cases = [Case(name, "soft", size, what=kind) for name in options.volumes for kind in KINDS]
         rooms = ("generation", "raycasting", "volume", "io")
-        execute("files", options, cases, measure, report, count=4, key=None, rooms=rooms)
+        execute("files", options, cases, measure, report, count=3, key=None, rooms=rooms)
     return 0
 
 
