@@ -1,212 +1,238 @@
-"""How large .vdi files are, and how long saving and loading take beside NumPy's own files.
+"""What VDIs take: bytes and seconds of files, what packing loses, and the peak of memory.
 
-Writes ``files_WxH.json`` (all figures) and ``.md`` (the tables). See README.md in this folder.
+Files beside NumPy's own of the same arrays, in turns. Packed VDIs' pictures beside the exact one's.
+Memory in a process of its own for each volume, which draws a small VDI first: the peak of what the
+process has in memory, above what was there before, over volume and VDI (Linux with glibc only).
 """
 
 from __future__ import annotations
 
 import argparse
+import ctypes
+import gc
+import json
 import os
 import statistics
+import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import (  # beside this file
-    add_vdi_options,
-    at_hand,
-    marked,
-    measure_missing,
-    new_parser,
-    timed,
-    vdi_of,
-)
+from shared import benches, execute, load, marked, mean_of, parser_of, table_of  # beside this file
 
-from pyvista_vdi.io import FORMAT_VERSION, read, read_info
-from pyvista_vdi.measure.report import describe_system, system_line, table
+from pyvista_vdi import Volume, compare_images, generate, render
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.io import read
+from pyvista_vdi.measure.clock import take_turns
+from pyvista_vdi.measure.harness import Bench, Case
+from pyvista_vdi.measure.report import mebibytes, table
+from pyvista_vdi.measure.results import Results
+from pyvista_vdi.model.packing import PRECISIONS
+from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.prepared import prepared_vdi
 
 #: Bytes of a supersegment in the dense form: two depths, four colour components, float32.
 DENSE_BYTES = 24
 
-#: Ways to compress, the default first.
+#: Ways to compress, the default first; a VDI's arrays.
 COMPRESSIONS = ("lz4", "zstd", "none")
-
-#: A VDI's arrays; NumPy's functions write and read each as one file.
 ARRAYS = ("offsets", "front", "back", "color", "optical_depth")
 
-#: Least ratio of dense form and file, and most of our times and NumPy's.
-LEAST_SHRINKING, MOST_SAVING, MOST_LOADING = 6.0, 10.0, 3.0
+#: Degrees from V_O of pictures of packed VDIs, and the largest loss of SSIM that is allowed.
+ANGLES, MOST_LOSS = (0.0, 5.0, 30.0), 0.001
 
-LEGEND = (
-    "`dense / size`: bytes of width x height x longest list x 24 over the file's. `save` and "
-    "`load`: our time over `numpy.save`'s and `numpy.load`'s for the same five arrays, by wall "
-    "clock (in brackets by the process's CPU time). Ours brings the file to the disk (fsync) and "
-    "NumPy's does not; `synced` is over NumPy's with fsync. Loading takes from the page "
-    "cache, and ours compares checksums and checks every supersegment. Medians of turns."
-)
+KINDS = ("files", "packed", "memory")
 
 
-def main() -> int:
-    """Measure what is missing, and write what was found."""
-    options = parsed()
-    case = {
-        "transfer_function": options.tf,
-        "max_supersegments": options.max_supersegments,
-        "format_version": FORMAT_VERSION,
-        "system": {**describe_system(options.device), "numcodecs": version("numcodecs")},
-    }
-
-    def measured_of(volume: str) -> dict[str, Any]:
-        with tempfile.TemporaryDirectory(dir=options.disk) as folder:
-            return measured(vdi_of(volume, options), Path(folder), options)
-
-    volumes = at_hand(options.volumes)
-    results = measure_missing("files", options, case, volumes, measured_of, report)
-    return 0 if all(v["identical"] for v in results["volumes"].values()) else 1
-
-
-def parsed() -> argparse.Namespace:
-    """Return the options."""
-    parser = new_parser(__doc__, repeats=9, repeated="timed turns")
-    add_vdi_options(parser)
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure, and write what was found."""
+    parser = parser_of(__doc__, size=(1280, 720), repeats=5)
+    parser.add_argument("--max-supersegments", type=int, default=20, metavar="N")
     parser.add_argument("--disk", type=Path, metavar="FOLDER", help="where the files are written")
-    return parser.parse_args()
+    parser.add_argument("--child", metavar="PRECISION", help=argparse.SUPPRESS)
+    options = parser.parse_args(arguments)
+    if options.child:
+        print(json.dumps(memory(options)))
+        return 0
+    with benches(options) as bench_of:
+
+        def measure(case: Case) -> dict[str, Any]:
+            if case.what == "memory":
+                return {form: peaks_of(case.volume, form, options) for form in ("exact", "8-byte")}
+            bench = bench_of(case.volume, case.look)
+            vdi = bench.generate(max_supersegments=options.max_supersegments)
+            return (files if case.what == "files" else packed)(bench, vdi, options)
+
+        size = tuple(options.size)
+        cases = [Case(name, "soft", size, what=kind) for name in options.volumes for kind in KINDS]
+        rooms = ("generation", "raycasting", "volume", "io")
+        execute("files", options, cases, measure, report, count=3, key=None, rooms=rooms)
+    return 0
 
 
-def measured(vdi: VDI, folder: Path, options: argparse.Namespace) -> dict[str, Any]:
-    """Return sizes and times of one VDI's files."""
-    files = {kind: folder / f"{kind}.vdi" for kind in COMPRESSIONS}
-    ways: dict[str, Callable[[], object]] = {
-        "numpy save": partial(save_arrays, vdi, folder),
-        "numpy save, synced": partial(save_arrays, vdi, folder, synced=True),
-        "numpy load": partial(load_arrays, folder),
-        "info": partial(read_info, files["lz4"]),
-    }
-    for kind, file in files.items():
-        ways[f"{kind} save"] = partial(vdi.save, file, compression=kind)
-        ways[f"{kind} load"] = partial(read, file)
-    packed = folder / "compressed.npz"
-    arrays = {name: getattr(vdi, name) for name in ARRAYS}
-    for way in (*(w for n, w in ways.items() if "save" in n), *ways.values()):
-        way()  # files are there, modules imported, memory warm
-    width, height = vdi.window_size
-    return {
-        "supersegments": vdi.n_supersegments,
-        "empty_lists": float((vdi.counts == 0).mean()),
-        "array_bytes": vdi.nbytes,
-        "dense_bytes": width * height * options.max_supersegments * DENSE_BYTES,
-        "file_bytes": {kind: file.stat().st_size for kind, file in files.items()},
-        "identical": all(read(file).equals(vdi) for file in files.values()),
-        "seconds": timed(ways, options.repeats),
-        "savez_compressed": {
-            **timed({"save": partial(np.savez_compressed, packed, **arrays)}, 1),
-            **timed({"load": partial(load_packed, packed)}, 3),
-            "file_bytes": packed.stat().st_size,
-        },
-    }
+def files(_: Bench, vdi: VDI, options: argparse.Namespace) -> dict[str, Any]:
+    """Return sizes and times of a VDI's files, and whether each gives back every bit."""
+    with tempfile.TemporaryDirectory(dir=options.disk) as name:
+        folder = Path(name)
+        paths = {kind: folder / f"{kind}.vdi" for kind in COMPRESSIONS}
+        ways: dict[str, Callable[[], object]] = {
+            "numpy save": partial(save_arrays, vdi, folder),
+            "numpy load": lambda: [np.load(folder / f"{name}.npy") for name in ARRAYS],
+        }
+        for kind, file in paths.items():
+            ways[f"{kind} save"] = partial(vdi.save, file, compression=kind)
+            ways[f"{kind} load"] = partial(read, file)
+        taken = take_turns(ways, options.repeats)
+        width, height = vdi.window_size
+        return {
+            "empty_lists": float((vdi.counts == 0).mean()),
+            "array_bytes": vdi.nbytes,
+            "dense_bytes": width * height * options.max_supersegments * DENSE_BYTES,
+            "file_bytes": {kind: file.stat().st_size for kind, file in paths.items()},
+            "identical": all(read(file).equals(vdi) for file in paths.values()),
+            "seconds": {way: statistics.median(times["clock"]) for way, times in taken.items()},
+        }
 
 
-def save_arrays(vdi: VDI, folder: Path, *, synced: bool = False) -> None:
-    """Write a VDI's arrays by ``numpy.save``."""
+def save_arrays(vdi: VDI, folder: Path) -> None:
+    """Write a VDI's arrays by ``numpy.save``, to the disk, as a VDI's file is."""
     for name in ARRAYS:
         with (folder / f"{name}.npy").open("wb") as stream:
             np.save(stream, getattr(vdi, name))
-            if synced:
-                stream.flush()
-                os.fsync(stream.fileno())
+            stream.flush()
+            os.fsync(stream.fileno())
 
 
-def load_arrays(folder: Path) -> list[Any]:
-    """Read a VDI's arrays by ``numpy.load``."""
-    return [np.load(folder / f"{name}.npy") for name in ARRAYS]
+def packed(bench: Bench, vdi: VDI, options: argparse.Namespace) -> dict[str, Any]:
+    """Return losses, bytes and times of a VDI in every form."""
+    forms = {precision: vdi.with_precision(precision) for precision in PRECISIONS}
+    found: dict[str, Any] = {"losses": {}, "seconds": {}, "bytes": {}}
+    with tempfile.TemporaryDirectory() as folder:
+        for name, form in forms.items():
+            on_device = prepared_vdi(bench.runtime, form).list_bytes
+            found["bytes"][name] = [on_device, form.save(Path(folder) / "a.vdi").stat().st_size]
+    for angle in ANGLES:
+        camera = bench.view.azimuth(angle)
+        pictures = {name: bench.draw(form, camera) for name, form in forms.items()}
+        losses = {}
+        for name in PRECISIONS[1:]:
+            compared = compare_images(pictures[name], pictures["exact"])
+            losses[name] = {"ssim": 1 - compared.ssim, "worst_pixel": compared.worst_pixel}
+        found["losses"][f"{angle:g}"] = losses
+        ways = {name: partial(bench.draw, form, camera) for name, form in forms.items()}
+        taken = take_turns(ways, options.repeats, runtime=bench.runtime)
+        found["seconds"][f"{angle:g}"] = {
+            name: statistics.median(times["device"]) for name, times in taken.items()
+        }
+    return found
 
 
-def load_packed(file: Path) -> list[Any]:
-    """Read a VDI's arrays from a compressed archive of NumPy."""
-    with np.load(file) as archive:
-        return [archive[name] for name in ARRAYS]
+def peaks_of(volume: str, precision: str, options: argparse.Namespace) -> dict[str, int]:
+    """Return the peaks of memory that another process finds, bytes."""
+    size = f"{options.size[0]}x{options.size[1]}"
+    command = [sys.executable, __file__, "--child", precision, "--volumes", volume, "--size", size]
+    command += ["--max-supersegments", str(options.max_supersegments)]
+    command += ["--device", options.device] if options.device else []
+    return dict(json.loads(subprocess.run(command, check=True, capture_output=True).stdout))
 
 
-def report(results: dict[str, Any]) -> str:
-    """Return the tables: a line per volume, the emptiest first."""
-    width, height = results["window_size"]
-    case = f"{results['transfer_function']}, {results['max_supersegments']} supersegments"
-    volumes = sorted(results["volumes"].items(), key=lambda item: -item[1]["empty_lists"])
-    lines = [f"# Files, {width}x{height}, {case}", "", LEGEND]
-    rows = []
-    for name, found in volumes:
-        shrinking = found["dense_bytes"] / found["file_bytes"]["lz4"]
-        cells = [
-            name,
-            f"{found['empty_lists']:.0%}",
-            mebibytes(found["array_bytes"]),
-            mebibytes(found["file_bytes"]["lz4"]),
-            marked(f"{shrinking:.1f}", shrinking >= LEAST_SHRINKING),
-            ratio(found, "lz4 save", "numpy save", MOST_SAVING),
-            ratio(found, "lz4 save", "numpy save, synced", MOST_SAVING),
-            ratio(found, "lz4 load", "numpy load", MOST_LOADING),
-        ]
-        rows.append(cells)
-    heads = ["volume", "empty lists", "arrays, MiB", ".vdi, MiB", "dense / size"]
-    lines += [
-        "",
-        *table((*heads, "save", "synced", "load"), rows),
-        "",
-        "## Other compressions",
-        "",
-        "Dense form over file, then save and load as above. `npz`: `numpy.savez_compressed`.",
-        "",
-    ]
-    rows = []
-    for name, found in volumes:
-        cells = [name]
-        for kind in COMPRESSIONS[1:]:
-            cells.append(f"{found['dense_bytes'] / found['file_bytes'][kind]:.1f}")
-            cells += [ratio(found, f"{kind} {a}", f"numpy {a}") for a in ("save", "load")]
-        npz = found["savez_compressed"]
-        cells.append(f"{found['dense_bytes'] / npz['file_bytes']:.1f}")
-        cells += [
-            f"{npz[a]['wall']['median'] / found['seconds'][f'numpy {a}']['wall']['median']:.0f}"
-            for a in ("save", "load")
-        ]
-        rows.append(cells)
-    heads = [head for kind in (*COMPRESSIONS[1:], "npz") for head in (kind, "save", "load")]
-    lines += table(("volume", *heads), rows)
-    infos = [1e3 * found["seconds"]["info"]["wall"]["median"] for _, found in volumes]
-    spreads = [
-        (wall["most"] - wall["least"]) / wall["median"]
-        for _, found in volumes
-        for wall in (found["seconds"]["lz4 load"]["wall"], found["seconds"]["numpy load"]["wall"])
-    ]
-    if volumes:
-        spread = statistics.median(spreads)
-        lines += [
-            "",
-            f"`read_info`: {min(infos):.1f} to {max(infos):.1f} ms.",
-            f"Spread of the repeated loads, (most - least) / median: {spread:.0%}.",
-        ]
-    return "\n".join([*lines, "", system_line(results["system"]), ""])
+def memory(options: argparse.Namespace) -> dict[str, int]:
+    """Return the bytes of a volume, its VDI, and the peaks above what was there before."""
+    (name,) = options.volumes
+    dtype = load(name).array.dtype
+    drawn(Volume(np.indices((40, 40, 40)).sum(axis=0).astype(dtype)), (64, 48), options, 0)
+    forget_peak()
+    before = resident()
+    volume = load(name)
+    return {"volume": volume.array.nbytes, **drawn(volume, tuple(options.size), options, before)}
 
 
-def ratio(found: dict[str, Any], ours: str, theirs: str, most: float = np.inf) -> str:
-    """Return our time over theirs, by wall clock and by CPU; bold where it is above ``most``."""
-    seconds = found["seconds"]
-    wall, cpu = (
-        seconds[ours][clock]["median"] / seconds[theirs][clock]["median"]
-        for clock in ("wall", "cpu")
+def drawn(
+    volume: Volume, size: tuple[int, int], options: argparse.Namespace, before: int
+) -> dict[str, int]:
+    """Generate a VDI and draw it from another view; return its bytes and the peaks."""
+    view = filling_camera(volume.bounds, size)
+    forget_peak()
+    vdi = generate(
+        volume,
+        view,
+        size,
+        transfer_function=table_of(volume, "soft"),
+        max_supersegments=options.max_supersegments,
+        precision=options.child,
+        device=options.device,
     )
-    return f"{marked(f'{wall:.1f}', wall <= most)} ({cpu:.1f})"
+    generating = resident("VmHWM") - before
+    forget_peak()
+    render(vdi, view.azimuth(5), device=options.device)
+    drawing = resident("VmHWM") - before
+    device = get_runtime(options.device).peak_allocated
+    return {"vdi": vdi.nbytes, "generate": generating, "render": drawing, "device": device}
 
 
-def mebibytes(n: int) -> str:
-    """Return bytes in MiB."""
-    return f"{n / 2**20:.1f}"
+def resident(which: str = "VmRSS") -> int:
+    """Return what the process has in memory, or with ``"VmHWM"`` had at most; bytes."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    (line,) = (line for line in lines if line.startswith(f"{which}:"))
+    return int(line.split()[1]) * 1024
+
+
+def forget_peak() -> None:
+    """Hand back what was freed, and let the peak begin anew."""
+    gc.collect()
+    ctypes.CDLL("libc.so.6").malloc_trim(0)
+    Path("/proc/self/clear_refs").write_text("5")
+
+
+def report(results: Results, every: list[Case]) -> Iterator[str]:
+    """Yield the tables: a line per volume, and form."""
+    yield "*Dense / size*: bytes of width x height x longest list x 24 over the file's. *Save* and"
+    yield "*load*: our time over `numpy.save`'s (with fsync, as ours) and `numpy.load`'s."
+    yield ""
+    rows = []
+    for row in results.rows(what="files"):
+        if "refused" not in row:
+            seconds = row["seconds"]
+            cells = [row["case"]["volume"], f"{row['empty_lists']:.0%}"]
+            cells.append(mebibytes(row["array_bytes"]))
+            for kind in COMPRESSIONS:
+                cells.append(f"{row['dense_bytes'] / row['file_bytes'][kind]:.1f}")
+                for way in ("save", "load"):
+                    cells.append(f"{seconds[f'{kind} {way}'] / seconds[f'numpy {way}']:.1f}")
+            rows.append([*cells, marked("the same", row["identical"])])
+    heads = [head for kind in COMPRESSIONS for head in (f"dense / size, {kind}", "save", "load")]
+    yield from table(("volume", "empty lists", "arrays, MiB", *heads, "bits"), rows)
+    of = lambda row: row["dense_bytes"] / row["file_bytes"]["lz4"]  # noqa: E731
+    yield from ("", f"Dense / size, mean: {mean_of(results, every, of, what='files')}.", "")
+    yield from ("", "Packed over exact; losses of SSIM in millionths, the worst of all angles:", "")
+    rows = []
+    for row in results.rows(what="packed"):
+        for form in PRECISIONS[1:] if "refused" not in row else ():
+            losses = [loss[form] for loss in row["losses"].values()]
+            ssim = max(loss["ssim"] for loss in losses)
+            cells = [row["case"]["volume"], form, marked(f"{1e6 * ssim:.0f}", ssim <= MOST_LOSS)]
+            cells.append(f"{max(loss['worst_pixel'] for loss in losses):.2f}")
+            cells += [f"{s[form] / s['exact']:.2f}" for s in row["seconds"].values()]
+            sizes = zip(row["bytes"][form], row["bytes"]["exact"], strict=True)
+            rows.append([*cells, *(f"{of / exact:.2f}" for of, exact in sizes)])
+    times = [f"time {angle:g}°" for angle in ANGLES]
+    heads = ["volume", "form", "loss", "worst pixel, /255", *times, "on the device", "file"]
+    yield from table(heads, rows)
+    yield from ("", "Peak of memory over volume and VDI:", "")
+    rows = []
+    for row in results.rows(what="memory"):
+        for form in ("exact", "8-byte") if "refused" not in row else ():
+            of = row[form]
+            cells = [mebibytes(of[what]) for what in ("volume", "vdi", "device")]
+            shares = [f"{of[k] / (of['volume'] + of['vdi']):.2f}" for k in ("generate", "render")]
+            rows.append([row["case"]["volume"], form, *cells, *shares])
+    heads = ["volume, MiB", "VDI, MiB", "device, MiB", "while generated", "while drawn"]
+    yield from table(("volume", "form", *heads), rows)
 
 
 if __name__ == "__main__":

@@ -91,6 +91,8 @@ providers.provide(
     notebook_bundle="pyvista_vdi.web.notebook:mime_bundle",
     notebook_html="pyvista_vdi.web.notebook:html_of",
     plot="pyvista_vdi.plotting.accessor:plot",
+    read_by_pyvista="pyvista_vdi.plotting.imports:read_volume",
+    read_nrrd="pyvista_vdi.examples:read_nrrd",
     scene_pages="pyvista_vdi.web.scenes.export:export_html",
     temporal_volumes="pyvista_vdi.vtk_pipeline.filters.temporal:steps_and_times",
     thinned="pyvista_vdi.model.thinned:thinned",

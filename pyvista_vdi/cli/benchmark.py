@@ -18,11 +18,12 @@ from pyvista_vdi.measure.paper import (
     describe,
     describe_changes,
     find_dataset,
+    open_results,
     read_results,
     run,
 )
-from pyvista_vdi.measure.paper.plot import write_plot
-from pyvista_vdi.measure.report import describe_system, write_text
+from pyvista_vdi.measure.paper.report import write_plot
+from pyvista_vdi.measure.report import write_text
 
 
 def benchmark(options: argparse.Namespace) -> int:
@@ -98,10 +99,7 @@ def _results(options: argparse.Namespace, plan: Plan) -> Results:
         )
     require_new(path, options)
     check_writable(path)
-    system = describe_system(options.device)
-    if path.exists():
-        return Results.resumed(path, plan, system)
-    results = Results.begun(path, plan, system)
+    results = open_results(plan, path, options.device, resume=options.resume)
     results.save()
     return results
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -19,9 +18,9 @@ from pyvista_vdi.cli.inputs import (
     say_written,
     volume_name,
 )
-from pyvista_vdi.io import whole_file, write_png
+from pyvista_vdi.io import write_png
 from pyvista_vdi.measure.compare import Settings, contact_sheet, measure, table
-from pyvista_vdi.measure.front import Plan, measure_front, summary
+from pyvista_vdi.measure.front import Plan, left_out, measure_front, summary
 from pyvista_vdi.measure.report import write_text
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
@@ -63,8 +62,7 @@ def compare(options: argparse.Namespace) -> int:
     sizes = {**report.sizes, "file_bytes": files["vdi"].stat().st_size}
     report = replace(report, sizes=sizes)
     write_png(contact_sheet(report, images), files["png"])
-    with whole_file(files["json"]) as stream:
-        stream.write(json.dumps(report.to_dict(), indent=1).encode())
+    report.results(files["json"]).save()
     print(table(report))
     say_written(Path(options.out) / path.name for path in files.values())
     return 0
@@ -86,8 +84,8 @@ def _front(options: argparse.Namespace) -> int:
         )
     lines = summary(found)
     print("\n".join(lines))
-    for name, why in found.data["left_out"].items():
-        print(f"left out: {name} ({why})", file=sys.stderr)
+    for what in left_out(found):
+        print(f"left out: {what}", file=sys.stderr)
     write_text(files["md"], "\n".join([*lines, ""]))
     say_written(files.values())
     return 0

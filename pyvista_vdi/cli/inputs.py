@@ -16,6 +16,7 @@ from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
 from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file
 from pyvista_vdi.io.stores import StoredVolume, is_store, open_volume
+from pyvista_vdi.io.volumes import read_file
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.host_memory import require_free_memory
@@ -69,8 +70,6 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
 
             volume = examples.load_data(options.example, as_volume=True)
         else:
-            from pyvista_vdi.measure.volumes import read_file
-
             volume = read_file(Path(options.file))
     taken = as_volume(volume, options.scalars, options.preference or "point")
     if options.spacing is None and options.origin is None:

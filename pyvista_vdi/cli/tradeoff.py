@@ -19,11 +19,11 @@ from pyvista_vdi.cli.inputs import (
     volume_name,
 )
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.measure.paper.datasets import look
 from pyvista_vdi.measure.report import write_text
 from pyvista_vdi.measure.tradeoff import AXES, Setting, measure_tradeoff, sweep
 from pyvista_vdi.measure.tradeoff.report import summary
 from pyvista_vdi.measure.tradeoff.settings import DEFAULT_AXES, QUICK_AXES
-from pyvista_vdi.measure.volumes import look
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.volume import Volume
 

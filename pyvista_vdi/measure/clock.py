@@ -22,7 +22,7 @@ WALL: Mapping[str, Callable[[], float]] = {"clock": time.perf_counter}
 #: Chance of a separation by noise up to which times count as different.
 CHANCE = 0.01
 
-#: Samples up to which the chance is exact; SciPy's takes long beyond.
+#: Samples of either up to which the chance is exact; SciPy's takes long beyond.
 EXACT = 40
 
 
@@ -89,7 +89,7 @@ def rank_sum_chance(a: Sequence[float], b: Sequence[float]) -> float:
     return _rank_sum_chance(tuple(a), tuple(b))
 
 
-@lru_cache(maxsize=4096)  # fronts compare the same samples again and again
+@lru_cache(maxsize=2**16)  # fronts compare the same samples again and again
 def _rank_sum_chance(a: tuple[float, ...], b: tuple[float, ...]) -> float:
     from scipy.stats import mannwhitneyu  # takes a second to load
 

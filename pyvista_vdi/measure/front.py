@@ -7,23 +7,22 @@ voxel, by ``render_volume``'s kernel for ours and by the same mapper for VTK's.
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import statistics
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
-from contextlib import closing as closed_at_end
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import Any, ClassVar
-
-import numpy as np
+from itertools import product
+from typing import Any
 
 from pyvista_vdi import examples
+from pyvista_vdi.errors import DataNotFoundError, DeviceMemoryError
+from pyvista_vdi.measure import report
 from pyvista_vdi.measure.clock import median, take_turns
-from pyvista_vdi.measure.report import ABSENT, closing, describe_system, table
-from pyvista_vdi.measure.results_file import ResultsFile
-from pyvista_vdi.measure.session import Steps, check_count
+from pyvista_vdi.measure.harness import ROOMS, Case, Latest, Progress, check_count, run
+from pyvista_vdi.measure.results import Results
 from pyvista_vdi.measure.vtk_baselines import (
     MAPPERS,
     OffScreenVolume,
@@ -56,18 +55,9 @@ SLACK = 0.002
 class Point:
     """A way to draw, what it takes and how near it comes to the own full picture.
 
-    Parameters
-    ----------
-    who : {"vdi", "volume", "gpu", "fixed_point"}
-        Our VDI, our volume raycaster, or one of VTK's mappers.
-    distance : float
-        Pixels along each edge for a ray.
-    step : float
-        Voxels along the ray; of a VDI what it was generated with.
-    seconds : float
-        Of a frame, the median.
-    ssim : float
-        To the own full picture.
+    ``who`` is our "vdi" or "volume" raycaster, or VTK's "gpu" or "fixed_point" mapper; it casts a
+    ray for ``distance`` pixels along each edge, in steps of ``step`` voxels, of a VDI those that it
+    was generated with. ``seconds`` are the median of a frame.
     """
 
     who: str
@@ -78,11 +68,11 @@ class Point:
 
     @property
     def ours(self) -> bool:
-        """Whether it is ours."""
+        """Whether it is none of VTK's."""
         return self.who in ("vdi", "volume")
 
 
-def front_of(points: Sequence[Point]) -> list[Point]:
+def front_of(points: Iterable[Point]) -> list[Point]:
     """Return the points that none is as fast and as near as, the fastest first."""
     best: list[Point] = []
     for point in sorted(points, key=lambda p: (p.seconds, -p.ssim)):
@@ -91,7 +81,7 @@ def front_of(points: Sequence[Point]) -> list[Point]:
     return best
 
 
-def over(points: Sequence[Point], others: Sequence[Point]) -> list[float]:
+def over(points: Iterable[Point], others: Sequence[Point]) -> list[float]:
     """Return each time of the front of ``points`` over the least of ``others`` that are as near.
 
     As near is an SSIM that is less by :data:`SLACK` at most. Points that none comes as near as are
@@ -123,19 +113,7 @@ def cost_alone(points: Sequence[Point]) -> list[float]:
 
 @dataclass(frozen=True)
 class Plan:
-    """Which cases are measured, and how.
-
-    Parameters
-    ----------
-    volumes, looks : tuple of str
-        Names of volumes (:data:`pyvista_vdi.examples.VOLUMES`) and transfer functions.
-    views : tuple of (float, float)
-        Degrees from V_O and zoom.
-    window_size : (int, int)
-        Pixels.
-    repeats : int
-        Timed frames of each way and view.
-    """
+    """Which cases are measured: volumes and transfer functions by name, angles and zooms."""
 
     volumes: tuple[str, ...]
     looks: tuple[str, ...] = tuple(TRANSFER_FUNCTIONS)
@@ -151,24 +129,15 @@ class Plan:
         """Return that of a short run."""
         return cls(QUICK_VOLUMES, views=QUICK_VIEWS, **more)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it in values that JSON can hold."""
-        lists: Callable[[Any], Any] = lambda v: [*map(lists, v)] if isinstance(v, tuple) else v  # noqa: E731
-        return {name: lists(value) for name, value in asdict(self).items()}
+    def cases(self) -> Iterator[Case]:
+        """Yield the views of each volume and transfer function."""
+        for volume, look, (angle, zoom) in product(self.volumes, self.looks, self.views):
+            yield Case(volume, look, self.window_size, angle, zoom)
 
 
-class FrontFile(ResultsFile):
-    """What was measured: ``cases`` by "volume, look", a list of views with their points."""
-
-    form, version = "pyvista-vdi front", 1
-    empty: ClassVar[Mapping[str, Any]] = {"cases": {}, "left_out": {}}
-
-    def views(self) -> Iterator[tuple[str, float, float, list[Point]]]:
-        """Yield each case's name, degrees, zoom and points."""
-        for name, views in self.data["cases"].items():
-            for view in views:
-                points = [Point(**point) for point in view["points"]]
-                yield name, view["angle"], view["zoom"], points
+def points_of(row: Mapping[str, Any]) -> list[Point]:
+    """Return the ways of a view."""
+    return [Point(*values) for values in row["points"]]
 
 
 class OurVolume(OffScreenVolume):
@@ -219,141 +188,99 @@ def measure_front(
     *,
     resume: bool = False,
     device: Any = None,
-    progress: Callable[..., object] | None = None,
-) -> FrontFile:
-    """Measure, and write what there is after each pair of volume and transfer function.
+    progress: Progress | None = None,
+) -> Results:
+    """Measure, and write what there is to a JSON file after each view: see :func:`points_of`.
 
-    Parameters
-    ----------
-    plan : Plan
-        The cases.
-    path : path-like, optional
-        A JSON file to write.
-    resume : bool
-        Go on with that file, which an earlier run of the same plan has left.
-    device : optional
-        OpenCL device of ours.
-    progress : callable, optional
-        Called with the finished fraction, 0 to 1, and what is being done.
-
-    Returns
-    -------
-    FrontFile
-        What was found.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If there is nothing to go on with, or it is of another plan or device.
-    MissingDependencyError
-        If VTK cannot be loaded, or finds no OpenGL.
+    ``resume`` goes on with the file, if it is there, which an earlier run of the same plan has
+    left. ``progress`` is called with the finished fraction and what is being done.
     """
-    system = describe_system(device)
-    if resume and path is not None:
-        found = FrontFile.resumed(path, plan, system)
-    else:
-        found = FrontFile.begun(path, plan, system)
-    steps = Steps(progress, len(plan.volumes) * len(plan.looks) * len(plan.views))
+    extent = "whole" if set(examples.WHOLE) <= set(plan.volumes) else "sample"
+    more = {"rooms": (*ROOMS, "vtk_pipeline"), "extent": extent, "device": device}
+    found = Results.begun("front", asdict(plan), path=path, resume=resume, **more)
     there = examples.available()
+    missing = f"{DataNotFoundError.__name__}: not in {examples.DATA_VARIABLE}"
+    found.data["rows"] = [row for row in found.rows() if row.get("refused") != missing]
     for name in plan.volumes:
         if name not in there:
-            found.data["left_out"][name] = f"not in {examples.DATA_VARIABLE}"
-            steps(finished=len(plan.looks) * len(plan.views))
-            continue
-        found.data["left_out"].pop(name, None)  # of an earlier run, which had no such file
-        volume = examples.load_data(name, as_volume=True)
-        for look in plan.looks:
-            case = f"{name}, {look}"
-            if case in found.data["cases"]:
-                steps(finished=len(plan.views))
-                continue
-            views = []
-            with ExitStack() as stack:
-                everybody = _Everybody(volume, look, plan, device, stack)
-                found.data["system"].setdefault("opengl", everybody.opengl)
-                for angle, zoom in plan.views:
-                    steps.begin(f"{case}, {angle:g} degrees" + (f" x {zoom:g}" * (zoom != 1)))
-                    points = [asdict(point) for point in everybody.points(angle, zoom)]
-                    views.append({"angle": angle, "zoom": zoom, "points": points})
-            found.data["cases"][case] = views
-            found.save()
-    found.save()  # what was left out, too
+            found.add(Case(name).to_dict(), refused=missing)
+    volumes = Latest(lambda name: examples.load_data(name, as_volume=True))
+    with Latest(lambda name, look: _Everybody(volumes(name), look, plan, device)) as everybody:
+
+        def measured(case: Case) -> dict[str, Any]:
+            drawn = everybody(case.volume, case.look)
+            found.data["system"].setdefault("opengl", drawn.opengl)
+            return {"points": [list(asdict(point).values()) for point in drawn.points(case)]}
+
+        cases = (case for case in plan.cases() if case.volume in there)
+        run(cases, measured, found, progress, (DeviceMemoryError, MemoryError))
+    found.save()
     return found
 
 
 class _Everybody:
     """All who draw a volume with a transfer function."""
 
-    def __init__(
-        self, volume: Volume, look: str, plan: Plan, device: Any, stack: ExitStack
-    ) -> None:
+    def __init__(self, volume: Volume, look: str, plan: Plan, device: Any) -> None:
         self._plan = plan
         self._voxel = voxel = min(volume.spacing)
         self._view = view = filling_camera(volume.bounds, plan.window_size)
         looks, size = TRANSFER_FUNCTIONS[look], plan.window_size
         classified = Classification(looks, "a front").transfer_function(volume)
-
-        def own(draw: str, step: float) -> OurVolume:
-            drawn = OurVolume(volume, looks, size, draw, step * voxel, view, device)
-            return stack.enter_context(closed_at_end(drawn))
-
-        self._vdi = own("vdi", FULL_STEP)
-        self._volumes = {step: own("volume", step) for step in (FULL_STEP, *STEPS)}
         prop = property_from_transfer_function(volume, classified)
-        self._theirs = {
-            name: stack.enter_context(closed_at_end(VTKBaseline(volume, prop, size, name, voxel)))
-            for name in MAPPERS
-        }
+        with ExitStack() as stack:
 
-    @property
-    def opengl(self) -> str:
-        """What VTK draws by."""
-        return self._theirs["gpu"].opengl
+            def own(draw: str, step: float) -> OurVolume:
+                drawn = OurVolume(volume, looks, size, draw, step * voxel, view, device)
+                return stack.enter_context(closing(drawn))
 
-    def points(self, angle: float, zoom: float) -> Iterator[Point]:
+            self._vdi = own("vdi", FULL_STEP)
+            self._volumes = {step: own("volume", step) for step in (FULL_STEP, *STEPS)}
+            self._theirs = {
+                name: stack.enter_context(closing(VTKBaseline(volume, prop, size, name, voxel)))
+                for name in MAPPERS
+            }
+            self.opengl = self._theirs["gpu"].opengl
+            self.close = stack.pop_all().close
+
+    def points(self, case: Case) -> Iterator[Point]:
         """Yield every way to draw a view."""
-        camera = self._view.azimuth(angle)
-        camera = camera.replace(view_angle=camera.view_angle / zoom)
+        camera = case.camera(self._view)
         ways: dict[tuple[str, float, float], tuple[OffScreenVolume, Callable[[], object]]] = {}
-        put: Callable[[], object]
         full = {}
         for name, baseline in self._theirs.items():
             _set(baseline, 1.0, FULL_STEP * self._voxel)
             full[name] = baseline.image(camera)
-            for distance in DISTANCES:
-                for step in STEPS:
-                    put = partial(_set, baseline, distance, step * self._voxel)
-                    ways[name, distance, step] = baseline, put
+            for distance, step in product(DISTANCES, STEPS):
+                put = partial(_set, baseline, distance, step * self._voxel)
+                ways[name, distance, step] = baseline, put
         exact = self._volumes[FULL_STEP]
         exact.mapper.SetImageSampleDistance(1)
         full["vdi"] = full["volume"] = exact.image(camera)
         ways["volume", 1.0, FULL_STEP] = exact, lambda: None
-        for distance in _OWN_DISTANCES:
-            put = partial(self._vdi.mapper.SetImageSampleDistance, distance)
-            ways["vdi", distance, FULL_STEP] = self._vdi, put
-            for step in STEPS:
-                drawn = self._volumes[step]
-                put = partial(drawn.mapper.SetImageSampleDistance, distance)
-                ways["volume", distance, step] = drawn, put
-        pictures = {}
-        for way, (drawn_by, put) in ways.items():
+        ours = [("vdi", FULL_STEP, self._vdi)]
+        ours += [("volume", step, self._volumes[step]) for step in STEPS]
+        for distance, (name, step, drawn) in product(_OWN_DISTANCES, ours):
+            ways[name, distance, step] = (
+                drawn,
+                partial(drawn.mapper.SetImageSampleDistance, distance),
+            )
+
+        def frame(drawn: OffScreenVolume, put: Callable[[], object]) -> None:
             put()
+            drawn.render(camera)
+
+        pictures = {}
+        for way, (drawn_by, put_way) in ways.items():
+            put_way()
             pictures[way] = drawn_by.image(camera)
         with ThreadPoolExecutor(os.cpu_count()) as pool:  # before anything is timed
             compared = pool.map(compare_images, pictures.values(), (full[w[0]] for w in ways))
-            ssim = {way: float(found.ssim) for way, found in zip(ways, compared, strict=True)}
-
-        def frame(drawn_by: OffScreenVolume, put: Callable[[], object]) -> None:
-            put()
-            drawn_by.render(camera)
-
-        work = {way: partial(frame, *both) for way, both in ways.items()}
-        named = {str(way): step for way, step in work.items()}
-        taken = take_turns(named, self._plan.repeats)
-        for way in ways:
-            seconds = median(taken[str(way)])
-            assert seconds is not None
-            yield Point(*way, round(seconds, 6), round(ssim[way], 6))
+            near = [float(found.ssim) for found in compared]
+        work = {str(way): partial(frame, *both) for way, both in ways.items()}
+        taken = take_turns(work, self._plan.repeats)
+        for way, ssim in zip(ways, near, strict=True):
+            yield Point(*way, median(taken[str(way)]) or 0.0, ssim)
 
 
 def _set(baseline: VTKBaseline, distance: float, step: float) -> None:
@@ -361,14 +288,17 @@ def _set(baseline: VTKBaseline, distance: float, step: float) -> None:
     baseline.set_sample_distance(step)
 
 
-def summary(found: FrontFile) -> list[str]:
+def summary(found: Results) -> list[str]:
     """Return lines of a report in Markdown: gains over VTK by view and by case, and on what."""
     by_view: dict[str, list[list[Point]]] = {}
     by_case: dict[str, list[list[Point]]] = {}
-    for case, angle, zoom, points in found.views():
-        title = f"{angle:g} degrees" + (f", zoomed by {zoom:g}" if zoom != 1 else "")
-        by_view.setdefault(title, []).append(points)
-        by_case.setdefault(case, []).append(points)
+    for row in found.rows():
+        if "refused" in row:
+            continue
+        case = row["case"]
+        zoomed = f", zoomed by {case['zoom']:g}" if "zoom" in case else ""
+        by_view.setdefault(f"{case['angle']:g} degrees{zoomed}", []).append(points_of(row))
+        by_case.setdefault(f"{case['volume']}, {case['look']}", []).append(points_of(row))
     by_view["all"] = [points for views in by_case.values() for points in views]
     lines = []
     for first, groups in (("view", by_view), ("volume, transfer function", by_case)):
@@ -382,10 +312,17 @@ def summary(found: FrontFile) -> list[str]:
                 rows.append([title, str(len(gained)), _mean(gained), least, full, alone])
         head = [first, "points of VTK's front", "VTK's time / ours, geometric mean", "worst"]
         more = ["of VTK's full picture", "a VDI's alone / VTK's"]
-        lines += [*table([*head, *more], rows), ""]
-    return lines[:-1] + closing(found.data)
+        lines += [*report.table([*head, *more], rows), ""]
+    return lines[:-1] + report.closing(found.data)
+
+
+def left_out(found: Results) -> Iterator[str]:
+    """Yield what was not measured, and why."""
+    for row in found.rows():
+        if "refused" in row:
+            names = (str(row["case"][n]) for n in ("volume", "look", "angle") if n in row["case"])
+            yield f"{', '.join(names)} ({row['refused']})"
 
 
 def _mean(ratios: Sequence[float]) -> str:
-    """Return the geometric mean."""
-    return f"{math.exp(float(np.mean(np.log(ratios)))):.2f}" if ratios else ABSENT
+    return f"{statistics.geometric_mean(ratios):.2f}" if ratios else report.ABSENT

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import InvalidArgumentError, VDIError
+from pyvista_vdi.errors import DeviceError, InvalidArgumentError, VDIError
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.measure.clock import WALL, Step, Times, take_turns
+from pyvista_vdi.measure.clock import Step, Times, take_turns
 from pyvista_vdi.measure.report import across
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.model.camera import Camera
@@ -73,24 +73,9 @@ _Made = TypeVar("_Made")
 class Case:
     """What one row of a measurement is about.
 
-    Parameters
-    ----------
-    volume : str
-        Name of the volume.
-    look : str, optional
-        Name of the transfer function.
-    window_size : (int, int), optional
-        Pixels.
-    angle : float, optional
-        Degrees of ``Azimuth`` from V_O.
-    zoom : float
-        By what the view is zoomed in.
-    options : tuple of (str, object)
-        What else was chosen, such as ``(("max_supersegments", 15),)``.
-    candidates : tuple of str
-        Who draws, if not all do.
-    what : str, optional
-        What is measured of it, where a run measures several things.
+    ``angle`` is in degrees of ``Azimuth`` from V_O, ``options`` are what else was chosen, such as
+    ``(("max_supersegments", 15),)``, ``candidates`` who draws if not all do, and ``what`` says what
+    is measured where a run measures several things.
     """
 
     volume: str
@@ -110,17 +95,12 @@ class Case:
     @property
     def name(self) -> str:
         """What people call it: ``"brain, soft, 1280x720, max_supersegments 15, 5 degrees"``."""
-        parts = [
-            self.volume,
-            self.look,
-            self.window_size and across(self.window_size),
-            *(f"{name} {value}" for name, value in self.options),
-            None if self.angle is None else f"{self.angle:g} degrees",
-            None if self.zoom == 1 else f"zoomed by {self.zoom:g}",
-            *self.candidates,
-            self.what,
-        ]
-        return ", ".join(part for part in parts if part)
+        size, angle = self.window_size, self.angle
+        parts = [self.volume, self.look, size and across(size)]
+        parts += [f"{name} {value}" for name, value in self.options]
+        parts += [None if angle is None else f"{angle:g} degrees"]
+        parts += [None if self.zoom == 1 else f"zoomed by {self.zoom:g}", *self.candidates]
+        return ", ".join(part for part in (*parts, self.what) if part)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what tells it from others, as results have it: only what was given."""
@@ -159,16 +139,9 @@ def sample(
 
 @dataclass(frozen=True)
 class Estimate:
-    """A mean over all cases, estimated from a sample.
+    """A mean over all cases from those that were measured, ``count`` of ``of``.
 
-    Parameters
-    ----------
-    mean : float
-        The estimate.
-    error : float
-        Its standard error: 0 where all cases were measured.
-    count, of : int
-        Cases that were measured, and all.
+    Its standard ``error`` is 0 where all were.
     """
 
     mean: float
@@ -208,25 +181,27 @@ def run(
     measure: Callable[[Case], Mapping[str, Any]],
     results: Results,
     progress: Progress | None = None,
+    refused: tuple[type[BaseException], ...] = REFUSALS,
 ) -> None:
     """Measure the cases that the results lack, and write the file after every one.
 
-    What cannot be measured becomes a row with ``refused``, the reason. Cases that share a volume, a
+    Errors that are ``refused`` become rows with that, the reason. Cases that share a volume, a
     bench or a VDI should follow each other: see :class:`Latest`.
 
     ``measure`` returns a case's figures, in values that JSON can hold. ``progress`` is called with
     the finished fraction and the case's name.
     """
     missing = [case for case in cases if results.row(case.to_dict()) is None]
-    steps = Steps(progress, len(missing))
-    for case in missing:
-        steps.begin(case.name)
+    for done, case in enumerate(missing):
+        if progress is not None:
+            progress(done / len(missing), case.name)
         try:
             figures = measure(case)
-        except REFUSALS as error:
+        except refused as error:
             figures = {"refused": refusal(error)}
         results.add(case.to_dict(), **figures)
-    steps()
+    if progress is not None:
+        progress(1.0)
 
 
 def refusal(error: BaseException) -> str:
@@ -243,14 +218,6 @@ class Steps:
     def __call__(self, *doing: str) -> None:
         """Say that a piece is finished, and what is being done now."""
         self._done += 1
-        self._say(*doing)
-
-    def begin(self, doing: str) -> None:
-        """Say what is being done: a piece, finished by the time of the next call."""
-        self._say(doing)
-        self._done += 1
-
-    def _say(self, *doing: str) -> None:
         if self._progress is not None:
             self._progress(min(1.0, self._done / self._total), *doing)
 
@@ -354,36 +321,24 @@ def enlarged(image: Image, size: tuple[int, int]) -> Image:
 class Bench:
     """One volume with one transfer function in one window: VDIs of it, our raycaster and VTK's.
 
-    Frames are timed with steps of one voxel. Pictures are compared with those of our raycaster at
-    shorter steps, which are also those that VDIs are generated with.
+    Frames are timed with steps of one ``voxel``. Pictures are compared with those of our raycaster
+    at shorter steps, half a voxel unless ``sample_distance`` is given, which are also those
+    that VDIs are generated with. VTK's mappers are "raycast alone", in windows of their own without
+    multisampling: ``vtk`` holds those that take part, by the keys of :data:`CANDIDATES`, and
+    ``left_out`` the errors of those that cannot.
 
     Parameters
     ----------
-    volume : Volume
-        The scalars.
-    table : TransferFunction
-        How they look.
+    volume, table : Volume, TransferFunction
+        The scalars, and how they look.
     window_size : (int, int)
         Of all frames, pixels.
-    device : optional
-        OpenCL device of ours.
-    vtk : bool
-        Whether VTK's mappers take part ("raycast alone": their own windows, no multisampling).
+    device, vtk : optional
+        OpenCL device of ours, and whether VTK's mappers take part.
     view : Camera, optional
         V_O; the view that the volume fills unless given.
-    sample_distance : float, optional
-        The step of comparisons and generation, model units; half a voxel unless given.
     volume_property : vtkVolumeProperty, optional
         How the volume looks to VTK; as `table` says unless given.
-
-    Attributes
-    ----------
-    voxel, step : float
-        Steps of timed frames, and of comparisons and generation; model units.
-    vtk : dict of str to VTKBaseline
-        VTK's mappers that take part, by the keys of :data:`CANDIDATES`.
-    left_out : dict of str to VDIError
-        Those that cannot, and why.
     """
 
     def __init__(
@@ -407,6 +362,7 @@ class Bench:
         self.left_out: dict[str, VDIError] = {}
         self._media: dict[tuple[float, bool], DeviceVolume] = {}
         self._references: dict[Camera, Image] = {}
+        self._near: dict[Camera, dict[str, float]] = {}
         self._open = ExitStack()
         if vtk:
             self._open_vtk(volume_property)
@@ -420,15 +376,9 @@ class Bench:
         self, window_size: tuple[int, int] | None = None, view: Camera | None = None, **options: Any
     ) -> VDI:
         """Generate a VDI, by default from V_O in the bench's window and step."""
-        options = {"sample_distance": self.step, **options}
-        return generate_vdi(
-            self.volume,
-            view or self.view,
-            window_size or self.size,
-            self.table,
-            device=self.runtime,
-            **options,
-        )
+        options = {"sample_distance": self.step, "device": self.runtime, **options}
+        place = view or self.view, window_size or self.size
+        return generate_vdi(self.volume, *place, self.table, **options)
 
     def timed_generation(
         self,
@@ -437,8 +387,6 @@ class Bench:
         *,
         before: Mapping[str, Step] | None = None,
         forms: Sequence[str] = (),
-        clocks: Mapping[str, Callable[[], float]] = WALL,
-        done: Callable[[], object] = lambda: None,
         **options: Any,
     ) -> tuple[dict[str, VDI], dict[str, Times]]:
         """Generate a VDI as often as is timed, in turn with other work; kernels are compiled first.
@@ -458,10 +406,7 @@ class Bench:
         self.generate(WARM_UP_SIZE, **options)
         packing = {form: partial(pack, form) for form in forms if form != "exact"}
         work: dict[str, Step] = {**(before or {}), "generate": generate, **packing}
-        taken = take_turns(
-            work, repeats, runtime=self.runtime, warm_up=False, clocks=clocks, done=done
-        )
-        return made, taken
+        return made, take_turns(work, repeats, runtime=self.runtime, warm_up=False)
 
     def raycast(
         self,
@@ -471,25 +416,28 @@ class Bench:
         **options: Any,
     ) -> Image:
         """Draw the volume as ``render_volume`` does, by default at the step of comparisons."""
-        looks = RenderOptions(**options)
-        frame = FrameRequest(camera, window_size or self.size, looks, device=self.runtime)
         sampling = MediumOptions(sample_distance=sample_distance or self.step)
+        frame = self._request(camera, window_size, options)
         return raycast_volume(self.volume, self.table, frame, sampling)
+
+    def _request(
+        self, camera: Camera, size: tuple[int, int] | None, options: dict[str, Any]
+    ) -> FrameRequest:
+        looks = RenderOptions(**options)
+        return FrameRequest(camera, size or self.size, looks, device=self.runtime)
 
     def image(self, camera: Camera) -> Image:
         """Draw the volume at the step of comparisons, premultiplied RGBA (H, W, 4)."""
-        return raycast_medium(self._medium(self.step, True), FrameRequest(camera, self.size))
+        return self._volume_frame(camera, self.step)
 
     def reference(self, camera: Camera) -> Image:
         """Return the same picture, kept for other VDIs; a black one raises InvalidArgumentError."""
         if camera not in self._references:
-            image = self.image(camera)
-            if not image.any():
-                raise InvalidArgumentError(
-                    "nothing is to be seen: the transfer function leaves the whole volume "
-                    "transparent"
-                )
-            self._references[camera] = image
+            self._references[camera] = self.image(camera)
+        if not self._references[camera].any():
+            raise InvalidArgumentError(
+                "nothing is to be seen: the transfer function leaves the whole volume transparent"
+            )
         return self._references[camera]
 
     def vtk_image(self, camera: Camera, name: str = "vtk_gpu") -> Image:
@@ -500,23 +448,19 @@ class Bench:
 
     def near_vtk(self, camera: Camera) -> dict[str, float] | None:
         """Return how near our reference and VTK's GPU mapper are; ``None`` where it draws not."""
-        if "vtk_gpu" not in self.vtk:
-            return None
-        try:
-            theirs = self.vtk_image(camera)
-        except VDIError as error:
-            self.left_out["vtk_gpu"] = error
-            del self.vtk["vtk_gpu"]
-            return None
-        return accuracy(self.reference(camera), theirs)
+        if "vtk_gpu" in self.vtk and camera not in self._near:
+            try:
+                self._near[camera] = accuracy(self.reference(camera), self.vtk_image(camera))
+            except DeviceError as error:
+                self.left_out["vtk_gpu"] = error
+                del self.vtk["vtk_gpu"]
+        return self._near.get(camera)
 
     def draw(
         self, vdi: VDI, camera: Camera, window_size: tuple[int, int] | None = None, **options: Any
     ) -> Image:
         """Draw a VDI; premultiplied RGBA (H, W, 4) on the host."""
-        looks = RenderOptions(**options)
-        frame = FrameRequest(camera, window_size or self.size, looks, device=self.runtime)
-        return render_vdi(vdi, frame)
+        return render_vdi(vdi, self._request(camera, window_size, options))
 
     def frames(self, camera: Camera, vdi: VDI | None = None) -> dict[str, Step]:
         """Return what draws a frame, by the keys of :data:`CANDIDATES`.
@@ -527,28 +471,21 @@ class Bench:
         if vdi is not None:
             steps["vdi"] = partial(self.draw, vdi, camera, skip_empty=False)
             steps["vdi_skipping"] = partial(self.draw, vdi, camera)
-        for name, skipping in (("volume", False), ("volume_skipping", True)):
-            medium = self._medium(self.voxel, skipping)
-            steps[name] = partial(raycast_medium, medium, FrameRequest(camera, self.size))
-        for name, baseline in self.vtk.items():
-            steps[name] = partial(self._vtk_frame, baseline, camera)
-        return steps
+        steps["volume"] = partial(self._volume_frame, camera, self.voxel, skip_empty=False)
+        steps["volume_skipping"] = partial(self._volume_frame, camera, self.voxel)
+        return steps | {name: partial(self._vtk_frame, name, camera) for name in self.vtk}
 
-    def _vtk_frame(self, baseline: Any, camera: Camera) -> None:
-        baseline.set_sample_distance(self.voxel)
-        baseline.render(camera)
+    def _vtk_frame(self, name: str, camera: Camera) -> None:
+        self.vtk[name].set_sample_distance(self.voxel)
+        self.vtk[name].render(camera)
 
-    def _medium(self, step: float, skip_empty: bool) -> DeviceVolume:
-        """Return the volume on the device; it stays there with the bench."""
+    def _volume_frame(self, camera: Camera, step: float, *, skip_empty: bool = True) -> Image:
+        """Draw the volume, which stays on the device with the bench."""
         if (step, skip_empty) not in self._media:
-            self._media[step, skip_empty] = DeviceVolume(
-                self.runtime,
-                self.volume,
-                self.table,
-                sample_distance=step,
-                skip_empty=skip_empty,
-            )
-        return self._media[step, skip_empty]
+            given = (self.runtime, self.volume, self.table)
+            medium = DeviceVolume(*given, sample_distance=step, skip_empty=skip_empty)
+            self._media[step, skip_empty] = medium
+        return raycast_medium(self._media[step, skip_empty], FrameRequest(camera, self.size))
 
     def _open_vtk(self, volume_property: Any) -> None:
         from pyvista_vdi.measure.vtk_baselines import (

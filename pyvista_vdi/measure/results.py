@@ -58,44 +58,32 @@ class Results:
 
         Parameters
         ----------
-        kind : str
-            What is measured, such as ``"benchmark"``.
-        plan : mapping
-            All that was chosen, in values that JSON can hold.
+        kind, plan : str, mapping
+            What is measured, such as ``"benchmark"``, and all that was chosen.
         path : path-like, optional
-            The file to write.
+            The file to write, or with ``resume`` to go on with where there is one; it raises
+            InvalidArgumentError if it is none, or of another plan, device or code.
         rooms : iterable of str
             Whose code decides the figures, see :func:`.provenance.provenance`.
         extent : {"whole", "sample"}
             Whether all cases are measured, or some drawn from them.
         device : optional
             The OpenCL device that measures.
-        resume : bool
-            Go on with the file where there is one.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If the file to go on with is none, or of another plan, device or code.
         """
         plan = json.loads(json.dumps(plan))
         system = describe_system(device)
         if resume and path is not None and Path(path).exists():
             return cls.read(path, kind)._checked(plan, system, extent)
-        now = _now()
         head = {"format": FORMAT, "version": VERSION, "kind": kind, "plan": plan, "system": system}
         code = {"measured": provenance(rooms), "extent": extent}
-        data = {**head, **code, "begun": now, "changed": now, "rows": []}
+        data = {**head, **code, "begun": now(), "changed": now(), "rows": []}
         return cls(data, path)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], kind: str | None = None) -> Results:
         """Read a file, which must be of a kind if one is given.
 
-        Raises
-        ------
-        InvalidArgumentError
-            If it cannot be read, or is something else.
+        What cannot be read, or is something else, raises InvalidArgumentError.
         """
         what = f"pyvista-vdi {kind}" if kind else "a measurement"
         try:
@@ -159,17 +147,15 @@ class Results:
 
         Numbers are rounded to :data:`DIGITS`, and infinite ones become null.
         """
-        found = self.row(case)
-        if found is not None:
-            self.data["rows"].remove(found)
         row: dict[str, Any] = json.loads(json.dumps({"case": dict(case), **rounded(figures)}))
-        self.data["rows"].append(row)
+        others = [other for other in self.data["rows"] if other["case"] != row["case"]]
+        self.data["rows"] = [*others, row]
         self.save()
         return row
 
     def save(self) -> None:
         """Write the file, if there is one; a run that is stopped meanwhile leaves the old one."""
-        self.data["changed"] = _now()
+        self.data["changed"] = now()
         if self._path is None:
             return
         head = [f"{json.dumps(n)}: {json.dumps(v)}" for n, v in self.data.items() if n != "rows"]
@@ -212,6 +198,6 @@ def rounded(value: Any) -> Any:
     return value
 
 
-def _now() -> str:
+def now() -> str:
     """Return the date and time, UTC."""
     return datetime.now(timezone.utc).isoformat(timespec="seconds")

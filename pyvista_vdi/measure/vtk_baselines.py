@@ -30,16 +30,8 @@ _WINDOW_REMEDY = (
 class OffScreenVolume:
     """A ``vtkVolume``, or what is one, in an off-screen window, over black.
 
-    Without VTK or an off-screen window MissingDependencyError names the system packages.
-
-    Parameters
-    ----------
-    name : str
-        Who draws it, for messages.
-    actor : vtkVolume
-        With its mapper and property.
-    window_size : (int, int)
-        Pixels.
+    ``name`` says in messages who draws it. Without VTK or an off-screen window
+    MissingDependencyError names the system packages.
     """
 
     def __init__(self, name: str, actor: Any, window_size: tuple[int, int]) -> None:
@@ -77,15 +69,10 @@ class OffScreenVolume:
         A blank one, in which VTK has drawn nothing, raises DeviceError.
         """
         self.render(camera)
-        return self.pixels()
-
-    def pixels(self) -> NDArray[np.float32]:
-        """Return what the window shows, as :meth:`image` does."""
         width, height = self._window.GetSize()
         pixels = _vtk("vtkCommonCore").vtkUnsignedCharArray()
-        front_buffer = 0  # what has been drawn lies in the back buffer, off-screen as well
-        right_eye = 0
-        self._window.GetPixelData(0, 0, width - 1, height - 1, front_buffer, pixels, right_eye)
+        # Of the left eye; what has been drawn lies in the back buffer, off-screen as well
+        self._window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
         bottom_up = _vtk("util.numpy_support").vtk_to_numpy(pixels).reshape(height, width, 3)
         if not bottom_up.any():
             raise DeviceError(
@@ -128,13 +115,12 @@ class VTKBaseline(OffScreenVolume):
     ) -> None:
         if mapper not in MAPPERS:
             raise InvalidArgumentError(f"mapper must be one of {MAPPERS}; got {mapper!r}")
-        core = _vtk("vtkRenderingCore")
+        actor = _vtk("vtkRenderingCore").vtkVolume()
         from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
 
         self._mapper = _make_mapper(mapper)
         self._mapper.SetInputData(volume_to_image(volume))
         self.set_sample_distance(sample_distance)
-        actor = core.vtkVolume()
         actor.SetMapper(self._mapper)
         actor.SetProperty(volume_property)
         super().__init__(f"VTK's {mapper} mapper", actor, window_size)
@@ -142,10 +128,6 @@ class VTKBaseline(OffScreenVolume):
     def set_sample_distance(self, sample_distance: float) -> None:
         """Set the length of a step along the ray, world units."""
         self._mapper.SetSampleDistance(sample_distance)
-
-    def adjust_by_rate(self) -> None:
-        """Let VTK choose fewer rays by the window's desired update rate."""
-        self._mapper.SetAutoAdjustSampleDistances(True)
 
     def set_image_sample_distance(self, distance: float) -> None:
         """Cast a ray for every so many pixels along each edge."""
@@ -175,8 +157,7 @@ def property_from_transfer_function(volume: Volume, table: TransferFunction) -> 
     prop.SetColor(color)
     prop.SetScalarOpacity(opacity)
     prop.SetScalarOpacityUnitDistance(table.unit_distance or volume.default_unit_distance)
-    if table.interpolation == "linear":
-        prop.SetInterpolationTypeToLinear()
+    prop.SetInterpolationType(table.interpolation == "linear")  # VTK_NEAREST_INTERPOLATION is 0
     return prop
 
 
@@ -195,25 +176,19 @@ def add_volume_property(volume: Volume, arguments: Mapping[str, Any]) -> Any:
         prop = plotter.add_volume(grid, show_scalar_bar=False, render=False, **arguments).prop
     finally:
         plotter.close()
-    if interpolation == "linear":
-        prop.SetInterpolationTypeToLinear()
-    else:
-        prop.SetInterpolationTypeToNearest()
+    prop.SetInterpolationType(interpolation == "linear")  # VTK_NEAREST_INTERPOLATION is 0
     return prop
 
 
 def _make_mapper(name: str) -> Any:
-    gpu = name == "gpu"
-    mapper = (
-        _vtk("vtkRenderingVolumeOpenGL2").vtkOpenGLGPUVolumeRayCastMapper()
-        if gpu
-        else _vtk("vtkRenderingVolume").vtkFixedPointVolumeRayCastMapper()
-    )
+    if name == "gpu":
+        mapper = _vtk("vtkRenderingVolumeOpenGL2").vtkOpenGLGPUVolumeRayCastMapper()
+        mapper.SetUseJittering(False)
+    else:
+        mapper = _vtk("vtkRenderingVolume").vtkFixedPointVolumeRayCastMapper()
     mapper.SetAutoAdjustSampleDistances(False)
     mapper.SetLockSampleDistanceToInputSpacing(False)
     mapper.SetImageSampleDistance(1.0)
-    if gpu:
-        mapper.SetUseJittering(False)
     return mapper
 
 

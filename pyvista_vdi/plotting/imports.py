@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.errors import MissingDependencyError
@@ -46,3 +47,11 @@ def import_pyvista() -> Any:
             ) from error
         raise explain_import_error(error) from error
     return pv
+
+
+def read_volume(file: Path) -> Any:
+    """Read a volume by PyVista's readers; MissingDependencyError says how to get them."""
+    import_pyvista()
+    from pyvista_vdi.plotting import volume_files
+
+    return volume_files.read_volume(file)

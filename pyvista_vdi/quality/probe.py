@@ -44,7 +44,7 @@ from pyvista_vdi.quality.tiles import REACH, TileSample, tiles_ssim, window_pixe
 from pyvista_vdi.quality.view_error import ViewErrorEstimator, world_centre
 from pyvista_vdi.raycasting.raycast import render_vdi
 
-#: Tiles that are measured, and their edge in pixels: benchmarks/dial.py.
+#: Tiles that are measured, and their edge in pixels: docs/decisions/dial.md.
 TILES = 9
 TILE_SIZE = 32
 

@@ -43,7 +43,7 @@ from pyvista_vdi.volume.render import picture_room, raycast_medium
 
 Pause: TypeAlias = Callable[[], object]
 
-#: Tiles of an estimate, and their edge in pixels: benchmarks/view_error.py.
+#: Tiles of an estimate, and their edge in pixels: docs/regeneration.md.
 TILES = 16
 TILE_SIZE = 24
 

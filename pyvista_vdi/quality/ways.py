@@ -29,7 +29,7 @@ _NEWEST = 0.4
 #: predictions are no better than that, and nothing may flicker.
 _GAIN, _SAVING = 0.004, 0.25
 #: SSIM lost by a VDI away from V_O where nothing was estimated: the median at 30 degrees of
-#: benchmarks/standard_table.py.
+#: docs/performance.md.
 _UNKNOWN_LOSS = 0.012
 
 

@@ -64,15 +64,15 @@ LEVELS = (
 LEVELS_WITHIN = {
     "io": (
         ("whole_file", "progress"),
-        ("png", "ranges", "vdi_file"),
-        ("deep_exr", "stores"),
+        ("image_stack", "png", "ranges", "vdi_file"),
+        ("deep_exr", "stores", "volumes"),
         ("files",),
     ),
     "vtk_pipeline": (("filters",), ("interaction",), ("drawing",)),
 }
 
 #: Rooms that need VTK or PyVista in order to be imported.
-WITH_VTK = ("vtk_pipeline", "plotting", "paraview", "web.scenes", "measure.rivals.opengl")
+WITH_VTK = ("vtk_pipeline", "plotting", "paraview", "web.scenes")
 
 #: Slow to import, or optional: never loaded by ``import pyvista_vdi``.
 HEAVY = (

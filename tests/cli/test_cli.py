@@ -20,7 +20,7 @@ from fresh_python import PATIENCE
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
 from pyvista_vdi.cli import parser
-from pyvista_vdi.measure.volumes import read_file
+from pyvista_vdi.io.volumes import read_file
 from pyvista_vdi.model.standard_cases import filling_camera
 
 VERBS = tuple(parser._VERBS)

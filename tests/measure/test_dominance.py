@@ -138,41 +138,31 @@ def test_too_few_repetitions_show_nothing():
 
 def test_gains_must_outweigh_losses():
     # Better by 1.1 of what does not count in one figure, worse by 0.9 in each of two
-    one = exact(0, 0.9, 0.9, tolerance=1.0)
     other = exact(1.1, 0, 0, tolerance=1.0)
-    assert not dominates(one, other)
+    assert not dominates(exact(0, 0.9, 0.9, tolerance=1.0), other)
     assert dominates(exact(0, 0.5, 0.5, tolerance=1.0), other)
 
 
-def test_circles_of_small_differences_leave_somebody():
-    """Each is better than the next by what counts in one figure, and nowhere worse by it."""
-    a, b, c = (0, 0.5, 1.1), (1.1, 0, 0.5), (0.5, 1.1, 0)
-    for one, other in ((a, b), (b, c), (c, a)):
-        differences = [x - y for x, y in zip(one, other, strict=True)]
-        assert min(differences) < -1
-        assert max(differences) <= 1
-    settings = {n: exact(*v, tolerance=1.0) for n, v in (("a", a), ("b", b), ("c", c))}
-    assert front(settings) == ["a", "b", "c"]
-
-
-def test_equal_settings_do_not_dominate_each_other():
-    assert find_dominated({"a": exact(1, 2), "b": exact(1, 2)}) == {}
-    assert find_dominated({}) == {}
-    assert front({}) == []
-
-
-def test_those_on_the_front_are_named():
-    found = find_dominated({"c": exact(3, 3), "b": exact(2, 2), "a": exact(1, 1)})
-    assert found == {"c": ["a"], "b": ["a"]}
-
-
-def test_a_chain_of_neighbours_does_not_lead_away():
-    """Each has much of one figure for a little of another; the ends are far apart."""
-    chain = {str(i): exact(-2 * i, 0.9 * i, tolerance=1.0) for i in range(9)}
-    for i in range(8):
-        assert dominates(chain[str(i + 1)], chain[str(i)])
-    assert front(chain) == ["0", "2", "4", "6", "8"]
-    assert find_dominated(chain)["1"] == ["2"]
+@pytest.mark.parametrize(
+    ("settings", "kept", "by"),
+    [
+        pytest.param([(1, 2), (1, 2)], [0, 1], {}, id="equal"),
+        pytest.param([], [], {}, id="none"),
+        pytest.param([(12, 12), (8, 8), (4, 4)], [2], {0: [2], 1: [2]}, id="named by the front"),
+        # Each is better than the next by what counts in one figure, and nowhere worse by it
+        pytest.param(
+            [(0, 0.5, 1.1), (1.1, 0, 0.5), (0.5, 1.1, 0)], [0, 1, 2], {}, id="in a circle"
+        ),
+        # Each has much of one figure for a little of another; the ends are far apart
+        pytest.param(
+            [(-2 * i, 0.9 * i) for i in range(5)], [0, 2, 4], {1: [2], 3: [4]}, id="in a chain"
+        ),
+    ],
+)
+def test_a_front_and_what_it_dominates(settings, kept, by):
+    named = {str(i): exact(*values, tolerance=1.0) for i, values in enumerate(settings)}
+    assert front(named) == [str(i) for i in kept]
+    assert find_dominated(named) == {str(i): [str(one) for one in ones] for i, ones in by.items()}
 
 
 @pytest.mark.parametrize(("value", "tolerance"), [(math.nan, 1), (math.inf, 1), (1, 0), (1, -1)])

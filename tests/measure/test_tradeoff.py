@@ -1,33 +1,24 @@
-"""The tradeoff: sweeps, tiny runs end to end, going on, refusing, and what figures come to.
-
-Its tiny runs and made-up results serve every test: hence more than 500 lines.
-"""
+"""The tradeoff: sweeps, tiny runs, and what is made of their figures."""
 
 from __future__ import annotations
 
+import copy
 import itertools
 import json
 import math
-import os
-import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from fresh_python import PATIENCE, run_bare
-from json_schema import faults, read_checked
+from json_schema import faults
+from measured import SCHEMA, checked, made_up_results
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
-from pyvista_vdi.cli import parser
-from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
-from pyvista_vdi.measure import session as shared
-from pyvista_vdi.measure.tradeoff import AXES, Setting, Tradeoff, measure_tradeoff, session, sweep
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.measure.paper.datasets import look
+from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.tradeoff import AXES, Setting, Tradeoff, measure_tradeoff, sweep
 from pyvista_vdi.measure.tradeoff.settings import DEFAULT_AXES, ON_REQUEST, PAIRS, QUICK_AXES
-
-SCHEMA = Path(__file__).parents[2] / "docs" / "tradeoff_schema.json"
 
 TINY_SWEEP = ("max-supersegments=2", "precision=8-byte", "preview=0.5", "skip-empty")
 TINY_RUN = ("--size", "32x24", "--angles", "0,30", "--repeats", "2", "--generations", "1")
@@ -49,30 +40,23 @@ def folder(tmp_path_factory):
     return path
 
 
-def checked(path):
-    """Read results after holding them to the schema."""
-    return read_checked(path, SCHEMA)
+def settings_of(results):
+    """Return the rows of settings by what they change."""
+    return {
+        " ".join(str(v) for n, v in row["case"].items() if n in AXES): row
+        for row in results.rows(what="setting")
+    }
 
 
 def tradeoff(*arguments):
     return cli.main(["tradeoff", *(str(a) for a in arguments)])
 
 
-def names(entries):
-    return [entry["name"] for entry in entries]
-
-
-# -- sweeps ----------------------------------------------------------------------------------------
-
-
 def test_the_default_is_what_generate_does():
     setting, defaults = Setting(), pvdi.generate.__kwdefaults__
-    assert setting.max_supersegments == defaults["max_supersegments"]
-    assert setting.tolerance == defaults["tolerance"]
-    assert setting.view_cone == defaults["view_cone"]
-    assert setting.criterion == defaults["criterion"]
-    assert setting.name == "default"
-    assert setting.changes == {}
+    for name in ("max_supersegments", "tolerance", "view_cone", "criterion"):
+        assert getattr(setting, name) == defaults[name]
+    assert (setting.name, setting.changes) == ("default", {})
 
 
 def test_the_default_sweep_changes_one_thing_or_a_pair():
@@ -90,13 +74,8 @@ def test_the_default_sweep_changes_one_thing_or_a_pair():
 
 def test_pairs_need_both_axes():
     settings = sweep({"lists": (2.0,), "precision": ("8-byte",), "tolerance": (0.1,)})
-    assert [setting.name for setting in settings] == [
-        "default",
-        "lists x2",
-        "8-byte",
-        "tolerance 0.1",
-        "lists x2, 8-byte",
-    ]
+    names = ["default", "lists x2", "8-byte", "tolerance 0.1", "lists x2, 8-byte"]
+    assert [setting.name for setting in settings] == names
     assert len(sweep({"lists": (2.0,), "precision": ("8-byte",)}, pairs=False)) == 3
 
 
@@ -106,8 +85,6 @@ def test_a_product_has_every_combination():
     assert combinations == set(itertools.product((20, 5, 10), (True, False)))
     base = Setting(lists=2.0, precision="8-byte")
     assert sweep({"tolerance": (0.1,)}, base=base)[1].name == "tolerance 0.1, lists x2, 8-byte"
-    with pytest.raises(InvalidArgumentError, match="has 1001 settings, more than 500"):
-        sweep({"tolerance": [i / 1000 for i in range(1, 1001)]})
 
 
 def test_what_is_chosen_after_generation_shares_a_vdi():
@@ -116,59 +93,56 @@ def test_what_is_chosen_after_generation_shares_a_vdi():
 
 
 @pytest.mark.parametrize(
-    ("values", "message"),
+    ("make", "values", "message"),
     [
-        ({"max_supersegments": 0}, "from 1 to 4096; got 0"),
-        ({"precision": "4-byte"}, "precision must be one of exact, 16-byte, 8-byte"),
-        ({"criterion": "depth"}, "criterion must be one of least-error"),
-        ({"lists": 0.0}, "lists must be from 0.05 to 8; got 0.0"),
-        ({"preview": 1.5}, "preview must be from 0.02 to 1; got 1.5"),
-        ({"tolerance": math.nan}, "tolerance must be from 0 to 1e"),
-        ({"view_cone": 91.0}, "view_cone must be from 0 to 90"),
+        (Setting, {"max_supersegments": 0}, "from 1 to 4096; got 0"),
+        (Setting, {"precision": "4-byte"}, "precision must be one of exact, 16-byte, 8-byte"),
+        (Setting, {"criterion": "depth"}, "criterion must be one of least-error"),
+        (Setting, {"lists": 0.0}, "lists must be from 0.05 to 8; got 0.0"),
+        (Setting, {"preview": 1.5}, "preview must be from 0.02 to 1; got 1.5"),
+        (Setting, {"tolerance": math.nan}, "tolerance must be from 0 to 1e"),
+        (Setting, {"view_cone": 91.0}, "view_cone must be from 0 to 90"),
+        (sweep, {"axes": ["size"]}, "no axis 'size': known are max_supersegments"),
+        (
+            sweep,
+            {"axes": {"tolerance": np.linspace(0.001, 1, 1000)}},
+            "has 1001 settings, more than 500",
+        ),
     ],
 )
-def test_settings_are_checked(values, message):
+def test_settings_and_sweeps_are_checked(make, values, message):
     with pytest.raises(InvalidArgumentError, match=message):
-        Setting(**values)
-
-
-def test_unknown_axes_are_named():
-    with pytest.raises(InvalidArgumentError, match="no axis 'size': known are max_supersegments"):
-        sweep(["size"])
-
-
-# -- a run -----------------------------------------------------------------------------------------
+        make(**values)
 
 
 def test_a_tiny_run_writes_what_the_schema_says(runtime, folder, tmp_path, capsys):
     device = ("--device", runtime.info.selector)
     run = (folder / "ball.npy", *TINY_RUN, "--sweep", *TINY_SWEEP, "--no-vtk", *device)
     assert tradeoff(*run, "--out", tmp_path) == 0
-    data = checked(tmp_path / "tradeoff-ball.json")
-    assert names(data["points"]) == ["default", "N_S 2", "8-byte", "preview x0.5", "no skipping"]
-    points = {point["name"]: point for point in data["points"]}
+    results = checked(tmp_path / "tradeoff-ball.json")
+    points = settings_of(results)
+    assert set(points) == {"", "2", "8-byte", "0.5", "False"}
     for point in points.values():
-        assert point["refused"] is None
-        assert [row["angle"] for row in point["angles"]] == [0, 30]
-        for row in point["angles"]:
-            for taken in (row["seconds"], row["volume_seconds"]):
+        assert [view["angle"] for view in point["angles"]] == [0, 30]
+        for view in point["angles"]:
+            for taken in (view["seconds"], view["volume_seconds"]):
                 assert len(taken["clock"]) == len(taken["device"]) == 2
         assert len(point["generation"]["seconds"]["clock"]) == 1
     # From V_O a VDI loses nothing, whatever the budget
-    for name in ("default", "N_S 2", "no skipping"):
+    for name in ("", "2", "False"):
         assert points[name]["angles"][0]["to_volume"]["ssim"] > 0.9999
     # Skipping changes no bit
-    for row, other in zip(
-        points["default"]["angles"], points["no skipping"]["angles"], strict=True
-    ):
-        assert row["to_volume"] == other["to_volume"]
-    assert points["N_S 2"]["vdi"]["longest_list"] == 2
-    assert points["8-byte"]["vdi"]["bytes_memory"] < points["default"]["vdi"]["bytes_memory"]
+    near = [[view["to_volume"] for view in points[name]["angles"]] for name in ("", "False")]
+    assert near[0] == near[1]
+    assert points["2"]["vdi"]["longest_list"] == 2
+    assert points["8-byte"]["vdi"]["bytes_memory"] < points[""]["vdi"]["bytes_memory"]
     assert points["8-byte"]["generation"]["packing"] is not None
     # What differs only after generation shares a VDI
-    assert points["preview x0.5"]["vdi"] == points["default"]["vdi"]
-    assert points["preview x0.5"]["generation"] == points["default"]["generation"]
-    assert points["N_S 2"]["generation"] != points["default"]["generation"]
+    assert points["0.5"]["vdi"] == points[""]["vdi"]
+    assert points["0.5"]["generation"] == points[""]["generation"]
+    assert points["2"]["generation"] != points[""]["generation"]
+    names = [one.name for one in Tradeoff.read(tmp_path / "tradeoff-ball.json").points]
+    assert names == ["default", "N_S 2", "8-byte", "preview x0.5", "no skipping"]
     text = (tmp_path / "tradeoff-ball.md").read_text()
     assert "| preview x0.5 |" in text
     assert "Not measured" not in text
@@ -182,7 +156,6 @@ def test_python_and_the_command_measure_the_same(default_runtime, folder, tmp_pa
     run = (folder / "ball_20x18x14_uint8.raw", *TINY_RUN, "--sweep", "lists=0.5", "--no-vtk")
     assert tradeoff(*run, "--out", tmp_path, "--device", default_runtime.info.selector) == 0
     commanded = Tradeoff.read(tmp_path / "tradeoff-ball_20x18x14_uint8.json")
-    table = pvdi.measure.volumes.look("ramp", (0.0, 255.0), "nearest")
     ours = measure_tradeoff(
         pvdi.Volume(shell()),
         sweep({"lists": (0.5,)}),
@@ -191,7 +164,7 @@ def test_python_and_the_command_measure_the_same(default_runtime, folder, tmp_pa
         repeats=1,
         generations=1,
         vtk=False,
-        transfer_function=table,
+        transfer_function=look("ramp", (0.0, 255.0), "nearest"),
         device=default_runtime,
     )
     assert [one.name for one in ours.points] == ["default", "lists x0.5"]
@@ -209,161 +182,13 @@ def test_python_and_the_command_measure_the_same(default_runtime, folder, tmp_pa
 def test_vtk_takes_part(default_runtime, folder, tmp_path):
     run = (folder / "ball.npy", *TINY_RUN, "--sweep", "skip-empty", "--interpolation", "linear")
     assert tradeoff(*run, "--out", tmp_path, "--device", default_runtime.info.selector) == 0
-    data = checked(tmp_path / "tradeoff-ball.json")
-    assert data["left_out"] == {}
-    for row in data["baselines"]:
+    results = checked(tmp_path / "tradeoff-ball.json")
+    for row in results.rows(what="volume rendering"):
+        assert row["left_out"] == {}
         assert {"vtk_gpu", "vtk_fixed_point"} < set(row["seconds"])
         assert row["volume_to_vtk_gpu"]["ssim"] > 0.95
-    assert data["system"]["opengl"]
+    assert results.data["system"]["opengl"]
     assert "VTK GPU | VTK fixed point" in (tmp_path / "tradeoff-ball.md").read_text()
-
-
-def test_the_engine_alone_can_run_it(default_runtime, folder, tmp_path):
-    for file in ("ball.npy", "ball_20x18x14_uint8.raw"):
-        out = ["--out", str(tmp_path), "--sweep", "precision=8-byte"]
-        arguments = ["tradeoff", str(folder / file), *TINY_RUN, *out]
-        result = run_bare(arguments)
-        assert result.returncode == 0, result.stderr
-        assert "VTK is not installed: its mappers are left out" in result.stderr
-        stem = f"tradeoff-{file.split('.')[0]}"
-        assert checked(tmp_path / f"{stem}.json")["plan"]["vtk"] is False
-        assert not (tmp_path / f"{stem}.png").exists()
-
-
-# -- stopping, going on, refusing ------------------------------------------------------------------
-
-
-def test_an_interrupted_run_can_be_gone_on_with(
-    default_runtime, folder, tmp_path, monkeypatch, capsys
-):
-    sweep_two = ("--sweep", "max-supersegments=2,3", "precision=8-byte", "--name", "two")
-    run = (folder / "ball.npy", *TINY_RUN, *sweep_two, "--no-vtk", "--out", tmp_path)
-    out = tmp_path / "tradeoff-two.json"
-    whole = session._Run._group
-
-    def interrupted(self, generated, settings):
-        if generated.max_supersegments == 3:
-            raise KeyboardInterrupt
-        return whole(self, generated, settings)
-
-    monkeypatch.setattr(session._Run, "_group", interrupted)
-    assert tradeoff(*run) == 130
-    assert "--resume goes on" in capsys.readouterr().err
-    first = checked(out)
-    assert names(first["points"]) == ["default", "N_S 2", "8-byte"]
-    assert first["findings"] is None
-    assert [path.name for path in tmp_path.iterdir()] == [out.name]
-
-    monkeypatch.setattr(session._Run, "_group", whole)
-    assert tradeoff(*run) == 1
-    assert "--resume goes on with it, or choose another --out" in capsys.readouterr().err
-    assert tradeoff(*run, "--resume") == 0
-    second = checked(out)
-    assert names(second["points"]) == ["default", "N_S 2", "N_S 3", "8-byte"]
-    kept = [point for point in second["points"] if point["name"] != "N_S 3"]
-    assert kept == first["points"]
-    assert second["baselines"] == first["baselines"]
-
-    # Nothing is left to do: nothing is measured
-    monkeypatch.setattr(session._Run, "_group", None)
-    assert tradeoff(*run, "--resume") == 0
-    assert checked(out)["points"] == second["points"]
-
-    assert tradeoff(*run, "--resume", "--angles", "0") == 1
-    assert "holds results for angles = [0.0, 30.0], not [0.0]" in capsys.readouterr().err
-    assert tradeoff(*run, "--resume", "--interpolation", "linear") == 1
-    assert "holds results for interpolation = nearest, not linear" in capsys.readouterr().err
-
-
-@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
-def test_ctrl_c_leaves_no_half_file(folder, default_runtime, tmp_path):
-    """The interrupt comes while the results are written: those of the VDI before stay."""
-    code = (
-        "import sys, time\n"
-        "from pyvista_vdi.cli import main\n"
-        "from pyvista_vdi.measure.tradeoff import results, session\n"
-        "save = results.TradeoffFile.save\n"
-        "def slow(self):\n"
-        "    if self.data['points']:\n"
-        "        print('writing', flush=True); time.sleep(60)\n"
-        "    save(self)\n"
-        "results.TradeoffFile.save = slow\n"
-        "sys.exit(main(sys.argv[1:]))\n"
-    )
-    arguments = (str(folder / "ball.npy"), *TINY_RUN, "--no-vtk", "--out", str(tmp_path))
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, "tradeoff", *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert process.stdout.readline() == "writing\n"
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=PATIENCE)
-    finally:
-        process.kill()
-    assert process.returncode == 130
-    assert err.splitlines()[-1] == "pyvista-vdi: error: interrupted; nothing was left half done"
-    assert "Traceback" not in err
-    assert [path.name for path in tmp_path.iterdir()] == ["tradeoff-ball.json"]
-    data = checked(tmp_path / "tradeoff-ball.json")
-    assert (len(data["baselines"]), data["points"]) == (2, [])
-
-
-def test_a_vdi_beyond_the_device_is_a_refused_row(default_runtime, folder, tmp_path, monkeypatch):
-    whole = shared.generate_vdi
-
-    def too_large(*arguments, max_supersegments, **others):
-        if max_supersegments == 3:
-            raise DeviceMemoryError("the lists need 9 GiB; 'X' allows 1 GiB")
-        return whole(*arguments, max_supersegments=max_supersegments, **others)
-
-    monkeypatch.setattr(shared, "generate_vdi", too_large)
-    run = (*TINY_RUN, "--sweep", "max-supersegments=2,3", "--no-vtk", "--out", tmp_path)
-    assert tradeoff(folder / "ball.npy", *run) == 0
-    data = checked(tmp_path / "tradeoff-ball.json")
-    refused = {point["name"]: point["refused"] for point in data["points"]}
-    assert refused["N_S 3"] == "DeviceMemoryError: the lists need 9 GiB; 'X' allows 1 GiB"
-    assert refused["default"] is None
-    text = (tmp_path / "tradeoff-ball.md").read_text()
-    assert "- N_S 3: DeviceMemoryError: the lists need 9 GiB" in text
-
-
-def test_a_volume_that_is_not_seen_is_refused(default_runtime, tmp_path, capsys):
-    np.save(tmp_path / "zero.npy", np.zeros((4, 4, 4), np.uint8))
-    table = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 0], (0, 1))
-    (tmp_path / "tf.json").write_text(json.dumps(table.to_dict()))
-    looks = ("--transfer-function", tmp_path / "tf.json", "--no-vtk", "--out", tmp_path)
-    assert tradeoff(tmp_path / "zero.npy", *TINY_RUN, *looks) == 1
-    assert "nothing is to be seen at 0 degrees" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--sweep", "size"], "--sweep knows no 'size': known are max-supersegments, tolerance"),
-        (["--sweep", "lists=a"], "--sweep lists takes a number; got 'a'"),
-        (["--sweep", "max-supersegments=1.5"], "takes a whole number; got '1.5'"),
-        (["--sweep", "skip-empty=no"], "--sweep skip-empty takes on or off; got 'no'"),
-        (["--sweep", "precision=4-byte"], "precision must be one of exact, 16-byte, 8-byte"),
-        (["--size", "8x8"], "a window of 8 x 8 has no SSIM: each edge must have 11 pixels"),
-        (["--angles", "5,5"], "an angle is given twice"),
-        (["--angles", "nan"], "angles must be one or more numbers of degrees"),
-        (["--repeats", "2000"], "repeats must be a whole number from 1 to 1000; got 2000"),
-        (["--name", "a/b"], "--name becomes a file's, without a folder; got 'a/b'"),
-        (["--out", "ball.npy"], "the folder ball.npy cannot be made"),
-        (["--cmap", "bone", "--transfer-function", "none.json"], "none.json cannot be read"),
-    ],
-)
-def test_mistakes_are_one_line(arguments, message, folder, capsys, monkeypatch, default_runtime):
-    monkeypatch.chdir(folder)
-    before = sorted(folder.iterdir())
-    assert tradeoff("ball.npy", "--no-vtk", *arguments) == 1
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1
-    assert sorted(folder.iterdir()) == before
 
 
 def test_mistakes_of_the_command_line(capsys):
@@ -375,117 +200,82 @@ def test_mistakes_of_the_command_line(capsys):
 
 @pytest.mark.parametrize("size", [(32, 24, 3), (32.5, 24), 32])
 def test_a_window_that_is_none_is_refused(size):
-    table = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 1], (0, 1))
     with pytest.raises(InvalidArgumentError, match=r"window_size must be \(width, height\)"):
-        measure_tradeoff(pvdi.Volume(shell()), window_size=size, transfer_function=table)
-
-
-def test_a_file_of_another_kind_is_refused(folder, capsys, tmp_path):
-    (tmp_path / "tradeoff-ball.json").write_text('{"format": "pyvista-vdi benchmark"}')
-    assert tradeoff(folder / "ball.npy", "--no-vtk", "--resume", "--out", tmp_path) == 1
-    assert "holds no results: name a file that pyvista-vdi tradeoff has" in capsys.readouterr().err
-
-
-HEADER = b"\x93NUMPY\x01\x00\x28\x00"
+        measure_tradeoff(pvdi.Volume(shell()), window_size=size)
 
 
 @pytest.mark.parametrize(
-    "content",
+    ("options", "names"),
     [
-        b"",
-        b"no array",
-        b"PK\x03\x04",  # an .npz
-        HEADER + b"{'descr': '|u1', 'shape': (3,           ",  # a bracket that is not closed
-        HEADER + b"{'descr': '|u1', b'shape': (3, 4), 2: 1}",  # keys that cannot be sorted
-        HEADER + b"{'descr': '|O', 'fortran_order': 0}     ",
+        (["--sweep", "lists=0.5,2"], ["default", "lists x0.5", "lists x2"]),
+        (["--sweep", "view-cone"], ["default", *(f"view cone {n}" for n in (0, 30, 90))]),
+        (
+            ["--sweep", "lists=2", "precision=8-byte", "--alone"],
+            ["default", "lists x2", "8-byte"],
+        ),
+        (
+            ["--sweep", "lists=2", "skip-empty=off", "--product"],
+            ["default", "no skipping", "lists x2", "lists x2, no skipping"],
+        ),
+        (["--quick"], [setting.name for setting in sweep(QUICK_AXES, pairs=False)]),
+        ([], [setting.name for setting in sweep()]),
     ],
 )
-def test_what_is_no_array_is_refused(content, tmp_path, capsys):
-    (tmp_path / "a.npy").write_bytes(content)
-    assert tradeoff(tmp_path / "a.npy", "--no-vtk", "--out", tmp_path) == 1
-    assert "a.npy cannot be read as an array" in capsys.readouterr().err
+def test_the_options_reach_the_sweep(options, names, folder, tmp_path, monkeypatch):
+    asked = []
+
+    def measure(volume, settings, **others):
+        asked.append((settings, others["window_size"]))
+        return Tradeoff(made_up())
+
+    monkeypatch.setattr("pyvista_vdi.cli.tradeoff.measure_tradeoff", measure)
+    size = ("--window-size", "64x36", "--no-vtk", "--out", tmp_path)
+    assert tradeoff(folder / "ball.npy", *options, *size) == 0
+    ((settings, window),) = asked
+    assert window == (64, 36)
+    assert [setting.name for setting in settings] == names
 
 
-def test_the_options_reach_the_sweep():
-    options = parser.parse(["tradeoff", "a.npy", "--quick", "--window-size", "64x36"])
-    assert options.size == (64, 36)
-    from pyvista_vdi.cli.tradeoff import _settings
-
-    assert {name for s in _settings(options) for name in s.changes} == set(QUICK_AXES)
-    options = parser.parse(["tradeoff", "a.npy", "--sweep", "lists=0.5,2", "view-cone"])
-    expected = ["default", "lists x0.5", "lists x2", "view cone 0", "view cone 30", "view cone 90"]
-    assert [setting.name for setting in _settings(options)] == expected
+STEADY = np.array([1.0, 1.01, 0.99, 1.02, 0.98])
 
 
-# -- what is made of the figures -------------------------------------------------------------------
+def times(median):
+    return {"clock": (median * STEADY).tolist(), "device": []}
 
 
 def made_up(*points, angles=(5.0, 30.0)):
     """Return results of settings given as (setting, frame ratio, SSIM, bytes, generation ratio)."""
-    steady = np.array([1.0, 1.01, 0.99, 1.02, 0.98])
+    rows = []
+    taken = {"volume": times(0.02), "volume_skipping": times(0.01), "vtk_gpu": times(0.03)}
+    for angle in angles:
+        case = {"what": "volume rendering", "volume": "ball", "angle": angle}
+        found = {"volume_to_vtk_gpu": None, "seconds": copy.deepcopy(taken), "left_out": {}}
+        rows.append({"case": case, **found})
+    for setting, frame, ssim, size, made in points:
+        near = {"ssim": ssim, "psnr": 30.0, "worst_pixel": 9.0}
+        lists = {"window_size": [64, 36], "supersegments": 10, "mean_length": 2.0}
+        views = [
+            {
+                "angle": angle,
+                "to_volume": {**near},
+                "seconds": times(frame * 0.01),
+                "volume_seconds": times(0.01),
+            }
+            for angle in angles
+        ]
+        generation = {"seconds": times(made), "packing": None, "volume_seconds": times(1.0)}
+        vdi = {**lists, "longest_list": 4, "bytes_memory": size, "bytes_saved": size // 2}
+        case = {"what": "setting", "volume": "ball", **setting.changes}
+        rows.append({"case": case, "vdi": vdi, "generation": generation, "angles": views})
+    volume = {"name": "ball", "dimensions": [2, 2, 2], "dtype": "uint8", "bytes": 3 * 10**6}
+    plan = {"volume": volume, "looks": {"cmap": "bone"}, "interpolation": "nearest"}
+    plan |= {"window_size": [64, 36], "angles": list(angles), "repeats": 5, "generations": 5}
+    plan |= {"settings": [setting.to_dict() for setting, *_ in points]}
+    return made_up_results("tradeoff", plan, rows)
 
-    def times(median):
-        return {"clock": (median * steady).tolist(), "device": []}
 
-    entries = [
-        {
-            "name": setting.name,
-            "setting": setting.to_dict(),
-            "refused": None,
-            "vdi": {
-                "window_size": [64, 36],
-                "supersegments": 10,
-                "mean_length": 2.0,
-                "longest_list": 4,
-                "bytes_memory": size,
-                "bytes_file": size // 2,
-            },
-            "generation": {
-                "seconds": times(made),
-                "packing": None,
-                "volume_seconds": times(1.0),
-            },
-            "angles": [
-                {
-                    "angle": angle,
-                    "to_volume": {"ssim": ssim, "psnr": 30.0, "worst_pixel": 9.0},
-                    "seconds": times(frame * 0.01),
-                    "volume_seconds": times(0.01),
-                }
-                for angle in angles
-            ],
-        }
-        for setting, frame, ssim, size, made in points
-    ]
-    volume = {"name": "ball", "dimensions": [2, 2, 2], "spacing": [1, 1, 1], "dtype": "uint8"}
-    baseline = {
-        "volume_to_vtk_gpu": None,
-        "seconds": {"volume": times(0.02), "volume_skipping": times(0.01), "vtk_gpu": times(0.03)},
-    }
-    return {
-        "format": "pyvista-vdi tradeoff",
-        "version": 1,
-        "plan": {
-            "volume": {**volume, "bytes": 3 * 10**6},
-            "looks": {"cmap": "bone"},
-            "transfer_function": "0",
-            "interpolation": "nearest",
-            "camera": {},
-            "window_size": [64, 36],
-            "angles": list(angles),
-            "repeats": 5,
-            "generations": 5,
-            "vtk": True,
-            "settings": [setting.to_dict() for setting, *_ in points],
-        },
-        "system": {"device": "a", "driver": "1", "python": "3", "system": "b"},
-        "begun": "x",
-        "changed": "y",
-        "baselines": [{"angle": angle, **baseline} for angle in angles],
-        "left_out": {},
-        "points": entries,
-        "findings": None,
-    }
+def setting_rows(data):
+    return list(Results(data).rows(what="setting"))
 
 
 #: One setting that is best at nothing, and three that are best at something.
@@ -495,6 +285,10 @@ FOUR = (
     (Setting(lists=2.0), 0.80, 0.990, 16_000_000, 20.0),
     (Setting(tolerance=0.1), 0.60, 0.979, 4_100_000, 6.0),
 )
+
+
+#: One that is slower than the volume.
+SLOW = (Setting(lists=4.0), 1.5, 0.995, 64_000_000, 80.0)
 
 
 def test_made_up_figures_are_of_the_schema():
@@ -517,21 +311,20 @@ def test_fronts_and_dominated_settings():
 
 def test_worse_at_one_angle_is_worse():
     data = made_up(*FOUR)
-    (row,) = (row for row in data["points"][3]["angles"] if row["angle"] == 30)
-    row["to_volume"]["ssim"] = 0.9815  # less than the default at 5 degrees, more at 30
+    # Less than the default at 5 degrees, more at 30
+    setting_rows(data)[3]["angles"][1]["to_volume"]["ssim"] = 0.9815
     assert Tradeoff(data).dominated() == {}
 
 
 def test_equal_settings_are_named_once():
-    twin = (Setting(skip_empty=False), *FOUR[0][1:])
-    found = Tradeoff(made_up(*FOUR, twin))
+    found = Tradeoff(made_up(*FOUR, (Setting(skip_empty=False), *FOUR[0][1:])))
     assert "no skipping" not in found.front("memory")
     assert "no skipping" not in found.dominated()
 
 
 def test_what_noise_hides_is_named_once_and_not_dominated():
     data = made_up(*FOUR, (Setting(precision="8-byte"), 0.55, 0.9799, 4_000_000, 5.0))
-    frames = [row["seconds"] for row in data["points"][-1]["angles"]]
+    frames = [row["seconds"] for row in setting_rows(data)[-1]["angles"]]
     for row in frames:
         row["clock"][0] = 0.004  # once faster than the default, in the median a tenth slower
     found = Tradeoff(data)
@@ -545,7 +338,7 @@ def test_what_noise_hides_is_named_once_and_not_dominated():
 
 def test_a_slower_machine_in_one_round_changes_nothing():
     data = made_up(*FOUR)
-    for point in data["points"]:
+    for point in setting_rows(data):
         for row in point["angles"]:
             for name in ("seconds", "volume_seconds"):
                 row[name]["clock"][2] *= 7
@@ -556,14 +349,13 @@ def test_a_slower_machine_in_one_round_changes_nothing():
 
 def test_packing_is_part_of_generation():
     data = made_up(*FOUR)
-    data["points"][0]["generation"]["packing"] = {"clock": [0.5] * 5, "device": []}
-    found = Tradeoff(data).point("default")
-    assert found.generation == pytest.approx(5.5, rel=0.01)
+    setting_rows(data)[0]["generation"]["packing"] = {"clock": [0.5] * 5, "device": []}
+    assert Tradeoff(data).point("default").generation == pytest.approx(5.5, rel=0.01)
 
 
 def test_a_file_that_had_no_room_leaves_the_rest():
     data = made_up(*FOUR)
-    data["points"][2]["vdi"]["bytes_file"] = None
+    setting_rows(data)[2]["vdi"]["bytes_saved"] = None
     found = Tradeoff(data)
     assert found.front("file") == ["N_S 5", "default"]
     assert found.front("memory") == ["N_S 5", "default", "lists x2"]
@@ -577,16 +369,12 @@ def test_the_table_says_where_volumes_win():
     # Without skipping twice as slow, VTK three times; nobody is slower than either
     assert "| 5 | 10 | 2.00 | 3.00 | - | 0.50 | 0 of 4 | 0 of 4 |" in text
     assert "- tolerance 0.1: by default" in text
-    slow = (Setting(lists=4.0), 1.5, 0.995, 64_000_000, 80.0)
-    text = Tradeoff(made_up(*FOUR, slow)).table()
+    text = Tradeoff(made_up(*FOUR, SLOW)).table()
     assert "| 0.50 | 1 of 5 | 0 of 5 |" in text
     rows = [line for line in text.splitlines() if line.startswith("| N_S 5 | 0.40")]
-    header = next(line for line in text.splitlines() if line.startswith("| setting | frame /"))
+    heads = [line for line in text.splitlines() if line.startswith("| setting | frame /")]
     assert len(rows) == 2  # in the front, and among all
-    assert max(row.count("|") for row in rows) == max(header.count("|"), rows[-1].count("|"))
-
-
-# -- the plot --------------------------------------------------------------------------------------
+    assert [row.count("|") for row in rows] == [head.count("|") for head in heads]
 
 
 def labels(figure):
@@ -608,15 +396,10 @@ def test_the_plot_names_the_front_and_no_names_overlap():
     pytest.importorskip("matplotlib")
     rng = np.random.default_rng(5)
     # A front of fifteen settings close together, as a full sweep has it
+    dense = [Setting(max_supersegments=n, lists=2.0, precision="8-byte") for n in range(2, 17)]
     crowd = [
-        (
-            Setting(max_supersegments=n, lists=2.0, precision="8-byte"),
-            0.3 * 1.06**i,
-            0.97 + 0.0011 * i,
-            int(1e6 * 1.1**i),
-            4 * 1.06**i,
-        )
-        for i, n in enumerate(range(2, 17))
+        (setting, 0.3 * 1.06**i, 0.97 + 0.0011 * i, int(1e6 * 1.1**i), 4 * 1.06**i)
+        for i, setting in enumerate(dense)
     ]
     dominated = [
         (Setting(tolerance=float(t)), 1.0, 0.96, 9_000_000, 9.0) for t in rng.uniform(0, 1, 6)
@@ -624,22 +407,24 @@ def test_the_plot_names_the_front_and_no_names_overlap():
     found = Tradeoff(made_up(*crowd, *dominated))
     figure = found.plot()
     figure.canvas.draw()
-    for panel, kind in zip(labels(figure), ("frame", "memory", "generation"), strict=True):
-        assert list(panel) == found.front(kind)
-        assert len(panel) == 15
-        for (a, one), (b, other) in itertools.combinations(panel.items(), 2):
+    kinds = ("frame", "memory", "generation")
+    for panel, boxes, kind in zip(figure.axes, labels(figure), kinds, strict=True):
+        assert list(boxes) == found.front(kind)
+        assert len(boxes) == 15
+        for (a, one), (b, other) in itertools.combinations(boxes.items(), 2):
             assert not one.overlaps(other), (kind, a, b)
-    for panel in figure.axes:
         inside = panel.get_window_extent()
-        for box in labels(figure)[figure.axes.index(panel)].values():
+        for box in boxes.values():
             assert inside.x0 <= box.x0 <= box.x1 <= inside.x1
             assert inside.y0 <= box.y0 <= box.y1 <= inside.y1
 
 
 def test_the_limits_do_not_overlap_either():
     pytest.importorskip("matplotlib")
-    data = made_up(*FOUR, (Setting(lists=4.0), 1.5, 0.995, 64_000_000, 80.0))
-    for row in data["baselines"]:  # VTK is nearly as fast as render_volume
+    data = made_up(*FOUR, SLOW)
+    for row in Results(data).rows(
+        what="volume rendering"
+    ):  # VTK is nearly as fast as render_volume
         row["seconds"]["vtk_gpu"]["clock"] = [0.0101] * 5
     figure = Tradeoff(data).plot()
     figure.canvas.draw()
@@ -656,7 +441,7 @@ def test_the_plot_is_written_whole(tmp_path):
     path = Tradeoff(made_up(*FOUR)).save_plot(tmp_path / "a.png")
     assert path.read_bytes().startswith(b"\x89PNG")
     with pytest.raises(InvalidArgumentError, match="nothing was measured"):
-        Tradeoff({**made_up(*FOUR), "points": []}).plot()
+        Tradeoff(made_up()).plot()
 
 
 def test_exact_pictures_can_be_drawn():

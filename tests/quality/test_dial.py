@@ -379,7 +379,7 @@ def test_no_squares_are_seen_in_a_smooth_field(default_runtime):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", pvdi.examples.WHOLE)
 def test_high_quality_shows_no_squares_of_any_volume(default_runtime, name):
-    """The true figure of what the dial makes; all looks and rungs: benchmarks/dial.py."""
+    """The true figure of what the dial makes; all looks: benchmarks/accuracy.py."""
     volume, window = require_data(name), (416, 442)
     camera = filling_camera(volume.bounds, window)
     looks = dict(TRANSFER_FUNCTIONS["soft"])

@@ -7,6 +7,7 @@ supersegments in 1280 x 720; at other sizes it promises nothing.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -63,16 +64,7 @@ FRAME_RATIO_VOXELS = 256**3
 class Check:
     """One figure beside its bound.
 
-    Parameters
-    ----------
-    name : str
-        What is bounded.
-    value : float
-        What was measured.
-    sense : {">=", "<=", "<"}
-        How the value must stand to the bound.
-    bound : float
-        The bound.
+    ``sense`` says how the value must stand to the bound.
     """
 
     name: str
@@ -83,9 +75,9 @@ class Check:
     @property
     def passed(self) -> bool:
         """Whether the bound is kept; a value that is not a number does not keep it."""
-        if self.sense == ">=":
-            return self.value >= self.bound
-        return self.value <= self.bound if self.sense == "<=" else self.value < self.bound
+        return {">=": operator.ge, "<=": operator.le, "<": operator.lt}[self.sense](
+            self.value, self.bound
+        )
 
     def __str__(self) -> str:
         verdict = "reached" if self.passed else "MISSED"
@@ -95,19 +87,9 @@ class Check:
 def judge_vdi(report: Report, volume: str, transfer_function: str) -> list[Check]:
     """Hold the VDI's pictures, against our volume raycaster's, to the bounds of a standard case.
 
-    Parameters
-    ----------
-    report : Report
-        What :func:`pyvista_vdi.measure.compare.measure` found, with or without VTK and timings.
-    volume : str
-        Name of the volume, a key of :data:`pyvista_vdi.examples.VOLUMES`.
-    transfer_function : str
-        A key of :data:`pyvista_vdi.model.standard_cases.TRANSFER_FUNCTIONS`.
-
-    Returns
-    -------
-    list of Check
-        The bounds that apply to what was measured; other angles have none.
+    The case is named by keys of :data:`pyvista_vdi.examples.VOLUMES` and
+    :data:`pyvista_vdi.model.standard_cases.TRANSFER_FUNCTIONS`. Returns the bounds that apply to
+    what was measured; other angles have none.
     """
     checks = []
     for result in report.angles:
@@ -131,12 +113,7 @@ def judge_vtk(report: Report, transfer_function: str) -> list[Check]:
     """Hold our volume raycaster to its bounds against VTK's GPU mapper, at every angle measured.
 
     They are meant for converged steps: :data:`CONVERGED_STEPS` a voxel where half a voxel is not
-    enough. Arguments as for :func:`judge_vdi`.
-
-    Returns
-    -------
-    list of Check
-        The bounds that apply; none where VTK took no part.
+    enough. Arguments and result as of :func:`judge_vdi`; none without VTK.
     """
     checks = []
     for result in report.angles:
@@ -156,18 +133,11 @@ def judge_vtk(report: Report, transfer_function: str) -> list[Check]:
 
 
 def judge_times(report: Report, volume: str) -> list[Check]:
-    """Hold a report's times to the bounds; arguments as for :func:`judge_vdi`.
-
-    Returns
-    -------
-    list of Check
-        The bounds that apply; none where nothing was timed.
-    """
+    """Hold a report's times to the bounds; arguments and result as of :func:`judge_vdi`."""
     checks = []
     if report.generation_ratio is not None:
-        checks.append(
-            Check("generation / raycast", report.generation_ratio, "<=", GENERATION_RATIO)
-        )
+        bound = GENERATION_RATIO
+        checks.append(Check("generation / raycast", report.generation_ratio, "<=", bound))
     if math.prod(report.case["dimensions"]) < FRAME_RATIO_VOXELS or volume in BINARY_SOLID:
         return checks
     for result in report.angles:

@@ -1,48 +1,42 @@
 """The measurement: who is compared with whom, at which steps, and how it is timed.
 
 Pictures are compared at the accuracy step (half the smallest spacing unless given), frames are
-timed with steps of one voxel in every volume renderer, as the design's section 7 says. Each
-timing is a ratio to something measured in the same run: the candidates take turns, after one
-frame each that is not counted, and the median is reported.
+timed with steps of one voxel in every volume renderer (``docs/conventions.md``). The candidates
+take turns, after one frame each that is not counted, and the median is reported.
 """
 
 from __future__ import annotations
 
+import math
+import os
 import statistics
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.clock import Step, Times, take_turns
-from pyvista_vdi.measure.report import describe_system
-from pyvista_vdi.measure.results import rounded as without_infinities
-from pyvista_vdi.measure.session import (
+from pyvista_vdi.measure.harness import (
+    ROOMS,
     WARM_UP_SIZE,
+    Bench,
+    Case,
     Image,
     Steps,
     check_angles,
     check_count,
-    seen,
 )
-from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.measure.report import describe_system
+from pyvista_vdi.measure.results import Results, now
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.metrics import Comparison, compare_images
-from pyvista_vdi.model.options import MediumOptions
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
-from pyvista_vdi.model.standard_cases import ANGLES, WINDOW_SIZE, filling_camera
+from pyvista_vdi.model.standard_cases import ANGLES, WINDOW_SIZE
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.prepared import prepared_vdi
-from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.volume.classified_volume import checked_sample_distance
-from pyvista_vdi.volume.render import raycast_volume
 
 #: What takes part, by the keys of :attr:`AngleResult.seconds` and of the pictures.
 NAMES = {
@@ -51,11 +45,6 @@ NAMES = {
     "gpu": "VTK GPU mapper",
     "fixed_point": "VTK fixed-point mapper",
 }
-
-#: What to do where the volume is not seen.
-_TRANSPARENT = (
-    ": the transfer function leaves the whole volume transparent; choose another opacity or clim"
-)
 
 #: Bytes of a supersegment in the dense, uncompressed form that sizes are compared with.
 _DENSE_BYTES = 24
@@ -71,22 +60,16 @@ class Settings:
     ----------
     classification : mapping
         Classification arguments, those of :func:`pyvista_vdi.generate`.
-    window_size : (int, int)
-        Of the VDI and of all frames, pixels.
-    angles : tuple of float
-        New views, degrees of ``Azimuth`` from V_O.
-    max_supersegments : int
-        Longest list.
-    precision : str
-        Of the supersegments, see :meth:`VDI.with_precision`.
+    window_size, angles : tuple
+        Of the VDI and of all frames, pixels; new views, degrees of ``Azimuth`` from V_O.
+    max_supersegments, precision : int, str
+        Longest list, and form of its supersegments, see :meth:`VDI.with_precision`.
     sample_distance : float, optional
         The accuracy step, model units; half the smallest spacing by default.
     repeats : int
         Timed frames of each candidate and view; 0 compares pictures and times nothing.
-    vtk : bool
-        Whether VTK's mappers take part.
-    device : optional
-        OpenCL device of ours.
+    vtk, device : optional
+        Whether VTK's mappers take part, and the OpenCL device of ours.
     name : str
         What the volume and the transfer function are called in the report.
     """
@@ -122,20 +105,11 @@ class Timing:
 
 @dataclass(frozen=True)
 class AngleResult:
-    """What was found at one view.
+    """What was found at one view, degrees from V_O.
 
-    Parameters
-    ----------
-    angle : float
-        Degrees from V_O.
-    vdi_to_raycaster : Comparison
-        The VDI against our volume raycaster.
-    raycaster_to_gpu : Comparison, optional
-        Our volume raycaster against VTK's GPU mapper; ``None`` without VTK.
-    fixed_point_to_gpu : Comparison, optional
-        VTK's fixed-point mapper against VTK's GPU mapper.
-    seconds : dict of str to Timing
-        Frame times at steps of one voxel, by the keys of :data:`NAMES`; empty if not timed.
+    The VDI is compared with our volume raycaster; this one, and VTK's fixed-point mapper, with
+    VTK's GPU mapper, ``None`` without VTK. ``seconds`` are frame times at steps of one voxel, by
+    the keys of :data:`NAMES`; empty if not timed.
     """
 
     angle: float
@@ -147,35 +121,27 @@ class AngleResult:
     @property
     def ratio_to_vtk(self) -> float | None:
         """VDI's frame time over that of the faster of VTK's mappers."""
-        peers = [t.median for name, t in self.seconds.items() if name in ("gpu", "fixed_point")]
-        return self.seconds["vdi"].median / min(peers) if peers else None
+        return self._over("gpu", "fixed_point")
 
     @property
     def ratio_to_raycaster(self) -> float | None:
         """VDI's frame time over that of our volume raycaster."""
-        if not self.seconds:
-            return None
-        return self.seconds["vdi"].median / self.seconds["raycaster"].median
+        return self._over("raycaster")
+
+    def _over(self, *names: str) -> float | None:
+        peers = [self.seconds[name].median for name in names if name in self.seconds]
+        return self.seconds["vdi"].median / min(peers) if peers else None
 
 
 @dataclass(frozen=True)
 class Report:
     """All that was found, ready for JSON by :meth:`to_dict`.
 
-    Parameters
-    ----------
-    case : dict
-        Volume, classification, window, limits, steps.
-    system : dict
-        Device, driver, OpenGL, versions.
-    sizes : dict of str to int
-        Supersegments, lists, and bytes: of the volume, of the VDI in the process's memory
-        and on the device, of its dense form.
-    generation_seconds, full_raycast_seconds : Timing, optional
-        Generation, and our volume raycaster at the same step without early termination; ``None``
-        where nothing was timed.
-    angles : list of AngleResult
-        By view.
+    ``case`` holds volume, classification, window, limits and steps; ``system`` device, driver,
+    OpenGL and versions; ``sizes`` supersegments, lists, and bytes: of the volume, of the VDI in the
+    process's memory and on the device, of its dense form. ``full_raycast_seconds`` are those of our
+    volume raycaster at the step of generation without early termination; ``None`` where nothing was
+    timed. ``angles`` has the results by view, ``begun`` says when the measurement began.
     """
 
     case: dict[str, Any]
@@ -184,6 +150,7 @@ class Report:
     generation_seconds: Timing | None
     full_raycast_seconds: Timing | None
     angles: list[AngleResult] = field(default_factory=list)
+    begun: str | None = None
 
     @property
     def generation_ratio(self) -> float | None:
@@ -192,15 +159,26 @@ class Report:
             return None
         return self.generation_seconds.median / self.full_raycast_seconds.median
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything in values that JSON can hold; infinite and undefined become null."""
+    def results(self, path: str | os.PathLike[str] | None = None) -> Results:
+        """Return everything as the JSON has it: a row of the VDI, and one of each view."""
         described = asdict(self)
-        described["generation_ratio"] = self.generation_ratio
-        for entry, result in zip(described["angles"], self.angles, strict=True):
-            entry["ratio_to_vtk"] = result.ratio_to_vtk
-            entry["ratio_to_raycaster"] = result.ratio_to_raycaster
-        plain: dict[str, Any] = without_infinities(described)
-        return plain
+        plan, angles = described["case"], described["angles"]
+        results = Results.begun("compare", plan, rooms=ROOMS, path=path)
+        results.data |= {"system": self.system, "begun": self.begun or results.data["begun"]}
+        case = partial(Case, plan["name"], window_size=tuple(plan["window_size"]))
+        names = ("generation_seconds", "full_raycast_seconds")
+        times = {name: described[name] for name in names}
+        ratio = {"generation_ratio": self.generation_ratio}
+        results.add(case(what="vdi").to_dict(), **self.sizes, **times, **ratio)
+        for result, figures in zip(self.angles, angles, strict=True):
+            ratios = {n: getattr(result, n) for n in ("ratio_to_vtk", "ratio_to_raycaster")}
+            view = case(angle=figures.pop("angle"), what="view")
+            results.add(view.to_dict(), **figures, **ratios)
+        return results
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the same in values that JSON can hold; infinite and undefined become null."""
+        return self.results().data
 
 
 def measure(
@@ -208,14 +186,7 @@ def measure(
 ) -> tuple[Report, VDI, dict[float, Images]]:
     """Render one volume in every way, compare the pictures and time the frames.
 
-    Parameters
-    ----------
-    volume : Volume
-        What is rendered.
-    settings : Settings
-        How.
-    progress : callable, optional
-        Called with the finished fraction, 0 to 1.
+    ``progress`` is called with the finished fraction, 0 to 1.
 
     Returns
     -------
@@ -228,172 +199,126 @@ def measure(
 
     Raises
     ------
-    MissingDependencyError
-        If VTK takes part and cannot be loaded, or finds no OpenGL.
-    DeviceError
-        If VTK draws nothing, or the OpenCL device fails.
+    MissingDependencyError, DeviceError
+        If VTK takes part and cannot be loaded, or draws nothing; or the OpenCL device fails.
     InvalidArgumentError
         If the transfer function leaves nothing to see.
     """
     looks = Classification(settings.classification, "compare")
-    with ExitStack() as stack:
-        return _Bench(volume, settings, looks, progress).everything(stack)
-
-
-class _Bench:
-    """One volume, one table and one generating view, and everybody who draws them."""
-
-    def __init__(
-        self, volume: Volume, settings: Settings, looks: Classification, progress: Any
-    ) -> None:
-        self._volume, self._settings = volume, settings
-        self._table = looks.transfer_function(volume)
-        self._looks = looks.describe()
-        self.voxel = min(volume.spacing)
-        self.step = checked_sample_distance(volume, settings.sample_distance)
-        self.view = filling_camera(volume.bounds, settings.window_size)
-        self._device = get_runtime(settings.device)
-        self._baselines: dict[str, Any] = {}
-        repeats = settings.repeats
-        a_view = (4 if settings.vtk else 2) * (1 + (1 + repeats if repeats else 0))
-        steps = Steps(progress, 2 * repeats + len(settings.angles) * a_view)
-        self._done = partial(steps, finished=1)
-
-    def everything(self, stack: ExitStack) -> tuple[Report, VDI, dict[float, Images]]:
-        """Generate, draw and time; ``stack`` closes VTK's windows."""
-        settings = self._settings
-        if settings.vtk:
-            self._baselines = _baselines(self._volume, settings, self.step, stack)
-        vdi, generation, full_raycast = self._timed_generation()
-        images = {angle: self._images(vdi, angle) for angle in settings.angles}
-        results = [
-            _judged(angle, images[angle], self._frame_times(vdi, angle))
-            for angle in settings.angles
-        ]
+    steps, begun = Steps(progress, 1 + 2 * len(settings.angles)), now()
+    with Bench(
+        volume,
+        looks.transfer_function(volume),
+        settings.window_size,
+        device=settings.device,
+        vtk=settings.vtk,
+        sample_distance=settings.sample_distance,
+        volume_property=_property(volume, settings) if settings.vtk else None,
+    ) as bench:
+        for error in bench.left_out.values():
+            raise error
+        vdi, times = _generated(bench, settings)
+        steps()
+        images, seconds = {}, {}
+        for angle in settings.angles:
+            images[angle] = _images(bench, vdi, angle)
+            steps()
+        for angle in settings.angles:
+            seconds[angle] = _frame_times(bench, vdi, angle, settings.repeats)
+            steps()
         system = describe_system(settings.device)
-        if self._baselines:
-            system["opengl"] = self._baselines["gpu"].opengl
-        report = Report(self._case(), system, self._sizes(vdi), generation, full_raycast, results)
-        return report, vdi, images
-
-    def _timed_generation(self) -> tuple[VDI, Timing | None, Timing | None]:
-        """Generate the VDI, in turn with a full raycast at the same step where that is timed."""
-        size = self._settings.window_size
-        if self._settings.repeats == 0:
-            return self._generated(size), None, None
-        self._generated(WARM_UP_SIZE)
-        self._raycast(self.view, WARM_UP_SIZE, self.step, early_termination=False)
-        vdi: list[VDI] = []
-
-        def generate() -> None:
-            vdi[:] = [self._generated(size)]
-
-        def raycast() -> None:
-            self._raycast(self.view, size, self.step, early_termination=False)
-
-        work = {"generate": generate, "raycast": raycast}
-        taken = take_turns(work, self._settings.repeats, warm_up=False, done=self._done)
-        return vdi[0], Timing.of(taken["generate"]), Timing.of(taken["raycast"])
-
-    def _images(self, vdi: VDI, angle: float) -> Images:
-        """Render the accurate pictures of one view."""
-        camera, size = self.view.azimuth(angle), self._settings.window_size
-        images: Images = {}
-        for name, baseline in self._baselines.items():
-            baseline.set_sample_distance(self.step)
-            images[name] = baseline.image(camera)
-            self._done()
-        images["raycaster"] = self._raycast(camera, size, self.step)
-        self._done()
-        images["vdi"] = render_vdi(vdi, FrameRequest(camera, size, device=self._device))
-        self._done()
-        seen(images["raycaster"], angle, _TRANSPARENT)
-        return images
-
-    def _frame_times(self, vdi: VDI, angle: float) -> dict[str, Timing]:
-        """Time frames at steps of one voxel."""
-        if self._settings.repeats == 0:
-            return {}
-        camera, size = self.view.azimuth(angle), self._settings.window_size
-        frames: dict[str, Step] = {
-            "vdi": lambda: render_vdi(vdi, FrameRequest(camera, size, device=self._device)),
-            "raycaster": lambda: self._raycast(camera, size, self.voxel),
-        }
-        for name, baseline in self._baselines.items():
-            baseline.set_sample_distance(self.voxel)
-            frames[name] = partial(baseline.render, camera)
-        taken = take_turns(frames, self._settings.repeats, done=self._done)
-        return {name: Timing.of(times) for name, times in taken.items()}
-
-    def _generated(self, size: tuple[int, int]) -> VDI:
-        return generate_vdi(
-            self._volume,
-            self.view,
-            size,
-            self._table,
-            max_supersegments=self._settings.max_supersegments,
-            precision=self._settings.precision,
-            sample_distance=self.step,
-            device=self._device,
-        )
-
-    def _raycast(
-        self, camera: Camera, size: tuple[int, int], step: float, *, early_termination: bool = True
-    ) -> Image:
-        cutoff = TRANSMITTANCE_CUTOFF if early_termination else 0.0
-        # Without skipping: the plain baseline that the paper compares with
-        options = RenderOptions(skip_empty=False, transmittance_cutoff=cutoff)
-        frame = FrameRequest(camera, size, options, device=self._device)
-        sampling = MediumOptions(sample_distance=step)
-        return raycast_volume(self._volume, self._table, frame, sampling)
-
-    def _case(self) -> dict[str, Any]:
-        volume, settings = self._volume, self._settings
-        return {
-            "name": settings.name,
-            "dimensions": list(volume.dimensions),
-            "spacing": list(volume.spacing),
-            "dtype": str(volume.array.dtype),
-            "classification": self._looks,
-            "window_size": list(settings.window_size),
-            "max_supersegments": settings.max_supersegments,
-            "precision": settings.precision,
-            "sample_distance": self.step,
-            "timing_sample_distance": self.voxel,
-            "repeats": settings.repeats,
-            "camera": self.view.to_dict(),
-        }
-
-    def _sizes(self, vdi: VDI) -> dict[str, int]:
-        width, height = self._settings.window_size
-        return {
-            "volume_bytes": self._volume.array.nbytes,
-            "supersegments": vdi.n_supersegments,
-            "occupied_lists": int(np.count_nonzero(vdi.counts)),
-            "lists": width * height,
-            "vdi_bytes": vdi.nbytes,
-            "device_bytes": prepared_vdi(self._device, vdi).list_bytes,
-            "dense_bytes": width * height * self._settings.max_supersegments * _DENSE_BYTES,
-        }
+        if bench.opengl is not None:
+            system["opengl"] = bench.opengl
+        case = {**_case(bench, settings), "classification": looks.describe()}
+        results = [_judged(angle, images[angle], seconds[angle]) for angle in settings.angles]
+        sizes = _sizes(bench, vdi, settings)
+        return Report(case, system, sizes, *times, results, begun), vdi, images
 
 
-def _baselines(volume: Volume, settings: Settings, step: float, stack: ExitStack) -> dict[str, Any]:
-    """Return VTK's mappers, with the property that ``add_volume`` would give them."""
-    from pyvista_vdi.measure.vtk_baselines import MAPPERS, VTKBaseline, add_volume_property
+def _property(volume: Volume, settings: Settings) -> Any:
+    """Return how VTK's mappers see the volume: the property that ``add_volume`` would make."""
+    from pyvista_vdi.measure.vtk_baselines import add_volume_property
 
-    arguments = dict(settings.classification)
+    # Which array it is, has been chosen
+    arguments = {
+        name: value
+        for name, value in settings.classification.items()
+        if name not in ("scalars", "preference")
+    }
     if "transfer_function" in arguments:
         raise InvalidArgumentError(
             "VTK's mappers take no transfer_function: give add_volume's arguments or a "
             "volume_property, or leave VTK out"
         )
-    for name in ("scalars", "preference"):  # the array has been chosen
-        arguments.pop(name, None)
-    prop = arguments.get("volume_property") or add_volume_property(volume, arguments)
-    size = settings.window_size
+    return arguments.get("volume_property") or add_volume_property(volume, arguments)
+
+
+def _generated(bench: Bench, settings: Settings) -> tuple[VDI, tuple[Timing | None, Timing | None]]:
+    """Generate the VDI, in turn with a full raycast at the same step where that is timed."""
+    limit, precision = settings.max_supersegments, settings.precision
+    options: dict[str, Any] = {"max_supersegments": limit, "precision": precision}
+    if settings.repeats == 0:
+        return bench.generate(**options), (None, None)
+    # Without skipping: the plain baseline that the paper compares with
+    whole = partial(bench.raycast, bench.view, skip_empty=False, transmittance_cutoff=0.0)
+    whole(window_size=WARM_UP_SIZE)
+    made, taken = bench.timed_generation(settings.repeats, before={"raycast": whole}, **options)
+    return made["exact"], (Timing.of(taken["generate"]), Timing.of(taken["raycast"]))
+
+
+def _images(bench: Bench, vdi: VDI, angle: float) -> Images:
+    """Render the accurate pictures of one view."""
+    camera = bench.view.azimuth(angle)
+    images = {name.removeprefix("vtk_"): bench.vtk_image(camera, name) for name in bench.vtk}
+    images["raycaster"] = bench.raycast(camera, skip_empty=False)
+    images["vdi"] = bench.draw(vdi, camera)
+    if not images["raycaster"].any():
+        raise InvalidArgumentError(
+            f"nothing is to be seen at {angle:g} degrees: the transfer function leaves the whole "
+            "volume transparent; choose another opacity or clim"
+        )
+    return images
+
+
+def _frame_times(bench: Bench, vdi: VDI, angle: float, repeats: int) -> dict[str, Timing]:
+    """Time frames at steps of one voxel."""
+    if repeats == 0:
+        return {}
+    camera = bench.view.azimuth(angle)
+    frames = bench.frames(camera, vdi)
+    raycast = partial(bench.raycast, camera, None, bench.voxel, skip_empty=False)
+    chosen: dict[str, Step] = {"vdi": frames["vdi_skipping"], "raycaster": raycast}
+    chosen |= {name.removeprefix("vtk_"): frames[name] for name in bench.vtk}
+    taken = take_turns(chosen, repeats)
+    return {name: Timing.of(times) for name, times in taken.items()}
+
+
+def _case(bench: Bench, settings: Settings) -> dict[str, Any]:
     return {
-        name: stack.enter_context(closing(VTKBaseline(volume, prop, size, name, step)))
-        for name in MAPPERS
+        "name": settings.name,
+        "dimensions": list(bench.volume.dimensions),
+        "spacing": list(bench.volume.spacing),
+        "dtype": str(bench.volume.array.dtype),
+        "window_size": list(settings.window_size),
+        "max_supersegments": settings.max_supersegments,
+        "precision": settings.precision,
+        "sample_distance": bench.step,
+        "timing_sample_distance": bench.voxel,
+        "repeats": settings.repeats,
+        "camera": bench.view.to_dict(),
+    }
+
+
+def _sizes(bench: Bench, vdi: VDI, settings: Settings) -> dict[str, int]:
+    lists = math.prod(settings.window_size)
+    return {
+        "volume_bytes": bench.volume.array.nbytes,
+        "supersegments": vdi.n_supersegments,
+        "occupied_lists": int(np.count_nonzero(vdi.counts)),
+        "lists": lists,
+        "vdi_bytes": vdi.nbytes,
+        "device_bytes": prepared_vdi(bench.runtime, vdi).list_bytes,
+        "dense_bytes": lists * settings.max_supersegments * _DENSE_BYTES,
     }
 
 
@@ -402,10 +327,6 @@ def _judged(angle: float, images: Images, seconds: dict[str, Timing]) -> AngleRe
         both = one in images and other in images
         return compare_images(images[one], images[other]) if both else None
 
-    return AngleResult(
-        angle=angle,
-        vdi_to_raycaster=compare_images(images["vdi"], images["raycaster"]),
-        raycaster_to_gpu=compared("raycaster", "gpu"),
-        fixed_point_to_gpu=compared("fixed_point", "gpu"),
-        seconds=seconds,
-    )
+    vdi_to_raycaster = compare_images(images["vdi"], images["raycaster"])
+    to_gpu = compared("raycaster", "gpu"), compared("fixed_point", "gpu")
+    return AngleResult(angle, vdi_to_raycaster, *to_gpu, seconds)

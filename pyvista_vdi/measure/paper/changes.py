@@ -9,6 +9,7 @@ are now faster and now slower leave alone. What repeats exactly is held to fixed
 
 from __future__ import annotations
 
+import json
 import math
 import statistics
 from collections.abc import Iterator
@@ -16,7 +17,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from pyvista_vdi.measure.clock import CHANCE, rank_sum_chance, ratios
-from pyvista_vdi.measure.session import CANDIDATES
+from pyvista_vdi.measure.harness import CANDIDATES
+from pyvista_vdi.measure.paper.report import measured, name_of
+from pyvista_vdi.measure.results import Results
 
 #: Relative change of a median below which nothing counts as changed.
 LEAST_CHANGE = 0.05
@@ -31,19 +34,8 @@ _SIZE_LIMIT = 0.001  # relative
 class Change:
     """A figure in two runs.
 
-    Parameters
-    ----------
-    cell : str
-        Which row.
-    figure : str
-        Which figure of it.
-    before, after : float
-        Medians, or the figures themselves.
-    chance : float or None
-        Chance that noise alone would separate the repetitions as much; ``None`` for what repeats
-        exactly.
-    changed : bool
-        Whether it is beyond noise.
+    ``cell`` says which row, ``figure`` which of its figures, a median or what repeats exactly;
+    ``chance`` of the former is that of noise alone to separate the repetitions as much.
     """
 
     cell: str
@@ -60,17 +52,9 @@ class Change:
 
 
 def compare_results(before: dict[str, Any], after: dict[str, Any]) -> list[Change]:
-    """Return every figure that is in both runs.
+    """Return every figure that is in both runs, in the order of `before`.
 
-    Parameters
-    ----------
-    before, after : dict
-        What two files hold, see :func:`pyvista_vdi.measure.paper.read_results`.
-
-    Returns
-    -------
-    list of Change
-        In the order of `before`.
+    They are what two files hold, see :func:`pyvista_vdi.measure.paper.read_results`.
     """
     return list(_changes(before, after))
 
@@ -114,28 +98,20 @@ def describe_changes(before: dict[str, Any], after: dict[str, Any]) -> str:
 
 
 def _changes(before: dict[str, Any], after: dict[str, Any]) -> Iterator[Change]:
-    others = {cell["name"]: cell for cell in after["cells"]}
-    for cell in before["cells"]:
-        other = others.get(cell["name"])
-        if other is None:
-            continue
-        name = cell["name"]
-        if cell["vdi"] is not None and other["vdi"] is not None:
-            yield from _vdi_changes(name, cell["vdi"], other["vdi"])
-        rows = {row["angle"]: row for row in other["angles"]}
-        for row in cell["angles"]:
-            if row["angle"] in rows:
-                at = f"{name} at {row['angle']:g} degrees"
-                yield from _row_changes(at, row, rows[row["angle"]])
+    others = {json.dumps(row["case"]): row for row in after["rows"] if "refused" not in row}
+    for what, changes in (("vdi", _vdi_changes), ("view", _row_changes)):
+        for row in measured(before, what):
+            if (other := others.get(json.dumps(row["case"]))) is not None:
+                yield from changes(name_of(row["case"]), row, other)
 
 
 def _vdi_changes(name: str, before: dict[str, Any], after: dict[str, Any]) -> Iterator[Change]:
     for figure in ("supersegments", "bytes_raw", "bytes_saved"):
-        old, new = before[figure], after[figure]
-        if old is not None and new is not None:
-            yield _exact(name, figure, old, new, _SIZE_LIMIT * old)
-    old, new = (vdi["generation_seconds"]["clock"] for vdi in (before, after))
-    yield _timed(name, "generation, s", old, new)
+        if None not in (both := (before[figure], after[figure])):
+            yield _exact(name, figure, *both, _SIZE_LIMIT * both[0])
+    yield _timed(
+        name, "generation, s", *(v["generation_seconds"]["clock"] for v in (before, after))
+    )
 
 
 def _row_changes(at: str, before: dict[str, Any], after: dict[str, Any]) -> Iterator[Change]:
@@ -143,17 +119,13 @@ def _row_changes(at: str, before: dict[str, Any], after: dict[str, Any]) -> Iter
     if None not in ssim:  # windows below 11 pixels have none
         yield _exact(at, "SSIM", ssim[0], ssim[1], _SSIM_LIMIT)
     for name, label in CANDIDATES.items():
-        if name not in before["seconds"] or name not in after["seconds"]:
-            continue
-        old, new = (row["seconds"][name]["clock"] for row in (before, after))
-        yield _timed(at, f"{label}, s", old, new)
-        if name != "volume":
-            # Each repetition over that of render_volume beside it
-            old, new = (
-                ratios(row["seconds"][name]["clock"], row["seconds"]["volume"]["clock"])
-                for row in (before, after)
-            )
-            yield _timed(at, f"{label} / render_volume", old, new)
+        if name in before["seconds"] and name in after["seconds"]:
+            taken = [row["seconds"][name]["clock"] for row in (before, after)]
+            yield _timed(at, f"{label}, s", *taken)
+            if name != "volume":
+                # Each repetition over that of render_volume beside it
+                beside = [row["seconds"]["volume"]["clock"] for row in (before, after)]
+                yield _timed(at, f"{label} / render_volume", *map(ratios, taken, beside))
 
 
 def _timed(cell: str, figure: str, before: list[float], after: list[float]) -> Change:
@@ -168,13 +140,16 @@ def _exact(cell: str, figure: str, before: float, after: float, limit: float) ->
 
 
 def _only_in_one(before: dict[str, Any], after: dict[str, Any]) -> Iterator[str]:
-    """Name cells that one run lacks, or has refused."""
-    runs = [{cell["name"]: cell for cell in run["cells"]} for run in (before, after)]
+    """Name VDIs that one run lacks, or has refused."""
+    runs = [
+        {name_of(row["case"]): row.get("refused") for row in Results(run).rows(what="vdi")}
+        for run in (before, after)
+    ]
     for name in dict.fromkeys([*runs[0], *runs[1]]):
-        states = ["missing" if name not in run else _state(run[name]) for run in runs]
+        states = [_state(run[name]) if name in run else "missing" for run in runs]
         if states[0] != states[1]:
             yield f"{name}: {states[0]} -> {states[1]}"
 
 
-def _state(cell: dict[str, Any]) -> str:
-    return "measured" if cell["refused"] is None else f"refused ({cell['refused']})"
+def _state(refused: str | None) -> str:
+    return "measured" if refused is None else f"refused ({refused})"

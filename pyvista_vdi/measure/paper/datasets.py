@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyvista_vdi import examples
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.measure.paper.procedural import PROCEDURAL, Procedural, Progress, make
-from pyvista_vdi.measure.paper.published import paper_tables
-from pyvista_vdi.measure.volumes import look, read_file
+from pyvista_vdi.io.volumes import read_file
+from pyvista_vdi.measure.paper.procedural import PROCEDURAL, make
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -27,6 +28,22 @@ DEFAULT_SEED = 1
 #: Noise and planes while a procedural volume is made, bytes: at most.
 _WORKING_BYTES = 2**30
 
+#: Entries of the transfer functions, as ``add_volume`` has them by default.
+_ENTRIES = 256
+
+#: Opacity at equidistant scalars, by look.
+_OPACITIES: Mapping[str, tuple[float, ...]] = {
+    # What add_volume's opacity="linear" is
+    "ramp": (0.0, 1.0),
+    # Air and its noise are transparent; tissue is translucent, bone is not
+    "empty below a fifth": (0.0, 0.0, 0.02, 0.05, 0.3, 0.8),
+    # One fluid is transparent, the other translucent
+    "one of two fluids": (0.0, 0.0, 0.0, 0.01, 0.05, 0.15, 0.05, 0.01, 0.005),
+}
+
+#: RGB at equidistant scalars: black, blue-grey, white.
+_COLORS = ((0.0, 0.0, 0.0), (0.25, 0.3, 0.45), (0.7, 0.7, 0.6), (1.0, 1.0, 1.0))
+
 #: Looks of the paper's data sets.
 _LOOKS = {
     "kingsnake": "empty below a fifth",
@@ -35,26 +52,28 @@ _LOOKS = {
 }
 
 
+def look(name: str, scalar_range: tuple[float, float], interpolation: str) -> TransferFunction:
+    """Return a transfer function by its name: a key of the opacities above."""
+    return TransferFunction(
+        np.stack([_resampled(channel) for channel in zip(*_COLORS, strict=True)], axis=1),
+        _resampled(_OPACITIES[name]),
+        scalar_range,
+        interpolation=interpolation,
+    )
+
+
+def _resampled(nodes: tuple[float, ...]) -> NDArray[np.float64]:
+    at = np.linspace(0, len(nodes) - 1, _ENTRIES)
+    return np.interp(at, np.arange(len(nodes)), nodes)
+
+
 @dataclass(frozen=True)
 class Dataset:
     """A volume to be measured, and how it looks.
 
-    Parameters
-    ----------
-    name : str
-        What the results call it.
-    source : {"example", "procedural", "file"}
-        Where it is from.
-    paper : str or None
-        The paper's data set that it is, or stands in for.
-    description : str
-        One phrase.
-    look : str
-        Name of its transfer function.
-    nbytes : int or None
-        Bytes of the volume, where they are known before it is there.
-    load : callable
-        ``load(progress)`` returns the volume.
+    ``source`` is "example", "procedural" or "file"; ``paper`` the paper's data set that it is, or
+    stands in for; ``look`` the name of its transfer function; ``nbytes`` is ``None`` where it is
+    not known before the volume is there, which ``load`` returns.
     """
 
     name: str
@@ -63,7 +82,7 @@ class Dataset:
     description: str
     look: str
     nbytes: int | None
-    load: Callable[[Progress | None], Volume]
+    load: Callable[[], Volume]
 
     def transfer_function(self, volume: Volume, interpolation: str) -> TransferFunction:
         """Return its transfer function; it needs no PyVista, so that every run has the same."""
@@ -88,36 +107,19 @@ class Dataset:
 
 
 def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
-    """Return a data set by its name.
+    """Return a data set by its name; what nothing is called raises InvalidArgumentError.
 
-    Parameters
-    ----------
-    name : str
-        A name of :data:`pyvista_vdi.examples.VOLUMES`; ``kingsnake_like``, ``beechnut_like`` or
-        ``richtmyer_meshkov_like``, made at the paper's size or with ``@4`` at a quarter of it
-        along each edge; or a file, as ``FILE`` or as ``NAME=FILE``, where a NAME of ``kingsnake``,
-        ``beechnut`` or ``richtmyer_meshkov`` says which of the paper's it is.
-    seed : int
-        Of a procedural volume.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If nothing has that name.
+    They are names of :data:`pyvista_vdi.examples.VOLUMES`; ``kingsnake_like``, ``beechnut_like`` or
+    ``richtmyer_meshkov_like``, made from a seed at the paper's size or with ``@4`` at a quarter of
+    it along each edge; or a file, as ``FILE`` or as ``NAME=FILE``, where a NAME of ``kingsnake``,
+    ``beechnut`` or ``richtmyer_meshkov`` says which of the paper's it is.
     """
-    base = name.partition("@")[0]
-    if base in PROCEDURAL:
-        return _procedural(name, PROCEDURAL[base], _factor(name), seed)
+    if name.partition("@")[0] in PROCEDURAL:
+        return _procedural(name, seed)
     if name in examples.VOLUMES:
-        return Dataset(
-            name,
-            "example",
-            None,
-            examples.VOLUMES[name].description,
-            "ramp",
-            None,
-            lambda progress: examples.load_data(name, as_volume=True),
-        )
+        described = examples.VOLUMES[name].description
+        load = partial(examples.load_data, name, as_volume=True)
+        return Dataset(name, "example", None, described, "ramp", None, load)
     label, file = _named_file(name)
     if not os.path.exists(file):  # noqa: PTH110 - pathlib's raises for a name that is too long
         known = ", ".join([*sorted(examples.VOLUMES), *PROCEDURAL])
@@ -125,16 +127,13 @@ def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
             f"no volume is called {name!r}, and there is no such file: choose one of {known}, or "
             "name a file"
         )
-    paper = label if label in {row["dataset"] for row in paper_tables()["table1"]} else None
-    return Dataset(
-        label,
-        "file",
-        paper,
-        file.name,
-        _LOOKS.get(label, "ramp"),
-        None,
-        lambda progress: as_volume(read_file(file), None, "point"),
-    )
+    paper = label if label in _LOOKS else None
+    looks = _LOOKS.get(label, "ramp")
+
+    def read() -> Volume:
+        return as_volume(read_file(file), None, "point")
+
+    return Dataset(label, "file", paper, file.name, looks, None, read)
 
 
 def label_of(name: str) -> str:
@@ -152,40 +151,27 @@ def _named_file(name: str) -> tuple[str, Path]:
     return label or Path(path).name.split(".")[0], Path(path)
 
 
-def _procedural(name: str, kind: Procedural, factor: int, seed: int) -> Dataset:
+def _procedural(name: str, seed: int) -> Dataset:
+    base, at, text = name.partition("@")
+    if at and not (text.isdecimal() and 1 <= int(text) <= 128):
+        raise InvalidArgumentError(
+            f"{name!r} does not say how much smaller: write a whole number from 1 to 128 behind "
+            "the @, as in kingsnake_like@4"
+        )
+    kind, factor = PROCEDURAL[base], int(text or 1)
     nbytes = kind.nbytes(factor)
     size = " x ".join(str(n) for n in kind.reduced(factor))
 
-    def load(progress: Progress | None) -> Volume:
-        smaller = f"{name.partition('@')[0]}@{2 * factor}"
+    def load() -> Volume:
         require_free_memory(
             nbytes + _WORKING_BYTES,
             f"making the volume {name!r}, {size} of {kind.dtype},",
-            f"take {smaller!r}, half as large along each edge, or another machine",
+            f"take '{base}@{2 * factor}', half as large along each edge, or another machine",
         )
-        return make(kind, factor, seed, name, progress)
+        return make(kind, factor, seed, name)
 
-    return Dataset(
-        name,
-        "procedural",
-        kind.paper,
-        f"{kind.description} (made from seed {seed})",
-        _LOOKS[kind.paper],
-        nbytes,
-        load,
-    )
-
-
-def _factor(name: str) -> int:
-    _, at, text = name.partition("@")
-    if not at:
-        return 1
-    if text.isdecimal() and 1 <= int(text) <= 128:
-        return int(text)
-    raise InvalidArgumentError(
-        f"{name!r} does not say how much smaller: write a whole number from 1 to 128 behind the @, "
-        "as in kingsnake_like@4"
-    )
+    description = f"{kind.description} (made from seed {seed})"
+    return Dataset(name, "procedural", kind.paper, description, _LOOKS[kind.paper], nbytes, load)
 
 
 def require_allocation(runtime: Runtime, dataset: Dataset) -> None:

@@ -30,8 +30,6 @@ _TURBULENT = -11.0 / 6.0
 Plane = NDArray[np.float32]
 #: Scalars of slab k as float32 (ny, nx), in units of the type's values.
 Slab = Callable[[int], Plane]
-#: Called with the finished fraction.
-Progress = Callable[[float], object]
 
 
 @dataclass(frozen=True)
@@ -59,9 +57,7 @@ class Procedural:
         return nx * ny * nz * np.dtype(self.dtype).itemsize
 
 
-def make(
-    kind: Procedural, factor: int, seed: int, name: str, progress: Progress | None = None
-) -> Volume:
+def make(kind: Procedural, factor: int, seed: int, name: str) -> Volume:
     """Make a volume at 1 / ``factor`` of the full size; equal seeds give equal volumes."""
     dimensions = kind.reduced(factor)
     nx, ny, nz = dimensions
@@ -80,8 +76,6 @@ def make(
             waiting.append(pool.submit(fill, k))
             if len(waiting) > 2 * workers:
                 waiting.popleft().result()
-            if progress is not None:
-                progress(k / nz)
         for future in waiting:
             future.result()
     return Volume(array, name=name)

@@ -12,16 +12,10 @@ from typing import Any
 
 @dataclass(frozen=True)
 class PaperCell:
-    """One cell of the paper's Table 1.
+    """One cell of the paper's Table 1: frames per second, and SSIM to volume rendering.
 
-    Parameters
-    ----------
-    volume_fps : float
-        Frames per second of the paper's volume rendering at this angle.
-    fps, fps_skipping : float
-        Frames per second of the VDI without and with skipping of empty space.
-    ssim : float
-        SSIM of the VDI's picture against volume rendering.
+    ``volume_fps`` are the paper's volume rendering's at this angle, ``fps`` and ``fps_skipping``
+    the VDI's without and with skipping of empty space.
     """
 
     volume_fps: float
@@ -51,35 +45,17 @@ def paper_tables() -> dict[str, Any]:
 def paper_cell(
     dataset: str | None, window_size: Sequence[int], max_supersegments: int, angle: float
 ) -> PaperCell | None:
-    """Return what the paper measured.
+    """Return what the paper measured, or None where it has no such cell.
 
-    Parameters
-    ----------
-    dataset : str or None
-        ``"kingsnake"``, ``"beechnut"`` or ``"richtmyer_meshkov"``.
-    window_size : (int, int)
-        Width and height in pixels.
-    max_supersegments : int
-        N_S.
-    angle : float
-        Degrees from V_O.
-
-    Returns
-    -------
-    PaperCell or None
-        ``None`` where the paper has no such cell.
+    ``dataset`` is ``"kingsnake"``, ``"beechnut"`` or ``"richtmyer_meshkov"``, ``max_supersegments``
+    its N_S, ``angle`` in degrees from V_O.
     """
     for row in paper_tables()["table1"]:
-        if row["dataset"] != dataset or row["window_size"] != list(window_size):
-            continue
-        for cell in row["vdi"]:
-            if cell["max_supersegments"] == max_supersegments and cell["angle"] == angle:
-                return PaperCell(
-                    row["volume_fps"][str(cell["angle"])],
-                    cell["fps"],
-                    cell["fps_skipping"],
-                    cell["ssim"],
-                )
+        if (row["dataset"], row["window_size"]) == (dataset, list(window_size)):
+            for cell in row["vdi"]:
+                if (cell["max_supersegments"], cell["angle"]) == (max_supersegments, angle):
+                    figures = (cell[name] for name in ("fps", "fps_skipping", "ssim"))
+                    return PaperCell(row["volume_fps"][str(cell["angle"])], *figures)
     return None
 
 

@@ -1,25 +1,17 @@
-"""The results as Markdown: Table 1, what each VDI takes, Table 2."""
+"""The results as Markdown, Table 1, what each VDI takes and Table 2, and as a plot."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+from pyvista_vdi.measure import report
 from pyvista_vdi.measure.clock import Times, median, spread
+from pyvista_vdi.measure.harness import CANDIDATES
 from pyvista_vdi.measure.paper.published import PaperCell, paper_cell, paper_tables
-from pyvista_vdi.measure.report import (
-    ABSENT,
-    METRICS,
-    across,
-    closing,
-    mebibytes,
-    milliseconds,
-    number,
-    ratio,
-    section,
-    table,
-)
-from pyvista_vdi.measure.session import CANDIDATES
+from pyvista_vdi.measure.report import across, milliseconds, number, ratio, section, table
+from pyvista_vdi.measure.results import Results
 
 #: What a row is of; a VDI has no angle.
 _ROW = ("data set", "window", "N_S", "angle")
@@ -41,22 +33,11 @@ _TAKEN = (
 
 
 def describe(data: dict[str, Any]) -> str:
-    """Return the tables as Markdown.
-
-    Parameters
-    ----------
-    data : dict
-        What the JSON holds.
-
-    Returns
-    -------
-    str
-        Ends with a newline.
-    """
+    """Return the tables of what the JSON holds as Markdown, ending with a newline."""
+    plan = data["plan"]
     lines = [
-        f"# Benchmark, profile {data['plan']['profile']}",
-        "",
-        *_explanation(data["plan"]),
+        *(f"# Benchmark, profile {plan['profile']}", ""),
+        *(line for text in _explanation(plan) for line in (text, "")),
         *section("Table 1"),
         *table((*_ROW, *CANDIDATES.values(), *_FIGURES), _table1(data)),
         "",
@@ -76,7 +57,7 @@ def describe(data: dict[str, Any]) -> str:
         *_table2(data),
         *_refused(data),
         *_datasets(data),
-        *closing(data),
+        *report.closing(data),
     ]
     return "\n".join(lines) + "\n"
 
@@ -90,18 +71,19 @@ def _explanation(plan: dict[str, Any]) -> Iterator[str]:
         "over `render_volume` without skipping; the paper's, over its own volume rendering "
         f"({paper_tables()['device']})."
     )
-    yield ""
-    yield f"SSIM, PSNR (dB) and worst pixel (in 1/255) are of the VDI's picture against {METRICS}"
-    yield ""
+    yield (
+        "SSIM, PSNR (dB) and worst pixel (in 1/255) are of the VDI's picture against "
+        f"{report.METRICS}"
+    )
 
 
 def _table1(data: dict[str, Any]) -> Iterator[list[str]]:
-    for cell, row, paper in _rows(data):
+    for row, paper in _views(data):
         found, vtk = row["vdi_to_volume"], row["volume_to_vtk_gpu"]
         times = {name: median(taken) for name, taken in row["seconds"].items()}
         peers = [t for n, t in times.items() if n.startswith("vtk_") and t is not None]
         yield [
-            *_named(cell, row),
+            *_named(row),
             *(_with_spread(row["seconds"].get(name)) for name in CANDIDATES),
             ratio(times.get("volume"), times.get("vdi")),
             number(getattr(paper, "speed_up", None), ".1f"),
@@ -118,10 +100,10 @@ def _table1(data: dict[str, Any]) -> Iterator[list[str]]:
 
 def _by_events(data: dict[str, Any]) -> Iterator[list[str]]:
     """Give the times of our kernels alone, by the driver's events."""
-    for cell, row, paper in _rows(data):
+    for row, paper in _views(data):
         times = {n: median(row["seconds"].get(n, {}), "device") for n in _OURS}
         yield [
-            *_named(cell, row),
+            *_named(row),
             *(milliseconds(times[name]) for name in _OURS),
             ratio(times["volume"], times["vdi"]),
             ratio(times["volume"], times["vdi_skipping"]),
@@ -130,105 +112,156 @@ def _by_events(data: dict[str, Any]) -> Iterator[list[str]]:
 
 
 def _vdis(data: dict[str, Any]) -> Iterator[list[str]]:
-    for cell in data["cells"]:
-        vdi = cell["vdi"]
-        if vdi is None:
-            continue
+    for row in measured(data, "vdi"):
         yield [
-            *_named(cell),
-            f"{vdi['occupied_lists'] / vdi['lists']:.0%}",
-            f"{vdi['mean_length']:.1f}",
-            str(vdi["longest_list"]),
-            mebibytes(vdi["bytes_raw"]),
-            mebibytes(vdi["bytes_saved"]),
-            number(median(vdi["generation_seconds"]), ".2f"),
-            number(median(vdi["generation_seconds"], "device"), ".2f"),
-            number(vdi["save_seconds"], ".2f"),
+            *_named(row),
+            f"{row['occupied_lists'] / row['lists']:.0%}",
+            f"{row['mean_length']:.1f}",
+            str(row["longest_list"]),
+            report.mebibytes(row["bytes_raw"]),
+            report.mebibytes(row["bytes_saved"]),
+            number(median(row["generation_seconds"]), ".2f"),
+            number(median(row["generation_seconds"], "device"), ".2f"),
+            number(row["save_seconds"], ".2f"),
         ]
 
 
 def _table2(data: dict[str, Any]) -> Iterator[str]:
-    for entry in data["previews"]:
+    for row in measured(data, "preview"):
+        case = row["case"]
         yield from section(
             "Table 2",
-            f"Previews of {entry['dataset']}, {across(entry['window_size'])}, "
-            f"N_S {entry['max_supersegments']}, "
-            f"{entry['angle']:g} degrees, at the paper's rates as multiples of the full frame's "
+            f"Previews of {case['volume']}, {across(case['window_size'])}, "
+            f"N_S {case['max_supersegments']}, "
+            f"{case['angle']:g} degrees, at the paper's rates as multiples of the full frame's "
             "(40 to 80 over 24 frames per second). Fewer pixels is what `add_vdi` does; samples "
             "per ray is the paper's. SSIM to the full frame and to `render_volume`.",
+            f"The full frame takes {milliseconds(median(row['seconds']))} ms; its SSIM to "
+            f"`render_volume` is {number(row['to_volume']['ssim'], '.4f')}.",
         )
-        if entry["refused"] is not None:
-            yield from (f"Refused: {entry['refused']}", "")
-            continue
-        full = median(entry["full"]["seconds"])
-        yield (
-            f"The full frame takes {milliseconds(full)} ms; its SSIM to `render_volume` is "
-            f"{number(entry['full']['to_volume']['ssim'], '.4f')}."
-        )
-        yield ""
         rows = (
             [
-                row["way"],
-                f"{row['target_speed_up']:.2f}x",
-                ratio(full, median(row["seconds"])),
-                f"{row['share']:.3f}",
-                number(row["to_full"]["ssim"], ".4f"),
-                number(row["paper_ssim"], ".4f"),
-                number(row["to_volume"]["ssim"], ".4f"),
+                way["way"],
+                f"{way['target_speed_up']:.2f}x",
+                ratio(median(row["seconds"]), median(way["seconds"])),
+                f"{way['share']:.3f}",
+                number(way["to_full"]["ssim"], ".4f"),
+                number(way["paper_ssim"], ".4f"),
+                number(way["to_volume"]["ssim"], ".4f"),
             ]
-            for row in entry["rows"]
+            for way in row["ways"]
         )
         heads = ("way", "target", "reached", "share", "SSIM to full", "paper", "SSIM to volume")
         yield from (*table(heads, rows), "")
 
 
 def _refused(data: dict[str, Any]) -> Iterator[str]:
-    """Name what was not measured, and why."""
-    refused = [cell for cell in data["cells"] if cell["refused"] is not None]
-    left_out = {
-        (cell["dataset"], name, reason)
-        for cell in data["cells"]
-        for name, reason in cell.get("left_out", {}).items()
-    }
-    if not refused and not left_out:
-        return
-    yield from section("Not measured")
-    for cell in refused:
-        yield f"- `{cell['name']}`: {cell['refused']}"
-    for dataset, name, reason in sorted(left_out):
-        yield f"- {CANDIDATES[name]} with {dataset}: {reason}"
-    yield ""
+    """Name what was not measured, and why; what a volume's reason explains is not repeated."""
+    told: dict[str, str] = {}
+    left_out = {}
+    for row in data["rows"]:
+        name, reason = name_of(row["case"]), row.get("refused")
+        if reason and not any(name.startswith(n) and reason == r for n, r in told.items()):
+            told[name] = reason
+        for candidate, why in row.get("left_out", {}).items():
+            left_out[f"{CANDIDATES[candidate]} with {row['case']['volume']}"] = why
+    if told or left_out:
+        yield from section("Not measured")
+        yield from (f"- `{name}`: {reason}" for name, reason in told.items())
+        yield from (f"- {name}: {reason}" for name, reason in sorted(left_out.items()))
+        yield ""
 
 
 def _datasets(data: dict[str, Any]) -> Iterator[str]:
     yield from section("Data sets")
-    for name, found in data["datasets"].items():
+    for row in measured(data, "volume"):
         stands = ""
-        if found["paper"] is not None:
-            of_paper = found["source"] == "file"
-            stands = f"; {'is' if of_paper else 'stands in for'} the paper's {found['paper']}"
-        size = across(found["dimensions"], " x ")
-        yield f"- {name}: {size} {found['dtype']}, {found['description']}{stands}"
+        if row["paper"] is not None:
+            of_paper = row["source"] == "file"
+            stands = f"; {'is' if of_paper else 'stands in for'} the paper's {row['paper']}"
+        size = across(row["dimensions"], " x ")
+        yield f"- {row['case']['volume']}: {size} {row['dtype']}, {row['description']}{stands}"
 
 
-def _rows(
-    data: dict[str, Any],
-) -> Iterator[tuple[dict[str, Any], dict[str, Any], PaperCell | None]]:
-    """Yield cell, row and what the paper has there."""
-    for cell in data["cells"]:
-        paper = data["datasets"][cell["dataset"]]["paper"] if cell["angles"] else None
-        for row in cell["angles"]:
-            limit = cell["max_supersegments"]
-            yield cell, row, paper_cell(paper, cell["window_size"], limit, row["angle"])
+def measured(data: dict[str, Any], what: str) -> Iterator[dict[str, Any]]:
+    """Yield the rows that have figures of volumes, VDIs, views or previews."""
+    return (row for row in Results(data).rows(what=what) if "refused" not in row)
 
 
-def _named(cell: dict[str, Any], *rows: dict[str, Any]) -> Iterator[str]:
-    yield from (cell["dataset"], across(cell["window_size"]), str(cell["max_supersegments"]))
-    yield from (f"{row['angle']:g}" for row in rows)
+def name_of(case: dict[str, Any]) -> str:
+    """Return a short name: ``brain``, ``brain/1280x720/15``, ``brain/1280x720/15 at 5 degrees``."""
+    if "window_size" not in case:
+        return str(case["volume"])
+    name = f"{case['volume']}/{across(case['window_size'])}/{case['max_supersegments']}"
+    return f"{name} at {case['angle']:g} degrees" if "angle" in case else name
+
+
+def _views(data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], PaperCell | None]]:
+    """Yield the rows of views, and what the paper has there."""
+    of_paper = {row["case"]["volume"]: row["paper"] for row in measured(data, "volume")}
+    for row in measured(data, "view"):
+        case = row["case"]
+        size, limit = case["window_size"], case["max_supersegments"]
+        yield row, paper_cell(of_paper.get(case["volume"]), size, limit, case["angle"])
+
+
+def _named(row: dict[str, Any]) -> Iterator[str]:
+    case = row["case"]
+    yield from (case["volume"], across(case["window_size"]), str(case["max_supersegments"]))
+    if "angle" in case:
+        yield f"{case['angle']:g}"
 
 
 def _with_spread(taken: Times | None) -> str:
     middle = None if taken is None else median(taken)
     if taken is None or not middle:
-        return ABSENT
+        return report.ABSENT
     return f"{milliseconds(middle)} ±{spread(taken['clock']):.0%}"
+
+
+def write_plot(data: dict[str, Any], target: Path) -> bool:
+    """Write a PNG: a column per window and N_S, speed-up above, SSIM below.
+
+    Returns whether there was anything to draw; without Matplotlib ImportError is raised.
+    """
+    columns: dict[tuple[str, int], dict[str, list[tuple[dict[str, Any], PaperCell | None]]]] = {}
+    for row, paper in _views(data):
+        case = row["case"]
+        column = columns.setdefault((across(case["window_size"]), case["max_supersegments"]), {})
+        column.setdefault(case["volume"], []).append((row, paper))
+    if not columns:
+        return False
+    figure = report.new_figure((1.5 + 3.6 * len(columns), 6.0), layout="constrained")
+    panels = figure.subplots(2, len(columns), squeeze=False, sharex=True, sharey="row")
+    names = list(dict.fromkeys(name for column in columns.values() for name in column))
+    for (speed, ssim), ((size, limit), column) in zip(panels.T, columns.items(), strict=True):
+        for name, views in column.items():
+            _draw(name, views, f"C{names.index(name)}", speed, ssim)
+        speed.set(title=f"{size}, N_S {limit}", yscale="log")
+        ssim.set(xlabel="degrees from V_O")
+        for panel in (speed, ssim):
+            panel.grid(alpha=0.3, which="both")
+    panels[0][0].set_ylabel("speed-up over render_volume\nwithout skipping (x: the paper's)")
+    panels[1][0].set_ylabel("SSIM to render_volume")
+    handles, labels = panels[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize="small")
+    report.save_figure(figure, target)
+    return True
+
+
+def _draw(
+    name: str, views: list[tuple[dict[str, Any], PaperCell | None]], color: str, *panels: Any
+) -> None:
+    """Draw a data set's speed-up and SSIM on the panels of both."""
+    speed, ssim = panels
+    angles = [row["case"]["angle"] for row, _ in views]
+    speed_ups = [
+        (median(row["seconds"]["volume"]) or 0) / (median(row["seconds"]["vdi_skipping"]) or 1)
+        for row, _ in views
+    ]
+    speed.plot(angles, speed_ups, label=name, color=color, marker=".")
+    ssim.plot(angles, [row["vdi_to_volume"]["ssim"] for row, _ in views], color=color, marker=".")
+    for angle, (_, paper) in zip(angles, views, strict=True):
+        if paper is not None:
+            speed.plot([angle], [paper.speed_up_skipping], color=color, marker="x")
+            ssim.plot([angle], [paper.ssim], color=color, marker="x")

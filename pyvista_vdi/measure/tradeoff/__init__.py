@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from pyvista_vdi.measure.tradeoff.dominance import Figure, dominates, find_dominated, front
 from pyvista_vdi.measure.tradeoff.findings import Point
-from pyvista_vdi.measure.tradeoff.results import Tradeoff
-from pyvista_vdi.measure.tradeoff.session import measure_tradeoff
 from pyvista_vdi.measure.tradeoff.settings import AXES, Setting, sweep
+from pyvista_vdi.measure.tradeoff.tradeoff import Tradeoff, measure_tradeoff
 
 __all__ = [
     "AXES",

@@ -8,11 +8,10 @@ Every figure is smaller for the better. A setting *dominates* another if
 
 So noise keeps a setting from being called dominated and never makes it so. Where nothing is
 noisy and everything counts this is Pareto's dominance. With differences that do not count, the
-first two conditions alone could lead in circles (a is nearly as fast as b, and b as c, but a not as
-c), at whose end everything is dominated; the third one orders the settings by a sum. They could
-also lead astray: each setting gives way to a neighbour, and the last of them is far from the first.
-So a setting gives way only to one that stays. *The front* is what stays, found in the order of the
-sums: whatever is not on it is dominated by something that is.
+first two conditions alone could lead in circles, at whose end everything is dominated; the third
+one orders the settings by a sum. They could also lead astray, each setting giving way to a
+neighbour, until the last is far from the first. So a setting gives way only to one that stays.
+*The front* is what stays, found in the order of the sums.
 """
 
 from __future__ import annotations
@@ -30,14 +29,8 @@ from pyvista_vdi.measure.clock import CHANCE, rank_sum_chance
 class Figure:
     """One figure of a setting; the smaller, the better.
 
-    Parameters
-    ----------
-    value : float
-        What counts.
-    tolerance : float
-        Differences that do not, above 0 and the same in all figures of a kind.
-    repetitions : tuple of float
-        What `value` is the median of; none where it repeats exactly.
+    ``tolerance``, above 0 and the same in all figures of a kind, are differences that do not count;
+    ``repetitions`` what ``value`` is the median of, none where it repeats exactly.
     """
 
     value: float
@@ -65,48 +58,30 @@ class Figure:
         """Whether it is smaller by more than that, and beyond the noise."""
         if not other.is_worse(self):
             return False
-        if not (self.repetitions and other.repetitions):
-            return True
-        return rank_sum_chance(self.repetitions, other.repetitions) <= CHANCE
+        noisy = self.repetitions and other.repetitions
+        return not noisy or rank_sum_chance(self.repetitions, other.repetitions) <= CHANCE
 
 
 Figures = Sequence[Figure]
 
 
 def dominates(one: Figures, other: Figures) -> bool:
-    """Whether one setting makes another pointless.
-
-    Parameters
-    ----------
-    one, other : sequence of Figure
-        The same kinds of figures in the same order.
-    """
+    """Whether a setting makes another pointless: figures of the same kinds in the same order."""
     pairs = list(zip(one, other, strict=True))
-    if any(ours.is_worse(theirs) for ours, theirs in pairs):
-        return False
-    if _sum(one) >= _sum(other):
-        return False
-    return any(ours.is_better(theirs) for ours, theirs in pairs)
+    return (
+        not any(ours.is_worse(theirs) for ours, theirs in pairs)
+        and _sum(one) < _sum(other)
+        and any(ours.is_better(theirs) for ours, theirs in pairs)
+    )
 
 
 def find_dominated(settings: Mapping[str, Figures]) -> dict[str, list[str]]:
-    """Return the settings that are dominated, and by which of the others.
+    """Return the settings that are dominated, and by which of those on the front.
 
-    Parameters
-    ----------
-    settings : mapping of str to sequence of Figure
-        By name.
-
-    Returns
-    -------
-    dict of str to list of str
-        Dominated settings, in the order of `settings`; of each, those on the front that dominate
-        it, in the same order.
+    ``settings`` are figures by name, in whose order names are returned.
     """
     kept = front(settings)
-    found = {
-        name: [one for one in kept if dominates(settings[one], settings[name])] for name in settings
-    }
+    found = {n: [one for one in kept if dominates(settings[one], settings[n])] for n in settings}
     return {name: by for name, by in found.items() if by}
 
 

@@ -10,8 +10,9 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.measure.clock import ratios, spread
+from pyvista_vdi.measure.results import Results
 from pyvista_vdi.measure.tradeoff.dominance import Figure, find_dominated, front, told_apart
-from pyvista_vdi.measure.tradeoff.settings import Setting
+from pyvista_vdi.measure.tradeoff.settings import AXES, Setting
 
 #: What SSIM is traded for, by the keys of the findings, and how tables call it.
 COSTS: Mapping[str, str] = {
@@ -23,48 +24,22 @@ COSTS: Mapping[str, str] = {
 
 #: Differences that do not count: of SSIM, what devices that round differently may differ by; of
 #: times and bytes, relative.
-SSIM_TOLERANCE = 0.0005
-TIME_TOLERANCE = 0.05
-BYTES_TOLERANCE = 0.01
+SSIM_TOLERANCE, TIME_TOLERANCE, BYTES_TOLERANCE = 0.0005, 0.05, 0.01
 
 
 @dataclass(frozen=True)
 class Point:
     """One setting's figures over all angles.
 
-    Parameters
-    ----------
-    name : str
-        The setting.
-    setting : dict
-        Its values, see :class:`Setting`.
-    frame : float
-        Frame time over that of ``render_volume``: the geometric mean over the angles, of
-        repetitions in the same round; the median of the repetitions.
-    frame_spread : float
-        Half of what lies between its least and its most repetition, over the median.
-    frames : dict of float to float
-        The same by angle.
-    ssim : float
-        SSIM to ``render_volume``: the mean over the angles.
-    ssims : dict of float to float
-        By angle.
-    psnr : float
-        The least of all angles, dB; infinite for equal pictures.
-    worst_pixel : float
-        Of all angles, in 1/255.
-    bytes_memory : int
-        Of the lists on the device.
-    bytes_file : int or None
-        Of the ``.vdi``; ``None`` where there was no room for it.
-    generation : float
-        Time of generation, with packing, over that of a frame of ``render_volume`` at steps of
-        half a voxel; the median.
-    generation_seconds : float
-        The median by the clock.
-    figures : dict of str to Figure
-        What settings are judged by: ``"frame"``, ``"memory"``, ``"file"``, ``"generation"`` and
-        ``"loss"`` over all angles, ``"frame 5"`` and ``"loss 5"`` at each.
+    ``frame`` is its frame time over that of ``render_volume``: the median of repetitions, each the
+    geometric mean over the angles, with half of what lies between the least and the most as
+    ``frame_spread``; ``frames`` has the medians by angle. ``ssim`` to ``render_volume`` is the mean
+    over the angles, ``ssims`` by angle; ``psnr`` (dB, infinite for equal pictures) and
+    ``worst_pixel`` (in 1/255) are the worst of all. ``bytes_memory`` are those of the lists on the
+    device, ``bytes_file`` of the ``.vdi``, ``None`` where there was no room for it. ``generation``,
+    with packing, is over the time of a frame of ``render_volume`` at steps of half a voxel.
+    ``figures`` are what settings are judged by: "frame", "memory", "file", "generation" and "loss"
+    over all angles, "frame 5" and "loss 5" at each.
     """
 
     name: str
@@ -89,35 +64,34 @@ class Point:
 
     def cost(self, kind: str) -> float | None:
         """Return what tables and plots have for a key of :data:`COSTS`."""
-        return {
-            "frame": self.frame,
-            "memory": self.bytes_memory,
-            "file": self.bytes_file,
-            "generation": self.generation,
-        }[kind]
+        value: float | None = getattr(self, f"bytes_{kind}", getattr(self, kind, None))
+        return value
 
 
 def points_of(data: dict[str, Any]) -> list[Point]:
-    """Return every setting that was measured."""
-    return [_point(entry) for entry in data["points"] if entry["refused"] is None]
+    """Return every setting that was measured, in the order of the plan."""
+    order = {Setting(**values).name: i for i, values in enumerate(data["plan"]["settings"])}
+    rows = (row for row in Results(data).rows(what="setting") if "refused" not in row)
+    return sorted((_point(row) for row in rows), key=lambda one: order[one.name])
+
+
+def setting_of(row: dict[str, Any]) -> Setting:
+    """Return the setting that a row is about."""
+    return Setting(**{n: value for n, value in row["case"].items() if n in AXES})
 
 
 def best(points: Sequence[Point], kind: str) -> list[Point]:
     """Return the front of SSIM and a kind of cost, see :meth:`.Tradeoff.front`."""
     if kind not in COSTS:
         raise InvalidArgumentError(f"kind must be one of {', '.join(COSTS)}; got {kind!r}")
-    judged = {
-        one.name: [one.figures[kind], one.figures["loss"]] for one in points if kind in one.figures
-    }
+    judged = {p.name: [p.figures[kind], p.figures["loss"]] for p in points if kind in p.figures}
     on_front = front(judged)
     simplest_first = sorted(
         (one for one in points if one.name in on_front), key=lambda one: len(one.changes)
     )
     kept = told_apart([one.name for one in simplest_first], judged)
-    return sorted(
-        (one for one in simplest_first if one.name in kept),
-        key=lambda one: one.cost(kind) or math.inf,
-    )
+    found = (one for one in simplest_first if one.name in kept)
+    return sorted(found, key=lambda one: one.cost(kind) or math.inf)
 
 
 def dominated(points: Sequence[Point]) -> dict[str, list[str]]:
@@ -131,62 +105,54 @@ def dominated(points: Sequence[Point]) -> dict[str, list[str]]:
     return find_dominated({one.name: [one.figures[kind] for kind in kinds] for one in points})
 
 
-def _point(entry: dict[str, Any]) -> Point:
-    rows, generation = entry["angles"], entry["generation"]
-    at = {
-        row["angle"]: ratios(row["seconds"]["clock"], row["volume_seconds"]["clock"])
-        for row in rows
-    }
-    frames = [math.exp(_mean([math.log(r) for r in one])) for one in zip(*at.values(), strict=True)]
-    ssims = {row["angle"]: row["to_volume"]["ssim"] for row in rows}
+def _point(row: dict[str, Any]) -> Point:
+    views, generation, vdi = row["angles"], row["generation"], row["vdi"]
+    setting = setting_of(row)
+    at = {v["angle"]: ratios(v["seconds"]["clock"], v["volume_seconds"]["clock"]) for v in views}
+    frames = [statistics.geometric_mean(one) for one in zip(*at.values(), strict=True)]
+    ssims = {view["angle"]: view["to_volume"]["ssim"] for view in views}
+    ssim = statistics.fmean(ssims.values())
     made = generation["seconds"]["clock"]
     if generation["packing"] is not None:
         made = [a + b for a, b in zip(made, generation["packing"]["clock"], strict=True)]
     generations = ratios(made, generation["volume_seconds"]["clock"])
-    vdi = entry["vdi"]
     figures = {
         "frame": Figure.of_times(frames, TIME_TOLERANCE),
-        "loss": Figure(1 - _mean(list(ssims.values())), SSIM_TOLERANCE),
+        "loss": Figure(1 - ssim, SSIM_TOLERANCE),
         "memory": Figure(math.log(vdi["bytes_memory"]), BYTES_TOLERANCE),
         "generation": Figure.of_times(generations, TIME_TOLERANCE),
     }
-    if vdi["bytes_file"] is not None:
-        figures["file"] = Figure(math.log(vdi["bytes_file"]), BYTES_TOLERANCE)
+    if vdi["bytes_saved"] is not None:
+        figures["file"] = Figure(math.log(vdi["bytes_saved"]), BYTES_TOLERANCE)
     for angle, paired in at.items():
         figures[f"frame {angle:g}"] = Figure.of_times(paired, TIME_TOLERANCE)
         figures[f"loss {angle:g}"] = Figure(1 - ssims[angle], SSIM_TOLERANCE)
     return Point(
-        name=entry["name"],
-        setting=entry["setting"],
+        name=setting.name,
+        setting=setting.to_dict(),
         frame=statistics.median(frames),
         frame_spread=spread(frames),
         frames={angle: statistics.median(paired) for angle, paired in at.items()},
-        ssim=_mean(list(ssims.values())),
+        ssim=ssim,
         ssims=ssims,
         # Equal pictures: JSON has no infinity
-        psnr=min(math.inf if (p := row["to_volume"]["psnr"]) is None else p for row in rows),
-        worst_pixel=max(row["to_volume"]["worst_pixel"] for row in rows),
+        psnr=min(math.inf if (p := v["to_volume"]["psnr"]) is None else p for v in views),
+        worst_pixel=max(view["to_volume"]["worst_pixel"] for view in views),
         bytes_memory=vdi["bytes_memory"],
-        bytes_file=vdi["bytes_file"],
+        bytes_file=vdi["bytes_saved"],
         generation=statistics.median(generations),
         generation_seconds=statistics.median(made),
         figures=figures,
     )
 
 
-def _mean(values: list[float]) -> float:
-    return math.fsum(values) / len(values)
-
-
 def volume_renderers(data: dict[str, Any]) -> dict[float, dict[str, float]]:
     """Return by angle what volume renderers take, over ``render_volume``; medians of pairs."""
-    found = {}
-    for row in data["baselines"]:
-        base = row["seconds"]["volume_skipping"]
-        found[row["angle"]] = {
-            name: statistics.median(ratios(taken["clock"], base["clock"]))
-            for name, taken in row["seconds"].items()
-        }
+    found: dict[float, dict[str, float]] = {}
+    for row in Results(data).rows(what="volume rendering"):
+        base = row["seconds"]["volume_skipping"]["clock"]
+        taken = {name: ratios(times["clock"], base) for name, times in row["seconds"].items()}
+        found[row["case"]["angle"]] = {n: statistics.median(r) for n, r in taken.items()}
     return found
 
 

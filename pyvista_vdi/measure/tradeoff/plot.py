@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
@@ -22,26 +22,21 @@ _PANELS: Mapping[str, str] = {
     "generation": "generation time / a frame of render_volume at half a voxel",
 }
 
-#: Colour of a setting by the one axis on which it differs from the default.
-_COLORS: Mapping[str, str] = {
-    "max_supersegments": "#0072b2",
-    "tolerance": "#56b4e9",
-    "lists": "#d55e00",
-    "precision": "#009e73",
-    "skip_empty": "#8c6d31",
-    "preview": "#cc79a7",
-    "criterion": "#e69f00",
-    "view_cone": "#7b4fa3",
-    "sample_distance": "#3b3b98",
+#: Label and colour of settings by the one axis on which they differ from the default; by "" of the
+#: default, and of those that differ on several.
+_STYLES: Mapping[str, tuple[str, str]] = {
+    "": ("default", "black"),
+    "max_supersegments": ("N_S", "#0072b2"),
+    "tolerance": ("tolerance", "#56b4e9"),
+    "lists": ("number of lists", "#d55e00"),
+    "precision": ("precision", "#009e73"),
+    "skip_empty": ("no skipping", "#8c6d31"),
+    "preview": ("preview", "#cc79a7"),
+    "criterion": ("criterion", "#e69f00"),
+    "view_cone": ("view cone", "#7b4fa3"),
+    "sample_distance": ("steps of generation", "#3b3b98"),
+    "several": ("several changes", "#777777"),
 }
-_LABELS: Mapping[str, str] = {
-    "max_supersegments": "N_S",
-    "lists": "number of lists",
-    "skip_empty": "no skipping",
-    "view_cone": "view cone",
-    "sample_distance": "steps of generation",
-}
-_DEFAULT_COLOR, _SEVERAL_COLOR = "black", "#777777"
 
 #: SSIM at which the axis may have ticks; it is logarithmic in 1 - SSIM.
 _TICKS = (
@@ -51,23 +46,13 @@ _TICKS = (
 #: 1 - SSIM below which all is drawn as the same: from V_O it may be 0.
 _LEAST_LOSS = 1e-5
 
-_LABEL_SIZE = 8
 #: Distances of a label from its point, points of 1/72 inch, in the order in which they are tried.
 _DISTANCES = (7, 14, 22, 32, 44, 58, 74, 92, 112)
-#: Directions in which a label may stand, and how it is aligned there.
-_DIRECTIONS = (
-    (1, 1, "left", "bottom"),
-    (1, -1, "left", "top"),
-    (-1, 1, "right", "bottom"),
-    (-1, -1, "right", "top"),
-    (0, 1, "center", "bottom"),
-    (0, -1, "center", "top"),
-    (1, 0, "left", "center"),
-    (-1, 0, "right", "center"),
-)
+#: Directions in which a label may stand, right and up.
+_DIRECTIONS = ((1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
 
-#: Where a label's line begins, shares of its box, by how it is aligned.
-_SIDES = {"left": 0.0, "center": 0.5, "right": 1.0, "bottom": 0.0, "top": 1.0}
+#: Where a label is held, by the direction in which it stands.
+_ACROSS, _UP = ("center", "left", "right"), ("center", "bottom", "top")
 
 
 def draw(data: dict[str, Any], points: Sequence[Point]) -> Figure:
@@ -85,17 +70,21 @@ def draw(data: dict[str, Any], points: Sequence[Point]) -> Figure:
     for panel, (kind, label), front in zip(panels, _PANELS.items(), fronts, strict=True):
         _draw_panel(panel, points, front, kind)
         panel.set_xlabel(label)
-    _set_room(panels)
-    for panel, kind in zip(panels, _PANELS, strict=True):
+        low, high = panel.get_xlim()  # room for names at the borders
+        panel.set_xlim(low / (high / low) ** 0.12, high * (high / low) ** 0.12)
         _draw_limits(panel, data, kind)
+    least, most = sorted(panels[0].get_ylim())
+    room = (most / least) ** 0.08
+    panels[0].set_ylim(most * room, least / room)  # SSIM goes upwards
     angles = ", ".join(f"{angle:g}" for angle in data["plan"]["angles"])
     panels[0].set_ylabel(f"SSIM to render_volume, mean of {angles} degrees")
     figure.suptitle(
         f"{data['plan']['volume']['name']}, {across(data['plan']['window_size'], ' x ')}: what a "
         "VDI's settings cost and give (better: up and left)"
     )
-    handles = [_marker(color, label) for label, color in _legend(points)]
-    handles.append(_marker("none", "not on the front"))
+    there = {_style(one) for one in points}
+    labels = [(*style, True) for style in _STYLES.values() if style in there]
+    handles = [_marker(*label) for label in (*labels, ("not on the front", "#777777", False))]
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), fontsize="small")
     figure.subplots_adjust(left=0.062, right=0.99, top=0.92, bottom=0.15, wspace=0.06)
     for panel, kind, front in zip(panels, _PANELS, fronts, strict=True):
@@ -104,74 +93,18 @@ def draw(data: dict[str, Any], points: Sequence[Point]) -> Figure:
 
 
 def _draw_panel(panel: Axes, points: Sequence[Point], front: Sequence[Point], kind: str) -> None:
+    from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
+
     for one in points:
         x, y = _place(one, kind)
-        color = _color(one)
-        on = one in front
-        panel.plot(
-            [x],
-            [y],
-            linestyle="none",
-            marker="D" if one.name == "default" else "o",
-            markersize=7 if on else 5,
-            color=color,
-            markerfacecolor=color if on else "white",
-            alpha=1.0 if on else 0.75,
-            zorder=3 if on else 2,
-        )
+        marker = _marker(*_style(one), one in front)
+        marker.set(data=([x], [y]), zorder=3 if one in front else 2)
+        panel.add_line(marker)
+    panel.autoscale_view()
     line = [_place(one, kind) for one in front]
     panel.plot(*zip(*line, strict=True), drawstyle="steps-post", color="#aaaaaa", lw=1, zorder=1)
     panel.set(xscale="log", yscale="log")
     panel.grid(alpha=0.25, which="major")
-    _set_ticks(panel)
-
-
-def _draw_limits(panel: Axes, data: dict[str, Any], kind: str) -> None:
-    """Draw what a VDI competes with, where that lies within the panel."""
-    limits: dict[str, float] = {}
-    if kind == "frame":
-        limits["render_volume"] = 1.0
-        vtk = faster_vtk(data)
-        if vtk:
-            limits["VTK, faster mapper"] = sorted(vtk.values())[len(vtk) // 2]
-    if kind == "memory":
-        limits["the volume"] = data["plan"]["volume"]["bytes"] / 2**20
-    low, high = panel.get_xlim()
-    for label, x in limits.items():
-        if low < x < high:
-            panel.axvline(x, color="#bbbbbb", lw=1, ls="--", zorder=0)
-            panel.text(
-                x,
-                0.01,
-                f" {label}",
-                transform=panel.get_xaxis_transform(),
-                rotation=90,
-                fontsize=7,
-                color="#777777",
-                # Outwards of the two, which may be close together
-                ha="right" if x == min(limits.values()) else "left",
-                va="bottom",
-            )
-
-
-def _place(one: Point, kind: str) -> tuple[float, float]:
-    cost = one.cost(kind) or 0.0
-    return cost / 2**20 if kind == "memory" else cost, max(_LEAST_LOSS, 1 - one.ssim)
-
-
-def _set_room(panels: Sequence[Axes]) -> None:
-    """Leave room for names at the borders; SSIM, which all panels share, goes upwards."""
-    for panel in panels:
-        low, high = panel.get_xlim()
-        panel.set_xlim(low / (high / low) ** 0.12, high * (high / low) ** 0.12)
-    least, most = sorted(panels[0].get_ylim())
-    room = (most / least) ** 0.08
-    panels[0].set_ylim(most * room, least / room)
-
-
-def _set_ticks(panel: Axes) -> None:
-    from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
-
     panel.xaxis.set_major_locator(LogLocator(base=10, subs=(1, 2, 5)))
     panel.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     panel.xaxis.set_minor_formatter(NullFormatter())
@@ -180,33 +113,49 @@ def _set_ticks(panel: Axes) -> None:
     panel.yaxis.set_minor_locator(FixedLocator([]))
 
 
-def _color(one: Point) -> str:
+def _draw_limits(panel: Axes, data: dict[str, Any], kind: str) -> None:
+    """Draw what a VDI competes with, where that lies within the panel."""
+    limits: dict[str, float] = {}
+    if kind == "frame":
+        limits["render_volume"] = 1.0
+        if vtk := sorted(faster_vtk(data).values()):
+            limits["VTK, faster mapper"] = vtk[len(vtk) // 2]
+    if kind == "memory":
+        limits["the volume"] = data["plan"]["volume"]["bytes"] / 2**20
+    low, high = panel.get_xlim()
+    style = {"rotation": 90, "fontsize": 7, "color": "#777777", "va": "bottom"}
+    style["transform"] = panel.get_xaxis_transform()
+    for label, x in limits.items():
+        if low < x < high:
+            panel.axvline(x, color="#bbbbbb", lw=1, ls="--", zorder=0)
+            # Outwards of the two, which may be close together
+            outwards = "right" if x == min(limits.values()) else "left"
+            panel.text(x, 0.01, f" {label}", ha=outwards, **style)
+
+
+def _place(one: Point, kind: str) -> tuple[float, float]:
+    cost = one.cost(kind) or 0.0
+    return cost / 2**20 if kind == "memory" else cost, max(_LEAST_LOSS, 1 - one.ssim)
+
+
+def _style(one: Point) -> tuple[str, str]:
     changed = list(one.changes)
-    if not changed:
-        return _DEFAULT_COLOR
-    return _COLORS[changed[0]] if len(changed) == 1 else _SEVERAL_COLOR
+    return _STYLES["several" if len(changed) > 1 else "".join(changed)]
 
 
-def _legend(points: Sequence[Point]) -> Iterator[tuple[str, str]]:
-    """Yield labels and colours of what there is, the default first and several changes last."""
-    there = {_color(one) for one in points}
-    names = [("default", _DEFAULT_COLOR)]
-    names += [(_LABELS.get(axis, axis), color) for axis, color in _COLORS.items()]
-    names.append(("several changes", _SEVERAL_COLOR))
-    yield from ((label, color) for label, color in names if color in there)
-
-
-def _marker(color: str, label: str) -> Any:
+def _marker(label: str, color: str, on_front: bool) -> Any:
+    """Return the mark of a setting, hollow and smaller where it is not on the front."""
     from matplotlib.lines import Line2D
 
-    hollow = color == "none"
     return Line2D(
         [],
         [],
         linestyle="none",
         marker="D" if label == "default" else "o",
-        color=_SEVERAL_COLOR if hollow else color,
-        markerfacecolor="white" if hollow else color,
+        markersize=7 if on_front else 5,
+        color=color,
+        markerfacecolor=color if on_front else "white",
+        alpha=1.0 if on_front else 0.75,
         label=label,
     )
 
@@ -216,53 +165,48 @@ def _name_front(
 ) -> None:
     """Write the names of the front's settings where they cover neither points nor each other."""
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
-    border = panel.get_window_extent(renderer)
+    border = panel.get_window_extent(renderer).extents
     places = [panel.transData.transform(_place(one, kind)) for one in points]
     radius = 4.5 * figure.dpi / 72
     taken = [(x - radius, y - radius, x + radius, y + radius) for x, y in places]
-    taken += [_corners(text.get_window_extent(renderer)) for text in panel.texts]
+    taken += [text.get_window_extent(renderer).extents for text in panel.texts]
     for one in front:
-        style = {
-            "text": one.name,
-            "xy": _place(one, kind),
-            "textcoords": "offset points",
-            "fontsize": _LABEL_SIZE,
-            "zorder": 4,
-        }
-        trial = panel.annotate(xytext=(0, 0), **style)
-        best = None
-        for distance, (dx, dy, ha, va) in itertools.product(_DISTANCES, _DIRECTIONS):
-            trial.set(position=(dx * distance, dy * distance), ha=ha, va=va)
-            box = _corners(trial.get_window_extent(renderer))
-            cost = sum(_overlap(box, other) for other in taken) + _outside(box, border)
-            if best is None or cost < best[0]:
-                best = cost, (dx * distance, dy * distance), ha, va, box
-            if cost == 0:
+        label = panel.annotate(
+            one.name, _place(one, kind), (0, 0), textcoords="offset points", fontsize=8, zorder=4
+        )
+        tried: list[tuple[float, int, Any, dict[str, Any]]] = []
+        for distance, (right, up) in product(_DISTANCES, _DIRECTIONS):
+            way: dict[str, Any] = {
+                "position": (right * distance, up * distance),
+                "ha": _ACROSS[right],
+            }
+            label.set(**way, va=_UP[up])
+            box = label.get_window_extent(renderer).extents
+            outside = _overlap(box, box) - _overlap(box, border)
+            covered = outside + sum(_overlap(box, other) for other in taken)
+            tried.append((covered, len(tried), box, {**way, "va": _UP[up]}))
+            if covered == 0:
                 break
-        trial.remove()
-        assert best is not None
-        _, position, ha, va, box = best
+        _, _, box, way = min(tried, key=lambda entry: entry[:2])
+        label.remove()
+        relative = {"left": 0.0, "bottom": 0.0, "center": 0.5, "right": 1.0, "top": 1.0}
         line = {"arrowstyle": "-", "color": "#999999", "lw": 0.6, "shrinkA": 1, "shrinkB": 3}
-        line["relpos"] = _SIDES[ha], _SIDES[va]
-        panel.annotate(xytext=position, ha=ha, va=va, arrowprops=line, **style)
+        line["relpos"] = relative[way["ha"]], relative[way["va"]]
+        panel.annotate(
+            one.name,
+            _place(one, kind),
+            way.pop("position"),
+            textcoords="offset points",
+            fontsize=8,
+            zorder=4,
+            arrowprops=line,
+            **way,
+        )
         taken.append(box)
 
 
-_Box = tuple[float, float, float, float]
-
-
-def _corners(box: Any) -> _Box:
-    return box.x0, box.y0, box.x1, box.y1
-
-
-def _overlap(a: _Box, b: _Box) -> float:
+def _overlap(a: Sequence[float], b: Sequence[float]) -> float:
     """Return the area that two boxes share, pixels squared."""
     width = min(a[2], b[2]) - max(a[0], b[0])
     height = min(a[3], b[3]) - max(a[1], b[1])
-    return max(0.0, width) * max(0.0, height)
-
-
-def _outside(box: _Box, border: Any) -> float:
-    """Return the area of a box that lies beyond a border, pixels squared."""
-    whole = (box[2] - box[0]) * (box[3] - box[1])
-    return whole - _overlap(box, _corners(border))
+    return float(max(0.0, width) * max(0.0, height))

@@ -15,17 +15,46 @@ from pyvista_vdi.model.packing import PRECISIONS
 #: Most settings of one sweep: each is drawn many times from every angle.
 MOST_SETTINGS = 500
 
+#: How values of an axis are spelled, the least and the most of numbers (finer steps than the engine
+#: takes are refused by it), and what a sweep takes beside the default.
+_AXES: Mapping[str, tuple[str, tuple[float, float] | None, tuple[Any, ...]]] = {
+    "max_supersegments": ("N_S {:g}", None, (5, 10, 15, 30, 40)),
+    "tolerance": ("tolerance {:g}", (0.0, 1e6), (0.01, 0.1)),
+    "lists": ("lists x{:g}", (0.05, 8.0), (0.5, 1.5, 2.0)),
+    "precision": ("{}", None, ("16-byte", "8-byte")),
+    "skip_empty": ("{}", None, (False,)),
+    "preview": ("preview x{:g}", (0.02, 1.0), (0.7, 0.5, 0.35)),
+    "criterion": ("{}", None, ("homogeneity", "length", "transmittance", "optical-depth")),
+    "view_cone": ("view cone {:g}", (0.0, 90.0), (0.0, 30.0, 90.0)),
+    "sample_distance": ("steps {:g}", (1e-3, 100.0), (0.25, 1.0)),
+}
+
+#: Values of each axis in a sweep, beside the default.
+AXES: Mapping[str, tuple[Any, ...]] = {name: values for name, (_, _, values) in _AXES.items()}
+
+#: Axes that are swept by default; the others have a right value for each scene, or compare methods.
+DEFAULT_AXES, ON_REQUEST = tuple(AXES)[:6], tuple(AXES)[6:]
+
+#: The same where there is little time.
+QUICK_AXES: Mapping[str, tuple[Any, ...]] = {
+    "max_supersegments": (5, 10, 40),
+    "lists": (0.5, 2.0),
+    "precision": ("8-byte",),
+    "skip_empty": (False,),
+    "preview": (0.5,),
+}
+
 
 @dataclass(frozen=True)
 class Setting:
     """One choice of everything that trades accuracy for time and memory.
 
+    A value that is out of its range raises InvalidArgumentError.
+
     Parameters
     ----------
-    max_supersegments : int
-        Longest list, the paper's N_S.
-    tolerance : float
-        Error per list that may be traded for shorter lists.
+    max_supersegments, tolerance : int, float
+        Longest list, the paper's N_S, and error per list that may be traded for shorter ones.
     lists : float
         Lists along each edge of the VDI over pixels along that edge of the frame.
     precision : {"exact", "16-byte", "8-byte"}
@@ -35,17 +64,10 @@ class Setting:
     preview : float
         Share of the frame's edges that is drawn, 0 to 1, before it is brought to size: what a
         plotter does while the view moves.
-    criterion : str
-        What decides where lists are cut.
-    view_cone : float
-        Half angle of the cone of new views to serve, degrees.
+    criterion, view_cone : str, float
+        What decides where lists are cut, and for which new views: half an angle, degrees.
     sample_distance : float
         Step of generation over the volume's smallest spacing.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If a value is out of its range.
     """
 
     max_supersegments: int = 20
@@ -61,31 +83,31 @@ class Setting:
     def __post_init__(self) -> None:
         check_max_supersegments(self.max_supersegments)
         for name, choices in (("precision", PRECISIONS), ("criterion", CRITERIA)):
-            if getattr(self, name) not in choices:
+            if (value := getattr(self, name)) not in choices:
                 raise InvalidArgumentError(
-                    f"{name} must be one of {', '.join(choices)}; got {getattr(self, name)!r}"
+                    f"{name} must be one of {', '.join(choices)}; got {value!r}"
                 )
-        for name, (least, most) in _RANGES.items():
-            value = getattr(self, name)
-            if not (math.isfinite(value) and least <= value <= most):
-                raise InvalidArgumentError(
-                    f"{name} must be from {least:g} to {most:g}; got {value!r}"
-                )
+        for name, (_, limits, _) in _AXES.items():
+            if limits is not None:
+                value, (least, most) = getattr(self, name), limits
+                if not (math.isfinite(value) and least <= value <= most):
+                    raise InvalidArgumentError(
+                        f"{name} must be from {least:g} to {most:g}; got {value!r}"
+                    )
 
     @property
     def name(self) -> str:
         """What differs from the defaults: ``"N_S 10, lists x2"``, or ``"default"``."""
-        changed = [_spelled(n, getattr(self, n)) for n in AXES if n in self.changes]
-        return ", ".join(changed) or "default"
+        changes = self.changes
+        if "skip_empty" in changes:
+            changes["skip_empty"] = "no skipping"
+        return ", ".join(_AXES[n][0].format(value) for n, value in changes.items()) or "default"
 
     @property
     def changes(self) -> dict[str, Any]:
         """Values that differ from the defaults, by name."""
-        return {
-            field.name: getattr(self, field.name)
-            for field in fields(self)
-            if getattr(self, field.name) != field.default
-        }
+        values = {field.name: (getattr(self, field.name), field.default) for field in fields(self)}
+        return {name: value for name, (value, default) in values.items() if value != default}
 
     @property
     def generated(self) -> Setting:
@@ -96,52 +118,6 @@ class Setting:
         """Return the values by name."""
         return asdict(self)
 
-
-#: Least and most of the numbers; finer steps than the engine takes are refused by it.
-_RANGES: Mapping[str, tuple[float, float]] = {
-    "tolerance": (0.0, 1e6),
-    "lists": (0.05, 8.0),
-    "preview": (0.02, 1.0),
-    "view_cone": (0.0, 90.0),
-    "sample_distance": (1e-3, 100.0),
-}
-
-#: Values of each axis in the default sweep, beside the default; none of an axis that is swept only
-#: when it is asked for, see :data:`ON_REQUEST`.
-AXES: Mapping[str, tuple[Any, ...]] = {
-    "max_supersegments": (5, 10, 15, 30, 40),
-    "tolerance": (0.01, 0.1),
-    "lists": (0.5, 1.5, 2.0),
-    "precision": ("16-byte", "8-byte"),
-    "skip_empty": (False,),
-    "preview": (0.7, 0.5, 0.35),
-    "criterion": ("homogeneity", "length", "transmittance", "optical-depth"),
-    "view_cone": (0.0, 30.0, 90.0),
-    "sample_distance": (0.25, 1.0),
-}
-
-#: How values of an axis are spelled; those of the others speak for themselves.
-_FORMS: Mapping[str, str] = {
-    "max_supersegments": "N_S {:g}",
-    "tolerance": "tolerance {:g}",
-    "lists": "lists x{:g}",
-    "preview": "preview x{:g}",
-    "view_cone": "view cone {:g}",
-    "sample_distance": "steps {:g}",
-}
-
-#: Axes that are swept by default; the others have a right value for each scene, or compare methods.
-DEFAULT_AXES = tuple(AXES)[:6]
-ON_REQUEST = tuple(AXES)[6:]
-
-#: The same where there is little time.
-QUICK_AXES: Mapping[str, tuple[Any, ...]] = {
-    "max_supersegments": (5, 10, 40),
-    "lists": (0.5, 2.0),
-    "precision": ("8-byte",),
-    "skip_empty": (False,),
-    "preview": (0.5,),
-}
 
 #: Knobs that are worth turning together: bytes spent on more lists or on longer ones, saved by
 #: packing and spent again, and time saved twice.
@@ -171,7 +147,9 @@ def sweep(
     pairs: bool = True,
     product: bool = False,
 ) -> tuple[Setting, ...]:
-    """Return the settings of a sweep: the base, and every value of every axis by itself.
+    """Return the settings of a sweep: the base first, and every value of every axis by itself.
+
+    An unknown axis, a value out of its range and too many settings raise InvalidArgumentError.
 
     Parameters
     ----------
@@ -185,56 +163,29 @@ def sweep(
     product : bool
         In place of both: every combination.
 
-    Returns
-    -------
-    tuple of Setting
-        The base first; none twice.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If there is no such axis, a value is out of its range, or there are too many settings.
-
     Examples
     --------
     >>> from pyvista_vdi.measure.tradeoff import sweep
     >>> [setting.name for setting in sweep({"lists": (0.5, 2)})]
     ['default', 'lists x0.5', 'lists x2']
     """
-    base = Setting() if base is None else base
-    chosen = _chosen(DEFAULT_AXES if axes is None else axes)
+    base, axes = base or Setting(), DEFAULT_AXES if axes is None else axes
+    if unknown := [name for name in axes if name not in AXES]:
+        raise InvalidArgumentError(f"there is no axis {unknown[0]!r}: known are {', '.join(AXES)}")
+    given = axes if isinstance(axes, Mapping) else AXES
+    chosen = {name: tuple(given[name]) for name in axes}
     if product:
         values = [(getattr(base, name), *chosen[name]) for name in chosen]
-        found = [replace(base, **dict(zip(chosen, v, strict=True))) for v in combinations(*values)]
+        changes = [dict(zip(chosen, v, strict=True)) for v in combinations(*values)]
     else:
-        found = [base]
-        found += [replace(base, **{n: value}) for n, values in chosen.items() for value in values]
+        changes = [{}, *({n: value} for n, values in chosen.items() for value in values)]
         if pairs:
-            found += [
-                replace(base, **pair)
-                for pair in PAIRS
-                if all(n in chosen and value in chosen[n] for n, value in pair.items())
-            ]
-    settings = tuple(dict.fromkeys(found))
+            every = (dict(pair) for pair in PAIRS)
+            changes += [p for p in every if all(v in chosen.get(n, ()) for n, v in p.items())]
+    settings = tuple(dict.fromkeys(replace(base, **change) for change in changes))
     if len(settings) > MOST_SETTINGS:
         raise InvalidArgumentError(
             f"the sweep has {len(settings)} settings, more than {MOST_SETTINGS}: name fewer axes "
             "or values, or leave out the product"
         )
     return settings
-
-
-def _chosen(axes: Mapping[str, Sequence[Any]] | Sequence[str]) -> dict[str, tuple[Any, ...]]:
-    unknown = [name for name in axes if name not in AXES]
-    if unknown:
-        raise InvalidArgumentError(f"there is no axis {unknown[0]!r}: known are {', '.join(AXES)}")
-    if isinstance(axes, Mapping):
-        return {name: tuple(values) for name, values in axes.items()}
-    return {name: AXES[name] for name in axes}
-
-
-def _spelled(name: str, value: Any) -> str:
-    """Return a value as tables and plots have it."""
-    if name == "skip_empty":
-        return "skipping" if value else "no skipping"
-    return _FORMS.get(name, "{}").format(value)

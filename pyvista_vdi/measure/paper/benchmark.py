@@ -1,0 +1,322 @@
+"""The run: its plan, and what each row of the results holds."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import statistics
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import product
+from typing import Any
+
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.measure import harness
+from pyvista_vdi.measure.clock import Times, take_turns
+from pyvista_vdi.measure.harness import (
+    ROOMS,
+    Bench,
+    Case,
+    Image,
+    Latest,
+    Progress,
+    accuracy,
+    check_angles,
+    check_count,
+    enlarged,
+    refusal,
+    sizes_of,
+)
+from pyvista_vdi.measure.paper.datasets import (
+    DEFAULT_SEED,
+    Dataset,
+    find_dataset,
+    label_of,
+    require_allocation,
+)
+from pyvista_vdi.measure.paper.published import paper_targets
+from pyvista_vdi.measure.results import Results
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.quality.frame_rate import FrameRateController
+
+#: The paper's windows, supersegments and angles; and angles beyond the paper's.
+SIZES = ((1280, 720), (1920, 1080))
+LIMITS = (15, 30)
+ANGLES = (0.0, 5.0, 15.0, 30.0, 60.0, 90.0, 180.0)
+
+#: Frames of each kind at a view. Two runs of five are the fewest that ``--compare`` can tell apart.
+REPEATS = 5
+
+#: Frames in which the controller may find its choice, and those that are measured afterwards.
+_SETTLING_FRAMES = 12
+_MEASURED_FRAMES = 5
+
+#: Samples of a ray that count as full quality where samples along rays are given up.
+_MOST_SAMPLES = 64
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run measures; numbers out of their range raise InvalidArgumentError.
+
+    Parameters
+    ----------
+    profile : str
+        Name of what the rest began as.
+    datasets : tuple of str
+        Names that :func:`pyvista_vdi.measure.paper.find_dataset` knows.
+    sizes, limits, angles : tuple
+        Windows, pixels; longest lists, the paper's N_S; degrees of ``Azimuth`` from V_O.
+    repeats, generations : int
+        Timed frames of each candidate at each view, and timed generations of each VDI.
+    interpolation : {"nearest", "linear"}
+        Of all volume renderers, and of generation.
+    preview : tuple of (str, (int, int), int, float), optional
+        Data set, window, N_S and angle of Table 2; ``None`` leaves it out.
+    vtk : bool
+        Whether VTK's mappers take part.
+    seed : int
+        Of the procedural volumes.
+    """
+
+    profile: str
+    datasets: tuple[str, ...]
+    sizes: tuple[tuple[int, int], ...] = SIZES
+    limits: tuple[int, ...] = LIMITS
+    angles: tuple[float, ...] = ANGLES
+    repeats: int = REPEATS
+    generations: int = 3
+    interpolation: str = "nearest"
+    preview: tuple[str, tuple[int, int], int, float] | None = None
+    vtk: bool = True
+    seed: int = DEFAULT_SEED
+
+    def __post_init__(self) -> None:
+        check_count("repeats", self.repeats)
+        check_count("generations", self.generations)
+        labels = [label_of(name) for name in self.datasets]
+        twice = sorted({name for name in labels if labels.count(name) > 1})
+        if twice:
+            raise InvalidArgumentError(
+                f"{twice[0]!r} is given twice: name files differently, as in kingsnake=FILE"
+            )
+        check_angles(self.angles)
+        if self.seed < 0:
+            raise InvalidArgumentError(f"seed must be 0 or above; got {self.seed!r}")
+
+    def found(self) -> dict[str, Dataset]:
+        """Return the data sets by what the results call them; that of Table 2 may be one more."""
+        names = [*self.datasets, *([self.preview[0]] if self.preview else [])]
+        return {label_of(name): find_dataset(name, self.seed) for name in names}
+
+    def cases(self) -> Iterator[Case]:
+        """Yield what the rows are about: volumes, VDIs, views, and Table 2."""
+
+        def case(what: str, size: tuple[int, int], limit: int, angle: float | None = None) -> Case:
+            return Case(label, None, size, angle, 1.0, (("max_supersegments", limit),), (), what)
+
+        measured = [label_of(name) for name in self.datasets]
+        for label in self.found():
+            yield Case(label, what="volume")
+            for size, limit in product(self.sizes, self.limits) if label in measured else ():
+                yield case("vdi", size, limit)
+                yield from (case("view", size, limit, angle) for angle in self.angles)
+            if self.preview is not None and label == label_of(self.preview[0]):
+                yield case("preview", *self.preview[1:])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything in values that JSON can hold; files without their folders."""
+        described = asdict(self)
+        described["datasets"] = [label_of(name) for name in self.datasets]
+        if self.preview is not None:
+            names = ("dataset", "window_size", "max_supersegments", "angle")
+            described["preview"] = dict(zip(names, self.preview, strict=True))
+            described["preview"]["dataset"] = label_of(self.preview[0])
+        plain: dict[str, Any] = json.loads(json.dumps(described))
+        return plain
+
+
+#: Arguments of :class:`Plan` by the name of a profile. ``full`` also takes every volume in the
+#: folder that ``PYVISTA_VDI_DATA`` names.
+PROFILES: Mapping[str, Mapping[str, Any]] = {
+    # Sized for ten minutes on two cores
+    "quick": {
+        "datasets": (
+            *("brain", "rayleigh_taylor"),
+            *("kingsnake_like@4", "beechnut_like@4", "richtmyer_meshkov_like@8"),
+        ),
+        "sizes": SIZES[:1],
+        "angles": (0.0, 5.0, 30.0),
+        "generations": 1,
+        "preview": ("beechnut_like@4", SIZES[0], 15, 30.0),
+    },
+    "full": {
+        "datasets": ("kingsnake_like", "beechnut_like", "richtmyer_meshkov_like"),
+        "preview": ("beechnut_like", SIZES[1], 15, 30.0),
+    },
+}
+
+
+def open_results(
+    plan: Plan, path: str | os.PathLike[str], device: Any = None, *, resume: bool = False
+) -> Results:
+    """Return results that hold nothing yet, or those of an earlier run of the same plan."""
+    extent = "sample" if plan.profile == "quick" else "whole"
+    more = {"rooms": (*ROOMS, "quality"), "extent": extent, "device": device, "resume": resume}
+    return Results.begun("benchmark", plan.to_dict(), path=path, **more)
+
+
+def read_results(path: str | os.PathLike[str]) -> Results:
+    """Read a file of results; anything else raises InvalidArgumentError."""
+    return Results.read(path, "benchmark")
+
+
+def run(plan: Plan, results: Results, device: Any = None, progress: Progress | None = None) -> None:
+    """Measure what is missing, and write the file after every row.
+
+    A volume or VDI that the host or the device cannot hold gives rows that are marked as refused,
+    with the reason.
+
+    ``progress`` is called with the finished fraction and what is being done.
+    """
+    rows = _Rows(plan, results, device)
+    try:
+        harness.run(plan.cases(), rows.figures, results, progress)
+        results.save()
+    finally:
+        rows.close()
+
+
+class _Rows:
+    """Measures cases; a volume, a window with its VTK mappers and a VDI at a time."""
+
+    def __init__(self, plan: Plan, results: Results, device: Any) -> None:
+        self._plan, self._results, self._runtime = plan, results, get_runtime(device)
+        self._datasets = plan.found()
+        self._volumes = Latest(self._load)
+        self._benches = Latest(self._bench)
+        self._vdis = Latest(self._vdi)
+
+    def figures(self, case: Case) -> dict[str, Any]:
+        """Return the figures of a case."""
+        figures: dict[str, Any] = getattr(self, f"_{case.what}_row")(case)
+        return figures
+
+    def close(self) -> None:
+        """Release VTK's windows, and what lies on the device."""
+        for kept in (self._vdis, self._benches, self._volumes):
+            kept.close()
+
+    def _load(self, name: str) -> tuple[Volume, float]:
+        self._vdis.close()
+        self._benches.close()  # two volumes at a time may be too many
+        require_allocation(self._runtime, self._datasets[name])
+        begin = time.perf_counter()
+        return self._datasets[name].load(), time.perf_counter() - begin
+
+    def _bench(self, name: str, size: tuple[int, int]) -> Bench:
+        volume, _ = self._volumes(name)
+        table = self._datasets[name].transfer_function(volume, self._plan.interpolation)
+        bench = Bench(volume, table, size, device=self._runtime, vtk=self._plan.vtk)
+        if bench.opengl is not None:
+            self._results.data["system"]["opengl"] = bench.opengl
+        return bench
+
+    def _vdi(self, name: str, size: tuple[int, int], limit: int) -> tuple[VDI, Times]:
+        bench = self._benches(name, size)
+        made, seconds = bench.timed_generation(self._plan.generations, max_supersegments=limit)
+        return made["exact"], seconds["generate"]
+
+    def _made(self, case: Case) -> tuple[Bench, VDI, Times]:
+        key = (case.volume, case.window_size)
+        self._volumes(case.volume)  # before what is made of it: loading closes what was
+        return self._benches(*key), *self._vdis(*key, case.chosen["max_supersegments"])
+
+    def _volume_row(self, case: Case) -> dict[str, Any]:
+        volume, seconds = self._volumes(case.volume)
+        return {**self._datasets[case.volume].describe(volume), "load_seconds": seconds}
+
+    def _vdi_row(self, case: Case) -> dict[str, Any]:
+        _, vdi, seconds = self._made(case)
+        return {"generation_seconds": seconds, **sizes_of(vdi)}
+
+    def _view_row(self, case: Case) -> dict[str, Any]:
+        """Compare the pictures of one view, and time everybody's frames."""
+        bench, vdi, _ = self._made(case)
+        camera = case.camera(bench.view)
+        reference, near_vtk = bench.reference(camera), bench.near_vtk(camera)
+        frames = bench.frames(camera, vdi)
+        return {
+            "vdi_to_volume": accuracy(bench.draw(vdi, camera), reference),
+            "volume_to_vtk_gpu": near_vtk,
+            "seconds": take_turns(frames, self._plan.repeats, runtime=self._runtime),
+            "left_out": {name: refusal(error) for name, error in bench.left_out.items()},
+        }
+
+    def _preview_row(self, case: Case) -> dict[str, Any]:
+        """Keep each target rate of the paper's Table 2 in both ways, and look at the pictures."""
+        bench, vdi, _ = self._made(case)
+        camera = case.camera(bench.view)
+        reference, whole = bench.reference(camera), bench.draw(vdi, camera)
+        frame = {"full": partial(bench.draw, vdi, camera)}
+        full = take_turns(frame, self._plan.repeats, runtime=self._runtime)["full"]
+        width, height = bench.size
+
+        def fewer_pixels(pixels: int) -> Image:
+            edge = math.sqrt(pixels / (width * height))
+            size = max(1, round(width * edge)), max(1, round(height * edge))
+            return bench.draw(vdi, camera, size)
+
+        def fewer_samples(samples: int) -> Image:
+            return bench.draw(vdi, camera, preview_samples=samples)
+
+        ways = {
+            "fewer pixels": (fewer_pixels, width * height),
+            "samples per ray": (fewer_samples, _MOST_SAMPLES),
+        }
+        rows = []
+        for (speed_up, ssim), (name, (way, most)) in product(paper_targets(), ways.items()):
+            # Multiples of the full frame's rate ask the same of every device
+            target = speed_up / statistics.median(full["clock"])
+            samples, taken, image = _kept(way, most, target)
+            shown = enlarged(image, bench.size)
+            rows.append(
+                {
+                    "way": name,
+                    "target_speed_up": speed_up,
+                    "paper_ssim": ssim,
+                    "samples": samples,
+                    "share": samples / most,
+                    "seconds": {"clock": taken, "device": []},
+                    "to_full": accuracy(shown, whole),
+                    "to_volume": accuracy(shown, reference),
+                }
+            )
+        return {"seconds": full, "to_volume": accuracy(whole, reference), "ways": rows}
+
+
+def _kept(
+    way: Callable[[int], Image], most: int, target_fps: float
+) -> tuple[int, list[float], Image]:
+    """Let the controller find its choice; return it, the frames' times and the last picture."""
+    way(most)  # not counted: its kernel may have to be compiled
+    controller = FrameRateController(target_fps, floor=1 / most)
+    image: list[Image] = []
+
+    def frames(samples: int, repeats: int) -> list[float]:
+        def frame() -> None:
+            image[:] = [way(samples)]
+
+        return take_turns({"way": frame}, repeats, warm_up=False)["way"]["clock"]
+
+    for _ in range(_SETTLING_FRAMES):
+        samples = controller.choose(most)
+        (seconds,) = frames(samples, 1)
+        controller.record(samples, seconds, seconds)
+    samples = controller.choose(most)
+    return samples, frames(samples, _MEASURED_FRAMES), image[0]
