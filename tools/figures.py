@@ -8,9 +8,10 @@ A page says above a table or a picture where its figures come from::
     <!-- figures: benchmarks/results/frames_1280x720.json -->
     <!-- measured: 157b0bb77 raycasting volume -->
 
-The first names a file of results, which says what code it measured. The second is for what was
-found out once and has no file any more: the commit, and the folders of `pyvista_vdi/` and `opencl/`
-that decide it (by default those of pictures). ``% figures: ...`` does as well. Needs the package.
+The first names a file of results, which says what code it measured. The second is for figures that
+have no such file: the commit, and the folders of `pyvista_vdi/` and `opencl/` that decide them (by
+default those of pictures). ``% figures: ...`` does as well. In `docs/decisions/` figures are what was
+found out once, the reasons of a decision, and may be older. Needs the package.
 """
 
 # ruff: noqa: T201
@@ -38,7 +39,7 @@ class Figure(NamedTuple):
     place: str
     source: str
     older_than: tuple[str, ...]
-    once: bool = False  # found out once, and said to be: a decision's reason
+    once: bool  # what was found out once, and is a decision's reason
 
 
 def figures(checkout: Path = CHECKOUT) -> Iterator[Figure]:
@@ -51,11 +52,11 @@ def figures(checkout: Path = CHECKOUT) -> Iterator[Figure]:
             place = f"{page.relative_to(checkout)}:{line}"
             kind, source = found.groups()
             if kind == "figures":
-                yield Figure(place, source, results_older_than(checkout / source))
+                older = results_older_than(checkout / source)
             else:
                 commit, *rooms = source.split()
-                changed = changed_since(checkout, commit, rooms or PICTURES)
-                yield Figure(place, source, changed, once=True)
+                older = changed_since(checkout, commit, rooms or PICTURES)
+            yield Figure(place, source, older, once="decisions" in page.parts)
 
 
 def results_older_than(path: Path) -> tuple[str, ...]:

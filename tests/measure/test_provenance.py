@@ -90,10 +90,14 @@ def test_the_check_names_figures_older_than_what_they_measured(tmp_path):
     (tmp_path / "docs" / "a.md").write_text(
         "<!-- figures: silent.json -->\n<!-- figures: no.md -->"
     )
+    (tmp_path / "docs" / "decisions").mkdir()
+    (tmp_path / "docs" / "decisions" / "b.md").write_text("<!-- measured: 0abc volume -->\n")
+    assert [each.place for each in tool.figures(tmp_path) if each.once] == ["docs/decisions/b.md:1"]
     found = {each.place: each.older_than for each in tool.figures(tmp_path)}
     assert found == {
         "README.md:1": (),
         "README.md:4": ("raycasting",),
         "docs/a.md:1": ("whatever it measured: its results do not say",),
         "docs/a.md:2": ("whatever it measured: its results are not kept",),
+        "docs/decisions/b.md:1": ("volume",),  # of a commit that is not there
     }
