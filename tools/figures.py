@@ -10,8 +10,8 @@ A page says above a table or a picture where its figures come from::
 
 The first names a file of results, which says what code it measured. The second is for figures that
 have no such file: the commit, and the folders of `pyvista_vdi/` and `opencl/` that decide them (by
-default those of pictures). ``% figures: ...`` does as well. In `docs/decisions/` figures are what was
-found out once, the reasons of a decision, and may be older. Needs the package.
+default those of pictures). ``% figures: ...`` does as well. In `docs/decisions/` figures are what
+was found out once, the reasons of a decision, and may be older. Needs the package.
 """
 
 # ruff: noqa: T201
