@@ -26,7 +26,9 @@ def series(default_runtime):
         return ball
 
     camera, times = filling_camera((-1, 1, -1, 1, -1, 1), SIZE), np.arange(N) / 4
-    return pvdi.generate_series([volume(k) for k in range(N)], camera, SIZE, times, **CLASSIFICATION)
+    return pvdi.generate_series(
+        [volume(k) for k in range(N)], camera, SIZE, times, **CLASSIFICATION
+    )
 
 
 def shown(plotter, series, **options):
