@@ -17,16 +17,14 @@ MESSAGE = (
     "exported without its VDI: trame's export_html, export_vtksz and views .* empty box.*"
     "plotter.export_html, screenshots"
 )
+WINDOW = (60, 50)
 
 
-@pytest.fixture
-def plotter():
-    plotter = pv.Plotter(window_size=(60, 50), off_screen=True)
-    plotter.add_vdi(soft_ball(8), show_scalar_bar=False)
+def added(plotter):
+    actor = plotter.add_vdi(soft_ball(8), show_scalar_bar=False)
     plotter.add_mesh(pv.Sphere())
     plotter.show(auto_close=False)
-    yield plotter
-    plotter.close()
+    return actor.mapper
 
 
 def serialized(mapper):
@@ -35,36 +33,29 @@ def serialized(mapper):
     return mapper.GetInputDataObject(0, 0)
 
 
-def test_asking_for_the_data_to_be_exported_warns_once(plotter):
-    mapper = plotter.mapper if hasattr(plotter.mapper, "painter") else plotter.volume.mapper
-    with pytest.warns(VDIWarning, match=MESSAGE):
-        proxy = serialized(mapper)
-    assert proxy.GetDimensions() == (2, 2, 2)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        serialized(mapper)
-
-
-def test_vtks_own_mapper_warns_too():
-    mapper = pvdi.VDIMapper()
-    mapper.SetVDI(vdi_of_one_list())
-    with pytest.warns(VDIWarning, match=MESSAGE):
-        serialized(mapper)
-
-
-def test_what_draws_and_what_looks_at_the_scene_does_not_warn(plotter):
+def test_asking_for_the_data_to_be_exported_warns_once_and_nothing_else_does(plotter):
+    mapper = added(plotter)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         plotter.render()
         plotter.screenshot(return_img=True)
         plotter.reset_camera()
         assert len(plotter.meshes) == 2
-        plotter.volume.mapper.dataset  # noqa: B018
-        assert plotter.volume.mapper.GetInput() is not None
+        mapper.dataset  # noqa: B018
+        assert mapper.GetInput() is not None
+    with pytest.warns(VDIWarning, match=MESSAGE):
+        proxy = serialized(mapper)
+    assert proxy.GetDimensions() == (2, 2, 2)
+    serialized(mapper)  # warnings are errors: it is not said again
+    alone = pvdi.VDIMapper()  # VTK's own
+    alone.SetVDI(vdi_of_one_list())
+    with pytest.warns(VDIWarning, match=MESSAGE):
+        serialized(alone)
 
 
 @pytest.mark.parametrize("what", ["export_html", "export_vtksz"])
 def test_exports_of_trame_warn(plotter, what):
     pytest.importorskip("trame_pyvista")
+    added(plotter)
     with pytest.warns(VDIWarning, match=MESSAGE):
         getattr(plotter.trame, what)(None)

@@ -9,22 +9,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-import pyvista as pv
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.plotting.clip_plane import AddVDIClipPlane
-from pyvista_vdi.plotting.component import AddVDI
-
-
-def test_it_is_pyvistas_with_what_is_promised():
-    plotter = pvdi.Plotter(off_screen=True, window_size=(32, 24))
-    assert isinstance(plotter, pv.Plotter)
-    promised = pvdi.Plotter.__annotations__
-    assert set(promised) == {"add_vdi", "add_vdi_clip_plane"}
-    for name, kind in (("add_vdi", AddVDI), ("add_vdi_clip_plane", AddVDIClipPlane)):
-        assert promised[name] == kind.__name__
-        assert type(getattr(plotter, name)) is kind
-    plotter.close()
 
 
 @pytest.mark.slow
