@@ -293,25 +293,6 @@ def test_copies_of_what_the_plotter_holds_alone(plotter, deep):
     np.testing.assert_array_equal(shown(plotter), before)
 
 
-def test_depth_is_read_only_where_something_opaque_can_hide_the_vdi(plotter, monkeypatch):
-    reads = []
-    frame_type = painter_module.Frame
-    read = frame_type.opaque_z
-    monkeypatch.setattr(frame_type, "opaque_z", lambda *args: reads.append(1) or read(*args))
-    plotter.add_vdi(soft_ball(), **LOOKS)
-    plotter.add_axes()
-    plotter.add_text("words")
-    plotter.camera_position = view(8, 0, 0)
-    shown(plotter)
-    behind = plotter.add_mesh(pv.Sphere(center=(-4, 0, 0)), reset_camera=False)
-    plotter.add_mesh(pv.Sphere(center=(0, 0, 0)), opacity=0.5, reset_camera=False)
-    shown(plotter)
-    assert reads == []
-    behind.position = (4, 0, 0)
-    plotter.render()
-    assert reads
-
-
 def test_problem_in_a_frame_is_said_once_and_the_last_image_stays(plotter):
     actor = plotter.add_vdi(soft_ball(), **LOOKS)
     before = shown(plotter)

@@ -289,18 +289,24 @@ def test_a_mapper_s_data_set_is_what_was_added():
     plotter.close()
 
 
-def test_a_mapper_s_copy_draws_the_same_behind_another_actor():
+@pytest.mark.parametrize("of", ["mapper", "actor"])
+def test_a_copy_of_the_mapper_draws_the_same_behind_another_actor(of):
     plotter = pv.Plotter(window_size=WINDOW)
     plotter.set_background("lightsteelblue")
     actor = add_ours(plotter, soft_ball(16))
     plane = vtkPlane()
     plane.SetNormal(1, 0.3, 0)
     actor.mapper.AddClippingPlane(plane)
+    actor.mapper.SetCroppingRegionPlanes(-0.45, 0.3, -0.2, 0.5, -0.4, 0.25)
+    actor.mapper.SetCroppingRegionFlagsToFence()
+    actor.mapper.CroppingOn()
     actor.opacity_multiplier = 2.0
     plotter.camera_position = VIEW
     before = plotter.screenshot(return_img=True)
-    other = type(actor)()
-    other.mapper = actor.mapper.copy()
+    other = actor.copy() if of == "actor" else type(actor)()
+    if of == "mapper":
+        other.mapper = actor.mapper.copy()
+    assert other.opacity_multiplier == 2.0
     assert other.mapper.scalar_range == actor.mapper.scalar_range
     plotter.remove_actor(actor)
     plotter.add_actor(other, reset_camera=False)

@@ -73,16 +73,6 @@ def test_regions_are_vtks(regions):
     assert_as_vtk(cropped(regions))
 
 
-def test_one_corner():
-    planes = (0.1, 0.6, 0.2, 0.6, 0.1, 0.6)
-    # A ray along an edge may meet it or not
-    assert_as_vtk(cropped(0x0000001, planes=planes, direction=(-1, -0.7, 0.5)), strays=3)
-
-
-def test_planes_outside_the_volume():
-    assert_as_vtk(cropped("cross", planes=(-3, 0.1, -0.2, 5, 0.2, 0.3)))
-
-
 def test_planes_that_are_not_in_order_draw_nothing_as_in_vtk():
     """VTK's GPU mapper, which is below ours, does not render then, and says nothing."""
     scene = cropped(0x5A3C12F, planes=(-0.3, 0.1, 0.4, -0.2, 0.3, 0.5))
@@ -226,18 +216,6 @@ def test_numbers_that_are_none(plotter, name, default, wrong, message, bare):
     assert getattr(alone, name) == default
     with pytest.raises(InvalidArgumentError, match=bare):
         setattr(alone, name, 0.5)
-
-
-def test_copies_are_cropped_and_as_dense(plotter):
-    actor = plotter.add_vdi(soft_ball(), show_scalar_bar=False)
-    crop(actor.mapper, "fence")
-    actor.opacity_multiplier = 3.0
-    picture = shown(plotter)
-    other = actor.copy()
-    plotter.remove_actor(actor)
-    plotter.add_actor(other)
-    assert other.mapper.GetOpacityMultiplier() == 3.0
-    np.testing.assert_array_equal(shown(plotter), picture)
 
 
 def test_vtk_s_mapper_agrees_on_the_presets():

@@ -172,10 +172,16 @@ def test_only_what_can_hide_the_vdi_is_read(from_x, monkeypatch):
     monkeypatch.setattr(
         frame_module.Frame, "opaque_z", lambda self, area: areas.append(area) or read(self, area)
     )
-    from_x.add_mesh(pv.Sphere(radius=0.2, center=(1, -1.9, 1.7)), reset_camera=False)
+    beside = pv.Sphere(radius=0.2, center=(1, -1.9, 1.7))
+    from_x.add_mesh(beside, reset_camera=False, name="beside")
+    from_x.add_mesh(pv.Sphere(center=(-4, 0, 0)), reset_camera=False, name="behind")
+    from_x.add_mesh(pv.Sphere(), opacity=0.5, reset_camera=False, name="translucent")
+    from_x.add_axes()
+    from_x.add_text("words")
     from_x.show(auto_close=False)
-    assert areas == []  # it is beside the VDI
-    from_x.remove_actor(list(from_x.actors)[-1])
+    assert areas == []
+    for name in ("beside", "behind", "translucent"):
+        from_x.remove_actor(name)
     from_x.add_mesh(pv.Cube(center=(1, 0.5, 0)).scale((1, 0.2, 0.2)), reset_camera=False)
     from_x.render()
     ((left, bottom, right, top),) = areas
@@ -214,27 +220,6 @@ def test_vtk_copies_no_depth(plotter):
     assert texture.GetHandle() == 0
     plotter.render()
     assert texture.GetHandle() != 0
-
-
-def test_an_actor_in_two_viewports():
-    """Their sizes differ: each frame says where its image is."""
-    sides = pv.Plotter(shape=(1, 2), col_weights=[2, 1], window_size=(180, 90), border=False)
-    actor = sides.add_vdi(soft_ball(), **LOOKS)
-    sides.subplot(0, 1)
-    sides.add_actor(actor)
-    for column in (0, 1):
-        sides.subplot(0, column)
-        sides.camera_position = VIEW
-    both = shown(sides)
-    vdi = actor.vdi
-    sides.close()
-    for part, size in ((both[:, :120], (120, 90)), (both[:, 120:], (60, 90))):
-        alone = pv.Plotter(window_size=size)
-        alone.add_vdi(vdi, show_scalar_bar=False)
-        alone.camera_position = VIEW
-        np.testing.assert_array_equal(shown(alone), part)
-        assert np.ptp(part) > 40
-        alone.close()
 
 
 def test_cpu_devices_draw_where_vtk_uploads_from(plotter, monkeypatch):
