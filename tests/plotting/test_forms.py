@@ -44,7 +44,6 @@ def test_blocks_are_those_that_are_added_one_by_one(plotter, multi_colors):
     vtks = judge.add_volume(blocks, multi_colors=multi_colors, name="balls")
     assert len(vtks) == 2
     assert names == [name for name in judge.renderer.actors if name.startswith("balls")]
-    judge.close()
 
 
 @pytest.mark.parametrize("name", ["cmap", "colormap"])
@@ -95,7 +94,7 @@ def test_names_of_vtk_s_mappers_mean_nothing_and_are_noted_once(plotter):
     np.testing.assert_array_equal(shown(plotter), named)
 
 
-@pytest.mark.parametrize("given", ["volume", "actor"])
+@pytest.mark.parametrize("given", ["volume", "actor", "actor, by add_volume's"])
 def test_a_plane_widget_clips_as_it_clips_a_volume(given):
     plane = {"normal": "x", "interaction_event": "always"}
 
@@ -106,7 +105,8 @@ def test_a_plane_widget_clips_as_it_clips_a_volume(given):
             assert widget.IsA("vtkImplicitPlaneWidget")
         else:
             actor = add(plotter, soft_ball())
-            clips = {add_ours: "add_vdi_clip_plane", add_judge: "add_volume_clip_plane"}
+            ours = "add_vdi_clip_plane" if given == "actor" else "add_volume_clip_plane"
+            clips = {add_ours: ours, add_judge: "add_volume_clip_plane"}
             if add in clips:
                 getattr(plotter, clips[add])(actor, **plane)
         plotter.clear_plane_widgets()
@@ -158,4 +158,3 @@ def test_help_is_the_method_s_and_what_is_promised_is_there(plotter):
     kinds = {"add_vdi": AddVDI, "add_vdi_clip_plane": AddVDIClipPlane}
     assert pvdi.Plotter.__annotations__ == {name: kind.__name__ for name, kind in kinds.items()}
     assert {name: type(getattr(ours, name)) for name in kinds} == kinds
-    ours.close()

@@ -286,7 +286,6 @@ def test_a_mapper_s_data_set_is_what_was_added():
     other["v"] = ball["v"][::-1].copy()
     actor.mapper.dataset = other
     assert not actor.regenerate().equals(vdi)
-    plotter.close()
 
 
 @pytest.mark.parametrize("of", ["mapper", "actor"])
@@ -311,4 +310,3 @@ def test_a_copy_of_the_mapper_draws_the_same_behind_another_actor(of):
     plotter.remove_actor(actor)
     plotter.add_actor(other, reset_camera=False)
     np.testing.assert_array_equal(plotter.screenshot(return_img=True), before)
-    plotter.close()

@@ -158,7 +158,6 @@ def test_changes_act_on_the_next_frame_without_another_vdi(plotter):
     plain.add_vdi(vdi, show_scalar_bar=False)
     plain.camera = plotter.camera.copy()
     np.testing.assert_array_equal(again, shown(plain))
-    plain.close()
 
 
 def test_multiplier_is_another_unit_distance():

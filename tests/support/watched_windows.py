@@ -103,6 +103,18 @@ def frame(plotter, rate=STILL):
     return on_screen(plotter.render_window)
 
 
+def turned(plotter, degrees, rate=STILL):
+    """Turn the view, and draw a frame; while a hand moves, it draws at the rate MOVING."""
+    plotter.camera.Azimuth(degrees)
+    return frame(plotter, rate)
+
+
+def frames(plotter, count, rate=STILL):
+    """Draw frames of the same view."""
+    for _ in range(count):
+        frame(plotter, rate)
+
+
 def frames_until(plotter, happened, rate=STILL):
     """Draw frames, by default at rest, until something is so; all pictures."""
     pictures = []

@@ -16,7 +16,6 @@ from plugin_scenes import (
     tiled_picture,
 )
 from skimage.metrics import structural_similarity
-from vtkmodules.vtkCommonDataModel import vtkPlane
 from vtkmodules.vtkRenderingCore import vtkVolume
 from vtkmodules.vtkRenderingVolume import vtkMultiVolume
 from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
@@ -85,25 +84,10 @@ def meshes(plotter, actors):
     plotter.add_mesh(pv.Plane(direction=(1, 1, 0), i_size=2, j_size=2), color="red", opacity=0.5)
 
 
-def one_clipped(plotter, actors):
-    plane = vtkPlane()
-    plane.SetOrigin(0.9, 0.4, 0.2)
-    plane.SetNormal(0.3, -1, 0.2)
-    actors[1].mapper.AddClippingPlane(plane)
-
-
 def one_cropped(plotter, actors):
     actors[1].mapper.SetCroppingRegionPlanes(-0.5, 0.1, -0.3, 0.4, -0.2, 0.9)
     actors[1].mapper.SetCroppingRegionFlagsToFence()
     actors[1].mapper.CroppingOn()
-
-
-def one_denser(plotter, actors):
-    actors[1].mapper.SetOpacityMultiplier(3.0)
-
-
-def parallel(plotter, actors):
-    plotter.enable_parallel_projection()
 
 
 def eye_in_both(plotter, actors):
@@ -126,25 +110,11 @@ def sheared(plotter, actors):
     actors[1].user_matrix = shear
 
 
-def slow(scene):
-    return pytest.param(scene, marks=pytest.mark.slow, id=scene.__name__)
-
-
 @pytest.mark.every(3)
 @pytest.mark.filterwarnings("ignore:coverage='bounds'")
 @pytest.mark.parametrize(
     "scene",
-    [
-        meshes,
-        slow(one_clipped),  # one_cropped cuts by more planes
-        one_cropped,
-        slow(one_denser),  # tests/raycasting/test_multi_vdi_oracle.py has it
-        slow(parallel),  # likewise
-        eye_in_both,
-        anti_aliased,
-        right_eye,
-        sheared,
-    ],
+    [meshes, one_cropped, eye_in_both, anti_aliased, right_eye, sheared],
     ids=lambda scene: scene.__name__,
 )
 def test_the_order_of_adding_changes_nothing(scene, raycasts):
@@ -252,7 +222,6 @@ def test_apart_on_the_screen_each_draws_itself(raycasts):
     plotter.camera_position = ((6, 6, 2), (0, 0, 0), (0, 0, 1))
     plotter.show(auto_close=False)
     assert raycasts == []
-    plotter.close()
 
 
 def test_what_has_not_changed_is_not_raycast_again(raycasts, monkeypatch):
@@ -274,7 +243,6 @@ def test_what_has_not_changed_is_not_raycast_again(raycasts, monkeypatch):
     plotter.render()
     actors[0].SetVisibility(True)
     assert np.array_equal(shown(plotter), first)
-    plotter.close()
 
 
 def test_changes_are_seen_at_once(raycasts):
@@ -295,7 +263,6 @@ def test_changes_are_seen_at_once(raycasts):
     assert np.abs(moved - both).max() > 40
     actors[0].mapper.lookup_table.cmap = "bone"
     assert np.abs(shown(plotter) - moved).max() > 20
-    plotter.close()
 
 
 def test_several_renderers_and_one_actor_in_two(raycasts):

@@ -49,13 +49,6 @@ def slab(z=(-0.5, 0.5), color=(1, 0.5, 0), edge=16):
     )
 
 
-@pytest.fixture(autouse=True)
-def closed(vtk_messages):
-    """Plotters are closed, whatever becomes of the test."""
-    yield
-    pv.close_all()
-
-
 def screenshot(plotter):
     return plotter.screenshot(return_img=True)
 

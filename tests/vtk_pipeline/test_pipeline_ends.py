@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from plugin_scenes import soft_ball, vdi_of_one_list
+from vtk_sources import ready_source
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
@@ -13,7 +14,12 @@ from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 from vtkmodules.vtkRenderingCore import vtkCamera
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIFileError
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidVDIError,
+    InvalidVolumeError,
+    VDIFileError,
+)
 from pyvista_vdi.io import to_bytes
 from pyvista_vdi.vtk_pipeline import (
     VDIReader,
@@ -58,19 +64,22 @@ def extent(algorithm):
     return algorithm.GetOutputInformation(0).Get(key)
 
 
-@pytest.mark.parametrize("kind", [VDIToImage, VDIToDenseImage, VDIWriter])
+@pytest.mark.parametrize("kind", [VDIToImage, VDIToDenseImage, VDIWriter, pvdi.VDISource])
 def test_what_has_no_input_says_so(kind, expected_messages, tmp_path):
     end = kind()
-    ask = end.Update
+    ask, error = end.Update, InvalidVDIError
     if kind is VDIWriter:
         end.SetFileName(str(tmp_path / "a.vdi"))
         ask = end.Write
-    with pytest.raises(InvalidVDIError, match=rf"{kind.__name__} has no input: call SetInputData"):
+    elif kind is pvdi.VDISource:
+        end, error = ready_source(InputDataObject=None), InvalidVolumeError
+        ask = end.GetVDI
+    with pytest.raises(error, match=rf"{kind.__name__} has no input: call SetInputData"):
         ask()
     reader = vtkXMLImageDataReader()
     reader.SetFileName(str(tmp_path / "none.vti"))
     end.SetInputConnection(reader.GetOutputPort())
-    with pytest.raises(InvalidVDIError, match=r"VTK's output window says why"):
+    with pytest.raises(error, match=r"VTK's output window says why"):
         ask()
     assert "none.vti" in expected_messages.GetOutput()
     assert not list(tmp_path.iterdir())
@@ -157,9 +166,11 @@ def test_picture_is_made_again_only_if_something_changed(picture):
     np.testing.assert_array_equal(pixels(picture.GetImage()), turned)
 
 
-def test_what_is_no_vdi_has_no_picture(picture, expected_messages):
+@pytest.mark.parametrize("kind", [VDIToImage, VDIToDenseImage])
+def test_what_is_no_vdi_has_no_picture(kind, vdi, expected_messages):
+    picture, volume = kind(), vtkImageData()
+    picture.SetInputDataObject(vdi_to_image(vdi))
     picture.Update()
-    volume = vtkImageData()
     volume.SetDimensions(3, 3, 3)
     picture.SetInputDataObject(volume)
     with pytest.raises(InvalidVDIError, match="is not a VDI"):
@@ -167,7 +178,8 @@ def test_what_is_no_vdi_has_no_picture(picture, expected_messages):
     assert picture.GetOutputDataObject(0).GetNumberOfPoints() == 0
     assert expected_messages.GetOutput() == ""
     picture.GetExecutive().Update()  # VTK's own update cannot raise
-    assert "VDIToImage: this vtkImageData is not a VDI" in expected_messages.GetOutput()
+    said = f"{kind.__name__}: this vtkImageData is not a VDI"
+    assert said in expected_messages.GetOutput()
 
 
 @pytest.mark.parametrize("suffix", [".vdi", ".exr"])

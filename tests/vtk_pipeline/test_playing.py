@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import CLASSIFICATION, soft_ball, vdi_of_one_list
-from watched_windows import MOVING, WINDOW, frame, frames_until, picture_of, small_vdi, threads
+from watched_windows import (
+    MOVING,
+    WINDOW,
+    frame,
+    frames_until,
+    picture_of,
+    small_vdi,
+    threads,
+    turned,
+)
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, UnsupportedError, VDIWarning
@@ -101,8 +110,7 @@ def test_a_damaged_step_of_a_file_leaves_what_was_shown(plotter, series, tmp_pat
 def test_a_step_is_made_anew_for_another_view(plotter, series):
     actor = shown(plotter, series)
     actor.step = 1
-    plotter.camera.Azimuth(80)
-    frame(plotter)
+    turned(plotter, 80)
     assert actor.status.angle > 40
     vdi = actor.regenerate()
     assert vdi.window_size == WINDOW
@@ -154,7 +162,6 @@ def test_vtk_alone_shows_a_series(series):
     plotter.show(auto_close=False)
     actor.time = 0.75
     np.testing.assert_array_equal(frame(plotter), picture_of(series[3], plotter))
-    plotter.close()
 
 
 def test_what_has_no_times_is_refused(plotter, series):

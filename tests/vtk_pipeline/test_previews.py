@@ -22,6 +22,7 @@ from watched_windows import (
     on_screen,
     small_vdi,
     threads,
+    turned,
     watched,
 )
 
@@ -40,12 +41,6 @@ pytestmark = pytest.mark.gl
 ALL = WINDOW[0] * WINDOW[1]
 
 
-def turned(plotter, degrees=1e-6):
-    """A frame while a hand turns the view."""
-    plotter.camera.Azimuth(degrees)
-    return frame(plotter, MOVING)
-
-
 def test_preview_while_the_rate_is_high_and_full_in_the_next_frame(plotter, coarsest):
     actor = watched(plotter)
     opaque_sphere(plotter)
@@ -54,7 +49,7 @@ def test_preview_while_the_rate_is_high_and_full_in_the_next_frame(plotter, coar
     # An image that is there is better than a preview
     np.testing.assert_array_equal(frame(plotter, MOVING), full)
     assert actor.status.mode == "full"
-    preview = turned(plotter, 20)
+    preview = turned(plotter, 20, MOVING)
     status = actor.status
     assert status.mode == "preview"
     assert status.full_samples == ALL
@@ -72,7 +67,7 @@ def test_preview_while_the_rate_is_high_and_full_in_the_next_frame(plotter, coar
 def test_preview_is_not_shifted_and_the_mesh_stays_crisp(plotter, coarsest):
     watched(plotter)
     ball = frame(plotter)
-    preview = turned(plotter)
+    preview = turned(plotter, 1e-6, MOVING)
     y, x = np.mgrid[: WINDOW[1], : WINDOW[0]]
     centres = []
     for picture in (ball, preview):
@@ -84,7 +79,7 @@ def test_preview_is_not_shifted_and_the_mesh_stays_crisp(plotter, coarsest):
         pv.Sphere(radius=0.4, center=(1.2, 0, 0)), color="w", reset_camera=False
     )
     full = frame(plotter)
-    preview = turned(plotter)
+    preview = turned(plotter, 1e-6, MOVING)
     mesh.visibility = False
     inside = np.abs(full - frame(plotter)).sum(axis=2) > 200
     assert inside.sum() > 125
@@ -146,7 +141,7 @@ def crop(mapper):
 def test_previews_are_cut_as_full_frames_are(plotter, coarsest, cut, undo, share):
     actor = watched(plotter, soft_ball(48))
     cut(actor.mapper)
-    preview = turned(plotter, 1)
+    preview = turned(plotter, 1, MOVING)
     assert actor.status.mode == "preview"
     full = frame(plotter)
     assert actor.status.mode == "full"
@@ -158,25 +153,24 @@ def test_previews_are_cut_as_full_frames_are(plotter, coarsest, cut, undo, share
 
 def test_off_screen_windows_and_pictures_are_always_full(plotter, coarsest):
     actor = watched(plotter)
-    plotter.camera.Azimuth(20)
-    full = frame(plotter)
+    full = turned(plotter, 20)
     shot = plotter.screenshot(return_img=True)
     large = plotter.screenshot(return_img=True, scale=2)
     depth = plotter.get_image_depth()
-    turned(plotter, -20)
-    turned(plotter, 20)
+    turned(plotter, -20, MOVING)
+    turned(plotter, 20, MOVING)
     assert actor.status.mode == "preview"
     np.testing.assert_array_equal(plotter.screenshot(return_img=True), shot)
     assert actor.status.mode == "full"
     np.testing.assert_array_equal(on_screen(plotter.render_window), full)
-    turned(plotter, 1e-9)  # so that no image is kept
+    turned(plotter, 1e-9, MOVING)  # so that no image is kept
     assert actor.status.mode == "preview", "previews go on after a screenshot"
     np.testing.assert_allclose(plotter.screenshot(return_img=True, scale=2), large, atol=1)
-    turned(plotter, 1e-9)
+    turned(plotter, 1e-9, MOVING)
     assert actor.status.mode == "preview"
     np.testing.assert_allclose(plotter.get_image_depth(), depth, atol=1e-5)
     for again in range(2):  # VTK's own filter
-        turned(plotter, 1e-9)
+        turned(plotter, 1e-9, MOVING)
         assert actor.status.mode == "preview"
         grab = vtkWindowToImageFilter()
         grab.SetInput(plotter.render_window)
@@ -187,7 +181,7 @@ def test_off_screen_windows_and_pictures_are_always_full(plotter, coarsest):
         taken = taken.reshape(full.shape)[::-1]
         np.testing.assert_array_equal(taken, full, err_msg=str(again))
     actor.mapper.SetInteractiveOffScreen(False)
-    turned(plotter, 10)
+    turned(plotter, 10, MOVING)
     assert actor.status.mode == "full"
 
 
@@ -201,7 +195,7 @@ def test_movie_frames_and_vector_graphics_are_full(plotter, coarsest, tmp_path, 
         modes.append(painter.status().mode)
 
     monkeypatch.setattr(painter_module.Painter, "begin", noting)
-    turned(plotter, 10)
+    turned(plotter, 10, MOVING)
     assert modes.pop() == "preview"
     plotter.camera.Azimuth(10)
     plotter.open_gif(str(tmp_path / "movie.gif"))
@@ -254,7 +248,7 @@ def test_vtks_switches_turn_previews_off_and_bound_them(plotter, coarsest):
     assert mapper.GetAutoAdjustSampleDistances()
 
     def share():
-        turned(plotter, 3)
+        turned(plotter, 3, MOVING)
         return actor.status.share
 
     assert share() < 0.1
@@ -284,7 +278,7 @@ def test_several_vdis_and_two_eyes_share_a_frame(plotter, coarsest):
     plotter.render_window.SetStereoTypeToSplitViewportHorizontal()
     plotter.render_window.StereoRenderOn()
     frame(plotter)
-    preview = turned(plotter, 10)
+    preview = turned(plotter, 10, MOVING)
     assert first.status.mode == second.status.mode == "preview"
     assert first.status.share == second.status.share
     full = frame(plotter)
@@ -325,7 +319,7 @@ def test_samples_follow_the_time_that_frames_take(plotter, counted):
     """240 frames a second leave 4167 rays, a third of them; the aim is a little higher."""
     actor = watched(plotter, target_fps=240.0 / HEADROOM)
     for _ in range(8):
-        turned(plotter, 1e-3)
+        turned(plotter, 1e-3, MOVING)
     # the controller's threshold is a tenth, and the edges are rounded to whole pixels
     assert actor.status.samples == pytest.approx(4167, rel=0.12)
     assert actor.status.fps == pytest.approx(240, rel=0.12)
@@ -342,7 +336,7 @@ def test_frames_keep_the_rate_where_rays_get_dearer_as_views_turn_away(plotter, 
     for _ in range(20):
         counted.dear = 0.2 * ways.rise(actor.status.angle + 2)
         began = counted.now
-        turned(plotter, 2)
+        turned(plotter, 2, MOVING)
         rates.append(1 / (counted.now - began))
     assert min(rates) > 240 / 1.2, rates
 
@@ -358,7 +352,7 @@ def test_few_frames_are_late_where_some_take_longer(plotter, counted):
         for _ in range(count):
             counted.dear = 1.5 if rng.random() < disturbed else 1.0
             began = counted.now
-            turned(plotter, 1e-3)
+            turned(plotter, 1e-3, MOVING)
             seconds.append(counted.now - began)
         return np.array(seconds[-count:])
 
@@ -394,14 +388,13 @@ def test_few_pixels_from_the_side_take_few_lists(plotter, counted):
     Where rays get cheap, and dear again, frames of few lists and full ones do not take turns.
     """
     actor = watched(plotter, target_fps=400.0 / HEADROOM)
-    plotter.camera.Azimuth(30)
-    whole = frame(plotter)
+    whole = turned(plotter, 30)
     full = counted.windows[-1]
 
     def turn(frames):
         samples = []
         for _ in range(frames):
-            turned(plotter, 1e-3)
+            turned(plotter, 1e-3, MOVING)
             finish("few lists")
             samples.append(actor.status.samples)
         return samples
@@ -413,8 +406,7 @@ def test_few_pixels_from_the_side_take_few_lists(plotter, counted):
     assert actor.status.fps == pytest.approx(400, rel=0.12)
     shown = frame(plotter, MOVING)
     assert np.abs(shown - whole).mean() < 2
-    plotter.camera.Azimuth(-20e-3)
-    again = frame(plotter)
+    again = turned(plotter, -20e-3)
     assert counted.windows[-1] == full
     assert actor.status.mode == "full"
     assert np.abs(again - whole).max() <= 1
@@ -423,7 +415,7 @@ def test_few_pixels_from_the_side_take_few_lists(plotter, counted):
     counted.dear = 1.0
     samples = turn(30)[4:]  # two frames tell, two more change over to fewer lists
     assert max(samples) < 1.5 * min(samples), samples
-    turned(plotter, -30)  # near V_O all lists are taken, however few the pixels are
+    turned(plotter, -30, MOVING)  # near V_O all lists are taken, however few the pixels are
     assert counted.windows[-1] == full
 
 
@@ -437,12 +429,11 @@ def test_frames_go_on_while_fewer_lists_are_made(plotter, counted, monkeypatch):
 
     monkeypatch.setattr(few_lists, "thinned", slow)
     watched(plotter, target_fps=400.0)
-    plotter.camera.Azimuth(30)
-    frame(plotter)
+    turned(plotter, 30)
     while not threads("few lists"):
-        turned(plotter, 1e-3)
+        turned(plotter, 1e-3, MOVING)
     for _ in range(3):
-        turned(plotter, 1e-3)
+        turned(plotter, 1e-3, MOVING)
     drawn.set()
     finish("few lists")
     assert waited == [True]

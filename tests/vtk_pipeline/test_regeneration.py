@@ -18,10 +18,12 @@ from watched_windows import (
     coarse,
     finish,
     frame,
+    frames,
     frames_until,
     picture_of,
     small_vdi,
     threads,
+    turned,
     watched,
 )
 
@@ -46,8 +48,7 @@ def test_each_frame_shows_one_generation(plotter, gate, stereo):
         plotter.render_window.StereoRenderOn()
     actor = coarse(plotter, regenerate=lambda status: wanted[0])
     old = actor.vdi
-    plotter.camera.Azimuth(80)
-    before = frame(plotter)
+    before = turned(plotter, 80)
     wanted[0] = True
     pictures = [frame(plotter) for _ in range(3)]
     wanted[0] = False
@@ -71,16 +72,15 @@ def test_changed_property_and_data_are_made_behind_the_frames(plotter, gate):
     volume = soft_ball()
     actor = watched(plotter, volume)
     before, old = frame(plotter), actor.vdi
-    plotter.camera.Azimuth(30)
-    turned = frame(plotter)
+    aside = turned(plotter, 30)
     actor.mapper.lookup_table.cmap = "inferno"
-    assert np.abs(frame(plotter) - turned).max() > 40  # the volume stands in
+    assert np.abs(frame(plotter) - aside).max() > 40  # the volume stands in
     assert actor.status.progress == 0.0
     assert actor.vdi is old
     gate.set()
     frames_until(plotter, lambda: actor.vdi is not old)
     assert actor.vdi.camera.position == old.camera.position, "'never' keeps the view"
-    assert np.abs(frame(plotter) - turned).max() > 40
+    assert np.abs(frame(plotter) - aside).max() > 40
     new = actor.vdi
     volume["v"][:] = 0
     frames_until(plotter, lambda: actor.vdi is not new)
@@ -145,15 +145,13 @@ def test_auto_estimates_when_the_view_has_moved_and_regenerates_below_the_bound(
 ):
     actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
     old = actor.vdi
-    for _ in range(3):
-        frame(plotter)
+    frames(plotter, 3)
     assert no_estimates.asked == 0, "nothing has moved"
     no_estimates.ssim = 0.91
     plotter.camera.Azimuth(30)
     frames_until(plotter, lambda: actor.status.ssim is not None)
     assert actor.status.ssim == 0.91
-    for _ in range(3):
-        frame(plotter)
+    frames(plotter, 3)
     assert no_estimates.asked == 1
     assert actor.vdi is old
     assert (actor.status.progress, threads("estimate")) == (None, [])
@@ -162,8 +160,7 @@ def test_auto_estimates_when_the_view_has_moved_and_regenerates_below_the_bound(
     frames_until(plotter, lambda: actor.vdi is not old)
     assert actor.status.ssim is None, "nothing is known of the new one"
     asked, new = no_estimates.asked, actor.vdi
-    for _ in range(3):
-        frame(plotter)
+    frames(plotter, 3)
     assert no_estimates.asked == asked
     assert actor.vdi is new, "a VDI of this very view would be the same again"
 
@@ -180,8 +177,7 @@ def test_the_estimate_is_of_the_picture_that_is_shown(plotter, no_estimates):
     actor.mapper.SetCroppingRegionPlanes(planes)
     actor.mapper.SetCroppingRegionFlagsToFence()
     actor.opacity_multiplier = 0.5
-    for _ in range(3):
-        frame(plotter)
+    frames(plotter, 3)
     assert no_estimates.asked == 0, "these changes need no new VDI"
     plotter.camera.Azimuth(30)
     frames_until(plotter, lambda: actor.status.ssim is not None)
@@ -195,8 +191,7 @@ def test_the_estimate_is_of_the_picture_that_is_shown(plotter, no_estimates):
     assert (row[:3] - (0.1, 0.2, 0.3)) @ (0.6, 0, 0.8) == pytest.approx(0, abs=1e-9)
     actor.opacity_multiplier = 0.8
     actor.mapper.CroppingOff()
-    for _ in range(3):
-        frame(plotter)
+    frames(plotter, 3)
     assert no_estimates.asked == 1
     assert actor.vdi is old
 
@@ -253,26 +248,21 @@ def test_estimates_know_of_ambient_occlusion():
 def test_what_is_made_for_a_view_that_was_left_is_given_up(plotter, gate):
     asked = [True]
     actor = coarse(plotter, regenerate=lambda status: asked.pop() if asked else False)
-    plotter.camera.Azimuth(60)
-    frame(plotter)
+    turned(plotter, 60)
     assert actor.status.progress == 0.0
-    plotter.camera.Azimuth(10)
-    frame(plotter)
+    turned(plotter, 10)
     assert actor.status.progress == 0.0, "still nearer to it than to the old"
-    plotter.camera.Azimuth(-65)
-    frame(plotter)
+    turned(plotter, -65)
     assert actor.status.progress is None, "the view has come back"
     gate.set()
-    for _ in range(3):
-        frame(plotter)
+    frames(plotter, 3)
     assert actor.status.generation == 1
 
 
 def test_callable_gets_the_status_of_the_frames_view(plotter):
     seen = []
     actor = watched(plotter, regenerate=lambda status: seen.append(status))
-    plotter.camera.Azimuth(25)
-    frame(plotter)
+    turned(plotter, 25)
     assert seen[-1].angle == pytest.approx(25)
     assert seen[-1].vdi is actor.vdi
     before = len(seen)
@@ -285,18 +275,15 @@ def test_off_screen_frames_wait_for_their_vdi_and_nothing_is_estimated(plotter, 
     actor = plotter.add_vdi(soft_ball(), regenerate=beyond(20), **LOOKS)
     plotter.show(auto_close=False)
     old = actor.vdi
-    plotter.camera.Azimuth(15)
-    frame(plotter)
+    turned(plotter, 15)
     assert actor.vdi is old
-    plotter.camera.Azimuth(15)
-    frame(plotter)
+    turned(plotter, 15)
     assert actor.vdi is not old
     assert actor.status.angle < 1e-6
     old = actor.vdi
     actor.mapper.SetRegenerate("auto")
     for _ in range(3):
-        plotter.camera.Azimuth(40)
-        frame(plotter)
+        turned(plotter, 40)
         assert not threads()
     assert (actor.vdi is old, no_estimates.asked) == (True, 0)
     actor.prop.interpolation_type = "linear"
@@ -315,13 +302,11 @@ def test_a_vdi_drawn_in_two_views_belongs_to_neither(no_estimates):
     no_estimates.ssim = 0.1
     old = actor.vdi
     for _ in range(5):
-        plotter.camera.Azimuth(20)
-        frame(plotter)
+        turned(plotter, 20)
     assert (actor.vdi is old, no_estimates.asked) == (True, 0)
     actor.prop.interpolation_type = "linear"
     frame(plotter)
     assert actor.vdi is not old, "changed data are made in step"
-    plotter.close()
 
 
 def test_copies_share_a_source_and_keep_the_settings(plotter, no_estimates):
@@ -334,8 +319,7 @@ def test_copies_share_a_source_and_keep_the_settings(plotter, no_estimates):
     no_estimates.ssim = 0.1
     old = actor.vdi
     plotter.camera.Azimuth(20)
-    for _ in range(5):
-        frame(plotter)
+    frames(plotter, 5)
     assert (actor.vdi is old, copy.vdi is old) == (True, True)
 
 
@@ -396,8 +380,7 @@ def in_the_middle():
     """A plotter for which a VDI is being made."""
     plotter = pv.Plotter(window_size=WINDOW)
     actor = watched(plotter, regenerate=beyond(10), status=True)
-    plotter.camera.Azimuth(30)
-    frame(plotter)
+    turned(plotter, 30)
     assert actor.status.progress == 0.0
     assert len(threads()) == 1
     return plotter
@@ -426,36 +409,7 @@ def test_forgetting_a_scene_in_the_middle_leaves_no_thread(gate, no_leaks):
 def test_no_leaks_of_a_watched_scene(no_leaks):
     plotter = pv.Plotter(window_size=WINDOW)
     actor = watched(plotter, regenerate=beyond(10), status=True)
-    plotter.camera.Azimuth(30)
-    frame(plotter, MOVING)
+    turned(plotter, 30, MOVING)
     frames_until(plotter, lambda: actor.status.generation == 2)
     plotter.screenshot()
     plotter.close()
-
-
-@pytest.mark.slow
-def test_regenerating_does_not_take_more_and_more_memory():
-    def resident():
-        with open("/proc/self/statm") as file:  # noqa: PTH123 - pathlib knows no more of it
-            return int(file.read().split()[1]) * 4096
-
-    plotter = pv.Plotter(window_size=(120, 100))
-    actor = watched(plotter, soft_ball(16), regenerate=beyond(10))
-    times, start, runtime = 200, None, pvdi.device.get_runtime()
-    before = runtime.allocated
-    for number in range(times):
-        if number == times // 4:  # caches of drivers and allocators are warm
-            gc.collect()
-            start = resident()
-        plotter.camera.Azimuth(30)
-        frames_until(plotter, lambda number=number: actor.status.generation == number + 2)
-    gc.collect()
-    grown, size = resident() - start, actor.vdi.nbytes
-    # A generation that was kept would show as its whole size, on the device as well: there are
-    # the volume, the VDI that is shown and buffers of the frame
-    assert runtime.allocated - before < 4 * size
-    assert grown / (times - times // 4) < 0.25 * size
-    plotter.camera.Azimuth(30)
-    frame(plotter)  # in the middle of another
-    plotter.close()
-    assert not threads()

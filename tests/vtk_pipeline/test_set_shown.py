@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from plugin_scenes import CLASSIFICATION, soft_ball
-from watched_windows import MOVING, finish, frame, frames_until, picture_of, threads
+from watched_windows import MOVING, finish, frame, frames_until, picture_of, threads, turned
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
@@ -59,8 +59,7 @@ def test_each_view_is_drawn_by_the_vdi_nearest_to_it(plotter, made):
     actor = shown(plotter, made, regenerate="never")
     seen = set()
     for _ in range(8):
-        plotter.camera.Azimuth(41)
-        picture = frame(plotter)
+        picture = turned(plotter, 41)
         nearest = made.nearest(plotter.camera)
         seen.add(nearest)
         assert actor.vdi is made[nearest]
@@ -81,8 +80,7 @@ def test_between_two_a_blend_is_drawn(plotter, made):
     made.blend = 60
     plotter.window_size = (241, 203)  # with fewer pixels blends differ by fewer steps
     shown(plotter, made, regenerate="never")
-    plotter.camera.Azimuth(17)
-    picture = frame(plotter)
+    picture = turned(plotter, 17)
     weights = made.weights(plotter.camera)
     assert len(weights) > 1
     mean = sum(w * picture_of(made[i], plotter).astype(float) for i, w in weights)
@@ -101,8 +99,7 @@ def test_a_set_from_a_file_is_decoded_ahead(plotter, made, decoded, tmp_path):
     nearest = np.argsort(read.distances(plotter.camera), kind="stable")[:wanted].tolist()
     assert set(nearest) <= {i for i, _ in decoded}
     decoded.clear()
-    plotter.camera.Azimuth(5)
-    frame(plotter)
+    turned(plotter, 5)
     finish("set")
     assert not any(in_frame for _, in_frame in decoded), "a frame has waited"
     actor.mapper.painter.release()
@@ -117,18 +114,15 @@ def test_with_little_memory_what_is_drawn_stays(plotter, made, decoded, monkeypa
     shown(plotter, made, regenerate="never")
     drawn = []
     for _ in range(5):
-        plotter.camera.Azimuth(50)
-        frame(plotter)
+        turned(plotter, 50)
         finish("set")
         drawn.append({i for i, _ in made.weights(plotter.camera)})
         decoded.clear()
-        plotter.camera.Azimuth(1e-6)
-        frame(plotter)
+        turned(plotter, 1e-6)
         assert not drawn[-1] & {i for i, in_frame in decoded if in_frame}
     assert any(later - before for before, later in pairwise(drawn))
     decoded.clear()
-    plotter.camera.Azimuth(-200)
-    frame(plotter)
+    turned(plotter, -200)
     gone = {i for i, _ in made.weights(plotter.camera)} - drawn[-1]
     # All but one that was decoded ahead
     assert len(gone - {i for i, _ in decoded}) <= 1

@@ -113,7 +113,6 @@ def test_it_executes_only_when_something_has_changed():
         source.Update()
         assert len(counted) == count
     assert not source.GetVDI().equals(first)
-    pv.close_all()
 
 
 def test_options_are_set_one_by_one_or_all_at_once():
@@ -312,6 +311,9 @@ def test_a_producer_of_something_else_is_refused_by_name(producer, message):
     with pytest.raises(UnsupportedError, match=message):
         source.SetInputConnection(producer.GetOutputPort())
     assert source.GetVDI() is before, "the input before stays"
+    if isinstance(producer, vtkMultiBlockDataGroupFilter):
+        with pytest.raises(InvalidVDIError, match="MultiBlock.*is not a VDI"):
+            pvdi.VDIMapper().SetInputConnection(producer.GetOutputPort())
 
 
 @pytest.mark.parametrize(
@@ -342,12 +344,6 @@ def test_what_only_an_update_can_tell_is_refused_by_name(data, message, expected
     assert source.GetVDI().n_supersegments > 500
 
 
-def test_a_mapper_says_what_it_needs_in_place_of_blocks():
-    mapper, blocks = pvdi.VDIMapper(), multi_block()
-    with pytest.raises(InvalidVDIError, match="MultiBlock.*is not a VDI"):
-        mapper.SetInputConnection(blocks.GetOutputPort())
-
-
 def test_a_mapper_behind_a_file_keeps_its_reader(tmp_path):
     """A VTK port does not: a reader that only the mapper knows would be gone."""
     made, path = ready_source().GetVDI(), tmp_path / "v.vti"
@@ -362,17 +358,6 @@ def test_a_mapper_behind_a_file_keeps_its_reader(tmp_path):
     gc.collect()
     assert mapper.GetVDI().equals(made)
     assert mapper.GetBounds() == pytest.approx(soft_ball(12).GetBounds())
-
-
-def test_a_reader_without_its_file(tmp_path, expected_messages):
-    source = ready_source()
-    source.GetVDI()
-    reader = read_from(tmp_path / "none.vti", vtkXMLImageDataReader())
-    source.SetInputConnection(reader.GetOutputPort())
-    for ask in (source.Update, source.GetVDI):
-        with pytest.raises(InvalidVolumeError, match="VTK's output window says why"):
-            ask()
-    assert "none.vti" in expected_messages.GetOutput()
 
 
 def test_a_copy_is_kept_unless_the_camera_is_followed():
@@ -456,7 +441,6 @@ def test_a_followed_camera_in_a_scene():
         shown = actor.mapper.GetSource().GetCamera()
         assert shown.position == pytest.approx(plotter.camera.position)
         assert actor.vdi is actor.mapper.GetSource().GetVDI()
-    plotter.close()
 
 
 def test_following_keeps_nothing_alive(no_leaks):

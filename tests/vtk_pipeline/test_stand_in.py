@@ -83,7 +83,6 @@ def test_a_stand_in_is_vtks_picture_of_the_volume(plotter, gate):
     judge.camera = plotter.camera.copy()
     judge.show(auto_close=False)
     assert alike(picture, shot(judge)) > 0.98
-    judge.close()
 
 
 def test_a_neighbour_that_overlaps_is_drawn_as_well(plotter, gate):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from plugin_scenes import LOOKS, soft_ball
 from skimage.io import imread
-from watched_windows import MOVING, STILL, frame, small_vdi, watched
+from watched_windows import MOVING, STILL, frame, small_vdi, turned, watched
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.cli import main
@@ -66,8 +66,7 @@ def test_corner_text_is_of_the_frame_that_shows_it(plotter, coarsest):
     plotter.window_size = (241, 203)
     actor = watched(plotter)
     annotation = actor.show_status()
-    plotter.camera.Azimuth(20)
-    frame(plotter, MOVING)
+    turned(plotter, 20, MOVING)
     texts, pictures = [], []
     for rate in (MOVING, STILL):
         pictures.append(frame(plotter, rate)[:60, :120])

@@ -127,6 +127,7 @@ def test_files_of_vtk_and_pyvista_keep_every_bit(kind, mode, compressor, tmp_pat
     getattr(writer, f"SetDataModeTo{mode}")()
     getattr(writer, f"SetCompressorTypeTo{compressor}")()
     assert writer.Write()
+    assert is_vdi_file(path)
     reader = vtkXMLImageDataReader()
     reader.SetFileName(str(path))
     reader.Update()
@@ -237,16 +238,12 @@ def test_what_was_read_is_taken_everywhere(tmp_path):
         pvdi.generate(image, vdi.camera, (8, 6), cmap="bone")
 
 
-def test_numpy_metadata_become_plain():
+def test_metadata_of_numpy_become_plain_and_others_are_refused(tmp_path):
     vdi = some_vdi()
     vdi.metadata.update(a=np.float64(1 / 3), b=np.arange(3))
     stored = vdi_from_image(vdi_to_image(vdi)).metadata
     assert stored["a"] == 1 / 3
     assert stored["b"] == [0, 1, 2]
-
-
-def test_metadata_that_json_cannot_hold(tmp_path):
-    vdi = some_vdi()
     vdi.metadata["a"] = object()
     with pytest.raises(InvalidVDIError, match="metadata cannot be written.*object.*numbers, text"):
         vdi_to_image(vdi)
@@ -277,17 +274,6 @@ def test_files_that_hold_no_vdi(make, message, tmp_path):
     with pytest.raises(VDIFileError, match=message):
         read_info(path)
     assert not is_vdi_file(path)
-
-
-@pytest.mark.parametrize("make", [vdi_to_image, vdi_to_dense_image])
-def test_files_that_hold_a_vdi_are_known_by_what_they_name(make, tmp_path):
-    writer = vtkXMLImageDataWriter()
-    writer.SetInputData(make(some_vdi(3)))
-    for mode in (writer.Appended, writer.Binary):
-        writer.SetFileName(str(tmp_path / f"{mode}.vti"))
-        writer.SetDataMode(mode)
-        writer.Write()
-        assert is_vdi_file(tmp_path / f"{mode}.vti")
 
 
 def test_truncated_files_are_noticed(tmp_path):
@@ -346,13 +332,22 @@ def test_command_line_converts_both_ways(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("kind", VDIS)
-def test_exact_dense_form_keeps_every_bit(kind):
+def test_the_exact_dense_form_keeps_every_bit(kind, tmp_path):
     vdi = VDIS[kind]()
     image = vdi_to_dense_image(vdi, exact=True)
-    longest = max(1, vdi.counts.max())
+    longest = max(1, int(vdi.counts.max()))
     assert image.GetDimensions() == (*vdi.window_size, longest)
     assert is_dense_image(image)
     assert_same(vdi_from_dense_image(image), vdi)
+    wide = vdi_to_dense_image(vdi, exact=True, max_supersegments=longest + 3)
+    assert wide.GetDimensions()[2] == longest + 3
+    assert_same(vdi_from_dense_image(wide), vdi)
+    path = tmp_path / "dense.vti"
+    pv.wrap(image).save(path)
+    assert is_vdi_file(path)
+    assert_same(pvdi.read(path), vdi)
+    with pytest.raises(InvalidVDIError, match="a dense form by vdi_from_dense_image"):
+        pvdi.render(pv.read(path), vdi.camera)
 
 
 def test_points_are_the_supersegments():
@@ -382,21 +377,14 @@ def test_points_are_the_supersegments():
 
 def test_bytes_lose_colour_only_and_no_more_than_documented():
     vdi = some_vdi(6)
+    longest = int(vdi.counts.max())
+    with pytest.raises(InvalidArgumentError, match=f"longest list has {longest}.*would drop some"):
+        vdi_to_dense_image(vdi, max_supersegments=longest - 1)
     again = vdi_from_dense_image(vdi_to_dense_image(vdi))
     for name in ("offsets", "front", "back", "optical_depth"):
         np.testing.assert_array_equal(getattr(again, name), getattr(vdi, name))
     # half a step, and a rounding of the division
     assert np.abs(again.color.astype(float) - vdi.color).max() <= 1 / 510 + 2**-24
-
-
-def test_room_for_more_and_none_for_less():
-    vdi = some_vdi(7, max_supersegments=5)
-    longest = int(vdi.counts.max())
-    image = vdi_to_dense_image(vdi, exact=True, max_supersegments=longest + 3)
-    assert image.GetDimensions()[2] == longest + 3
-    assert_same(vdi_from_dense_image(image), vdi)
-    with pytest.raises(InvalidArgumentError, match=f"longest list has {longest}.*would drop some"):
-        vdi_to_dense_image(vdi, max_supersegments=longest - 1)
 
 
 def test_memory_is_asked_for_before_it_is_taken(monkeypatch):
@@ -431,26 +419,9 @@ def test_damaged_dense_forms_are_refused(damage, message):
         vdi_from_dense_image(image)
 
 
-def test_dense_files(tmp_path):
-    vdi = some_vdi(10)
-    pv.wrap(vdi_to_dense_image(vdi, exact=True)).save(tmp_path / "dense.vti")
-    assert_same(pvdi.read(tmp_path / "dense.vti"), vdi)
-    image = pv.read(tmp_path / "dense.vti")
-    with pytest.raises(InvalidVDIError, match="a dense form by vdi_from_dense_image"):
-        pvdi.render(image, vdi.camera)
-    # What streams by extent: one slice of it
-    voi = vtkExtractVOI()
-    voi.SetInputData(image)
-    voi.SetVOI(0, vdi.window_size[0] - 1, 0, 0, 0, 0)
-    voi.Update()
-    assert voi.GetOutput().GetPointData().GetArray("depth").GetNumberOfComponents() == 2
-
-
 def test_the_filter_in_a_pipeline():
-    vdi = some_vdi(11)
-    producer = vtkTrivialProducer()
+    vdi, producer, dense = some_vdi(11), vtkTrivialProducer(), VDIToDenseImage()
     producer.SetOutput(vdi_to_image(vdi))
-    dense = VDIToDenseImage()
     dense.SetInputConnection(producer.GetOutputPort())
     dense.Update()
     longest = int(vdi.counts.max())
@@ -467,11 +438,12 @@ def test_the_filter_in_a_pipeline():
     assert_same(vdi_from_dense_image(dense.GetOutputDataObject(0)), vdi)
     dense.ExactOff()
     assert (dense.GetExact(), dense.GetMaxSupersegments()) == (False, longest + 2)
-    downstream = vtkExtractVOI()
-    downstream.SetInputConnection(dense.GetOutputPort())
-    downstream.SetVOI(0, vdi.window_size[0] - 1, 0, vdi.window_size[1] - 1, 0, 0)
-    downstream.Update()
-    assert downstream.GetOutput().GetNumberOfPoints() == np.prod(vdi.window_size)
+    voi = vtkExtractVOI()  # what streams by extent: one slice of it
+    voi.SetInputConnection(dense.GetOutputPort())
+    voi.SetVOI(0, vdi.window_size[0] - 1, 0, vdi.window_size[1] - 1, 0, 0)
+    voi.Update()
+    assert voi.GetOutput().GetNumberOfPoints() == np.prod(vdi.window_size)
+    assert voi.GetOutput().GetPointData().GetArray("depth").GetNumberOfComponents() == 2
     dense.SetMaxSupersegments(1)
     with pytest.raises(InvalidArgumentError, match="would drop some"):
         dense.Update()
@@ -509,14 +481,3 @@ def test_filters_behind_the_dense_form_see_all_of_it(given, exact, limit, tmp_pa
     )
     assert one.dtype == other.dtype
     np.testing.assert_array_equal(one, other[::-1])
-
-
-def test_the_filter_refuses_what_is_no_vdi(expected_messages):
-    dense = VDIToDenseImage()
-    dense.SetInputDataObject(soft_ball(4))
-    with pytest.raises(InvalidVDIError, match="is not a VDI"):
-        dense.Update()
-    downstream = vtkExtractVOI()
-    downstream.SetInputConnection(dense.GetOutputPort())
-    downstream.Update()
-    assert "VDIToDenseImage: this ImageData is not a VDI" in expected_messages.GetOutput()
