@@ -1,11 +1,13 @@
-"""The plugin's example scripts run on their own and write a picture with something in it."""
+"""Example scripts write a picture with something in it, and the gallery's the one that is shown."""
 
 from __future__ import annotations
 
 import os
 import re
+import runpy
 import subprocess
 import sys
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,7 +18,17 @@ from skimage.io import imread
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
+CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
+GALLERY = CHECKOUT / "docs" / "gallery"
+
+#: Scripts of the gallery that are run with every change; the others take as long, or longer.
+QUICK = ("ct_pins", "ct_projections")
+
 pytestmark = pytest.mark.gl
+documented = pytest.mark.skipif(
+    not GALLERY.is_dir(),
+    reason="no documentation at hand: set PYVISTA_VDI_CHECKOUT to a checkout",
+)
 
 
 #: Arguments of each; those without are to choose the file's name.
@@ -165,3 +177,39 @@ def test_a_page_is_written(name, said, written, tmp_path):
     printed, target = run_example(name, tmp_path)
     assert said in printed
     assert written in target.read_bytes()
+
+
+def scripts():
+    """Name each script of the gallery, most of them for the nightly run."""
+    for script in sorted(GALLERY.glob("*.py")):
+        marks = () if script.stem in QUICK else pytest.mark.slow
+        yield pytest.param(script.stem, marks=marks)
+
+
+@documented
+@pytest.mark.every(3)
+@pytest.mark.parametrize("name", [*scripts()])
+def test_a_script_of_the_gallery_writes_its_picture(name, tmp_path, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(GALLERY / f"{name}.py"))
+    assert [file.name for file in tmp_path.iterdir()] == [f"{name}.png"]
+    shown = CHECKOUT / "docs" / "images" / f"gallery-{name}.jpg"
+    stored = BytesIO()  # as docs/make_gallery.py does
+    Image.open(tmp_path / f"{name}.png").convert("RGB").save(stored, "jpeg", quality=85)
+    written, kept = (np.asarray(Image.open(file), dtype=float) for file in (stored, shown))
+    assert written.shape == kept.shape
+    # The same where it was made; fonts, drivers and devices differ in few pixels
+    assert np.abs(written - kept).mean() < 1
+
+
+@documented
+def test_every_script_of_the_gallery_has_its_picture_and_says_what_it_is():
+    found = sorted(GALLERY.glob("*.py"))
+    assert 6 <= len(found) <= 12
+    for script in found:
+        text = script.read_text(encoding="utf-8")
+        name = f"gallery-{script.stem}.jpg"
+        assert f".. image:: /images/{name}\n   :alt: " in text
+        assert f"sphinx_gallery_thumbnail_path = 'images/{name}'" in text
+        assert (CHECKOUT / "docs" / "images" / name).stat().st_size <= 150 * 1024

@@ -1,4 +1,4 @@
-"""The forms in which volumes are shown without ``add_volume(grid)``, and what help says."""
+"""The forms in which volumes are shown without ``add_volume(grid)``; help; exports."""
 
 from __future__ import annotations
 
@@ -8,7 +8,15 @@ import warnings
 import numpy as np
 import pytest
 import pyvista as pv
-from plugin_scenes import LOOKS, add_judge, add_ours, assert_as_vtk, shown, soft_ball
+from plugin_scenes import (
+    LOOKS,
+    add_judge,
+    add_ours,
+    assert_as_vtk,
+    shown,
+    soft_ball,
+    vdi_of_one_list,
+)
 from pyvista.plotting.plotter import _ALL_PLOTTERS
 
 import pyvista_vdi as pvdi
@@ -20,6 +28,11 @@ from pyvista_vdi.plotting.component import AddVDI
 pytestmark = pytest.mark.gl
 
 WINDOW = (60, 50)
+#: That the VDI is missing where a scene is written for another renderer.
+MESSAGE = (
+    "exported without its VDI: trame's export_html, export_vtksz and views .* empty box.*"
+    "plotter.export_html, screenshots"
+)
 
 
 def two_balls():
@@ -158,3 +171,44 @@ def test_help_is_the_method_s_and_what_is_promised_is_there(plotter):
     kinds = {"add_vdi": AddVDI, "add_vdi_clip_plane": AddVDIClipPlane}
     assert pvdi.Plotter.__annotations__ == {name: kind.__name__ for name, kind in kinds.items()}
     assert {name: type(getattr(ours, name)) for name in kinds} == kinds
+
+
+def added(plotter):
+    actor = plotter.add_vdi(soft_ball(8), show_scalar_bar=False)
+    plotter.add_mesh(pv.Sphere())
+    plotter.show(auto_close=False)
+    return actor.mapper
+
+
+def serialized(mapper):
+    """What the serialisers of trame-vtk and of vtkmodules.web ask a volume mapper for."""
+    mapper.GetInputAlgorithm().Update()
+    return mapper.GetInputDataObject(0, 0)
+
+
+def test_asking_for_the_data_to_be_exported_warns_once_and_nothing_else_does(plotter):
+    mapper = added(plotter)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plotter.render()
+        plotter.screenshot(return_img=True)
+        plotter.reset_camera()
+        assert len(plotter.meshes) == 2
+        mapper.dataset  # noqa: B018
+        assert mapper.GetInput() is not None
+    with pytest.warns(VDIWarning, match=MESSAGE):
+        proxy = serialized(mapper)
+    assert proxy.GetDimensions() == (2, 2, 2)
+    serialized(mapper)  # warnings are errors: it is not said again
+    alone = pvdi.VDIMapper()  # VTK's own
+    alone.SetVDI(vdi_of_one_list())
+    with pytest.warns(VDIWarning, match=MESSAGE):
+        serialized(alone)
+
+
+@pytest.mark.parametrize("what", ["export_html", "export_vtksz"])
+def test_exports_of_trame_warn(plotter, what):
+    pytest.importorskip("trame_pyvista")
+    added(plotter)
+    with pytest.warns(VDIWarning, match=MESSAGE):
+        getattr(plotter.trame, what)(None)

@@ -1,4 +1,4 @@
-"""VDIMapper and VDIActor in pure VTK: no PyVista in the scene."""
+"""VDIMapper and VDIActor in windows of VTK's own, without a plotter."""
 
 from __future__ import annotations
 
@@ -10,20 +10,17 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from plugin_scenes import CLASSIFICATION, TOLERANCE, soft_ball, vdi_of_one_list
-from vtk_sources import ready_source
-from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
+from plugin_scenes import TOLERANCE, soft_ball, vdi_of_one_list
+from vtk_sources import ready_source, some_property
 from vtkmodules.vtkCommonExecutionModel import vtkTrivialProducer
 from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkRenderingCore import (
     vtkActor,
     vtkCamera,
-    vtkColorTransferFunction,
     vtkPolyDataMapper,
     vtkRenderer,
     vtkRenderWindow,
     vtkVolume,
-    vtkVolumeProperty,
 )
 from vtkmodules.vtkRenderingVolume import vtkGPUVolumeRayCastMapper
 from watched_windows import on_screen
@@ -34,19 +31,6 @@ from pyvista_vdi.vtk_pipeline.drawing.frame import as_array, view_of
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
 
 pytestmark = pytest.mark.gl
-
-
-def red_property():
-    prop, opacity, color = vtkVolumeProperty(), vtkPiecewiseFunction(), vtkColorTransferFunction()
-    opacity.AddPoint(0, 0)
-    opacity.AddPoint(255, 1)
-    color.AddRGBPoint(0, 1, 1, 0)
-    color.AddRGBPoint(255, 1, 0, 0)
-    prop.SetScalarOpacity(opacity)
-    prop.SetColor(color)
-    prop.SetScalarOpacityUnitDistance(CLASSIFICATION["opacity_unit_distance"])
-    prop.SetInterpolationTypeToLinear()
-    return prop
 
 
 def window_with(*renderers, size=(120, 100)):
@@ -69,7 +53,6 @@ def our_actor(source=None):
     if source is None:
         source = ready_source(
             InputDataObject=soft_ball(),
-            VolumeProperty=red_property(),
             Camera=None,
             WindowSize=None,
             MaxSupersegments=64,
@@ -89,7 +72,7 @@ def judging_actor():
     mapper.SetSampleDistance(0.02)
     actor = vtkVolume()
     actor.SetMapper(mapper)
-    actor.SetProperty(red_property())
+    actor.SetProperty(some_property())
     return actor
 
 

@@ -255,6 +255,7 @@ def test_what_is_made_for_a_view_that_was_left_is_given_up(plotter, gate):
     turned(plotter, -65)
     assert actor.status.progress is None, "the view has come back"
     gate.set()
+    finish()
     frames(plotter, 3)
     assert actor.status.generation == 1
 
@@ -320,7 +321,7 @@ def test_copies_share_a_source_and_keep_the_settings(plotter, no_estimates):
     old = actor.vdi
     plotter.camera.Azimuth(20)
     frames(plotter, 5)
-    assert (actor.vdi is old, copy.vdi is old) == (True, True)
+    assert (actor.vdi is old, copy.vdi is old, no_estimates.asked) == (True, True, 0)
 
 
 def test_what_fails_is_said_once_and_not_repeated(plotter, monkeypatch):
@@ -339,6 +340,7 @@ def test_what_fails_is_said_once_and_not_repeated(plotter, monkeypatch):
     for _ in range(5):
         frame(plotter)
         time.sleep(0.01)
+    finish()
     assert len(tries) == 1
     assert actor.vdi is before
     monkeypatch.undo()

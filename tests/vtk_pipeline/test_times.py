@@ -7,7 +7,7 @@ import pytest
 import pyvista as pv
 from plugin_scenes import soft_ball
 from strategies import random_vdi
-from vtk_sources import executions, some_property
+from vtk_sources import executions, ready_source, some_property
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
@@ -176,12 +176,7 @@ def made_of(volume, camera=CAMERA, size=SIZE):
 
 
 def source_of(producer):
-    source = pvdi.VDISource()
-    source.SetInputConnection(producer.GetOutputPort())
-    source.SetVolumeProperty(some_property())
-    source.SetCamera(CAMERA)
-    source.SetWindowSize(*SIZE)
-    return source
+    return ready_source(producer, CAMERA, WindowSize=SIZE)
 
 
 @pytest.fixture(scope="module")
@@ -266,8 +261,7 @@ def drawn():
     actor.SetMapper(mapper)
     plotter = pv.Plotter(off_screen=True, window_size=SIZE)
     plotter.renderer.AddVolume(actor)
-    yield producer, source, plotter, actor
-    plotter.close()
+    return producer, source, plotter, actor
 
 
 @pytest.mark.gl
@@ -342,13 +336,8 @@ def test_a_series_of_pyvistas_readers(vdis, tmp_path):
         '<?xml version="1.0"?><VTKFile type="Collection" version="0.1"><Collection>'
         f"{''.join(entries)}</Collection></VTKFile>"
     )
-    series = pvdi.generate_series(
-        pv.get_reader(tmp_path / "a.pvd"),
-        CAMERA,
-        SIZE,
-        volume_property=some_property(),
-        precision="exact",
-    )
+    reader, looks = pv.get_reader(tmp_path / "a.pvd"), {"volume_property": some_property()}
+    series = pvdi.generate_series(reader, CAMERA, SIZE, **looks, precision="exact")
     assert series.times == TIMES
     assert all(series[step].equals(vdis[step]) for step in range(3))
     assert series.volumes[1].origin == ball_at(1).origin
