@@ -305,7 +305,7 @@ def test_a_copy_of_the_mapper_draws_the_same_behind_another_actor(of):
     other = actor.copy() if of == "actor" else type(actor)()
     if of == "mapper":
         other.mapper = actor.mapper.copy()
-    assert other.opacity_multiplier == 2.0
+    assert other.opacity_multiplier == other.mapper.GetOpacityMultiplier() == 2.0
     assert other.mapper.scalar_range == actor.mapper.scalar_range
     plotter.remove_actor(actor)
     plotter.add_actor(other, reset_camera=False)

@@ -14,12 +14,7 @@ from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 from vtkmodules.vtkRenderingCore import vtkCamera
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import (
-    InvalidArgumentError,
-    InvalidVDIError,
-    InvalidVolumeError,
-    VDIFileError,
-)
+from pyvista_vdi import errors
 from pyvista_vdi.io import to_bytes
 from pyvista_vdi.vtk_pipeline import (
     VDIReader,
@@ -67,12 +62,12 @@ def extent(algorithm):
 @pytest.mark.parametrize("kind", [VDIToImage, VDIToDenseImage, VDIWriter, pvdi.VDISource])
 def test_what_has_no_input_says_so(kind, expected_messages, tmp_path):
     end = kind()
-    ask, error = end.Update, InvalidVDIError
+    ask, error = end.Update, errors.InvalidVDIError
     if kind is VDIWriter:
         end.SetFileName(str(tmp_path / "a.vdi"))
         ask = end.Write
     elif kind is pvdi.VDISource:
-        end, error = ready_source(InputDataObject=None), InvalidVolumeError
+        end, error = ready_source(InputDataObject=None), errors.InvalidVolumeError
         ask = end.GetVDI
     with pytest.raises(error, match=rf"{kind.__name__} has no input: call SetInputData"):
         ask()
@@ -111,7 +106,9 @@ def test_picture_is_what_render_returns(picture, vdi):
 @pytest.mark.parametrize("degrees", ["x", None, np.nan, np.inf])
 def test_a_picture_is_turned_by_a_finite_angle(degrees, picture):
     for turn in (picture.SetAzimuth, picture.SetElevation):
-        with pytest.raises(InvalidArgumentError, match=f"finite angle, degrees; got {degrees!r}"):
+        with pytest.raises(
+            errors.InvalidArgumentError, match=f"finite angle, degrees; got {degrees!r}"
+        ):
             turn(degrees)
     assert (picture.GetAzimuth(), picture.GetElevation()) == (0, 0)
 
@@ -173,7 +170,7 @@ def test_what_is_no_vdi_has_no_picture(kind, vdi, expected_messages):
     picture.Update()
     volume.SetDimensions(3, 3, 3)
     picture.SetInputDataObject(volume)
-    with pytest.raises(InvalidVDIError, match="is not a VDI"):
+    with pytest.raises(errors.InvalidVDIError, match="is not a VDI"):
         picture.Update()
     assert picture.GetOutputDataObject(0).GetNumberOfPoints() == 0
     assert expected_messages.GetOutput() == ""
@@ -198,14 +195,14 @@ def test_files_keep_every_bit(vdi, suffix, tmp_path):
 
 
 def test_files_say_what_is_wrong(vdi, tmp_path):
-    with pytest.raises(InvalidArgumentError, match="SetFileName"):
+    with pytest.raises(errors.InvalidArgumentError, match="SetFileName"):
         VDIReader().Update()
-    with pytest.raises(VDIFileError, match="absent.vdi cannot be read"):
+    with pytest.raises(errors.VDIFileError, match="absent.vdi cannot be read"):
         reader_of(tmp_path / "absent.vdi").Update()
     for name, data, error, message in (
-        (None, vdi_to_image(vdi), InvalidArgumentError, "SetFileName"),
-        ("ball.png", vdi_to_image(vdi), VDIFileError, "png"),
-        ("ball.vdi", vtkImageData(), InvalidVDIError, "is not a VDI"),
+        (None, vdi_to_image(vdi), errors.InvalidArgumentError, "SetFileName"),
+        ("ball.png", vdi_to_image(vdi), errors.VDIFileError, "png"),
+        ("ball.vdi", vtkImageData(), errors.InvalidVDIError, "is not a VDI"),
     ):
         writer = VDIWriter()
         writer.SetInputData(data)

@@ -155,12 +155,15 @@ def test_it_grows_where_the_picture_misses_the_target(plotter, made, once):
     assert len(once) <= n
 
 
-def test_it_does_not_grow_where_the_target_is_reached(made, plotter):
-    view = made.cameras[0]
+def test_it_does_not_grow_where_the_target_is_reached_or_nothing_is_to_be_made(plotter, made, once):
+    view, n = made.cameras[0], len(made)
     assert made.lacking(view) is None or made._maker.maker.ssim([(made[0], 1.0)], view) < 0.8
+    made._maker = Hungry(once._maker)
     shown(plotter, made, regenerate="never")
-    frame(plotter)
-    assert not threads(GROWTH)
+    for _ in range(3):
+        frame(plotter)
+        finish(GROWTH)
+    assert len(made) == n
 
 
 def test_regenerate_adds_the_view_that_is_shown(plotter, made):

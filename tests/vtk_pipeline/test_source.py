@@ -26,14 +26,7 @@ from vtkmodules.vtkIOImage import vtkMetaImageReader, vtkMetaImageWriter, vtkNrr
 from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLImageDataWriter
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import (
-    Cancelled,
-    InvalidArgumentError,
-    InvalidCameraError,
-    InvalidVDIError,
-    InvalidVolumeError,
-    UnsupportedError,
-)
+from pyvista_vdi import errors
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image
 
@@ -130,15 +123,15 @@ def test_options_are_set_one_by_one_or_all_at_once():
 @pytest.mark.parametrize(
     ("method", "value", "error", "message"),
     [
-        ("SetWindowSize", (0, 5), InvalidArgumentError, "between 1 and .*got 0 x 5"),
-        ("SetMaxSupersegments", (5000,), InvalidArgumentError, "1 to 4096; got 5000"),
-        ("SetViewCone", (91,), InvalidArgumentError, "got 91"),
-        ("SetSampleDistance", (0.0,), InvalidArgumentError, r"got 0\.0"),
+        ("SetWindowSize", (0, 5), errors.InvalidArgumentError, "between 1 and .*got 0 x 5"),
+        ("SetMaxSupersegments", (5000,), errors.InvalidArgumentError, "1 to 4096; got 5000"),
+        ("SetViewCone", (91,), errors.InvalidArgumentError, "got 91"),
+        ("SetSampleDistance", (0.0,), errors.InvalidArgumentError, r"got 0\.0"),
         ("SetSampleDistance", ("far",), TypeError, "must be a positive length.*got 'far'"),
-        ("SetCamera", ("front",), InvalidCameraError, "vtkCamera.*got str"),
-        ("SetCamera", (camera_at(0, 0, 9),), InvalidCameraError, "view_up .* is parallel"),
-        ("SetInputDataObject", (vtkSphereSource(),), UnsupportedError, "not a uniform grid"),
-        ("SetScalars", ("v", "edge"), InvalidArgumentError, "'point' or 'cell'"),
+        ("SetCamera", ("front",), errors.InvalidCameraError, "vtkCamera.*got str"),
+        ("SetCamera", (camera_at(0, 0, 9),), errors.InvalidCameraError, "view_up .* is parallel"),
+        ("SetInputDataObject", (vtkSphereSource(),), errors.UnsupportedError, "not a uniform grid"),
+        ("SetScalars", ("v", "edge"), errors.InvalidArgumentError, "'point' or 'cell'"),
     ],
     ids=str,
 )
@@ -161,7 +154,7 @@ def test_settings_are_checked_when_they_are_set(method, value, error, message):
 def test_what_is_missing_is_named(setting, message, expected_messages):
     source = ready_source(**{setting: None})
     for ask in (source.Update, source.GetVDI):
-        with pytest.raises((InvalidArgumentError, InvalidVolumeError), match=message):
+        with pytest.raises((errors.InvalidArgumentError, errors.InvalidVolumeError), match=message):
             ask()
     behind(source).Update()  # from C++: nothing can be raised
     said = "0 connections" if setting == "InputDataObject" else "VDISource has no"
@@ -308,11 +301,11 @@ def multi_block():
 def test_a_producer_of_something_else_is_refused_by_name(producer, message):
     source = ready_source()
     before = source.GetVDI()
-    with pytest.raises(UnsupportedError, match=message):
+    with pytest.raises(errors.UnsupportedError, match=message):
         source.SetInputConnection(producer.GetOutputPort())
     assert source.GetVDI() is before, "the input before stays"
     if isinstance(producer, vtkMultiBlockDataGroupFilter):
-        with pytest.raises(InvalidVDIError, match="MultiBlock.*is not a VDI"):
+        with pytest.raises(errors.InvalidVDIError, match="MultiBlock.*is not a VDI"):
             pvdi.VDIMapper().SetInputConnection(producer.GetOutputPort())
 
 
@@ -332,7 +325,7 @@ def test_what_only_an_update_can_tell_is_refused_by_name(data, message, expected
     source = ready_source(producer)
     assert source.GetInputBounds() is None
     for ask in (source.Update, source.GetVDI, source.GetVolume, source.MakeRequest):
-        with pytest.raises(UnsupportedError, match=message):
+        with pytest.raises(errors.UnsupportedError, match=message):
             ask()
     downstream = behind(source)
     source.Modified()
@@ -403,7 +396,7 @@ def test_a_camera_on_its_way_through_nonsense():
     source.TrackCameraOn()
     first = source.GetVDI()
     camera.SetPosition(0, 0, 9)  # along view up
-    with pytest.raises(InvalidCameraError, match="is parallel"):
+    with pytest.raises(errors.InvalidCameraError, match="is parallel"):
         source.GetVDI()
     assert source.GetCurrentVDI() is first
     camera.SetViewUp(0, 1, 0)
@@ -468,7 +461,7 @@ def test_progress_begins_rises_and_ends_and_a_callback_stops_the_work():
     before = source.GetVDI()
     source.SetMaxSupersegments(4)
     source.SetProgressCallback(lambda fraction: False)
-    with pytest.raises(Cancelled):
+    with pytest.raises(errors.Cancelled):
         source.Update()
     assert source.GetCurrentVDI() is before
     source.SetProgressCallback(None)
@@ -498,7 +491,7 @@ def test_an_abort_leaves_nothing_half_done_and_the_next_update_works(how, when):
     assert downstream.GetOutput().GetNumberOfPoints() == 0
     assert source.GetCurrentVDI() is before
     assert downstream.GetAbortOutput()
-    with pytest.raises(Cancelled):
+    with pytest.raises(errors.Cancelled):
         source.Update()
     assert source.GetOutputDataObject(0).GetNumberOfPoints() == 0
     assert source.GetCurrentVDI() is before
@@ -522,7 +515,7 @@ def test_an_aborted_update_from_c_is_made_up_for_by_the_next():
 def test_an_abort_before_the_update_is_of_that_update():
     source = ready_source()
     source.SetAbortExecuteAndUpdateTime()
-    with pytest.raises(Cancelled, match="before it began"):
+    with pytest.raises(errors.Cancelled, match="before it began"):
         source.Update()
     assert source.GetVDI().n_supersegments > 500
 
