@@ -36,20 +36,14 @@ ARGUMENTS = {
     "opacity": ({"opacity": "sigmoit"}, "opacity='sigmoit'.*did you mean 'sigmoid'"),
     "opacity above 1": ({"opacity": 1.5}, "opacity=1.5.*between 0 and 1"),
     "opacity too long": ({"opacity": np.zeros(300)}, r"n_colors=256.*\(300,\)"),
-    "opacity beyond a byte": (
-        {"opacity": [0, 300], "n_colors": 2},
-        "0 to 255; got values from 0 to 300",
-    ),
+    "opacity's bytes": ({"opacity": [0, 300], "n_colors": 2}, "0 to 255; got values from 0 to 300"),
     "n_colors": ({"n_colors": 0}, "n_colors.*got 0"),
     "clim": ({"clim": (3, 1)}, r"clim.*got \(3.0, 1.0\)"),
     "clim of three": ({"clim": (1, 2, 3)}, "clim must be one"),
     "unit distance": ({"opacity_unit_distance": -1.0}, "opacity_unit_distance.*got -1.0"),
     "preference": ({"preference": "face"}, "preference.*'face'"),
     "interpolation": ({"interpolation": "cubic"}, "'nearest' or 'linear'"),
-    "ambient occlusion": (
-        {"ambient_occlusion": "strong"},
-        "ambient_occlusion must be True, a radius.*got 'strong'",
-    ),
+    "occlusion": ({"ambient_occlusion": "strong"}, "must be True, a radius.*got 'strong'"),
     "occlusion's radius": ({"ambient_occlusion": 0.0}, "radius of ambient occlusion.*got 0"),
     "mapper": ({"mapper": "cpu"}, "mapper='cpu' is none of"),
     "no supersegments": ({"max_supersegments": 0}, "from 1 to 4096; got 0"),
@@ -61,70 +55,54 @@ ARGUMENTS = {
     "memory": ({"memory_limit": "lots"}, "memory_limit.*got 'lots'"),
     "coverage": ({"coverage": "all"}, "coverage.*got 'all'"),
 }
-
-#: The volumes, arguments, kinds of error and words of what is refused.
-ROWS = {
-    "no scalars": (EMPTY_POINTS, {}, errors.InvalidVolumeError, "no scalars: there is nothing"),
-    "one plane": (grid_of(np.zeros(16)), {}, errors.InvalidVolumeError, "only one plane.*at least"),
-    "empty": (pv.ImageData(), {}, errors.InvalidVolumeError, "the volume is empty"),
-    "all NaN": (grid_of([np.nan] * 64), {}, errors.InvalidVolumeError, "every value is NaN"),
-    "infinite": (
-        grid_of(np.r_[np.zeros(63), np.inf]),
-        {},
-        errors.InvalidArgumentError,
-        "from 0.0 to inf: give a finite",
-    ),
-    "flat array": (np.zeros((3, 3)), {}, errors.InvalidVolumeError, r"shape \(3, 3\)"),
-    "RGBA array": (np.zeros((3, 3, 3, 4)), {}, errors.UnsupportedError, "no RGBA colours"),
-    "resolution": (
-        np.zeros((3, 3, 3)),
-        {"resolution": (1, 2)},
-        errors.InvalidArgumentError,
-        r"three positive spacings; got \(1, 2\)",
-    ),
-    "rectilinear": (
-        pv.RectilinearGrid([0.0, 1, 3], [0.0, 1], [0.0, 1]),
-        {},
-        errors.UnsupportedError,
-        "not a uniform grid.*resample",
-    ),
+#: Scalars and blending modes that a good volume cannot be drawn with.
+SCALARS = {
+    "unknown": ("w", errors.InvalidVolumeError, r"no array 'w': its arrays are \['v'\]"),
+    "too few": (np.zeros(5), errors.InvalidVolumeError, r"per point \(512\).*\(5,\)"),
+    "texts": (np.full(N, "a"), errors.InvalidVolumeError, "scalars must be numbers"),
+    "RGBA": (np.zeros((N, 4), np.uint16), errors.UnsupportedError, "no RGBA colours.*or one scal"),
+}
+BLENDING = {"minimum": "minimum"} | dict.fromkeys(
+    ("maximum", "max", "Maximum", "maximum_intensity", 1), "maximum"
+)
+INFINITE = grid_of(np.r_[np.zeros(63), np.inf])
+UNEVEN = pv.RectilinearGrid([0.0, 1, 3], [0.0, 1], [0.0, 1])
+#: The volumes, kinds of error and words of what is refused whatever the arguments.
+VOLUMES = {
+    "no scalars": (EMPTY_POINTS, errors.InvalidVolumeError, "no scalars: there is nothing"),
+    "one plane": (grid_of(np.zeros(16)), errors.InvalidVolumeError, "only one plane.*at least two"),
+    "empty": (pv.ImageData(), errors.InvalidVolumeError, "the volume is empty"),
+    "all NaN": (grid_of([np.nan] * 64), errors.InvalidVolumeError, "every value is NaN"),
+    "infinite": (INFINITE, errors.InvalidArgumentError, "from 0.0 to inf: give a finite"),
+    "flat array": (np.zeros((3, 3)), errors.InvalidVolumeError, r"shape \(3, 3\)"),
+    "RGBA array": (np.zeros((3, 3, 3, 4)), errors.UnsupportedError, "no RGBA colours"),
+    "rectilinear": (UNEVEN, errors.UnsupportedError, "not a uniform grid.*resample"),
     "unstructured": (
-        VOLUME.cast_to_unstructured_grid(),
-        {},
-        errors.UnsupportedError,
+        *(VOLUME.cast_to_unstructured_grid(), errors.UnsupportedError),
         "not a uniform.*resample",
     ),
-    "blocks": (pv.MultiBlock([VOLUME, pv.Sphere()]), {}, errors.UnsupportedError, "no volume"),
-    "surface": (pv.Sphere(), {}, errors.UnsupportedError, "a surface has no volume"),
-    "a path": ("brain.nrrd", {}, errors.InvalidVolumeError, "pyvista.ImageData; got str"),
+    "blocks": (pv.MultiBlock([VOLUME, pv.Sphere()]), errors.UnsupportedError, "no volume"),
+    "surface": (pv.Sphere(), errors.UnsupportedError, "a surface has no volume"),
+    "a path": ("brain.nrrd", errors.InvalidVolumeError, "pyvista.ImageData; got str"),
+}
+#: Volumes, arguments, kinds of error and words of the message.
+ROWS = {
+    "resolution": (
+        *(np.zeros((3, 3, 3)), {"resolution": (1, 2)}, errors.InvalidArgumentError),
+        r"three positive spacings; got \(1, 2\)",
+    ),
     "camera": (VOLUME, {"camera": "xy"}, errors.InvalidCameraError, "vtkCamera.*got str"),
     "device": (VOLUME, {"device": "no such device"}, errors.NoDeviceError, "no such device"),
     "unknown keyword": (VOLUME, {"opcity": 1}, TypeError, "'opcity': did you mean 'opacity'"),
     "scalar": (VOLUME, {"scalar": "v"}, TypeError, "'scalar': did you mean 'scalars'"),
+    **{name: (volume, {}, *rest) for name, (volume, *rest) in VOLUMES.items()},
+    **{f"scalars: {k}": (VOLUME, {"scalars": v}, *rest) for k, (v, *rest) in SCALARS.items()},
     **{
-        f"scalars: {message[:12]}": (VOLUME, {"scalars": scalars}, error, message)
-        for scalars, error, message in (
-            ("w", errors.InvalidVolumeError, r"no array 'w': its arrays are \['v'\]"),
-            (np.zeros(5), errors.InvalidVolumeError, r"per point \(512\).*\(5,\)"),
-            (np.full(N, "a"), errors.InvalidVolumeError, "scalars must be numbers"),
-            (
-                np.zeros((N, 4), np.uint16),
-                errors.UnsupportedError,
-                "no RGBA colours.*or one scalar per point",
-            ),
-        )
-    },
-    **{
-        f"blending {mode}": (
-            VOLUME,
-            {"blending": mode},
-            errors.UnsupportedError,
+        f"blending: {given}": (
+            *(VOLUME, {"blending": given}, errors.UnsupportedError),
             f"blending='{name}'.*composite.*add_volume",
         )
-        for mode, name in (
-            *(("maximum", "maximum"), ("minimum", "minimum"), ("max", "maximum")),
-            *(("Maximum", "maximum"), ("maximum_intensity", "maximum"), (1, "maximum")),
-        )
+        for given, name in BLENDING.items()
     },
     **{
         name: (VOLUME, arguments, errors.InvalidArgumentError, message)
