@@ -142,7 +142,7 @@ def test_without_meshes_only_what_is_seen_is_picked(picker):
 
 
 def from_inside(scene):
-    scene.look((0, 0, 0.8), (0, 0, -1))
+    scene.look((0, 0, 0.5), (0, 0, -1))
 
 
 def moved(scene):
@@ -170,14 +170,14 @@ FACES = {
     "matrix": (moved, 0.0),
     "clipping": (clipped, 0.2),
     "parallel": (parallel, 0.5),
-    "from inside the box": (from_inside, 0.5),
+    "from inside the box": (from_inside, -0.25),
     "stereo": (lambda scene: scene.plotter.enable_stereo_render(), 0.5),
 }
 
 
 @pytest.mark.parametrize(("change", "face"), FACES.values(), ids=FACES)
 def test_the_place_is_on_the_face(change, face):
-    scene = Scene(slab())
+    scene = Scene(slab((-0.5, -0.25)) if change is from_inside else slab())
     change(scene)
     scene.show()
     picker, name = scene.under(*CENTRE)

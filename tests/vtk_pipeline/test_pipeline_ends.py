@@ -71,11 +71,16 @@ def test_what_has_no_input_says_so(kind, expected_messages, tmp_path):
         ask = end.GetVDI
     with pytest.raises(error, match=rf"{kind.__name__} has no input: call SetInputData"):
         ask()
+    if kind is pvdi.VDISource:  # of what was there before, nothing is left
+        end.SetInputDataObject(soft_ball(4))
+        end.GetVDI()
     reader = vtkXMLImageDataReader()
     reader.SetFileName(str(tmp_path / "none.vti"))
     end.SetInputConnection(reader.GetOutputPort())
     with pytest.raises(error, match=r"VTK's output window says why"):
         ask()
+    with pytest.raises(error, match=r"VTK's output window says why"):
+        (ask if kind is VDIWriter else end.Update)()
     assert "none.vti" in expected_messages.GetOutput()
     assert not list(tmp_path.iterdir())
 
