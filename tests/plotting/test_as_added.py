@@ -13,6 +13,7 @@ from pyvista_vdi import errors
 pytestmark = pytest.mark.gl
 
 N = 8
+WINDOW = (48, 40)
 LOOKS = {"clim": (0, N - 1), "cmap": "gray", "show_scalar_bar": False}
 #: A change that is seen moves pixels by more than 60 of 255, another by none.
 SEEN = 30
@@ -69,53 +70,61 @@ CHANGES = {
 
 @pytest.fixture
 def plotter():
-    plotter = pv.Plotter(window_size=(48, 40), off_screen=True)
+    plotter = pv.Plotter(window_size=WINDOW, off_screen=True)
     plotter.camera_position = "xz"
     yield plotter
     plotter.close()
 
 
+def swapped(plotter, actor, other):
+    """The picture with another actor in the place of one."""
+    plotter.remove_actor(actor)
+    plotter.add_actor(other, reset_camera=False)
+    return shown(plotter)
+
+
 @pytest.mark.every(6)
 @pytest.mark.parametrize(("arguments", "change"), CHANGES.values(), ids=CHANGES)
 def test_changes_of_the_grid_show_where_add_volume_s_show(arguments, change):
-    differences = []
+    seen = []
     for method in ("add_volume", "add_vdi"):
-        plotter = pv.Plotter(window_size=(48, 40), off_screen=True)
+        plotter = pv.Plotter(window_size=WINDOW, off_screen=True)
         plotter.camera_position = "xz"
         grid = ramp()
         getattr(plotter, method)(grid, **LOOKS, **arguments)
         before = shown(plotter)
         change(grid)
-        differences.append(np.abs(shown(plotter) - before).max())
+        seen.append(np.abs(shown(plotter) - before).max())
         plotter.close()
-    vtks, ours = differences
-    assert (ours > SEEN) == (vtks > SEEN), differences
+    vtks, ours = seen
+    assert (ours > SEEN) == (vtks > SEEN), seen
 
 
 def test_one_grid_added_twice_shows_each_array_under_its_own_range():
-    grid, judge, actors = ramp(), [], []
-    plotter = pv.Plotter(shape=(1, 2), window_size=(96, 40), off_screen=True)
-    for column, factor in enumerate((1, -1)):
+    def sides():
+        return pv.Plotter(shape=(1, 2), window_size=(96, 40), off_screen=True)
+
+    def add(plotter, column, grid):
         plotter.subplot(0, column)
+        actor = plotter.add_vdi(grid, cmap="gray", show_scalar_bar=False)
+        plotter.camera_position = "xz"
+        return actor
+
+    grid, judge, actors, plotter = ramp(), [], [], sides()
+    for column, factor in enumerate((1, -1)):
         grid["s"] = np.float32(factor * grid.points[:, 2])
         grid.origin = (2.0 * column, 0, 0)
-        actors.append(plotter.add_vdi(grid, cmap="gray", show_scalar_bar=False))
-        plotter.camera_position = "xz"
+        actors.append(add(plotter, column, grid))
         judge.append(grid.copy())
     picture = shown(plotter)
     assert [each.mapper.scalar_range for each in actors] == [(0, N - 1), (1 - N, 0)]
     plotter.close()
     for column, alone in enumerate(judge):  # as if it had been the only one
-        plotter = pv.Plotter(shape=(1, 2), window_size=(96, 40), off_screen=True)
-        plotter.subplot(0, column)
-        plotter.add_vdi(alone, cmap="gray", show_scalar_bar=False)
-        plotter.camera_position = "xz"
+        plotter = sides()
+        add(plotter, column, alone)
         half = slice(48 * column, 48 * column + 48)
         np.testing.assert_array_equal(picture[:, half], shown(plotter)[:, half])
         plotter.close()
-
-
-# -- properties, copies and other VDIs -------------------------------------------------------------
 
 
 def test_a_replaced_property_takes_effect(plotter):
@@ -135,30 +144,28 @@ def test_a_replaced_property_takes_effect(plotter):
     plotter.add_actor(actor, reset_camera=False)
     prop.opacity_unit_distance = 60.0  # it is followed
     assert np.abs(shown(plotter) - after).max() > SEEN
-
-
-def test_a_property_that_a_vdi_cannot_honour_leaves_the_one_before(plotter):
-    actor = plotter.add_vdi(ramp(), **LOOKS)
-    before = actor.prop
-    refused = before.copy()
+    refused = prop.copy()
     refused.SetTransferFunctionModeTo2D()
     with pytest.raises(errors.UnsupportedError, match="2D transfer function"):
         actor.prop = refused
-    assert actor.prop is before
+    assert actor.prop is prop
 
 
-def change_shade(actor):
+def shade(actor):
     actor.prop.shade = True
     actor.prop.ambient, actor.prop.diffuse = 0.0, 0.1
 
 
+def another_property(actor):
+    table = pv.LookupTable("hot", scalar_range=(0, 1))
+    actor.prop = pv.VolumeProperty(lookup_table=table)
+
+
 PROPERTIES = {
-    "shade": change_shade,
+    "shade": shade,
     "unit distance": lambda actor: setattr(actor.prop, "opacity_unit_distance", 0.2),
     "lookup table": lambda actor: setattr(actor.mapper.lookup_table, "cmap", "hot"),
-    "property": lambda actor: setattr(
-        actor, "prop", pv.VolumeProperty(lookup_table=pv.LookupTable("hot", scalar_range=(0, 1)))
-    ),
+    "property": another_property,
 }
 
 
@@ -166,19 +173,21 @@ PROPERTIES = {
 @pytest.mark.parametrize("change", PROPERTIES.values(), ids=PROPERTIES)
 def test_a_copy_s_properties_are_its_own(plotter, change):
     actor = plotter.add_vdi(ramp(), **LOOKS)
+    actor.mapper.SetMaximumImageSampleDistance(8.0)
+    actor.mapper.SetAutomaticView(False)
+    actor.mapper.GetSource().SetCamera(plotter.camera)
+    actor.mapper.GetSource().SetWindowSize(WINDOW)
     before = shown(plotter)
     vdi = actor.vdi
     twin = actor.copy()
-    plotter.remove_actor(actor)
-    plotter.add_actor(twin, reset_camera=False)
-    np.testing.assert_array_equal(shown(plotter), before)
+    np.testing.assert_array_equal(swapped(plotter, actor, twin), before)
     assert twin.vdi is vdi, "a copy shows the same VDI"
+    mapper = twin.mapper  # and by the same settings
+    assert (mapper.GetMaximumImageSampleDistance(), mapper.GetAutomaticView()) == (8.0, False)
     change(twin)
     changed = shown(plotter)
     assert np.abs(changed - before).max() > SEEN
-    plotter.remove_actor(twin)
-    plotter.add_actor(actor, reset_camera=False)
-    np.testing.assert_array_equal(shown(plotter), before)
+    np.testing.assert_array_equal(swapped(plotter, twin, actor), before)
     assert actor.vdi is vdi
     change(actor)
     np.testing.assert_array_equal(shown(plotter), changed)
@@ -189,20 +198,10 @@ def test_a_copy_draws_colours_of_the_volume_s_own(plotter):
     colors = np.uint8(255 * (grid.points / (N - 1)))
     grid["rgba"] = np.column_stack([colors, np.full(len(colors), 90, np.uint8)])
     actor = plotter.add_vdi(grid, scalars="rgba")
+    assert actor.copy().vdi is None, "before there is a view"
     before = shown(plotter)
     assert np.ptp(before) > SEEN
-    twin = actor.copy()
-    plotter.remove_actor(actor)
-    plotter.add_actor(twin, reset_camera=False)
-    np.testing.assert_array_equal(shown(plotter), before)
-
-
-def test_a_copy_draws_by_the_same_settings(plotter):
-    mapper = plotter.add_vdi(ramp(), **LOOKS).mapper
-    mapper.SetMaximumImageSampleDistance(8.0)
-    mapper.SetAutomaticView(False)
-    twin = plotter.volume.copy().mapper
-    assert (twin.GetMaximumImageSampleDistance(), twin.GetAutomaticView()) == (8.0, False)
+    np.testing.assert_array_equal(swapped(plotter, actor, actor.copy()), before)
 
 
 def test_a_shallow_copy_shares_its_property_until_it_is_given_another(plotter):
@@ -210,22 +209,19 @@ def test_a_shallow_copy_shares_its_property_until_it_is_given_another(plotter):
     before = shown(plotter)
     twin = actor.copy(deep=False)
     assert twin.prop is actor.prop
-    PROPERTIES["property"](twin)
+    another_property(twin)
     np.testing.assert_array_equal(shown(plotter), before)
-    plotter.remove_actor(actor)
-    plotter.add_actor(twin, reset_camera=False)
-    assert np.abs(shown(plotter) - before).max() > SEEN
+    assert np.abs(swapped(plotter, actor, twin) - before).max() > SEEN
 
 
 def test_another_vdi_takes_the_place_of_the_first(plotter):
     actor = plotter.add_vdi(ramp(), **LOOKS)
     before = shown(plotter)
-    other = pvdi.generate(ramp(), plotter.camera, (48, 40), clim=(0, N - 1), cmap="hot")
+    other = pvdi.generate(ramp(), plotter.camera, WINDOW, clim=(0, N - 1), cmap="hot")
     actor.vdi = other
     assert actor.vdi is other
-    after = shown(plotter)
-    assert np.abs(after - before).max() > SEEN
-    with pytest.raises(errors.InvalidArgumentError, match="without its volume"):
+    assert np.abs(shown(plotter) - before).max() > SEEN
+    with pytest.raises(errors.InvalidArgumentError, match="without its volume.*add the volume"):
         actor.regenerate()
     with pytest.raises(errors.InvalidArgumentError, match="no mapper that could show"):
         pvdi.VDIActor().vdi = other

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-import pyvista as pv
-from plugin_scenes import LOOKS, WINDOW, soft_ball
+from plugin_scenes import LOOKS, soft_ball
+from vtk_sources import SIZE, executions, ready_source, some_property
+from watched_windows import finish, small_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
@@ -17,36 +18,13 @@ from pyvista_vdi.vtk_pipeline.filters.dense import VDIToDenseImage
 
 pytestmark = pytest.mark.gl
 
-SIZE = (60, 48)
+WINDOW = (60, 48)
 
 
 def shown(plotter, **arguments):
     actor = plotter.add_vdi(soft_ball(12), **LOOKS, **arguments)
     plotter.show(auto_close=False)
     return actor
-
-
-def red_property():
-    prop = pv.VolumeProperty(
-        lookup_table=pv.LookupTable("viridis", scalar_range=LOOKS["clim"]),
-        opacity_unit_distance=LOOKS["opacity_unit_distance"],
-    )
-    prop.GetScalarOpacity().RemoveAllPoints()
-    prop.GetScalarOpacity().AddPoint(0, 0)
-    prop.GetScalarOpacity().AddPoint(255, 1)
-    return prop
-
-
-def ready_source():
-    source = pvdi.VDISource()
-    source.SetInputDataObject(soft_ball(12))
-    source.SetVolumeProperty(red_property())
-    source.SetCamera(pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1)))
-    source.SetWindowSize(SIZE)
-    return source
-
-
-# -- a plotter -------------------------------------------------------------------------------------
 
 
 def test_the_status_says_what_was_chosen_and_is_predicted(plotter):
@@ -58,17 +36,19 @@ def test_the_status_says_what_was_chosen_and_is_predicted(plotter):
     width, height = actor.vdi.window_size
     assert f"chosen {width} x {height} lists of up to" in str(status)
     assert actor.vdi.precision == "8-byte"
+    before = actor.vdi
+    actor.regenerate(pvdi.Camera((3, -4, 1), (0, 0, 0), (0, 0, 1)))
+    assert actor.vdi is not before
+    assert actor.status.dial["asked"] == {"quality": "balanced"}
 
 
 def test_without_a_dial_nothing_is_chosen(plotter):
     actor = shown(plotter)
     assert actor.status.dial is None
     assert "chosen" not in str(actor.status)
-    reference = pv.Plotter(window_size=WINDOW)
-    try:
-        assert shown(reference, quality="reference").vdi.equals(actor.vdi)
-    finally:
-        reference.close()
+    plain = actor.vdi
+    plotter.remove_actor(actor)
+    assert shown(plotter, quality="reference").vdi.equals(plain)
 
 
 def test_precision_and_limits_reach_the_vdi(plotter):
@@ -94,44 +74,33 @@ def test_views_regenerate_below_what_was_asked_for(plotter, arguments, bound):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "error", "said"),
+    ("arguments", "said"),
     [
-        ({"quality": "best"}, InvalidArgumentError, "quality must be one of"),
-        ({"quality": "fast", "target_ssim": 0.9}, InvalidArgumentError, "give one of them"),
-        ({"quality": "fast", "max_supersegments": 9}, InvalidArgumentError, "max_supersegments=9"),
-        ({"full_fps": -1}, InvalidArgumentError, "target_fps must be"),
-        ({"precision": "half"}, InvalidArgumentError, "precision must be one of"),
+        ({"quality": "best"}, "quality must be one of"),
+        ({"quality": "fast", "target_ssim": 0.9}, "give one of them"),
+        ({"quality": "fast", "max_supersegments": 9}, "max_supersegments=9"),
+        ({"full_fps": -1}, "target_fps must be"),
+        ({"precision": "half"}, "precision must be one of"),
     ],
 )
-def test_what_contradicts_is_refused_when_it_is_added(plotter, arguments, error, said):
-    with pytest.raises(error, match=said):
+def test_what_contradicts_is_refused_when_it_is_added(plotter, arguments, said):
+    with pytest.raises(InvalidArgumentError, match=said):
         plotter.add_vdi(soft_ball(12), **arguments)
 
 
 def test_a_vdi_has_nothing_to_choose(plotter):
-    vdi = ready_source().GetVDI()
     with pytest.raises(UnsupportedError, match="quality cannot be given with a VDI"):
-        plotter.add_vdi(vdi, quality="fast")
-
-
-def test_a_vdi_of_another_view_is_chosen_for_again(plotter):
-    actor = shown(plotter, target_ssim=0.97)
-    before = actor.vdi
-    actor.regenerate(pvdi.Camera((3, -4, 1), (0, 0, 0), (0, 0, 1)))
-    assert actor.vdi is not before
-    assert actor.status.dial["asked"] == {"target_ssim": 0.97}
-
-
-# -- a pipeline ------------------------------------------------------------------------------------
+        plotter.add_vdi(small_vdi(), quality="fast")
 
 
 def test_a_source_makes_what_generate_makes():
     source = ready_source()
-    source.SetDial("high", max_bytes=10**6, target_angle=20)
-    assert source.GetDial() == Dial.of("high", max_bytes=10**6, target_angle=20)
-    arguments = {"quality": "high", "max_bytes": 10**6, "target_angle": 20}
+    asked = {"max_bytes": 10**6, "target_angle": 20}
+    source.SetDial("high", **asked)
+    assert source.GetDial() == Dial.of("high", **asked)
+    looks = {"volume_property": some_property()}
     expected = pvdi.generate(
-        soft_ball(12), source.GetCamera(), SIZE, volume_property=red_property(), **arguments
+        soft_ball(12), source.GetCamera(), SIZE, quality="high", **asked, **looks
     )
     assert source.GetVDI().equals(expected)
     assert source.GetVDI().metadata["dial"]["chosen"] == expected.metadata["dial"]["chosen"]
@@ -140,6 +109,10 @@ def test_a_source_makes_what_generate_makes():
     source.SetPrecision("8-byte")
     assert source.GetPrecision() == source.GetVDI().precision == "8-byte"
     assert source.GetVDI().window_size == SIZE
+    source.SetMaxSupersegments(5)
+    source.SetDial("fast")
+    with pytest.raises(InvalidArgumentError, match="max_supersegments=5"):
+        source.GetVDI()
 
 
 def test_an_equal_dial_changes_nothing_and_another_makes_another():
@@ -165,18 +138,9 @@ def test_what_is_behind_a_source_sees_the_window_that_was_chosen(asked, recwarn)
     assert source.GetOutputDataObject(0).GetDimensions() == (*chosen, 1)
     assert vdi_from_image(source.GetOutputDataObject(0)).equals(source.GetVDI())
     assert dense.GetOutputDataObject(0).GetDimensions()[:2] == chosen
-    counted = []
-    source.AddObserver("StartEvent", lambda *_: counted.append(1))
+    counted = executions(source)
     dense.Update()
     assert not counted
-
-
-def test_settings_that_a_dial_chooses_are_refused_in_a_source():
-    source = ready_source()
-    source.SetMaxSupersegments(5)
-    source.SetDial("fast")
-    with pytest.raises(InvalidArgumentError, match="max_supersegments=5"):
-        source.GetVDI()
 
 
 def test_what_is_made_in_the_background_is_chosen_there():
@@ -186,7 +150,7 @@ def test_what_is_made_in_the_background_is_chosen_there():
     dial_measurement.forget()
     with BackgroundGeneration() as background:
         background.start(*request.arguments, request.options, dial=request.dial)
-        background._worker.join()
+        finish()
         made = background.take()
     assert made.equals(source.GetVDI())
     assert made.metadata["dial"]["asked"] == {"quality": "balanced"}

@@ -1,11 +1,13 @@
-"""The plugin's example scripts run on their own and write a picture with something in it."""
+"""Example scripts write a picture with something in it, and the gallery's the one that is shown."""
 
 from __future__ import annotations
 
 import os
 import re
+import runpy
 import subprocess
 import sys
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,7 +18,17 @@ from skimage.io import imread
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
+CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
+GALLERY = CHECKOUT / "docs" / "gallery"
+
+#: Scripts of the gallery that are run with every change; the others take as long, or longer.
+QUICK = ("ct_pins", "ct_projections")
+
 pytestmark = pytest.mark.gl
+documented = pytest.mark.skipif(
+    not GALLERY.is_dir(),
+    reason="no documentation at hand: set PYVISTA_VDI_CHECKOUT to a checkout",
+)
 
 
 #: Arguments of each; those without are to choose the file's name.
@@ -36,7 +48,6 @@ ARGUMENTS = {
     "web_page.py": ["page.html"],
     "web_scene.py": ["scene.html"],
 }
-
 
 #: Those that serve, which write no picture: tests/web/test_served_examples.py runs them.
 SERVING = ["serve.py", "trame_app.py"]
@@ -88,6 +99,16 @@ def test_example_writes_a_picture(name, tmp_path):
     assert np.ptp(image.reshape(-1, 3).astype(int), axis=0).max() > 100
 
 
+def gif(path):
+    """The frames of a movie, and their size."""
+    with Image.open(path) as movie:
+        frames = []
+        for k in range(movie.n_frames):
+            movie.seek(k)
+            frames.append(np.asarray(movie.convert("RGB")).astype(int))
+        return frames, movie.size
+
+
 @pytest.mark.slow
 def test_dial_example_writes_a_picture_of_three_qualities(tmp_path):
     said, target = run_example("dial.py", tmp_path)
@@ -95,10 +116,9 @@ def test_dial_example_writes_a_picture_of_three_qualities(tmp_path):
     # Below the texts, which differ from run to run: eight lines, down to row 107
     image = imread(target)[120:, :, :3].astype(int)
     assert image.shape == (240, 900, 3)
-    parts = np.split(image, 3, axis=1)
+    fast, balanced, good = parts = np.split(image, 3, axis=1)
     assert all(np.ptp(part.reshape(-1, 3), axis=0).max() > 100 for part in parts)
     # The best is more like the second than like the cheapest
-    good, balanced, fast = parts[2], parts[1], parts[0]
     assert 0 < np.abs(good - balanced).mean() < np.abs(good - fast).mean()
 
 
@@ -109,13 +129,10 @@ def test_interactive_example_writes_an_animation_with_a_new_vdi(tmp_path):
     shown = re.search(r"VDI no\. (\d+)", said)
     assert shown is not None, said
     assert int(shown[1]) >= 2
-    with Image.open(target) as animation:
-        assert animation.size == (320, 240)
-        assert animation.n_frames > 20
-        first = np.asarray(animation.convert("RGB")).astype(int)
-        animation.seek(animation.n_frames - 1)
-        last = np.asarray(animation.convert("RGB")).astype(int)
-    assert np.abs(last - first)[100:].mean() > 5, "nothing has turned"
+    frames, size = gif(target)
+    assert size == (320, 240)
+    assert len(frames) > 20
+    assert np.abs(frames[-1] - frames[0])[100:].mean() > 5, "nothing has turned"
 
 
 @pytest.mark.slow
@@ -124,25 +141,20 @@ def test_series_example_writes_a_movie_of_its_steps(tmp_path):
     sizes = re.search(r"series\.vdis: ([\d.]+) MiB for ([\d.]+) MiB", said)
     assert sizes is not None, said
     assert float(sizes[1]) < 0.3 * float(sizes[2])
-    with Image.open(target) as movie:
-        assert (movie.size, movie.n_frames) == ((480, 360), 12)
-        dark = []
-        for k in (0, 4, 8, 11):
-            movie.seek(k)
-            dark.append((np.asarray(movie.convert("L")) < 128).mean())
-    assert all(later > 1.2 * before for before, later in pairwise(dark[:3])), "it has not risen"
+    frames, size = gif(target)
+    assert (size, len(frames)) == ((480, 360), 12)
+    dark = [(frames[k].mean(axis=2) < 128).mean() for k in (0, 4, 8)]
+    assert all(later > 1.2 * before for before, later in pairwise(dark)), "it has not risen"
 
 
 @pytest.mark.slow
 def test_sets_example_writes_a_movie_of_a_turn(tmp_path):
     said, target = run_example("sets.py", tmp_path)
     assert "'below_target': 0" in said
-    with Image.open(target) as movie:
-        assert (movie.size, movie.n_frames) == ((200, 150), 24)
-        for k in (0, 7, 12, 23):
-            movie.seek(k)
-            there = (np.asarray(movie.convert("L")) < 128).mean()
-            assert 0.02 < there < 0.5  # from every side there is a knot
+    frames, size = gif(target)
+    assert (size, len(frames)) == ((200, 150), 24)
+    for k in (0, 7, 12, 23):  # from every side there is a knot
+        assert 0.02 < (frames[k].mean(axis=2) < 128).mean() < 0.5
 
 
 @pytest.mark.slow
@@ -153,14 +165,51 @@ def test_tradeoff_example_draws_its_three_fronts(tmp_path):
     assert all(np.ptp(panel) > 100 for panel in panels)
 
 
-def test_a_page_is_written(tmp_path):
+@pytest.mark.parametrize(
+    ("name", "said", "written"),
+    [
+        ("web_page.py", "supersegments", b"<vdi-viewer"),
+        ("web_scene.py", "MiB", b"application/vdi-scene+base64"),
+    ],
+)
+def test_a_page_is_written(name, said, written, tmp_path):
     """It opens again in there; tests/web look at such pages in a browser."""
-    printed, target = run_example("web_page.py", tmp_path)
-    assert "supersegments" in printed
-    assert b"<vdi-viewer" in target.read_bytes()
+    printed, target = run_example(name, tmp_path)
+    assert said in printed
+    assert written in target.read_bytes()
 
 
-def test_a_scene_is_written(tmp_path):
-    printed, target = run_example("web_scene.py", tmp_path)
-    assert "MiB" in printed
-    assert b"application/vdi-scene+base64" in target.read_bytes()
+def scripts():
+    """Name each script of the gallery, most of them for the nightly run."""
+    for script in sorted(GALLERY.glob("*.py")):
+        marks = () if script.stem in QUICK else pytest.mark.slow
+        yield pytest.param(script.stem, marks=marks)
+
+
+@documented
+@pytest.mark.every(3)
+@pytest.mark.parametrize("name", [*scripts()])
+def test_a_script_of_the_gallery_writes_its_picture(name, tmp_path, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(GALLERY / f"{name}.py"))
+    assert [file.name for file in tmp_path.iterdir()] == [f"{name}.png"]
+    shown = CHECKOUT / "docs" / "images" / f"gallery-{name}.jpg"
+    stored = BytesIO()  # as docs/make_gallery.py does
+    Image.open(tmp_path / f"{name}.png").convert("RGB").save(stored, "jpeg", quality=85)
+    written, kept = (np.asarray(Image.open(file), dtype=float) for file in (stored, shown))
+    assert written.shape == kept.shape
+    # The same where it was made; fonts, drivers and devices differ in few pixels
+    assert np.abs(written - kept).mean() < 1
+
+
+@documented
+def test_every_script_of_the_gallery_has_its_picture_and_says_what_it_is():
+    found = sorted(GALLERY.glob("*.py"))
+    assert 6 <= len(found) <= 12
+    for script in found:
+        text = script.read_text(encoding="utf-8")
+        name = f"gallery-{script.stem}.jpg"
+        assert f".. image:: /images/{name}\n   :alt: " in text
+        assert f"sphinx_gallery_thumbnail_path = 'images/{name}'" in text
+        assert (CHECKOUT / "docs" / "images" / name).stat().st_size <= 150 * 1024

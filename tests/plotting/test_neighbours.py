@@ -1,7 +1,8 @@
-"""A VDI beside everything else that a plotter can add, before and after it: as beside a volume.
+"""A VDI beside what a plotter draws in different ways, before and after it: as beside a volume.
 
 The judge is the same scene with ``add_volume``. Where VTK's own volume is missing or wrong, which
-is known and said, it is our picture of the plain scene.
+is known and said, it is our picture of the plain scene. ``tests/drop_in/test_neighbours.py`` has
+everything else that a plotter can add.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import (
-    LOOKS,
     TOLERANCE,
     add_judge,
     add_nothing,
@@ -41,11 +41,6 @@ Add = Callable[[Plotter], object]
 def beside() -> pv.PolyData:
     """A mesh whose half is inside the ball."""
     return pv.Sphere(radius=0.5, center=(0.5, 0.7, 0.5), theta_resolution=12, phi_resolution=12)
-
-
-def blocks() -> pv.MultiBlock:
-    cube = pv.Cube(center=(0.9, -0.4, 0.3), x_length=0.7, y_length=0.7, z_length=0.7)
-    return pv.MultiBlock({"ball": beside(), "cube": cube})
 
 
 def checks() -> pv.Texture:
@@ -77,31 +72,9 @@ def lit_by_the_sky(plotter: Plotter) -> None:
     plotter.add_mesh(beside(), pbr=True, metallic=0.8, roughness=0.2, color="w")
 
 
-def skybox(plotter: Plotter) -> None:
-    plotter.add_actor(sky().to_skybox())
-
-
 def textured(plotter: Plotter) -> None:
     mesh = pv.Plane(center=(0.4, 0.5, 0.2), direction=(1, 0.6, 0.3), i_size=2, j_size=2)
     plotter.add_mesh(mesh, texture=checks())
-
-
-def with_scalars(plotter: Plotter) -> None:
-    mesh = beside()
-    mesh["height"] = mesh.points[:, 2]
-    plotter.add_mesh(mesh, cmap="plasma", scalar_bar_args={"title": "height"})
-
-
-def peeled(plotter: Plotter) -> None:
-    plotter.enable_depth_peeling(4)
-    plotter.add_mesh(beside(), color="r", opacity=0.5)
-    plotter.add_mesh(pv.Plane(direction=(1, 1, 0), i_size=2, j_size=2), color="b", opacity=0.5)
-
-
-def part_of_an_assembly(plotter: Plotter) -> None:
-    assembly = vtkPropAssembly()
-    assembly.AddPart(pv.Actor(pv.DataSetMapper(beside())))
-    plotter.add_actor(assembly)
 
 
 def charted(plotter: Plotter) -> None:
@@ -110,68 +83,38 @@ def charted(plotter: Plotter) -> None:
     plotter.add_chart(chart)
 
 
-def another_volume(plotter: Plotter) -> None:
-    moved = pv.Transform().translate(0, 2.5, 0).matrix
-    plotter.add_volume(soft_ball(12), mapper="gpu", user_matrix=moved, **LOOKS)
+def blocks(plotter: Plotter) -> None:
+    cube = pv.Cube(center=(0.9, -0.4, 0.3), x_length=0.7, y_length=0.7, z_length=0.7)
+    plotter.add_mesh(pv.MultiBlock({"ball": beside(), "cube": cube}), multi_colors=True)
 
 
-def line_of(points: int = 20) -> pv.PolyData:
-    t = np.linspace(0, 6, points)
-    return pv.Spline(np.column_stack([np.cos(t), np.sin(t), t / 4 - 0.7]), points)
+def tubes(plotter: Plotter) -> None:
+    t = np.linspace(0, 6, 20)
+    line = pv.Spline(np.column_stack([np.cos(t), np.sin(t), t / 4 - 0.7]), 20)
+    plotter.add_mesh(line, color="k", line_width=3, render_lines_as_tubes=True)
 
 
-def corners() -> pv.PolyData:
-    return pv.PolyData([[0.9, 0.5, 0.5], [0.2, 0.9, 0.8], [-0.8, 0.4, 0.9]])
+def labels(plotter: Plotter) -> None:
+    corners = pv.PolyData([[0.9, 0.5, 0.5], [0.2, 0.9, 0.8], [-0.8, 0.4, 0.9]])
+    plotter.add_point_labels(corners, ["a", "b", "c"], font_size=8)
 
 
 #: What a plotter can add, or switch on, that VTK's own volume is right beside.
 KINDS: dict[str, Add] = {
-    "mesh": lambda p: p.add_mesh(beside(), color="w"),
-    "scalars": with_scalars,
-    "edges": lambda p: p.add_mesh(beside(), show_edges=True, line_width=2),
-    "wireframe": lambda p: p.add_mesh(beside(), style="wireframe"),
-    "unstructured grid": lambda p: p.add_mesh(beside().delaunay_3d(), color="w"),
-    "silhouette": lambda p: p.add_mesh(beside(), silhouette=True),
-    "vertices": lambda p: p.add_mesh(beside(), show_vertices=True),
     "texture": textured,
-    "multi-block": lambda p: p.add_mesh(blocks(), multi_colors=True),
-    "composite": lambda p: p.add_composite(blocks(), color="orange"),
-    "translucent blocks": lambda p: p.add_composite(blocks(), opacity=0.5),
+    "multi-block": blocks,
     "environment": lit_by_the_sky,
-    "skybox": skybox,
-    "points": lambda p: p.add_points(beside().points, color="r", point_size=4),
-    "spheres": lambda p: p.add_points(
-        beside().points, color="r", point_size=8, render_points_as_spheres=True
-    ),
+    "skybox": lambda p: p.add_actor(sky().to_skybox()),
     "gaussians": lambda p: p.add_mesh(beside(), style="points_gaussian", point_size=6),
-    "lines": lambda p: p.add_mesh(line_of(), color="k", line_width=3),
-    "tubes": lambda p: p.add_mesh(line_of(), color="k", line_width=3, render_lines_as_tubes=True),
-    "segments": lambda p: p.add_lines(line_of(20).points, color="k", width=2),
-    "arrows": lambda p: p.add_arrows(corners().points, np.eye(3), mag=0.4),
-    "point labels": lambda p: p.add_point_labels(corners(), ["a", "b", "c"], font_size=8),
-    "text": lambda p: p.add_text("beside", font_size=6),
-    "3D text": lambda p: p.add_mesh(pv.Text3D("abc", height=0.5, center=(0.8, 0.5, 0.5))),
-    "title": lambda p: p.add_title("above", font_size=6),
-    "legend": lambda p: p.add_legend([("ball", "r"), ("cube", "b")]),
-    "scale": lambda p: p.add_legend_scale(),
-    "axes": lambda p: p.add_axes(),
-    "axes actor": lambda p: p.add_actor(pv.AxesAssembly(scale=1.3)),
-    "axes at origin": lambda p: p.add_axes_at_origin(),
-    "box axes": lambda p: p.add_box_axes(),
-    "bounding box": lambda p: p.add_bounding_box(),
-    "grid": lambda p: p.show_grid(),
-    "bounds": lambda p: p.show_bounds(grid="back", font_size=6),
-    "floor": lambda p: p.add_floor("-z", color="w", pad=0.5),
-    "ruler": lambda p: p.add_ruler((-1, -1, 1), (1, 1, 1)),
-    "background gradient": lambda p: p.set_background("w", top="b"),
+    "tubes": tubes,
+    "point labels": labels,
     "chart": charted,
-    "cursor": lambda p: p.add_cursor(bounds=(-1, 1, -1, 1, -1, 1)),
-    "light": lambda p: p.add_light(pv.Light(position=(3, 3, 3), color="r")),
-    "other volume": another_volume,
-    "translucent mesh": lambda p: p.add_mesh(beside(), color="r", opacity=0.5),
-    "depth peeling": peeled,
-    "assembly": part_of_an_assembly,
     "plane widget": lambda p: p.add_plane_widget(lambda *_: None),
+}
+#: Likewise, and at night.
+MORE: dict[str, Add] = {
+    "vertices": lambda p: p.add_mesh(beside(), show_vertices=True),
+    "cursor": lambda p: p.add_cursor(bounds=(-1, 1, -1, 1, -1, 1)),
     "box widget": lambda p: p.add_box_widget(lambda *_: None),
     "slider": lambda p: p.add_slider_widget(lambda *_: None, (0, 1)),
     "line widget": lambda p: p.add_line_widget(lambda *_: None),
@@ -179,27 +122,8 @@ KINDS: dict[str, Add] = {
     "spline widget": lambda p: p.add_spline_widget(lambda *_: None),
     "button": lambda p: p.add_checkbox_button_widget(lambda *_: None, size=20),
     "clip plane of a mesh": lambda p: p.add_mesh_clip_plane(beside()),
-    "slice of a mesh": lambda p: p.add_mesh_slice(soft_ball(12), show_scalar_bar=False),
-    "orientation widget": lambda p: p.add_camera_orientation_widget(),
-    "north arrow": lambda p: p.add_north_arrow_widget(),
     "measurement": lambda p: p.add_measurement_widget(),
-    "radio button": lambda p: p.add_radio_button_widget(lambda *_: None, "group", size=20),
-    "background image": lambda p: p.add_background_image(pv.examples.mapfile, auto_resize=False),
-    "logo": lambda p: p.add_logo_widget(),
-    "msaa": lambda p: (p.enable_anti_aliasing("msaa"), p.add_mesh(beside(), color="w")),
-    "hidden lines": lambda p: (
-        p.enable_hidden_line_removal(),
-        p.add_mesh(beside(), style="wireframe"),
-    ),
-    "parallel": lambda p: (p.enable_parallel_projection(), p.add_mesh(beside(), color="w")),
-    "stereo": lambda p: (p.enable_stereo_render(), p.add_mesh(beside(), color="w")),
 }
-
-#: Those that draw in different ways, but for what test_scenes.py has; the others are marked slow.
-QUICK = (
-    *("texture", "multi-block", "environment", "skybox", "gaussians", "tubes", "point labels"),
-    *("chart", "plane widget"),
-)
 
 #: Pixels in which a mesh itself differs: points and lines at the window's very last bits.
 STRAYS = 6
@@ -227,19 +151,16 @@ def picture(kind: Add, add: Callable[..., object], *, later: bool = False) -> np
 
 @pytest.mark.every(3)
 @pytest.mark.parametrize(
-    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in KINDS]
+    "name", [*KINDS, *(pytest.param(name, marks=pytest.mark.slow) for name in MORE)]
 )
 def test_a_vdi_beside_it_is_drawn_as_a_volume_is(name):
-    kind = KINDS[name]
+    kind = {**KINDS, **MORE}[name]
     judge = picture(kind, add_judge)
     assert np.abs(judge - picture(kind, add_nothing)).max() > 40, "VTK's volume is not seen"
     for later in (False, True):
         off = np.abs(picture(kind, add_ours, later=later) - judge).max(axis=-1)
         count = np.count_nonzero(off > TOLERANCE)
         assert count <= STRAYS, f"later={later}: {count} pixels are off by up to {off.max()}"
-
-
-# -- assemblies ------------------------------------------------------------------------------------
 
 
 @pytest.mark.every(2)
@@ -271,9 +192,6 @@ def shot_from(plotter: Plotter, view: object) -> np.ndarray:
     plotter.camera_position = view
     plotter.show(auto_close=False)  # VTK's first frame with depth of field is black
     return plotter.screenshot(return_img=True)
-
-
-# -- render passes ---------------------------------------------------------------------------------
 
 
 def before_a_wall(plotter: Plotter, add: Callable[..., object], **looks: object) -> None:
@@ -319,9 +237,6 @@ def test_depth_of_field_says_that_it_does_not_see_a_vdi():
     with pytest.warns(VDIWarning, match=r"depth of field \(enable_depth_of_field\) does not see"):
         ours = seen_under(Plotter.enable_depth_of_field, add_ours)
     assert np.abs(ours - seen_under(Plotter.enable_depth_of_field, add_nothing)).max() > 40
-
-
-# -- moving actors ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("rgba", [False, True])
@@ -371,23 +286,27 @@ def test_a_mapper_s_data_set_is_what_was_added():
     other["v"] = ball["v"][::-1].copy()
     actor.mapper.dataset = other
     assert not actor.regenerate().equals(vdi)
-    plotter.close()
 
 
-def test_a_mapper_s_copy_draws_the_same_behind_another_actor():
+@pytest.mark.parametrize("of", ["mapper", "actor"])
+def test_a_copy_of_the_mapper_draws_the_same_behind_another_actor(of):
     plotter = pv.Plotter(window_size=WINDOW)
     plotter.set_background("lightsteelblue")
     actor = add_ours(plotter, soft_ball(16))
     plane = vtkPlane()
     plane.SetNormal(1, 0.3, 0)
     actor.mapper.AddClippingPlane(plane)
+    actor.mapper.SetCroppingRegionPlanes(-0.45, 0.3, -0.2, 0.5, -0.4, 0.25)
+    actor.mapper.SetCroppingRegionFlagsToFence()
+    actor.mapper.CroppingOn()
     actor.opacity_multiplier = 2.0
     plotter.camera_position = VIEW
     before = plotter.screenshot(return_img=True)
-    other = type(actor)()
-    other.mapper = actor.mapper.copy()
+    other = actor.copy() if of == "actor" else type(actor)()
+    if of == "mapper":
+        other.mapper = actor.mapper.copy()
+    assert other.opacity_multiplier == other.mapper.GetOpacityMultiplier() == 2.0
     assert other.mapper.scalar_range == actor.mapper.scalar_range
     plotter.remove_actor(actor)
     plotter.add_actor(other, reset_camera=False)
     np.testing.assert_array_equal(plotter.screenshot(return_img=True), before)
-    plotter.close()

@@ -57,7 +57,6 @@ def test_add_volume_takes_a_preset():
     plotter = pv.Plotter(off_screen=True, window_size=(32, 24))
     actor = plotter.add_volume(pv.Wavelet(), **pvdi.presets["mri-skin"])
     assert actor.prop.shade
-    plotter.close()
 
 
 def test_unknown_names():

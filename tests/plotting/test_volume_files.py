@@ -3,8 +3,6 @@
 The files are written byte by byte by ``scan_files``, or by VTK and pynrrd. Where the marked voxel
 lies is what SimpleITK 2.5 and nibabel 5.3 say of the same files, too (with x and y of NIfTI's frame
 negated for SimpleITK).
-
-All formats are held to the same marked voxel: hence more than 500 lines.
 """
 
 from __future__ import annotations
@@ -28,6 +26,8 @@ from scan_files import (
     write_nifti,
 )
 from strategies import random_vdi
+from vtkmodules.vtkCommonMath import vtkMatrix4x4
+from vtkmodules.vtkIOImage import vtkMetaImageWriter, vtkNIFTIImageWriter
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
@@ -134,9 +134,6 @@ def values_in_space(volume):
     return rows[np.argsort(rows[:, 3], kind="stable")]
 
 
-# -- orientation -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("direction", DIRECTIONS)
 @pytest.mark.parametrize("kind", FORMATS)
 def test_every_voxel_is_where_the_file_says(kind, direction, tmp_path):
@@ -149,9 +146,17 @@ def test_every_voxel_is_where_the_file_says(kind, direction, tmp_path):
     np.testing.assert_allclose(values_in_space(volume), reference, atol=1e-5)
 
 
+def assert_marked_at(path, world, atol=1e-5):
+    """The largest value lies there."""
+    np.testing.assert_allclose(marked(read(path)), world[:3], atol=atol)
+
+
 @pytest.mark.parametrize("qfac", [1.0, -1.0])
-def test_nifti_by_quaternion(qfac, tmp_path):
-    """30 degrees about z; qfac -1 turns the third axis round (nifti1.h, method 2)."""
+def test_nifti_by_quaternion_and_by_sform_which_comes_first(qfac, tmp_path):
+    """30 degrees about z; qfac -1 turns the third axis round (nifti1.h, method 2).
+
+    The form is sheared; nibabel takes it so.
+    """
     half = np.radians(15)
     path = write_nifti(
         tmp_path / "a.nii",
@@ -160,53 +165,36 @@ def test_nifti_by_quaternion(qfac, tmp_path):
         quaternion=(0, 0, np.sin(half), *ORIGIN),
         qfac=qfac,
     )
-    expected = affine(turned(30, 0) @ np.diag([1, 1, qfac])) @ [*MARK, 1]
-    np.testing.assert_allclose(marked(read(path)), expected[:3], atol=1e-5)
-
-
-@pytest.mark.parametrize("qfac", [1.0, -1.0])
-def test_niftis_sform_comes_first(qfac, tmp_path):
-    """Sheared, and beside a quaternion: nibabel takes it so."""
+    assert_marked_at(path, affine(turned(30, 0) @ np.diag([1, 1, qfac])) @ [*MARK, 1])
     sform = affine(turned(30, 20))
     sform[:3, 1] += 0.3 * sform[:3, 0]
     path = write_nifti(
         tmp_path / "a.nii", scan(), SPACING, sform=sform, quaternion=(0, 0, 1, 1, 2, 3), qfac=qfac
     )
-    np.testing.assert_allclose(marked(read(path)), (sform @ [*MARK, 1])[:3], atol=1e-5)
+    assert_marked_at(path, sform @ [*MARK, 1])
 
 
 def test_nifti_without_a_map_begins_at_the_origin(tmp_path):
-    volume = read(write_nifti(tmp_path / "a.nii", scan(), SPACING))
-    np.testing.assert_allclose(marked(volume), SPACING * MARK, atol=1e-6)
+    assert_marked_at(write_nifti(tmp_path / "a.nii", scan(), SPACING), SPACING * MARK, atol=1e-6)
 
 
-def test_nifti_of_vtks_writer(tmp_path):
-    from vtkmodules.vtkCommonMath import vtkMatrix4x4
-    from vtkmodules.vtkIOImage import vtkNIFTIImageWriter
-
+def test_files_of_vtks_writers(tmp_path):
     matrix = vtkMatrix4x4()  # VTK's maps points, spacing included
     for (i, j), value in np.ndenumerate(affine(turned(30, 20)) @ np.diag([*1 / SPACING, 1])):
         matrix.SetElement(i, j, value)
-    writer = vtkNIFTIImageWriter()
-    writer.SetFileName(str(tmp_path / "a.nii"))
-    grid = as_grid(np.eye(3))
+    grid, writer = as_grid(np.eye(3)), vtkNIFTIImageWriter()
     grid.origin = (0, 0, 0)  # which the matrix has
+    writer.SetFileName(str(tmp_path / "a.nii"))
     writer.SetInputData(grid)
     writer.SetSFormMatrix(matrix)
     writer.Write()
-    expected = affine(turned(30, 20)) @ [*MARK, 1]
-    np.testing.assert_allclose(marked(read(tmp_path / "a.nii")), expected[:3], atol=1e-5)
-
-
-def test_meta_image_of_vtks_writer(tmp_path):
-    from vtkmodules.vtkIOImage import vtkMetaImageWriter
-
+    assert_marked_at(tmp_path / "a.nii", affine(turned(30, 20)) @ [*MARK, 1])
     writer = vtkMetaImageWriter()
     writer.SetFileName(str(tmp_path / "a.mha"))
     writer.SetInputData(as_grid(np.eye(3)))
     writer.Write()
     assert read(tmp_path / "a.mha").direction.tolist() == np.eye(3).tolist()
-    np.testing.assert_allclose(marked(read(tmp_path / "a.mha")), SPACING * MARK + ORIGIN)
+    assert_marked_at(tmp_path / "a.mha", SPACING * MARK + ORIGIN)
 
 
 @pytest.mark.parametrize("key", ["TransformMatrix", "Rotation", "Orientation"])
@@ -222,8 +210,7 @@ def test_a_tilted_gantry_shears_the_volume(tmp_path):
     for z, pixels in enumerate(scan()):
         data = dicom_slice(pixels, ORIGIN + z * step, np.eye(3)[:2], SPACING, number=z)
         (folder / f"{z}.dcm").write_bytes(data)
-    expected = ORIGIN + SPACING * [MARK[0], MARK[1], 0] + step * MARK[2]
-    np.testing.assert_allclose(marked(read(folder)), expected, atol=1e-5)
+    assert_marked_at(folder, ORIGIN + SPACING * [MARK[0], MARK[1], 0] + step * MARK[2])
 
 
 @pytest.mark.every(3)
@@ -246,9 +233,6 @@ def test_pictures_of_all_formats_are_the_same(kind, tmp_path, capsys, default_ru
     assert pictures[0].max() > 60
     # Coordinates differ by float32's rounding, rays at faces may take another voxel: seen up to 1
     assert np.abs(pictures[0] - pictures[1]).max() <= 2
-
-
-# -- values ----------------------------------------------------------------------------------------
 
 
 def test_scaled_values(tmp_path):
@@ -302,35 +286,34 @@ def test_several_times_are_refused_by_name(tmp_path):
         read(path)
 
 
-# -- DICOM folders ---------------------------------------------------------------------------------
-
-
 def dicom_folder(tmp_path, **options):
     return write_dicom(tmp_path / "scan", scan(), SPACING, ORIGIN, np.eye(3), **options)
 
 
-@pytest.mark.parametrize("options", [{"suffix": ""}, {"syntax": IMPLICIT}])
-def test_names_without_a_suffix_and_implicit_types(options, tmp_path):
-    folder = dicom_folder(tmp_path, **options)
-    np.testing.assert_allclose(marked(read(folder)), ORIGIN + SPACING * MARK, atol=1e-5)
+def open_ended(tag, content, explicit):
+    """A sequence of undefined length (PS3.5, section 7.5)."""
+    head = struct.pack("<HH", tag >> 16, tag & 0xFFFF)
+    head += b"SQ\0\0" if explicit else b""
+    item = struct.pack("<HHI", 0xFFFE, 0xE000, 0xFFFFFFFF) + content
+    item += struct.pack("<HHI", 0xFFFE, 0xE00D, 0)
+    return head + b"\xff" * 4 + item + struct.pack("<HHI", 0xFFFE, 0xE0DD, 0)
 
 
 @pytest.mark.parametrize("syntax", [IMPLICIT, "1.2.840.10008.1.2.1"])
-def test_sequences_before_what_is_wanted_are_passed_by(syntax, tmp_path):
-    """Of undefined length, one in the other (PS3.5, section 7.5)."""
+def test_what_lies_before_and_beside_what_is_wanted_is_passed_by(syntax, tmp_path):
+    """Sequences, one in the other; files that are no slices; names without a suffix."""
     explicit = syntax != IMPLICIT
-
-    def open_ended(tag, content):
-        head = struct.pack("<HH", tag >> 16, tag & 0xFFFF)
-        head += b"SQ\0\0" if explicit else b""
-        item = struct.pack("<HHI", 0xFFFE, 0xE000, 0xFFFFFFFF) + content
-        item += struct.pack("<HHI", 0xFFFE, 0xE00D, 0)
-        return head + b"\xff" * 4 + item + struct.pack("<HHI", 0xFFFE, 0xE0DD, 0)
-
     inner = element(0x0020000E, "UI", "9.9.9", explicit=explicit)  # of another series
-    sequence = open_ended(0x00081115, open_ended(0x0008114A, inner) + inner)
-    folder = dicom_folder(tmp_path, syntax=syntax, sequence=sequence)
-    np.testing.assert_allclose(marked(read(folder)), ORIGIN + SPACING * MARK, atol=1e-5)
+    sequence = open_ended(0x0008114A, inner, explicit) + inner
+    sequence = open_ended(0x00081115, sequence, explicit)
+    for options in ({"sequence": sequence}, {"suffix": ""}):
+        folder = dicom_folder(tmp_path, syntax=syntax, **options)
+        (folder / "README.txt").write_text("not a slice")
+        (folder / "empty").touch()
+        (folder / "noise.dcm").write_bytes(bytes(range(256)) * 8)
+        (folder / "sub").mkdir()
+        assert_marked_at(folder, ORIGIN + SPACING * MARK)
+        shutil.rmtree(folder)
 
 
 def test_slices_lie_where_they_say_however_numbers_are_written(tmp_path, monkeypatch):
@@ -369,15 +352,6 @@ def test_values_are_those_that_the_slices_mean(slope, intercept, dtype, tmp_path
     assert volume.array.dtype == dtype
     expected = slope * scan().astype(float) + intercept
     assert np.array_equal(np.sort(volume.array.ravel()), np.sort(expected.ravel()))
-
-
-def test_other_files_beside_the_slices(tmp_path):
-    folder = dicom_folder(tmp_path)
-    (folder / "README.txt").write_text("not a slice")
-    (folder / "empty").touch()
-    (folder / "noise.dcm").write_bytes(bytes(range(256)) * 8)
-    (folder / "sub").mkdir()
-    np.testing.assert_allclose(marked(read(folder)), ORIGIN + SPACING * MARK, atol=1e-5)
 
 
 @pytest.mark.parametrize("damage", ["ends early", "no number"])
@@ -434,28 +408,21 @@ def test_several_series_are_named(tmp_path):
         read(folder)
 
 
-def rewritten(folder, name, position, orientation=None, **options):
-    data = dicom_slice(
-        scan()[0],
-        position,
-        np.eye(3)[:2] if orientation is None else orientation,
-        SPACING,
-        **options,
-    )
-    (folder / name).write_bytes(data)
-
-
 def test_slices_that_do_not_make_a_volume(tmp_path):
     folder = dicom_folder(tmp_path)
-    rewritten(folder, "10.dcm", ORIGIN)
-    with pytest.raises(InvalidVolumeError, match="several slices .* lie in the same place"):
-        read(folder)
-    rewritten(folder, "10.dcm", ORIGIN + 40, turned(0, 90)[:, :2].T)
-    with pytest.raises(InvalidVolumeError, match="turned against each other"):
-        read(folder)
-    rewritten(folder, "10.dcm", ORIGIN, syntax=JPEG)
-    with pytest.raises(UnsupportedError, match=rf"10\.dcm .* {re.escape(JPEG)}.*gdcmconv --raw"):
-        read(folder)
+    along, across = np.eye(3)[:2], turned(0, 90)[:, :2].T
+    for place, orientation, options, error, message in (
+        (ORIGIN, along, {}, InvalidVolumeError, "several slices .* lie in the same place"),
+        (ORIGIN + 40, across, {}, InvalidVolumeError, "turned against each other"),
+        (
+            *(ORIGIN, along, {"syntax": JPEG}),
+            *(UnsupportedError, rf"10\.dcm .* {re.escape(JPEG)}.*gdcmconv --raw"),
+        ),
+    ):
+        data = dicom_slice(scan()[0], place, orientation, SPACING, **options)
+        (folder / "10.dcm").write_bytes(data)
+        with pytest.raises(error, match=message):
+            read(folder)
     with pytest.raises(UnsupportedError, match="gdcmconv --raw"):
         read(folder / "10.dcm")
     with pytest.raises(InvalidVolumeError, match=r"00\.dcm holds one slice of 7 x 6 .* folder"):
@@ -479,9 +446,6 @@ def test_slices_that_do_not_say_where_they_lie(tmp_path):
         assert read(folder).spacing == tuple(SPACING)
 
 
-# -- names and damage ------------------------------------------------------------------------------
-
-
 def test_a_vdi_is_no_volume(tmp_path):
     vdi = random_vdi(np.random.default_rng(1))
     for name in ("a.vdi", "a.exr"):
@@ -500,16 +464,21 @@ def test_a_folder_that_is_named_like_a_file(kind, tmp_path):
         read(tmp_path / f"a.{kind}")
 
 
-@pytest.mark.parametrize("written", ["mha", "nii", "vti"])
-@pytest.mark.parametrize("named", ["mha", "nii", "nii.gz", "vti", "nrrd", "dat"])
+#: A NIfTI is seen to be compressed whatever it is called.
+_MISNAMED = [
+    (written, named)
+    for written in ("mha", "nii", "vti")
+    for named in ("mha", "nii", "nii.gz", "vti", "nrrd", "dat")
+    if not named.startswith(written)
+]
+
+
+@pytest.mark.parametrize(("written", "named"), _MISNAMED)
 def test_another_formats_name(written, named, tmp_path, expected_messages):
-    if named.startswith(written):
-        pytest.skip("the right name; whether a NIfTI is compressed is seen whatever it is called")
     path = tmp_path / f"b.{named}"
     shutil.copy(write_in(written, tmp_path, np.eye(3)), path)
-    with pytest.raises(
-        InvalidVolumeError, match=rf"b\.{re.escape(named)} (cannot be read|holds no)"
-    ):
+    said = rf"b\.{re.escape(named)} (cannot be read|holds no)"
+    with pytest.raises(InvalidVolumeError, match=said):
         read(path)
 
 

@@ -28,7 +28,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import reference
 from pyvista_vdi.device import get_runtime
 
-#: Largest error that a channel may have beyond the oracle's range (DESIGN section 6).
+#: Largest error that a channel may have beyond the oracle's range (docs/conventions.md).
 BOUND = 5e-5
 #: Share of the frames that is warm-up: every kernel has been compiled, every buffer was once there.
 WARM_UP = 0.3
@@ -139,8 +139,6 @@ class Load:
         self.outcome.seconds = time.perf_counter() - began
         return self.outcome
 
-    # -- what is done ----------------------------------------------------------------------------
-
     def _disturb(self, frame: int) -> None:
         outcome, rng = self.outcome, self.rng
         if frame % 500 == 0:
@@ -212,8 +210,6 @@ class Load:
         camera.parallel_projection = bool(self.rng.random() < 0.2)
         camera.parallel_scale = self.rng.uniform(0.5, 2)
         self.plotter.renderer.ResetCameraClippingRange()
-
-    # -- what is seen ----------------------------------------------------------------------------
 
     def _check(self) -> None:
         """Hold a picture of the VDI on the screen against the oracle, at some pixels."""

@@ -36,6 +36,13 @@ def vtk_messages(off_screen):
     assert window.GetOutput() == ""
 
 
+@pytest.fixture(autouse=True)
+def closed(vtk_messages):
+    """Close all plotters of a test, whatever becomes of it."""
+    yield
+    pv.close_all()
+
+
 @pytest.fixture
 def expected_messages(vtk_messages):
     """What VTK writes to its output window, which is no failure here."""

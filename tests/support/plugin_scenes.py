@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
 import pyvista_vdi as pvdi
 
@@ -18,9 +20,11 @@ LOOKS: dict[str, Any] = {
     "opacity_unit_distance": 0.2,
     "show_scalar_bar": False,
 }
+#: The same for ``generate``, which shows nothing.
+CLASSIFICATION = {name: value for name, value in LOOKS.items() if name != "show_scalar_bar"}
 #: The issue's bound for a scene, in steps of 255. With V_N = V_O, seen are 1 to 5.
 TOLERANCE = 8
-WINDOW = (240, 200)
+WINDOW = (120, 100)
 
 
 def soft_ball(n: int = 24, *, direction: Any = None) -> pv.ImageData:
@@ -77,7 +81,20 @@ def shown(plotter: pv.Plotter) -> np.ndarray:
     """What a plotter shows now: a screenshot alone draws the first frame only."""
     plotter.show(auto_close=False)
     plotter.render()
-    return np.asarray(plotter.screenshot(return_img=True)).astype(int)
+    return np.asarray(plotter.screenshot(return_img=True))[..., :3].astype(int)
+
+
+def tiled_picture(plotter: pv.Plotter) -> np.ndarray:
+    """What VTK's filter puts together of four frames: a picture of twice the size."""
+    plotter.show(auto_close=False)
+    tiles = vtkWindowToImageFilter()
+    tiles.SetInput(plotter.render_window)
+    tiles.SetScale(2, 2)
+    tiles.ReadFrontBufferOff()
+    tiles.Update()
+    width, height, _ = tiles.GetOutput().GetDimensions()
+    values = vtk_to_numpy(tiles.GetOutput().GetPointData().GetScalars())
+    return values.reshape(height, width, 3)[::-1]
 
 
 def draw(

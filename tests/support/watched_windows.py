@@ -7,7 +7,7 @@ import time
 
 import pytest
 import pyvista as pv
-from plugin_scenes import LOOKS, soft_ball
+from plugin_scenes import CLASSIFICATION, LOOKS, soft_ball
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
@@ -17,7 +17,7 @@ from pyvista_vdi.quality.frame_rate import FrameRateController
 from pyvista_vdi.vtk_pipeline.interaction import estimation
 
 #: Odd, so that no smaller image divides it.
-WINDOW = (241, 203)
+WINDOW = (121, 103)
 #: Seconds after which something that should have happened has not.
 LONG = 600.0
 MOVING, STILL = 30.0, 0.0001
@@ -32,11 +32,13 @@ def plotter():
 
 @pytest.fixture
 def gate(monkeypatch):
-    """Holds up what is generated in the background, until it is set."""
+    """Holds up what is generated in the background, until it is set; ``begun`` counts it."""
     gate = threading.Event()
+    gate.begun = 0
     generate_by_dial = background.generate_by_dial
 
     def gated(*arguments, device, **keywords):
+        gate.begun += 1
         while not gate.is_set():
             device.give_way()
             time.sleep(0.001)
@@ -101,25 +103,45 @@ def frame(plotter, rate=STILL):
     return on_screen(plotter.render_window)
 
 
-def frames_until(plotter, happened):
-    """Draw frames at rest until something is so; all pictures."""
+def turned(plotter, degrees, rate=STILL):
+    """Turn the view, and draw a frame; while a hand moves, it draws at the rate MOVING."""
+    plotter.camera.Azimuth(degrees)
+    return frame(plotter, rate)
+
+
+def frames(plotter, count, rate=STILL):
+    """Draw frames of the same view."""
+    for _ in range(count):
+        frame(plotter, rate)
+
+
+def frames_until(plotter, happened, rate=STILL):
+    """Draw frames, by default at rest, until something is so; all pictures."""
     pictures = []
     end = time.monotonic() + LONG
     while not happened():
         assert time.monotonic() < end, "it has not happened"
-        pictures.append(frame(plotter))
+        pictures.append(frame(plotter, rate))
         time.sleep(0.005)
     return pictures
 
 
-def generation_threads():
-    return [t for t in threading.enumerate() if t.name == "pyvista-vdi generation"]
+def threads(work="generation"):
+    """Threads that do a kind of work behind the frames."""
+    return [t for t in threading.enumerate() if t.name == f"pyvista-vdi {work}"]
 
 
-def picture_of(vdi, plotter, **options):
-    """What another plotter shows of a VDI that never changes, from this one's view."""
+def finish(work="generation"):
+    """Wait for what is done behind the frames."""
+    for thread in threads(work):
+        thread.join(LONG)
+        assert not thread.is_alive()
+
+
+def picture_of(thing, plotter, **options):
+    """What another plotter shows of a VDI or a volume, from this one's view, waiting for it."""
     other = pv.Plotter(window_size=plotter.window_size)
-    other.add_vdi(vdi, show_scalar_bar=False, regenerate="never", **options)
+    other.add_vdi(thing, show_scalar_bar=False, regenerate="never", **options)
     if plotter.render_window.GetStereoRender():
         other.render_window.SetStereoType(plotter.render_window.GetStereoType())
         other.render_window.StereoRenderOn()
@@ -138,6 +160,5 @@ def coarse(plotter, **options):
 
 
 def small_vdi(size=(60, 50), **options):
-    keep = {k: v for k, v in LOOKS.items() if k != "show_scalar_bar"}
     camera = pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1))
-    return pvdi.generate(soft_ball(12), camera, size, **keep, **options)
+    return pvdi.generate(soft_ball(12), camera, size, **CLASSIFICATION, **options)

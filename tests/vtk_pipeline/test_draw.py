@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import pyvista as pv
-from plugin_scenes import LOOKS, add_judge, soft_ball
+from plugin_scenes import LOOKS, add_judge, shown, soft_ball
 from skimage.metrics import structural_similarity
-from watched_windows import MOVING, WINDOW, frame, no_estimates, watched  # noqa: F401
+from watched_windows import MOVING, WINDOW, finish, frame, small_vdi, watched
 
-import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.quality.ways import Ways
 from pyvista_vdi.vtk_pipeline.interaction import regeneration
@@ -17,83 +16,84 @@ from pyvista_vdi.vtk_pipeline.interaction.window_clock import HEADROOM
 
 pytestmark = pytest.mark.gl
 
-
-def shot(plotter):
-    plotter.render()
-    return np.asarray(plotter.screenshot(return_img=True)).astype(int)
+VIEW = ((5, 2, 3), (0, 0, 0), (0, 0, 1))
 
 
 def alike(a, b):
     return structural_similarity(a, b, channel_axis=2, data_range=255)
 
 
+def beside(plotter, add, **options):
+    """Another plotter of the same view, to which something was added."""
+    other = pv.Plotter(window_size=WINDOW, **options)
+    actor = add(other)
+    other.camera = plotter.camera.copy()
+    return other, actor
+
+
 def test_the_volume_is_drawn_as_by_vtk_and_no_vdi_is_made(plotter):
     volume = soft_ball()
     actor = plotter.add_vdi(volume, draw="volume", interpolation="linear", **LOOKS)
-    plotter.camera_position = ((5, 2, 3), (0, 0, 0), (0, 0, 1))
-    plotter.show(auto_close=False)
-    seen = shot(plotter)
+    plotter.camera_position = VIEW
+    seen = shown(plotter)
     assert actor.status.drawn == "volume"
     assert not actor.status.stand_in
     assert actor.mapper.GetVDI() is None
-    judge = pv.Plotter(window_size=WINDOW)
-    add_judge(judge, volume)
-    judge.camera = plotter.camera.copy()
-    judge.show(auto_close=False)
-    assert alike(seen, shot(judge)) > 0.995
+    judge, _ = beside(plotter, lambda other: add_judge(other, volume))
+    assert alike(seen, shown(judge)) > 0.995
     judge.close()
     # Another view, and other voxels, at once
     plotter.camera.azimuth = 120
-    turned = shot(plotter)
+    turned = shown(plotter)
     assert np.abs(turned - seen).max() > 8
     volume["v"][:] = 0.5 * volume["v"]
-    assert np.abs(shot(plotter) - turned).max() > 8
+    assert np.abs(shown(plotter) - turned).max() > 8
     assert actor.mapper.GetVDI() is None
 
 
 def test_a_shaded_volume_is_lit_from_where_it_is_seen(plotter):
     """A headlight goes with the camera; what is baked into a VDI does not."""
-    volume = soft_ball()
-    looks = {**LOOKS, "shade": True, "interpolation": "linear"}
-    plotter.remove_all_lights()
-    plotter.add_light(pv.Light(light_type="headlight"))
-    actor = plotter.add_vdi(volume, draw="volume", **looks)
-    plotter.camera_position = ((5, 2, 3), (0, 0, 0), (0, 0, 1))
+
+    def add(plotter):
+        plotter.remove_all_lights()
+        plotter.add_light(pv.Light(light_type="headlight"))
+        looks = {**LOOKS, "shade": True, "interpolation": "linear"}
+        return plotter.add_vdi(soft_ball(), draw="volume", **looks)
+
+    actor = add(plotter)
+    plotter.camera_position = VIEW
     plotter.show(auto_close=False)
     plotter.camera.azimuth = 150
-    turned = shot(plotter)
-    other = pv.Plotter(window_size=WINDOW)
-    other.remove_all_lights()
-    other.add_light(pv.Light(light_type="headlight"))
-    other.add_vdi(volume, draw="volume", **looks)
-    other.camera = plotter.camera.copy()
-    other.show(auto_close=False)
-    np.testing.assert_array_equal(turned, shot(other))
+    turned = shown(plotter)
+    other, _ = beside(plotter, add)
+    np.testing.assert_array_equal(turned, shown(other))
     other.close()
     assert actor.status.drawn == "volume"
 
 
-def known(monkeypatch, way):
-    """Let every choice be one way."""
-    asked = []
+@pytest.fixture
+def chosen(monkeypatch):
+    """Every choice between VDI and volume is ``chosen.way``; ``chosen.asked`` has what it knew."""
+
+    class Chosen:
+        way = "volume"
+        asked = ()
 
     def choose(self, angle, pixels, seconds, ssim=None, bound=0.0):
-        asked.append((angle, pixels, seconds))
-        self._way = way[0]
-        return self._way
+        Chosen.asked = angle, pixels, seconds
+        self._way = Chosen.way
+        return Chosen.way
 
     monkeypatch.setattr(Ways, "choose", choose)
-    return asked
+    return Chosen
 
 
-def test_auto_draws_what_was_chosen_and_brightness_does_not_jump(plotter, monkeypatch):
-    way = ["vdi"]
-    asked = known(monkeypatch, way)
+def test_auto_draws_what_was_chosen_and_brightness_does_not_jump(plotter, chosen):
+    chosen.way = "vdi"
     actor = watched(plotter, draw="auto", interpolation="linear", max_supersegments=64)
-    assert frame(plotter).shape[:2] == WINDOW[::-1]
     by_vdi = frame(plotter)
     assert actor.status.drawn == "vdi"
-    way[0] = "volume"
+    chosen.way = "volume"
     plotter.renderer.Modified()
     by_volume = frame(plotter)
     assert actor.status.drawn == "volume"
@@ -102,55 +102,49 @@ def test_auto_draws_what_was_chosen_and_brightness_does_not_jump(plotter, monkey
     assert alike(by_vdi, by_volume) > 0.999
     # Mean brightness: half of 1/255
     assert abs(by_vdi.mean() - by_volume.mean()) < 0.5
-    angle, pixels, seconds = asked[-1]
+    angle, pixels, seconds = chosen.asked
     assert angle < 1e-3
     assert 0 < pixels <= WINDOW[0] * WINDOW[1]
     assert seconds is None  # at rest
     plotter.camera.azimuth = 40
     frame(plotter, MOVING)
-    angle, _, seconds = asked[-1]
+    angle, _, seconds = chosen.asked
     assert angle == pytest.approx(40, abs=0.1)
     assert seconds == pytest.approx(1 / 30 / HEADROOM)
 
 
 def test_in_motion_errors_are_estimated_of_vdis_that_are_drawn(
-    plotter,
-    monkeypatch,
-    no_estimates,  # noqa: F811
+    plotter, chosen, monkeypatch, no_estimates
 ):
-    way = ["volume"]
-    known(monkeypatch, way)
     monkeypatch.setattr(regeneration, "_ESTIMATE_PERIOD_IN_MOTION", 0.0)
     no_estimates.ssim = 0.99
-    actor = watched(plotter, draw="auto", regenerate="auto")
-    worker = actor.mapper.painter.upkeep.regeneration._estimation._worker
+    watched(plotter, draw="auto", regenerate="auto")
 
     def asked():
         for _ in range(3):
             plotter.camera.azimuth += 40
             frame(plotter, MOVING)
-            worker.join()
+            finish("estimate")
         return no_estimates.asked
 
     before = asked()
     assert asked() == before, "frames of the volume have no error"
-    way[0] = "vdi"
+    chosen.way = "vdi"
     assert asked() > before
 
 
 def test_the_first_frame_of_a_volume_in_motion_is_no_slower_than_a_picture_has_told(
-    plotter, monkeypatch
+    plotter, chosen, monkeypatch
 ):
-    known(monkeypatch, ["volume"])
     actor = watched(plotter, draw="auto")
-    upkeep = actor.mapper.painter.upkeep
-    upkeep._preparation.join()
-    upkeep.ways = Ways()
-    upkeep.ways.took("volume", 0.0, 1.0, 1e-3)  # a millisecond per ray
+    finish("stand-in")
+    each = Ways()
+    each.took("volume", 0.0, 1.0, 1e-3)  # a millisecond per ray
+    actor.mapper.painter.upkeep.ways = each
     plotter.camera.azimuth = 40
     frame(plotter, MOVING)
     assert actor.status.drawn == "volume"
-    assert actor.status.samples == 60 * 51  # the floor: a sixteenth
+    assert actor.status.samples == 30 * 26  # the floor: a sixteenth
 
 
 def test_auto_goes_by_what_frames_take(plotter, monkeypatch):
@@ -162,7 +156,7 @@ def test_auto_goes_by_what_frames_take(plotter, monkeypatch):
 
     monkeypatch.setattr(Ways, "took", dear)
     actor = watched(plotter, draw="auto")
-    actor.mapper.painter.upkeep.ways.took("volume", 0.0, 1e4, 1.0)
+    finish("stand-in")  # pictures of the volume tell what its rays take
     plotter.camera.azimuth = 60
     frame(plotter)
     frame(plotter)
@@ -172,8 +166,7 @@ def test_auto_goes_by_what_frames_take(plotter, monkeypatch):
     assert actor.status.drawn == "vdi"
 
 
-def test_off_screen_and_beside_another_vdi_the_vdi_is_drawn(plotter, monkeypatch):
-    known(monkeypatch, ["volume"])
+def test_off_screen_and_beside_another_vdi_the_vdi_is_drawn(plotter, chosen):
     actor = plotter.add_vdi(soft_ball(), **LOOKS)
     plotter.show(auto_close=False)
     assert actor.status.drawn == "vdi"
@@ -187,9 +180,7 @@ def test_off_screen_and_beside_another_vdi_the_vdi_is_drawn(plotter, monkeypatch
 
 
 def test_a_vdi_without_its_volume_is_all_there_is(plotter):
-    vdi = pvdi.generate(
-        soft_ball(12), pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1)), (40, 30), cmap="bone"
-    )
+    vdi = small_vdi()
     with pytest.raises(UnsupportedError, match="draw='volume' draws the volume"):
         plotter.add_vdi(vdi, draw="volume")
     plotter.add_vdi(vdi, draw="auto")
@@ -199,24 +190,20 @@ def test_a_vdi_without_its_volume_is_all_there_is(plotter):
 def test_fewer_rays_as_by_vtks_mappers(plotter):
     volume = soft_ball()
     actor = plotter.add_vdi(volume, **LOOKS)
-    plotter.camera_position = ((5, 2, 3), (0, 0, 0), (0, 0, 1))
-    plotter.show(auto_close=False)
-    full = shot(plotter)
+    plotter.camera_position = VIEW
+    full = shown(plotter)
     actor.mapper.SetImageSampleDistance(2)
     assert actor.mapper.GetImageSampleDistance() == 2
-    coarse = shot(plotter)
+    few = shown(plotter)
     assert actor.status.share == pytest.approx(1 / 4, rel=0.02)
-    judge = pv.Plotter(window_size=WINDOW)
-    theirs = add_judge(judge, volume)
-    judge.camera = plotter.camera.copy()
-    judge.show(auto_close=False)
-    exact = shot(judge)
+    judge, theirs = beside(plotter, lambda other: add_judge(other, volume))
+    exact = shown(judge)
     theirs.mapper.SetImageSampleDistance(2)
-    judged = alike(shot(judge), exact)
+    judged = alike(shown(judge), exact)
     judge.close()
     # As near its own full picture as VTK's is
-    assert alike(coarse, full) > min(judged, 0.99) - 0.005
-    assert np.abs(coarse - full).max() > 0
+    assert alike(few, full) > min(judged, 0.99) - 0.005
+    assert np.abs(few - full).max() > 0
     for wrong in (0.5, 101, float("nan"), True, "2x"):
         with pytest.raises(InvalidArgumentError):
             actor.mapper.SetImageSampleDistance(wrong)

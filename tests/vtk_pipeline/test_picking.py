@@ -17,13 +17,15 @@ from vtkmodules.vtkRenderingCore import (
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, VDIWarning
+from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
+from pyvista_vdi.vtk_pipeline.drawing import selection
 
 pytestmark = pytest.mark.gl
 
-WINDOW = (240, 200)
-CENTRE = (120, 100)
+WINDOW = (120, 100)
+CENTRE = (60, 50)
 #: Beside the ball, before the backdrop, inside the VDI's box.
-CORNER = (70, 150)
+CORNER = (35, 75)
 #: Of float32 depth in a window of 24 bits or more, between near and far planes about as far
 #: apart as they are from the eye: 6e-8 times a few units of depth, and a few roundings.
 Z_BUFFER = 1e-5
@@ -47,11 +49,8 @@ def slab(z=(-0.5, 0.5), color=(1, 0.5, 0), edge=16):
     )
 
 
-@pytest.fixture(autouse=True)
-def closed(vtk_messages):
-    """Plotters are closed, whatever becomes of the test."""
-    yield
-    pv.close_all()
+def screenshot(plotter):
+    return plotter.screenshot(return_img=True)
 
 
 class Scene:
@@ -94,29 +93,42 @@ class Scene:
         camera = self.plotter.camera
         return np.dot(np.subtract(point, camera.position), camera.direction)
 
+    def selected(self, area, association=None):
+        """The properties of what an area's selection has, by prop."""
+        selector = vtkHardwareSelector()
+        selector.SetRenderer(self.plotter.renderer)
+        selector.SetArea(*area)
+        if association is not None:
+            selector.SetFieldAssociation(association)
+        selection = selector.Select()
+        nodes = [selection.GetNode(i).GetProperties() for i in range(selection.GetNumberOfNodes())]
+        return {node.Get(vtkSelectionNode.PROP()): node for node in nodes}
 
-def pixel_at(scene, depth):
-    """The size of a pixel at a view depth, world units: what VTK's own places may be off by."""
-    return 2 * depth * np.tan(np.radians(scene.plotter.camera.view_angle / 2)) / WINDOW[1]
 
-
-# -- which prop, and where ----------------------------------------------------------------------
-
-
-def test_what_is_in_front_is_picked():
+def test_what_is_in_front_is_picked_and_where_it_begins():
     scene = Scene().show()
     wanted = {
         CENTRE: "vdi",
-        (150, 100): "front",
+        (75, 50): "front",
         CORNER: "backdrop",  # behind a part of the box where nothing is to be seen
-        (5, 5): None,
-        (81, 61): "inside",  # in the box, before the ball
+        (2, 2): None,
+        (40, 30): "inside",  # in the box, before the ball
     }
-    found = {place: scene.under(*place)[1] for place in wanted}
-    assert found == wanted
+    assert {place: scene.under(*place)[1] for place in wanted} == wanted
     assert {place: scene.vdi.pick(*place) is not None for place in wanted} == {
         place: name == "vdi" for place, name in wanted.items()
     }
+    half_angle = np.radians(scene.plotter.camera.view_angle / 2)
+    for place in (CENTRE, (50, 40), (38, 33), (55, 65)):
+        picker, name = scene.under(*place)
+        hit = scene.vdi.pick(*place)
+        assert name == "vdi"
+        expected = pvdi.pick(scene.vdi.vdi, scene.plotter.camera, place, WINDOW)
+        assert hit == expected or hit.position == pytest.approx(expected.position, abs=1e-12)
+        assert scene.depth_of(picker.GetPickPosition()) == pytest.approx(hit.depth, abs=Z_BUFFER)
+        # VTK puts it on the ray through the pixel's corner, not through its centre
+        apart = np.subtract(picker.GetPickPosition(), hit.position)
+        assert np.abs(apart).max() <= 0.51 * 2 * hit.depth * np.tan(half_angle) / WINDOW[1]
 
 
 @pytest.mark.parametrize("picker", [vtkPropPicker, vtkHardwarePicker])
@@ -129,40 +141,81 @@ def test_without_meshes_only_what_is_seen_is_picked(picker):
     assert scene.under(*CORNER, picker)[1] is None
 
 
-def test_prop_picker_gives_the_place_of_the_first_hit():
-    scene = Scene().show()
-    for place in (CENTRE, (100, 80), (75, 65), (110, 130)):
-        picker, name = scene.under(*place)
-        hit = scene.vdi.pick(*place)
-        assert name == "vdi"
-        expected = pvdi.pick(scene.vdi.vdi, scene.plotter.camera, place, WINDOW)
-        assert hit == expected or hit.position == pytest.approx(expected.position, abs=1e-12)
-        assert scene.depth_of(picker.GetPickPosition()) == pytest.approx(hit.depth, abs=Z_BUFFER)
-        # VTK puts it on the ray through the pixel's corner, not through its centre
-        apart = np.subtract(picker.GetPickPosition(), hit.position)
-        assert np.abs(apart).max() <= 0.51 * pixel_at(scene, hit.depth)
+def from_inside(scene):
+    scene.look((0, 0, 0.5), (0, 0, -1))
 
 
-def test_the_place_is_on_the_face():
-    scene = Scene(slab()).show()
-    picker, _ = scene.under(*CENTRE)
-    assert picker.GetPickPosition()[2] == pytest.approx(0.5, abs=Z_BUFFER)
-    hit = scene.vdi.pick(*CENTRE)
-    assert hit.position[2] == pytest.approx(0.5, abs=1e-12)
-    assert hit.color == (1, 0.5, 0)
+def moved(scene):
+    scene.vdi.user_matrix = np.array(
+        [[0, -1, 0, 0.1], [1, 0, 0, 0], [0, 0, 0.5, -0.25], [0, 0, 0, 1]]
+    )
 
 
-def test_from_another_view():
-    scene = Scene(slab())
-    scene.look((4, 3, 3))
+def clipped(scene):
+    plane = vtkPlane()
+    plane.SetOrigin(0, 0, 0.2)
+    plane.SetNormal(0, 0, -1)
+    scene.vdi.mapper.AddClippingPlane(plane)
+
+
+def parallel(scene):
+    scene.plotter.enable_parallel_projection()
+    scene.plotter.camera.parallel_scale = 1.6
+
+
+#: What is done to the slab's scene, and where its face is then.
+FACES = {
+    "plain": (lambda scene: None, 0.5),
+    "another view": (lambda scene: scene.look((4, 3, 3)), None),
+    "matrix": (moved, 0.0),
+    "clipping": (clipped, 0.2),
+    "parallel": (parallel, 0.5),
+    "from inside the box": (from_inside, -0.25),
+    "stereo": (lambda scene: scene.plotter.enable_stereo_render(), 0.5),
+}
+
+
+@pytest.mark.parametrize(("change", "face"), FACES.values(), ids=FACES)
+def test_the_place_is_on_the_face(change, face):
+    scene = Scene(slab((-0.5, -0.25)) if change is from_inside else slab())
+    change(scene)
     scene.show()
     picker, name = scene.under(*CENTRE)
+    place, hit = picker.GetPickPosition(), scene.vdi.pick(*CENTRE)
     assert name == "vdi"
-    hit = scene.vdi.pick(*CENTRE)
-    # Into the cube by one of its three faces that this view sees
-    face = np.abs(np.subtract(hit.position, (1, 1, 0.5)))
-    assert face.min() < 1e-12
-    assert scene.depth_of(picker.GetPickPosition()) == pytest.approx(hit.depth, abs=Z_BUFFER)
+    assert hit.color == (1, 0.5, 0)
+    if face is None:  # into the cube by one of its three faces that this view sees
+        assert np.abs(np.subtract(hit.position, (1, 1, 0.5))).min() < 1e-12
+        assert scene.depth_of(place) == pytest.approx(hit.depth, abs=Z_BUFFER)
+        return
+    assert place[2] == pytest.approx(face, abs=Z_BUFFER)
+    # VTK's stereo camera is a matrix of float32
+    tolerance = 1e-6 if scene.plotter.render_window.GetStereoRender() else 1e-12
+    assert hit.position[2] == pytest.approx(face, abs=tolerance)
+    if change is parallel:
+        half_pixel = 1.6 / WINDOW[1]
+        assert hit.position == pytest.approx((half_pixel, half_pixel, 0.5), abs=1e-12)
+    if change is clipped:
+        scene.vdi.mapper.GetClippingPlanes().GetItem(0).SetOrigin(0, 0, -2)
+        assert scene.vdi.pick(*CENTRE) is None
+        assert scene.under(*CENTRE)[1] == "backdrop"
+
+
+@pytest.mark.parametrize("kind", ["msaa", "ssaa", "eye dome lighting", "depth peeling"])
+def test_pick_works_however_the_scene_is_drawn(kind):
+    """VTK's own pickers find nothing, not even meshes, under SSAA and eye-dome lighting."""
+    scene = Scene(slab())
+    if kind == "eye dome lighting":
+        scene.plotter.enable_eye_dome_lighting()
+    elif kind == "depth peeling":
+        scene.plotter.enable_depth_peeling()
+    else:
+        scene.plotter.enable_anti_aliasing(kind)
+    scene.show()
+    before = screenshot(scene.plotter)
+    assert scene.vdi.pick(*CENTRE).position[2] == pytest.approx(0.5, abs=1e-12)
+    assert scene.vdi.pick(75, 50) is None  # the sphere in front
+    assert np.array_equal(screenshot(scene.plotter), before)
 
 
 def test_threshold():
@@ -181,226 +234,111 @@ def test_threshold():
     mapper.SetPickingAccumulated(False)
     assert scene.vdi.pick(*CENTRE) is None
     assert scene.under(*CENTRE)[1] == "backdrop"
+    copied = scene.vdi.copy(deep=False).mapper
+    assert (copied.GetPickingOpacity(), copied.GetPickingAccumulated()) == (0.9, False)
+    with pytest.raises(InvalidArgumentError, match="opacity_threshold must be at least 0"):
+        mapper.SetPickingOpacity(1)
+    assert mapper.GetPickingOpacity() == 0.9
 
 
-def test_copies_keep_the_threshold():
-    plotter = pv.Plotter(window_size=WINDOW)
-    actor = plotter.add_vdi(slab())
-    actor.mapper.SetPickingOpacity(0.9)
-    actor.mapper.SetPickingAccumulated(False)
-    copied = actor.copy(deep=False)
-    assert copied.mapper.GetPickingOpacity() == 0.9
-    assert copied.mapper.GetPickingAccumulated() is False
-
-
-def test_a_selection_has_as_many_pixels_as_are_seen():
+def test_selections_have_as_many_pixels_as_are_seen():
     scene = Scene()
     scene.front.SetPickable(False)
     scene.inside.SetVisibility(False)
     scene.show()
-    selector = vtkHardwareSelector()
-    selector.SetRenderer(scene.plotter.renderer)
-    selector.SetArea(70, 50, 169, 149)  # all of it before the backdrop
-    selection = selector.Select()
-    counts = {}
-    for i in range(selection.GetNumberOfNodes()):
-        properties = selection.GetNode(i).GetProperties()
-        counts[properties.Get(vtkSelectionNode.PROP())] = properties.Get(
-            vtkSelectionNode.PIXEL_COUNT()
-        )
+    found = scene.selected((35, 25, 84, 74))  # all of it before the backdrop
+    counts = {prop: node.Get(vtkSelectionNode.PIXEL_COUNT()) for prop, node in found.items()}
     depth = pvdi.render_depth(scene.vdi.vdi, scene.plotter.camera, WINDOW)
-    seen = np.count_nonzero(np.isfinite(depth[::-1][50:150, 70:170]))
-    assert counts == {scene.vdi: seen, scene.backdrop: 100 * 100 - seen}
-    assert 2000 < seen < 100 * 100
-
-
-def test_points_of_other_props_can_be_selected():
-    scene = Scene().show()
-    selector = vtkHardwareSelector()
-    selector.SetRenderer(scene.plotter.renderer)
-    selector.SetArea(0, 0, WINDOW[0] - 1, WINDOW[1] - 1)
-    selector.SetFieldAssociation(vtkDataObject.FIELD_ASSOCIATION_POINTS)
-    selection = selector.Select()
-    nodes = [selection.GetNode(i).GetProperties() for i in range(selection.GetNumberOfNodes())]
-    props = [node.Get(vtkSelectionNode.PROP()) for node in nodes]
-    assert scene.vdi not in props
-    assert scene.front in props
-
-
-# -- scenes -------------------------------------------------------------------------------------
+    seen = np.count_nonzero(np.isfinite(depth[::-1][25:75, 35:85]))
+    assert counts == {scene.vdi: seen, scene.backdrop: 50 * 50 - seen}
+    assert 500 < seen < 50 * 50
+    # Points, of which a VDI has none, can be selected of other props
+    scene.front.SetPickable(True)
+    whole = (0, 0, WINDOW[0] - 1, WINDOW[1] - 1)
+    points = scene.selected(whole, vtkDataObject.FIELD_ASSOCIATION_POINTS)
+    assert scene.vdi not in points
+    assert scene.front in points
 
 
 def test_flags_of_the_actor_are_honoured():
     scene = Scene().show()
-    scene.vdi.SetPickable(False)
-    assert scene.under(*CENTRE)[1] == "backdrop"
-    assert scene.vdi.pick(*CENTRE) is None
-    scene.vdi.SetPickable(True)
-    scene.vdi.SetVisibility(False)
-    assert scene.under(*CENTRE)[1] == "backdrop"
-    assert scene.vdi.pick(*CENTRE) is None
-    scene.vdi.SetVisibility(True)
-    assert scene.under(*CENTRE)[1] == "vdi"
+    for hide in (scene.vdi.SetPickable, scene.vdi.SetVisibility):
+        hide(False)
+        assert scene.under(*CENTRE)[1] == "backdrop"
+        assert scene.vdi.pick(*CENTRE) is None
+        hide(True)
+        assert scene.under(*CENTRE)[1] == "vdi"
 
 
-def test_matrix_of_the_actor():
-    scene = Scene(slab())
-    scene.vdi.user_matrix = np.array(
-        [[0, -1, 0, 0.1], [1, 0, 0, 0], [0, 0, 0.5, -0.25], [0, 0, 0, 1]]
-    )
-    scene.show()
-    assert scene.vdi.pick(*CENTRE).position[2] == pytest.approx(0.0, abs=1e-12)
-    place = scene.under(*CENTRE)[0].GetPickPosition()
-    assert place[2] == pytest.approx(0.0, abs=Z_BUFFER)
-
-
-def test_clipping_planes():
-    scene = Scene(slab()).show()
-    plane = vtkPlane()
-    plane.SetOrigin(0, 0, 0.2)
-    plane.SetNormal(0, 0, -1)
-    scene.vdi.mapper.AddClippingPlane(plane)
-    assert scene.vdi.pick(*CENTRE).position[2] == pytest.approx(0.2, abs=1e-12)
-    assert scene.under(*CENTRE)[0].GetPickPosition()[2] == pytest.approx(0.2, abs=Z_BUFFER)
-    plane.SetOrigin(0, 0, -2)
-    assert scene.vdi.pick(*CENTRE) is None
-    assert scene.under(*CENTRE)[1] == "backdrop"
-
-
-def test_parallel_projection():
-    scene = Scene(slab())
-    scene.plotter.enable_parallel_projection()
-    scene.plotter.camera.parallel_scale = 1.6
-    scene.show()
-    place = scene.under(*CENTRE)[0].GetPickPosition()
-    assert place[2] == pytest.approx(0.5, abs=Z_BUFFER)
-    hit = scene.vdi.pick(*CENTRE)
-    half_pixel = 1.6 / WINDOW[1]
-    assert hit.position == pytest.approx((half_pixel, half_pixel, 0.5), abs=1e-12)
-
-
-def test_camera_inside_the_box():
-    scene = Scene(slab((-0.5, -0.25)))
-    scene.look((0, 0, 0.5), (0, 0, -1))
-    scene.show()
-    assert scene.under(*CENTRE)[1] == "vdi"
-    assert scene.vdi.pick(*CENTRE).position[2] == pytest.approx(-0.25, abs=1e-12)
-
-
-def test_stereo():
-    scene = Scene(slab())
-    scene.plotter.enable_stereo_render()
-    scene.show()
-    place = scene.under(*CENTRE)[0].GetPickPosition()
-    assert place[2] == pytest.approx(0.5, abs=Z_BUFFER)
-    assert scene.vdi.pick(*CENTRE).position[2] == pytest.approx(0.5, abs=1e-6)
-
-
-@pytest.mark.parametrize("kind", ["msaa", "ssaa", "eye dome lighting", "depth peeling"])
-def test_pick_works_however_the_scene_is_drawn(kind):
-    """VTK's own pickers find nothing, not even meshes, under SSAA and eye-dome lighting."""
-    scene = Scene(slab())
-    if kind == "eye dome lighting":
-        scene.plotter.enable_eye_dome_lighting()
-    elif kind == "depth peeling":
-        scene.plotter.enable_depth_peeling()
-    else:
-        scene.plotter.enable_anti_aliasing(kind)
-    scene.show()
-    before = scene.plotter.screenshot(return_img=True)
-    assert scene.vdi.pick(*CENTRE).position[2] == pytest.approx(0.5, abs=1e-12)
-    assert scene.vdi.pick(150, 100) is None  # the sphere in front
-    assert np.array_equal(scene.plotter.screenshot(return_img=True), before)
-
-
-def test_the_nearer_of_two_is_picked_in_either_order():
-    near, far = slab((0.25, 0.5), (1, 0, 0)), slab((-0.5, -0.25), (0, 0, 1))
-    for first, second in ((near, far), (far, near)):
-        plotter = pv.Plotter(window_size=WINDOW)
-        actors = {id(vdi): plotter.add_vdi(vdi) for vdi in (first, second)}
-        plotter.camera_position = ((0, 0, 6), (0, 0, 0), (0, 1, 0))
-        plotter.show(auto_close=False)
-        picker = vtkPropPicker()
-        picker.Pick(*CENTRE, 0, plotter.renderer)
-        assert picker.GetViewProp() is actors[id(near)]
-        assert picker.GetPickPosition()[2] == pytest.approx(0.5, abs=Z_BUFFER)
-        assert actors[id(near)].pick(*CENTRE).position[2] == pytest.approx(0.5, abs=1e-12)
-        assert actors[id(far)].pick(*CENTRE) is None
-
-
-def test_subplots():
-    plotter = pv.Plotter(shape=(1, 2), window_size=WINDOW)
-    actors = []
-    for column, face in enumerate((0.5, 0.25)):
-        plotter.subplot(0, column)
-        actors.append(plotter.add_vdi(slab((-0.5, face))))
-        plotter.camera_position = ((0, 0, 8), (0, 0, 0), (0, 1, 0))
+@pytest.mark.parametrize("first", [0, 1])
+def test_the_nearer_of_two_is_picked_in_either_order(first):
+    vdis = slab((0.25, 0.5), (1, 0, 0)), slab((-0.5, -0.25), (0, 0, 1))
+    plotter = pv.Plotter(window_size=WINDOW)
+    near, far = (plotter.add_vdi(vdis[(first + k) % 2]) for k in range(2))
+    near, far = (near, far) if first == 0 else (far, near)
+    plotter.camera_position = ((0, 0, 6), (0, 0, 0), (0, 1, 0))
     plotter.show(auto_close=False)
-    for actor, x, face in zip(actors, (60, 180), (0.5, 0.25), strict=True):
-        assert actor.pick(x, 100).position[2] == pytest.approx(face, abs=1e-12)
-        assert actor.pick(240 - x, 100) is None
+    picker = vtkPropPicker()
+    picker.Pick(*CENTRE, 0, plotter.renderer)
+    assert picker.GetViewProp() is near
+    assert picker.GetPickPosition()[2] == pytest.approx(0.5, abs=Z_BUFFER)
+    assert near.pick(*CENTRE).position[2] == pytest.approx(0.5, abs=1e-12)
+    assert far.pick(*CENTRE) is None
 
 
-def test_one_actor_in_two_renderers():
+@pytest.mark.parametrize("how", ["two", "one twice", "copies"])
+def test_two_renderers(how):
+    """Copies share a shader, which is picked in one and drawn in the other."""
     plotter = pv.Plotter(shape=(1, 2), window_size=WINDOW)
-    actor = plotter.add_vdi(slab())
+    left = plotter.add_vdi(slab())
     plotter.camera_position = ((0, 0, 8), (0, 0, 0), (0, 1, 0))
     plotter.subplot(0, 1)
-    plotter.add_actor(actor)
-    plotter.camera_position = ((0, 0, -8), (0, 0, 0), (0, 1, 0))
+    if how == "two":
+        right = plotter.add_vdi(slab((-0.5, 0.25)))
+    else:
+        right = left if how == "one twice" else left.copy(deep=False)
+        assert right.GetShaderProperty() is left.GetShaderProperty()
+        plotter.add_actor(right)
+    face, eye = (0.25, 8) if how == "two" else (-0.5, -8)
+    plotter.camera_position = ((0, 0, eye), (0, 0, 0), (0, 1, 0))
     plotter.show(auto_close=False)
-    before = plotter.screenshot(return_img=True)
-    assert actor.pick(60, 100).position[2] == pytest.approx(0.5, abs=1e-12)
-    assert actor.pick(180, 100).position[2] == pytest.approx(-0.5, abs=1e-12)
-    other = plotter.renderers[0]
-    assert actor.pick(180, 100, renderer=other) is None
-    assert np.array_equal(plotter.screenshot(return_img=True), before)
+    before = screenshot(plotter)
+    for _ in range(2):
+        assert left.pick(30, 50).position[2] == pytest.approx(0.5, abs=1e-12)
+        assert right.pick(90, 50).position[2] == pytest.approx(face, abs=1e-12)
+        assert np.array_equal(screenshot(plotter), before)
+    if how == "one twice":
+        assert right.pick(90, 50, renderer=plotter.renderers[0]) is None
+    else:
+        assert left.pick(90, 50) is None
+        assert right.pick(30, 50) is None
 
 
-def test_the_picture_stays(no_leaks):
+def test_the_picture_stays(no_leaks, monkeypatch):
     scene = Scene().show()
-    before = scene.plotter.screenshot(return_img=True)
-    raycasts = scene.vdi.mapper.painter._raycasts
+    before, raycasts, render_vdi = screenshot(scene.plotter), [], painter_module.render_vdi
+    monkeypatch.setattr(
+        painter_module, "render_vdi", lambda *a: raycasts.append(1) or render_vdi(*a)
+    )
     for picker in (vtkPropPicker, vtkHardwarePicker):
         scene.under(*CENTRE, picker)
-        assert np.array_equal(scene.plotter.screenshot(return_img=True), before)
+        assert np.array_equal(screenshot(scene.plotter), before)
     assert scene.vdi.pick(*CENTRE) is not None
-    assert np.array_equal(scene.plotter.screenshot(return_img=True), before)
-    assert scene.vdi.mapper.painter._raycasts == raycasts  # the image is kept
-
-
-def test_copies_in_two_renderers_share_a_shader():
-    """One is picked while the other is drawn: each must find its own text in place."""
-    plotter = pv.Plotter(shape=(1, 2), window_size=WINDOW)
-    actor = plotter.add_vdi(slab())
-    plotter.camera_position = ((0, 0, 8), (0, 0, 0), (0, 1, 0))
-    plotter.subplot(0, 1)
-    twin = actor.copy(deep=False)
-    assert twin.GetShaderProperty() is actor.GetShaderProperty()
-    plotter.add_actor(twin)
-    plotter.camera_position = ((0, 0, -8), (0, 0, 0), (0, 1, 0))
-    plotter.show(auto_close=False)
-    before = plotter.screenshot(return_img=True)
-    for _ in range(2):
-        assert actor.pick(60, 100).position[2] == pytest.approx(0.5, abs=1e-12)
-        assert twin.pick(180, 100).position[2] == pytest.approx(-0.5, abs=1e-12)
-        assert np.array_equal(plotter.screenshot(return_img=True), before)
+    assert np.array_equal(screenshot(scene.plotter), before)
+    assert raycasts == []  # the image is kept
 
 
 def test_another_mapper_after_a_pick():
     scene = Scene(slab()).show()
-    before = scene.plotter.screenshot(return_img=True)
+    before = screenshot(scene.plotter)
     assert scene.vdi.pick(*CENTRE) is not None
     mapper = pvdi.VDIMapper()
     mapper.SetVDI(slab())
     scene.vdi.SetMapper(mapper)
-    assert np.array_equal(scene.plotter.screenshot(return_img=True), before)
+    assert np.array_equal(screenshot(scene.plotter), before)
 
 
-# -- PyVista and VTK ----------------------------------------------------------------------------
-
-
-def test_point_picking_in_a_plotter():
+def test_pyvistas_point_picking():
     scene = Scene(slab())
     points = []
     scene.plotter.enable_point_picking(
@@ -412,6 +350,8 @@ def test_point_picking_in_a_plotter():
     assert len(points) == 1
     assert points[0][2] == pytest.approx(0.5, abs=Z_BUFFER)
     assert scene.plotter.picked_point == pytest.approx(points[0])
+    scene.plotter.mouse_position = CENTRE
+    assert scene.plotter.pick_mouse_position()[2] == pytest.approx(0.5, abs=Z_BUFFER)
 
 
 def test_the_callback_can_ask_for_the_actor():
@@ -425,33 +365,24 @@ def test_the_callback_can_ask_for_the_actor():
         callback, picker="prop", use_picker=True, left_clicking=True, show_point=False
     )
     scene.show()
-    for place in (CENTRE, (5, 5)):
+    for place in (CENTRE, (2, 2)):
         scene.plotter.iren._mouse_left_button_press(*place)
         scene.plotter.iren._mouse_left_button_release(*place)
-    (on_it, hit), (beside_it, nothing) = found
+    (on_it, hit), beside = found
     assert on_it is scene.vdi
     assert hit.position[2] == pytest.approx(0.5, abs=1e-12)
-    assert beside_it is None
-    assert nothing is None
-
-
-def test_pick_mouse_position():
-    scene = Scene(slab()).show()
-    scene.plotter.iren.picker = "prop"
-    scene.plotter.mouse_position = CENTRE
-    assert scene.plotter.pick_mouse_position()[2] == pytest.approx(0.5, abs=Z_BUFFER)
+    assert beside == (None, None)
 
 
 def test_in_plain_vtk_and_before_the_first_frame():
     mapper, actor = pvdi.VDIMapper(), pvdi.VDIActor()
     mapper.SetVDI(slab())
     actor.SetMapper(mapper)
-    with pytest.raises(InvalidArgumentError, match="nothing shows this actor yet"):
-        actor.pick(1, 1)
     renderer, window = vtkRenderer(), vtkRenderWindow()
-    renderer.AddVolume(actor)
-    with pytest.raises(InvalidArgumentError, match="nothing shows this actor yet"):
-        actor.pick(1, 1)
+    for show in (lambda: None, lambda: renderer.AddVolume(actor)):
+        show()
+        with pytest.raises(InvalidArgumentError, match="nothing shows this actor yet"):
+            actor.pick(1, 1)
     window.SetOffScreenRendering(True)
     window.SetSize(*WINDOW)
     window.AddRenderer(renderer)
@@ -466,16 +397,7 @@ def test_in_plain_vtk_and_before_the_first_frame():
     window.Finalize()
 
 
-def test_an_impossible_threshold_is_refused():
-    mapper = pvdi.VDIMapper()
-    with pytest.raises(InvalidArgumentError, match="opacity_threshold must be at least 0"):
-        mapper.SetPickingOpacity(1)
-    assert mapper.GetPickingOpacity() == 0.05
-
-
 def test_what_fails_is_said_once_and_picks_nothing(monkeypatch):
-    from pyvista_vdi.vtk_pipeline.drawing import selection
-
     def fail(*args, **options):
         raise DeviceError("the device is gone")
 

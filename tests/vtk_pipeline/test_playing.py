@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-import time
 from itertools import pairwise
 
 import numpy as np
 import pytest
 import pyvista as pv
-from plugin_scenes import LOOKS, soft_ball, vdi_of_one_list
-from watched_windows import LONG, MOVING, WINDOW, frame, picture_of, small_vdi
+from plugin_scenes import CLASSIFICATION, soft_ball, vdi_of_one_list
+from watched_windows import (
+    MOVING,
+    WINDOW,
+    frame,
+    frames_until,
+    picture_of,
+    small_vdi,
+    threads,
+    turned,
+)
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, UnsupportedError, VDIWarning
@@ -19,52 +27,61 @@ N = 4
 SIZE = (60, 50)
 
 
-def _volume(k):
-    ball = soft_ball(12)
-    ball["v"] = np.roll(ball["v"].reshape(12, 12, 12), k, axis=2).ravel()
-    return ball
-
-
 @pytest.fixture(scope="module")
 def series(default_runtime):
-    looks = {name: value for name, value in LOOKS.items() if name != "show_scalar_bar"}
-    volumes = [_volume(k) for k in range(N)]
-    camera = filling_camera((-1, 1, -1, 1, -1, 1), SIZE)
-    return pvdi.generate_series(volumes, camera, SIZE, np.arange(N) / 4, **looks)
+    def volume(k):
+        ball = soft_ball(12)
+        ball["v"] = np.roll(ball["v"].reshape(12, 12, 12), k, axis=2).ravel()
+        return ball
+
+    camera, times = filling_camera((-1, 1, -1, 1, -1, 1), SIZE), np.arange(N) / 4
+    return pvdi.generate_series(
+        [volume(k) for k in range(N)], camera, SIZE, times, **CLASSIFICATION
+    )
 
 
-def _shown(plotter, series, **options):
+def shown(plotter, series, **options):
     actor = plotter.add_vdi(series, show_scalar_bar=False, regenerate="never", **options)
     actor.mapper.SetInteractiveOffScreen(True)
     plotter.show(auto_close=False)
     return actor
 
 
-def test_each_step_is_drawn_as_its_vdi(plotter, series):
-    actor = _shown(plotter, series)
+def test_each_step_is_drawn_as_its_vdi(plotter, series, tmp_path):
+    imageio = pytest.importorskip("imageio")
+    plotter.window_size = (112, 96)  # no movie's codec complains
+    actor = shown(plotter, series)
     assert (actor.series, actor.time, actor.vdi) == (series, 0.0, series[0])
+    plotter.open_gif(tmp_path / "m.gif")
     pictures = []
     for k, now in enumerate(series.times):
         actor.time = now + 0.1
         assert (actor.step, actor.time) == (k, now)
         pictures.append(frame(plotter))
         np.testing.assert_array_equal(pictures[-1], picture_of(series[k], plotter))
+        plotter.write_frame()
+    plotter.mwriter.close()
     assert all(np.abs(b - a).max() > 8 for a, b in pairwise(pictures))
+    movie = [np.asarray(each).astype(int)[..., :3] for each in imageio.mimread(tmp_path / "m.gif")]
+    for written, picture in zip(movie, pictures, strict=True):
+        # 256 colours of a picture that has more
+        assert np.abs(written - picture).mean() < 3
     actor.step = -2
     np.testing.assert_array_equal(frame(plotter), pictures[-2])
     assert f"time {series.times[-2]:g}" in str(actor.status)
 
 
 def test_it_plays_while_the_camera_turns(plotter, series):
-    actor = _shown(plotter, series)
+    actor = shown(plotter, series)
     actor.play(rate=200)
-    seen, end = set(), time.monotonic() + LONG
-    while len(seen) < N:
-        assert time.monotonic() < end, seen
+    seen = set()
+
+    def all_seen():
         plotter.camera.Azimuth(3)
-        picture = frame(plotter, MOVING)
         seen.add(actor.step)
-    assert picture.shape == (*WINDOW[::-1], 3)
+        return len(seen) == N
+
+    frames_until(plotter, all_seen, rate=MOVING)
     assert actor.playing
     actor.pause()
     step = actor.step
@@ -73,22 +90,16 @@ def test_it_plays_while_the_camera_turns(plotter, series):
     np.testing.assert_array_equal(rest, picture_of(series[step], plotter))
 
 
-def test_a_series_from_a_file(plotter, series, tmp_path):
-    series.save(tmp_path / "s.vdis")
-    actor = _shown(plotter, pvdi.read(tmp_path / "s.vdis"))
-    actor.step = 2
-    np.testing.assert_array_equal(frame(plotter), picture_of(series[2], plotter))
-
-
-def test_a_damaged_step_leaves_what_was_shown(plotter, series, tmp_path):
+def test_a_damaged_step_of_a_file_leaves_what_was_shown(plotter, series, tmp_path):
     path = series.save(tmp_path / "s.vdis")
     content = bytearray(path.read_bytes())
     places = [k for k in range(len(content)) if content[k : k + 4] == b"STEP"]
     content[places[2] + 60] ^= 255
     path.write_bytes(content)
-    actor = _shown(plotter, pvdi.read(path))
+    actor = shown(plotter, pvdi.read(path))
     actor.step = 1
     before = frame(plotter)
+    np.testing.assert_array_equal(before, picture_of(series[1], plotter))
     actor.step = 2
     with pytest.warns(VDIWarning, match="step 2"):
         np.testing.assert_array_equal(frame(plotter), before)
@@ -97,10 +108,9 @@ def test_a_damaged_step_leaves_what_was_shown(plotter, series, tmp_path):
 
 
 def test_a_step_is_made_anew_for_another_view(plotter, series):
-    actor = _shown(plotter, series)
+    actor = shown(plotter, series)
     actor.step = 1
-    plotter.camera.Azimuth(80)
-    frame(plotter)
+    turned(plotter, 80)
     assert actor.status.angle > 40
     vdi = actor.regenerate()
     assert vdi.window_size == WINDOW
@@ -114,9 +124,13 @@ def test_a_step_is_made_anew_for_another_view(plotter, series):
     assert actor.vdi is series[1]
 
 
-def test_another_series_keeps_the_time(plotter, series):
-    actor = _shown(plotter, series)
+def test_another_series_keeps_the_time_and_copies_play_by_themselves(plotter, series):
+    actor = shown(plotter, series)
     actor.time = 0.5
+    other = actor.copy()
+    assert other.step == 2
+    other.step = 0
+    assert actor.step == 2
     actor.series = series[1:]
     assert (actor.time, actor.step) == (0.5, 1)
     actor.vdi = series[0]
@@ -124,34 +138,8 @@ def test_another_series_keeps_the_time(plotter, series):
     assert not actor.playing
 
 
-def test_copies_play_by_themselves(plotter, series):
-    actor = _shown(plotter, series)
-    actor.step = 2
-    other = actor.copy()
-    assert other.step == 2
-    other.step = 0
-    assert actor.step == 2
-
-
-def test_a_movie_has_every_step(plotter, series, tmp_path):
-    imageio = pytest.importorskip("imageio")
-    plotter.window_size = (240, 200)
-    actor = _shown(plotter, series)
-    plotter.open_gif(tmp_path / "m.gif")
-    for now in series.times:
-        actor.time = now
-        plotter.write_frame()
-    plotter.mwriter.close()
-    frames = [np.asarray(each).astype(int) for each in imageio.mimread(tmp_path / "m.gif")]
-    assert len(frames) == N
-    for k, picture in enumerate(frames):
-        other = picture_of(series[k], plotter)
-        # 256 colours of a picture that has more
-        assert np.abs(picture[..., :3] - other).mean() < 3
-
-
 def test_a_slider_sets_the_time_and_follows_it(plotter, series):
-    actor = _shown(plotter, series)
+    actor = shown(plotter, series)
     slider = actor.add_time_slider(plotter, title="t / s")
     bar = slider.GetRepresentation()
     assert (bar.GetMinimumValue(), bar.GetMaximumValue(), bar.GetValue()) == (0.0, 0.75, 0.0)
@@ -159,10 +147,7 @@ def test_a_slider_sets_the_time_and_follows_it(plotter, series):
     slider.InvokeEvent("InteractionEvent")
     assert actor.time == 0.5
     actor.play(rate=200)
-    end = time.monotonic() + LONG
-    while actor.step == 2:
-        assert time.monotonic() < end
-        frame(plotter)
+    frames_until(plotter, lambda: actor.step != 2)
     assert bar.GetValue() == actor.time
 
 
@@ -177,7 +162,6 @@ def test_vtk_alone_shows_a_series(series):
     plotter.show(auto_close=False)
     actor.time = 0.75
     np.testing.assert_array_equal(frame(plotter), picture_of(series[3], plotter))
-    plotter.close()
 
 
 def test_what_has_no_times_is_refused(plotter, series):
@@ -187,28 +171,25 @@ def test_what_has_no_times_is_refused(plotter, series):
             use()
     assert actor.series is None
     assert not actor.playing
-    with pytest.raises(InvalidArgumentError, match="VDISeries"):
-        actor.mapper.SetSeries([1, 2])
-    with pytest.raises(UnsupportedError, match="cmap cannot be given with a VDI"):
-        plotter.add_vdi(series, cmap="bone")
-    with pytest.raises(InvalidVDIError):
-        actor.mapper.SetVDI([series])
-    files = pvdi.VDISeries.of([vdi_of_one_list()] * 2)
-    one = plotter.add_vdi(files[:1], show_scalar_bar=False)
-    with pytest.raises(InvalidArgumentError, match="one step"):
-        one.add_time_slider(plotter)
-    with pytest.raises(InvalidArgumentError, match="not at hand"):
-        one.regenerate()
+    one = plotter.add_vdi(pvdi.VDISeries.of([vdi_of_one_list()] * 2)[:1], show_scalar_bar=False)
+    for use, error, message in (
+        (lambda: actor.mapper.SetSeries([1, 2]), InvalidArgumentError, "VDISeries"),
+        (lambda: plotter.add_vdi(series, cmap="bone"), UnsupportedError, "cmap cannot be given"),
+        (lambda: actor.mapper.SetVDI([series]), InvalidVDIError, "list"),
+        (lambda: one.add_time_slider(plotter), InvalidArgumentError, "one step"),
+        (one.regenerate, InvalidArgumentError, "not at hand"),
+    ):
+        with pytest.raises(error, match=message):
+            use()
 
 
 def test_closing_while_it_plays_leaves_nothing(no_leaks, series):
     plotter = pv.Plotter(window_size=WINDOW)
-    actor = _shown(plotter, series)
+    actor = shown(plotter, series)
     actor.add_time_slider(plotter)
     actor.play()
     frame(plotter)
-    player = actor._player()
     plotter.close()
-    assert not player.playing
-    assert not player._worker.running
+    assert not actor.playing
+    assert not threads("series")
     del plotter, actor

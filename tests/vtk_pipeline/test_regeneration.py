@@ -9,26 +9,35 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import LOOKS, soft_ball
+from vtk_sources import ready_source
 from vtkmodules.vtkCommonDataModel import vtkPlane
 from watched_windows import (
     LONG,
     MOVING,
     WINDOW,
     coarse,
+    finish,
     frame,
+    frames,
     frames_until,
-    generation_threads,
     picture_of,
     small_vdi,
+    threads,
+    turned,
     watched,
 )
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import DeviceError, VDIWarning
 from pyvista_vdi.quality import background
-from pyvista_vdi.vtk_pipeline.interaction import estimation
+from pyvista_vdi.vtk_pipeline.interaction.estimation import Estimation
 
 pytestmark = pytest.mark.gl
+
+
+def beyond(degrees):
+    """A policy that wants a VDI of each view so far from the last one's."""
+    return lambda status: status.angle > degrees
 
 
 @pytest.mark.parametrize("stereo", [False, True])
@@ -39,8 +48,7 @@ def test_each_frame_shows_one_generation(plotter, gate, stereo):
         plotter.render_window.StereoRenderOn()
     actor = coarse(plotter, regenerate=lambda status: wanted[0])
     old = actor.vdi
-    plotter.camera.Azimuth(80)
-    before = frame(plotter)
+    before = turned(plotter, 80)
     wanted[0] = True
     pictures = [frame(plotter) for _ in range(3)]
     wanted[0] = False
@@ -55,31 +63,24 @@ def test_each_frame_shows_one_generation(plotter, gate, stereo):
     after = picture_of(actor.vdi, plotter)
     assert np.abs(after - before).max() > 8, "the two VDIs cannot be told apart"
     np.testing.assert_array_equal(picture_of(old, plotter), before)
-    kinds = [
-        "old"
-        if np.array_equal(picture, before)
-        else "new"
-        if np.array_equal(picture, after)
-        else "?"
-        for picture in pictures
-    ]
-    assert kinds == ["old"] * (len(kinds) - 1) + ["new"]
+    *earlier, last = pictures
+    assert all(np.array_equal(picture, before) for picture in earlier)
+    np.testing.assert_array_equal(last, after)
 
 
 def test_changed_property_and_data_are_made_behind_the_frames(plotter, gate):
     volume = soft_ball()
     actor = watched(plotter, volume)
     before, old = frame(plotter), actor.vdi
-    plotter.camera.Azimuth(30)
-    turned = frame(plotter)
+    aside = turned(plotter, 30)
     actor.mapper.lookup_table.cmap = "inferno"
-    assert np.abs(frame(plotter) - turned).max() > 40  # the volume stands in
+    assert np.abs(frame(plotter) - aside).max() > 40  # the volume stands in
     assert actor.status.progress == 0.0
     assert actor.vdi is old
     gate.set()
     frames_until(plotter, lambda: actor.vdi is not old)
     assert actor.vdi.camera.position == old.camera.position, "'never' keeps the view"
-    assert np.abs(frame(plotter) - turned).max() > 40
+    assert np.abs(frame(plotter) - aside).max() > 40
     new = actor.vdi
     volume["v"][:] = 0
     frames_until(plotter, lambda: actor.vdi is not new)
@@ -106,28 +107,36 @@ def test_changes_while_one_is_made_begin_another(plotter, gate):
     actor = watched(plotter)
     generations = actor.status.generation
     actor.mapper.lookup_table.cmap = "inferno"
-    frame(plotter)
-    first = actor.mapper.painter.upkeep.regeneration._background.key
-    frame(plotter)
-    assert actor.mapper.painter.upkeep.regeneration._background.key is first
+    frames_until(plotter, lambda: gate.begun == 1)
+    for _ in range(3):
+        frame(plotter)  # which begin none, or three would have begun in the end
     actor.mapper.lookup_table.cmap = "bone"
-    frame(plotter)
-    second = actor.mapper.painter.upkeep.regeneration._background.key
-    assert second != first
+    frames_until(plotter, lambda: gate.begun == 2)
     gate.set()
     frames_until(plotter, lambda: actor.status.generation > generations)
+    assert gate.begun == 2
     colors = pvdi.vtk_pipeline.transfer_function_from_property(actor.prop).colors
     assert actor.vdi.metadata["transfer_function"]["colors"] == colors.tolist()
     assert actor.status.generation == generations + 1, "the first was shown"
 
 
-def test_a_change_that_is_undone_is_given_up(plotter, gate):
+def test_what_goes_on_is_given_up_for_what_is_asked_for(plotter, gate):
+    """A change that is undone needs no VDI, and an explicit regeneration makes its own."""
     actor = watched(plotter)
     actor.prop.interpolation_type = "linear"
     frame(plotter)
     assert actor.status.progress == 0.0
     actor.prop.interpolation_type = "nearest"
     frame(plotter)
+    assert actor.status.progress is None
+    actor.prop.interpolation_type = "linear"
+    frame(plotter)
+    assert actor.status.progress == 0.0
+    plotter.camera.Azimuth(30)
+    vdi = actor.regenerate()
+    assert actor.status.progress is None
+    frame(plotter)
+    assert actor.vdi is vdi
     assert actor.status.progress is None
 
 
@@ -136,25 +145,22 @@ def test_auto_estimates_when_the_view_has_moved_and_regenerates_below_the_bound(
 ):
     actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
     old = actor.vdi
-    for _ in range(3):
-        frame(plotter)
+    frames(plotter, 3)
     assert no_estimates.asked == 0, "nothing has moved"
     no_estimates.ssim = 0.91
     plotter.camera.Azimuth(30)
     frames_until(plotter, lambda: actor.status.ssim is not None)
     assert actor.status.ssim == 0.91
-    for _ in range(3):
-        frame(plotter)
+    frames(plotter, 3)
     assert no_estimates.asked == 1
     assert actor.vdi is old
-    assert not actor.mapper.painter.upkeep.regeneration.busy
+    assert (actor.status.progress, threads("estimate")) == (None, [])
     no_estimates.ssim = 0.89
     plotter.camera.Azimuth(5)
     frames_until(plotter, lambda: actor.vdi is not old)
     assert actor.status.ssim is None, "nothing is known of the new one"
     asked, new = no_estimates.asked, actor.vdi
-    for _ in range(3):
-        frame(plotter)
+    frames(plotter, 3)
     assert no_estimates.asked == asked
     assert actor.vdi is new, "a VDI of this very view would be the same again"
 
@@ -171,8 +177,7 @@ def test_the_estimate_is_of_the_picture_that_is_shown(plotter, no_estimates):
     actor.mapper.SetCroppingRegionPlanes(planes)
     actor.mapper.SetCroppingRegionFlagsToFence()
     actor.opacity_multiplier = 0.5
-    for _ in range(3):
-        frame(plotter)
+    frames(plotter, 3)
     assert no_estimates.asked == 0, "these changes need no new VDI"
     plotter.camera.Azimuth(30)
     frames_until(plotter, lambda: actor.status.ssim is not None)
@@ -186,8 +191,7 @@ def test_the_estimate_is_of_the_picture_that_is_shown(plotter, no_estimates):
     assert (row[:3] - (0.1, 0.2, 0.3)) @ (0.6, 0, 0.8) == pytest.approx(0, abs=1e-9)
     actor.opacity_multiplier = 0.8
     actor.mapper.CroppingOff()
-    for _ in range(3):
-        frame(plotter)
+    frames(plotter, 3)
     assert no_estimates.asked == 1
     assert actor.vdi is old
 
@@ -196,18 +200,16 @@ def test_an_estimate_that_ends_between_two_looks_is_not_asked_for_again(
     plotter, no_estimates, monkeypatch
 ):
     actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
-    take, missed = estimation.Estimation.take, []
+    take, missed = Estimation.take, []
 
-    def too_early(self):
-        job = self._worker.job
-        if job is None or missed:
-            return take(self)
-        self._worker.join()  # it ends right after this look
-        assert not self._worker.running
-        missed.append(job)
+    def too_early(estimation):
+        if missed or not estimation.running:
+            return take(estimation)
+        finish("estimate")  # it ends right after this look
+        missed.append(estimation)
         return None
 
-    monkeypatch.setattr(estimation.Estimation, "take", too_early)
+    monkeypatch.setattr(Estimation, "take", too_early)
     plotter.camera.Azimuth(30)
     frames_until(plotter, lambda: actor.status.ssim is not None)
     assert len(missed) == 1
@@ -218,10 +220,7 @@ def test_auto_bears_more_while_the_view_moves(plotter, no_estimates, gate):
     actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
     no_estimates.ssim = 0.85
     plotter.camera.Azimuth(30)
-    end = time.monotonic() + LONG
-    while actor.status.ssim is None:
-        frame(plotter, MOVING)
-        assert time.monotonic() < end
+    frames_until(plotter, lambda: actor.status.ssim is not None, rate=MOVING)
     frame(plotter, MOVING)
     assert actor.status.progress is None
     frame(plotter)
@@ -236,29 +235,35 @@ def test_auto_with_the_real_estimate(plotter):
     np.testing.assert_array_equal(frame(plotter), picture_of(actor.vdi, plotter))
 
 
+def test_estimates_know_of_ambient_occlusion():
+    """What is judged is the occluded VDI; so is then what it is judged by."""
+    source = ready_source(AmbientOcclusion=pvdi.AmbientOcclusion(0.5, strength=1.0))
+    vdi, request, estimation = source.GetVDI(), source.GetCurrentRequest(), Estimation()
+    estimation.start(vdi, request, request.screen)
+    finish("estimate")
+    assert estimation.take().error.ssim > 0.9999
+    estimation.close()
+
+
 def test_what_is_made_for_a_view_that_was_left_is_given_up(plotter, gate):
     asked = [True]
     actor = coarse(plotter, regenerate=lambda status: asked.pop() if asked else False)
-    plotter.camera.Azimuth(60)
-    frame(plotter)
+    turned(plotter, 60)
     assert actor.status.progress == 0.0
-    plotter.camera.Azimuth(10)
-    frame(plotter)
+    turned(plotter, 10)
     assert actor.status.progress == 0.0, "still nearer to it than to the old"
-    plotter.camera.Azimuth(-65)
-    frame(plotter)
+    turned(plotter, -65)
     assert actor.status.progress is None, "the view has come back"
     gate.set()
-    for _ in range(3):
-        frame(plotter)
+    finish()
+    frames(plotter, 3)
     assert actor.status.generation == 1
 
 
 def test_callable_gets_the_status_of_the_frames_view(plotter):
     seen = []
     actor = watched(plotter, regenerate=lambda status: seen.append(status))
-    plotter.camera.Azimuth(25)
-    frame(plotter)
+    turned(plotter, 25)
     assert seen[-1].angle == pytest.approx(25)
     assert seen[-1].vdi is actor.vdi
     before = len(seen)
@@ -267,28 +272,20 @@ def test_callable_gets_the_status_of_the_frames_view(plotter):
     assert actor.status.generation == 1
 
 
-def test_callable_off_screen_is_asked_and_answered_in_step(plotter):
-    actor = plotter.add_vdi(soft_ball(), regenerate=lambda status: status.angle > 20, **LOOKS)
+def test_off_screen_frames_wait_for_their_vdi_and_nothing_is_estimated(plotter, no_estimates):
+    actor = plotter.add_vdi(soft_ball(), regenerate=beyond(20), **LOOKS)
     plotter.show(auto_close=False)
     old = actor.vdi
-    plotter.camera.Azimuth(15)
-    frame(plotter)
+    turned(plotter, 15)
     assert actor.vdi is old
-    plotter.camera.Azimuth(15)
-    frame(plotter)
+    turned(plotter, 15)
     assert actor.vdi is not old
     assert actor.status.angle < 1e-6
-    assert not generation_threads()
-
-
-def test_off_screen_auto_starts_nothing(plotter, no_estimates):
-    actor = plotter.add_vdi(soft_ball(), regenerate="auto", **LOOKS)
-    plotter.show(auto_close=False)
     old = actor.vdi
+    actor.mapper.SetRegenerate("auto")
     for _ in range(3):
-        plotter.camera.Azimuth(40)
-        frame(plotter)
-        assert not generation_threads()
+        turned(plotter, 40)
+        assert not threads()
     assert (actor.vdi is old, no_estimates.asked) == (True, 0)
     actor.prop.interpolation_type = "linear"
     frame(plotter)
@@ -306,18 +303,16 @@ def test_a_vdi_drawn_in_two_views_belongs_to_neither(no_estimates):
     no_estimates.ssim = 0.1
     old = actor.vdi
     for _ in range(5):
-        plotter.camera.Azimuth(20)
-        frame(plotter)
+        turned(plotter, 20)
     assert (actor.vdi is old, no_estimates.asked) == (True, 0)
     actor.prop.interpolation_type = "linear"
     frame(plotter)
     assert actor.vdi is not old, "changed data are made in step"
-    plotter.close()
 
 
-def test_copies_share_a_source_and_keep_the_settings(plotter, no_estimates):
+def test_shallow_copies_share_a_source_and_keep_the_settings(plotter, no_estimates):
     actor = watched(plotter, regenerate="auto", regenerate_below=0.8)
-    copy = actor.copy()
+    copy = actor.copy(deep=False)
     assert copy.mapper.GetInteractiveOffScreen()
     assert copy.mapper.GetTargetFrameRate() == 30
     assert copy.mapper.GetRegenerateBelow() == 0.8
@@ -325,26 +320,15 @@ def test_copies_share_a_source_and_keep_the_settings(plotter, no_estimates):
     no_estimates.ssim = 0.1
     old = actor.vdi
     plotter.camera.Azimuth(20)
-    for _ in range(5):
-        frame(plotter)
+    for work in ("estimate", "generation", "generation"):
+        frames(plotter, 3)
+        finish(work)
+    frames(plotter, 3)
     assert (actor.vdi is old, copy.vdi is old) == (True, True)
 
 
-def test_explicit_regeneration_gives_up_what_goes_on(plotter, gate):
-    actor = watched(plotter)
-    actor.prop.interpolation_type = "linear"
-    frame(plotter)
-    assert actor.status.progress == 0.0
-    plotter.camera.Azimuth(30)
-    vdi = actor.regenerate()
-    assert actor.status.progress is None
-    frame(plotter)
-    assert actor.vdi is vdi
-    assert actor.status.progress is None
-
-
 def test_what_fails_is_said_once_and_not_repeated(plotter, monkeypatch):
-    actor = watched(plotter, regenerate=lambda status: status.angle > 10)
+    actor = watched(plotter, regenerate=beyond(10))
     tries = []
 
     def failing(*_, **__):
@@ -354,11 +338,12 @@ def test_what_fails_is_said_once_and_not_repeated(plotter, monkeypatch):
     monkeypatch.setattr(background, "generate_by_dial", failing)
     plotter.camera.Azimuth(40)
     before = actor.vdi
-    with pytest.warns(VDIWarning, match="cannot be made anew: DeviceError: no more"):
-        frames_until(plotter, lambda: actor.mapper.painter.upkeep.regeneration._failed)
+    with pytest.warns(VDIWarning, match="cannot be made anew: DeviceError: no more") as said:
+        frames_until(plotter, lambda: said)
     for _ in range(5):
         frame(plotter)
         time.sleep(0.01)
+    finish()
     assert len(tries) == 1
     assert actor.vdi is before
     monkeypatch.undo()
@@ -374,9 +359,6 @@ def test_what_cannot_be_made_any_more_is_said_and_the_old_stays(plotter):
     with pytest.warns(VDIWarning, match="cannot be made anew: UnsupportedError: .*2D transfer"):
         frame(plotter)
     np.testing.assert_array_equal(frame(plotter), before)
-
-
-# -- without the volume ----------------------------------------------------------------------------
 
 
 def test_a_vdi_without_its_volume_says_once_that_the_view_is_far(plotter):
@@ -399,81 +381,40 @@ def test_a_vdi_without_its_volume_says_once_that_the_view_is_far(plotter):
     plotter.render()
 
 
-# -- the end ---------------------------------------------------------------------------------------
+def in_the_middle():
+    """A plotter for which a VDI is being made."""
+    plotter = pv.Plotter(window_size=WINDOW)
+    actor = watched(plotter, regenerate=beyond(10), status=True)
+    turned(plotter, 30)
+    assert actor.status.progress == 0.0
+    assert len(threads()) == 1
+    return plotter
 
 
 def test_closing_in_the_middle_leaves_no_thread(gate):
-    plotter = pv.Plotter(window_size=WINDOW)
-    actor = watched(plotter, regenerate=lambda status: status.angle > 10, status=True)
-    plotter.camera.Azimuth(30)
-    frame(plotter)
-    assert actor.status.progress == 0.0
-    assert len(generation_threads()) == 1
+    plotter = in_the_middle()
     plotter.close()
-    assert not generation_threads()
+    assert not threads()
 
 
 def test_forgetting_a_scene_in_the_middle_leaves_no_thread(gate, no_leaks):
     def scene():
-        plotter = pv.Plotter(window_size=WINDOW)
-        watched(plotter, regenerate=lambda status: status.angle > 10, status=True)
-        plotter.camera.Azimuth(30)
-        frame(plotter)
-        assert len(generation_threads()) == 1
+        plotter = in_the_middle()
         plotter.clear()
         plotter.close()
 
     scene()
     gc.collect()
     end = time.monotonic() + LONG
-    while generation_threads():
+    while threads():
         assert time.monotonic() < end
         time.sleep(0.01)
 
 
 def test_no_leaks_of_a_watched_scene(no_leaks):
     plotter = pv.Plotter(window_size=WINDOW)
-    actor = watched(plotter, regenerate=lambda status: status.angle > 10, status=True)
-    plotter.camera.Azimuth(30)
-    frame(plotter, MOVING)
+    actor = watched(plotter, regenerate=beyond(10), status=True)
+    turned(plotter, 30, MOVING)
     frames_until(plotter, lambda: actor.status.generation == 2)
     plotter.screenshot()
     plotter.close()
-
-
-def resident():
-    with open("/proc/self/statm") as file:  # noqa: PTH123 - not a file that pathlib knows more of
-        return int(file.read().split()[1]) * 4096
-
-
-def regenerate_repeatedly(times):
-    """Regenerate in the background again and again; bytes of memory per round, after the first."""
-    plotter = pv.Plotter(window_size=(120, 100))
-    actor = watched(plotter, soft_ball(16), regenerate=lambda status: status.angle > 10)
-    start, runtime = None, pvdi.device.get_runtime()
-    before = runtime.allocated
-    for number in range(times):
-        if number == times // 4:  # caches of drivers and allocators are warm
-            gc.collect()
-            start = resident()
-        plotter.camera.Azimuth(30)
-        frames_until(plotter, lambda number=number: actor.status.generation == number + 2)
-    gc.collect()
-    grown = resident() - start
-    allocated, size = runtime.allocated - before, actor.vdi.nbytes
-    plotter.camera.Azimuth(30)
-    frame(plotter)  # in the middle of another
-    plotter.close()
-    assert not generation_threads()
-    return grown / (times - times // 4), size, allocated
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("times", [12, pytest.param(200, marks=pytest.mark.slow)])
-def test_regenerating_does_not_take_more_and_more_memory(times):
-    grown, size, allocated = regenerate_repeatedly(times)
-    # A generation that was kept would show as its whole size, on the device as well: there are
-    # the volume, the VDI that is shown and buffers of the frame
-    assert allocated < 4 * size
-    if times >= 200:
-        assert grown < 0.25 * size

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import pyvista as pv
-from plugin_scenes import LOOKS, add_judge, soft_ball
+from plugin_scenes import CLASSIFICATION, LOOKS, add_judge, soft_ball
 from skimage.metrics import structural_similarity
 from vtkmodules.vtkCommonDataModel import vtkPlane
 from vtkmodules.vtkRenderingCore import vtkPropPicker
-from watched_windows import WINDOW, frame, frames_until, picture_of, watched
+from watched_windows import WINDOW, finish, frame, frames_until, picture_of, watched
 
 from pyvista_vdi.device import programs
 from pyvista_vdi.errors import DeviceMemoryError
@@ -23,32 +23,37 @@ def shot(plotter):
     return np.asarray(plotter.screenshot(return_img=True)).astype(int)
 
 
-def in_step(volume, plotter, **options):
-    """What another plotter, which makes VDIs in step, shows of a volume from this one's view."""
-    other = pv.Plotter(window_size=WINDOW)
-    other.add_vdi(volume, **{**LOOKS, **options})
-    other.camera = plotter.camera.copy()
-    other.show(auto_close=False)
-    picture = shot(other)
-    other.close()
-    return picture
+def alike(one, other):
+    return structural_similarity(one, other, channel_axis=2, data_range=255)
 
 
 def test_changes_faster_than_vdis_are_all_shown(plotter, gate, coarsest):
     volume = soft_ball()
     values = volume["v"].copy()
     actor = watched(plotter, volume)
+    before = frame(plotter)
+    actor.prop.interpolation_type = "linear"
+    frame(plotter)
+    assert actor.status.stand_in
+    actor.prop.interpolation_type = "nearest"  # undone: the old VDI is back
+    np.testing.assert_array_equal(frame(plotter), before)
+    assert (actor.status.stand_in, actor.status.generation) == (False, 1)
     old = actor.vdi
     for scale in (0.8, 0.5, 0.9):
         volume["v"][:] = scale * values
         coarse = frame(plotter)
         assert actor.status.mode == "preview"
         assert actor.status.stand_in
-        full = in_step(volume, plotter)
+        full = picture_of(volume, plotter, **CLASSIFICATION)
         # A sixteenth of the pixels, interpolated; the other steps are at .8 and less
-        assert structural_similarity(coarse, full, channel_axis=2, data_range=255) > 0.97
+        assert alike(coarse, full) > 0.97
         assert np.abs(shot(plotter) - full).max() <= 2  # rounding of supersegments and volume
         assert actor.status.mode == "full"
+    large = np.asarray(plotter.screenshot(return_img=True, scale=2)).astype(int)
+    assert actor.status.stand_in
+    assert large.shape[:2] == (2 * WINDOW[1], 2 * WINDOW[0])
+    small = large.reshape(WINDOW[1], 2, WINDOW[0], 2, 3).mean(axis=(1, 3))
+    assert alike(small, full) > 0.99
     assert actor.vdi is old
     assert actor.status.generation == 1
     gate.set()
@@ -77,39 +82,14 @@ def test_a_stand_in_is_vtks_picture_of_the_volume(plotter, gate):
     judge.add_mesh(pv.Sphere(radius=0.5, center=(0.6, 0.3, 0.2)), color="red")
     judge.camera = plotter.camera.copy()
     judge.show(auto_close=False)
-    assert structural_similarity(picture, shot(judge), channel_axis=2, data_range=255) > 0.98
-    judge.close()
-
-
-def test_a_change_undone_brings_the_old_vdi_back(plotter, gate):
-    actor = watched(plotter)
-    before = frame(plotter)
-    actor.prop.interpolation_type = "linear"
-    frame(plotter)
-    assert actor.status.stand_in
-    actor.prop.interpolation_type = "nearest"
-    np.testing.assert_array_equal(frame(plotter), before)
-    assert (actor.status.stand_in, actor.status.generation) == (False, 1)
-
-
-def test_a_screenshot_in_tiles_shows_what_was_set(plotter, gate):
-    volume = soft_ball()
-    actor = watched(plotter, volume)
-    volume["v"][:] *= 0.5
-    large = np.asarray(plotter.screenshot(return_img=True, scale=2)).astype(int)
-    assert actor.status.stand_in
-    assert large.shape[:2] == (2 * WINDOW[1], 2 * WINDOW[0])
-    small = large.reshape(WINDOW[1], 2, WINDOW[0], 2, 3).mean(axis=(1, 3))
-    full = in_step(volume, plotter)
-    assert structural_similarity(small, full, channel_axis=2, data_range=255) > 0.99
+    assert alike(picture, shot(judge)) > 0.98
 
 
 def test_a_neighbour_that_overlaps_is_drawn_as_well(plotter, gate):
     moved = soft_ball()
     moved.origin = (-1, 0, -1)
     watched(plotter, moved)
-    volume = soft_ball()
-    actor = plotter.add_vdi(volume, regenerate="never", **LOOKS)
+    actor = plotter.add_vdi(soft_ball(), regenerate="never", **LOOKS)
     actor.mapper.SetInteractiveOffScreen(True)
     before = frame(plotter)
     actor.mapper.lookup_table.cmap = "inferno"
@@ -151,7 +131,7 @@ def test_the_first_change_waits_for_no_compiler(plotter, gate, monkeypatch):
     volume = soft_ball()
     volume["v"] = (volume["v"] / 2).astype(np.int8)  # which no other test here has had compiled
     actor = watched(plotter, volume)
-    actor.mapper.painter.upkeep._preparation.join()
+    finish("stand-in")
     monkeypatch.setattr(programs, "build", None)
     volume["v"][:] //= 2
     frame(plotter)

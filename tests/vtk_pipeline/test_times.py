@@ -7,13 +7,13 @@ import pytest
 import pyvista as pv
 from plugin_scenes import soft_ball
 from strategies import random_vdi
+from vtk_sources import executions, ready_source, some_property
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkFiltersGeneral import vtkMultiBlockDataGroupFilter
 from vtkmodules.vtkFiltersHybrid import vtkTemporalInterpolator
 from vtkmodules.vtkImagingCore import vtkExtractVOI, vtkRTAnalyticSource
-from vtkmodules.vtkRenderingCore import vtkVolumeProperty
 from watched_windows import frame, frames_until
 
 import pyvista_vdi as pvdi
@@ -55,24 +55,29 @@ def time_of(image):
     return information.Get(key) if information.Has(key) else None
 
 
-# -- the reader ------------------------------------------------------------------------------------
-
-
-def test_the_reader_gives_the_step_nearest_to_the_time(path):
-    series, reader = pvdi.read(path), reader_of(path)
-    assert announced(reader) == (TIMES, (0.5, 4.0))
+def test_the_reader_gives_the_step_nearest_to_the_time_down_the_pipeline(path):
+    """Each asks what is before it for its time: filters of VTK's, ours, and a mapper."""
+    series, reader, mapper = pvdi.read(path), reader_of(path), pvdi.VDIMapper()
+    voi, picture = vtkExtractVOI(), VDIToImage()
+    for each in (voi, picture, mapper):
+        each.SetInputConnection(reader.GetOutputPort())
+    assert announced(reader) == announced(voi) == announced(picture) == (TIMES, (0.5, 4.0))
     reader.Update()
     assert vdi_from_image(reader.GetOutputDataObject(0)).equals(series[0])
+    assert mapper.GetVDI().equals(series[0])
     for time, step in ASKED:
         reader.UpdateTimeStep(time)
         image = reader.GetOutputDataObject(0)
         assert vdi_from_image(image).equals(series[step])
-        assert time_of(image) == TIMES[step]
+        assert mapper.GetVDI().equals(series[step])
+        picture.UpdateTimeStep(time)
+        assert time_of(image) == time_of(picture.GetOutputDataObject(0)) == TIMES[step]
+        assert picture.GetOutputDataObject(0).GetDimensions()[:2] == series[step].picture_size
 
 
 def test_a_step_is_read_once(path):
-    executed, reader = [], reader_of(path)
-    reader.AddObserver("StartEvent", lambda *_: executed.append(1))
+    reader = reader_of(path)
+    executed = executions(reader)
     for time, n in ((3.0, 1), (3.0, 1), (0.5, 2), (3.0, 3)):
         reader.UpdateTimeStep(time)
         reader.Update()
@@ -80,28 +85,6 @@ def test_a_step_is_read_once(path):
     opened = reader.GetSeries()
     reader.UpdateTimeStep(1.0)
     assert reader.GetSeries() is opened
-
-
-def test_times_go_down_the_pipeline(path):
-    """Through a filter of VTK's, and one of ours; each asks what is before it for its time."""
-    series, reader, voi, picture = pvdi.read(path), reader_of(path), vtkExtractVOI(), VDIToImage()
-    voi.SetInputConnection(reader.GetOutputPort())
-    picture.SetInputConnection(reader.GetOutputPort())
-    assert announced(voi) == announced(picture) == (TIMES, (0.5, 4.0))
-    for time, step in ASKED:
-        picture.UpdateTimeStep(time)
-        image = picture.GetOutputDataObject(0)
-        assert time_of(image) == TIMES[step]
-        assert image.GetDimensions()[:2] == series[step].picture_size
-
-
-def test_a_mapper_draws_the_step_that_was_asked_for(path):
-    series, reader, mapper = pvdi.read(path), reader_of(path), pvdi.VDIMapper()
-    mapper.SetInputConnection(reader.GetOutputPort())
-    assert mapper.GetVDI().equals(series[0])
-    for time, step in ASKED:
-        reader.UpdateTimeStep(time)
-        assert mapper.GetVDI().equals(series[step])
 
 
 def test_a_series_grows_while_it_is_read(path, tmp_path):
@@ -150,9 +133,8 @@ def test_what_is_wrong_with_a_series_is_said(path):
     assert time_of(reader.GetOutputDataObject(0)) == 4.0
 
 
-# -- volumes ---------------------------------------------------------------------------------------
-
 SIZE = (24, 18)
+CAMERA = pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1), view_angle=25)
 
 
 class Moving(VTKPythonAlgorithmBase):
@@ -189,37 +171,18 @@ def ball_at(step):
     return ball
 
 
-def some_property():
-    prop = vtkVolumeProperty()
-    prop.GetRGBTransferFunction().AddRGBPoint(0, 0, 0.2, 1)
-    prop.GetRGBTransferFunction().AddRGBPoint(255, 1, 0.5, 0)
-    prop.GetScalarOpacity().AddPoint(0, 0)
-    prop.GetScalarOpacity().AddPoint(255, 0.8)
-    prop.SetScalarOpacityUnitDistance(0.3)
-    prop.SetInterpolationTypeToLinear()
-    return prop
-
-
-def some_camera():
-    return pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1), view_angle=25)
+def made_of(volume, camera=CAMERA, size=SIZE):
+    return pvdi.generate(volume, camera, size, volume_property=some_property())
 
 
 def source_of(producer):
-    source = pvdi.VDISource()
-    source.SetInputConnection(producer.GetOutputPort())
-    source.SetVolumeProperty(some_property())
-    source.SetCamera(some_camera())
-    source.SetWindowSize(*SIZE)
-    return source
+    return ready_source(producer, CAMERA, WindowSize=SIZE)
 
 
 @pytest.fixture(scope="module")
 def vdis(default_runtime):
     """What generate makes of each step."""
-    made = [
-        pvdi.generate(ball_at(step), some_camera(), SIZE, volume_property=some_property())
-        for step in range(3)
-    ]
+    made = [made_of(ball_at(step)) for step in range(3)]
     assert made[0].n_supersegments > 200
     assert not made[0].equals(made[1])
     assert not made[1].equals(made[2])
@@ -250,8 +213,7 @@ def test_a_source_behind_what_interpolates_in_time(default_runtime):
     half = ball_at(0)
     half["v"] = (balls[0]["v"] + balls[1]["v"]) / 2
     np.testing.assert_allclose(source.GetVolume().array.ravel(), half["v"], rtol=1e-12)
-    expected = pvdi.generate(half, some_camera(), SIZE, volume_property=some_property())
-    assert source.GetVDI().equals(expected)
+    assert source.GetVDI().equals(made_of(half))
 
 
 def test_each_source_keeps_its_time_whatever_others_ask_for(vdis):
@@ -289,33 +251,34 @@ def test_extents_follow_a_volume_that_grows(default_runtime):
     assert seen[0] < seen[1] < seen[2]
 
 
-@pytest.mark.gl
-def test_a_mapper_draws_the_time_that_is_asked_of_the_source_or_before_it(vdis):
+@pytest.fixture
+def drawn():
+    """A producer, the source behind it, and the plotter and the actor that draw its VDI."""
     producer = Moving()
     source, mapper, actor = source_of(producer), pvdi.VDIMapper(), pvdi.VDIActor()
     mapper.SetInputConnection(source.GetOutputPort())
+    mapper.SetDraw("vdi")
     actor.SetMapper(mapper)
     plotter = pv.Plotter(off_screen=True, window_size=SIZE)
     plotter.renderer.AddVolume(actor)
+    return producer, source, plotter, actor
+
+
+@pytest.mark.gl
+def test_a_mapper_draws_the_time_that_is_asked_of_the_source_or_before_it(vdis, drawn):
+    producer, source, plotter, actor = drawn
     plotter.show(auto_close=False)
     for asked in (producer, source):
         for time, step in ASKED[:3]:
             asked.UpdateTimeStep(time)
             plotter.render()
-            assert mapper.GetVDI().equals(vdis[step])
-    plotter.close()
+            assert actor.vdi.equals(vdis[step])
 
 
 @pytest.mark.gl
-def test_in_a_watched_window_the_volume_is_drawn_until_its_vdi_is_there(gate):
-    producer = Moving()
-    source, mapper, actor = source_of(producer), pvdi.VDIMapper(), pvdi.VDIActor()
-    mapper.SetInputConnection(source.GetOutputPort())
-    mapper.SetInteractiveOffScreen(True)
-    mapper.SetDraw("vdi")
-    actor.SetMapper(mapper)
-    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
-    plotter.renderer.AddVolume(actor)
+def test_in_a_watched_window_the_volume_is_drawn_until_its_vdi_is_there(gate, drawn):
+    producer, source, plotter, actor = drawn
+    actor.GetMapper().SetInteractiveOffScreen(True)
     plotter.show(auto_close=False)
     asked = vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
     for generation, (algorithm, step) in enumerate(((producer, 2), (producer, 1), (source, 0)), 2):
@@ -327,12 +290,7 @@ def test_in_a_watched_window_the_volume_is_drawn_until_its_vdi_is_there(gate):
         gate.set()
         frames_until(plotter, lambda: not actor.status.stand_in)
         assert actor.status.generation == generation
-        made = mapper.GetVDI()
-        expected = pvdi.generate(
-            ball_at(step), made.camera, made.window_size, volume_property=some_property()
-        )
-        assert made.equals(expected)
-    plotter.close()
+        assert actor.vdi.equals(made_of(ball_at(step), actor.vdi.camera, actor.vdi.window_size))
 
 
 def test_the_writer_writes_all_times(vdis, tmp_path):
@@ -351,16 +309,11 @@ def test_the_writer_writes_all_times(vdis, tmp_path):
     assert len(pvdi.read(tmp_path / "made.vdis")) == 3
 
 
-# -- sources for generate_series -------------------------------------------------------------------
-
-
 def test_a_series_of_a_source_with_times(vdis):
     """Each step is read when its turn comes, and again when it is asked for again."""
     producer = Moving()
     prop = some_property()
-    series = pvdi.generate_series(
-        producer, some_camera(), SIZE, volume_property=prop, precision="exact"
-    )
+    series = pvdi.generate_series(producer, CAMERA, SIZE, volume_property=prop, precision="exact")
     assert producer.read == [0, 1, 2]
     assert series.times == TIMES
     for step in range(3):
@@ -383,13 +336,8 @@ def test_a_series_of_pyvistas_readers(vdis, tmp_path):
         '<?xml version="1.0"?><VTKFile type="Collection" version="0.1"><Collection>'
         f"{''.join(entries)}</Collection></VTKFile>"
     )
-    series = pvdi.generate_series(
-        pv.get_reader(tmp_path / "a.pvd"),
-        some_camera(),
-        SIZE,
-        volume_property=some_property(),
-        precision="exact",
-    )
+    reader, looks = pv.get_reader(tmp_path / "a.pvd"), {"volume_property": some_property()}
+    series = pvdi.generate_series(reader, CAMERA, SIZE, **looks, precision="exact")
     assert series.times == TIMES
     assert all(series[step].equals(vdis[step]) for step in range(3))
     assert series.volumes[1].origin == ball_at(1).origin
@@ -397,7 +345,7 @@ def test_a_series_of_pyvistas_readers(vdis, tmp_path):
 
 def test_what_cannot_be_a_series_is_refused():
     with pytest.raises(InvalidArgumentError, match="vtkRTAnalyticSource announces no time steps"):
-        pvdi.generate_series(vtkRTAnalyticSource(), some_camera(), SIZE)
+        pvdi.generate_series(vtkRTAnalyticSource(), CAMERA, SIZE)
     two_blocks = Moving()
     blocks, times = steps_and_times(two_blocks)
     assert (len(blocks), times) == (3, TIMES)
@@ -406,4 +354,4 @@ def test_what_cannot_be_a_series_is_refused():
     group.AddInputConnection(two_blocks.GetOutputPort())
     group.AddInputConnection(two_blocks.GetOutputPort())
     with pytest.raises(UnsupportedError, match="MultiBlock"):
-        pvdi.generate_series(group, some_camera(), SIZE)
+        pvdi.generate_series(group, CAMERA, SIZE)
