@@ -181,8 +181,9 @@ def add_volume_property(volume: Volume, arguments: Mapping[str, Any]) -> Any:
 
 
 def _make_mapper(name: str) -> Any:
+    opengl = _vtk("vtkRenderingVolumeOpenGL2")  # without it the other mapper crashes, too
     if name == "gpu":
-        mapper = _vtk("vtkRenderingVolumeOpenGL2").vtkOpenGLGPUVolumeRayCastMapper()
+        mapper = opengl.vtkOpenGLGPUVolumeRayCastMapper()
         mapper.SetUseJittering(False)
     else:
         mapper = _vtk("vtkRenderingVolume").vtkFixedPointVolumeRayCastMapper()

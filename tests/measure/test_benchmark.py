@@ -14,7 +14,7 @@ from measured import SCHEMA, checked, made_up_results
 
 from pyvista_vdi import cli, examples
 from pyvista_vdi.cli import parser
-from pyvista_vdi.errors import DeviceMemoryError
+from pyvista_vdi.errors import DeviceError, DeviceMemoryError
 from pyvista_vdi.measure.compare.bounds import SSIM_TO_VTK
 from pyvista_vdi.measure.paper import (
     PROFILES,
@@ -28,6 +28,7 @@ from pyvista_vdi.measure.paper import (
 )
 from pyvista_vdi.measure.paper.procedural import PROCEDURAL, make
 from pyvista_vdi.measure.paper.published import paper_tables, paper_targets
+from pyvista_vdi.measure.paper.report import write_plot
 from pyvista_vdi.measure.results import Results
 
 #: 32 x 32 x 25 voxels, uint8.
@@ -148,15 +149,26 @@ def test_a_volume_beyond_the_host_is_refused_by_name(monkeypatch):
 
 
 @pytest.mark.gl
-def test_vtk_is_left_out_by_name_where_memory_is_short(default_runtime, tmp_path, monkeypatch):
-    # Enough for the volume of 25 KiB and the working memory, and not for two copies of another
-    free = iter([2**40] + [2**10] * 100)
-    monkeypatch.setattr("pyvista_vdi.model.host_memory.free_memory", lambda: next(free))
+@pytest.mark.parametrize("why", ["needs 0.00 GiB on the host", "drew nothing"])
+def test_vtk_is_left_out_by_name(why, default_runtime, tmp_path, monkeypatch):
+    from pyvista_vdi.measure.vtk_baselines import VTKBaseline
+
+    def blank(*_):
+        raise DeviceError(why)
+
+    if why == "drew nothing":
+        monkeypatch.setattr(VTKBaseline, "image", blank)
+    else:
+        # Enough for the volume of 25 KiB and the working memory, and not for two copies of another
+        free = iter([2**40] + [2**10] * 100)
+        monkeypatch.setattr("pyvista_vdi.model.host_memory.free_memory", lambda: next(free))
     out = tmp_path / "a.json"
     assert benchmark(*TINY_RUN, "--angles", "5", "--tables", "1", "--out", out) == 0
     (row,) = checked(out).rows(what="view")
     assert list(row["left_out"]) == ["vtk_gpu"]
-    assert "needs 0.00 GiB on the host" in row["left_out"]["vtk_gpu"]
+    assert why in row["left_out"]["vtk_gpu"]
+    assert row["volume_to_vtk_gpu"] is None
+    assert "vtk_gpu" not in row["seconds"]
     assert "vtk_fixed_point" in row["seconds"]
     assert f"- VTK GPU with {TINY}: " in out.with_suffix(".md").read_text()
 
@@ -280,7 +292,8 @@ def test_the_papers_figures():
     assert [round(24 * ratio) for ratio, _ in paper_targets()] == [40, 50, 60, 70, 80]
 
 
-def test_a_table_has_the_papers_figures_beside_ours():
+def test_tables_and_plots_have_the_papers_figures_beside_ours(tmp_path):
+    pytest.importorskip("matplotlib")
     data = results((STEADY, STEADY))
     (row,) = Results(data).rows(what="view")
     row["seconds"]["vdi_skipping"] = {"clock": (STEADY / 4).tolist(), "device": []}
@@ -288,6 +301,8 @@ def test_a_table_has_the_papers_figures_beside_ours():
     cells = [part.strip() for part in line.strip("|").split("|")]
     assert cells[10:14] == ["1.0", f"{231 / 31:.1f}", "4.0", f"{277 / 31:.1f}"]
     assert cells[15:17] == ["0.9800", "0.982"]
+    assert write_plot(data, tmp_path / "a.png")
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     assert "Measured from x to y of a sample of the cases, commit abc on: device a" in describe(
         data
     )

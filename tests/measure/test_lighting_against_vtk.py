@@ -67,14 +67,13 @@ def put_lights(renderer, kind):
         light.SetDiffuseColor(1.0, 0.6, 0.3)
         light.SetSpecularColor(0.2, 0.9, 0.4)
         light.SetIntensity(1.0 if kind == "coloured" else 0.7)
-        renderer.AddLight(light)
-        return
-    light.SetLightTypeToSceneLight()
-    light.SetPosition(300, -500, 600)
-    light.SetFocalPoint(90, 100, 90)
-    if kind == "spot":
-        light.PositionalOn()
-        light.SetConeAngle(20)
+    else:
+        light.SetLightTypeToSceneLight()
+        light.SetPosition(300, -500, 600)
+        light.SetFocalPoint(90, 100, 90)
+        if kind == "spot":
+            light.PositionalOn()
+            light.SetConeAngle(20)
     renderer.AddLight(light)
 
 
@@ -104,15 +103,13 @@ def test_pictures_are_those_of_vtk(name, default_runtime):
     if case.get("rgba"):
         volume = coloured(volume)
     prop = the_property(volume, case)
-    peer = VTKBaseline(volume, prop, WINDOW, "gpu", min(volume.spacing) / 2)
-    lights = None
-    if "lights" in case:
-        put_lights(peer.renderer, case["lights"])
-        lights = peer.renderer
     camera = filling_camera(volume.bounds, WINDOW)
     turned = camera.azimuth(10)
+    peer = VTKBaseline(volume, prop, WINDOW, "gpu", min(volume.spacing) / 2)
+    if "lights" in case:
+        put_lights(peer.renderer, case["lights"])
     from_10_degrees, from_v_o = peer.image(turned), peer.image(camera)
-    looks = {"volume_property": prop, "lights": lights}
+    looks = {"volume_property": prop, "lights": peer.renderer if "lights" in case else None}
     vdi = api.generate(volume, camera, WINDOW, **looks)
     own = {
         "raycaster": (api.render_volume(volume, camera, WINDOW, **looks), from_v_o),

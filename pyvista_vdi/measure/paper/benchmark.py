@@ -28,7 +28,6 @@ from pyvista_vdi.measure.harness import (
     check_angles,
     check_count,
     enlarged,
-    refusal,
     sizes_of,
 )
 from pyvista_vdi.measure.paper.datasets import (
@@ -255,7 +254,7 @@ class _Rows:
             "vdi_to_volume": accuracy(bench.draw(vdi, camera), reference),
             "volume_to_vtk_gpu": near_vtk,
             "seconds": take_turns(frames, self._plan.repeats, runtime=self._runtime),
-            "left_out": {name: refusal(error) for name, error in bench.left_out.items()},
+            "left_out": {name: str(error) for name, error in bench.left_out.items()},
         }
 
     def _preview_row(self, case: Case) -> dict[str, Any]:
