@@ -1,7 +1,5 @@
 """Run the quick cases in windows on the screen that DISPLAY names, and print what is wrong."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

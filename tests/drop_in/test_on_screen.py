@@ -1,7 +1,5 @@
 """The quick cases in windows on a virtual screen, as scripts without ``off_screen`` open them."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """``docs/drop_in.md`` is what the cases make of it."""
 
-from __future__ import annotations
-
 import pytest
 from drop_in.make_page import kinds, page
 from drop_in.stage import PAGE, least_ssims
