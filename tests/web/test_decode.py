@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import zipfile
 import zlib
@@ -10,7 +9,7 @@ from io import BytesIO
 
 import numpy as np
 import pytest
-from browsers import PAGE, SITE, Page
+from browsers import WITHOUT_WORKERS, array_of, in_base64
 from rewriting import described, rewritten
 from strategies import random_vdi
 
@@ -31,31 +30,33 @@ window.decoded = async (bytes) => {
     return `${error.name}: ${error.message}`;
   }
 };
-window.decodeVDI = decodeVDI;
 window.loadVDI = load;
 """
 
+EIGHT_BYTES = {"compression": "deflate", "precision": "8-byte"}
+DIRECT = ("counts", "front", "back", "color", "optical_depth")
+PACKED = ("counts", "origin", "stride", *DIRECT[1:])
 
-@pytest.fixture(scope="module")
-def page(chromium):
-    """One page for all tests: it keeps nothing of a file."""
-    context = chromium.new_context()
-    content = PAGE.format(attributes="", script=SCRIPT, width=160, height=90)
-    page = Page(context.new_page(), {"page.html": content}, None)
-    page.page.goto(SITE + "page.html")
-    page.wait_for("window.begun")
-    yield page
-    context.close()
-    assert not page.complaints
+
+@pytest.fixture
+def page(open_page):
+    return open_page(script=SCRIPT)
 
 
 def decoded(page, data):
-    text = base64.b64encode(data).decode()
-    return page.evaluate("(text) => decoded(bytesOf(text))", text)
+    return page.evaluate("(text) => decoded(bytesOf(text))", in_base64(data))
 
 
-def vdi_bytes(vdi, tmp_path, **options):
-    return vdi.save(tmp_path / "a.vdi", **options).read_bytes()
+@pytest.fixture
+def written(tmp_path):
+    """The bytes of a VDI's file, of a random one by its seed."""
+
+    def written(vdi, max_window=(6, 5), **options):
+        if isinstance(vdi, int):
+            vdi = random_vdi(np.random.default_rng(vdi), max_window=max_window)
+        return vdi.save(tmp_path / "a.vdi", **options).read_bytes()
+
+    return written
 
 
 def large_vdi():
@@ -75,11 +76,10 @@ def large_vdi():
 @pytest.mark.every(6)
 @pytest.mark.parametrize("codec", ["lz4", "zstd", "deflate", "none"])
 @pytest.mark.parametrize("precision", ["exact", "16-byte", "8-byte"])
-def test_arrays_are_python_s(codec, precision, page, tmp_path):
-    vdis = [large_vdi(), *(random_vdi(np.random.default_rng(seed)) for seed in range(4))]
-    for vdi in vdis:
+def test_arrays_are_python_s(codec, precision, page, written):
+    for vdi in (large_vdi(), *(random_vdi(np.random.default_rng(seed)) for seed in range(4))):
         packed = vdi.with_precision(precision)
-        got = decoded(page, vdi_bytes(packed, tmp_path, compression=codec))
+        got = decoded(page, written(packed, compression=codec))
         assert isinstance(got, dict), got
         assert tuple(got["windowSize"]) == packed.window_size
         assert got["camera"] == json.loads(json.dumps(packed.camera.to_dict()))
@@ -94,45 +94,71 @@ def test_arrays_are_python_s(codec, precision, page, tmp_path):
             wanted |= {"front": packed.front, "back": packed.back, "color": packed.color}
             wanted["opticalDepth"] = packed.optical_depth
         for name, array in wanted.items():
-            found = np.frombuffer(base64.b64decode(got[name]), array.dtype)
+            found = array_of(got[name], array.dtype)
             np.testing.assert_array_equal(found, array.reshape(-1), err_msg=name)
 
 
-def test_the_coarse_level_comes_before_the_rest_is_there(page, tmp_path):
-    """The source gives nothing more until the coarse level has come."""
-    vdi = random_vdi(np.random.default_rng(1))
-    data = vdi_bytes(vdi, tmp_path, compression="deflate", precision="8-byte")
-    cut = data.index(b"PK\3\4", data.index(b"PK\5\6"))  # the member behind the coarse level
-    levels = page.evaluate(
-        """async ([text, cut]) => {
-          const bytes = bytesOf(text), levels = [], rest = Promise.withResolvers();
-          async function* pieces() {
-            yield bytes.slice(0, cut - 10);
-            yield textOf(bytes.subarray(cut - 10, cut + 11)).slice(0, 26);
-            await rest.promise;
-            yield textOf(bytes.subarray(cut - 10, cut + 11)).slice(26);
-            yield textOf(bytes.subarray(cut + 11));
-          }
-          await loadVDI(pieces(), { onLevel: (prepared) => {
-            levels.push([prepared.level, prepared.n, prepared.windowSize, prepared.pictureSize]);
-            rest.resolve();
-          } });
-          return levels;
-        }""",
-        [base64.b64encode(data).decode(), cut],
-    )
+def test_python_reads_what_was_written(tmp_path):
+    """What the test above compares with is what files hold."""
+    vdi = large_vdi()
+    assert io.read(vdi.save(tmp_path / "a.vdi", compression="deflate")).equals(vdi)
+
+
+def levels_of(vdi):
     small, window = coarser(vdi), list(vdi.window_size)
-    assert levels == [
+    return [
         ["coarse", small.n_supersegments, list(small.window_size), window],
         ["full", vdi.n_supersegments, window, window],
     ]
 
 
-def test_every_truncation_is_noticed(page, tmp_path):
+TOLD = "({ level, n, windowSize, pictureSize }) => [level, n, windowSize, pictureSize]"
+
+
+def test_the_coarse_level_comes_before_the_rest_is_there(page, written):
+    """The source gives nothing more until the coarse level has come."""
+    vdi = random_vdi(np.random.default_rng(1))
+    data = written(vdi, **EIGHT_BYTES)
+    cut = data.index(b"PK\3\4", data.index(b"PK\5\6"))  # the member behind the coarse level
+    levels = page.evaluate(
+        f"""async ([text, cut]) => {{
+          const bytes = bytesOf(text), levels = [], rest = Promise.withResolvers();
+          async function* pieces() {{
+            yield bytes.slice(0, cut - 10);
+            yield textOf(bytes.subarray(cut - 10, cut + 11)).slice(0, 26);
+            await rest.promise;
+            yield textOf(bytes.subarray(cut - 10, cut + 11)).slice(26);
+            yield textOf(bytes.subarray(cut + 11));
+          }}
+          await loadVDI(pieces(), {{ onLevel: (prepared) => {{
+            levels.push(({TOLD})(prepared));
+            rest.resolve();
+          }} }});
+          return levels;
+        }}""",
+        [in_base64(data), cut],
+    )
+    assert levels == levels_of(vdi)
+
+
+def test_without_workers_the_page_decodes(open_page, written):
+    """Where a policy forbids workers."""
+    vdi = random_vdi(np.random.default_rng(1))
+    levels = open_page(script=SCRIPT, before=WITHOUT_WORKERS).evaluate(
+        f"""async (text) => {{
+          const levels = [];
+          await loadVDI(bytesOf(text), {{ onLevel: (it) => levels.push(({TOLD})(it)) }});
+          return levels;
+        }}""",
+        in_base64(written(vdi, compression="deflate")),
+    )
+    assert levels == levels_of(vdi)
+
+
+def test_every_truncation_is_noticed(page, written):
     """But for the archive's directory behind the last member, which nothing is read from."""
-    vdi = random_vdi(np.random.default_rng(1), max_window=(6, 5))
     for codec in ("deflate", "lz4"):
-        data = vdi_bytes(vdi, tmp_path, compression=codec, precision="8-byte")
+        data = written(1, compression=codec, precision="8-byte")
         end = zipfile.ZipFile(BytesIO(data)).start_dir
         cuts = [*range(0, end, 41), end - 1, end]
         answers = page.evaluate(
@@ -141,7 +167,7 @@ def test_every_truncation_is_noticed(page, tmp_path):
               for (const cut of cuts) answers.push(await decoded(bytes.slice(0, cut)));
               return answers.map(String);
             }""",
-            [base64.b64encode(data).decode(), cuts],
+            [in_base64(data), cuts],
         )
         for cut, answer in zip(cuts, answers, strict=True):
             assert answer.startswith("VDIFileError: the VDI file is "), (cut, answer)
@@ -149,9 +175,8 @@ def test_every_truncation_is_noticed(page, tmp_path):
 
 
 @pytest.mark.parametrize("codec", ["deflate", "lz4", "zstd", "none"])
-def test_every_changed_byte_is_noticed_or_harmless(codec, page, tmp_path):
-    vdi = random_vdi(np.random.default_rng(2), max_window=(6, 5))
-    data = vdi_bytes(vdi, tmp_path, compression=codec, precision="8-byte")
+def test_every_changed_byte_is_noticed_or_harmless(codec, page, written):
+    data = written(2, compression=codec, precision="8-byte")
     outcome = page.evaluate(
         """async ([text, step]) => {
           const bytes = bytesOf(text), whole = JSON.stringify(await decoded(bytes));
@@ -166,73 +191,71 @@ def test_every_changed_byte_is_noticed_or_harmless(codec, page, tmp_path):
           }
           return outcome;
         }""",
-        [base64.b64encode(data).decode(), max(1, len(data) // 400)],
+        [in_base64(data), max(1, len(data) // 400)],
     )
     assert outcome["other"] == []
     # The coarse level, the directory and the headers' times and attributes are not read here
     assert outcome["refused"] > 0.4 * (outcome["refused"] + outcome["same"])
 
 
-def test_hostile_headers(page, tmp_path):
+HOSTILE = {
+    "n_supersegments": (10**9, -1, 1.5, "5", None, 2**60),
+    "window_size": ([65536, 65536], [0, 1], [1], None, [1e9, 1]),
+    "version": (5, "4"),
+    "codec": ("deflate", "lzma", ["none"]),
+    "precision": ("half",),
+    "depth_step": (0.3, -1),
+    "bounds": ([1, 0, 0, 1, 0, 1], "x"),
+    "arrays": (None, {}),
+    "metadata": (None,),
+    "chunk_rows": (1,),
+    "format": ("x",),
+    "depth_origin": (None,),
+}
+NO_CAMERAS = (
+    {"view_angle": 180},
+    {"position": [None, 0, 0]},
+    {"model_transform": [[1]]},
+    {"parallel_scale": "x"},
+)
+
+
+def test_hostile_headers(page, written):
     vdi = random_vdi(np.random.default_rng(2), max_window=(6, 5)).with_precision("8-byte")
-    data = vdi_bytes(vdi, tmp_path, compression="none")
-    camera = vdi.camera.to_dict()
-    hostile = {
-        "more than": [{"n_supersegments": n} for n in (10**9, -1, 1.5, "5", None, 2**60)],
-        "window_size": [{"window_size": w} for w in ([65536, 65536], [0, 1], [1], None, [1e9, 1])],
-        "camera": [
-            {"camera": {**camera, **change}}
-            for change in (
-                {"view_angle": 180},
-                {"position": camera["focal_point"]},
-                {"position": [None, 0, 0]},
-                {"model_transform": [[1]]},
-                {"parallel_scale": "x"},
-            )
-        ],
-        "others": [
-            {"version": 5}, {"version": "4"}, {"codec": "deflate"}, {"codec": "lzma"},
-            {"codec": ["none"]}, {"precision": "half"}, {"depth_step": 0.3}, {"depth_step": -1},
-            {"bounds": [1, 0, 0, 1, 0, 1]}, {"bounds": "x"}, {"arrays": None}, {"arrays": {}},
-            {"metadata": None}, {"chunk_rows": 1}, {"format": "x"}, {"depth_origin": None},
-        ],
-    }  # fmt: skip
-    for kind, changes in hostile.items():
-        for change in changes:
-            answer = decoded(page, described(data, **change))
-            assert isinstance(answer, str), (kind, change)
-            assert answer.startswith("VDIFileError: "), (kind, change, answer)
+    data, camera = written(vdi, compression="none"), vdi.camera.to_dict()
+    changes = [{name: value} for name, values in HOSTILE.items() for value in values]
+    for wrong in (*NO_CAMERAS, {"position": camera["focal_point"]}):
+        changes.append({"camera": {**camera, **wrong}})
+    for change in changes:
+        answer = decoded(page, described(data, **change))
+        assert isinstance(answer, str), change
+        assert answer.startswith("VDIFileError: "), (change, answer)
 
 
-def test_streams_that_lie_about_their_size(page, tmp_path):
+@pytest.mark.parametrize("more", [b"", b"\0" * 10**7], ids=["too short", "too long"])
+def test_streams_that_lie_about_their_size(more, page, written):
     """A stream that goes on is broken off; one that ends early is noticed."""
-    vdi = random_vdi(np.random.default_rng(2), max_window=(6, 5)).with_precision("8-byte")
-    data = vdi_bytes(vdi, tmp_path, compression="deflate")
-    names = ("counts", "origin", "stride", "front", "back", "color", "optical_depth")
-    for more in (b"", b"\0" * 10**7):
 
-        def edit(members, more=more):
-            raw = zlib.decompress(members["back"])
-            members["back"] = zlib.compress(raw + more if more else raw[:-1])
+    def edit(members):
+        raw = zlib.decompress(members["back"])
+        members["back"] = zlib.compress(raw + more if more else raw[:-1])
 
-        assert "does not decompress to the" in decoded(page, rewritten(data, edit, names))
+    answer = decoded(page, rewritten(written(2, **EIGHT_BYTES), edit, PACKED))
+    assert "does not decompress to the" in answer
 
 
-def test_noise_is_no_lz4(page, tmp_path):
+@pytest.mark.parametrize("begin", [16, 24, 40])
+def test_noise_is_no_lz4(begin, page, written):
     """Frames of Blosc whose streams are noise end as a sentence, within their bounds."""
+
+    def edit(members):
+        color = bytearray(members["color"])
+        color[begin:] = np.random.default_rng(3).bytes(len(color) - begin)
+        members["color"] = bytes(color)
+
     vdi = random_vdi(np.random.default_rng(4))
-    data = vdi_bytes(vdi, tmp_path, compression="lz4", precision="exact")
-    names = ("counts", "front", "back", "color", "optical_depth")
-    rng = np.random.default_rng(3)
-    for begin in (16, 24, 40):
-
-        def edit(members, begin=begin):
-            color = bytearray(members["color"])
-            color[begin:] = rng.bytes(len(color) - begin)
-            members["color"] = bytes(color)
-
-        answer = decoded(page, rewritten(data, edit, names))
-        assert "VDIFileError: the VDI file is damaged" in str(answer)
+    answer = decoded(page, rewritten(written(vdi, compression="lz4"), edit, DIRECT))
+    assert "VDIFileError: the VDI file is damaged" in str(answer)
 
 
 @pytest.mark.parametrize(
@@ -247,32 +270,13 @@ def test_foreign_files(content, why, page):
     answer = page.evaluate(
         """async (text) => loadVDI(bytesOf(text), { onLevel() {} }).then(
              () => "taken", (error) => error.message)""",
-        base64.b64encode(content).decode(),
+        in_base64(content),
     )
     assert why in answer
 
 
-def test_without_workers_the_page_decodes(open_page, tmp_path):
-    """Where a policy forbids workers."""
-    vdi = random_vdi(np.random.default_rng(1))
-    script = "window.Worker = class { constructor() { throw new Error('forbidden'); } };" + SCRIPT
-    page = open_page(script=script)
-    text = base64.b64encode(vdi_bytes(vdi, tmp_path, compression="deflate")).decode()
-    levels = page.evaluate(
-        """async (text) => {
-          const levels = [];
-          await loadVDI(bytesOf(text), { onLevel: ({ level, n }) => levels.push([level, n]) });
-          return levels;
-        }""",
-        text,
-    )
-    assert levels == [["coarse", coarser(vdi).n_supersegments], ["full", vdi.n_supersegments]]
-
-
-def test_a_load_can_be_ended(page, tmp_path):
+def test_a_load_can_be_ended(page, written):
     """And the worker that was decoding is gone: the next load has one that answers it alone."""
-    vdi = random_vdi(np.random.default_rng(1))
-    text = base64.b64encode(vdi_bytes(vdi, tmp_path, compression="deflate")).decode()
     reason, levels = page.evaluate(
         """async (text) => {
           const bytes = bytesOf(text), stop = new AbortController(), levels = [];
@@ -287,18 +291,6 @@ def test_a_load_can_be_ended(page, tmp_path):
           await loadVDI(bytes, { onLevel });
           return [reason, levels];
         }""",
-        text,
+        in_base64(written(random_vdi(np.random.default_rng(1)), compression="deflate")),
     )
     assert (reason, levels) == ("enough", ["coarse", "full"])
-
-
-def test_what_is_not_there_is_a_sentence(open_page):
-    page = open_page(attributes='src="missing.vdi"', expected="404")
-    page.wait_for("viewer.status.state === 'error'")
-    assert "missing.vdi cannot be read: 404" in page.evaluate("viewer.status.message")
-
-
-def test_python_reads_what_was_written(tmp_path):
-    """What the tests above are compared with is what files hold."""
-    vdi = large_vdi()
-    assert io.read(vdi.save(tmp_path / "a.vdi", compression="deflate")).equals(vdi)
