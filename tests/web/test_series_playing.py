@@ -18,7 +18,7 @@ N = 9
 
 
 @pytest.fixture(scope="module")
-def series(default_runtime, tmp_path_factory):
+def path(default_runtime, tmp_path_factory):
     """A ball that moves, and stands still between the fifth step and the seventh."""
     z, y, x = np.meshgrid(*(np.linspace(-1, 1, 20),) * 3, indexing="ij")
 
@@ -30,13 +30,17 @@ def series(default_runtime, tmp_path_factory):
     looks = {"cmap": "viridis", "opacity": "linear", "clim": (0, 1)}
     made = pvdi.generate_series(ball, camera, SIZE, [0.5 * i for i in range(N)], **looks)
     path = tmp_path_factory.mktemp("series") / "ball.vdis"
-    return pvdi.read(made.save(path, precision="8-byte"))
+    return made.save(path, precision="8-byte")
 
 
 @pytest.fixture(scope="module")
-def data(series, tmp_path_factory):
-    path = tmp_path_factory.mktemp("series") / "again.vdis"
-    return series.save(path, precision="8-byte").read_bytes()
+def series(path):
+    return pvdi.read(path)
+
+
+@pytest.fixture(scope="module")
+def data(path):
+    return path.read_bytes()
 
 
 @pytest.fixture(scope="module")
@@ -321,7 +325,10 @@ def test_another_file_takes_its_place_and_the_element_can_move(series, data, pla
         with pytest.raises(Exception, match="no series"):
             page.evaluate(f"() => {{ {call}; }}")
     page.load(data)
-    for call, why in (("viewer.play({ rate: 0 })", "above 0"), ("viewer.time = 'x'", "is a number")):
+    for call, why in (
+        ("viewer.play({ rate: 0 })", "above 0"),
+        ("viewer.time = 'x'", "is a number"),
+    ):
         with pytest.raises(Exception, match=why):
             page.evaluate(f"() => {{ {call}; }}")
 
