@@ -135,9 +135,8 @@ def test_the_still_picture_is_python_s(vdi):
     coded = {"qtables": still.quantization, "subsampling": JpegImagePlugin.get_sampling(still)}
     Image.fromarray(expected).save(same, "jpeg", **coded)
     off = np.abs(np.asarray(still, float) - np.asarray(Image.open(same), float))
-    # A value that is rounded the other way changes the 64 pixels of a block of JPEG
-    print(off.mean(), off.max())
-    assert off.mean() < 0.05
+    # 0 is seen; a value that is rounded the other way may change a block of JPEG
+    assert off.mean() < 0.01
 
 
 def test_damaged_data_are_a_sentence(vdi, open_file, tmp_path):

@@ -57,6 +57,19 @@ def server(default_runtime):
         yield serving
 
 
+@pytest.fixture
+def own_server(default_runtime):
+    """Return ``make(**options)``: a server with other limits."""
+    with contextlib.ExitStack() as stack:
+
+        def make(**options):
+            looks = Classification(LOOK, "serve")
+            source = Source([HIGH], looks, GenerationOptions(precision="8-byte"), lists=10**6)
+            return stack.enter_context(Server(source, port=0, **options).start())
+
+        yield make
+
+
 def by_clients(story):
     """Make a test of what one or two clients of the server say and are told."""
     number = len(inspect.signature(story).parameters)
@@ -81,6 +94,13 @@ def by_a_client(server, folder, story, **how):
             return await story(client)
 
     return asyncio.run(asyncio.wait_for(told(), PATIENCE))
+
+
+def hello_of(server, folder, **how):
+    async def hello(client):
+        return client.hello
+
+    return by_a_client(server, folder, hello, **how)
 
 
 def ssim(vdi, volume, **look):
@@ -276,62 +296,46 @@ def test_a_full_vdi_on_a_slow_line_gives_way(server, tmp_path):
     assert came < head["bytes"]
 
 
-def status_of(server, path="/", query=None, **headers):
-    async def got():
-        url = f"http://127.0.0.1:{server.port}{path}"
-        params = {"token": server.token} if query is None else query
-        async with (
-            aiohttp.ClientSession() as session,
-            session.get(url, params=params, headers=headers) as response,
-        ):
-            return response.status
-
-    return asyncio.run(got())
+async def status_of(server, path, query, headers):
+    url = f"http://127.0.0.1:{server.port}{path}"
+    params = {"token": server.token} if query is None else query
+    async with (
+        aiohttp.ClientSession() as session,
+        session.get(url, params=params, headers=headers) as response,
+    ):
+        return response.status
 
 
-@pytest.mark.parametrize("query", [{}, {"token": ""}, {"token": "x"}, {"token": "ü"}])
-@pytest.mark.parametrize("path", ["/", "/socket", "/nothing"])
-def test_without_the_token_there_is_nothing(server, path, query):
-    assert status_of(server, path, query) == 403
-
-
-@pytest.mark.parametrize("path", ["/etc/passwd", "/../../etc/passwd", "/%2e%2e/x", "/viewer.js"])
-def test_no_file_is_reachable(server, path):
-    assert status_of(server, path) == 404
-
-
-@pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "["])
-def test_other_names_are_refused(server, host):
-    """DNS rebinding: a name of theirs that points here."""
-    assert status_of(server, Host=host) in (400, 403)
-
-
-def test_addresses_and_names_of_ours_are_taken_as_browsers_write_them(server, own_server):
-    other = own_server(hosts=["MyBox"])
-    names = ("localhost", f"localhost:{server.port}", "[::1]:80", "10.0.0.7")
-    for of, host in (*((server, name) for name in names), (other, "mybox"), (other, "MYBOX:80")):
-        assert status_of(of, "/nothing", Host=host) == 404
-
-
+QUERIES = [{}, {"token": ""}, {"token": "x"}, {"token": "ü"}]
+FILES = ["/etc/passwd", "/../../etc/passwd", "/%2e%2e/x", "/viewer.js"]
+#: DNS rebinding: names of theirs that point here.
+HOSTS = ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "["]
+OUR_HOSTS = ["localhost", "localhost:80", "[::1]:80", "10.0.0.7", "mybox", "MYBOX:80"]
 ORIGINS = ["http://evil.example", "null", "http://127.0.0.1:1", "http://["]
 
 
-@pytest.mark.parametrize("origin", ORIGINS)
-def test_pages_of_others_cannot_connect(server, origin):
-    assert status_of(server, "/socket", Origin=origin) == 403
+@pytest.mark.parametrize(
+    ("path", "query", "headers", "statuses"),
+    [
+        *((path, query, {}, {403}) for path in ("/", "/socket", "/nothing") for query in QUERIES),
+        *((path, None, {}, {404}) for path in FILES),
+        *(("/", None, {"Host": host}, {400, 403}) for host in HOSTS),
+        *(("/nothing", None, {"Host": host}, {404}) for host in OUR_HOSTS),
+        *(("/socket", None, {"Origin": origin}, {403}) for origin in ORIGINS),
+    ],
+)
+def test_who_is_let_in(path, query, headers, statuses, default_runtime, own_server):
+    """Who knows the token, by a name of ours, from no page of others; and to no file."""
+    server = own_server(hosts=["MyBox"])
+    assert asyncio.run(status_of(server, path, query, headers)) in statuses
 
 
-def test_our_page_can_connect(server, tmp_path):
-    async def protocol(client):
-        return client.hello["protocol"]
-
-    headers = {"Origin": f"http://127.0.0.1:{server.port}"}
-    assert by_a_client(server, tmp_path, protocol, headers=headers) == 1
-
-
-def test_any_text_is_a_token_but_none(own_server):
-    with urllib.request.urlopen(own_server(token="a+b c&d=é#").url) as response:
+def test_any_text_is_a_token_but_none_and_our_page_can_connect(own_server, tmp_path):
+    server = own_server(token="a+b c&d=é#")
+    with urllib.request.urlopen(server.url) as response:
         assert response.status == 200
+    headers = {"Origin": f"http://127.0.0.1:{server.port}"}
+    assert hello_of(server, tmp_path, headers=headers)["protocol"] == 1
     with pytest.raises(InvalidArgumentError, match="token is empty"):
         own_server(token="")
 
@@ -340,29 +344,27 @@ EYE = {"position": [0, -5, 0], "focal_point": [0, 0, 0], "view_up": [0, 0, 1]}
 VIEW = {"type": "view", "camera": EYE, "size": [64, 48]}
 OTHER_VIEWS = [
     *({"size": size} for size in ([0, 48], [64, 48.5], [10**9, 10**9], [True, True])),
-    {"more": 1},
-    {"moving": 1},
-    {"camera": None},
+    *({"more": 1}, {"moving": 1}, {"camera": None}),
 ]
+PLACES = ([0, 0, 0], [math.nan, 0, 0], [math.inf, 0, 0], [10**400, 0, 0], "abc")
 OTHER_EYES = [
-    *([0, 0, 0], [math.nan, 0, 0], [math.inf, 0, 0], [10**400, 0, 0], "abc"),
+    *({"position": place} for place in PLACES),
+    *({"view_angle": 180}, {"parallel_scale": -1}, {"model_transform": []}),
 ]
-LENSES = [{"view_angle": 180}, {"parallel_scale": -1}, {"model_transform": []}]
+OTHERS = [
+    *({"type": "look", "opacity": opacity} for opacity in ([0.5] * 1000, {})),
+    {"type": "look", "cmap": "../../etc/passwd"},
+    {"type": "look", "clim": [1, 1]},
+    *({"type": "time", "step": step} for step in (2, -1)),
+    *({"type": "clip", "planes": planes} for planes in ([[0] * 6], [[0, 0, 0, 1, 0, 0]] * 7)),
+    {"type": "file", "path": "/etc/passwd"},
+    {"type": "é" * 40},  # the reason, which has it, is cut
+]
 BAD = [
     *("", "{", "[]", "1", "null", '{"type": []}', '{"type": "view"}', "[" * 10_000),
-    '{"type": "file", "path": "/etc/passwd"}',
     *(json.dumps({**VIEW, **other}) for other in OTHER_VIEWS),
-    *(json.dumps({**VIEW, "camera": {**EYE, "position": eye}}) for eye in OTHER_EYES),
-    *(json.dumps({**VIEW, "camera": {**EYE, **lens}}) for lens in LENSES),
-    json.dumps({"type": "look", "cmap": "../../etc/passwd"}),
-    json.dumps({"type": "look", "opacity": [0.5] * 1000}),
-    json.dumps({"type": "look", "opacity": {}}),
-    json.dumps({"type": "look", "clim": [1, 1]}),
-    json.dumps({"type": "time", "step": 2}),
-    json.dumps({"type": "time", "step": -1}),
-    json.dumps({"type": "clip", "planes": [[0, 0, 0, 0, 0, 0]]}),
-    json.dumps({"type": "clip", "planes": [[0, 0, 0, 1, 0, 0]] * 7}),
-    json.dumps({"type": "é" * 40}),  # the reason, which has it, is cut
+    *(json.dumps({**VIEW, "camera": {**EYE, **other}}) for other in OTHER_EYES),
+    *map(json.dumps, OTHERS),
 ]
 
 
@@ -421,19 +423,6 @@ async def test_extreme_views_harm_nobody(client, other):
         await client.idle()
     await other.look_from(CAMERA, SIZE)
     assert (await other.vdi()).n_supersegments > 0
-
-
-@pytest.fixture
-def own_server(default_runtime):
-    """Return ``make(**options)``: a server with other limits."""
-    with contextlib.ExitStack() as stack:
-
-        def make(**options):
-            looks = Classification(LOOK, "serve")
-            source = Source([HIGH], looks, GenerationOptions(precision="8-byte"), lists=10**6)
-            return stack.enter_context(Server(source, port=0, **options).start())
-
-        yield make
 
 
 @pytest.mark.slow
@@ -541,11 +530,8 @@ def test_steps_are_any_object_with_a_length_and_items(default_runtime, tmp_path)
         def __getitem__(self, step):
             return [HIGH, LOW][step]
 
-    async def steps(client):
-        return client.hello["steps"]
-
     with serve(Steps(), **LOOK) as server:
-        assert by_a_client(server, tmp_path, steps) == 2
+        assert hello_of(server, tmp_path)["steps"] == 2
 
 
 def test_the_command_serves_until_ctrl_c(tmp_path, default_runtime):

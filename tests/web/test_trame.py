@@ -38,7 +38,7 @@ def test_the_component_s_state(default_runtime):
     assert eye["view_angle"] == CAMERA.view_angle
     view.update(vdi)
     turned = re.search(r"""@turned="trigger\('([^']+)'""", view.html)[1]
-    app.trigger_fn(turned)({"camera": {**eye, "view_angle": 5}, "size": [30, 20]})
+    app.controller.trigger_fn(turned)({"camera": {**eye, "view_angle": 5}, "size": [30, 20]})
     assert view.camera.view_angle == 5
     assert view.size == (30, 20)
 
