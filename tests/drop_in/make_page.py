@@ -1,9 +1,10 @@
 """Write ``docs/drop_in.md``: draws the cases of all kinds, or of those that are named.
 
-``python tests/drop_in/make_page.py [arguments data ...]``
+``python tests/drop_in/make_page.py [arguments data ... | on-screen]``
 """
 
 import importlib
+import json
 import sys
 from pathlib import Path
 
@@ -77,8 +78,18 @@ def _cell(text):
     return "`" + text + "`" if "=" in text or "_" in text else text
 
 
+def differences_on_screen():
+    """Draw the quick cases in windows on the screen that DISPLAY names; return what is wrong."""
+    quick = [case for kind in kinds().values() for case in kind.cases if case.quick]
+    found = {case.name: outcome(case, off_screen=False).wrong for case in quick}
+    return {"cases": len(found), "wrong": {name: wrong for name, wrong in found.items() if wrong}}
+
+
 def main():
-    """Draw, and write the page."""
+    """Draw, and write the page; or print what is wrong on a screen."""
+    if "on-screen" in sys.argv:
+        print(json.dumps(differences_on_screen()))
+        return
     chosen = [each for each in sys.argv[1:] if each in NAMES]
     least = least_ssims() if PAGE.is_file() else {}
     for name, kind in kinds().items():

@@ -1,8 +1,8 @@
 """Scenes that are drawn twice, with ``add_volume`` and with ``add_vdi``, and what each must show.
 
 A case is a function ``scene(plotter, add)`` as a user's script has it; ``add`` is the plotter's
-``add_volume``, then its ``add_vdi``. It returns nothing, and the picture is a screenshot, or a list
-of pictures that it took. The kinds of cases are the files ``test_*.py`` beside this one.
+``add_volume``, then its ``add_vdi``. It returns nothing, and the picture is a screenshot, or the
+pictures that it took. The kinds of cases are the files ``test_*.py`` beside this one.
 """
 
 import os
@@ -157,8 +157,8 @@ def draw(case, ours, off_screen=True):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                pictures = case.scene(plotter, Add(plotter, ours))
-                if pictures is None:
+                pictures = list(case.scene(plotter, Add(plotter, ours)) or [])
+                if not pictures:
                     pictures = [shot(plotter)]
                     drawn.empty = without_volumes(plotter)
                 drawn.pictures = [np.asarray(each)[..., :3] for each in pictures]

@@ -20,9 +20,9 @@ def change(name, act, *, quick=False, **arguments):
     def scene(pl, add):
         volume = grid()
         actor = add(volume, **{"show_scalar_bar": False, **arguments})
-        before = shot(pl)
+        yield shot(pl)
         act(pl, actor, volume)
-        return [before, shot(pl)]
+        yield shot(pl)
 
     kind.add(name, scene, quick=quick)
 
@@ -171,18 +171,16 @@ BARE = {"show_scalar_bar": False}
 @kind.case(quick=True)
 def replaced_by_name(pl, add):
     add(grid(), name="ball", **BARE)
-    before = shot(pl)
+    yield shot(pl)
     add(grid(seed=1), name="ball", cmap="hot", **BARE)
-    return [before, shot(pl)]
+    yield shot(pl)
 
 
 @kind.case()
 def a_loop_that_replaces_by_name(pl, add):
-    out = []
     for i in range(4):
         add(grid(seed=i / 3), name="ball", clim=(0, 255), **BARE)
-        out.append(shot(pl))
-    return out
+        yield shot(pl)
 
 
 @kind.case()
@@ -197,22 +195,19 @@ def removed_by_name_and_added_again(pl, add):
 def a_mesh_that_moves_through(pl, add):
     add(grid(), **BARE)
     mesh = pl.add_mesh(pv.Sphere(radius=0.4), color="w", reset_camera=False)
-    out = []
     for x in (-1, 0, 1):
         mesh.position = (x, x, x)
-        out.append(shot(pl))
-    return out
+        yield shot(pl)
 
 
 @kind.case()
 def one_grid_in_two_plots(pl, add):
-    volume, out = grid(), []
+    volume = grid()
     for k in range(2):
         other = pv.Plotter(window_size=WINDOW, off_screen=True)
         volume[f"v{k}"] = (values(24, k).ravel() * (50 + 200 * k)).astype(np.float32)
         add(volume, to=other, scalars=f"v{k}")
-        out.append(shot(other))
-    return out
+        yield shot(other)
 
 
 @kind.case(window={"shape": (1, 2), "window_size": (300, 150)})
@@ -238,29 +233,28 @@ def a_light_that_moves(pl, add):
     add(grid(), shade=True, **BARE)
     light = pv.Light(position=(0, 5, 0), light_type="scene light")
     pl.add_light(light)
-    before = shot(pl)
+    yield shot(pl)
     light.position = (5, -5, 0)
-    return [before, shot(pl)]
+    yield shot(pl)
 
 
 @kind.case(quick=True)
 def a_small_turn(pl, add):
     add(grid(), **BARE)
-    before = shot(pl)
+    yield shot(pl)
     pl.camera.azimuth += 5
-    return [before, shot(pl)]
+    yield shot(pl)
 
 
 @kind.case()
 def an_orbit(pl, add):
     actor = add(grid(), **BARE)
-    out = [shot(pl)]
+    yield shot(pl)
     for _ in range(3):
         pl.camera.Azimuth(90)
         if add.ours:
             actor.regenerate()
-        out.append(shot(pl))
-    return out
+        yield shot(pl)
 
 
 @kind.case(name="a film: a.gif")
@@ -276,7 +270,7 @@ def _(pl, add):
             pl.write_frame()
         pl.close()
         with Image.open(path) as image:
-            return [np.asarray(f.convert("RGB")) for f in ImageSequence.Iterator(image)]
+            yield from [np.asarray(f.convert("RGB")) for f in ImageSequence.Iterator(image)]
 
 
 def widget(name, put):

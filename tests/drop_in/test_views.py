@@ -213,9 +213,9 @@ def last_image(pl):
 
 
 def in_another_size(pl):
-    before = shot(pl)
+    yield shot(pl)
     pl.window_size = (150, 180)
-    return [before, shot(pl)]
+    yield shot(pl)
 
 
 def shown_twice(pl):

@@ -8,6 +8,8 @@ loop running in its thread, so a file of tests has a browser of its own, which e
 from __future__ import annotations
 
 import base64
+import io
+import json
 import os
 import re
 import shutil
@@ -15,6 +17,8 @@ from importlib import resources
 
 import numpy as np
 import pytest
+
+from pyvista_vdi.io.vdi_file.writer import write_to
 
 #: Names of Chromium in distributions.
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -41,10 +45,34 @@ window.textOf = (bytes) => {
   }
   return btoa(text);
 };
+// What a decoder returns: its arrays as base64, or its sentence
+window.told = async (decoding) => {
+  try {
+    const raw = ({ buffer, byteOffset, byteLength }) =>
+      textOf(new Uint8Array(buffer, byteOffset, byteLength));
+    return Object.fromEntries(Object.entries(await decoding).map(
+      ([name, value]) => [name, ArrayBuffer.isView(value) ? raw(value) : value]));
+  } catch (error) {
+    return `${error.name}: ${error.message}`;
+  }
+};
 """
 
 WITHOUT_WORKERS = """
 window.Worker = class { constructor() { throw new Error("forbidden"); } };
+"""
+
+#: Counts a page's objects of WebGL.
+COUNTING = """
+window.alive = {};
+const of = WebGL2RenderingContext.prototype;
+for (const kind of ["Texture", "Framebuffer", "Renderbuffer", "Buffer", "VertexArray", "Program",
+  "Shader"]) {
+  const [make, free] = [of["create" + kind], of["delete" + kind]];
+  alive[kind] = 0;
+  of["create" + kind] = function (...rest) { ++alive[kind]; return make.apply(this, rest); };
+  of["delete" + kind] = function (what) { alive[kind] -= !!what; return free.call(this, what); };
+}
 """
 
 PAGE = """<!doctype html><meta charset="utf-8"><style>body {{ margin: 0 }}</style>
@@ -103,8 +131,35 @@ def in_base64(data):
     return base64.b64encode(data).decode()
 
 
+def file_of(vdi, compression="deflate"):
+    """The bytes of a VDI's file."""
+    stream = io.BytesIO()
+    write_to(stream, vdi, compression, 1)
+    return stream.getvalue()
+
+
 def array_of(text, dtype):
     return np.frombuffer(base64.b64decode(text), dtype)
+
+
+def assert_decoded(got, vdi):
+    """Hold what a decoder has ``told`` to the VDI that Python has."""
+    assert isinstance(got, dict), got
+    assert tuple(got["windowSize"]) == vdi.window_size
+    assert got["camera"] == json.loads(json.dumps(vdi.camera.to_dict()))
+    assert (got["depthOrigin"], tuple(got["bounds"])) == (vdi.depth_origin, vdi.bounds)
+    wanted = {"offsets": vdi.offsets.astype("<u4")}
+    if vdi.precision == "8-byte":
+        packing = vdi.packing
+        assert (got["precision"], got["depthStep"]) == ("8-byte", packing.step)
+        wanted |= {"words": packing.words, "origin": packing.origins, "stride": packing.strides}
+    else:
+        assert got["precision"] == "exact"
+        wanted |= {name: getattr(vdi, name) for name in ("front", "back", "color")}
+        wanted["opticalDepth"] = vdi.optical_depth
+    for name, array in wanted.items():
+        found = array_of(got[name], array.dtype)
+        np.testing.assert_array_equal(found, array.reshape(-1), err_msg=name)
 
 
 def picture(page, size, viewer="viewer"):

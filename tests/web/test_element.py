@@ -6,7 +6,8 @@ from io import BytesIO
 
 import numpy as np
 import pytest
-from browsers import in_base64
+import pyvista as pv
+from browsers import COUNTING, file_of, in_base64
 from plugin_scenes import soft_ball
 from rewriting import described
 from skimage.io import imread
@@ -39,9 +40,8 @@ def vdi(default_runtime):
 
 
 @pytest.fixture(scope="module")
-def data(vdi, tmp_path_factory):
-    path = tmp_path_factory.mktemp("web") / "ball.vdi"
-    return vdi.save(path, compression="deflate").read_bytes()
+def data(vdi):
+    return file_of(vdi)
 
 
 @pytest.fixture
@@ -104,19 +104,12 @@ DRAGS = {
 @pytest.mark.parametrize("parallel", [False, True])
 def test_drags_are_those_of_vtks_trackball_camera(parallel, ball):
     """By VTK's own style, with its own events, in a window of the same size."""
-    vtk = pytest.importorskip("vtk")
-    window, renderer = vtk.vtkRenderWindow(), vtk.vtkRenderer()
-    window.SetOffScreenRendering(1)
-    window.SetSize(300, 200)
-    window.AddRenderer(renderer)
-    interactor = vtk.vtkRenderWindowInteractor()
-    interactor.SetRenderWindow(window)
+    plotter = pv.Plotter(off_screen=True, window_size=(300, 200))
+    plotter.enable_trackball_style()
+    plotter.show(auto_close=False)
+    interactor, camera = plotter.iren.interactor, plotter.camera
     interactor.EnableRenderOff()
-    style = vtk.vtkInteractorStyleTrackballCamera()
-    style.SetAutoAdjustCameraClippingRange(0)
-    interactor.SetInteractorStyle(style)
-    interactor.SetSize(300, 200)
-    camera = renderer.GetActiveCamera()
+    interactor.GetInteractorStyle().SetAutoAdjustCameraClippingRange(0)
     camera.SetPosition(1, 2, 5)
     camera.SetFocalPoint(0.5, 0.1, 0)
     camera.SetViewUp(0.1, 1, 0.2)
@@ -147,6 +140,7 @@ def test_drags_are_those_of_vtks_trackball_camera(parallel, ball):
         for name, value in expected.items():
             # VTK goes through the focal point's depth in the window, in float64
             np.testing.assert_allclose(after[name], value, atol=1e-6, err_msg=what)
+    plotter.close()
 
 
 def test_people_turn_it_by_mouse_wheel_and_keys(vdi, ball):
@@ -319,25 +313,24 @@ def test_broken_files_are_a_sentence_and_nothing_else(data, open_page):
     """How it is said; tests/web/test_decode.py has in which places files are broken."""
     changed = bytearray(data)
     changed[len(data) // 2] ^= 1
-    bad = [data[: len(data) // 2], bytes(changed), b"", b"<!doctype html>"]
+    bad = {data[: len(data) // 2]: "truncated", bytes(changed): "damaged", b"": "it is empty"}
+    bad[b"<p>Not found, but with status 200"] = "this is no VDI file: it begins"
+    bad[b"PK\3\4" + b"\0" * 100] = "VDI"
     for change in ({"n_supersegments": 10**9}, {"camera": None}, {"version": 99}, {"arrays": {}}):
-        bad.append(described(data, **change))
+        bad[described(data, **change)] = "VDI"
     files = {f"{k}.vdi": content for k, content in enumerate(bad)}
     page = open_page(SIZE, files={"good.vdi": data, **files}, expected="404")
-    names = [*files, "none.vdi", "http://["]
+    words = {name: bad[content] for name, content in files.items()}
+    words |= {"none.vdi": "none.vdi cannot be read: 404", "http://[": "http://[ cannot be read"}
+    names = [*words]
     whole, *said, again = page.evaluate(SHOW, ["good.vdi", *names, "good.vdi"])
-    assert (whole["state"], whole["level"], whole["alert"], whole["told"]) == (
-        *("full", "full", ""),
-        [],
-    )
+    assert (whole["state"], whole["level"], whole["alert"]) == ("full", "full", "")
     assert again == whole  # whatever came between
     for name, answer in zip(names, said, strict=True):
         assert answer["state"] == "error", name
         assert answer["told"] == [answer["outcome"]] == [answer["alert"]]
         assert not any(word in answer["alert"] for word in ("undefined", "NaN", "not a function"))
-        assert "VDI" in answer["alert"] or "cannot be read" in answer["alert"]
-    assert "none.vdi cannot be read: 404" in said[-2]["alert"]
-    assert "http://[ cannot be read" in said[-1]["alert"]
+        assert words[name] in answer["alert"]
     assert page.page.locator("vdi-viewer").get_by_role("alert").is_hidden()
 
 
@@ -391,19 +384,6 @@ def test_elements_come_and_go(vdi, data, open_page):
         )
     page.load(data)
     assert_as_rendered(page, vdi)
-
-
-#: Counts what a page has of each kind of WebGL's objects.
-COUNTING = """
-window.alive = {};
-const of = WebGL2RenderingContext.prototype;
-for (const kind of ["Texture", "Framebuffer", "Program", "VertexArray", "Shader"]) {
-  const [make, free] = [of["create" + kind], of["delete" + kind]];
-  alive[kind] = 0;
-  of["create" + kind] = function (...rest) { ++alive[kind]; return make.apply(this, rest); };
-  of["delete" + kind] = function (what) { alive[kind] -= !!what; return free.call(this, what); };
-}
-"""
 
 
 @pytest.mark.slow

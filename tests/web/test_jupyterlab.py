@@ -196,24 +196,14 @@ def until(condition):
         time.sleep(0.1)
 
 
-@pytest.fixture
-def context(chromium):
-    context = chromium.new_context(viewport={"width": 900, "height": 1400})
-    context.add_init_script(HELPERS)
-    yield context
-    context.close()
-
-
 def assert_alike(picture, expected):
     """Hold the viewer's picture to the bound of issue 17."""
     assert np.mean(np.abs(picture - expected).max(axis=2) <= 2 / 255) >= 0.999
 
 
-def same_place(one, other):
-    return np.allclose(one["position"], other["position"], rtol=1e-9)
-
-
-def test_in_jupyterlab(context, lab, vdi):
+def test_in_jupyterlab(chromium, lab, vdi):
+    context = chromium.new_context(viewport={"width": 900, "height": 1400})
+    context.add_init_script(HELPERS)
     notebook = Notebook(context.new_page(), lab[1])
     notebook.run(TURNED)
     assert notebook.camera(TURNED) == viewer_camera(vdi.camera)
@@ -241,8 +231,13 @@ def test_in_jupyterlab(context, lab, vdi):
     notebook.drag(PLOTTED)
     turned = notebook.camera(PLOTTED)
     until(lambda: json.loads(notebook.run(READ_PLOTTER)) == turned)
+
     # The view rests there: the kernel makes a VDI of it, and the browser is given that
-    until(lambda: same_place(json.loads(notebook.run(READ_VDI)), turned))
+    def has_a_vdi_of_it():
+        made = json.loads(notebook.run(READ_VDI))
+        return np.allclose(made["position"], turned["position"], rtol=1e-9)
+
+    until(has_a_vdi_of_it)
     assert notebook.camera(PLOTTED) == turned
     notebook.run(SET_PLOTTER)
     until(lambda: notebook.camera(PLOTTED) == json.loads(notebook.run(READ_PLOTTER)) != turned)
@@ -268,6 +263,7 @@ def test_in_jupyterlab(context, lab, vdi):
     server = lab[1].partition("/doc")[0]
     foreign = [url for url in notebook.hosts if not url.startswith((server, "blob:", "data:"))]
     assert not foreign
+    context.close()
 
 
 def pictures_in(path):

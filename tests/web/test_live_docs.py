@@ -22,10 +22,13 @@ DOCS = CHECKOUT / "docs"
 NAMES = {"brain.html", "rayleigh_taylor.html"}
 SIZE = (120, 90)
 
-pytestmark = pytest.mark.skipif(
-    not (DOCS / "live.py").is_file(),
-    reason="no documentation at hand: set PYVISTA_VDI_CHECKOUT to a checkout",
-)
+pytestmark = [
+    pytest.mark.slow,  # .ci/run has it of the built site
+    pytest.mark.skipif(
+        not (DOCS / "live.py").is_file(),
+        reason="no documentation at hand: set PYVISTA_VDI_CHECKOUT to a checkout",
+    ),
+]
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +53,6 @@ def site(tmp_path_factory, default_runtime):
     return folder
 
 
-@pytest.mark.slow  # .ci/run has it of the built site
 @pytest.mark.parametrize("name", ["index", "gallery"])
 def test_vdis_turn_on_the_page(site, open_page, name):
     """Dragged in the page; the picture is then the raycaster's from where the drag led."""

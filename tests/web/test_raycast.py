@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import strategies
-from browsers import array_of, in_base64
+from browsers import COUNTING, array_of, file_of, in_base64
 from oracle import explain
 from real_data import require_data
 
@@ -28,31 +28,15 @@ TOLERANCE = 2e-4
 PRECISIONS = ("exact", "8-byte")
 
 SCRIPT = """
+import { decodeVDI } from "./decode.js";
 import { prepare } from "./prepare.js";
 import { Raycaster } from "./raycast.js";
 
-const KINDS = { f4: Float32Array, u4: Uint32Array, i4: Int32Array, u2: Uint16Array };
 const gl = window.gl = document.createElement("canvas").getContext("webgl2");
 gl.getExtension("EXT_color_buffer_float");
 const raycaster = window.raycaster = new Raycaster(gl);
 
-// Textures that are there: made and not deleted
-window.textures = new Set();
-for (const [name, change] of [["createTexture", "add"], ["deleteTexture", "delete"]]) {
-  const own = gl[name].bind(gl);
-  gl[name] = (...given) => {
-    const texture = own(...given);
-    textures[change](texture ?? given[0]);
-    return texture;
-  };
-}
-
-window.give = ({ arrays, ...vdi }) => {
-  for (const [name, [kind, text]] of Object.entries(arrays)) {
-    vdi[name] = new KINDS[kind](bytesOf(text).buffer);
-  }
-  raycaster.set(prepare(vdi));
-};
+window.give = async (text) => raycaster.set(prepare(await decodeVDI(bytesOf(text))));
 
 function texture(format, width, height) {
   const made = gl.createTexture();
@@ -85,35 +69,6 @@ window.picture = (camera, width, height, clippingPlanes, depth, few) => {
 """
 
 
-def text_of(array):
-    return in_base64(np.ascontiguousarray(array).tobytes())
-
-
-def in_javascript(vdi):
-    """A VDI as decode.js makes it, its arrays in base64."""
-    arrays = {"offsets": ("u4", vdi.offsets)}
-    state = {
-        "windowSize": list(vdi.window_size),
-        "camera": vdi.camera.to_dict(),
-        "bounds": [float(x) for x in vdi.bounds],
-        "depthOrigin": float(vdi.depth_origin),
-        "precision": vdi.precision,
-    }
-    if vdi.precision == "8-byte":
-        packing = vdi.packing
-        state["depthStep"] = float(packing.step)
-        arrays |= {"words": ("u4", packing.words), "origin": ("i4", packing.origins)}
-        arrays["stride"] = ("u2", packing.strides)
-    else:
-        arrays |= {name: ("f4", getattr(vdi, name)) for name in ("front", "back", "color")}
-        arrays["opticalDepth"] = ("f4", vdi.optical_depth)
-    state["arrays"] = {
-        name: (kind, text_of(np.asarray(value).astype("<" + kind)))
-        for name, (kind, value) in arrays.items()
-    }
-    return state
-
-
 class Raycaster:
     """The page's raycaster."""
 
@@ -121,7 +76,7 @@ class Raycaster:
         self.page = page
 
     def give(self, vdi):
-        self.page.evaluate("(vdi) => give(vdi)", in_javascript(vdi))
+        self.page.evaluate("(text) => give(text)", in_base64(file_of(vdi, "none")))
 
     def draw(self, camera, size, *, clipping_planes=(), opaque_depth=None, few=False):
         """Premultiplied RGBA, float32 (H, W, 4), top row first."""
@@ -129,7 +84,7 @@ class Raycaster:
             {"origin": [float(x) for x in plane[:3]], "normal": [float(x) for x in plane[3:]]}
             for plane in clipping_planes
         ]
-        depth = None if opaque_depth is None else text_of(opaque_depth[::-1])
+        depth = None if opaque_depth is None else in_base64(opaque_depth[::-1].tobytes())
         text = self.page.evaluate(
             "(given) => picture(...given)", [camera.to_dict(), *size, planes, depth, few]
         )
@@ -300,7 +255,7 @@ def test_long_lists_and_empty_space_between_them(raycaster):
     """
     vdi = layers((90, 60), 300)
     assert np.diff(vdi.offsets).max() > 200
-    size = (48, 36)
+    size = (40, 30)
     for precision, turns in (("exact", (20, 200)), ("8-byte", (0, 90))):
         kept = vdi.with_precision(precision)
         raycaster.give(kept)
@@ -313,17 +268,18 @@ def test_long_lists_and_empty_space_between_them(raycaster):
 
 
 def test_a_vdi_is_swapped_whole_and_nothing_is_left_behind(open_page):
-    raycaster = Raycaster(open_page(script=SCRIPT, own=True))
-    page = raycaster.page
+    page = open_page(script=SCRIPT, before=COUNTING)
+    raycaster = Raycaster(page)
+    before = page.evaluate("alive.Texture")
     first = random_case([0, 0], "around")[1]
     second = random_case([1, 0], "around")[1].with_precision("8-byte")
     counts = []
     for vdi in (first, second, first, second):
         raycaster.give(vdi)
         raycaster.draw(vdi.camera, vdi.window_size)
-        counts.append(page.evaluate("() => textures.size"))
+        counts.append(page.evaluate("alive.Texture") - before)
     assert counts == [4, 3, 4, 3]  # an exact VDI's faces and media are textures of their own
-    before = raycaster.draw(second.camera, second.window_size)
+    picture = raycaster.draw(second.camera, second.window_size)
     refused = page.evaluate(
         """() => {
           const largest = gl.getParameter(gl.MAX_TEXTURE_SIZE);
@@ -333,9 +289,9 @@ def test_a_vdi_is_swapped_whole_and_nothing_is_left_behind(open_page):
     )
     assert "MAX_TEXTURE_SIZE" in refused
     assert "fewer lists" in refused
-    assert np.array_equal(raycaster.draw(second.camera, second.window_size), before)
+    assert np.array_equal(raycaster.draw(second.camera, second.window_size), picture)
     page.evaluate("() => raycaster.dispose()")
-    assert page.evaluate("() => textures.size") == 0
+    assert page.evaluate("alive.Texture") - before == 0
 
 
 def check_pictures(raycaster, vdi, cameras):

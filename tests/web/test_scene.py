@@ -11,7 +11,7 @@ import zlib
 import numpy as np
 import pytest
 import pyvista as pv
-from browsers import in_base64, picture
+from browsers import COUNTING, file_of, in_base64, picture
 from plugin_scenes import soft_ball
 from scipy import ndimage
 from skimage.metrics import structural_similarity
@@ -19,7 +19,6 @@ from vtkmodules.vtkCommonDataModel import vtkPlane
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
-from pyvista_vdi.io.vdi_file.writer import write_to
 from pyvista_vdi.web.bundle import viewer_script
 from pyvista_vdi.web.scenes.scene import scene_of
 
@@ -64,16 +63,15 @@ def page(open_page):
 def give(page, plotter, whole=True):
     """Show a plotter, and its scene in a page: the ``whole`` of it."""
     plotter.show(auto_close=False)
-    scene, data = scene_of(plotter.renderer), io.BytesIO()
+    scene = scene_of(plotter.renderer)
     assert not whole or scene.left_out == []
-    write_to(data, scene.vdi, "deflate", 1)
     page.evaluate(
         """async ([scene, data]) => {
           const { Scene } = await import("./scene.js");
           viewer.scene = new Scene(bytesOf(scene));
           await viewer.load(bytesOf(data));
         }""",
-        [in_base64(part) for part in (scene.data, data.getvalue())],
+        [in_base64(part) for part in (scene.data, file_of(scene.vdi))],
     )
     return scene
 
@@ -428,18 +426,6 @@ def test_subplots_stand_beside_each_other_and_turn_together(from_disk, tmp_path)
     assert pvdi.read(tmp_path / "scene.html").equals(vdi.with_precision("8-byte"))
 
 
-COUNTING = """
-window.alive = 0;
-const kinds = ["Texture", "Framebuffer", "Renderbuffer", "Buffer", "VertexArray", "Program"];
-for (const kind of kinds) {
-  const { prototype } = WebGL2RenderingContext;
-  const [create, remove] = [prototype[`create${kind}`], prototype[`delete${kind}`]];
-  prototype[`create${kind}`] = function () { ++window.alive; return create.call(this); };
-  prototype[`delete${kind}`] = function (it) { if (it) --window.alive; remove.call(this, it); };
-}
-"""
-
-
 @slow
 def test_scenes_that_follow_each_other_leave_nothing_behind(plotter, open_page):
     translucent_and_textured(plotter)
@@ -454,7 +440,7 @@ def test_scenes_that_follow_each_other_leave_nothing_behind(plotter, open_page):
             viewer.scene = next;
             await next.whole;
             await viewer.screenshot({ width: 32, height: 18 });
-            alive.push(window.alive);
+            alive.push(JSON.stringify(window.alive));
           }
           return alive;
         }""",

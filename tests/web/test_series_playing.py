@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from browsers import WITHOUT_WORKERS, in_base64
+from browsers import WITHOUT_WORKERS, file_of, in_base64
 from frames import frames_of
 
 import pyvista_vdi as pvdi
@@ -310,14 +310,14 @@ def test_without_workers_the_page_plays(series, playing):
 
 
 @pytest.mark.slow
-def test_another_file_takes_its_place_and_the_element_can_move(series, data, playing, tmp_path):
+def test_another_file_takes_its_place_and_the_element_can_move(series, data, playing):
     page = playing(attributes="autoplay")
     page.evaluate("{ const { parentNode } = viewer; viewer.remove(); parentNode.append(viewer); }")
     assert not page.evaluate("viewer.playing")
     seek(page, 3)
     page.wait_for("heard.at(-1)[0] === 'framedrawn' && heard.at(-1)[1].full")
     assert_is(page, series[6], series.camera)
-    page.load(series[2].save(tmp_path / "a.vdi").read_bytes())
+    page.load(file_of(series[2]))
     assert page.evaluate("[viewer.series, viewer.time, viewer.playing]") == [None, None, False]
     assert not page.page.locator("vdi-viewer .controls").is_visible()
     assert_is(page, series[2], series.camera)
