@@ -95,8 +95,9 @@ def other_property(pl, actor, volume):
 
 
 def copied_property(pl, actor, volume):
-    actor.prop = actor.prop.copy()
-    actor.prop.opacity_unit_distance = 0.4
+    copy = actor.prop.copy()
+    copy.opacity_unit_distance = 0.4
+    actor.prop = copy
 
 
 def function(*points):

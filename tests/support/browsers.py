@@ -18,6 +18,7 @@ from importlib import resources
 import numpy as np
 import pytest
 
+import pyvista_vdi as pvdi
 from pyvista_vdi.io.vdi_file.writer import write_to
 
 #: Names of Chromium in distributions.
@@ -232,6 +233,13 @@ class Page:
         """Wait until a JavaScript expression is true."""
         self.page.wait_for_function(condition)
 
+    def assert_shows(self, vdi, size, *views):
+        """Hold the viewer's pictures from views, or from the VDI's own, to those of ``render``."""
+        for view in views or [vdi.camera]:
+            expected = pvdi.render(vdi, view, size) * 255.0
+            # A picture has 8 bits, and float32 of two devices composites; test_raycast has the rest
+            assert np.abs(self.screenshot(view, size) - expected).max() <= 1.0
+
     def ready(self):
         """Wait until all of what is to be shown is drawn."""
         self.page.evaluate("viewer.ready.then(() => true)")
@@ -253,7 +261,7 @@ class Page:
 
 @pytest.fixture(scope="module")
 def shared_pages(chromium):
-    """Pages that the tests of a file share, by their scripts; each test has a viewer of its own."""
+    """Pages that the tests of a file share, by their scripts."""
     return {}
 
 
@@ -264,10 +272,10 @@ def open_page(chromium, shared_pages):
 
     ``before`` runs before anything else, ``script`` before there is a viewer. Of files named in
     ``in_parts`` the server gives parts. What the page complains of fails the test, but for what
-    ``expected`` (a pattern) is found in. Pages with nothing of their own are shared with other
-    tests, but for ``own``, and with ``options`` of Playwright's context; and viewers as well that
-    show ``data``, the bytes of a file: then the test leaves the viewer as it was, but for its view,
-    its planes and its background.
+    ``expected`` (a pattern) is found in. Without ``options`` of Playwright's context a page of the
+    same scripts is shared by the tests of a file, each of which has a viewer of its own; but a
+    viewer that shows ``data``, the bytes of a file, is shared as well: a test leaves it as it was,
+    but for its view, its planes and its background.
     """
     contexts, pages, used = [], [], []
 
@@ -288,10 +296,9 @@ def open_page(chromium, shared_pages):
         url=None,
         expected=None,
         in_parts=(),
-        own=False,
         **options,
     ):
-        shared = not (own or options or name or url)
+        shared = not (options or name or url)
         page = shared_pages.get((script, before)) if shared else None
         fresh = page is None
         if fresh:

@@ -1,7 +1,5 @@
 """The viewer reads files: every array as Python has it, and damaged ones refused by a sentence."""
 
-from __future__ import annotations
-
 import zipfile
 import zlib
 from io import BytesIO

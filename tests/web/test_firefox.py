@@ -3,8 +3,6 @@
 ``PYVISTA_VDI_FIREFOX`` names the executable where it is not in the path.
 """
 
-from __future__ import annotations
-
 import asyncio
 import os
 import re

@@ -1,7 +1,5 @@
 """VDIs in a real JupyterLab in a real browser: turned there, read in the kernel, and saved."""
 
-from __future__ import annotations
-
 import base64
 import importlib.util
 import io

@@ -4,8 +4,6 @@
 stand in a bare page, beside small VDIs that the same code makes.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import re

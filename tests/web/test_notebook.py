@@ -1,7 +1,5 @@
 """VDIs in notebooks: the widget, what IPython shows, PyVista's backend, and the view in a page."""
 
-from __future__ import annotations
-
 import asyncio
 import base64
 import importlib.metadata

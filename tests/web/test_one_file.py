@@ -1,7 +1,5 @@
 """One file with viewer and VDI: from disk, offline, in a real browser."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re

@@ -7,8 +7,6 @@ place. 6.4e-5 were seen by SwiftShader, of a thin supersegment.
 Against the kernels 99.9 % of pixels are within 2/255 and none is beyond 24/255.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import strategies

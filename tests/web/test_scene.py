@@ -1,7 +1,5 @@
 """Scenes in a page: what is seen among VDIs is what VTK draws of the same plotter."""
 
-from __future__ import annotations
-
 import io
 import json
 import re
@@ -60,11 +58,11 @@ def page(open_page):
     return open_page(SMALL)
 
 
-def give(page, plotter, whole=True):
-    """Show a plotter, and its scene in a page: the ``whole`` of it."""
+def give(page, plotter):
+    """Show a plotter, and its scene, of which nothing is left out, in a page."""
     plotter.show(auto_close=False)
     scene = scene_of(plotter.renderer)
-    assert not whole or scene.left_out == []
+    assert scene.left_out == []
     page.evaluate(
         """async ([scene, data]) => {
           const { Scene } = await import("./scene.js");

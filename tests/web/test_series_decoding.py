@@ -1,7 +1,5 @@
 """The viewer reads ``.vdis`` files: every step as Python has it, and damaged ones by a sentence."""
 
-from __future__ import annotations
-
 import base64
 
 import numpy as np

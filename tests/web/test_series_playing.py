@@ -1,7 +1,5 @@
 """Series in a page: every step drawn as Python draws it, sought, played, skipped where damaged."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from browsers import WITHOUT_WORKERS, file_of, in_base64
@@ -12,8 +10,6 @@ from pyvista_vdi.cli import main
 from pyvista_vdi.model.standard_cases import filling_camera
 
 SIZE = (97, 55)
-#: Of 255: as of tests/web/test_element.py.
-CLOSE = 1.0
 N = 9
 
 
@@ -63,11 +59,6 @@ def playing(data, open_page):
     return playing
 
 
-def assert_is(page, vdi, camera):
-    picture = page.screenshot(camera, SIZE)
-    assert np.abs(picture - pvdi.render(vdi, camera, SIZE) * 255.0).max() <= CLOSE
-
-
 def seek(page, time):
     page.evaluate("(time) => { viewer.time = time; }", time)
 
@@ -89,7 +80,7 @@ def test_steps_are_drawn_as_render_draws_them(series, playing):
     assert page.evaluate("[viewer.series.times, viewer.series.length]") == [list(series.times), N]
     assert page.evaluate("[viewer.time, viewer.playing, viewer.status.state]") == [0, False, "full"]
     turned = series.camera.azimuth(40)
-    assert_is(page, series[0], turned)
+    page.assert_shows(series[0], SIZE, turned)
     for time, step in ((3.6, 7), (-9, 0), (1.2, 2), (99, N - 1)):
         seek(page, time)
         assert page.evaluate("viewer.time") == series.times[step]
@@ -97,7 +88,7 @@ def test_steps_are_drawn_as_render_draws_them(series, playing):
         # The view stays
         position = page.evaluate("viewer.camera.position")
         np.testing.assert_allclose(position, turned.position)
-        assert_is(page, series[step], turned)
+        page.assert_shows(series[step], SIZE, turned)
         assert page.evaluate("viewer.status.supersegments") == series[step].n_supersegments
     assert shown(page) == [0, 7, 0, 2, N - 1]
 
@@ -111,7 +102,7 @@ def test_it_plays_to_its_end_in_order(series, playing):
     steps = shown(page)
     assert steps == sorted(set(steps))
     assert (steps[0], steps[-1]) == (0, N - 1)
-    assert_is(page, series[N - 1], series.camera)
+    page.assert_shows(series[N - 1], SIZE, series.camera)
     # From the first step again
     begun = page.evaluate("() => { viewer.play({ rate: 50, loop: false }); return viewer.time; }")
     assert begun == series.times[0]
@@ -134,7 +125,7 @@ def test_it_begins_anew_turns_meanwhile_and_pauses(series, playing):
     page.evaluate("viewer.pause()")
     page.ready()
     assert not page.evaluate("viewer.playing")
-    assert_is(page, series[series.nearest(page.evaluate("viewer.time"))], turned)
+    page.assert_shows(series[series.nearest(page.evaluate("viewer.time"))], SIZE, turned)
 
 
 @pytest.mark.slow
@@ -236,7 +227,7 @@ def test_steps_are_fetched_when_they_are_asked_for(series, frames, playing):
     asked = {part for name, part in page.asked if name == "ball.vdis"}
     assert wanted[0] in asked
     assert asked <= {*wanted}
-    assert_is(page, series[8], series.camera)
+    page.assert_shows(series[8], SIZE, series.camera)
 
 
 def test_the_first_step_is_shown_while_the_rest_comes(series, data, frames, open_page):
@@ -299,14 +290,14 @@ def test_a_step_that_was_given_up_comes_when_the_element_is_back(series, playing
         }"""
     )
     page.ready()
-    assert_is(page, series[6], series.camera)
+    page.assert_shows(series[6], SIZE, series.camera)
 
 
 @pytest.mark.slow
 def test_without_workers_the_page_plays(series, playing):
     page = playing(before=WITHOUT_WORKERS)
     seek(page, 2)
-    assert_is(page, series[4], series.camera)
+    page.assert_shows(series[4], SIZE, series.camera)
 
 
 @pytest.mark.slow
@@ -316,11 +307,11 @@ def test_another_file_takes_its_place_and_the_element_can_move(series, data, pla
     assert not page.evaluate("viewer.playing")
     seek(page, 3)
     page.wait_for("heard.at(-1)[0] === 'framedrawn' && heard.at(-1)[1].full")
-    assert_is(page, series[6], series.camera)
+    page.assert_shows(series[6], SIZE, series.camera)
     page.load(file_of(series[2]))
     assert page.evaluate("[viewer.series, viewer.time, viewer.playing]") == [None, None, False]
     assert not page.page.locator("vdi-viewer .controls").is_visible()
-    assert_is(page, series[2], series.camera)
+    page.assert_shows(series[2], SIZE, series.camera)
     for call in ("viewer.play()", "viewer.time = 1"):
         with pytest.raises(Exception, match="no series"):
             page.evaluate(f"() => {{ {call}; }}")
@@ -343,7 +334,7 @@ def test_a_page_of_its_own_plays_from_disk(series, open_page, tmp_path):
     page.wait_for("viewer.series?.complete && viewer.playing && viewer.time > 1")
     page.evaluate("viewer.pause()")
     seek(page, 4)
-    assert_is(page, series[8], series.camera)
+    page.assert_shows(series[8], SIZE, series.camera)
     assert page.page.title() == "a ball"
 
 

@@ -1,7 +1,5 @@
 """The page of a server in a real browser: it draws what it has, and is sent what its view needs."""
 
-from __future__ import annotations
-
 import io
 import re
 import urllib.request

@@ -1,7 +1,5 @@
 """Served VDIs: what clients get, whom the server lets in, and that none can harm another."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import inspect

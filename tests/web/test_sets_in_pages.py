@@ -1,7 +1,5 @@
 """Sets in a page: each view is drawn by the VDI nearest to it, which is fetched when it is near."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -16,8 +14,6 @@ from pyvista_vdi.sets import files
 from pyvista_vdi.sets.sphere import orbit, spiral, spread
 
 SIZE = (97, 55)
-#: Of 255: as of tests/web/test_element.py.
-CLOSE = 1.0
 
 
 @pytest.fixture(scope="module")
@@ -61,11 +57,6 @@ def turning(data, open_page):
     return turning
 
 
-def assert_is_drawn(page, vdis, view):
-    picture = page.screenshot(view, SIZE)
-    assert np.abs(picture - pvdi.render(vdis, view, SIZE) * 255.0).max() <= CLOSE
-
-
 def test_each_view_is_drawn_by_the_vdi_nearest_to_it(vdis, turning):
     page = turning()
     page.ready()
@@ -74,13 +65,13 @@ def test_each_view_is_drawn_by_the_vdi_nearest_to_it(vdis, turning):
     assert page.evaluate("[viewer.series, viewer.time, viewer.playing]") == [None, None, False]
     seen = set()
     for view in [vdis.camera, *orbit(vdis.camera, vdis.bounds, spiral(7))]:
-        assert_is_drawn(page, vdis, view)
+        page.assert_shows(vdis, SIZE, view)
         seen.add(vdis.nearest(view))
         assert page.evaluate("viewer.set.nearest") == vdis.nearest(view)
     assert len(seen) > 4
     # Of two eyes in one line the nearer one's distance counts as well
     near = vdis.camera.replace(position=0.5 * np.add(vdis.camera.position, vdis.camera.focal_point))
-    assert_is_drawn(page, vdis, near)
+    page.assert_shows(vdis, SIZE, near)
     assert page.page.locator("vdi-viewer .controls").is_hidden()
     with pytest.raises(Exception, match="no series"):
         page.evaluate("viewer.play()")
@@ -111,7 +102,7 @@ def test_views_are_fetched_as_it_turns(vdis, data, turning):
     for angle in range(8, 121, 8):
         view = vdis.camera.azimuth(angle)
         before = fetched()
-        assert_is_drawn(page, vdis, view)
+        page.assert_shows(vdis, SIZE, view)
         if vdis.nearest(view) != nearest:
             nearest = vdis.nearest(view)
             early, late = early + (nearest in before), late + (nearest not in before)

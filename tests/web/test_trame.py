@@ -1,7 +1,5 @@
 """The component for trame apps: VDIs from Python, the camera both ways, in a real browser."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys
