@@ -1,11 +1,10 @@
 """Write ``docs/drop_in.md``: draws the cases of all kinds, or of those that are named.
 
-``python tests/drop_in/make_page.py [arguments data ...]``
+``python tests/drop_in/make_page.py [arguments data ... | on-screen]``
 """
 
-from __future__ import annotations
-
 import importlib
+import json
 import sys
 from pathlib import Path
 
@@ -13,7 +12,7 @@ TESTS = Path(__file__).resolve().parents[1]
 if __name__ == "__main__":
     sys.path[:0] = [str(TESTS), str(TESTS / "support")]
 
-from drop_in.stage import LARGEST_BLOCK, LEAST_SSIM, PAGE, Case, Kind, least_ssims, outcome  # noqa: E402
+from drop_in.stage import LARGEST_BLOCK, LEAST_SSIM, PAGE, least_ssims, outcome  # noqa: E402
 
 NAMES = ("arguments", "data", "neighbours", "views", "changes")
 
@@ -33,17 +32,17 @@ them with every change, and these every night in windows on a (virtual) screen, 
 """
 
 
-def kinds() -> dict[str, Kind]:
+def kinds():
     """Return the kinds of cases by the names of their modules."""
     return {name: importlib.import_module(f"drop_in.test_{name}").kind for name in NAMES}
 
 
-def works(case: Case) -> bool:
+def works(case):
     """Whether a case shows a picture."""
     return not (case.refused or case.both_refuse or case.defect)
 
 
-def page(least: dict[str, float]) -> str:
+def page(least):
     """Return the page, with the least SSIM of each kind by its title."""
     every = kinds().values()
     cases = [case for kind in every for case in kind.cases]
@@ -75,12 +74,22 @@ def page(least: dict[str, float]) -> str:
     return "".join(out)
 
 
-def _cell(text: str) -> str:
+def _cell(text):
     return "`" + text + "`" if "=" in text or "_" in text else text
 
 
-def main() -> None:
-    """Draw, and write the page."""
+def differences_on_screen():
+    """Draw the quick cases in windows on the screen that DISPLAY names; return what is wrong."""
+    quick = [case for kind in kinds().values() for case in kind.cases if case.quick]
+    found = {case.name: outcome(case, off_screen=False).wrong for case in quick}
+    return {"cases": len(found), "wrong": {name: wrong for name, wrong in found.items() if wrong}}
+
+
+def main():
+    """Draw, and write the page; or print what is wrong on a screen."""
+    if "on-screen" in sys.argv:
+        print(json.dumps(differences_on_screen()))
+        return
     chosen = [each for each in sys.argv[1:] if each in NAMES]
     least = least_ssims() if PAGE.is_file() else {}
     for name, kind in kinds().items():

@@ -1,11 +1,9 @@
 """Scenes that are drawn twice, with ``add_volume`` and with ``add_vdi``, and what each must show.
 
 A case is a function ``scene(plotter, add)`` as a user's script has it; ``add`` is the plotter's
-``add_volume``, then its ``add_vdi``. It returns nothing, and the picture is a screenshot, or a list
-of pictures that it took. The kinds of cases are the files ``test_*.py`` beside this one.
+``add_volume``, then its ``add_vdi``. It returns nothing, and the picture is a screenshot, or the
+pictures that it took. The kinds of cases are the files ``test_*.py`` beside this one.
 """
-
-from __future__ import annotations
 
 import os
 import re
@@ -13,7 +11,6 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -33,74 +30,52 @@ CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve
 #: The page that make_page.py writes of all cases.
 PAGE = CHECKOUT / "docs" / "drop_in.md"
 
-Scene = Callable[[pv.Plotter, "Add"], Any]
-
 
 @dataclass(frozen=True)
 class Case:
-    """One script, and what is expected of it.
+    """One script, and what is expected of it."""
 
-    Parameters
-    ----------
-    name : str
-        What the page calls it.
-    scene : callable
-        Takes a plotter and an :class:`Add`.
-    window : dict
-        Arguments of the plotter.
-    refused : (str, str), optional
-        A pattern of the error (or warning) by which a VDI refuses it, and the reason for it.
-    both_refuse : bool
-        ``add_volume`` raises, and so does ``add_vdi``: one of this package's errors, or the same.
-    warns : str, optional
-        A pattern of a ``VDIWarning`` that comes with the right picture.
-    note : str
-        Where ``add_volume`` is wrong: how, and what the picture is compared with instead.
-    quick : bool
-        Runs with every change, not only at night.
-    defect : str
-        What is known to be wrong at present.
-    """
-
-    name: str
-    scene: Scene
-    window: dict[str, Any] = field(default_factory=dict)
+    name: str  # what the page calls it
+    scene: Callable  # takes a plotter and an Add
+    window: dict = field(default_factory=dict)  # arguments of the plotter
+    #: A pattern of the error (or warning) by which a VDI refuses it, and the reason for it
     refused: tuple[str, str] | None = None
+    #: ``add_volume`` raises, and so does ``add_vdi``: one of this package's errors, or the same
     both_refuse: bool = False
-    warns: str | None = None
+    warns: str | None = None  # a pattern of a VDIWarning that comes with the right picture
+    #: Where ``add_volume`` is wrong: how, and what the picture is compared with instead
     note: str = ""
-    quick: bool = False
-    defect: str = ""
+    quick: bool = False  # runs with every change, not only at night
+    defect: str = ""  # what is known to be wrong at present
+
+
+def expectations(keywords):
+    """Take what is said about a case, rather than given to ``add_volume``, out of keywords."""
+    said = ("refused", "both_refuse", "warns", "note", "quick", "defect")
+    return {name: keywords.pop(name) for name in said if name in keywords}
 
 
 class Kind:
     """Cases of a kind, each a test of the module that names them."""
 
-    def __init__(self, title: str) -> None:
-        self.title = title
-        self.cases: list[Case] = []
+    def __init__(self, title):
+        self.title, self.cases = title, []
 
-    def add(self, name: str, scene: Scene, **how: Any) -> None:
-        """Add a case."""
+    def add(self, name, scene, **how):
         assert name not in {case.name for case in self.cases}, name
         self.cases.append(Case(name, scene, **how))
 
-    def case(self, **how: Any) -> Callable[[Scene], Scene]:
-        """Add the decorated function as a case of its own name."""
+    def case(self, name=None, **how):
+        """Add the decorated function as a case, of its own name by default."""
+        return lambda scene: self.add(name or scene.__name__.replace("_", " "), scene, **how)
 
-        def add(scene: Scene) -> Scene:
-            self.add(scene.__name__.replace("_", " "), scene, **how)
-            return scene
-
-        return add
-
-    def test(self) -> Callable[[Case], None]:
+    def test(self):
         """Return a test of all cases."""
 
         @pytest.mark.parametrize(
             "case", [pytest.param(case, id=case.name, marks=_marks(case)) for case in self.cases]
         )
-        def test(case: Case, default_runtime: object) -> None:
+        def test(case, default_runtime):
             found = outcome(case)
             assert not found.wrong, found.wrong
             if found.ssim is not None and PAGE.is_file():
@@ -110,13 +85,13 @@ class Kind:
         return test
 
 
-def least_ssims() -> dict[str, float]:
+def least_ssims():
     """Return what the page says of each kind by its title."""
     rows = re.findall(r"^\| ([^*|]+) \|(?: \d+ \|){5} ([\d.]+) \|$", PAGE.read_text(), re.M)
     return {title: float(ssim) for title, ssim in rows}
 
 
-def _marks(case: Case) -> list[Any]:
+def _marks(case):
     marks = [pytest.mark.gl]
     if not case.quick:
         marks.append(pytest.mark.slow)
@@ -126,15 +101,14 @@ def _marks(case: Case) -> list[Any]:
 
 
 class Add:
-    """What a scene adds a volume with."""
+    """What a scene adds a volume with; VTK takes steps of half a voxel."""
 
-    def __init__(self, plotter: pv.Plotter, ours: bool) -> None:
-        self._plotter = plotter
-        self.ours = ours
+    def __init__(self, plotter, ours):
+        self.plotter, self.ours = plotter, ours
 
-    def __call__(self, volume: Any, *arguments: Any, **keywords: Any) -> Any:
-        """Add a volume to the plotter, or to ``to=``; VTK at steps of half a voxel."""
-        plotter = keywords.pop("to", self._plotter)
+    def __call__(self, volume, *arguments, to=None, **keywords):
+        """Add a volume to the plotter, or to another one."""
+        plotter = to or self.plotter
         if self.ours:
             return plotter.add_vdi(volume, *arguments, **keywords)
         actor = plotter.add_volume(volume, *arguments, **keywords)
@@ -143,7 +117,7 @@ class Add:
         return actor
 
 
-def half_voxel_steps(actor: Any) -> None:
+def half_voxel_steps(actor):
     """Have VTK's mapper of an actor take steps of half the smallest spacing, in the world."""
     mapper = actor.mapper
     for switch in ("SetAutoAdjustSampleDistances", "SetInteractiveAdjustSampleDistances"):
@@ -164,14 +138,14 @@ def half_voxel_steps(actor: Any) -> None:
 class Drawn:
     """What a scene gave one way: pictures or an error, and what was said."""
 
-    pictures: list[np.ndarray] = field(default_factory=list)
+    pictures: list = field(default_factory=list)
     error: Exception | None = None
-    said: list[str] = field(default_factory=list)
-    ours: list[str] = field(default_factory=list)
+    said: list = field(default_factory=list)
+    ours: list = field(default_factory=list)
     empty: np.ndarray | None = None
 
 
-def draw(case: Case, ours: bool, off_screen: bool = True) -> Drawn:
+def draw(case, ours, off_screen=True):
     """Draw a case one way."""
     drawn = Drawn()
     theme = pv.themes.Theme()
@@ -183,8 +157,8 @@ def draw(case: Case, ours: bool, off_screen: bool = True) -> Drawn:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                pictures = case.scene(plotter, Add(plotter, ours))
-                if pictures is None:
+                pictures = list(case.scene(plotter, Add(plotter, ours)) or [])
+                if not pictures:
                     pictures = [shot(plotter)]
                     drawn.empty = without_volumes(plotter)
                 drawn.pictures = [np.asarray(each)[..., :3] for each in pictures]
@@ -203,7 +177,7 @@ def draw(case: Case, ours: bool, off_screen: bool = True) -> Drawn:
     return drawn
 
 
-def shot(plotter: pv.Plotter, **how: Any) -> np.ndarray:
+def shot(plotter, **how):
     """Show a plotter, without handing control to its window, and return its picture."""
     if plotter.render_window.GetNeverRendered() or plotter._first_time:
         plotter.show(auto_close=False, interactive_update=not plotter.off_screen)
@@ -211,7 +185,7 @@ def shot(plotter: pv.Plotter, **how: Any) -> np.ndarray:
     return np.array(plotter.screenshot(return_img=True, **how))
 
 
-def without_volumes(plotter: pv.Plotter) -> np.ndarray:
+def without_volumes(plotter):
     """Return the picture without volumes, which says whether there were any in it."""
     for renderer in plotter.renderers:
         for prop in renderer.GetViewProps():
@@ -226,26 +200,22 @@ class Outcome:
 
     wrong: str = ""
     ssim: float | None = None
-    block: float | None = None
-    theirs: Drawn = field(default_factory=Drawn)
-    ours: Drawn = field(default_factory=Drawn)
 
 
-def outcome(case: Case, off_screen: bool = True) -> Outcome:
+def outcome(case, off_screen=True):
     """Draw a case both ways and judge it."""
     ours = draw(case, True, off_screen)
-    found = Outcome(ours=ours)
     if case.refused:
         said = [f"{ours.error}"] if isinstance(ours.error, VDIError) else ours.ours
-        if not any(re.search(case.refused[0], each) for each in said):
-            found.wrong = f"is not refused by {case.refused[0]!r}: {ours.error!r}, {ours.ours}"
-        return found
-    found.theirs = theirs = draw(case, False, off_screen)
-    found.wrong = _errors(case, theirs, ours) or _pictures(found, case)
-    return found
+        if any(re.search(case.refused[0], each) for each in said):
+            return Outcome()
+        return Outcome(f"is not refused by {case.refused[0]!r}: {ours.error!r}, {ours.ours}")
+    theirs = draw(case, False, off_screen)
+    wrong = _errors(case, theirs, ours)
+    return Outcome(wrong) if wrong or case.both_refuse else _compared(theirs, ours)
 
 
-def _errors(case: Case, theirs: Drawn, ours: Drawn) -> str:
+def _errors(case, theirs, ours):
     if case.both_refuse:
         if theirs.error is None or not isinstance(ours.error, VDIError | type(theirs.error)):
             return f"add_volume: {theirs.error!r}; add_vdi: {ours.error!r}"
@@ -261,28 +231,23 @@ def _errors(case: Case, theirs: Drawn, ours: Drawn) -> str:
     return f"said {unexpected}" if unexpected else ""
 
 
-def _pictures(found: Outcome, case: Case) -> str:
-    theirs, ours = found.theirs, found.ours
-    if case.both_refuse:
-        return ""
-    if [each.shape for each in theirs.pictures] != [each.shape for each in ours.pictures]:
-        return (
-            f"pictures of {[each.shape for each in theirs.pictures]} and "
-            f"{[each.shape for each in ours.pictures]}"
-        )
+def _compared(theirs, ours):
+    shapes = [[each.shape for each in drawn.pictures] for drawn in (theirs, ours)]
+    if shapes[0] != shapes[1]:
+        return Outcome("pictures of {} and {}".format(*shapes))
     if theirs.empty is not None and np.ptp(theirs.empty - theirs.pictures[0].astype(int)) < 20:
-        return "add_volume's own picture shows no volume"
+        return Outcome("add_volume's own picture shows no volume")
     pairs = list(zip(ours.pictures, theirs.pictures, strict=True))
-    found.ssim = min(compare_images(a / 255, b / 255).ssim for a, b in pairs)
-    found.block = max(_largest_block(a, b) for a, b in pairs)
-    if not found.ssim >= LEAST_SSIM:
-        return f"SSIM {found.ssim:.4f}"
-    if found.block > LARGEST_BLOCK:
-        return f"SSIM {found.ssim:.4f}, but 8 x 8 pixels differ by {found.block:.1f} of 255"
-    return ""
+    ssim = min(compare_images(a / 255, b / 255).ssim for a, b in pairs)
+    block = max(_largest_block(a, b) for a, b in pairs)
+    if not ssim >= LEAST_SSIM:
+        return Outcome(f"SSIM {ssim:.4f}", ssim)
+    if block > LARGEST_BLOCK:
+        return Outcome(f"SSIM {ssim:.4f}, but 8 x 8 pixels differ by {block:.1f} of 255", ssim)
+    return Outcome(ssim=ssim)
 
 
-def _largest_block(a: np.ndarray, b: np.ndarray, n: int = 8) -> float:
+def _largest_block(a, b, n=8):
     height, width = (size // n * n for size in a.shape[:2])
     difference = a[:height, :width].astype(float) - b[:height, :width]
     blocks = difference.reshape(height // n, n, width // n, n, 3).mean(axis=(1, 3))

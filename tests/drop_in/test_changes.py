@@ -1,191 +1,218 @@
 """Every kind of change: of the actor, its property and table, of data, and of the scene."""
 
-from __future__ import annotations
-
-from typing import Any
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pyvista as pv
-from drop_in.stage import Kind, half_voxel_steps, shot
+from drop_in.stage import WINDOW, Kind, half_voxel_steps, shot
 from drop_in.volumes import grid, values
+from PIL import Image, ImageSequence
+from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction, vtkPlane
+from vtkmodules.vtkRenderingCore import vtkColorTransferFunction
 
 kind = Kind("Changes after the first picture")
 
 
-def change(name: str, act: Any, *, again: bool = True, **how: Any) -> None:
+def change(name, act, *, quick=False, **arguments):
     """Add a case: a picture before and one after ``act(plotter, actor, volume)``."""
-    arguments = how.pop("arguments", {})
 
-    def scene(pl: pv.Plotter, add: Any) -> list[Any]:
+    def scene(pl, add):
         volume = grid()
         actor = add(volume, **{"show_scalar_bar": False, **arguments})
-        before = shot(pl)
+        yield shot(pl)
         act(pl, actor, volume)
-        return [before, shot(pl)]
+        yield shot(pl)
 
-    kind.add(name, scene, **how)
+    kind.add(name, scene, quick=quick)
 
 
-def to(target: str, **values: Any) -> Any:
-    """Return an act that sets attributes."""
+def table_of(actor):
+    return actor.mapper.lookup_table
 
-    def act(pl: Any, actor: Any, volume: Any) -> None:
-        place = {
-            "actor": actor,
-            "prop": actor.prop,
-            "table": actor.mapper.lookup_table,
-            "mapper": actor.mapper,
-        }[target]
-        for key, value in values.items():
-            setattr(place, key, value)
+
+def to(of, **attributes):
+    """An act that sets attributes of the actor, its property, or its table."""
+
+    def act(pl, actor, volume):
+        target = {"actor": actor, "prop": actor.prop, "table": table_of(actor)}[of]
+        for key, value in attributes.items():
+            setattr(target, key, value)
 
     return act
 
 
-# -- the actor
+def prop(name, value, *, quick=False, **arguments):
+    change(f"prop.{name}", to("prop", **{name: value}), quick=quick, **arguments)
+
+
+def clip(*normals):
+    """An act that clips by planes."""
+
+    def act(pl, actor, volume):
+        for normal in normals:
+            plane = vtkPlane()
+            plane.SetOrigin(0.1, 0, 0)
+            plane.SetNormal(*normal)
+            actor.mapper.AddClippingPlane(plane)
+
+    return act
+
+
+def add_moved_copy(pl, actor, volume):
+    other = actor.copy()
+    other.position = (2.2, 0, 0)
+    pl.add_actor(other)
+
+
 change("visibility", to("actor", visibility=False))
 change("position", to("actor", position=(0.4, 0.2, 0)), quick=True)
 change("scale", to("actor", scale=(1.2, 0.8, 1.0)))
 change("orientation", to("actor", orientation=(20, 30, 10)))
-change("rotate_x", lambda pl, actor, v: actor.rotate_x(40))
-change("rotate_y", lambda pl, actor, v: actor.rotate_y(40))
-change("rotate_z", lambda pl, actor, v: actor.rotate_z(40))
-change("origin", lambda pl, actor, v: (setattr(actor, "origin", (1, 0, 0)), actor.rotate_z(30)))
-change(
-    "user_matrix", to("actor", user_matrix=pv.Transform().rotate_y(30).translate(0.2, 0, 0).matrix)
-)
-change("a clipping plane", lambda pl, actor, v: actor.mapper.AddClippingPlane(plane()))
-change(
-    "two clipping planes",
-    lambda pl, actor, v: [
-        actor.mapper.AddClippingPlane(plane(n)) for n in ((1, 0.5, 0), (0, 0.2, -1))
-    ],
-)
-change("remove_actor", lambda pl, actor, v: pl.remove_actor(actor), quick=True)
-change(
-    "remove_actor and add_actor", lambda pl, actor, v: (pl.remove_actor(actor), pl.add_actor(actor))
-)
-change("clear", lambda pl, actor, v: pl.clear())
-change("clear_actors", lambda pl, actor, v: pl.clear_actors())
-change(
-    "add_actor of a copy", lambda pl, actor, v: (pl.remove_actor(actor), pl.add_actor(actor.copy()))
-)
-change("deep copy with another place", lambda pl, actor, v: moved(pl, actor))
+for axis in "xyz":
+    change(f"rotate_{axis}", lambda pl, a, v, name=f"rotate_{axis}": getattr(a, name)(40))
+change("origin", lambda pl, a, v: (setattr(a, "origin", (1, 0, 0)), a.rotate_z(30)))
+MATRIX = pv.Transform().rotate_y(30).translate(0.2, 0, 0).matrix
+change("user_matrix", to("actor", user_matrix=MATRIX))
+change("a clipping plane", clip((1, 0.5, 0)))
+change("two clipping planes", clip((1, 0.5, 0), (0, 0.2, -1)))
+change("remove_actor", lambda pl, a, v: pl.remove_actor(a), quick=True)
+change("remove_actor and add_actor", lambda pl, a, v: (pl.remove_actor(a), pl.add_actor(a)))
+change("clear", lambda pl, a, v: pl.clear())
+change("clear_actors", lambda pl, a, v: pl.clear_actors())
+change("add_actor of a copy", lambda pl, a, v: (pl.remove_actor(a), pl.add_actor(a.copy())))
+change("deep copy with another place", add_moved_copy)
 
-# -- its property
-change("prop.shade", to("prop", shade=True))
-change("prop.interpolation_type", to("prop", interpolation_type="linear"), quick=True)
-change("prop.opacity_unit_distance", to("prop", opacity_unit_distance=0.5))
-change("prop.ambient", to("prop", ambient=0.8), arguments={"shade": True})
-change("prop.diffuse", to("prop", diffuse=0.2), arguments={"shade": True})
-change("prop.specular", to("prop", specular=1.0, specular_power=50), arguments={"shade": True})
-change("prop.apply_lookup_table", lambda pl, actor, v: actor.prop.apply_lookup_table(table("hot")))
-change(
-    "another VolumeProperty",
-    lambda pl, actor, v: setattr(
-        actor, "prop", pv.VolumeProperty(lookup_table=table("hot"), opacity_unit_distance=0.3)
-    ),
-)
-change(
-    "a copy of the property",
-    lambda pl, actor, v: setattr(actor, "prop", changed(actor.prop.copy())),
-)
-change("prop.independent_components", to("prop", independent_components=True))
+
+def table():
+    made = pv.LookupTable(cmap="hot", scalar_range=(0, 255))
+    made.apply_opacity([0, 0.3, 0.1, 0.8])
+    return made
+
+
+def other_property(pl, actor, volume):
+    actor.prop = pv.VolumeProperty(lookup_table=table(), opacity_unit_distance=0.3)
+
+
+def copied_property(pl, actor, volume):
+    copy = actor.prop.copy()
+    copy.opacity_unit_distance = 0.4
+    actor.prop = copy
+
+
+def function(*points):
+    made = vtkPiecewiseFunction()
+    for point in points:
+        made.AddPoint(*point)
+    return made
+
+
+def color_function(pl, actor, volume):
+    made = vtkColorTransferFunction()
+    for point in ((0, 0, 0, 1), (150, 1, 1, 0), (255, 1, 0, 0)):
+        made.AddRGBPoint(*point)
+    actor.prop.SetColor(made)
+
+
+def opacity_function(pl, actor, volume):
+    points = ((0, 0), (100, 0.0), (130, 0.3), (255, 0.6))
+    actor.prop.SetScalarOpacity(function(*points))
+
+
+def gradient_opacity(pl, actor, volume):
+    actor.prop.SetGradientOpacity(function((0, 0), (400, 1)))
+
+
+prop("shade", True)
+prop("interpolation_type", "linear", quick=True)
+prop("opacity_unit_distance", 0.5)
+prop("ambient", 0.8, shade=True)
+prop("diffuse", 0.2, shade=True)
+change("prop.specular", to("prop", specular=1.0, specular_power=50), shade=True)
+change("prop.apply_lookup_table", lambda pl, a, v: a.prop.apply_lookup_table(table()))
+change("another VolumeProperty", other_property)
+change("a copy of the property", copied_property)
+prop("independent_components", True)
 change("table.cmap", to("table", cmap="inferno"), quick=True)
 change("table.scalar_range", to("table", scalar_range=(50, 150)))
-change(
-    "table.apply_opacity",
-    lambda pl, actor, v: actor.mapper.lookup_table.apply_opacity([0, 0.5, 0, 0.9]),
-)
-change("table.apply_cmap", lambda pl, actor, v: actor.mapper.lookup_table.apply_cmap("hot", 256))
-change("VTK's colour function", lambda pl, actor, v: actor.prop.SetColor(color_function()))
-change(
-    "VTK's opacity function", lambda pl, actor, v: actor.prop.SetScalarOpacity(opacity_function())
-)
-change(
-    "VTK's gradient opacity",
-    lambda pl, actor, v: actor.prop.SetGradientOpacity(gradient_function()),
-    arguments={"opacity": 0.3},
-)
-
-# -- data
-change(
-    "values in place",
-    lambda pl, actor, v: v["values"].__setitem__(slice(None), values(24, 1).ravel() * 255),
-    quick=True,
-    note="",
-)
-change(
-    "values and Modified",
-    lambda pl, actor, v: (
-        v["values"].__setitem__(slice(None), values(24, 1).ravel() * 255),
-        v.Modified(),
-    ),
-)
-change(
-    "another array of the name",
-    lambda pl, actor, v: v.__setitem__("values", (values(24, 1).ravel() * 255).astype(np.float32)),
-)
-change("another origin", lambda pl, actor, v: setattr(v, "origin", (0, 0, 0)))
-change("another spacing", lambda pl, actor, v: setattr(v, "spacing", (0.1, 0.05, 0.1)))
-change(
-    "another active array",
-    lambda pl, actor, v: (v.__setitem__("other", 255 - v["values"]), v.set_active_scalars("other")),
-)
+change("table.apply_opacity", lambda pl, a, v: table_of(a).apply_opacity([0, 0.5, 0, 0.9]))
+change("table.apply_cmap", lambda pl, a, v: table_of(a).apply_cmap("hot", 256))
+change("VTK's colour function", color_function)
+change("VTK's opacity function", opacity_function)
+change("VTK's gradient opacity", gradient_opacity, opacity=0.3)
 
 
-# -- the scene
-def replaced(pl: pv.Plotter, add: Any) -> list[Any]:
-    add(grid(), name="ball", show_scalar_bar=False)
-    before = shot(pl)
-    add(grid(seed=1), name="ball", cmap="hot", show_scalar_bar=False)
-    return [before, shot(pl)]
+def other_values():
+    return (values(24, 1).ravel() * 255).astype(np.float32)
 
 
-kind.add("replaced by name", replaced, quick=True)
+def in_place(pl, actor, volume):
+    volume["values"][:] = other_values()
+
+
+def another_array(pl, actor, volume):
+    volume["values"] = other_values()
+
+
+def another_active_array(pl, actor, volume):
+    volume["other"] = 255 - volume["values"]
+    volume.set_active_scalars("other")
+
+
+change("values in place", in_place, quick=True)
+change("values and Modified", lambda pl, a, v: (in_place(pl, a, v), v.Modified()))
+change("another array of the name", another_array)
+change("another origin", lambda pl, a, v: setattr(v, "origin", (0, 0, 0)))
+change("another spacing", lambda pl, a, v: setattr(v, "spacing", (0.1, 0.05, 0.1)))
+change("another active array", another_active_array)
+
+BARE = {"show_scalar_bar": False}
+
+
+@kind.case(quick=True)
+def replaced_by_name(pl, add):
+    add(grid(), name="ball", **BARE)
+    yield shot(pl)
+    add(grid(seed=1), name="ball", cmap="hot", **BARE)
+    yield shot(pl)
 
 
 @kind.case()
-def a_loop_that_replaces_by_name(pl: pv.Plotter, add: Any) -> list[Any]:
-    out = []
+def a_loop_that_replaces_by_name(pl, add):
     for i in range(4):
-        add(grid(seed=i / 3), name="ball", clim=(0, 255), show_scalar_bar=False)
-        out.append(shot(pl))
-    return out
+        add(grid(seed=i / 3), name="ball", clim=(0, 255), **BARE)
+        yield shot(pl)
 
 
 @kind.case()
-def removed_by_name_and_added_again(pl: pv.Plotter, add: Any) -> None:
-    add(grid(), name="ball", show_scalar_bar=False)
+def removed_by_name_and_added_again(pl, add):
+    add(grid(), name="ball", **BARE)
     shot(pl)
     pl.remove_actor("ball")
-    add(grid(seed=1), show_scalar_bar=False)
+    add(grid(seed=1), **BARE)
 
 
 @kind.case()
-def a_mesh_that_moves_through(pl: pv.Plotter, add: Any) -> list[Any]:
-    add(grid(), show_scalar_bar=False)
+def a_mesh_that_moves_through(pl, add):
+    add(grid(), **BARE)
     mesh = pl.add_mesh(pv.Sphere(radius=0.4), color="w", reset_camera=False)
-    out = []
     for x in (-1, 0, 1):
         mesh.position = (x, x, x)
-        out.append(shot(pl))
-    return out
+        yield shot(pl)
 
 
 @kind.case()
-def one_grid_in_two_plots(pl: pv.Plotter, add: Any) -> list[Any]:
-    volume, out = grid(), []
+def one_grid_in_two_plots(pl, add):
+    volume = grid()
     for k in range(2):
-        other = pv.Plotter(window_size=(200, 150), off_screen=True)
+        other = pv.Plotter(window_size=WINDOW, off_screen=True)
         volume[f"v{k}"] = (values(24, k).ravel() * (50 + 200 * k)).astype(np.float32)
         add(volume, to=other, scalars=f"v{k}")
-        out.append(shot(other))
-    return out
+        yield shot(other)
 
 
 @kind.case(window={"shape": (1, 2), "window_size": (300, 150)})
-def one_grid_twice_with_other_data(pl: pv.Plotter, add: Any) -> None:
+def one_grid_twice_with_other_data(pl, add):
     volume = grid()
     for k in range(2):
         pl.subplot(0, k)
@@ -195,191 +222,119 @@ def one_grid_twice_with_other_data(pl: pv.Plotter, add: Any) -> None:
 
 
 @kind.case()
-def one_grid_twice_at_other_places(pl: pv.Plotter, add: Any) -> None:
+def one_grid_twice_at_other_places(pl, add):
     volume = grid()
-    add(volume, show_scalar_bar=False)
+    add(volume, **BARE)
     volume.origin = (1.5, 0, 0)
-    add(volume, show_scalar_bar=False, cmap="hot", name="second")
+    add(volume, cmap="hot", name="second", **BARE)
 
 
 @kind.case()
-def a_light_that_moves(pl: pv.Plotter, add: Any) -> list[Any]:
-    add(grid(), shade=True, show_scalar_bar=False)
+def a_light_that_moves(pl, add):
+    add(grid(), shade=True, **BARE)
     light = pv.Light(position=(0, 5, 0), light_type="scene light")
     pl.add_light(light)
-    before = shot(pl)
+    yield shot(pl)
     light.position = (5, -5, 0)
-    return [before, shot(pl)]
+    yield shot(pl)
 
 
 @kind.case(quick=True)
-def a_small_turn(pl: pv.Plotter, add: Any) -> list[Any]:
-    add(grid(), show_scalar_bar=False)
-    before = shot(pl)
+def a_small_turn(pl, add):
+    add(grid(), **BARE)
+    yield shot(pl)
     pl.camera.azimuth += 5
-    return [before, shot(pl)]
+    yield shot(pl)
 
 
 @kind.case()
-def an_orbit(pl: pv.Plotter, add: Any) -> list[Any]:
-    actor = add(grid(), show_scalar_bar=False)
-    out = [shot(pl)]
+def an_orbit(pl, add):
+    actor = add(grid(), **BARE)
+    yield shot(pl)
     for _ in range(3):
         pl.camera.Azimuth(90)
         if add.ours:
             actor.regenerate()
-        out.append(shot(pl))
-    return out
+        yield shot(pl)
 
 
-def film(name: str, begin: Any) -> None:
-    """Add a case of frames written to a file."""
-
-    def scene(pl: pv.Plotter, add: Any) -> list[Any]:
-        import tempfile
-        from pathlib import Path
-
-        from PIL import Image, ImageSequence
-
-        volume = grid()
-        add(volume, clim=(0, 255), show_scalar_bar=False)
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / name
-            begin(pl, path)
-            for i in range(3):
-                volume["values"][:] = values(24, i / 2).ravel() * 255
-                volume.Modified()
-                pl.write_frame()
-            pl.close()
-            with Image.open(path) as image:
-                return [np.asarray(f.convert("RGB")) for f in ImageSequence.Iterator(image)]
-
-    kind.add(f"a film: {name}", scene)
+@kind.case(name="a film: a.gif")
+def _(pl, add):
+    volume = grid()
+    add(volume, clim=(0, 255), **BARE)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.gif"
+        pl.open_gif(str(path))
+        for i in range(3):
+            volume["values"][:] = values(24, i / 2).ravel() * 255
+            volume.Modified()
+            pl.write_frame()
+        pl.close()
+        with Image.open(path) as image:
+            yield from [np.asarray(f.convert("RGB")) for f in ImageSequence.Iterator(image)]
 
 
-film("a.gif", lambda pl, path: pl.open_gif(str(path)))
-
-
-# -- widgets
-def widget(name: str, put: Any, **how: Any) -> None:
+def widget(name, put):
     """Add a case of a widget beside or on the volume."""
 
-    def scene(pl: pv.Plotter, add: Any) -> None:
-        put(pl, add(grid(), show_scalar_bar=False))
+    def scene(pl, add):
+        put(pl, add(grid(), **BARE))
 
-    kind.add(name, scene, **how)
+    kind.add(name, scene)
 
 
-widget(
-    "add_volume_clip_plane of the actor",
-    lambda pl, actor: pl.add_volume_clip_plane(actor, normal="x"),
-)
-widget(
-    "add_volume_clip_plane, normal and origin",
-    lambda pl, actor: pl.add_volume_clip_plane(actor, normal=(1, 1, 0), origin=(0.2, 0, 0)),
-)
-widget(
-    "add_volume_clip_plane, not implicit",
-    lambda pl, actor: pl.add_volume_clip_plane(actor, normal="y", implicit=False),
-)
+def method(name, *arguments, **keywords):
+    """Add a case of a plotter's method."""
+    widget(name, lambda pl, actor: getattr(pl, name)(*arguments, **keywords))
+
+
+def clip_plane(case, **how):
+    put = "add_volume_clip_plane"
+    widget(f"{put}{case}", lambda pl, actor: pl.add_volume_clip_plane(actor, **how))
+
+
+clip_plane(" of the actor", normal="x")
+clip_plane(", normal and origin", normal=(1, 1, 0), origin=(0.2, 0, 0))
+clip_plane(", not implicit", normal="y", implicit=False)
 
 
 @kind.case()
-def a_clip_plane_of_a_grid(pl: pv.Plotter, add: Any) -> None:
+def a_clip_plane_of_a_grid(pl, add):
     """``add_vdi_clip_plane(grid)`` in place of ``add_volume_clip_plane(grid)``."""
     put = pl.add_vdi_clip_plane if add.ours else pl.add_volume_clip_plane
-    put(grid(), normal="x", show_scalar_bar=False)
+    put(grid(), normal="x", **BARE)
     if not add.ours:
         half_voxel_steps(pl.volume)
 
 
-widget(
-    "add_slider_widget",
-    lambda pl, actor: pl.add_slider_widget(lambda value: None, (0, 1), title="x"),
-)
-widget(
-    "a slider that sets the range",
-    lambda pl, actor: pl.add_slider_widget(
-        lambda value: setattr(actor.mapper.lookup_table, "scalar_range", (value, 255)),
-        (0, 100),
-        value=60,
-    ),
-)
-widget(
-    "add_checkbox_button_widget",
-    lambda pl, actor: pl.add_checkbox_button_widget(actor.SetVisibility, value=True, size=20),
-)
-widget("add_box_widget", lambda pl, actor: pl.add_box_widget(lambda box: None))
-widget("add_plane_widget", lambda pl, actor: pl.add_plane_widget(lambda normal, origin: None))
-widget("add_line_widget", lambda pl, actor: pl.add_line_widget(lambda line: None))
-widget("add_sphere_widget", lambda pl, actor: pl.add_sphere_widget(lambda center: None, radius=0.3))
-widget(
-    "add_text_slider_widget",
-    lambda pl, actor: pl.add_text_slider_widget(lambda value: None, ["a", "b"]),
-)
-widget("add_measurement_widget", lambda pl, actor: pl.add_measurement_widget())
-widget("enable_point_picking", lambda pl, actor: pl.enable_point_picking(show_message=False))
-widget("enable_mesh_picking", lambda pl, actor: pl.enable_mesh_picking(show_message=False))
-widget("add_key_event", lambda pl, actor: pl.add_key_event("a", lambda: None))
-widget("enable_trackball_actor_style", lambda pl, actor: pl.enable_trackball_actor_style())
-widget("enable_terrain_style", lambda pl, actor: pl.enable_terrain_style())
-widget("track_mouse_position", lambda pl, actor: pl.track_mouse_position())
-widget("add_on_render_callback", lambda pl, actor: pl.add_on_render_callback(lambda p: None))
-widget("add_timer_event", lambda pl, actor: pl.add_timer_event(2, 100, lambda step: None))
+def range_by_slider(pl, actor):
+    def moved(value):
+        table_of(actor).scalar_range = (value, 255)
+
+    pl.add_slider_widget(moved, (0, 100), value=60)
 
 
-def plane(normal: Any = (1, 0.5, 0)) -> Any:
-    from vtkmodules.vtkCommonDataModel import vtkPlane
-
-    made = vtkPlane()
-    made.SetOrigin(0.1, 0, 0)
-    made.SetNormal(*normal)
-    return made
+def nothing(*_):
+    pass
 
 
-def table(cmap: str) -> pv.LookupTable:
-    made = pv.LookupTable(cmap=cmap, scalar_range=(0, 255))
-    made.apply_opacity([0, 0.3, 0.1, 0.8])
-    return made
-
-
-def changed(prop: pv.VolumeProperty) -> pv.VolumeProperty:
-    prop.opacity_unit_distance = 0.4
-    return prop
-
-
-def moved(pl: pv.Plotter, actor: Any) -> None:
-    other = actor.copy()
-    other.position = (2.2, 0, 0)
-    pl.add_actor(other)
-
-
-def color_function() -> Any:
-    from vtkmodules.vtkRenderingCore import vtkColorTransferFunction
-
-    made = vtkColorTransferFunction()
-    made.AddRGBPoint(0, 0, 0, 1)
-    made.AddRGBPoint(150, 1, 1, 0)
-    made.AddRGBPoint(255, 1, 0, 0)
-    return made
-
-
-def opacity_function() -> Any:
-    from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
-
-    made = vtkPiecewiseFunction()
-    for x, y in ((0, 0), (100, 0.0), (130, 0.3), (255, 0.6)):
-        made.AddPoint(x, y)
-    return made
-
-
-def gradient_function() -> Any:
-    from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
-
-    made = vtkPiecewiseFunction()
-    made.AddPoint(0, 0)
-    made.AddPoint(400, 1)
-    return made
-
+method("add_slider_widget", nothing, (0, 1), title="x")
+widget("a slider that sets the range", range_by_slider)
+BUTTON = {"value": True, "size": 20}
+name = "add_checkbox_button_widget"
+widget(name, lambda pl, actor: pl.add_checkbox_button_widget(actor.SetVisibility, **BUTTON))
+for each in ("box", "plane", "line"):
+    method(f"add_{each}_widget", nothing)
+method("add_sphere_widget", nothing, radius=0.3)
+method("add_text_slider_widget", nothing, ["a", "b"])
+method("add_measurement_widget")
+method("enable_point_picking", show_message=False)
+method("enable_mesh_picking", show_message=False)
+method("add_key_event", "a", lambda: None)
+method("enable_trackball_actor_style")
+method("enable_terrain_style")
+method("track_mouse_position")
+method("add_on_render_callback", nothing)
+method("add_timer_event", 2, 100, nothing)
 
 test_changes = kind.test()

@@ -8,6 +8,8 @@ loop running in its thread, so a file of tests has a browser of its own, which e
 from __future__ import annotations
 
 import base64
+import io
+import json
 import os
 import re
 import shutil
@@ -15,6 +17,9 @@ from importlib import resources
 
 import numpy as np
 import pytest
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.io.vdi_file.writer import write_to
 
 #: Names of Chromium in distributions.
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -31,27 +36,72 @@ SITE = "http://vdi.test/"
 #: Milliseconds after which something that should have happened has not.
 LONG = 120_000
 
+#: In every page.
+HELPERS = """
+window.bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+window.textOf = (bytes) => {
+  let text = "";
+  for (let k = 0; k < bytes.length; k += 8192) {
+    text += String.fromCharCode(...bytes.subarray(k, k + 8192));
+  }
+  return btoa(text);
+};
+// What a decoder returns: its arrays as base64, or its sentence
+window.told = async (decoding) => {
+  try {
+    const raw = ({ buffer, byteOffset, byteLength }) =>
+      textOf(new Uint8Array(buffer, byteOffset, byteLength));
+    return Object.fromEntries(Object.entries(await decoding).map(
+      ([name, value]) => [name, ArrayBuffer.isView(value) ? raw(value) : value]));
+  } catch (error) {
+    return `${error.name}: ${error.message}`;
+  }
+};
+"""
+
+WITHOUT_WORKERS = """
+window.Worker = class { constructor() { throw new Error("forbidden"); } };
+"""
+
+#: Counts a page's objects of WebGL.
+COUNTING = """
+window.alive = {};
+const of = WebGL2RenderingContext.prototype;
+for (const kind of ["Texture", "Framebuffer", "Renderbuffer", "Buffer", "VertexArray", "Program",
+  "Shader"]) {
+  const [make, free] = [of["create" + kind], of["delete" + kind]];
+  alive[kind] = 0;
+  of["create" + kind] = function (...rest) { ++alive[kind]; return make.apply(this, rest); };
+  of["delete" + kind] = function (what) { alive[kind] -= !!what; return free.call(this, what); };
+}
+"""
+
 PAGE = """<!doctype html><meta charset="utf-8"><style>body {{ margin: 0 }}</style>
-<vdi-viewer {attributes} style="width: {width}px; height: {height}px; aspect-ratio: auto">
-</vdi-viewer>
-<script type="module">
+<body></body><script type="module">
 import "./element.js";
 {script}
-const viewer = window.viewer = document.querySelector("vdi-viewer");
-window.heard = [];
-for (const name of ["camerachange", "framedrawn", "vditime", "error"]) {{
-  viewer.addEventListener(name, (event) => heard.push([name, event.detail]));
-}}
-window.bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-window.textOf = (bytes) => {{
-  let text = "";
-  for (let k = 0; k < bytes.length; k += 8192) {{
-    text += String.fromCharCode(...bytes.subarray(k, k + 8192));
+let shown = [];
+window.show = async (markup, data) => {{
+  if (!data || shown[0] !== markup || shown[1] !== data) {{
+    shown = [markup, data];
+    document.body.innerHTML = markup;
+    window.viewer = document.querySelector("vdi-viewer");
+    for (const name of ["camerachange", "framedrawn", "vditime", "error"]) {{
+      viewer?.addEventListener(name, (event) => heard.push([name, event.detail]));
+    }}
+    window.heard = [];
+    if (data) await viewer.load(bytesOf(data));
+    return;
   }}
-  return btoa(text);
+  window.heard = [];
+  viewer.clippingPlanes = [];
+  viewer.removeAttribute("background");
+  viewer.resetCamera();
 }};
-window.begun = true;
 </script>"""
+
+VIEWER = """<vdi-viewer {attributes}
+  style="width: {width}px; height: {height}px; aspect-ratio: auto"></vdi-viewer>"""
 
 
 def missing(reason):
@@ -78,36 +128,86 @@ def chromium():
         browser.close()
 
 
+def in_base64(data):
+    return base64.b64encode(data).decode()
+
+
+def file_of(vdi, compression="deflate"):
+    """The bytes of a VDI's file."""
+    stream = io.BytesIO()
+    write_to(stream, vdi, compression, 1)
+    return stream.getvalue()
+
+
+def array_of(text, dtype):
+    return np.frombuffer(base64.b64decode(text), dtype)
+
+
+def assert_decoded(got, vdi):
+    """Hold what a decoder has ``told`` to the VDI that Python has."""
+    assert isinstance(got, dict), got
+    assert tuple(got["windowSize"]) == vdi.window_size
+    assert got["camera"] == json.loads(json.dumps(vdi.camera.to_dict()))
+    assert (got["depthOrigin"], tuple(got["bounds"])) == (vdi.depth_origin, vdi.bounds)
+    wanted = {"offsets": vdi.offsets.astype("<u4")}
+    if vdi.precision == "8-byte":
+        packing = vdi.packing
+        assert (got["precision"], got["depthStep"]) == ("8-byte", packing.step)
+        wanted |= {"words": packing.words, "origin": packing.origins, "stride": packing.strides}
+    else:
+        assert got["precision"] == "exact"
+        wanted |= {name: getattr(vdi, name) for name in ("front", "back", "color")}
+        wanted["opticalDepth"] = vdi.optical_depth
+    for name, array in wanted.items():
+        found = array_of(got[name], array.dtype)
+        np.testing.assert_array_equal(found, array.reshape(-1), err_msg=name)
+
+
+def picture(page, size, viewer="viewer"):
+    """What a viewer of a page (or frame) shows: premultiplied RGBA, uint8, top row first."""
+    *shape, text = page.evaluate(
+        f"""async ([width, height]) => {{
+          const shot = await {viewer}.screenshot({{ width, height }});
+          return [shot.height, shot.width, textOf(shot.data)];
+        }}""",
+        list(size),
+    )
+    assert shape == [size[1], size[0]]
+    return array_of(text, np.uint8).reshape(*shape, 4)
+
+
 class Page:
     """A page with a viewer; ``page`` is Playwright's.
 
     ``asked`` has the names of the files that were asked for, and the range of each or None. Parts
-    are given of those whose names are in ``in_parts``.
+    are given of those whose names are in ``in_parts``. ``urls`` has what else was asked for.
     """
 
-    def __init__(self, page, files, expected, in_parts=()):
-        self.page = page
-        self.complaints = []
-        self.expected = expected
-        self.asked = []
-        self.in_parts = in_parts
-        page.set_default_timeout(LONG)
-        page.on("pageerror", lambda error: self._complain(str(error)))
-        page.on("console", self._hear)
-        page.route(SITE + "**", lambda route: self._answer(route, files))
+    def __init__(self, context):
+        self.page = context.new_page()
+        self.begin_anew()
+        self.page.set_default_timeout(LONG)
+        self.page.on("pageerror", lambda error: self.complain(str(error)))
+        self.page.on("console", self.hear)
+        self.page.on("request", lambda request: self.urls.append(request.url))
+        self.page.route(SITE + "**", self.answer)
 
-    def _hear(self, message):
+    def begin_anew(self, files=None, expected=None, in_parts=()):
+        self.files, self.expected, self.in_parts = dict(files or {}), expected, in_parts
+        self.asked, self.urls, self.complaints = [], [], []
+
+    def hear(self, message):
         # Calls that WebGL refuses are warnings to Chromium
         if message.type == "error" or "GL_INVALID" in message.text:
-            self._complain(message.text)
+            self.complain(message.text)
 
-    def _complain(self, text):
+    def complain(self, text):
         if not (self.expected and re.search(self.expected, text)):
             self.complaints.append(text)
 
-    def _answer(self, route, files):
+    def answer(self, route):
         name = route.request.url.removeprefix(SITE).partition("?")[0]
-        content = files.get(name)
+        content = self.files.get(name)
         part = re.fullmatch(r"bytes=(\d+)-(\d+)", route.request.headers.get("range", ""))
         self.asked.append((name, part and tuple(map(int, part.groups()))))
         if part and name in self.in_parts:
@@ -133,68 +233,104 @@ class Page:
         """Wait until a JavaScript expression is true."""
         self.page.wait_for_function(condition)
 
+    def assert_shows(self, vdi, size, *views):
+        """Hold the viewer's pictures from views, or from the VDI's own, to those of ``render``."""
+        for view in views or [vdi.camera]:
+            expected = pvdi.render(vdi, view, size) * 255.0
+            # A picture has 8 bits, and float32 of two devices composites; test_raycast has the rest
+            assert np.abs(self.screenshot(view, size) - expected).max() <= 1.0
+
+    def ready(self):
+        """Wait until all of what is to be shown is drawn."""
+        self.page.evaluate("viewer.ready.then(() => true)")
+
     def load(self, data):
         """Show the bytes of a .vdi file; return when all of it is drawn."""
-        text = base64.b64encode(data).decode()
-        self.page.evaluate("(text) => viewer.load(bytesOf(text)).then(() => true)", text)
+        self.page.evaluate("(text) => viewer.load(bytesOf(text)).then(() => true)", in_base64(data))
 
     def screenshot(self, camera, size):
         """The viewer's picture from a Camera, premultiplied, uint8 (H, W, 4), top row first."""
         keys = ["position", "focal_point", "view_up", "window_center"]
         keys.append("parallel_scale" if camera.parallel_projection else "view_angle")
         state = camera.to_dict()
-        shot = self.page.evaluate(
-            """async ([camera, width, height]) => {
-              viewer.camera = camera;
-              const shot = await viewer.screenshot({ width, height });
-              return [shot.width, shot.height, textOf(shot.data)];
-            }""",
-            [{key: state[key] for key in keys}, *size],
+        self.page.evaluate(
+            "(camera) => { viewer.camera = camera; }", {key: state[key] for key in keys}
         )
-        assert shot[:2] == list(size)
-        picture = np.frombuffer(base64.b64decode(shot[2]), np.uint8)
-        return picture.reshape(size[1], size[0], 4)
+        return picture(self.page, size)
+
+
+@pytest.fixture(scope="module")
+def shared_pages(chromium):
+    """Pages that the tests of a file share, by their scripts."""
+    return {}
 
 
 @pytest.fixture
-def open_page(chromium):
-    """Open a page with a viewer of ``size`` CSS pixels, or one of ``files`` by its ``name``.
+def open_page(chromium, shared_pages):
+    """Open a page with a viewer of ``size`` CSS pixels, the one of ``files`` that has ``name``, or
+    a ``url`` of the disk or of a server, which must ask for nothing from elsewhere.
 
-    ``before`` runs before anything else. Of files named in ``in_parts`` the server gives parts.
-    What the page complains of fails the test, but for what ``expected`` (a pattern) is found in.
+    ``before`` runs before anything else, ``script`` before there is a viewer. Of files named in
+    ``in_parts`` the server gives parts. What the page complains of fails the test, but for what
+    ``expected`` (a pattern) is found in. Without ``options`` of Playwright's context a page of the
+    same scripts is shared by the tests of a file, each of which has a viewer of its own; but a
+    viewer that shows ``data``, the bytes of a file, is shared as well: a test leaves it as it was,
+    but for its view, its planes and its background.
     """
-    contexts, pages = [], []
+    contexts, pages, used = [], [], []
+
+    def new(before, options):
+        context = chromium.new_context(**options)
+        context.add_init_script(HELPERS + before)
+        return Page(context)
 
     def open_page(
         size=(320, 180),
         *,
         attributes="",
+        data=None,
         script="",
         before="",
         files=None,
         name=None,
+        url=None,
         expected=None,
         in_parts=(),
         **options,
     ):
-        files = dict(files or {})
-        if name is None:
-            name = "page.html"
-            files[name] = PAGE.format(
-                attributes=attributes, script=script, width=size[0], height=size[1]
-            )
-        context = chromium.new_context(**options)
-        context.add_init_script(before)
-        contexts.append(context)
-        page = Page(context.new_page(), files, expected, in_parts)
-        pages.append(page)
-        page.page.goto(SITE + name)
-        if name == "page.html":
-            page.wait_for("window.begun")
+        shared = not (options or name or url)
+        page = shared_pages.get((script, before)) if shared else None
+        fresh = page is None
+        if fresh:
+            page = new(before, options)
+            if shared:
+                shared_pages[script, before] = page
+            else:
+                contexts.append(page.page.context)
+        if shared:
+            used.append((page, data))
+        page.begin_anew(files, expected, in_parts)
+        pages.append((page, url))
+        if url is None and name is None:
+            if fresh:
+                page.files["page.html"] = PAGE.format(script=script)
+                page.page.goto(SITE + "page.html")
+                page.wait_for("!!window.show")
+            markup = VIEWER.format(attributes=attributes, width=size[0], height=size[1])
+            page.evaluate("(given) => show(...given)", [markup, data and in_base64(data)])
+        else:
+            page.page.goto(url or SITE + name)
+            if options.get("java_script_enabled", True):
+                page.evaluate("window.viewer = document.querySelector('vdi-viewer')")
         return page
 
     yield open_page
+    for page, data in used:
+        if not data:
+            page.evaluate("show('')")
     for context in contexts:
         context.close()
-    complaints = [text for page in pages for text in page.complaints]
-    assert not complaints
+    for page, url in pages:
+        assert not page.complaints
+        ours = url and (url.partition("?")[0], "blob:", "data:")
+        assert not url or not [each for each in page.urls if not each.startswith(ours)]

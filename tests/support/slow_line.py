@@ -18,17 +18,11 @@ _LATE = 0.05
 class SlowLine:
     """Forwards connections to a port at so many bytes a second, so many seconds later.
 
-    Attributes
-    ----------
-    port : int
-        Where it listens.
-    down, up : int
-        Bytes that went to clients, and from them.
+    ``port`` is where it listens.
     """
 
-    def __init__(self, port, *, rate, latency):
-        self._to, self._rate, self._latency = port, rate, latency
-        self.port = self.down = self.up = 0
+    def __init__(self, to, *, rate, latency):
+        self._to, self._rate, self._latency = to, rate, latency
         self._ends = []
 
     async def __aenter__(self):
@@ -50,14 +44,11 @@ class SlowLine:
         there, back = await asyncio.open_connection(sock=way, limit=_PIECE)
         self._ends += [writer, back]
         with contextlib.suppress(ConnectionError, asyncio.CancelledError):
-            await asyncio.gather(
-                self._carry(there, writer, "down"), self._carry(reader, back, "up")
-            )
+            await asyncio.gather(self._carry(there, writer), self._carry(reader, back))
 
-    async def _carry(self, reader, writer, way):
+    async def _carry(self, reader, writer):
         loop = asyncio.get_running_loop()
-        held = max(1, int(self._rate * self._latency / _PIECE))  # what is on the line at once
-        line = asyncio.Queue(held)
+        line = asyncio.Queue(max(1, int(self._rate * self._latency / _PIECE)))  # what is on it
 
         async def deliver():
             while (item := await line.get()) is not None:
@@ -71,7 +62,6 @@ class SlowLine:
         async def take_up():
             free = loop.time()
             while data := await reader.read(_PIECE):
-                setattr(self, way, getattr(self, way) + len(data))
                 # Not from now on: sleeps last longer than asked for, which would slow the line
                 free = max(free, loop.time() - _LATE) + len(data) / self._rate
                 await line.put((free + self._latency, data))

@@ -1,9 +1,9 @@
 """What the tests of this room share."""
 
 import pytest
-from browsers import chromium, open_page
+from browsers import chromium, open_page, shared_pages
 
-__all__ = ["chromium", "open_page", "settled_at_once"]
+__all__ = ["chromium", "open_page", "settled_at_once", "shared_pages"]
 
 
 @pytest.fixture(scope="module")

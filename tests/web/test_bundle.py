@@ -1,7 +1,5 @@
 """The viewer's modules as one script: order, names, what is refused."""
 
-from __future__ import annotations
-
 import re
 from importlib import resources
 

@@ -3,10 +3,7 @@
 ``PYVISTA_VDI_FIREFOX`` names the executable where it is not in the path.
 """
 
-from __future__ import annotations
-
 import asyncio
-import base64
 import os
 import re
 import shutil
@@ -15,6 +12,7 @@ import subprocess
 import numpy as np
 import pytest
 import pyvista as pv
+from browsers import HELPERS, array_of
 from plugin_scenes import soft_ball
 from virtual_screen import virtual_screen
 
@@ -32,12 +30,10 @@ PREFERENCES = {"webgl.force-enabled": "true", "security.sandbox.content.level": 
 SOFTWARE = {"LIBGL_ALWAYS_SOFTWARE": "1", "MOZ_X11_EGL": "1"}
 
 SHOT = f"""async () => {{
+  {HELPERS}
   const viewer = document.querySelector("vdi-viewer");
   await viewer.ready;
-  const {{ data }} = await viewer.screenshot({{ width: {SIZE[0]}, height: {SIZE[1]} }});
-  let text = "";
-  for (const byte of data) text += String.fromCharCode(byte);
-  return btoa(text);
+  return textOf((await viewer.screenshot({{ width: {SIZE[0]}, height: {SIZE[1]} }})).data);
 }}"""
 
 
@@ -103,17 +99,21 @@ def picture_in_firefox(folder, page, script=SHOT):
             process.terminate()
             process.wait()
             process.stderr.close()
-    return np.frombuffer(base64.b64decode(text), np.uint8).reshape(*SIZE[::-1], 4)
+    return array_of(text, np.uint8).reshape(*SIZE[::-1], 4)
+
+
+def assert_as_rendered(folder, page, vdi, script=SHOT):
+    expected = pvdi.render(vdi, vdi.camera, SIZE) * 255.0
+    assert expected.max() > 200
+    # 8 bits, and other roundings of float32
+    assert np.abs(picture_in_firefox(folder, page, script) - expected).max() <= 1
 
 
 def test_a_page_from_disk_is_drawn_as_render_draws_it(tmp_path, default_runtime):
     volume = soft_ball()
     camera = filling_camera(volume.bounds, SIZE)
     vdi = pvdi.generate(volume, camera, SIZE, cmap="viridis", clim=(0, 1))
-    picture = picture_in_firefox(tmp_path, vdi.save(tmp_path / "ball.html"))
-    expected = pvdi.render(vdi.with_precision("8-byte"), camera, SIZE) * 255.0
-    assert expected.max() > 200
-    assert np.abs(picture - expected).max() <= 1  # 8 bits, and other roundings of float32
+    assert_as_rendered(tmp_path, vdi.save(tmp_path / "ball.html"), vdi.with_precision("8-byte"))
 
 
 @pytest.mark.gl
@@ -142,7 +142,4 @@ def test_a_page_of_a_series_shows_its_steps(tmp_path, default_runtime):
     series = pvdi.generate_series(balls, camera, SIZE, cmap="viridis", clim=(0, 255))
     page = series.save(tmp_path / "balls.html")
     seek = SHOT.replace("await viewer.ready;", "await viewer.ready; viewer.time = 2;", 1)
-    picture = picture_in_firefox(tmp_path, page, seek)
-    expected = pvdi.render(pvdi.read(page)[2], camera, SIZE) * 255.0
-    assert expected.max() > 200
-    assert np.abs(picture - expected).max() <= 1
+    assert_as_rendered(tmp_path, page, pvdi.read(page)[2], seek)

@@ -1,7 +1,5 @@
 """VDIs in a real JupyterLab in a real browser: turned there, read in the kernel, and saved."""
 
-from __future__ import annotations
-
 import base64
 import importlib.util
 import io
@@ -15,7 +13,9 @@ import urllib.request
 
 import numpy as np
 import pytest
+from browsers import HELPERS, array_of
 from PIL import Image
+from web_client import soft_ball
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.web.camera import camera_of, viewer_camera
@@ -71,12 +71,8 @@ SET, SET_PLOTTER = 2, 6  # that set one
 
 @pytest.fixture(scope="module")
 def vdi():
-    x = np.linspace(-1, 1, 24)
-    radius = np.sqrt(x[:, None, None] ** 2 + x[:, None] ** 2 + x**2)
-    density = 255 * np.clip(1 - radius, 0, 1).astype(np.float32)
-    volume = pvdi.Volume(density, (2 / 23,) * 3, (-1, -1, -1))
     camera = pvdi.Camera((3, 2, 5), (0, 0, 0), (0, 1, 0))
-    return pvdi.generate(volume, camera, SIZE, cmap="viridis", opacity=[0, 0.1, 0.4, 0.9])
+    return pvdi.generate(soft_ball(), camera, SIZE, cmap="viridis", opacity=[0, 0.1, 0.4, 0.9])
 
 
 @pytest.fixture
@@ -85,53 +81,42 @@ def lab(vdi, tmp_path, monkeypatch):
     folder = tmp_path / "books"
     folder.mkdir()
     vdi.save(folder / "ball.vdi")
-    cells = [
-        {
-            "cell_type": "code",
-            "id": f"cell{k}",
-            "metadata": {},
-            "source": text.strip(),
-            "outputs": [],
-            "execution_count": None,
-        }
-        for k, text in enumerate(CELLS)
-    ]
+    cell = {"cell_type": "code", "metadata": {}, "outputs": [], "execution_count": None}
+    cells = [{**cell, "id": f"cell{k}", "source": text.strip()} for k, text in enumerate(CELLS)]
     kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
-    book = {
-        "cells": cells,
-        "metadata": {"kernelspec": kernel},
-        "nbformat": 4,
-        "nbformat_minor": 5,
-    }
+    book = {"cells": cells, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 5}
     (folder / "book.ipynb").write_text(json.dumps(book))
     settings = tmp_path / "settings"
     settings.mkdir()
-    (settings / "overrides.json").write_text(
-        json.dumps(
-            {
-                "@jupyterlab/apputils-extension:notification": {"fetchNews": "false"},
-                "@jupyter-widgets/jupyterlab-manager:plugin": {"saveState": True},
-            }
-        )
-    )
+    overrides = {
+        "@jupyterlab/apputils-extension:notification": {"fetchNews": "false"},
+        "@jupyter-widgets/jupyterlab-manager:plugin": {"saveState": True},
+    }
+    (settings / "overrides.json").write_text(json.dumps(overrides))
     own = {f"JUPYTER_{kind}_DIR": str(tmp_path / kind) for kind in ("CONFIG", "DATA", "RUNTIME")}
     environment = {**os.environ, **own, "IPYTHONDIR": str(tmp_path / "ipython")}
+    options = {
+        "ServerApp.root_dir": folder,
+        "ServerApp.ip": "127.0.0.1",
+        "ServerApp.port": 0,
+        "IdentityProvider.token": "known",
+        "LabApp.app_settings_dir": settings,
+        "LabApp.expose_app_in_browser": True,
+        "LabApp.news_url": "",
+        "LabApp.check_for_updates_class": "jupyterlab.NeverCheckForUpdate",
+    }
     command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root"]
-    command += [f"--ServerApp.root_dir={folder}", "--ServerApp.ip=127.0.0.1"]
-    command += ["--ServerApp.port=0", "--IdentityProvider.token=known"]
-    command += [f"--LabApp.app_settings_dir={settings}"]
-    command += ["--LabApp.expose_app_in_browser=True", "--LabApp.news_url="]
-    command += ["--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate"]
+    command += [f"--{name}={value}" for name, value in options.items()]
     with (tmp_path / "log").open("w") as log:
         process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
     try:
-        yield folder, f"{_address(process, tmp_path)}doc/tree/book.ipynb?token=known"
+        yield folder, f"{address_of(process, tmp_path)}doc/tree/book.ipynb?token=known"
     finally:
         process.terminate()
         process.wait(LONG)
 
 
-def _address(process, folder):
+def address_of(process, folder):
     """Return a server's URL as soon as it answers: it writes it to a file of its own."""
     end = time.monotonic() + LONG
     while time.monotonic() < end:
@@ -194,14 +179,12 @@ class Notebook:
 
     def picture(self, k):
         """Return what a viewer shows, premultiplied RGBA from 0 to 1."""
-        shot = self.viewer(k).evaluate(
-            """async (viewer, [width, height]) => {
-              const { data } = await viewer.screenshot({ width, height });
-              return btoa(Array.from(data, (b) => String.fromCharCode(b)).join(""));
-            }""",
+        text = self.viewer(k).evaluate(
+            """async (viewer, [width, height]) =>
+              textOf((await viewer.screenshot({ width, height })).data)""",
             SIZE,
         )
-        return np.frombuffer(base64.b64decode(shot), np.uint8).reshape(*SIZE[::-1], 4) / 255
+        return array_of(text, np.uint8).reshape(*SIZE[::-1], 4) / 255
 
 
 def until(condition):
@@ -211,23 +194,14 @@ def until(condition):
         time.sleep(0.1)
 
 
-@pytest.fixture
-def context(chromium):
-    context = chromium.new_context(viewport={"width": 900, "height": 1400})
-    yield context
-    context.close()
-
-
 def assert_alike(picture, expected):
     """Hold the viewer's picture to the bound of issue 17."""
     assert np.mean(np.abs(picture - expected).max(axis=2) <= 2 / 255) >= 0.999
 
 
-def same_place(one, other):
-    return np.allclose(one["position"], other["position"], rtol=1e-9)
-
-
-def test_in_jupyterlab(context, lab, vdi):
+def test_in_jupyterlab(chromium, lab, vdi):
+    context = chromium.new_context(viewport={"width": 900, "height": 1400})
+    context.add_init_script(HELPERS)
     notebook = Notebook(context.new_page(), lab[1])
     notebook.run(TURNED)
     assert notebook.camera(TURNED) == viewer_camera(vdi.camera)
@@ -255,44 +229,42 @@ def test_in_jupyterlab(context, lab, vdi):
     notebook.drag(PLOTTED)
     turned = notebook.camera(PLOTTED)
     until(lambda: json.loads(notebook.run(READ_PLOTTER)) == turned)
+
     # The view rests there: the kernel makes a VDI of it, and the browser is given that
-    until(lambda: same_place(json.loads(notebook.run(READ_VDI)), turned))
+    def has_a_vdi_of_it():
+        made = json.loads(notebook.run(READ_VDI))
+        return np.allclose(made["position"], turned["position"], rtol=1e-9)
+
+    until(has_a_vdi_of_it)
     assert notebook.camera(PLOTTED) == turned
     notebook.run(SET_PLOTTER)
     until(lambda: notebook.camera(PLOTTED) == json.loads(notebook.run(READ_PLOTTER)) != turned)
-    if "PYVISTA_VDI_PICTURES" in os.environ:
-        notebook.page.screenshot(path=f"{os.environ['PYVISTA_VDI_PICTURES']}/jupyterlab.png")
 
     # Saved: the pictures are there for who does not run it
     notebook.page.evaluate("jupyterapp.commands.execute('docmanager:save')")
     path = lab[0] / "book.ipynb"
-    until(lambda: len(_pictures(path)) == 3)
-    pictures = _pictures(path)
+    until(lambda: len(pictures_in(path)) == 3)
+    pictures = pictures_in(path)
     expected = pvdi.io.to_bytes(pvdi.render(vdi, vdi.camera))
     np.testing.assert_array_equal(pictures[SHOWN], expected)
     assert pictures[TURNED].shape == pictures[PLOTTED].shape == (*SIZE[::-1], 3)
 
     # The viewer as well, where the state of widgets is saved: another kernel knows nothing of it
-    notebook.page.evaluate(
-        """async () => {
-          await jupyterapp.shell.currentWidget.sessionContext.shutdown();
-        }"""
-    )
+    notebook.page.evaluate("jupyterapp.shell.currentWidget.sessionContext.shutdown()")
     notebook.page.close()
     again = Notebook(context.new_page(), lab[1])
     assert again.camera(TURNED) == viewer_camera(vdi.camera.azimuth(60))
     assert_alike(again.picture(TURNED), pvdi.render(sent, vdi.camera.azimuth(60)))
     again.drag(SHOWN)
-    if "PYVISTA_VDI_PICTURES" in os.environ:
-        again.page.screenshot(path=f"{os.environ['PYVISTA_VDI_PICTURES']}/again.png")
 
     # Nothing came from elsewhere
     server = lab[1].partition("/doc")[0]
     foreign = [url for url in notebook.hosts if not url.startswith((server, "blob:", "data:"))]
     assert not foreign
+    context.close()
 
 
-def _pictures(path):
+def pictures_in(path):
     """Return the pictures that a notebook's file holds, by cell."""
     found = {}
     for k, cell in enumerate(json.loads(path.read_text())["cells"]):

@@ -4,8 +4,6 @@
 stand in a bare page, beside small VDIs that the same code makes.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import re
@@ -13,18 +11,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browsers import LONG, Page
+from browsers import LONG, picture
 
 import pyvista_vdi as pvdi
 
 CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
 DOCS = CHECKOUT / "docs"
 NAMES = {"brain.html", "rayleigh_taylor.html"}
+SIZE = (120, 90)
 
-pytestmark = pytest.mark.skipif(
-    not (DOCS / "live.py").is_file(),
-    reason="no documentation at hand: set PYVISTA_VDI_CHECKOUT to a checkout",
-)
+pytestmark = [
+    pytest.mark.slow,  # .ci/run has it of the built site
+    pytest.mark.skipif(
+        not (DOCS / "live.py").is_file(),
+        reason="no documentation at hand: set PYVISTA_VDI_CHECKOUT to a checkout",
+    ),
+]
 
 
 @pytest.fixture(scope="module")
@@ -38,8 +40,7 @@ def site(tmp_path_factory, default_runtime):
     spec = importlib.util.spec_from_file_location("live", DOCS / "live.py")
     live = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(live)
-    made = live.make(folder / live.FOLDER, (120, 90))
-    assert {path.name for path in made} == NAMES
+    assert {path.name for path in live.make(folder / live.FOLDER, SIZE)} == NAMES
     for name in ("index", "gallery"):
         text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
         blocks = re.findall(r"^<(?:div|iframe).*?^$", text, re.MULTILINE | re.DOTALL)
@@ -50,74 +51,51 @@ def site(tmp_path_factory, default_runtime):
     return folder
 
 
-@pytest.mark.slow  # .ci/run has it of the built site
 @pytest.mark.parametrize("name", ["index", "gallery"])
-def test_vdis_turn_on_the_page(site, chromium, name):
-    context = chromium.new_context(viewport={"width": 1280, "height": 800})
-    try:
-        page = Page(context.new_page(), {}, None)
-        page.page.goto((site / f"{name}.html").as_uri())
-        frames = page.page.locator("iframe")
-        assert frames.count() == 2
-        seen = set()
-        for k in range(2):
-            frames.nth(k).scroll_into_view_if_needed()
-            frame = frames.nth(k).element_handle().content_frame()
-            frame.wait_for_function(
-                "document.querySelector('vdi-viewer')?.status?.state === 'full'", timeout=LONG
-            )
-            path = site / "live" / Path(frame.url).name
-            seen.add(path.name)
-            box = frames.nth(k).bounding_box()
-            assert box["width"] / box["height"] == pytest.approx(4 / 3, rel=0.02)
-            turns_as_python_says(page.page, frame, box, pvdi.read(path))
-        assert seen == NAMES
-        assert not page.complaints
-    finally:
-        context.close()
-
-
-def turns_as_python_says(page, frame, box, vdi):
-    """Drag in the page; the picture is then the raycaster's from where the drag led."""
-    frame.evaluate(
-        """async () => {
-          window.viewer = document.querySelector("vdi-viewer");
-          await viewer.ready;
-        }"""
-    )
-    before = frame.evaluate("viewer.camera.position")
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x + 30, y + 10)
-    page.mouse.up()
-    frame.wait_for_function(
-        "(before) => viewer.camera.position.some((c, k) => c !== before[k])", arg=before
-    )
-    camera = frame.evaluate("viewer.camera")
-    turned = vdi.camera.replace(
-        position=camera["position"], focal_point=camera["focal_point"], view_up=camera["view_up"]
-    )
-    width, height = 120, 90
-    data = frame.evaluate(
-        """async ([width, height]) =>
-          Array.from((await viewer.screenshot({ width, height })).data)""",
-        [width, height],
-    )
-    got = np.array(data).reshape(height, width, 4)
-    want = np.rint(pvdi.render(vdi, turned, (width, height)) * 255)
-    assert want[..., 3].max() > 200  # something is seen
-    off = np.abs(got - want).max(axis=2)
-    # The issue's bound, as in test_one_file.py
-    assert (off <= 2).mean() >= 0.999
+def test_vdis_turn_on_the_page(site, open_page, name):
+    """Dragged in the page; the picture is then the raycaster's from where the drag led."""
+    page = open_page(viewport={"width": 1280, "height": 800}).page
+    page.goto((site / f"{name}.html").as_uri())
+    frames = page.locator("iframe")
+    assert frames.count() == 2
+    seen = set()
+    for k in range(2):
+        frames.nth(k).scroll_into_view_if_needed()
+        frame = frames.nth(k).element_handle().content_frame()
+        loaded = "document.querySelector('vdi-viewer')?.status?.state === 'full'"
+        frame.wait_for_function(loaded, timeout=LONG)
+        frame.evaluate(
+            """async () => {
+              window.viewer = document.querySelector("vdi-viewer");
+              await viewer.ready;
+            }"""
+        )
+        path = site / "live" / Path(frame.url).name
+        seen.add(path.name)
+        box, before = frames.nth(k).bounding_box(), frame.evaluate("viewer.camera.position")
+        assert box["width"] / box["height"] == pytest.approx(4 / 3, rel=0.02)
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 30, y + 10)
+        page.mouse.up()
+        frame.wait_for_function(
+            "(before) => viewer.camera.position.some((c, k) => c !== before[k])", arg=before
+        )
+        camera, vdi = frame.evaluate("viewer.camera"), pvdi.read(path)
+        keys = ("position", "focal_point", "view_up")
+        turned = vdi.camera.replace(**{key: camera[key] for key in keys})
+        want = np.rint(pvdi.render(vdi, turned, SIZE) * 255)
+        assert want[..., 3].max() > 200  # something is seen
+        # The issue's bound, as in test_one_file.py
+        assert (np.abs(picture(frame, SIZE) - want).max(axis=2) <= 2).mean() >= 0.999
+    assert seen == NAMES
 
 
 def test_the_first_page_is_light(site):
     """Two VDIs of a few MB, and frames that wait until they are near the screen."""
-    sizes = [(site / "live" / name).stat().st_size for name in NAMES]
-    assert sum(sizes) < 10e6
+    assert sum((site / "live" / name).stat().st_size for name in NAMES) < 10e6
     for name in ("index", "gallery"):
         text = (site / f"{name}.html").read_text(encoding="utf-8")
-        assert (
-            len(re.findall(r"<iframe [^>]*loading=\"lazy\"", text)) == text.count("<iframe ") == 2
-        )
+        lazy = re.findall(r"<iframe [^>]*loading=\"lazy\"", text)
+        assert len(lazy) == text.count("<iframe ") == 2

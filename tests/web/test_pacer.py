@@ -40,7 +40,8 @@ def draw(open_page):
 
 def test_a_compiler_s_time_is_no_frame_s(draw):
     """The first frame, of few pixels, waited for one: the full frame is in few bands all the same,
-    and the movement after it has all pixels."""
+    and the movement after it has all pixels.
+    """
     few, full = draw((320, 180, 1.0, 1e-6), (1280, 720, 0.0, 4e-6))
     assert few["bands"] == [180]
     assert sum(full["bands"]) == 720

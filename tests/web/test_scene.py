@@ -1,11 +1,5 @@
-"""Scenes in a page: what is seen among VDIs is what VTK draws of the same plotter.
+"""Scenes in a page: what is seen among VDIs is what VTK draws of the same plotter."""
 
-Plotters and pages are compared by the same helpers: hence more than 500 lines.
-"""
-
-from __future__ import annotations
-
-import base64
 import io
 import json
 import re
@@ -15,7 +9,7 @@ import zlib
 import numpy as np
 import pytest
 import pyvista as pv
-from browsers import LONG, Page
+from browsers import COUNTING, file_of, in_base64, picture
 from plugin_scenes import soft_ball
 from scipy import ndimage
 from skimage.metrics import structural_similarity
@@ -23,7 +17,6 @@ from vtkmodules.vtkCommonDataModel import vtkPlane
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
-from pyvista_vdi.io.vdi_file.writer import write_to
 from pyvista_vdi.web.bundle import viewer_script
 from pyvista_vdi.web.scenes.scene import scene_of
 
@@ -41,7 +34,6 @@ MEAN = 0.6
 
 #: The issue's; measured: .996 to .9997.
 SSIM = 0.98
-
 
 #: Of RGB: what is seen of one channel, less the others.
 WEIGHTS = ((1, -1, -1), (-1, 1, -1), (-1, -1, 1))
@@ -61,29 +53,35 @@ def ball(plotter, *, at=(0, 0, 0), **more):
     return plotter.add_vdi(volume, **{**looks, **more})
 
 
+@pytest.fixture
+def page(open_page):
+    return open_page(SMALL)
+
+
 def give(page, plotter):
-    """Show a plotter's scene in a page."""
+    """Show a plotter, and its scene, of which nothing is left out, in a page."""
+    plotter.show(auto_close=False)
     scene = scene_of(plotter.renderer)
-    data = io.BytesIO()
-    write_to(data, scene.vdi, "deflate", 1)
+    assert scene.left_out == []
     page.evaluate(
         """async ([scene, data]) => {
           const { Scene } = await import("./scene.js");
           viewer.scene = new Scene(bytesOf(scene));
           await viewer.load(bytesOf(data));
         }""",
-        [base64.b64encode(part).decode() for part in (scene.data, data.getvalue())],
+        [in_base64(part) for part in (scene.data, file_of(scene.vdi))],
     )
     return scene
 
 
 def shot(page, size=SIZE):
     """The page's picture from the view it is in, premultiplied RGBA, int."""
-    data = page.evaluate(
-        "async ([width, height]) => textOf((await viewer.screenshot({ width, height })).data)",
-        list(size),
-    )
-    return np.frombuffer(base64.b64decode(data), np.uint8).reshape(*size[::-1], 4).astype(int)
+    return picture(page, size).astype(int)
+
+
+def shot_over_white(page, size=SIZE):
+    seen = shot(page, size)
+    return seen[..., :3] + (255 - seen[..., 3:])
 
 
 def background_of(renderer):
@@ -95,15 +93,12 @@ def background_of(renderer):
 
 
 def assert_as_vtk(page, plotter, *, mean=MEAN, ssim=SSIM):
-    picture = shot(page)
-    got = picture[..., :3] + (1 - picture[..., 3:] / 255) * background_of(plotter.renderer)
+    seen = shot(page)
+    got = seen[..., :3] + (1 - seen[..., 3:] / 255) * background_of(plotter.renderer)
     want = plotter.screenshot(return_img=True)[..., :3].astype(float)
     assert np.ptp(want) > 60
     assert np.abs(got - want).mean() <= mean
     assert structural_similarity(got, want, channel_axis=2, data_range=255) >= ssim
-
-
-# -- pictures --------------------------------------------------------------------------------------
 
 
 def meshes(plotter):
@@ -139,12 +134,8 @@ def cells_lines_points(plotter):
     plotter.add_mesh(tube, color="gold", render_lines_as_tubes=True, line_width=8)
     points = pv.PolyData(np.random.default_rng(0).normal(size=(30, 3)))
     plotter.add_points(points, color="red", point_size=7)
-    plotter.add_mesh(
-        points.translate((0, 0, 0.5)),
-        render_points_as_spheres=True,
-        point_size=12,
-        show_scalar_bar=False,
-    )
+    looks = {"render_points_as_spheres": True, "point_size": 12, "show_scalar_bar": False}
+    plotter.add_mesh(points.translate((0, 0, 0.5)), **looks)
     plotter.add_mesh(pv.Cube(center=(-1, 1, 0)), style="wireframe", color="k", line_width=3)
 
 
@@ -199,32 +190,24 @@ def overlapping(plotter):
 
 
 slow = pytest.mark.slow
+SCENES = [in_parallel, cells_lines_points, translucent_and_textured]
+SCENES += [meshes, clipped_and_moved, apart, overlapping]
+AT_ONCE = (cells_lines_points, translucent_and_textured)
 
 
 @pytest.mark.every(3)
 @pytest.mark.parametrize(
-    "scene",
-    [
-        pytest.param(in_parallel, marks=slow),
-        cells_lines_points,
-        translucent_and_textured,
-        pytest.param(meshes, marks=slow),
-        pytest.param(clipped_and_moved, marks=slow),
-        pytest.param(apart, marks=slow),
-        pytest.param(overlapping, marks=slow),
-    ],
+    "scene", [pytest.param(each, marks=[] if each in AT_ONCE else slow) for each in SCENES]
 )
-def test_a_scene_is_drawn_as_vtk_draws_it(scene, plotter, open_page):
+def test_a_scene_is_drawn_as_vtk_draws_it(scene, plotter, page):
     scene(plotter)
-    plotter.show(auto_close=False)
-    page = open_page(SMALL)
-    assert give(page, plotter).left_out == []
+    give(page, plotter)
     # Lines are silhouettes all over
     more = {"mean": 2.5, "ssim": 0.97} if scene is cells_lines_points else {}
     assert_as_vtk(page, plotter, **more)
 
 
-def test_opaque_things_hide_a_vdi_and_are_hidden_where_they_are(plotter, open_page):
+def test_opaque_things_hide_a_vdi_and_are_hidden_where_they_are(plotter, page):
     """Three discs without light along one ray, in a VDI that is clipped and opaque."""
     actor = ball(plotter, opacity=[1, 1], cmap=["white", "white"])
     plane = vtkPlane()
@@ -236,30 +219,32 @@ def test_opaque_things_hide_a_vdi_and_are_hidden_where_they_are(plotter, open_pa
         plotter.add_mesh(disc, color=color, lighting=False)
     plotter.view_xy()
     plotter.set_background("k")
-    plotter.show(auto_close=False)
-    page = open_page(SMALL)
     give(page, plotter)
     # Before the clipped front, behind it by 0.1, and behind all; then seen from there
     assert seen(page) == [True, False, False]
+    look_from_behind(page)
+    assert seen(page) == [False, False, True]
+
+
+def look_from_behind(page):
     page.evaluate(
         """() => {
           const { position: [x, y, z], ...more } = viewer.camera;
           viewer.camera = { ...more, position: [x, y, -z] };
         }"""
     )
-    assert seen(page) == [False, False, True]
 
 
 def seen(page):
     """Whether red, green and blue are seen, not mixed with others."""
-    picture = shot(page, (81, 45))[..., :3]
-    strengths = [(picture * weight).sum(axis=2).max() for weight in WEIGHTS]
+    colors = shot(page, (81, 45))[..., :3]
+    strengths = [(colors * weight).sum(axis=2).max() for weight in WEIGHTS]
     assert all(strength > 250 or strength < 5 for strength in strengths)
     return [bool(strength > 250) for strength in strengths]
 
 
 @pytest.mark.slow
-def test_vdis_that_overlap_are_mixed_as_by_render(open_page):
+def test_vdis_that_overlap_are_mixed_as_by_render(page):
     size = (81, 45)
     volumes = [soft_ball(12), soft_ball(12)]
     volumes[1].origin = np.add(volumes[1].origin, (0.5, 0.2, 0.4))
@@ -274,21 +259,18 @@ def test_vdis_that_overlap_are_mixed_as_by_render(open_page):
         plotter.add_vdi(vdi, show_scalar_bar=False, regenerate="never")
     plotter.camera.position, plotter.camera.focal_point = camera.position, camera.focal_point
     plotter.camera.up = camera.view_up
-    plotter.show(auto_close=False)
-    page = open_page(SMALL)
     give(page, plotter)
     plotter.close()
-    picture = shot(page, size)
-    off = np.abs(picture - pvdi.render(vdis, camera, size) * 255)
+    mixed = shot(page, size)
+    off = np.abs(mixed - pvdi.render(vdis, camera, size) * 255)
     # 8 bits are rounded after each of 64 layers, by half at most and both ways; 32 slabs
     assert off.mean() < 1
     assert off.max() < 12
-    assert np.abs(picture - pvdi.render(vdis[0], camera, size) * 255).max() > 40
+    assert np.abs(mixed - pvdi.render(vdis[0], camera, size) * 255).max() > 40
 
 
 @pytest.mark.slow
-def test_layers_have_an_order_wherever_the_eye_is(open_page):
-    page = open_page(SMALL)
+def test_layers_have_an_order_wherever_the_eye_is(page):
     got = page.evaluate(
         """async () => {
           const { cornersOf, layersOf } = await import("./layers.js");
@@ -319,31 +301,21 @@ def test_layers_have_an_order_wherever_the_eye_is(open_page):
     assert ends[1] == ends[2] == (9.875, 10)
 
 
-# -- texts -----------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("vertical", [False, pytest.param(True, marks=slow)])
-def test_texts_and_scalar_bars_stand_where_vtk_has_them(vertical, plotter, open_page):
+def test_texts_and_scalar_bars_stand_where_vtk_has_them(vertical, plotter, page):
     """Fonts differ: compared are the boxes around what is written, and the bar's colours."""
     plotter.window_size = size = (480, 270)
     ball(plotter, opacity=[0, 0])
-    bar = {"title": "Height", "vertical": vertical, "n_labels": 3}
-    plotter.add_scalar_bar(**bar)
+    plotter.add_scalar_bar(title="Height", vertical=vertical, n_labels=3)
     plotter.add_text("A corner", position="upper_left", font_size=8, color="b")
     plotter.add_text("two\nlines", position=(300, 200), font_size=8, color="r")
-    plotter.show(auto_close=False)
-    page = open_page(SMALL)
-    assert give(page, plotter).left_out == []
-    picture = shot(page, size)
-    got = picture[..., :3] + (255 - picture[..., 3:])
+    give(page, plotter)
+    got = shot_over_white(page, size)
     want = plotter.screenshot(return_img=True)[..., :3].astype(int)
     for pixels in (got, want):  # each text is written in its own colour
         pixels[pixels.min(axis=2) > 200] = 255
-    for place in (
-        np.s_[:60, :240],
-        np.s_[40:100, 290:400],
-        np.s_[100:] if not vertical else np.s_[60:, 400:],
-    ):
+    bar = np.s_[60:, 400:] if vertical else np.s_[100:]
+    for place in (np.s_[:60, :240], np.s_[40:100, 290:400], bar):
         boxes = []
         for pixels in (got, want):
             rows, columns = np.nonzero((pixels[place] < 255).any(axis=2))
@@ -352,17 +324,16 @@ def test_texts_and_scalar_bars_stand_where_vtk_has_them(vertical, plotter, open_
         assert np.abs(np.subtract(*boxes)).max() <= 12, boxes
 
 
-def test_letters_of_axes_stand_where_vtk_has_them(plotter, open_page):
+def test_letters_of_axes_stand_where_vtk_has_them(plotter, page):
     plotter.window_size = size = (480, 270)
     ball(plotter, opacity=[0, 0])
     plotter.add_axes(viewport=(0, 0, 0.4, 0.6), color="k")
-    plotter.show(auto_close=False)
-    page = open_page(SMALL)
-    assert give(page, plotter).left_out == []
-    picture = shot(page, size)
-    got = picture[..., :3] + (255 - picture[..., 3:])
+    give(page, plotter)
     centres = []
-    for pixels in (got, plotter.screenshot(return_img=True)[..., :3].astype(int)):
+    for pixels in (
+        shot_over_white(page, size),
+        plotter.screenshot(return_img=True)[..., :3].astype(int),
+    ):
         letters, count = ndimage.label(ndimage.binary_dilation(pixels.max(axis=2) < 128))
         assert count == 3
         centres.append(ndimage.center_of_mass(letters > 0, letters, range(1, count + 1)))
@@ -371,7 +342,7 @@ def test_letters_of_axes_stand_where_vtk_has_them(plotter, open_page):
 
 
 @pytest.mark.slow
-def test_labels_stand_at_their_points_and_nearer_ones_before_others(plotter, open_page):
+def test_labels_stand_at_their_points_and_nearer_ones_before_others(plotter, page):
     ball(plotter, opacity=[0, 0])
     points = np.array([[0.8, 0, 0], [-0.8, 0, 0], [-0.8, 0, -0.5]])
     plotter.add_point_labels(
@@ -379,53 +350,25 @@ def test_labels_stand_at_their_points_and_nearer_ones_before_others(plotter, ope
         show_points=False, always_visible=True, font_size=10,
     )  # fmt: skip
     plotter.view_xy()
-    plotter.show(auto_close=False)
-    page = open_page(SMALL)
-    assert give(page, plotter).left_out == []
-    for angle in (0, 180):
-        page.evaluate(
-            """(sign) => {
-              const { position: [x, y, z], ...more } = viewer.camera;
-              viewer.camera = { ...more, position: [x, y, sign * Math.abs(z)] };
-            }""",
-            1 if angle == 0 else -1,
-        )
-        picture = shot(page)
-        red = picture[..., 0] - picture[..., 2] > 150
+    give(page, plotter)
+    for behind in (False, True):
+        if behind:
+            look_from_behind(page)
+        seen = shot(page)
+        red = seen[..., 0] - seen[..., 2] > 150
         left, right = red[:, : SIZE[0] // 2].sum(), red[:, SIZE[0] // 2 :].sum()
         assert min(left, right) > 40
         # From behind the longer label is before the shorter, and to the right
-        assert (right > 1.5 * left) == (angle == 180)
-
-
-# -- the page --------------------------------------------------------------------------------------
+        assert (right > 1.5 * left) == behind
 
 
 @pytest.fixture
-def from_disk(chromium):
-    contexts = []
-
+def from_disk(open_page):
     def from_disk(path):
-        context = chromium.new_context(viewport={"width": SIZE[0], "height": SIZE[1]}, offline=True)
-        contexts.append(context)
-        page = Page(context.new_page(), {}, None)
-        page.page.goto(path.as_uri())
-        page.evaluate(
-            """() => {
-              window.viewer = document.querySelector("vdi-viewer");
-              window.textOf = (bytes) => {
-                let text = "";
-                for (const byte of bytes) text += String.fromCharCode(byte);
-                return btoa(text);
-              };
-            }"""
-        )
-        page.page.set_default_timeout(LONG)
-        return page
+        viewport = {"width": SIZE[0], "height": SIZE[1]}
+        return open_page(url=path.as_uri(), viewport=viewport, offline=True)
 
-    yield from_disk
-    for context in contexts:
-        context.close()
+    return from_disk
 
 
 def test_export_html_writes_a_page_that_shows_the_scene(plotter, from_disk, tmp_path):
@@ -437,7 +380,7 @@ def test_export_html_writes_a_page_that_shows_the_scene(plotter, from_disk, tmp_
         assert plotter.export_html(tmp_path / "scene.htm") is None
     path = tmp_path / "scene.html"
     page = from_disk(path)
-    page.evaluate("viewer.ready.then(() => true)")
+    page.ready()
     assert_as_vtk(page, plotter)
     assert page.evaluate("getComputedStyle(viewer).backgroundImage").startswith("linear-gradient")
     view = page.evaluate("viewer.camera")
@@ -458,7 +401,7 @@ def test_subplots_stand_beside_each_other_and_turn_together(from_disk, tmp_path)
     plotter.add_mesh(pv.Sphere(radius=0.3, center=(1, 1, 1)))
     plotter.link_views()
     plotter.export_html(tmp_path / "scene.html")
-    picture, vdi = plotter.screenshot()[..., :3].astype(float), plotter.volume.vdi
+    wanted, vdi = plotter.screenshot()[..., :3].astype(float), plotter.volume.vdi
     views = [renderer.GetSize() for renderer in plotter.renderers]
     plotter.close()
     page = from_disk(tmp_path / "scene.html")
@@ -471,50 +414,35 @@ def test_subplots_stand_beside_each_other_and_turn_together(from_disk, tmp_path)
     )
     for number, size in enumerate(views):
         page.evaluate(f"window.viewer = viewers[{number}]")
-        got = shot(page, size)
-        got = got[..., :3] + 255 - got[..., 3:]
-        want = picture[:, : size[0]] if number == 0 else picture[:, -size[0] :]
+        want = wanted[:, : size[0]] if number == 0 else wanted[:, -size[0] :]
         assert np.ptp(want) > 100
-        assert np.abs(got - want).mean() < 2 * MEAN  # half of the pixels, and the line between them
+        assert (
+            np.abs(shot_over_white(page, size) - want).mean() < 2 * MEAN
+        )  # half of the pixels, and the line between them
     page.evaluate("viewers[0].camera = {...viewers[0].camera, position: [1, 2, 9]}")
     assert page.evaluate("viewers[1].camera.position") == [1, 2, 9]
     assert pvdi.read(tmp_path / "scene.html").equals(vdi.with_precision("8-byte"))
-
-
-COUNTING = """
-window.alive = 0;
-const kinds = ["Texture", "Framebuffer", "Renderbuffer", "Buffer", "VertexArray", "Program"];
-for (const kind of kinds) {
-  const { prototype } = WebGL2RenderingContext;
-  const [create, remove] = [prototype[`create${kind}`], prototype[`delete${kind}`]];
-  prototype[`create${kind}`] = function () { ++window.alive; return create.call(this); };
-  prototype[`delete${kind}`] = function (it) { if (it) --window.alive; remove.call(this, it); };
-}
-"""
 
 
 @slow
 def test_scenes_that_follow_each_other_leave_nothing_behind(plotter, open_page):
     translucent_and_textured(plotter)
     ball(plotter, at=(1, 0, 0))
-    plotter.show(auto_close=False)
     page = open_page(SMALL, before=COUNTING)
-    scene = give(page, plotter)
-    page.evaluate(
-        "(text) => { window.packed = bytesOf(text); }", base64.b64encode(scene.data).decode()
-    )
     alive = page.evaluate(
-        """async () => {
+        """async (text) => {
+          const packed = bytesOf(text);
           const { Scene } = await import("./scene.js"), alive = [];
           for (let k = 0; k < 4; ++k) {
             const next = new Scene(packed);
             viewer.scene = next;
             await next.whole;
             await viewer.screenshot({ width: 32, height: 18 });
-            alive.push(window.alive);
+            alive.push(JSON.stringify(window.alive));
           }
           return alive;
-        }"""
+        }""",
+        in_base64(give(page, plotter).data),
     )
     assert len(set(alive[1:])) == 1, alive
 
@@ -524,7 +452,7 @@ def test_a_lost_context_is_made_up_for(plotter, from_disk, tmp_path):
     meshes(plotter)
     plotter.export_html(tmp_path / "scene.html")
     page = from_disk(tmp_path / "scene.html")
-    page.evaluate("viewer.ready.then(() => true)")
+    page.ready()
     before = shot(page)
     page.evaluate(
         """async () => {
@@ -564,11 +492,7 @@ def test_what_is_not_shown_is_named_in_one_warning(plotter):
         plotter.export_html(None)
     assert len(warned) == 1
     words = str(warned[0].message)
-    for what in (
-        "cropping",
-        "physically based shading (ball)",
-        "CubeAxes",
-    ):
+    for what in ("cropping", "physically based shading (ball)", "CubeAxes"):
         assert what in words
 
 
@@ -599,24 +523,18 @@ def test_the_viewer_with_scenes_is_as_small_as_the_issue_asks():
     assert len(viewer_script(scene=True).encode()) <= 160_000
 
 
-# -- what is sent ----------------------------------------------------------------------------------
-
-
-def head_of(scene):
-    data = zlib.decompress(scene.data)
-    return json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
-
-
-def arrays_of(scene):
+def contents(scene):
+    """What is said of a scene, and its arrays."""
     data = zlib.decompress(scene.data)
     begin = 4 + int.from_bytes(data[:4], "little")
+    head = json.loads(data[4:begin])
     kinds = {"Float32Array": "f4", "Int16Array": "i2", "Uint8Array": "u1", "Uint32Array": "u4"}
     arrays = []
-    for kind, at, size in head_of(scene)["arrays"]:
+    for kind, at, size in head["arrays"]:
         dtype = np.dtype(kinds[kind])
         planes = np.frombuffer(data, np.uint8, size * dtype.itemsize, begin + at)
         arrays.append(planes.reshape(dtype.itemsize, -1).T.copy().view(dtype).ravel())
-    return arrays
+    return head, arrays
 
 
 def test_polygons_are_fans_whose_edges_are_the_polygons(plotter):
@@ -630,8 +548,8 @@ def test_polygons_are_fans_whose_edges_are_the_polygons(plotter):
     mesh.cell_data["c"] = colors
     plotter.add_mesh(mesh, scalars="c", rgba=True, show_edges=True)
     plotter.show(auto_close=False)
-    scene = scene_of(plotter.renderer)
-    shape, arrays = head_of(scene)["shapes"][0], arrays_of(scene)
+    head, arrays = contents(scene_of(plotter.renderer))
+    shape = head["shapes"][0]
     placed = arrays[shape["points"]].reshape(-1, 3) + shape["origin"]
     parts = {part["kind"]: part for part in shape["parts"]}
     corners = {kind: placed[arrays[part["points"]]] for kind, part in parts.items()}
@@ -652,7 +570,7 @@ def test_lists_that_browsers_hold_in_float32_are_about_their_middle(plotter):
     ball(plotter, at=(5e6, 0, 0))
     plotter.add_mesh(pv.Sphere(radius=0.5).translate((5e6, 0, 0)).cast_to_unstructured_grid())
     plotter.show(auto_close=False)
-    scene = scene_of(plotter.renderer)
-    shape = head_of(scene)["shapes"][0]
+    head, arrays = contents(scene_of(plotter.renderer))
+    shape = head["shapes"][0]
     assert shape["origin"] == pytest.approx([5e6, 0, 0], abs=1)
-    assert np.abs(arrays_of(scene)[shape["points"]]).max() < 2
+    assert np.abs(arrays[shape["points"]]).max() < 2

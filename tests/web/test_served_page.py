@@ -1,44 +1,42 @@
 """The page of a server in a real browser: it draws what it has, and is sent what its view needs."""
 
-from __future__ import annotations
-
-import base64
 import io
 import re
 import urllib.request
 
 import numpy as np
 import pytest
-from browsers import LONG
+from browsers import picture
 from PIL import Image
 from web_client import soft_ball
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import web
 
+pytestmark = pytest.mark.usefixtures("settled_at_once")
 
-def _checkered(ball):
+
+def checkered(ball):
     """A ball whose every other voxel is thin: seen from near, it needs more lists."""
     values = ball.array.copy()
     values[np.indices(values.shape).sum(axis=0) % 2 == 1] //= 8
     return pvdi.Volume(values, ball.spacing, ball.origin)
 
 
-pytestmark = pytest.mark.usefixtures("settled_at_once")
-
-BALL = _checkered(soft_ball(16))
+BALL = checkered(soft_ball(16))
 LOOK = {"clim": (0, 255), "opacity": "linear", "cmap": "bone"}
 SIZE = (240, 180)
 #: The viewer is not as high as the pictures that are compared, so that pixels and lists do not
 #: coincide: .94 to .97 where a full VDI is shown, below .9 by that of the view before.
 ENOUGH = 0.92
 
-SHOT = """async ([width, height]) => {
-  const shot = await viewer.screenshot({ width, height });
-  let text = "";
-  for (const value of shot.data) text += String.fromCharCode(value);
-  return [viewer.camera, btoa(text)];
-}"""
+#: Gives its sockets away.
+SOCKETS = """
+window.sockets = [];
+window.WebSocket = class extends WebSocket {
+  constructor(...given) { super(...given); sockets.push(this); }
+};
+"""
 
 
 @pytest.fixture(scope="module")
@@ -48,38 +46,27 @@ def server(default_runtime):
 
 
 @pytest.fixture
-def page(server, chromium):
-    context = chromium.new_context(viewport={"width": SIZE[0], "height": SIZE[1] + 100})
-    page = context.new_page()
-    page.set_default_timeout(LONG)
-    complaints = []
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
-    page.goto(server.url)
-    yield page
-    context.close()
-    assert not complaints
+def page(server, open_page):
+    viewport = {"width": SIZE[0], "height": SIZE[1] + 100}
+    return open_page(url=server.url, before=SOCKETS, viewport=viewport)
 
 
-def _picture(page):
-    """Return what the viewer shows, RGBA from 0 to 1, and its camera."""
-    state, text = page.evaluate(SHOT, SIZE)
-    picture = np.frombuffer(base64.b64decode(text), np.uint8).reshape(SIZE[1], SIZE[0], 4)
+def camera_of(page):
+    state = page.evaluate("viewer.camera")
     names = ("position", "focal_point", "view_up", "view_angle")
-    camera = pvdi.Camera(**{name: state[name] for name in names})
-    return picture.astype(np.float32) / 255, camera
+    return pvdi.Camera(**{name: state[name] for name in names})
 
 
-def _ssim_of(page, **look):
-    picture, camera = _picture(page)
-    truth = pvdi.render_volume(BALL, camera, SIZE, **{**LOOK, **look})
-    return pvdi.compare_images(picture, truth).ssim
+def ssim_of(page, **look):
+    shown = picture(page, SIZE).astype(np.float32) / 255
+    truth = pvdi.render_volume(BALL, camera_of(page), SIZE, **{**LOOK, **look})
+    return pvdi.compare_images(shown, truth).ssim
 
 
-def _wait(page, condition):
+def wait(page, condition):
     # Playwright's own wait evaluates text in the page, which its policy forbids
     while not page.evaluate(condition):
-        page.wait_for_timeout(20)
+        page.page.wait_for_timeout(20)
 
 
 def test_the_page_is_the_viewer_and_leaks_nothing(server):
@@ -94,26 +81,23 @@ def test_the_page_is_the_viewer_and_leaks_nothing(server):
 
 
 def test_a_page_is_sent_what_its_view_needs(page):
-    _wait(page, "remote.received.full === 1")
+    wait(page, "remote.received.full === 1")
     assert page.evaluate("remote.received.coarse") == 1
     page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 4 }")
-    _wait(page, "remote.received.full === 2")
-    assert _ssim_of(page) > ENOUGH
+    wait(page, "remote.received.full === 2")
+    assert ssim_of(page) > ENOUGH
 
 
 def test_a_view_at_rest_is_the_volumes_own_picture(page):
     over = """viewer.shadowRoot.querySelector("img.over")"""
-    _wait(page, "viewer.camera !== null && remote.received.full >= 1")
+    wait(page, "viewer.camera !== null && remote.received.full >= 1")
     page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 9 }")
     # The bar of what is being loaded lies over the picture's last rows
     bar = """viewer.shadowRoot.querySelector("progress")"""
-    _wait(page, f"remote.received.full >= 2 && !{over}.hidden && {bar}.hidden")
-    file = page.locator("vdi-viewer").screenshot()
+    wait(page, f"remote.received.full >= 2 && !{over}.hidden && {bar}.hidden")
+    file = page.page.locator("vdi-viewer").screenshot()
     shown = np.asarray(Image.open(io.BytesIO(file)).convert("RGB"), np.int16)
-    state = page.evaluate("viewer.camera")
-    names = ("position", "focal_point", "view_up", "view_angle")
-    camera = pvdi.Camera(**{name: state[name] for name in names})
-    truth = pvdi.render_volume(BALL, camera, shown.shape[1::-1], **LOOK)[..., :3] * 255
+    truth = pvdi.render_volume(BALL, camera_of(page), shown.shape[1::-1], **LOOK)[..., :3] * 255
     # Straight colour and opacity are rounded to eight bits, and so is their product
     assert np.abs(shown - truth).max() <= 2
     page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 10 }")
@@ -127,7 +111,8 @@ def test_a_view_that_goes_on_moving_is_shown_what_comes(open_page):
     )
     shown = page.evaluate(
         """async () => {
-          window.WebSocket = class { close() {} };
+          let socket;
+          window.WebSocket = class { constructor() { socket = this; } close() {} };
           const viewer = document.createElement("div"), shown = [];
           viewer.showBytes = (file) => {
             shown.push(file[0]);
@@ -136,8 +121,8 @@ def test_a_view_that_goes_on_moving_is_shown_what_comes(open_page):
           const remote = new RemoteVDI(viewer, "");
           for (const byte of [1, 2]) {
             const head = { type: "vdi", level: "coarse", bytes: 1 };
-            remote._socket.onmessage({ data: JSON.stringify(head) });
-            remote._socket.onmessage({ data: Uint8Array.of(byte).buffer });
+            socket.onmessage({ data: JSON.stringify(head) });
+            socket.onmessage({ data: Uint8Array.of(byte).buffer });
           }
           const before = [...shown];
           const frame = { detail: { full: false, state: "full" } };
@@ -152,21 +137,21 @@ def test_a_view_that_goes_on_moving_is_shown_what_comes(open_page):
 
 @pytest.mark.slow
 def test_look_clipping_and_time_are_changed_in_the_page(page):
-    _wait(page, "remote.received.full === 1")
-    page.get_by_label("Colours").select_option("hot")
-    _wait(page, "remote.received.full >= 2")
-    assert _ssim_of(page, cmap="hot") > ENOUGH
+    wait(page, "remote.received.full === 1")
+    page.page.get_by_label("Colours").select_option("hot")
+    wait(page, "remote.received.full >= 2")
+    assert ssim_of(page, cmap="hot") > ENOUGH
 
-    page.get_by_label("Clip").first.select_option("x")
+    page.page.get_by_label("Clip").first.select_option("x")
     assert page.evaluate("viewer.clippingPlanes") == [{"origin": [0, 0, 0], "normal": [1, 0, 0]}]
-    assert _ssim_of(page, cmap="hot", clipping_planes=[(0, 0, 0, 1, 0, 0)]) > ENOUGH
+    assert ssim_of(page, cmap="hot", clipping_planes=[(0, 0, 0, 1, 0, 0)]) > ENOUGH
 
-    page.get_by_label("Time").fill("1")
-    _wait(page, "remote.received.full >= 3")
+    page.page.get_by_label("Time").fill("1")
+    wait(page, "remote.received.full >= 3")
 
 
 @pytest.mark.slow
 def test_a_lost_connection_comes_back(page):
-    _wait(page, "remote.received.full === 1")
-    page.evaluate("remote._socket.close(); viewer.camera = { ...viewer.camera, view_angle: 5 }")
-    _wait(page, "remote.received.full === 2")
+    wait(page, "remote.received.full === 1")
+    page.evaluate("sockets.at(-1).close(); viewer.camera = { ...viewer.camera, view_angle: 5 }")
+    wait(page, "remote.received.full === 2")

@@ -1,12 +1,11 @@
 """Sets in a page: each view is drawn by the VDI nearest to it, which is fetched when it is near."""
 
-from __future__ import annotations
-
-import base64
 import json
 
 import numpy as np
 import pytest
+from browsers import in_base64
+from frames import frames_of
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -15,14 +14,10 @@ from pyvista_vdi.sets import files
 from pyvista_vdi.sets.sphere import orbit, spiral, spread
 
 SIZE = (97, 55)
-#: Of 255: as of tests/web/test_element.py.
-CLOSE = 1.0
-
-READY = "viewer.ready.then(() => true)"
 
 
 @pytest.fixture(scope="module")
-def vdis(default_runtime, tmp_path_factory):
+def path(default_runtime, tmp_path_factory):
     z, y, x = np.meshgrid(*(np.linspace(-1, 1, 20),) * 3, indexing="ij")
     lumps = np.sin(5 * x) * np.cos(4 * y + 1) * np.sin(5 * z + 2)
     volume = pvdi.Volume(((1 + lumps) * (x**2 + y**2 + z**2 < 0.8)).astype("f4"))
@@ -35,15 +30,19 @@ def vdis(default_runtime, tmp_path_factory):
         ]
     )
     made.about["camera"] = around.to_dict()
-    path = made.save(tmp_path_factory.mktemp("sets") / "lumps.vdiset")
+    return made.save(tmp_path_factory.mktemp("sets") / "lumps.vdiset")
+
+
+@pytest.fixture(scope="module")
+def vdis(path):
     read = pvdi.read(path)
     read.blend = 0
     return read
 
 
 @pytest.fixture(scope="module")
-def data(vdis):
-    return vdis._views._path.read_bytes()
+def data(path):
+    return path.read_bytes()
 
 
 @pytest.fixture
@@ -58,39 +57,35 @@ def turning(data, open_page):
     return turning
 
 
-def worst(picture, vdis, camera):
-    return np.abs(picture - pvdi.render(vdis, camera, picture.shape[1::-1]) * 255.0).max()
-
-
 def test_each_view_is_drawn_by_the_vdi_nearest_to_it(vdis, turning):
     page = turning()
-    page.evaluate(READY)
+    page.ready()
     np.testing.assert_allclose(page.evaluate("viewer.camera.position"), vdis.camera.position)
     assert page.evaluate("viewer.set") == {"length": 14, "nearest": vdis.nearest(vdis.camera)}
     assert page.evaluate("[viewer.series, viewer.time, viewer.playing]") == [None, None, False]
     seen = set()
     for view in [vdis.camera, *orbit(vdis.camera, vdis.bounds, spiral(7))]:
-        assert worst(page.screenshot(view, SIZE), vdis, view) <= CLOSE
-        seen.add(page.evaluate("viewer.set.nearest"))
+        page.assert_shows(vdis, SIZE, view)
+        seen.add(vdis.nearest(view))
         assert page.evaluate("viewer.set.nearest") == vdis.nearest(view)
     assert len(seen) > 4
     # Of two eyes in one line the nearer one's distance counts as well
     near = vdis.camera.replace(position=0.5 * np.add(vdis.camera.position, vdis.camera.focal_point))
-    assert worst(page.screenshot(near, SIZE), vdis, near) <= CLOSE
+    page.assert_shows(vdis, SIZE, near)
     assert page.page.locator("vdi-viewer .controls").is_hidden()
     with pytest.raises(Exception, match="no series"):
         page.evaluate("viewer.play()")
 
 
 @pytest.mark.slow
-def test_views_are_fetched_as_it_turns(vdis, turning):
+def test_views_are_fetched_as_it_turns(vdis, data, turning):
     page = turning(in_parts=("lumps.vdiset",))
-    page.evaluate(READY)
-    frames = [(place + 40, header.n_bytes) for place, header in vdis._views._frames]
+    page.ready()
+    places = [place for place, _ in frames_of(data)]
 
     def fetched():
         begun = {part[0] for name, part in page.asked if name == "lumps.vdiset" and part}
-        return {i for i, (place, _) in enumerate(frames) if place in begun}
+        return {i for i, place in enumerate(places) if place in begun}
 
     # The nearest, and those that a view which does not move heads for: not all
     page.wait_for("viewer.set.nearest >= 0")
@@ -107,8 +102,7 @@ def test_views_are_fetched_as_it_turns(vdis, turning):
     for angle in range(8, 121, 8):
         view = vdis.camera.azimuth(angle)
         before = fetched()
-        worst_ = worst(page.screenshot(view, SIZE), vdis, view)
-        assert worst_ <= CLOSE
+        page.assert_shows(vdis, SIZE, view)
         if vdis.nearest(view) != nearest:
             nearest = vdis.nearest(view)
             early, late = early + (nearest in before), late + (nearest not in before)
@@ -119,9 +113,9 @@ def test_views_are_fetched_as_it_turns(vdis, turning):
 @pytest.mark.slow
 def test_a_damaged_view_is_named_and_others_are_shown(vdis, data, turning):
     nearest = vdis.nearest(vdis.camera)
-    place, header = vdis._views._frames[nearest]
+    place, header = frames_of(data)[nearest]
     broken = bytearray(data)
-    broken[place + 40 + header.n_bytes // 2] ^= 0x55
+    broken[place + header.n_bytes // 2] ^= 0x55
     page = turning(bytes(broken), expected="damaged")
     page.wait_for('heard.some(([name]) => name === "error")')
     message = next(detail["message"] for name, detail in page.evaluate("heard") if name == "error")
@@ -134,13 +128,12 @@ def test_a_damaged_view_is_named_and_others_are_shown(vdis, data, turning):
 
 def test_heads_that_are_wrong_are_said(data, open_page):
     begin = 20 + int.from_bytes(data[12:16], "little")
-    page = open_page(SIZE, files={})
+    page = open_page(SIZE)
     for change in ({"views": []}, {"bounds": [1, 2]}, {"views": [{"position": [0, 0, 0]}]}):
         head = {**json.loads(data[20:begin]), **change}
         content = layout.head_bytes(head, files.MAGIC) + data[begin:]
         said = page.evaluate(
-            "(text) => viewer.load(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)))"
-            ".then(() => '', (error) => error.message)",
-            base64.b64encode(content[: begin + 5000]).decode(),
+            "(text) => viewer.load(bytesOf(text)).then(() => '', (error) => error.message)",
+            in_base64(content[: begin + 5000]),
         )
         assert "does not say from where" in said
