@@ -15,12 +15,15 @@ from pyvista_vdi.device import devices, profiling, programs, sources
 from pyvista_vdi.device.runtime import Runtime
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, KernelBuildError
 
-# -- sources -----------------------------------------------------------------------------------
+
+def candidate_of(runtime):
+    (found,) = (c for c in devices.find_candidates()[0] if c.info.index == runtime.info.index)
+    return found
 
 
 @pytest.fixture
 def texts(monkeypatch):
-    """Kernel files in memory in place of the package's."""
+    """Kernel files in memory in place of the package's; what is expanded once is kept."""
     files: dict[str, str] = {}
 
     def read(path: str) -> str:
@@ -29,9 +32,7 @@ def texts(monkeypatch):
         return files[path]
 
     monkeypatch.setattr(sources, "read_resource", read)
-    sources._expand_resource.cache_clear()
-    yield files
-    sources._expand_resource.cache_clear()
+    return files
 
 
 def test_includes_are_expanded_once_with_line_marks(texts):
@@ -52,20 +53,24 @@ def test_includes_are_expanded_once_with_line_marks(texts):
 
 
 def test_a_file_that_includes_itself_ends(texts):
-    texts["a.cl"] = '#include "b.cl"\nint a;'
-    texts["b.cl"] = '#include "a.cl"\nint b;'
-    assert sources.expand("a.cl").count("int a;") == 1
+    texts["itself.cl"] = '#include "b.cl"\nint a;'
+    texts["b.cl"] = '#include "itself.cl"\nint b;'
+    assert sources.expand("itself.cl").count("int a;") == 1
 
 
-def test_missing_and_conditional_includes_name_the_place(texts):
-    texts["a.cl"] = '\n#include "nowhere.cl"\n'
-    with pytest.raises(KernelBuildError, match=r'a\.cl:2: #include "nowhere.cl": no such file'):
-        sources.expand("a.cl")
-    texts["c.cl"] = '#ifdef X\n#include "d.cl"\n#endif\n'
-    with pytest.raises(KernelBuildError, match=r"c\.cl:2: .* stands inside #if"):
-        sources.expand("c.cl")
-    with pytest.raises(KernelBuildError, match="no kernel file 'z.cl'"):
-        sources.expand("z.cl")
+@pytest.mark.parametrize(
+    ("path", "text", "message"),
+    [
+        ("a.cl", '\n#include "nowhere.cl"\n', r'a\.cl:2: #include "nowhere.cl": no such file'),
+        ("c.cl", '#ifdef X\n#include "d.cl"\n#endif\n', r"c\.cl:2: .* stands inside #if"),
+        ("z.cl", None, "no kernel file 'z.cl'"),
+    ],
+)
+def test_missing_and_conditional_includes_name_the_place(texts, path, text, message):
+    if text is not None:
+        texts[path] = text
+    with pytest.raises(KernelBuildError, match=message):
+        sources.expand(path)
 
 
 @pytest.mark.parametrize("path", ["../setup.py", "/etc/passwd", "", "common"])
@@ -73,8 +78,6 @@ def test_resources_outside_the_package_are_not_read(path):
     with pytest.raises(FileNotFoundError):
         sources.read_resource(path)
 
-
-# -- programs ----------------------------------------------------------------------------------
 
 SCALE = """\
 #include "lib/probe.cl"
@@ -101,20 +104,32 @@ def scale_file(tmp_path):
     return path
 
 
-def test_build_error_names_file_and_line(runtime, texts, tmp_path):
+def test_build_error_names_file_and_line(runtime, texts, monkeypatch, tmp_path):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     texts["common/good.cl"] = "int good(int a);\n" * 7
-    texts["vdi/bad.cl"] = (
-        '#include "common/good.cl"\n\n__kernel void bad()\n{\n    missing_it();\n}\n'
-    )
+    wrong = "".join(f"    missing_it{n}();\n" for n in range(40))
+    texts["vdi/bad.cl"] = f'#include "common/good.cl"\n\n__kernel void bad()\n{{\n{wrong}}}\n'
     with pytest.raises(KernelBuildError) as caught:
         runtime.kernel("vdi/bad.cl", "bad", {"N": 3})
     error = caught.value
     assert "vdi/bad.cl:5" in error.log
-    assert "missing_it" in str(error)
+    assert "missing_it0" in str(error)
+    more = len([line for line in error.log.splitlines() if line.strip()]) - programs.LOG_LINES_SHOWN
+    assert str(error).endswith(f"... {more} more lines in the error's .log")
     assert runtime.info.name in str(error)
     assert "-DN=3" in error.options
     assert '#line 2 "vdi/bad.cl"' in error.source
     assert error.__cause__ is not None
+    assert not list(tmp_path.glob("*.cl"))
+    # Where the device can, divisions are rounded correctly; and nothing is relaxed
+    cl = devices.opencl()
+    (device,) = (
+        c.device for c in devices.find_candidates()[0] if c.info.index == runtime.info.index
+    )
+    offered = device.single_fp_config & cl.device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT
+    assert ("-cl-fp32-correctly-rounded-divide-sqrt" in error.options) == bool(offered)
+    assert "relaxed" not in error.options
+    assert "unsafe" not in error.options
 
 
 def test_build_error_inside_an_include_names_the_include(runtime, texts):
@@ -124,22 +139,9 @@ def test_build_error_inside_an_include_names_the_include(runtime, texts):
         runtime.kernel("vdi/outer.cl", "k")
 
 
-def test_failed_builds_leave_no_files(runtime, texts, monkeypatch, tmp_path):
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    texts["vdi/bad.cl"] = "__kernel void bad() { not_there(); }"
-    with pytest.raises(KernelBuildError):
-        runtime.kernel("vdi/bad.cl", "bad")
-    assert not list(tmp_path.glob("*.cl"))
-
-
 def test_unknown_kernel_lists_those_there_are(runtime):
     with pytest.raises(KernelBuildError, match="has no kernel 'nix'.*it has: probe"):
         runtime.kernel("lib/probe.cl", "nix")
-
-
-def test_long_logs_are_trimmed():
-    text = programs._trimmed("\n".join(f"line {i}" for i in range(100)))
-    assert text.endswith("... 70 more lines in the error's .log")
 
 
 def test_programs_are_built_once_per_source_and_defines(runtime, scale_file, monkeypatch):
@@ -261,35 +263,36 @@ def test_padded():
     assert ocl.padded(0, 64) == (0,)
 
 
-def test_preferred_group_is_allowed(runtime):
-    width, height = runtime.preferred_group
-    assert width * height <= runtime._device.max_work_group_size
+def test_queue_scope_gives_a_thread_its_own_queue(runtime, scale_file, monkeypatch):
+    cl, queues = devices.opencl(), []
+    launch = cl.enqueue_nd_range_kernel
 
+    def noted(queue, *args, **kwargs):
+        queues.append(queue.int_ptr)
+        return launch(queue, *args, **kwargs)
 
-# -- queues and profiling ----------------------------------------------------------------------
-
-
-def test_queue_scope_gives_a_thread_its_own_queue(runtime, scale_file):
+    monkeypatch.setattr(cl, "enqueue_nd_range_kernel", noted)
     kernel = runtime.kernel(scale_file, "scale", {"ADD": 1})
-    outer = runtime._queue
     with runtime.buffer((4,)) as x:
         runtime.fill(x, 0)
+        args = (kernel, 4, None, x, np.float32(1), np.uint32(4))
+        runtime.launch(*args)
         with runtime.queue_scope():
-            assert runtime._queue is not outer
             with runtime.queue_scope():
-                runtime.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
-            runtime.launch(kernel, 4, None, x, np.float32(2), np.uint32(4))
-            assert len(runtime._queues) == 2
-        assert runtime._queue is outer
-        assert len(runtime._queues) == 1
-        assert np.all(runtime.download(x) == 3)
+                runtime.launch(*args)
+            runtime.launch(*args)
+        runtime.launch(*args)
+        assert np.all(runtime.download(x) == 4)
+    outer, innermost, inner, last = queues
+    assert outer == last
+    assert len({outer, innermost, inner}) == 3
 
 
 def test_profile_counts_calls_and_sums_times(runtime, scale_file, monkeypatch):
     monkeypatch.setattr("atexit.register", lambda function: None)
     monkeypatch.setattr(profiling, "PENDING_LIMIT", 3)
     monkeypatch.setenv("PYVISTA_VDI_PROFILE", "1")
-    profiled = Runtime(devices.Candidate(runtime.info, runtime._device))
+    profiled = Runtime(candidate_of(runtime))
     kernel = profiled.kernel(scale_file, "scale", {"ADD": 1})
     with profiled.buffer((4,)) as x:
         profiled.fill(x, 0)
@@ -332,14 +335,6 @@ def test_profile_table_is_printed_at_exit(runtime):
     head = lines.index(["kernel", "calls", "total", "ms", "mean", "ms", "share"])
     assert ["probe", "1"] in [line[:2] for line in lines[head + 1 :]]
     assert run_python(code, PYVISTA_VDI_PROFILE="0").stderr == ""
-
-
-def test_no_rounding_option_is_left_out_or_invented(runtime):
-    cl = devices.opencl()
-    offered = runtime._device.single_fp_config & cl.device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT
-    options = runtime._programs._base_options
-    assert ("-cl-fp32-correctly-rounded-divide-sqrt" in options) == bool(offered)
-    assert not any("relaxed" in option or "unsafe" in option for option in options)
 
 
 def test_a_lock_that_a_killed_process_left_does_not_hold_up_builds(
