@@ -9,16 +9,11 @@ import time
 import numpy as np
 import pytest
 from fresh_python import run_python
+from runtimes import fresh_runtime
 
 from pyvista_vdi import device as ocl
 from pyvista_vdi.device import devices, profiling, programs, sources
-from pyvista_vdi.device.runtime import Runtime
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, KernelBuildError
-
-
-def candidate_of(runtime):
-    (found,) = (c for c in devices.find_candidates()[0] if c.info.index == runtime.info.index)
-    return found
 
 
 @pytest.fixture
@@ -292,7 +287,7 @@ def test_profile_counts_calls_and_sums_times(runtime, scale_file, monkeypatch):
     monkeypatch.setattr("atexit.register", lambda function: None)
     monkeypatch.setattr(profiling, "PENDING_LIMIT", 3)
     monkeypatch.setenv("PYVISTA_VDI_PROFILE", "1")
-    profiled = Runtime(candidate_of(runtime))
+    profiled = fresh_runtime(runtime)
     kernel = profiled.kernel(scale_file, "scale", {"ADD": 1})
     with profiled.buffer((4,)) as x:
         profiled.fill(x, 0)

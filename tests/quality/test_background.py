@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from drawing import raycast_volume, render_vdi
 from fresh_python import run_python
+from runtimes import let_lack
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import scheduling as turns
@@ -367,15 +368,8 @@ def test_an_error_is_raised_once(runtime, generator, before):
 
 def test_a_lack_of_memory(runtime, generator, before, monkeypatch):
     """Found when the VDI is made and goes to the device, of which its maker keeps nothing."""
-    result = runtime.result
-
-    def scarce(*args, name="", **options):
-        if name == "supersegment media":
-            raise DeviceMemoryError(f"no room for {name}")
-        return result(*args, name=name, **options)
-
     with monkeypatch.context() as patched:
-        patched.setattr(runtime, "result", scarce)
+        let_lack(patched, runtime, "supersegment media")
         start(generator)
         with pytest.raises(DeviceMemoryError, match="no room for supersegment media"):
             taken(generator)

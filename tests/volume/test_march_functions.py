@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 from strategies import camera_around, random_transform
 
-from pyvista_vdi import Camera, TransferFunction, Volume
+from pyvista_vdi import TransferFunction, Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 
 EPS = 2.0**-24  # unit roundoff of float32
@@ -25,12 +25,10 @@ def random_volume(rng):
     )
 
 
-def marched(
-    call, runtime, volume, camera, window, transfer, step, *, t_end=np.inf, planes=(), group=1
-):
+def marched(call, runtime, volume, camera, window, transfer, step, *, group=1):
     """Whole marches of every pixel of a small window, and the rays that they belong to."""
     medium = DeviceVolume(runtime, volume, transfer, sample_distance=step)
-    march = medium.forms(camera, window, planes or ())
+    march = medium.forms(camera, window)
     rays = march.rays
     x, y = (i.ravel() for i in np.meshgrid(np.arange(window[0]), np.arange(window[1])))
     offsets = np.column_stack([x + 0.5 - window[0] / 2, y + 0.5 - window[1] / 2])
@@ -39,7 +37,7 @@ def marched(
     results = call(
         FILE, "marches", n, *medium.medium_arguments(camera), march.packed(), n_planes,
         offsets.astype(np.float32), np.float32(medium.sample_distance),
-        np.float32(medium.unit_distance), np.float32(t_end), np.int32(group), np.int32(capacity),
+        np.float32(medium.unit_distance), np.float32(np.inf), np.int32(group), np.int32(capacity),
         call.empty(n, 4), call.empty(n, dtype=np.int32), call.empty(n, capacity),
         call.empty(n, capacity, 4), call.empty(n, capacity, dtype=np.int32),
         by_value=(1, 7), **medium.defines, **march.defines,
@@ -60,7 +58,7 @@ def box_interval(volume, start, direction):
     return roots.min(axis=0).max(axis=1), roots.max(axis=0).min(axis=1), p, d
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_steps_cover_the_ray_without_gaps(call, runtime, seed):
     rng = np.random.default_rng(100 + seed)
     volume = random_volume(rng)
@@ -123,37 +121,8 @@ def medium_table(transfer):
     return [*transfer.colors.T.astype(np.float64), transfer.opacities.astype(np.float64)]
 
 
-def test_a_ray_ends_where_it_is_told(call, runtime):
-    """Opaque geometry and clipping planes shorten the march; behind them there is none."""
-    volume = Volume(np.ones((5, 5, 5), np.float32))
-    camera = Camera((2, 2, 12), (2, 2, 2), (0, 1, 0), parallel_projection=True, parallel_scale=1)
-    transfer = TransferFunction(np.ones((2, 3)), [0.5, 0.5], (0, 2), unit_distance=1.0)
-    window = (3, 3)
-    for t_end, planes, expected in (
-        (np.inf, None, (0, 4)),
-        (1.25, None, (0, 1.25)),
-        (0.0, None, None),
-        (-1.0, None, None),
-        (np.inf, [[0, 0, 3, 0, 0, -1]], (1, 4)),  # z <= 3 is kept; the ray comes from z = 4
-        (3.0, [[0, 0, 3, 0, 0, -1], [0, 0, 1.5, 0, 0, 1]], (1, 2.5)),
-        (np.inf, [[0, 0, 5, 0, 0, 1]], None),
-        (np.inf, [[10, 0, 0, 1, 0, 0]], None),  # parallel to the rays
-    ):
-        _, (intervals, steps, _, media, _) = marched(
-            call, runtime, volume, camera, window, transfer, 0.5, t_end=t_end, planes=planes
-        )
-        if expected is None:
-            assert (steps == -1).all()
-            continue
-        # Coordinates up to 12 in float64, a handful of float32 roundings of numbers up to 4
-        np.testing.assert_allclose(intervals[:, :2], np.tile(expected, (9, 1)), atol=16 * EPS * 4)
-        total = np.array([media[i, : steps[i], 3].sum() for i in range(9)])
-        exact = np.log(2) * (expected[1] - expected[0])
-        np.testing.assert_allclose(total, exact, rtol=64 * EPS)
-
-
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_what_is_passed_by_is_transparent(call, runtime, seed, interpolation):
     """Skipping decides what is looked at: never a step that holds something, in whole groups."""
     rng = np.random.default_rng(200 + seed)
