@@ -7,137 +7,100 @@ import sys
 
 import pytest
 
-from pyvista_vdi import _moved
+#: The former module, the module of today, and names that were documented under the former.
+MOVED = """
+ambient_occlusion model.ambient_occlusion AmbientOcclusion
+background quality.background BackgroundGeneration
+benchmark measure.paper run describe compare_results describe_changes find_dataset paper_cell
+benchmark measure.paper read_results Plan Results Dataset Change PaperCell
+camera model.camera Camera
+compare measure.compare measure table contact_sheet judge_vdi judge_vtk judge_times Settings
+compare measure.compare Report AngleResult Timing Check
+cropping model.cropping Cropping
+dial quality.dial Dial Choice Prediction Setting
+dial_measurement quality.probe choose forget
+frame_rate quality.frame_rate FrameRateController
+lighting model.lighting Light Lights Shading
+metrics model.metrics Comparison
+opencl_runtime device DeviceInfo
+picking raycasting.picking pick_vdi
+standard_cases model.standard_cases filling_camera TRANSFER_FUNCTIONS ANGLES ELEVATION
+standard_cases model.standard_cases VIEW_ANGLE WINDOW_SIZE
+tradeoff measure.tradeoff measure_tradeoff sweep Setting Tradeoff Point Figure dominates
+tradeoff measure.tradeoff find_dominated front
+transfer_function model.transfer_function TransferFunction
+vdi model.vdi VDI
+view_error quality.view_error ViewErrorEstimator ViewError angle_from_generating_view
+view_error quality.view_error magnification
+vtk_pipeline.actor vtk_pipeline.drawing.actor VDIActor
+vtk_pipeline.convert vtk_pipeline.filters.convert volume_from_vtk transfer_function_from_property
+vtk_pipeline.convert vtk_pipeline.filters.convert vdi_to_image vdi_from_image
+vtk_pipeline.dense vtk_pipeline.filters.dense vdi_to_dense_image vdi_from_dense_image
+vtk_pipeline.dense vtk_pipeline.filters.dense VDIToDenseImage
+vtk_pipeline.files vtk_pipeline.filters.files VDIReader VDIWriter
+vtk_pipeline.image vtk_pipeline.filters.image VDIToImage
+vtk_pipeline.mapper vtk_pipeline.drawing.mapper VDIMapper
+vtk_pipeline.properties vtk_pipeline.filters.properties transfer_function_from_property
+vtk_pipeline.source vtk_pipeline.filters.source VDISource
+vtk_pipeline.status vtk_pipeline.interaction.status VDIStatus
+"""
 
-#: Names that were documented under the module's former path, and the module of today.
-DOCUMENTED = {
-    "opencl_runtime": ("device", "DeviceInfo"),
-    "vtk_pipeline.image": ("vtk_pipeline.filters.image", "VDIToImage"),
-    "vtk_pipeline.files": ("vtk_pipeline.filters.files", "VDIReader VDIWriter"),
-    "vtk_pipeline.status": ("vtk_pipeline.interaction.status", "VDIStatus"),
-    "vtk_pipeline.convert": (
-        "vtk_pipeline.filters.convert",
-        "volume_from_vtk transfer_function_from_property vdi_to_image vdi_from_image",
-    ),
-    "vtk_pipeline.dense": (
-        "vtk_pipeline.filters.dense",
-        "vdi_to_dense_image vdi_from_dense_image VDIToDenseImage",
-    ),
-    "frame_rate": ("quality.frame_rate", "FrameRateController"),
-    "background": ("quality.background", "BackgroundGeneration"),
-    "view_error": (
-        "quality.view_error",
-        "ViewErrorEstimator ViewError angle_from_generating_view magnification",
-    ),
-    "dial": ("quality.dial", "Dial Choice Prediction Setting"),
-    "dial_measurement": ("quality.probe", "choose forget"),
-    "compare": (
-        "measure.compare",
-        (
-            "measure table contact_sheet judge_vdi judge_vtk judge_times Settings Report "
-            "AngleResult Timing Check"
-        ),
-    ),
-    "benchmark": (
-        "measure.paper",
-        (
-            "run describe compare_results describe_changes find_dataset paper_cell read_results "
-            "Plan Results Dataset Change PaperCell"
-        ),
-    ),
-    "tradeoff": (
-        "measure.tradeoff",
-        "measure_tradeoff sweep Setting Tradeoff Point Figure dominates find_dominated front",
-    ),
-    "standard_cases": (
-        "model.standard_cases",
-        "filling_camera TRANSFER_FUNCTIONS ANGLES ELEVATION VIEW_ANGLE WINDOW_SIZE",
-    ),
-    "metrics": ("model.metrics", "Comparison"),
-}
-
-#: Documented paths that are what they were.
-UNMOVED = {
-    "plotting.component": "AddVDI",
-    "plotting.accessor": "VDIAccessor",
-    "plotting.reader": "read_vdi",
-    "plotting.writer": "write_vdi",
-    "plotting.actor": "PlotterVDIActor",
-    "reference": (
-        "RaySamples ambient_transmittance build_vdi render render_joint render_joint_range "
-        "render_pixels render_range samples volume_image"
-    ),
-    "examples": (
-        "available load_brain load_ct load_data load_rayleigh_taylor path VOLUMES WHOLE "
-        "ExampleVolume"
-    ),
-    "errors": "VDIError",
-}
+#: The same of names in packages that were modules, and of what lies where it did.
+NAMES = """
+generation           generation.estimate  Estimate
+generation           generation.generate  generate_vdi
+volume               model.volume         Volume
+"""
+UNMOVED = """
+plotting.component   AddVDI
+plotting.accessor    VDIAccessor
+plotting.reader      read_vdi
+plotting.writer      write_vdi
+plotting.actor       PlotterVDIActor
+reference            RaySamples ambient_transmittance build_vdi render render_joint samples
+reference            render_joint_range render_pixels render_range volume_image
+examples             available load_brain load_ct load_data path VOLUMES WHOLE ExampleVolume
+errors               VDIError
+"""
 
 
-def in_package(name):
-    return f"pyvista_vdi.{name}"
+def rows(table):
+    return [line.split(maxsplit=2) for line in table.strip().splitlines()]
 
 
-@pytest.fixture
-def unimported(monkeypatch):
-    """Forgets a module, now and after the test: it warns when it is first imported."""
-
-    def forget(name):
-        package, _, attribute = in_package(name).rpartition(".")
-        monkeypatch.setitem(sys.modules, in_package(name), None)
-        del sys.modules[in_package(name)]
-        monkeypatch.setattr(importlib.import_module(package), attribute, None, raising=False)
-
-    return forget
-
-
-@pytest.mark.parametrize("old", DOCUMENTED)
-def test_documented_names_are_found_where_they_were(old, unimported):
-    new, names = DOCUMENTED[old]
-    if old.startswith("vtk_pipeline"):
+def module(name):
+    if name.startswith(("vtk_pipeline", "plotting")):
         pytest.importorskip("pyvista")
-    unimported(old)
-    with pytest.warns(DeprecationWarning, match=f"{in_package(old)} has moved to.*{new}"):
-        module = importlib.import_module(in_package(old))
-    today = importlib.import_module(in_package(new))
+    return importlib.import_module(f"pyvista_vdi.{name}")
+
+
+@pytest.mark.parametrize(("old", "new", "names"), rows(MOVED), ids=lambda text: text.split()[0])
+def test_documented_names_are_found_where_they_were(old, new, names, monkeypatch):
+    package, _, attribute = f"pyvista_vdi.{old}".rpartition(".")
+    # Forgotten now and after the test: it warns when it is first imported
+    monkeypatch.setitem(sys.modules, f"pyvista_vdi.{old}", None)
+    del sys.modules[f"pyvista_vdi.{old}"]
+    today = module(new)
+    monkeypatch.setattr(importlib.import_module(package), attribute, None, raising=False)
+    said = rf"pyvista_vdi\.{old} has moved to pyvista_vdi\.{new}; .*goes with the next release"
+    with pytest.warns(DeprecationWarning, match=said):
+        found = module(old)
     for name in names.split():
-        assert getattr(module, name) is getattr(today, name)
-    assert set(names.split()) <= set(dir(module))
+        assert getattr(found, name) is getattr(today, name)
+    assert set(names.split()) <= set(dir(found))
     with pytest.raises(AttributeError):
-        _ = module.there_is_no_such_name
+        _ = found.there_is_no_such_name
 
 
-@pytest.mark.parametrize("old", sorted(_moved.MODULES))
-def test_every_former_module_leads_somewhere(old, unimported):
-    if old.startswith("vtk_pipeline"):
-        pytest.importorskip("pyvista")
-    unimported(old)
-    with pytest.warns(DeprecationWarning, match="goes with the next release"):
-        importlib.import_module(in_package(old))
-    assert importlib.import_module(in_package(_moved.MODULES[old]))
-
-
-@pytest.mark.parametrize(
-    ("package", "name"), [(p, n) for p, names in _moved.NAMES.items() for n in names]
-)
-def test_names_of_modules_that_are_packages_today(package, name):
-    module = importlib.import_module(in_package(package))
+@pytest.mark.parametrize(("package", "home", "name"), rows(NAMES))
+def test_names_of_modules_that_are_packages_today(package, home, name):
     with pytest.warns(DeprecationWarning, match=f"{package}.{name} has moved"):
-        old = getattr(module, name)
-    home = importlib.import_module(in_package(_moved.NAMES[package][name]))
-    assert old is getattr(home, name)
+        old = getattr(module(package), name)
+    assert old is getattr(module(home), name)
 
 
-@pytest.mark.parametrize("module", UNMOVED)
-def test_what_has_not_moved_is_there(module):
-    if module.startswith("plotting"):
-        pytest.importorskip("pyvista")
-    found = importlib.import_module(in_package(module))
-    for name in UNMOVED[module].split():
-        assert hasattr(found, name), name
-
-
-def test_what_never_was_is_no_module():
+def test_what_has_not_moved_is_there():
+    for name, *names in map(str.split, UNMOVED.strip().splitlines()):
+        assert all(hasattr(module(name), each) for each in names), name
     with pytest.raises(ModuleNotFoundError, match="pyvista_vdi.nothing"):
         importlib.import_module("pyvista_vdi.nothing")
