@@ -30,22 +30,6 @@ devices generate render view turntable movie info convert serve series set compa
 tradeoff paraview
 """
 VERBS = NAMES.split()
-    "devices",
-    "generate",
-    "render",
-    "view",
-    "turntable",
-    "movie",
-    "info",
-    "convert",
-    "serve",
-    "series",
-    "set",
-    "compare",
-    "benchmark",
-    "tradeoff",
-    "paraview",
-]
 
 
 @pytest.fixture(autouse=True)

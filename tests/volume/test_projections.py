@@ -100,10 +100,7 @@ WAYS = {
     "cropping": (slice(2, 5), {"cropping": pvdi.Cropping(CUT)}),
     # The middle along z is kept, and what is below: no box
     "regions": (slice(0, 5), {"cropping": pvdi.Cropping(CUT, 1 << 4 | 1 << 13 | 1)}),
-    "planes": (
-        slice(2, 5),
-        {"clipping_planes": [[0, 0, 1.5, 0, 0, 1], [0, 0, 4.5, 0, 0, -1]]},
-    ),
+    "planes": (slice(2, 5), {"clipping_planes": [[0, 0, 1.5, 0, 0, 1], [0, 0, 4.5, 0, 0, -1]]}),
     "depth": (slice(2, NZ), {"opaque_depth": np.full((NY, NX), 20 - 1.5, np.float32)}),
 }
 

@@ -8,13 +8,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 EPS = 2.0**-24  # unit roundoff of float32
 FILE = "sampling_functions.cl"
-TYPES = {
-    "uint8": "uchar",
-    "int8": "char",
-    "uint16": "ushort",
-    "int16": "short",
-    "float32": "float",
-}
+TYPES = {"uint8": "uchar", "int8": "char", "uint16": "ushort", "int16": "short", "float32": "float"}
 #: Every type, and indices of 64 bits with the shortest and the longest.
 KINDS = [*((dtype, "uint") for dtype in TYPES), ("uint8", "ulong"), ("float32", "ulong")]
 
