@@ -276,27 +276,18 @@ def test_engine_imports_without_vtk_and_pyvista():
     )
 
 
-@pytest.fixture(scope="module")
-def modules_after_import():
-    """Return the modules that ``import pyvista_vdi`` loads beyond those that NumPy loads."""
-    return _run(
+def test_importing_the_package_loads_little():
+    """Beyond what NumPy loads; public names are loaded on first use."""
+    loaded = _run(
         "import sys, numpy\n"
         "before = set(sys.modules)\n"
         "import pyvista_vdi\n"
         "print(*sorted(set(sys.modules) - before), sep='\\n')\n"
     ).split()
-
-
-def test_importing_the_package_loads_nothing_heavy(modules_after_import):
-    heavy = [name for name in modules_after_import if name.split(".")[0] in HEAVY]
-    assert not heavy, heavy
-
-
-def test_importing_the_package_loads_few_modules(modules_after_import):
-    # Public names are loaded on first use. The package's own core and the standard library's
-    # modules that it needs stay under this; a single heavy import (scikit-image: about 400
-    # modules, PyVista: about 1000) is far beyond it.
-    assert len(modules_after_import) < 60, modules_after_import
+    assert not [name for name in loaded if name.split(".")[0] in HEAVY]
+    # The package's own core and the standard library's modules that it needs stay under this; a
+    # single heavy import (scikit-image: about 400 modules, PyVista: about 1000) is far beyond it
+    assert len(loaded) < 60, loaded
 
 
 def test_importing_touches_no_environment_and_prints_nothing():
@@ -312,8 +303,5 @@ def test_importing_touches_no_environment_and_prints_nothing():
 def test_every_public_name_resolves():
     missing = [name for name in pyvista_vdi.__all__ if getattr(pyvista_vdi, name, None) is None]
     assert not missing, missing
-
-
-def test_unknown_attribute_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no_such_name"):
         _ = pyvista_vdi.no_such_name

@@ -32,8 +32,8 @@ def test_upload_and_download(runtime, dtype, aligned):
     gc.collect()
     before = runtime.allocated
     with runtime.upload(array, name="values") as buffer:
-        in_place = runtime.is_cpu and aligned
-        assert runtime.allocated - before == (0 if in_place else array.nbytes)
+        if aligned:  # of others it depends on where the allocator puts them
+            assert runtime.allocated - before == (0 if runtime.is_cpu else array.nbytes)
         del array
         gc.collect()
         back = runtime.download(buffer)
@@ -76,12 +76,11 @@ def test_lasting_arrays_where_the_system_knows_no_huge_pages(monkeypatch):
 
 
 def test_a_host_without_memory_for_an_array_says_so(runtime, monkeypatch):
-    if not runtime.is_cpu:
-        pytest.skip("the device has memory of its own")
-
     def refused(*_, **__):
         raise OSError(12, "Cannot allocate memory")
 
+    if not runtime.is_cpu:
+        pytest.skip("the device has memory of its own")
     monkeypatch.setattr(host_memory.mmap, "mmap", refused)
     before = runtime.allocated
     with pytest.raises(DeviceMemoryError, match=r"no host memory .* 'lists' of 4\.00 MiB"):
@@ -109,6 +108,8 @@ def test_a_growing_array_keeps_what_was_written(monkeypatch, item, refused):
             return np.empty(n, dtype)
 
     array = ocl.GrowingArray(item)
+    array.reserve(0, most)
+    assert array.finished(0).shape == (0, *item)  # it may stay empty
     monkeypatch.setattr(buffers, "np", Short())
     for n in (1000, 1, 0, 30000):
         first, total = total, total + n
@@ -121,12 +122,6 @@ def test_a_growing_array_keeps_what_was_written(monkeypatch, item, refused):
     assert whole.ctypes.data % 4096 == 0 or refused
     np.testing.assert_array_equal(whole.reshape(total, -1).T[0], np.arange(total))
     np.testing.assert_array_equal(whole.reshape(total, -1).T[-1], np.arange(total))
-
-
-def test_a_growing_array_may_stay_empty():
-    array = ocl.GrowingArray((3,))
-    array.reserve(0, 100)
-    assert array.finished(0).shape == (0, 3)
 
 
 @pytest.mark.parametrize("shape", [(3, 5), (1000, 7), (0, 4)])
@@ -186,19 +181,18 @@ def test_write_fill_and_download_into(runtime):
         assert np.all(runtime.download(buffer) == -1)
         runtime.fill(buffer, np.int32(-5))
         assert np.all(runtime.download(buffer) == -5)
-        for bad in (np.zeros(6, np.float32), np.zeros(5, np.int32)):
-            with pytest.raises(InvalidArgumentError, match="'six' exchanges 6 C-contiguous"):
-                runtime.write(buffer, bad)
-            with pytest.raises(InvalidArgumentError, match="'six'"):
-                runtime.download(buffer, out=bad)
-        with pytest.raises(InvalidArgumentError, match="'six'"):
-            runtime.download(buffer, out=np.zeros((3, 2), np.int32).T[::-1])
-        with pytest.raises(InvalidArgumentError, match="256 is no byte"):
-            runtime.fill(buffer, 256)
-        with pytest.raises(InvalidArgumentError, match="does not divide"):
-            runtime.fill(buffer, np.zeros((), "f8")[()].astype("c16"))
-        with pytest.raises(InvalidArgumentError, match="7 elements were asked"):
-            runtime.download(buffer, count=7)
+        for use, message in (
+            (lambda: runtime.write(buffer, np.zeros(6, np.float32)), "'six' exchanges 6 C-contig"),
+            (lambda: runtime.write(buffer, np.zeros(5, np.int32)), "'six' exchanges 6 C-contig"),
+            (lambda: runtime.download(buffer, out=np.zeros(6, np.float32)), "'six'"),
+            (lambda: runtime.download(buffer, out=np.zeros(5, np.int32)), "'six'"),
+            (lambda: runtime.download(buffer, out=np.zeros((3, 2), np.int32).T[::-1]), "'six'"),
+            (lambda: runtime.fill(buffer, 256), "256 is no byte"),
+            (lambda: runtime.fill(buffer, np.complex128(0)), "does not divide"),
+            (lambda: runtime.download(buffer, count=7), "7 elements were asked"),
+        ):
+            with pytest.raises(InvalidArgumentError, match=message):
+                use()
 
 
 @pytest.mark.parametrize("behind_frames", [False, True])
@@ -281,20 +275,14 @@ def small(runtime, monkeypatch):
 
 def test_too_large_a_buffer_is_refused_before_it_is_taken(small):
     before = small.allocated
-    with pytest.raises(
-        DeviceMemoryError, match=r"'colours' needs 1.50 MiB \(1572864 bytes\).*1.00 MiB.*per buffer"
-    ) as caught:
+    message = r"'colours' needs 1.50 MiB \(1572864 bytes\).*1.00 MiB.*per buffer"
+    with pytest.raises(DeviceMemoryError, match=message) as caught:
         small.buffer(3 * 2**19, name="colours")
     assert isinstance(caught.value, MemoryError)
     assert "max_supersegments" in str(caught.value)
     for array in (np.zeros(2**19), ocl.aligned_empty(2**19, np.float64)):
         with pytest.raises(DeviceMemoryError, match="'volume' needs 4.00 MiB"):
             small.upload(array, name="volume")
-    assert small.allocated == before
-
-
-def test_too_much_in_all_is_refused_before_it_is_taken(small):
-    before = small.allocated
     with small.buffer(2**20, name="one"), small.buffer(2**20 - 4, name="two"):
         with pytest.raises(DeviceMemoryError, match=r"'three' needs .* are in use already"):
             small.buffer(8, name="three")
@@ -307,9 +295,8 @@ def test_drivers_refusal_of_a_buffer_is_a_memory_error(runtime, monkeypatch):
     without_limits = replace(runtime.info, max_allocation=2**62, global_memory=2**62)
     monkeypatch.setattr(runtime, "info", without_limits)
     before = runtime.allocated
-    with pytest.raises(
-        DeviceMemoryError, match="ran out of memory or resources while alloc.*'vast'"
-    ):
+    message = "ran out of memory or resources while alloc.*'vast'"
+    with pytest.raises(DeviceMemoryError, match=message):
         runtime.buffer(2**61, name="vast")
     assert runtime.allocated == before
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -45,9 +46,6 @@ def test_includes_are_expanded_once_with_line_marks(texts):
         '#line 3 "vdi/main.cl"',
         "int main_c;",
     ]
-
-
-def test_a_file_that_includes_itself_ends(texts):
     texts["itself.cl"] = '#include "b.cl"\nint a;'
     texts["b.cl"] = '#include "itself.cl"\nint b;'
     assert sources.expand("itself.cl").count("int a;") == 1
@@ -132,9 +130,6 @@ def test_build_error_inside_an_include_names_the_include(runtime, texts):
     texts["vdi/outer.cl"] = '// head\n#include "common/wrong.cl"\n__kernel void k() {}\n'
     with pytest.raises(KernelBuildError, match=r"common/wrong\.cl:2"):
         runtime.kernel("vdi/outer.cl", "k")
-
-
-def test_unknown_kernel_lists_those_there_are(runtime):
     with pytest.raises(KernelBuildError, match="has no kernel 'nix'.*it has: probe"):
         runtime.kernel("lib/probe.cl", "nix")
 
@@ -177,52 +172,33 @@ def test_float_defines_are_exact(runtime, scale_file):
 def test_threads_may_launch_the_same_kernel(runtime, scale_file):
     kernel = runtime.kernel(scale_file, "scale", {"ADD": 0})
     start = threading.Barrier(4)
-    wrong: list[object] = []
 
     def work(factor: int) -> None:
-        try:
-            data = np.full(100, factor, np.float32)
-            with runtime.buffer(data.shape, data.dtype) as x:
-                start.wait()
-                for _ in range(200):
-                    runtime.write(x, data)
-                    runtime.launch(kernel, 100, None, x, np.float32(factor), np.uint32(100))
-                    result = runtime.download(x)
-                    if not np.all(result == factor * factor):
-                        wrong.append((factor, result))
-        except Exception as exc:  # an assertion in a thread would be lost
-            wrong.append(exc)
+        data = np.full(100, factor, np.float32)
+        with runtime.buffer(data.shape, data.dtype) as x:
+            start.wait()
+            for _ in range(200):
+                runtime.write(x, data)
+                runtime.launch(kernel, 100, None, x, np.float32(factor), np.uint32(100))
+                assert np.all(runtime.download(x) == factor * factor)
 
-    threads = [threading.Thread(target=work, args=(factor,)) for factor in (2, 3, 5, 7)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert wrong == []
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(work, (2, 3, 5, 7)))
 
 
-def test_every_kind_of_argument(runtime, scale_file):
-    kernel = runtime.kernel(scale_file, "spread", {"ADD": 0})
-    data = np.arange(8, dtype=np.float32)
-    vector = np.array([1, 2, 3, 4], np.float32)
-    with runtime.upload(data) as x, runtime.buffer(x.shape) as y:
-        runtime.launch(kernel, 8, 4, x, y, vector, ocl.LocalMemory(16))
-        np.testing.assert_array_equal(runtime.download(y), [3, 2, 1, 0, 7, 6, 5, 4])
-        runtime.launch(kernel, (8,), (4,), None, y, vector, ocl.LocalMemory(16))
-        np.testing.assert_array_equal(runtime.download(y), np.full(8, 4))
-
-
-def test_a_launch_takes_the_arguments_of_its_own_and_not_of_the_launch_before(runtime, scale_file):
+def test_a_launch_takes_every_kind_of_argument_of_its_own(runtime, scale_file):
     """Only what changes is given to the driver: also signs of 0, arrays changed in place."""
     kernel = runtime.kernel(scale_file, "spread", {"ADD": 0})
-    vector = np.array([1, 2, 3, 4], np.float32)
-    with runtime.upload(np.zeros(4, np.float32)) as x, runtime.buffer(x.shape) as y:
+    vector, room = np.array([1, 2, 3, 4], np.float32), ocl.LocalMemory(16)
+    with runtime.upload(np.arange(8, dtype=np.float32)) as x, runtime.buffer(x.shape) as y:
+        runtime.launch(kernel, 8, 4, x, y, vector, room)
+        np.testing.assert_array_equal(runtime.download(y), [3, 2, 1, 0, 7, 6, 5, 4])
         for last in (4.0, 0.0, -0.0, np.nan, 7.0):
             vector[3] = last
-            runtime.launch(kernel, 4, 4, None, y, vector, ocl.LocalMemory(16))
-            assert runtime.download(y).tobytes() == np.full(4, last, np.float32).tobytes()
-        runtime.launch(kernel, 4, 4, x, y, vector, ocl.LocalMemory(16))
-        np.testing.assert_array_equal(runtime.download(y), np.zeros(4))
+            runtime.launch(kernel, (8,), (4,), None, y, vector, room)
+            assert runtime.download(y).tobytes() == np.full(8, last, np.float32).tobytes()
+        runtime.launch(kernel, 8, 4, x, y, vector, room)
+        np.testing.assert_array_equal(runtime.download(y), [3, 2, 1, 0, 7, 6, 5, 4])
     scale = runtime.kernel(scale_file, "scale", {"ADD": 0})
     for value in range(1, 6):  # a buffer that takes the place of one that has gone
         with runtime.buffer((3,)) as x:
@@ -307,12 +283,13 @@ def test_a_scope_can_be_profiled_by_itself(runtime, scale_file):
     profile = profiling.Profile()
     with runtime.buffer((4,)) as x:
         runtime.fill(x, 0)
+        args = (kernel, 4, None, x, np.float32(1), np.uint32(4))
         with runtime.queue_scope(profile):
-            runtime.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
+            runtime.launch(*args)
             with runtime.queue_scope():  # another's work, in the same thread
-                runtime.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
+                runtime.launch(*args)
             runtime.download(x)
-        runtime.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
+        runtime.launch(*args)
         assert np.all(runtime.download(x) == 3)
     calls = {row.name: row.calls for row in profile.figures()}
     assert calls == {"scale": 1, "[read]": 1}
@@ -332,26 +309,29 @@ def test_profile_table_is_printed_at_exit(runtime):
     assert run_python(code, PYVISTA_VDI_PROFILE="0").stderr == ""
 
 
+@pytest.fixture
+def new_kernel(tmp_path):
+    """A file that no cache knows."""
+    path = tmp_path / "new.cl"
+    path.write_text(f"// {tmp_path}\n__kernel void twice(__global float *x) {{ *x *= 2; }}")
+    return path
+
+
 def test_a_lock_that_a_killed_process_left_does_not_hold_up_builds(
-    runtime, tmp_path, monkeypatch, caplog
+    runtime, new_kernel, tmp_path, monkeypatch, caplog
 ):
     monkeypatch.setattr(programs, "cache_folder", lambda: tmp_path)
     lock = tmp_path / "lock"
     lock.touch()
     killed = time.time() - 2 * programs.STALE_LOCK
     os.utime(lock, (killed, killed))
-    source = tmp_path / "twice.cl"
-    source.write_text("__kernel void twice(__global float *x) { x[get_global_id(0)] *= 2; }")
     with caplog.at_level("DEBUG", "pyvista_vdi"):
-        runtime.kernel(source, "twice")
+        runtime.kernel(new_kernel, "twice")
     assert not lock.exists()
     assert "cache lock" not in caplog.text  # of pyopencl, when it has waited ten seconds
 
 
-def test_kernels_are_built_where_nothing_can_be_cached(runtime, tmp_path, monkeypatch):
-    occupied = tmp_path / "a file"
-    occupied.touch()
-    monkeypatch.setattr(programs, "cache_folder", lambda: occupied / "folder")
-    source = tmp_path / "thrice.cl"
-    source.write_text("__kernel void thrice(__global float *x) { x[get_global_id(0)] *= 3; }")
-    assert runtime.kernel(source, "thrice").argument_count == 1
+def test_kernels_are_built_where_nothing_can_be_cached(runtime, new_kernel, monkeypatch):
+    # A folder cannot be made below a file
+    monkeypatch.setattr(programs, "cache_folder", lambda: new_kernel / "folder")
+    assert runtime.kernel(new_kernel, "twice").argument_count == 1
