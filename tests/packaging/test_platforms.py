@@ -15,7 +15,6 @@ from pathlib import Path
 import pytest
 
 import pyvista_vdi
-from pyvista_vdi._version import __version__
 
 CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
 PACKAGE = Path(pyvista_vdi.__file__).parent
@@ -102,7 +101,7 @@ def test_one_version():
         ("tools/conda/recipe.yaml", r'^  version: "(\S+)"$'),
     ):
         text = (CHECKOUT / name).read_text(encoding="utf-8")
-        assert re.findall(pattern, text, re.MULTILINE) == [__version__], name
+        assert re.findall(pattern, text, re.MULTILINE) == [pyvista_vdi.__version__], name
 
 
 def test_the_conda_recipe_has_the_wheel_s_requirements():
