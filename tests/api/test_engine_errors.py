@@ -49,7 +49,6 @@ def make(runtime):
 
 @pytest.fixture
 def draw(runtime):
-    """``raycast_volume`` of the same scene, with some arguments changed."""
 
     def render(volume=VOLUME, camera=CAMERA, window_size=WINDOW, transfer=TRANSFER, **options):
         return raycast_volume(volume, camera, window_size, transfer, device=runtime, **options)
@@ -59,7 +58,6 @@ def draw(runtime):
 
 @pytest.fixture
 def view(runtime, make):
-    """``render_vdi`` of its VDI from another view, with some arguments changed."""
     vdi = make()
 
     def render(camera=TURNED, window_size=None, **options):
@@ -249,7 +247,6 @@ def test_a_volume_too_large_is_named(runtime, make, draw, monkeypatch):
 @pytest.mark.every(3)
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 def test_working_memory_too_small_is_named(runtime, make, monkeypatch, share):
-    """Wherever the memory ends, the message names a buffer and a remedy, and all is given back."""
     make()  # the volume is on the device
     working = estimate(VOLUME, WINDOW).working
     gc.collect()

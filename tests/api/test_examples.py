@@ -72,7 +72,6 @@ def test_shipped_volumes(name, shape, dtype, spacing, quantity, ends):
 
 
 def test_the_fluids_meet_along_z():
-    """The ends of that axis differ, those of x and y do not."""
     array = examples.load_rayleigh_taylor(as_volume=True).array
     means = [[np.take(array, end, axis).mean() for end in (0, -1)] for axis in range(3)]
     z, y, x = (abs(first - last) for first, last in means)
@@ -81,7 +80,6 @@ def test_the_fluids_meet_along_z():
 
 
 def test_ct_is_in_hounsfield_units():
-    """Means of the pins, against what their maker states for their materials."""
     array = examples.load_ct(as_volume=True).array
     pins = {  # row, column: air, PMP, LDPE, polystyrene, acrylic, Delrin, Teflon
         (325, 206): -1000,

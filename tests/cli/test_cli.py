@@ -366,7 +366,6 @@ def test_view_of_a_volume(folder, capsys, default_runtime, tmp_path):
 
 
 def test_a_page_is_taken_as_a_vdi_is(folder, capsys, default_runtime, tmp_path):
-    """What verbs do with x.html is what they do with the .vdi that it holds."""
     page, file = folder / "a.html", tmp_path / "a.vdi"
     assert run(capsys, "convert", page, "-o", file)[0] == 0
     assert io.read(file).equals(io.read(page))
@@ -455,7 +454,6 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
 
 
 def test_generate_within_a_memory_limit(folder, capsys, default_runtime, tmp_path):
-    """The file is that without a limit; one that is too little for a brick is refused."""
     array = np.random.default_rng(1).integers(0, 256, (80, 90, 200), dtype=np.uint8)
     nrrd.write(str(tmp_path / "v.nrrd"), array, index_order="C")
     arguments = ["generate", tmp_path / "v.nrrd", "--transfer-function", folder / "tf.json"]

@@ -88,7 +88,6 @@ def test_a_series_plays_and_turns_meanwhile(saved, capsys, tmp_path):
 
 
 def write_views(folder, **views):
-    """Write views to JSON files of their names; return these."""
     for name, view in views.items():
         (folder / name).write_text(json.dumps(view.to_dict()))
     return [folder / name for name in views]
@@ -133,7 +132,6 @@ def test_frames_of_a_gif_last_as_long_as_was_asked_for(saved, capsys, tmp_path):
 
 @needs_films
 def test_frames_of_a_film_are_not_kept(saved, capsys, monkeypatch, tmp_path):
-    """Each is handed to the encoder before the next is drawn."""
     done = []
 
     def writer(*_, **__):

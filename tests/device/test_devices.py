@@ -17,23 +17,11 @@ from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError
 
 
 def fake(platform: str, name: str, kind: str, index: tuple[int, int], **more) -> ocl.DeviceInfo:
-    fields = {
-        "name": name,
-        "platform": platform,
-        "vendor": "V",
-        "version": "OpenCL 3.0",
-        "driver": "1",
-        "kind": kind,
-        "compute_units": 4,
-        "global_memory": 2**33,
-        "max_allocation": 2**31,
-        "has_fp64": True,
-        "usable": True,
-        "reason": "",
-        "platform_index": index[0],
-        "device_index": index[1],
-    }
-    return ocl.DeviceInfo(**{**fields, **more})
+    names = {"name": name, "platform": platform, "vendor": "V", "version": "OpenCL 3.0"}
+    sizes = {"compute_units": 4, "global_memory": 2**33, "max_allocation": 2**31}
+    state = {"driver": "1", "kind": kind, "has_fp64": True, "usable": True, "reason": ""}
+    place = {"platform_index": index[0], "device_index": index[1]}
+    return ocl.DeviceInfo(**{**names, **sizes, **state, **place, **more})
 
 
 POCL = fake(
@@ -112,6 +100,10 @@ def test_a_device_that_fails_its_probe_is_described_and_refused(runtime):
 
 
 def test_environment_names_the_device(runtime, monkeypatch):
+    monkeypatch.delenv("PYVISTA_VDI_DEVICE", raising=False)
+    best = choice.default_device(ocl.list_devices())
+    marked = f"* [{best.platform_index}:{best.device_index}] {best.full_name}"
+    assert marked in ocl.describe_devices()
     monkeypatch.setenv("PYVISTA_VDI_DEVICE", runtime.info.selector)
     assert ocl.get_runtime() is runtime
     assert f"Default: {runtime.info.full_name}, because" in ocl.describe_devices()
@@ -141,14 +133,6 @@ def test_every_form_of_device_gives_the_same_runtime(runtime):
     assert runtime.info.full_name in str(caught.value)
 
 
-def test_description_marks_the_default(runtime, monkeypatch):
-    monkeypatch.delenv("PYVISTA_VDI_DEVICE", raising=False)
-    best = choice.default_device(ocl.list_devices())
-    assert best is not None
-    text = ocl.describe_devices()
-    assert f"* [{best.platform_index}:{best.device_index}] {best.full_name}" in text
-
-
 #: Columns of what the probe kernel computes.
 FUNCTIONS = ["expm1", "log1p", "exp", "fma"]
 
@@ -174,7 +158,6 @@ def test_probe_notices_wrong_numbers(runtime, monkeypatch, where):
 
 
 def test_import_and_listing_leave_the_environment_as_it_was():
-    """And importing loads no driver."""
     done = run_python(
         "import os, sys; before = dict(os.environ)\n"
         "import pyvista_vdi.device\n"
@@ -188,14 +171,14 @@ def test_import_and_listing_leave_the_environment_as_it_was():
 
 
 def test_no_device_says_what_was_found_and_the_remedy(tmp_path):
-    code = (
+    done = run_python(
         "from pyvista_vdi.errors import NoDeviceError\n"
         "from pyvista_vdi.device import get_runtime, list_devices, describe_devices\n"
         "assert list_devices() == []\n"
         "print(describe_devices())\n"
-        "try:\n    get_runtime()\nexcept NoDeviceError as exc:\n    print('caught', exc)\n"
+        "try:\n    get_runtime()\nexcept NoDeviceError as exc:\n    print('caught', exc)\n",
+        OCL_ICD_VENDORS=str(tmp_path),
     )
-    done = run_python(code, OCL_ICD_VENDORS=str(tmp_path))
     assert done.returncode == 0, done.stderr
     described, message = done.stdout.split("caught ")
     for text in (described, message):
@@ -234,9 +217,6 @@ def test_pip_driver_is_shown_beside_the_system_ones(vendors):
         assert discovery.added == library
     assert "OCL_ICD_VENDORS" not in os.environ
     assert not folder.exists()
-
-
-def test_environment_is_put_back_when_listing_fails(vendors):
     with pytest.raises(ZeroDivisionError), icd.drivers_visible():
         raise ZeroDivisionError
     assert "OCL_ICD_VENDORS" not in os.environ

@@ -245,8 +245,7 @@ def test_blocks_inside_blocks():
 
 
 def test_cancelled_work_ends_while_a_frame_waits_for_it():
-    each = Turns()
-    cancelled = threading.Event()
+    each, cancelled = Turns(), threading.Event()
 
     def work():
         with each.background(cancelled.is_set):
@@ -258,10 +257,7 @@ def test_cancelled_work_ends_while_a_frame_waits_for_it():
         with pytest.raises(Cancelled):
             thread.value()
     assert_free(each)
-
-
-def test_cancelled_work_ends_at_its_next_checkpoint():
-    each = Turns()
+    # And else at its next checkpoint
     with pytest.raises(Cancelled), each.background(lambda: True):
         each.checkpoint()
     assert_free(each)
@@ -270,12 +266,10 @@ def test_cancelled_work_ends_at_its_next_checkpoint():
 @pytest.mark.parametrize("error", [ValueError, Cancelled])
 def test_errors_leave_nothing_behind(error):
     each = Turns()
-    with pytest.raises(error), each.foreground(), each.aside():
-        raise error
-    assert_free(each)
-    with pytest.raises(error), each.background(never), each.aside():
-        raise error
-    assert_free(each)
+    for block in (each.foreground, lambda: each.background(never)):
+        with pytest.raises(error), block(), each.aside():
+            raise error
+        assert_free(each)
 
 
 def test_a_lock_is_handed_over_between_frame_and_work():

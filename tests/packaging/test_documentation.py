@@ -138,7 +138,6 @@ def test_where_is_what_names_kernels_tests_and_pages_that_exist():
 
 
 def test_pages_name_files_that_exist():
-    """Paths of this repository in the pages lead somewhere."""
     missing = set()
     for page in _pages():
         if page.name == "changelog.md":

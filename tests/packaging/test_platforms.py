@@ -59,7 +59,6 @@ def test_the_package_is_imported_where_posix_modules_are_absent():
 
 @pytest.fixture
 def names():
-    """Return the names of the checkout's files."""
     if not (CHECKOUT / ".git").exists():
         pytest.skip("no checkout at hand: set PYVISTA_VDI_CHECKOUT to one")
     listing = subprocess.run(
@@ -69,7 +68,6 @@ def names():
 
 
 def test_every_file_can_be_checked_out_on_windows_and_macos(names):
-    """No character or name that they refuse, no two names that differ by case, none too long."""
     parts = {part for name in names for part in name.split("/")}
     assert not [p for p in parts if re.search(r'[<>:"\\|?*\x00-\x1f]|[. ]$', p)]
     assert not [p for p in parts if RESERVED.fullmatch(p)]
@@ -78,7 +76,6 @@ def test_every_file_can_be_checked_out_on_windows_and_macos(names):
 
 
 def test_text_is_opened_with_its_encoding():
-    """Windows' default is not UTF-8."""
     found = []
     for path in PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

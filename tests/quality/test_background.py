@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import os
 import sys
 import threading
 import time
 import weakref
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -61,7 +59,6 @@ def start(generator, camera=CAMERA, key=None, **options):
 
 
 def finish(generator):
-    """Wait until there is something to take."""
     deadline = time.monotonic() + PATIENCE
     while generator.running:
         assert time.monotonic() < deadline, "the generation does not end"
@@ -163,20 +160,9 @@ def test_an_empty_vdi(runtime, generator):
     assert taken(generator).n_supersegments == 0
 
 
-def test_a_vdi_is_taken_once_and_is_on_the_device(runtime, generator):
+def test_a_vdi_is_taken_once_and_is_on_the_device(runtime, generator, gate):
     assert generator.take() is None
     assert (generator.running, generator.key, generator.progress) == (False, None, None)
-    start(generator, key="k")
-    vdi = taken(generator)
-    assert generator.take() is None
-    assert generator.key is None
-    before = runtime.allocated
-    prepared_vdi(runtime, vdi)
-    assert runtime.allocated == before
-    assert not threads()  # ends by itself
-
-
-def test_progress_and_key(generator, gate):
     start(generator, key=("view", 1))
     gate.wait()
     assert generator.running
@@ -187,8 +173,13 @@ def test_progress_and_key(generator, gate):
     finish(generator)
     assert generator.progress is None
     assert generator.key == ("view", 1)  # until it is taken
-    assert generator.take() is not None
+    vdi = generator.take()
+    assert generator.take() is None
     assert generator.key is None
+    before = runtime.allocated
+    prepared_vdi(runtime, vdi)
+    assert runtime.allocated == before
+    assert not threads()  # ends by itself
 
 
 def test_on_finished_is_called_when_there_is_something_to_take(runtime):
@@ -288,15 +279,12 @@ def test_what_is_finished_too_late_is_dropped(runtime, monkeypatch):
     assert calls == [1]
 
 
-def test_a_new_start_replaces_what_was_not_taken(runtime, generator):
+def test_what_was_not_taken_is_replaced_or_dropped(runtime, generator, before):
     start(generator, key=1)
     finish(generator)
     start(generator, CAMERA.azimuth(10), key=2)
     assert generator.key == 2
     assert taken(generator).equals(make(runtime, CAMERA.azimuth(10)))
-
-
-def test_cancelling_drops_what_was_not_taken(runtime, generator, before):
     start(generator)
     finish(generator)
     generator.cancel(wait=True)
@@ -436,27 +424,7 @@ def test_a_volume_that_both_threads_need_first(runtime, generator, monkeypatch):
         )
 
 
-@pytest.mark.parametrize("own_queues", [False, True])
-def test_two_threads_draw_at_once(runtime, own_queues):
-    vdis = [make(runtime, CAMERA.azimuth(angle)) for angle in (0, 25)]
-    view = CAMERA.azimuth(10)
-    expected = [render_vdi(vdi, view, device=runtime) for vdi in vdis]
-    begin = threading.Barrier(2, timeout=PATIENCE)
-
-    def draw(vdi, image):
-        with runtime.queue_scope() if own_queues else contextlib.nullcontext():
-            begin.wait()
-            for _ in range(30):
-                with runtime.foreground():
-                    picture = render_vdi(vdi, view, device=runtime)
-                np.testing.assert_array_equal(picture, image)
-
-    with ThreadPoolExecutor(2) as pool:
-        list(pool.map(draw, vdis, expected))
-
-
 def resident_bytes():
-    """Memory of this process in RAM, bytes; None where the system does not say in this way."""
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
     except OSError:
@@ -472,7 +440,6 @@ RAM_TOLERANCE = 40 * 2**20
 
 @pytest.mark.slow
 def test_many_regenerations_leave_nothing(runtime, generator):
-    """Frames of the old VDI meanwhile, and each new one takes its place."""
     window = (160, 120)
     others = threading.active_count()
 

@@ -45,7 +45,6 @@ class Recorded:
 
     @property
     def share_mean(self):
-        """The same of the rate over five measured frames."""
         mean = np.convolve(self.measured, np.full(5, 1 / 5), "valid")[self.attainable[4:]]
         return np.mean(np.abs(PERIOD / mean - 1) <= THRESHOLD)
 
@@ -87,7 +86,6 @@ def simulate(work, frames=400, overhead=OVERHEAD, noise=0.0, stalls=(), seed=0, 
 
 
 def pooled(work, seeds=range(5), **arguments):
-    """Several runs, one after the other, each without its first frames."""
     runs = [simulate(work, seed=seed, **arguments).after() for seed in seeds]
     columns = zip(*(vars(run).values() for run in runs), strict=True)
     return Recorded(*(np.concatenate(values) for values in columns))

@@ -89,7 +89,6 @@ def half_space(depth, sigma, radius):
 
 @pytest.mark.parametrize("tilted", [False, True])
 def test_in_a_half_space_it_is_the_mean_over_the_sky(runtime, tilted):
-    """On the face half the light arrives, and below it less with every step."""
     points = 61
     index = np.arange(points) - 30.0
     z, y, x = np.meshgrid(index, index, index, indexing="ij")
@@ -124,7 +123,6 @@ def case(seed, **options):
 @pytest.mark.every(3)
 @pytest.mark.parametrize("seed", range(4))
 def test_pictures_are_the_reference_s(runtime, seed):
-    """Any spacing, direction matrix, voxel type, radius and view."""
     volume, camera, function, occlusion = case(seed)
     given = {"ambient_occlusion": occlusion}
     expected = reference.volume_image(volume, camera, WINDOW, function, **given)
@@ -145,7 +143,6 @@ def test_pictures_are_the_reference_s(runtime, seed):
 @pytest.mark.every(4)
 @pytest.mark.parametrize("more", ["nearest", "gradient opacity", "shading", "RGBA", "opaque"])
 def test_with_everything_else_as_well(runtime, more):
-    """The extinction is that of the marches; lit colours are darkened as unlit ones are."""
     volume, camera, function, occlusion = case(7)
     low, high = volume.finite_range()
     gradient = {"gradient_opacities": [0, 1], "gradient_range": (0, (high - low) / 4)}

@@ -64,7 +64,6 @@ VIEWS = {
 
 @pytest.fixture
 def used(monkeypatch):
-    """The bricks that were made, in order."""
     made = []
     original = DeviceBricks.__init__
 
@@ -171,7 +170,6 @@ def colours_of_their_own():
 
 
 def doubles_far_from_zero():
-    """Scaled as they are copied; one of them none."""
     values = FIELD[:, :, :120] + 1e9
     values[3, 4:9, 5] = np.nan
     span = (1e9 + 0.3, 1e9 + 0.7)

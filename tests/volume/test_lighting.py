@@ -89,7 +89,6 @@ def case(seed, dtype="float32", **more):
 
 @pytest.mark.parametrize(("seed", "name"), list(enumerate(LIGHTS)))
 def test_shaded_pictures_are_the_reference_s(runtime, name, seed):
-    """From any view, by any lights, with any transform of the model."""
     volume, camera, function = case(seed)
     lights = LIGHTS[name]
     image = raycast_volume(volume, camera, WINDOW, function, lights=lights, device=runtime)
@@ -160,7 +159,6 @@ def test_nan_beside_a_sample_leaves_its_other_differences(runtime, interpolation
 
 
 def test_a_flat_volume_reflects_ambient_light_only():
-    """Where nothing changes there is no normal; in closed form."""
     volume = Volume(np.full((4, 4, 4), 7.0))
     function = TransferFunction([[0.5, 1, 0]], [0.4], (7, 7), unit_distance=1.0, shading=SHINY)
     camera = Camera((9, 1.5, 1.5), (1.5, 1.5, 1.5), (0, 0, 1))
@@ -226,7 +224,6 @@ def test_kernels_compile_only_what_is_used(default_runtime):
 
 
 def test_lights_change_nothing_without_shading(runtime):
-    """Not a bit of it, and not the program."""
     volume, camera, function = case(2, shaded=False)
     dark, lit = (
         generate_vdi(volume, camera, WINDOW, function, lights=lights, device=runtime)

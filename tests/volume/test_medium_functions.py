@@ -83,7 +83,6 @@ def test_one_entry_is_constant(call, span):
 
 
 def test_step_optical_depth(call):
-    """-log1p(-a) units, and at least 30 where the sample is opaque."""
     rng = np.random.default_rng(7)
     below_one = 1 - 2.0**-24
     opacities = np.concatenate(

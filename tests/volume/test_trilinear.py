@@ -24,14 +24,12 @@ def product_volume(dtype="float64", **options):
 
 
 def ramp(max_opacity=0.8, unit_distance=2.0):
-    """Opacity and colour linear in the scalar: two nodes."""
     options = {"unit_distance": unit_distance, "interpolation": "linear"}
     return TransferFunction([[0, 0, 1], [1, 0.5, 0]], [0, max_opacity], (0, TOP), **options)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_reference_image_is_the_formula_s(seed):
-    """With spacing, origin, direction and model transform in between."""
     rng = np.random.default_rng(seed)
     volume = product_volume(
         spacing=rng.uniform(0.3, 1.5, 3),
