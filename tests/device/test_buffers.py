@@ -20,31 +20,28 @@ from pyvista_vdi.model import host_memory
 DTYPES = ["u1", "i1", "u2", "i2", "u4", "i4", "u8", "f4", "f8"]
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("aligned", [True, False])
-def test_upload_and_download(runtime, dtype, aligned):
+def test_upload_and_download(runtime, aligned):
     """Aligned arrays are used in place on a CPU."""
-    rng = np.random.default_rng(7)
-    values = rng.integers(0, 120, (5, 3, 4)).astype(dtype)
-    array = ocl.aligned_empty((5, 3, 4), dtype) if aligned else np.empty_like(values)[::-1]
-    assert array.ctypes.data % 4096 == 0 or not aligned
-    array[...] = values
+    values = np.random.default_rng(7).integers(0, 120, (5, 3, 4))
     gc.collect()
     before = runtime.allocated
-    with runtime.upload(array, name="values") as buffer:
-        if aligned:  # of others it depends on where the allocator puts them
-            assert runtime.allocated - before == (0 if runtime.is_cpu else array.nbytes)
-        del array
-        gc.collect()
-        back = runtime.download(buffer)
-        assert (back.dtype, back.shape) == (np.dtype(dtype), (5, 3, 4))
-        np.testing.assert_array_equal(back, values)
-        np.testing.assert_array_equal(runtime.download(buffer, count=7), values.ravel()[:7])
-        with pytest.raises(InvalidArgumentError, match="'values' was uploaded"):
-            runtime.write(buffer, values)
-        with pytest.raises(InvalidArgumentError, match="'values' was uploaded"):
-            runtime.fill(buffer, 0)
-    assert runtime.allocated == before
+    for dtype in DTYPES:
+        array = ocl.aligned_empty((5, 3, 4), dtype) if aligned else np.empty((5, 3, 4), dtype)[::-1]
+        assert array.ctypes.data % 4096 == 0 or not aligned
+        array[...] = values
+        with runtime.upload(array, name="values") as buffer:
+            if aligned:  # of others it depends on where the allocator puts them
+                assert runtime.allocated - before == (0 if runtime.is_cpu else array.nbytes)
+            del array
+            back = runtime.download(buffer)
+            assert (back.dtype, back.shape) == (np.dtype(dtype), (5, 3, 4))
+            np.testing.assert_array_equal(back, values)
+            np.testing.assert_array_equal(runtime.download(buffer, count=7), values.ravel()[:7])
+            for change in (runtime.write, runtime.fill):
+                with pytest.raises(InvalidArgumentError, match="'values' was uploaded"):
+                    change(buffer, back if change == runtime.write else 0)
+        assert runtime.allocated == before
 
 
 @pytest.mark.parametrize("n", [1000, 2**20, 3 * 2**19 + 5])

@@ -185,17 +185,17 @@ def test_more_directions_come_closer_to_the_mean(runtime):
 def test_the_grid_is_near_the_definition():
     """Where something is to be seen; smaller cells than the radius's eighth are not needed."""
     rng = np.random.default_rng(3)
-    volume = Volume(strategies.random_array(rng, "float32", (32, 32, 32)))
+    volume = Volume(strategies.random_array(rng, "float32", (24, 24, 24)))
     function = TransferFunction(
         np.ones((3, 3)), [0, 0, 0.5], volume.finite_range(), unit_distance=1.0,
         interpolation="linear",
     )  # fmt: skip
-    grid = node_occlusion(volume, function, AmbientOcclusion(8.0, strength=1.0))
-    position = rng.uniform(8, 23, size=(100, 3))
+    grid = node_occlusion(volume, function, AmbientOcclusion(6.0, strength=1.0))
+    position = rng.uniform(6, 17, size=(100, 3))
     _, tau = reference.generate.medium_at(volume, function, position, np.ones(len(position)))
     position = position[tau > 0]
     assert len(position) > 30
-    exact = reference.ambient_transmittance(volume, function, position, 8.0, 128)
+    exact = reference.ambient_transmittance(volume, function, position, 6.0, 128)
     assert np.abs(grid.factors(position) - exact).mean() < 0.02
 
 
