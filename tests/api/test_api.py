@@ -113,34 +113,25 @@ def test_estimate_says_bytes(volume):
     )
     assert cut.working > 2 * merged.working
     assert cut.vdi_worst_case == merged.vdi_worst_case
+    # Scalars that are taken relative to their range are floats
+    counts = pvdi.Volume((60000 + np.arange(504).reshape(7, 8, 9) % 90).astype(np.uint16))
+    for clim, nbytes in ((None, 4 * 504), ((0, 60100), 2 * 504)):
+        assert api.estimate(counts, (64, 48), clim=clim).volume == nbytes
     with pytest.raises(InvalidArgumentError, match="criterion must be one of .*; got 'depth'"):
         api.estimate(volume, (640, 480), criterion="depth")
-
-
-def test_estimate_counts_scalars_that_are_taken_relative_to_their_range():
-    counts = (60000 + np.arange(504).reshape(7, 8, 9) % 90).astype(np.uint16)
-    narrow, wide = (
-        api.estimate(pvdi.Volume(counts), (64, 48), clim=clim).volume for clim in (None, (0, 60100))
-    )
-    assert (narrow, wide) == (4 * counts.size, 2 * counts.size)
     with pytest.raises(TypeError, match="color_map"):
-        api.estimate(pvdi.Volume(counts), (64, 48), color_map="bone")
+        api.estimate(volume, (64, 48), color_map="bone")
 
 
-def test_help_shows_every_classification_argument():
+def test_help_shows_every_classification_argument_with_add_volumes_defaults():
     for function in (api.generate, api.render_volume, api.estimate):
         parameters = inspect.signature(function).parameters
         assert {*classification.DEFAULTS, *classification.IN_PLACE} <= set(parameters)
         assert parameters["diffuse"].default == 0.7
         assert "classification" not in parameters
-
-
-def test_defaults_are_add_volumes():
-    pv = pytest.importorskip("pyvista")
-    theirs = inspect.signature(pv.Plotter.add_volume).parameters
+    theirs = inspect.signature(pytest.importorskip("pyvista").Plotter.add_volume).parameters
     for name, default in classification.DEFAULTS.items():
-        if name != "interpolation":
-            assert theirs[name].default == default, name
+        assert name == "interpolation" or theirs[name].default == default, name
 
 
 def test_the_engine_works_without_vtk_and_pyvista(default_runtime):
@@ -301,14 +292,11 @@ def test_settings_that_are_refused(change, message, volume, camera, default_runt
             function(volume, camera, transfer_function=ramp(volume), **asked)
 
 
-def test_cameras_that_see_nothing(volume):
+def test_cameras_and_devices_that_are_none(volume, camera, default_runtime):
     with pytest.raises(InvalidCameraError, match="position and focal point are the same point"):
         api.generate(volume, pvdi.Camera((1, 2, 3), (1, 2, 3), (0, 0, 1)), SIZE)
     with pytest.raises(InvalidCameraError, match="expected a pyvista_vdi.Camera, a vtkCamera"):
         api.generate(volume, "xy", SIZE)
-
-
-def test_a_device_that_is_absent(volume, camera, default_runtime):
     with pytest.raises(NoDeviceError, match="no such device|no .*device") as caught:
         api.generate(volume, camera, SIZE, transfer_function=ramp(volume), device="no such device")
     assert default_runtime.info.name in str(caught.value)  # the message lists what exists

@@ -220,7 +220,7 @@ def test_a_clipping_planes_normal_may_have_any_length(draw, view):
     for function in (draw, view):
         unit = function(clipping_planes=[[3.5, 0, 0, 1, 0, 0]])
         assert 0 < np.count_nonzero(unit[..., 3]) < unit[..., 3].size
-        for length in (1e-300, 1e-45, 1e50):
+        for length in (1e-300, 1e-45, 1e-20, 1e20, 1e50, 1e300):
             same = function(clipping_planes=[[3.5, 0, 0, length, 0, 0]])
             np.testing.assert_array_equal(same, unit)
 
@@ -352,17 +352,16 @@ def test_giving_up_leaves_nothing_allocated(runtime, sliced, at, error):
     assert sliced().equals(kept)
 
 
-def test_a_window_whose_lists_the_host_cannot_hold_is_refused_before_any_work(make, monkeypatch):
-    monkeypatch.setattr("pyvista_vdi.model.host_memory.physical_memory", lambda: 2**30)
-    with pytest.raises(
-        DeviceMemoryError, match=r"65536 x 65536 lists needs 32\.00 GiB.* has 1\.00"
-    ):
-        make(window_size=(65536, 65536))
-
-
-def test_a_vdi_that_outgrows_the_host_is_given_up_with_the_remedy(make, monkeypatch):
-    # Room for the offsets of its lists and nothing more
-    room = 8 * WINDOW[0] * WINDOW[1]
-    monkeypatch.setattr("pyvista_vdi.model.host_memory.physical_memory", lambda: room)
-    with pytest.raises(DeviceMemoryError, match=r"12 x 9 lists .* lower the window size"):
-        make()
+@pytest.mark.parametrize(
+    ("memory", "window", "message"),
+    [
+        # Before any work
+        (2**30, (65536, 65536), r"65536 x 65536 lists needs 32\.00 GiB.* has 1\.00"),
+        # Room for the offsets of its lists and nothing more
+        (8 * WINDOW[0] * WINDOW[1], WINDOW, "12 x 9 lists .* lower the window size"),
+    ],
+)
+def test_a_vdi_that_the_host_cannot_hold_is_refused(make, monkeypatch, memory, window, message):
+    monkeypatch.setattr("pyvista_vdi.model.host_memory.physical_memory", lambda: memory)
+    with pytest.raises(DeviceMemoryError, match=message):
+        make(window_size=window)

@@ -30,10 +30,6 @@ FEW = {"window_size": (80, 60), "max_supersegments": 4}
 #: Fine enough to be close to the volume near V_O.
 FINE = {"window_size": WINDOW, "max_supersegments": 20}
 
-#: One tile's picture against the part of the whole: rays are formed about another centre, a few
-#: float32 roundings of a coordinate. Seen on two devices: 1.2e-5 by VDI, where a ray may change
-#: lists, and 2e-6 by volume.
-BY_VDI, BY_VOLUME = 5e-5, 1e-5
 
 #: Estimate against truth with the default tiles. Seen in the views below: 0.006.
 CLOSE = 0.012
@@ -93,26 +89,6 @@ _scenes = {}
 @pytest.fixture
 def scene(runtime):
     return _scenes.setdefault(runtime, Scene(runtime))
-
-
-@pytest.mark.parametrize("lens", ["perspective", "parallel", "horizontal", "off-centre"])
-def test_a_tile_is_that_part_of_the_whole_picture(scene, lens):
-    camera = VIEW.azimuth(25).replace(
-        **{
-            "perspective": {},
-            "parallel": {"parallel_projection": True, "parallel_scale": 18},
-            "horizontal": {"use_horizontal_view_angle": True, "view_angle": 40},
-            "off-centre": {"window_center": (0.2, -0.1)},
-        }[lens]
-    )
-    vdi = scene.vdi("fine")
-    whole = scene.pictures(vdi, camera)
-    column, row, size = 62, 50, (31, 20)
-    tile = scene.pictures(vdi, camera.tile(WINDOW, (column, row), size), size)
-    for part, picture, tolerance in zip(tile, whole, (BY_VDI, BY_VOLUME), strict=True):
-        expected = picture[row : row + size[1], column : column + size[0]]
-        assert expected.max() > 0.3  # there is something to see
-        np.testing.assert_allclose(part, expected, rtol=0, atol=tolerance)
 
 
 @pytest.mark.parametrize(("kind", "angles"), [("coarse", (5, 20, 45, 90)), ("fine", (5, 40, 90))])
@@ -219,15 +195,13 @@ def test_views_that_are_zoomed(scene, own):
 @pytest.mark.parametrize("size", [(11, 11), (11, 200), (40, 12), (301, 33)])
 def test_windows_of_any_shape(scene, size):
     vdi, camera = scene.vdi("coarse"), VIEW.azimuth(60)
-    found = scene.estimator(tiles=1000).estimate(vdi, camera, size)
+    estimator = scene.estimator(tiles=1000)
+    found = estimator.estimate(vdi, camera, size)
     # All cells are told; the last few pixels of an odd region are in two cells
     assert found.ssim == pytest.approx(scene.truth(vdi, camera, size), abs=CLOSE)
-
-
-def test_a_window_without_an_ssim_has_no_estimate(scene):
-    found = scene.estimator().estimate(scene.vdi("coarse"), VIEW, (10, 300))
-    assert np.isnan([found.ssim, found.standard_error]).all()
-    assert found.tiles == 0
+    without = estimator.estimate(vdi, camera, (10, size[1]))  # no SSIM, no estimate
+    assert np.isnan([without.ssim, without.standard_error]).all()
+    assert without.tiles == 0
 
 
 @pytest.mark.parametrize(
@@ -265,19 +239,6 @@ def test_the_same_question_has_the_same_answer(scene):
     assert len({each.estimate(vdi, camera, WINDOW) for each in estimators}) == 1
 
 
-def test_a_picture_at_hand_saves_rendering_the_vdi(scene):
-    vdi, camera = scene.vdi("coarse"), VIEW.azimuth(33)
-    picture, _ = scene.pictures(vdi, camera)
-    calls = []
-    estimate = scene.estimator().estimate
-    without = estimate(vdi, camera, WINDOW, pause=lambda: calls.append("without"))
-    found = estimate(vdi, camera, WINDOW, picture=picture, pause=lambda: calls.append("with"))
-    assert calls.count("without") == 2 * TILES + 2
-    assert calls.count("with") == TILES + 1
-    # The coarse picture ends with the window, so that tiles may be others
-    assert found.ssim == pytest.approx(without.ssim, abs=CLOSE)
-
-
 def test_coarse_pictures_are_made_in_bands(scene):
     vdi, camera, size = scene.vdi("coarse"), VIEW.azimuth(33), (400, 300)
     calls = []
@@ -291,17 +252,25 @@ def test_coarse_pictures_are_made_in_bands(scene):
     expected = cells.sample(cells.guess(*coarse), TILES)
     found = scene.estimator().sample(vdi, camera, size)
     np.testing.assert_array_equal(found.corners, expected.corners)
-    # Roundings of rays about other centres: those of BY_VDI, of guesses of about 0.1
+    # Rays about another centre differ by float32 roundings, 5e-5 of pictures; guesses are of 0.1
     np.testing.assert_allclose(found.guess, expected.guess, rtol=1e-3)
     assert found.guessed == pytest.approx(expected.guessed, rel=1e-3)
 
 
-def test_pause_ends_an_estimate_between_two_launches(scene):
-    answers = iter([None, True, 0, False])
+def test_a_picture_at_hand_saves_rendering_the_vdi(scene):
+    vdi, camera = scene.vdi("coarse"), VIEW.azimuth(33)
+    picture, _ = scene.pictures(vdi, camera)
+    calls = []
+    estimate = scene.estimator().estimate
+    without = estimate(vdi, camera, WINDOW, pause=lambda: calls.append("without"))
+    found = estimate(vdi, camera, WINDOW, picture=picture, pause=lambda: calls.append("with"))
+    assert calls.count("without") == 2 * TILES + 2
+    assert calls.count("with") == TILES + 1
+    # The coarse picture ends with the window, so that tiles may be others
+    assert found.ssim == pytest.approx(without.ssim, abs=CLOSE)
+    answers = iter([None, True, 0, False])  # False ends an estimate
     with pytest.raises(Cancelled, match="estimate of a view's error was cancelled"):
-        scene.estimator().estimate(
-            scene.vdi("coarse"), VIEW.azimuth(33), WINDOW, pause=lambda: next(answers)
-        )
+        estimate(vdi, camera, WINDOW, pause=lambda: next(answers))
     assert list(answers) == []
 
 
@@ -391,22 +360,17 @@ def test_a_sample_has_as_many_tiles_the_likelier_the_more_is_guessed(seed, tiles
     )
 
 
-def test_where_nothing_is_guessed_all_have_the_same_chance():
-    np.testing.assert_allclose(cells_of(4, 2).sample(np.zeros(8), 2).chances, 0.25)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_guess_that_is_right_up_to_a_factor_leaves_no_error(seed):
+def test_what_is_inferred_from_a_sample():
     cells = cells_of(10, 6)
-    guess = np.random.default_rng(seed).exponential(size=60)
-    sample = cells.sample(guess, 9)
-    ssim, error = sample.infer(1 - 0.03 * sample.guess)
-    assert ssim == pytest.approx(1 - sample.share * 0.03 * guess.sum())
-    assert error == pytest.approx(0, abs=1e-12)
-
-
-def test_a_guess_of_nothing_leaves_the_weighted_losses():
-    """Two of four with a chance of a half each: 2 (0.1 + 0.3); residuals are the losses."""
+    for seed in range(3):  # a guess that is right up to a factor leaves no error
+        guess = np.random.default_rng(seed).exponential(size=60)
+        sample = cells.sample(guess, 9)
+        ssim, error = sample.infer(1 - 0.03 * sample.guess)
+        assert ssim == pytest.approx(1 - sample.share * 0.03 * guess.sum())
+        assert error == pytest.approx(0, abs=1e-12)
+    # Where nothing is guessed all have the same chance, and the weighted losses count: two of four
+    # with a chance of a half each, 2 (0.1 + 0.3); residuals are the losses
+    np.testing.assert_allclose(cells_of(4, 2).sample(np.zeros(8), 2).chances, 0.25)
     half = np.array([0.5, 0.5])
     sample = TileSample(np.zeros((2, 2), int), (24, 24), half, np.zeros(2), 0.0, 1.0)
     ssim, error = sample.infer(np.array([0.9, 0.7]))
