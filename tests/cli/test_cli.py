@@ -510,6 +510,8 @@ def test_camera_options(folder):
     parallel = view("--parallel-scale 4")
     assert (parallel.parallel_projection, parallel.parallel_scale) == (True, 4)
     assert view(f"--camera-json {folder / 'camera.json'}") == VIEW
+    options = parser.parse(["render", "a", "-o", "b", "--view-angle", "20"])
+    assert not inputs.camera(options, parallel).parallel_projection
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ PARTS = [
 ]
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     "options",
     [
@@ -78,7 +78,7 @@ def test_options(check, options):
     check(volume_of(np.uint8, spacing=(1, 0.8, 1.3)), "linear", **options)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
 @pytest.mark.parametrize("blending", ["maximum", "minimum", "average", "additive"])
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])

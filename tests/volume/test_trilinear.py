@@ -53,6 +53,7 @@ def test_the_reference_image_is_the_formula_s(seed):
             np.testing.assert_array_equal(ray.end[:-1], ray.begin[1:])
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("dtype", ["uint8", "int16", "uint16", "int32", "float32", "float64"])
 def test_the_device_samples_x_y_z(runtime, dtype):
     rng = np.random.default_rng(4)

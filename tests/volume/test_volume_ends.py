@@ -69,7 +69,12 @@ def test_opaque_geometry_ends_only_its_own_rays_top_row_first(opacity):
 
 
 @pytest.mark.parametrize(
-    ("dtype", "interpolation"), [(np.uint8, "nearest"), (np.int16, "linear"), (float, "linear")]
+    ("dtype", "interpolation"),
+    [
+        (np.uint8, "nearest"),
+        (float, "linear"),
+        pytest.param(np.int16, "linear", marks=pytest.mark.slow),
+    ],
 )
 def test_passing_by_transparent_blocks_changes_no_bit(runtime, monkeypatch, interpolation, dtype):
     rng = np.random.default_rng(7)
