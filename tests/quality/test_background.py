@@ -129,7 +129,10 @@ def gate(monkeypatch):
     made.open()
 
 
-@pytest.mark.parametrize(("dtype", "parallel"), [("f4", False), ("u1", True), ("f8", False)])
+@pytest.mark.parametrize(
+    ("dtype", "parallel"),
+    [("f4", False), ("f8", True), pytest.param("u1", False, marks=pytest.mark.slow)],
+)
 def test_the_same_bytes(runtime, generator, dtype, parallel):
     """As generate_vdi, which does not work in pieces; of a volume that is not there yet, too."""
     volume, camera = scene(dtype)

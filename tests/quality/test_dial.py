@@ -286,7 +286,7 @@ def shipped(default_runtime):
             table = Classification(looks, "test").transfer_function(volume)
             picture = raycast_volume(volume, view, window, table)
             found = measured(default_runtime, volume, camera, window, table)
-            for rung in predictions(found, window)[::3]:
+            for rung in predictions(found, window)[::4]:
                 options = rung.setting.applied_to(GenerationOptions())
                 vdi = generate_vdi(volume, camera, rung.window_size, table, options)
                 ssim = compare_images(render_vdi(vdi, view, window), picture).ssim
