@@ -97,6 +97,8 @@ def test_names_of_modules_that_are_packages_today(package, home, name):
     with pytest.warns(DeprecationWarning, match=f"{package}.{name} has moved"):
         old = getattr(module(package), name)
     assert old is getattr(module(home), name)
+    with pytest.raises(AttributeError, match=f"{package}' has no attribute 'nothing'"):
+        _ = module(package).nothing
 
 
 def test_what_has_not_moved_is_there():
