@@ -47,9 +47,6 @@ def camera(volume):
     return filling_camera(volume.bounds, SIZE)
 
 
-# -- what they take --------------------------------------------------------------------------------
-
-
 def test_a_volume_becomes_a_vdi_a_file_and_a_picture(volume, camera, default_runtime, tmp_path):
     table = ramp(volume)
     heard = []
@@ -73,6 +70,9 @@ def test_a_volume_becomes_a_vdi_a_file_and_a_picture(volume, camera, default_run
 
 def test_vtk_objects_give_the_same_as_ours(volume, camera, default_runtime):
     pv = pytest.importorskip("pyvista")
+    from pyvista_vdi.plotting.classify import Looks
+    from pyvista_vdi.vtk_pipeline import vdi_to_image
+
     grid = pv.ImageData(dimensions=volume.dimensions, spacing=volume.spacing)
     grid["values"] = volume.array.ravel()
     view = pv.Camera()
@@ -85,28 +85,14 @@ def test_vtk_objects_give_the_same_as_ours(volume, camera, default_runtime):
     assert ours.metadata["classification"]["cmap"] == "viridis"
     picture = api.render_volume(grid, view, SIZE, **arguments)
     assert np.array_equal(picture, api.render_volume(volume, camera, SIZE, **arguments))
-
-
-def test_a_volume_property_stands_in_place_of_arguments(volume, camera, default_runtime):
-    pv = pytest.importorskip("pyvista")
-    from pyvista_vdi.plotting.classify import Looks
-
-    looks = Looks(cmap="bone", opacity="linear")
+    # The VTK form of a VDI is rendered
+    assert np.array_equal(api.render(vdi_to_image(ours), camera), api.render(ours, camera))
+    # A volume property stands in place of arguments
+    looks = Looks(cmap="viridis", opacity="sigmoid_5", clim=(0, 40))
     table = looks.lookup_table(volume.array)
     prop = looks.volume_property(table, volume.default_unit_distance)
     assert isinstance(prop, pv.VolumeProperty)
-    a = api.render_volume(volume, camera, SIZE, volume_property=prop)
-    b = api.render_volume(volume, camera, SIZE, cmap="bone", opacity="linear")
-    assert np.array_equal(a, b)
-
-
-def test_the_vtk_form_of_a_vdi_is_rendered(volume, camera, default_runtime):
-    pytest.importorskip("vtkmodules")
-    from pyvista_vdi.vtk_pipeline import vdi_to_image
-
-    vdi = api.generate(volume, camera, SIZE, transfer_function=ramp(volume))
-    image = vdi_to_image(vdi)
-    assert np.array_equal(api.render(image, camera), api.render(vdi, camera))
+    assert np.array_equal(picture, api.render_volume(volume, camera, SIZE, volume_property=prop))
 
 
 def test_scalars_by_value_and_by_name(volume):
@@ -127,34 +113,25 @@ def test_estimate_says_bytes(volume):
     )
     assert cut.working > 2 * merged.working
     assert cut.vdi_worst_case == merged.vdi_worst_case
+    # Scalars that are taken relative to their range are floats
+    counts = pvdi.Volume((60000 + np.arange(504).reshape(7, 8, 9) % 90).astype(np.uint16))
+    for clim, nbytes in ((None, 4 * 504), ((0, 60100), 2 * 504)):
+        assert api.estimate(counts, (64, 48), clim=clim).volume == nbytes
     with pytest.raises(InvalidArgumentError, match="criterion must be one of .*; got 'depth'"):
         api.estimate(volume, (640, 480), criterion="depth")
-
-
-def test_estimate_counts_scalars_that_are_taken_relative_to_their_range():
-    counts = (60000 + np.arange(504).reshape(7, 8, 9) % 90).astype(np.uint16)
-    narrow, wide = (
-        api.estimate(pvdi.Volume(counts), (64, 48), clim=clim).volume for clim in (None, (0, 60100))
-    )
-    assert (narrow, wide) == (4 * counts.size, 2 * counts.size)
     with pytest.raises(TypeError, match="color_map"):
-        api.estimate(pvdi.Volume(counts), (64, 48), color_map="bone")
+        api.estimate(volume, (64, 48), color_map="bone")
 
 
-def test_help_shows_every_classification_argument():
+def test_help_shows_every_classification_argument_with_add_volumes_defaults():
     for function in (api.generate, api.render_volume, api.estimate):
         parameters = inspect.signature(function).parameters
         assert {*classification.DEFAULTS, *classification.IN_PLACE} <= set(parameters)
         assert parameters["diffuse"].default == 0.7
         assert "classification" not in parameters
-
-
-def test_defaults_are_add_volumes():
-    pv = pytest.importorskip("pyvista")
-    theirs = inspect.signature(pv.Plotter.add_volume).parameters
+    theirs = inspect.signature(pytest.importorskip("pyvista").Plotter.add_volume).parameters
     for name, default in classification.DEFAULTS.items():
-        if name != "interpolation":
-            assert theirs[name].default == default, name
+        assert name == "interpolation" or theirs[name].default == default, name
 
 
 def test_the_engine_works_without_vtk_and_pyvista(default_runtime):
@@ -171,9 +148,6 @@ assert pvdi.render(vdi, camera).max() > 0
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-# -- what they refuse ------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("name", "suggestion"),
     [
@@ -185,9 +159,8 @@ assert pvdi.render(vdi, camera).max() > 0
     ],
 )
 def test_an_unknown_keyword_is_a_type_error(name, suggestion, volume, camera):
-    with pytest.raises(
-        TypeError, match=rf"generate\(\) got an unexpected .*{name!r}: {suggestion}"
-    ):
+    message = rf"generate\(\) got an unexpected .*{name!r}: {suggestion}"
+    with pytest.raises(TypeError, match=message):
         api.generate(volume, camera, SIZE, **{name: 1})
 
 
@@ -248,11 +221,8 @@ def test_names_and_values_that_add_volume_would_not_take(arguments, message, vol
 
 def test_names_need_the_plot_extra(volume, camera, monkeypatch):
     monkeypatch.setattr(classification, "find_spec", lambda name: None)
-    with pytest.raises(
-        MissingDependencyError,
-        match=r'not installed: install it by pip install "pyvista-vdi\[plot\]", or pass '
-        r"transfer_function=",
-    ):
+    message = r'not installed: install it by pip install "pyvista-vdi\[plot\]", or pass transfer_fu'
+    with pytest.raises(MissingDependencyError, match=message):
         api.generate(volume, camera, SIZE, cmap="bone")
 
 
@@ -265,88 +235,68 @@ def test_names_need_the_plot_extra(volume, camera, monkeypatch):
     ],
 )
 def test_what_is_no_volume(given, message, camera):
-    for function in (api.generate, api.render_volume):
+    for function, arguments in (
+        (api.generate, (camera, SIZE)),
+        (api.render_volume, (camera, SIZE)),
+        (api.estimate, (SIZE,)),
+    ):
         with pytest.raises(InvalidVolumeError, match=message):
-            function(given, camera, SIZE)
-    with pytest.raises(InvalidVolumeError, match=message):
-        api.estimate(given, SIZE)
+            function(given, *arguments)
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
+def test_what_is_no_vdi(camera):
+    pv = pytest.importorskip("pyvista")
+    for given, message in (
         ("knee.vdi", r"got the path 'knee.vdi': read it by pyvista_vdi.read\(path\)"),
         (None, "expected a VDI or its VTK form"),
-    ],
-)
-def test_what_is_no_vdi(given, message, camera):
-    with pytest.raises(InvalidVDIError, match=message):
-        api.render(given, camera)
-
-
-def test_a_vtk_image_that_is_no_vdi(camera):
-    pv = pytest.importorskip("pyvista")
-    with pytest.raises(InvalidVDIError, match="is not a VDI"):
-        api.render(pv.ImageData(dimensions=(2, 2, 1)), camera)
+        (pv.ImageData(dimensions=(2, 2, 1)), "is not a VDI"),
+    ):
+        with pytest.raises(InvalidVDIError, match=message):
+            api.render(given, camera)
 
 
 def test_volumes_without_something_to_render(camera):
     pv = pytest.importorskip("pyvista")
-    empty, bare = pv.ImageData(dimensions=(0, 0, 0)), pv.ImageData(dimensions=(4, 4, 4))
     plane = pv.ImageData(dimensions=(4, 4, 1))
     plane["a"] = np.zeros(16)
     for grid, message in (
-        (empty, "the volume is empty"),
-        (bare, "the volume has no scalars"),
+        (pv.ImageData(dimensions=(0, 0, 0)), "the volume is empty"),
+        (pv.ImageData(dimensions=(4, 4, 4)), "the volume has no scalars"),
         (plane, "only one plane of points"),
+        (pvdi.Volume(np.full((3, 3, 3), np.nan)), "every value"),
     ):
         with pytest.raises(InvalidVolumeError, match=message):
-            api.generate(grid, camera, SIZE)
+            api.generate(grid, camera, SIZE, cmap="bone")
     with pytest.raises(UnsupportedError, match="not a uniform grid.*voxelise it"):
         api.generate(pv.Sphere(), camera, SIZE)
 
 
-def test_all_nan(camera):
-    volume = pvdi.Volume(np.full((3, 3, 3), np.nan))
-    with pytest.raises(InvalidVolumeError, match="every value"):
-        api.generate(volume, camera, SIZE, cmap="bone")
-
-
-@pytest.mark.parametrize("count", [0, -1, 4097, 2.5, "many", None])
-def test_the_limit_of_supersegments(count, volume, camera):
-    with pytest.raises(InvalidArgumentError, match="max_supersegments must be .* 1 to 4096; got"):
-        api.generate(volume, camera, SIZE, transfer_function=ramp(volume), max_supersegments=count)
-    with pytest.raises(InvalidArgumentError, match="max_supersegments must be .* 1 to 4096; got"):
-        api.estimate(volume, SIZE, max_supersegments=count)
-
-
 @pytest.mark.parametrize(
-    ("size", "message"),
+    ("change", "message"),
     [
-        ((0, 16), "window_size must be between 1 and 65536 pixels along each edge; got 0 x 16"),
-        ((1, 10**9), "between 1 and 65536"),
-        ((1.5, 2), "two whole numbers of pixels"),
-        (7, "two whole numbers of pixels"),
+        ({"max_supersegments": 4097}, "max_supersegments must be .* 1 to 4096; got 4097"),
+        ({"window_size": (0, 16)}, "between 1 and 65536 pixels along each edge; got 0 x 16"),
+        ({"window_size": 7}, "two whole numbers of pixels"),
     ],
 )
-def test_window_sizes(size, message, volume, camera, default_runtime):
-    table = ramp(volume)
+def test_settings_that_are_refused(change, message, volume, camera, default_runtime):
+    """All that the engine refuses: test_engine_errors.py."""
+    asked = {"window_size": SIZE, **change}
     with pytest.raises(InvalidArgumentError, match=message):
-        api.generate(volume, camera, size, transfer_function=table)
-    with pytest.raises(InvalidArgumentError, match=message):
-        api.render_volume(volume, camera, size, transfer_function=table)
-    with pytest.raises(InvalidArgumentError, match=message):
-        api.estimate(volume, size)
+        api.estimate(volume, **asked)
+    functions = [api.generate]
+    if "window_size" in change:
+        functions.append(api.render_volume)
+    for function in functions:
+        with pytest.raises(InvalidArgumentError, match=message):
+            function(volume, camera, transfer_function=ramp(volume), **asked)
 
 
-def test_cameras_that_see_nothing(volume):
+def test_cameras_and_devices_that_are_none(volume, camera, default_runtime):
     with pytest.raises(InvalidCameraError, match="position and focal point are the same point"):
         api.generate(volume, pvdi.Camera((1, 2, 3), (1, 2, 3), (0, 0, 1)), SIZE)
     with pytest.raises(InvalidCameraError, match="expected a pyvista_vdi.Camera, a vtkCamera"):
         api.generate(volume, "xy", SIZE)
-
-
-def test_a_device_that_is_absent(volume, camera, default_runtime):
     with pytest.raises(NoDeviceError, match="no such device|no .*device") as caught:
         api.generate(volume, camera, SIZE, transfer_function=ramp(volume), device="no such device")
     assert default_runtime.info.name in str(caught.value)  # the message lists what exists

@@ -19,10 +19,9 @@ from pyvista_vdi.errors import (
     MissingDependencyError,
 )
 
-#: Volumes that take seconds to read, by the same readers as the others.
-LARGE = ("allen_mouse_brain", "berea", "t1w_head", "visible_female_head")
-
 SHIPPED = sorted(name for name, example in examples.VOLUMES.items() if example.shipped)
+READ_ON_EVERY_CHANGE = ("aneurism", "catphan", "tooth")
+OTHERS = sorted({*examples.VOLUMES} - {*SHIPPED, *READ_ON_EVERY_CHANGE})
 
 
 def test_three_volumes_are_shipped_and_small():
@@ -48,23 +47,40 @@ def test_checksum_is_the_one_in_the_provenance(name):
     assert "| source |" in section
 
 
-def test_brain_as_volume():
-    volume = examples.load_brain(as_volume=True)
-    assert volume.array.shape == (181, 217, 181)
-    assert volume.array.dtype == np.uint8
-    assert volume.spacing == (1.0, 1.0, 1.0)
-    assert volume.name == "intensity"
-    assert (volume.array.min(), volume.array.max()) == (0, 133)
+@pytest.mark.parametrize(
+    ("name", "shape", "dtype", "spacing", "quantity", "ends"),
+    [
+        ("brain", (181, 217, 181), "uint8", (1.0, 1.0, 1.0), "intensity", (0, 133)),
+        ("rayleigh_taylor", (192, 192, 192), "uint8", None, "concentration", (0, 255)),
+        (
+            "ct",
+            (19, 412, 412),
+            "int16",
+            (0.48828125, 0.48828125, 2.5),
+            "hounsfield",
+            (-1000, 1810),
+        ),
+    ],
+)
+def test_shipped_volumes(name, shape, dtype, spacing, quantity, ends):
+    volume = getattr(examples, f"load_{name}")(as_volume=True)
+    assert volume.array.shape == shape
+    assert volume.array.dtype == dtype
+    assert spacing in (None, volume.spacing)
+    assert volume.name == quantity
+    assert (volume.array.min(), volume.array.max()) == ends
+
+
+def test_the_fluids_meet_along_z():
+    array = examples.load_rayleigh_taylor(as_volume=True).array
+    means = [[np.take(array, end, axis).mean() for end in (0, -1)] for axis in range(3)]
+    z, y, x = (abs(first - last) for first, last in means)
+    assert z > 200, means
+    assert max(x, y) < 10, means
 
 
 def test_ct_is_in_hounsfield_units():
-    """Means of the pins, against what their maker states for their materials."""
-    volume = examples.load_ct(as_volume=True)
-    assert volume.array.shape == (19, 412, 412)
-    assert volume.array.dtype == np.int16
-    assert volume.spacing == (0.48828125, 0.48828125, 2.5)
-    assert volume.name == "hounsfield"
-    assert (volume.array.min(), volume.array.max()) == (-1000, 1810)
+    array = examples.load_ct(as_volume=True).array
     pins = {  # row, column: air, PMP, LDPE, polystyrene, acrylic, Delrin, Teflon
         (325, 206): -1000,
         (102, 146): -200,
@@ -75,7 +91,7 @@ def test_ct_is_in_hounsfield_units():
         (102, 265): 990,
     }
     for (y, x), nominal in pins.items():
-        found = volume.array[2:9, y - 4 : y + 5, x - 4 : x + 5].mean()
+        found = array[2:9, y - 4 : y + 5, x - 4 : x + 5].mean()
         # Noise of 19 in 567 voxels, correlated over some; cone-beam artefacts
         assert found == pytest.approx(nominal, abs=20), (y, x)
 
@@ -88,39 +104,18 @@ def test_ct_is_a_part_of_its_source():
     assert part.spacing == pytest.approx(whole.spacing, rel=1e-12)  # 2.500000000000046 there
 
 
-def test_rayleigh_taylor_as_volume():
-    volume = examples.load_rayleigh_taylor(as_volume=True)
-    assert volume.array.shape == (192, 192, 192)
-    assert volume.name == "concentration"
-    assert (volume.array.min(), volume.array.max()) == (0, 255)
-    # the two fluids meet along z: the ends of that axis differ, those of x and y do not
-    means = [[np.take(volume.array, end, axis).mean() for end in (0, -1)] for axis in range(3)]
-    z, y, x = (abs(first - last) for first, last in means)
-    assert z > 200, means
-    assert max(x, y) < 10, means
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_same_grid_as_pyvista_reads(name):
-    _compare_with_pyvista(name)
-
-
-@pytest.mark.every(3)
-@pytest.mark.real_data
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=[pytest.mark.slow] * (name in LARGE))
-        for name in sorted(set(examples.VOLUMES) - set(SHIPPED))
+        *SHIPPED,
+        *(pytest.param(name, marks=pytest.mark.real_data) for name in READ_ON_EVERY_CHANGE),
+        *(pytest.param(name, marks=[pytest.mark.real_data, pytest.mark.slow]) for name in OTHERS),
     ],
 )
-def test_other_volumes_read_as_pyvista_reads(name):
-    require_data(name)
-    _compare_with_pyvista(name)
-
-
-def _compare_with_pyvista(name):
+def test_same_grid_as_pyvista_reads(name):
     pyvista = pytest.importorskip("pyvista")
+    if name not in SHIPPED:
+        require_data(name)
     expected = pyvista.read(examples.path(name))
     grid = examples.load_data(name)
     assert isinstance(grid, pyvista.ImageData)
@@ -133,46 +128,30 @@ def _compare_with_pyvista(name):
     assert np.array_equal(grid.active_scalars, expected.active_scalars)
 
 
-def test_unknown_name_lists_the_known_ones():
+def test_absent_without_the_variable(monkeypatch, tmp_path):
     with pytest.raises(InvalidArgumentError, match=r"'brian'.*aneurism.*brain"):
         examples.load_data("brian")
-
-
-def test_absent_without_the_variable(monkeypatch):
     monkeypatch.delenv(examples.DATA_VARIABLE, raising=False)
     with pytest.raises(DataNotFoundError, match=r"PYVISTA_VDI_DATA is not set.*aneurism_256_u8"):
         examples.load_data("aneurism")
     assert examples.available() == tuple(SHIPPED)
-
-
-def test_without_the_variable_the_current_folder_is_not_searched(monkeypatch, tmp_path):
+    # Nor is the current folder searched
     (tmp_path / examples.VOLUMES["aneurism"].file_name).write_bytes(b"")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv(examples.DATA_VARIABLE, "")
     assert "aneurism" not in examples.available()
 
 
-def test_absent_from_the_folder(monkeypatch, tmp_path):
+def test_absent_and_damaged_files_are_named(monkeypatch, tmp_path):
     monkeypatch.setenv(examples.DATA_VARIABLE, str(tmp_path))
     with pytest.raises(FileNotFoundError, match=re.escape(str(tmp_path)) + r".*aneurism_256_u8"):
         examples.load_data("aneurism")
-
-
-def test_unreadable_file_is_named(monkeypatch, tmp_path):
     broken = tmp_path / examples.VOLUMES["aneurism"].file_name
-    broken.write_bytes(b"NRRD0004\ntype: uint8\n")
-    monkeypatch.setenv(examples.DATA_VARIABLE, str(tmp_path))
-    with pytest.raises(InvalidVolumeError, match=re.escape(str(broken))):
-        examples.load_data("aneurism", as_volume=True)
-
-
-def test_truncated_file_is_named(monkeypatch, tmp_path):
     whole = examples.path("brain").read_bytes()
-    broken = tmp_path / examples.VOLUMES["aneurism"].file_name
-    broken.write_bytes(whole[: len(whole) // 2])
-    monkeypatch.setenv(examples.DATA_VARIABLE, str(tmp_path))
-    with pytest.raises(InvalidVolumeError, match=re.escape(str(broken))):
-        examples.load_data("aneurism", as_volume=True)
+    for content in (b"NRRD0004\ntype: uint8\n", whole[: len(whole) // 2]):
+        broken.write_bytes(content)
+        with pytest.raises(InvalidVolumeError, match=re.escape(str(broken))):
+            examples.load_data("aneurism", as_volume=True)
 
 
 def test_oblique_axes_and_anisotropy(monkeypatch, tmp_path):

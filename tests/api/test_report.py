@@ -30,9 +30,13 @@ def test_a_report_says_what_is_missing(monkeypatch):
     def none():
         raise NoDeviceError("no device")
 
-    found = report._version
+    def version(name, found=metadata.version):
+        if name == "h5py":
+            raise metadata.PackageNotFoundError(name)
+        return found(name)
+
     monkeypatch.setattr(report, "describe_devices", none)
-    monkeypatch.setattr(report, "_version", lambda n: None if n == "h5py" else found(n))
+    monkeypatch.setattr(metadata, "version", version)
     described = pvdi.Report()
     assert described.packages["h5py"] is None
     assert 'pip install "pyvista-vdi[hdf5]"' in repr(described)

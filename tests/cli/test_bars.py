@@ -72,26 +72,21 @@ def test_a_callback_ends_reading_and_writing(suffix, tmp_path):
         pvdi.read(path, progress=lambda _: False)
 
 
-def test_convert_has_a_bar(told, tmp_path):
-    first = VDI.save(tmp_path / "a.exr")
-    assert cli.main(["convert", str(first), "-o", str(tmp_path / "b.exr")]) == 0
-    assert {(label, doing) for label, _, doing in told} == {
-        ("converting", "reading"),
-        ("converting", "writing"),
-    }
-    fractions = [fraction for _, fraction, _ in told]
-    assert fractions == sorted(fractions)
-    assert (fractions[0], fractions[-1]) == (0, 1)
-    assert len(set(fractions)) == 2 * VDI.window_size[1] + 1
-
-
-def test_render_has_a_bar(told, tmp_path, default_runtime):
+def test_convert_and_render_have_a_bar(told, tmp_path, default_runtime):
     files = [str(vdi.save(tmp_path / f"{i}.exr")) for i, vdi in enumerate(pair())]
-    assert cli.main(["render", *files, "-o", str(tmp_path / "a.png")]) == 0
-    assert told[-1] == ("rendering", 0.5, "drawing")
-    fractions = [fraction for _, fraction, _ in told]
-    assert fractions == sorted(fractions)
-    assert len(set(fractions)) == 2 * VDI.window_size[1] + 1
+    rows = 2 * VDI.window_size[1]
+    for verb, inputs_, target, last in (
+        ("convert", files[:1], "b.exr", ("converting", 1, "writing")),
+        ("render", files, "a.png", ("rendering", 0.5, "drawing")),
+    ):
+        told.clear()
+        assert cli.main([verb, *inputs_, "-o", str(tmp_path / target)]) == 0
+        assert told[-1] == last
+        assert {(label, doing) for label, _, doing in told} == {(last[0], "reading"), last[::2]}
+        fractions = [fraction for _, fraction, _ in told]
+        assert fractions == sorted(fractions)
+        assert fractions[0] == 0
+        assert len(set(fractions)) == rows + 1
 
 
 def test_generate_has_a_bar_for_its_file(told, tmp_path, default_runtime):
@@ -106,19 +101,17 @@ def test_a_bar_shows_the_time_where_work_does_not_say_how_far_it_is(monkeypatch)
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(progress, "PATIENCE", 0.0)
     bar = progress.DelayedBar(always=True, label="rendering")
-    bar.pulse()  # not begun: nothing to show
-    assert stream.getvalue() == ""
+
+    def pulsed():
+        before = len(stream.getvalue())
+        bar.pulse()
+        return stream.getvalue()[before:]
+
+    assert pulsed() == ""  # not begun: nothing to show
     bar(0.5, "drawing")
-    before = stream.getvalue()
-    bar.pulse()
-    assert "rendering: drawing:  50%" in stream.getvalue()[len(before) :]
+    assert "rendering: drawing:  50%" in pulsed()
     bar.close()
-    before = stream.getvalue()
-    bar.pulse()
-    assert stream.getvalue() == before
-
-
-# -- a window without a screen ---------------------------------------------------------------------
+    assert pulsed() == ""
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems have a screen")

@@ -1,29 +1,32 @@
-"""The command line: what each verb does, and that every mistake is one clear line.
-
-All verbs share the folder of inputs and the ways to run a command: hence more than 500 lines.
-"""
+"""The command line: what each verb does, and that every mistake is one clear line."""
 
 from __future__ import annotations
 
+import importlib.util
 import json
-import os
 import re
-import signal
+import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import nrrd
 import numpy as np
 import pytest
-from fresh_python import PATIENCE
+from PIL import Image
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
-from pyvista_vdi.cli import parser
+from pyvista_vdi.cli import inputs, paraview, parser
 from pyvista_vdi.io.volumes import read_file
 from pyvista_vdi.model.standard_cases import filling_camera
 
-VERBS = tuple(parser._VERBS)
+NAMES = """
+devices generate render view turntable movie info convert serve series set compare benchmark
+tradeoff paraview
+"""
+VERBS = NAMES.split()
 
 
 @pytest.fixture(autouse=True)
@@ -31,29 +34,28 @@ def _no_debug(monkeypatch):
     monkeypatch.delenv(cli.DEBUG_VARIABLE, raising=False)
 
 
+BOUNDS = (0, 7, 0, 9, 0, 11)
+VIEW = filling_camera(BOUNDS, (24, 16))
+
+
+def vdi_of(n, camera=VIEW, front=20.0, thickness=1.0, color=(1.0, 0.5, 0.0), metadata=None):
+    """A VDI with one supersegment in each of its first n lists."""
+    offsets = np.minimum(np.arange(24 * 16 + 1), n)
+    faces = (np.full(n, front), np.full(n, front + thickness))
+    media = (np.full((n, 3), color), np.full(n, 0.7))
+    return pvdi.VDI(camera, (24, 16), offsets, *faces, *media, BOUNDS, metadata=metadata)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A folder with a volume, a transfer function, a camera, a VDI, a page of it, and rubbish."""
     path = tmp_path_factory.mktemp("cli")
-    import nrrd
-
     z, y, x = np.mgrid[:12, :10, :8]
     nrrd.write(str(path / "v.nrrd"), (x * y + z).astype(np.uint8), index_order="C")
     table = pvdi.TransferFunction([(0, 0, 0.2), (1, 0.5, 0)], [0, 0.5], (0, 74))
     (path / "tf.json").write_text(json.dumps(table.to_dict()))
-    camera = filling_camera((0, 7, 0, 9, 0, 11), (24, 16))
-    (path / "camera.json").write_text(json.dumps(camera.to_dict()))
-    vdi = pvdi.VDI(
-        camera,
-        (24, 16),
-        np.minimum(np.arange(24 * 16 + 1), 200),
-        np.full(200, 20.0),
-        np.full(200, 21.0),
-        np.full((200, 3), (1.0, 0.5, 0.0)),
-        np.full(200, 0.7),
-        (0, 7, 0, 9, 0, 11),
-        metadata={"criterion": "none"},
-    )
+    (path / "camera.json").write_text(json.dumps(VIEW.to_dict()))
+    vdi = vdi_of(200, metadata={"criterion": "none"})
     vdi.save(path / "a.vdi")
     page = vdi.save(path / "a.html").read_bytes()
     (path / "cut.html").write_bytes(page[: page.rindex(b"</script>") - 101])
@@ -69,6 +71,13 @@ def run(capsys, *arguments):
     return status, captured.out, captured.err
 
 
+def said(capsys, *arguments):
+    """Run what must succeed; return its output, and what it has said beside it."""
+    status, out, err = run(capsys, *arguments)
+    assert status == 0, err
+    return out + err
+
+
 def complaint(capsys, *arguments, status=1):
     """Run what must fail; return the message after checking that it is one line."""
     found, out, err = run(capsys, *arguments)
@@ -80,19 +89,14 @@ def complaint(capsys, *arguments, status=1):
     return err[len(prefix) :].strip()
 
 
-# -- help and mistakes -----------------------------------------------------------------------------
-
-
 def test_help_names_every_verb(capsys):
-    status, out, _ = run(capsys, "--help")
-    assert status == 0
+    out = said(capsys, "--help")
     # argparse begins a new line behind a long one
-    assert all(re.search(rf"^    {verb}\s", out, re.MULTILINE) for verb in VERBS)
+    assert set(VERBS) == set(re.findall(r"^    ([a-z]+)(?:\s|$)", out, re.MULTILINE))
 
 
 def test_without_a_verb_it_shows_commands_that_parse(capsys):
-    status, out, _ = run(capsys)
-    assert status == 0
+    out = said(capsys)
     shown = re.findall(r"^  pyvista-vdi (.+?)(?:  .*)?$", out, re.MULTILINE)
     assert [line.split()[0] for line in shown][:2] == ["generate", "view"]
     assert len(shown) == 6
@@ -102,14 +106,10 @@ def test_without_a_verb_it_shows_commands_that_parse(capsys):
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_each_verb_explains_itself_with_an_example(verb, capsys):
-    status, out, _ = run(capsys, verb, "--help")
-    assert status == 0
-    assert f"Example:\n  pyvista-vdi {verb}" in out
-
-
-def test_the_examples_of_the_help_parse():
-    for _, _, example, _ in parser._VERBS.values():
-        assert parser.parse(example.split()[1:]) is not None
+    out = said(capsys, verb, "--help")
+    example = out.partition("Example:\n  pyvista-vdi ")[2].split()
+    assert example[0] == verb
+    assert parser.parse(example) is not None
 
 
 def test_version(capsys):
@@ -119,136 +119,126 @@ def test_version(capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["generat"], "there is no verb 'generat': did you mean 'generate'?"),
-        (["zzz"], "there is no verb 'zzz': known are devices, generate, render, view, turntable"),
-        (["info"], "one of the arguments FILE --example is required; see pyvista-vdi info --help"),
+        ("generat", "there is no verb 'generat': did you mean 'generate'?"),
+        ("zzz", "there is no verb 'zzz': known are devices, generate, render, view, turntable"),
+        ("info", "one of the arguments FILE --example is required; see pyvista-vdi info --help"),
         # Not "argument VOLUME: not allowed with argument --example" for the value behind it
         (
-            ["generate", "--example", "brain", "--qualty", "high", "-o", "a"],
+            "generate --example brain --qualty high -o a",
             "generate takes no argument '--qualty': did you mean '--quality'?",
         ),
-        (["info", "a", "b"], "info takes no argument 'b'; see pyvista-vdi info --help"),
-        (
-            ["generate", "a", "-o", "b", "--cmpa=bone"],
-            "no argument '--cmpa=bone': did you mean '--cm",
-        ),
-        (["generate", "-o", "b"], "one of the arguments VOLUME --example is required"),
-        (["generate", "a", "--example", "b", "-o", "c"], "not allowed with argument"),
-        (["generate", "a", "-o", "b", "--size", "12"], "a size is WIDTHxHEIGHT, like 1280x720"),
-        (["generate", "a", "-o", "b", "--memory-limit", "2 foo"], "a size such as 2GiB .* '2 foo'"),
-        (["generate", "a", "-o", "b", "--max-bytes", "0"], "a size such as 2GiB or 800MB; got '0'"),
-        (["generate", "a", "-o", "b", "-q"], "no argument '-q': see --help"),
-        (["devices", "--jso"], "no argument '--jso': did you mean '--json'?"),
-        (["devices", "--Q"], "no argument '--Q': known are --help, --json"),
-        (["generate", "a", "-o", "b", "--size", "0x3"], "between 1 and 65536 pixels .* got 0 x 3"),
-        (["generate", "a", "-o", "b", "--opacity", "0,x"], "numbers with commas .* got '0,x'"),
-        (["generate", "a", "-o", "b", "--tf", "hard"], "invalid choice: 'hard'"),
-        (["generate", "a", "-o", "b", "--quality", "best"], "invalid choice: 'best'"),
-        (["generate", "a", "-o", "b", "--position", "1", "2"], "expected 3 arguments"),
-        (["compare", "a", "--angles", "0;5"], "got '0;5'"),
-        (["serve", "a", "--port", "65536"], "a port is a number up to 65535; got '65536'"),
-        (["serve"], "one of the arguments VOLUME --example is required"),
-        (["compare", "a", "--repeats", "0"], "a whole number above 0; got '0'"),
-        (["view", "a", "--rate", "nan"], "frames per second, 0 or above; got 'nan'"),
-        (["render", "a", "-o", "b", "--background", "pinkish"], "'pinkish' is no colour"),
-        (["render", "a", "-o", "b", "--background", "0,0,2"], "R,G,B from 0 to 1"),
+        ("info a b", "info takes no argument 'b'; see pyvista-vdi info --help"),
+        ("generate a -o b --cmpa=bone", "no argument '--cmpa=bone': did you mean '--cm"),
+        ("generate -o b", "one of the arguments VOLUME --example is required"),
+        ("generate a --example b -o c", "not allowed with argument"),
+        ("generate a -o b --size 12", "a size is WIDTHxHEIGHT, like 1280x720"),
+        ("generate a -o b --memory-limit '2 foo'", "a size such as 2GiB .* '2 foo'"),
+        ("generate a -o b --max-bytes 0", "a size such as 2GiB or 800MB; got '0'"),
+        ("generate a -o b -q", "no argument '-q': see --help"),
+        ("devices --jso", "no argument '--jso': did you mean '--json'?"),
+        ("devices --Q", "no argument '--Q': known are --help, --json"),
+        ("generate a -o b --size 0x3", "between 1 and 65536 pixels .* got 0 x 3"),
+        ("generate a -o b --opacity 0,x", "numbers with commas .* got '0,x'"),
+        ("generate a -o b --tf hard", "invalid choice: 'hard'"),
+        ("generate a -o b --quality best", "invalid choice: 'best'"),
+        ("generate a -o b --position 1 2", "expected 3 arguments"),
+        ("compare a --angles '0;5'", "got '0;5'"),
+        ("serve a --port 65536", "a port is a number up to 65535; got '65536'"),
+        ("serve", "one of the arguments VOLUME --example is required"),
+        ("compare a --repeats 0", "a whole number above 0; got '0'"),
+        ("view a --rate nan", "frames per second, 0 or above; got 'nan'"),
+        ("render a -o b --background pinkish", "'pinkish' is no colour"),
+        ("render a -o b --background 0,0,2", "R,G,B from 0 to 1"),
     ],
 )
 def test_mistakes_in_the_arguments(arguments, message, capsys):
-    assert re.search(message.replace("?", r"\?"), complaint(capsys, *arguments, status=2))
+    assert re.search(
+        message.replace("?", r"\?"), complaint(capsys, *shlex.split(arguments), status=2)
+    )
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["info", "none.vdi"], "none.vdi cannot be read: No such file or directory"),
-        (["info", "no.vdi"], "is not a VDI file"),
-        (["info", "a.vdi", "--spacing", "1", "1", "2"], "is a VDI: --spacing is for volumes"),
-        (["view", "a.vdi", "--scalars", "x", "--screenshot", "b.png"], "--scalars is for volumes"),
-        (["view", "a.vdi", "--cmap", "bone", "--screenshot", "b.png"], "cmap cannot be given with"),
-        (["info", "none.nrrd"], "none.nrrd cannot be read"),
-        (["render", "a.vdi", "-o", "a.gif"], "the name must end in .png"),
-        (["render", "a.vdi", "-o", "no/a.png"], "no does not exist; create it"),
-        (["render", "none.vdi", "-o", "a.png"], "none.vdi cannot be read"),
-        (["render", "a.vdi", "-o", "a.png", "--camera-json", "x.json"], "x.json cannot be read"),
-        (["render", "a.vdi", "-o", "a.png", "--camera-json", "v.nrrd"], "is no camera in JSON"),
-        (["render", "a.vdi", "-o", "a.png", "--camera-json", "tf.json"], "unknown entries"),
-        (["render", "a.vdi", "-o", "a.png", "--view-angle", "180"], "between 0 and 180 degrees"),
+        ("info none.vdi", "none.vdi cannot be read: No such file or directory"),
+        ("info no.vdi", "is not a VDI file"),
+        ("info a.vdi --spacing 1 1 2", "is a VDI: --spacing is for volumes"),
+        ("view a.vdi --scalars x --screenshot b.png", "--scalars is for volumes"),
+        ("view a.vdi --cmap bone --screenshot b.png", "cmap cannot be given with"),
+        ("info none.nrrd", "none.nrrd cannot be read"),
+        ("render a.vdi -o a.gif", "the name must end in .png"),
+        ("render a.vdi -o no/a.png", "no does not exist; create it"),
+        ("render none.vdi -o a.png", "none.vdi cannot be read"),
+        ("render a.vdi -o a.png --camera-json x.json", "x.json cannot be read"),
+        ("render a.vdi -o a.png --camera-json v.nrrd", "is no camera in JSON"),
+        ("render a.vdi -o a.png --camera-json tf.json", "unknown entries"),
+        ("render a.vdi -o a.png --view-angle 180", "between 0 and 180 degrees"),
         (
-            ["generate", "v.nrrd", "-o", "b.png"],
+            "generate v.nrrd -o b.png",
             "the name must end in .vdi or .exr or .vti or .html, for instance 'b.vdi'",
         ),
-        (["generate", "v.nrrd", "-o", "no/b.vdi"], "the folder .*no does not exist; create it"),
-        (["generate", "--example", "nothing", "-o", "b.vdi"], "no example volume is called 'noth"),
+        ("generate v.nrrd -o no/b.vdi", "the folder .*no does not exist; create it"),
+        ("generate --example nothing -o b.vdi", "no example volume is called 'noth"),
         (
-            [
-                "generate",
-                "v.nrrd",
-                "-o",
-                "b.vdi",
-                "--transfer-function",
-                "tf.json",
-                "--cmap",
-                "bone",
-            ],
+            "generate v.nrrd -o b.vdi --transfer-function tf.json --cmap bone",
             "transfer_function stands in place of cmap",
         ),
         (
-            ["generate", "v.nrrd", "-o", "b.vdi", "--transfer-function", "camera.json"],
+            "generate v.nrrd -o b.vdi --transfer-function camera.json",
             "is no transfer function in JSON",
         ),
         (
-            ["generate", "v.nrrd", "-o", "b.vdi", "--occlusion-radius", "0"],
+            "generate v.nrrd -o b.vdi --occlusion-radius 0",
             "radius of ambient occlusion must be a positive length in model units; got 0",
         ),
         (
-            ["generate", "v.nrrd", "-o", "b.vdi", "--quality", "fast", "--target-ssim", "0.9"],
+            "generate v.nrrd -o b.vdi --quality fast --target-ssim 0.9",
             "both say how good pictures are to be",
         ),
-        (["compare", "v.nrrd", "--out", "v.nrrd"], "the folder v.nrrd cannot be made"),
-        (["compare", "v.nrrd", "--out", "new", "--angles", "5,5"], "an angle is given twice"),
-        (["compare", "v.nrrd", "--resume"], "--resume is for --front: leave it out"),
-        (["compare", "--front", "--cmap", "bone"], "--cmap is for one volume"),
-        (["info", "x" * 300], "x does not exist: check the volume's path"),
-        (["info", "none.html"], "none.html cannot be read: No such file"),
-        (["info", "no.html"], "no.html is not a page with a VDI: .* written by VDI.save"),
-        (["view", "no.html", "--screenshot", "b.png"], "no.html is not a page with a VDI"),
-        (["view", "cut.html", "--screenshot", "b.png"], "cut.html is damaged: .*copy it from its"),
-        (["render", "cut.html", "-o", "b.png"], "cut.html is damaged"),
-        (["info", "a.html", "--spacing", "1", "1", "2"], "a.html is a VDI: --spacing is for vol"),
+        ("compare v.nrrd --out v.nrrd", "the folder v.nrrd cannot be made"),
+        ("compare v.nrrd --out new --angles 5,5", "an angle is given twice"),
+        ("compare v.nrrd --resume", "--resume is for --front: leave it out"),
+        ("compare --front --cmap bone", "--cmap is for one volume"),
+        ("info " + "x" * 300, "x does not exist: check the volume's path"),
+        ("info none.html", "none.html cannot be read: No such file"),
+        ("info no.html", "no.html is not a page with a VDI: .* written by VDI.save"),
+        ("view no.html --screenshot b.png", "no.html is not a page with a VDI"),
+        ("view cut.html --screenshot b.png", "cut.html is damaged: .*copy it from its"),
+        ("render cut.html -o b.png", "cut.html is damaged"),
+        ("info a.html --spacing 1 1 2", "a.html is a VDI: --spacing is for vol"),
     ],
 )
 def test_mistakes_that_the_work_finds(arguments, message, folder, capsys, monkeypatch):
     monkeypatch.chdir(folder)
     before = sorted(folder.iterdir())
-    assert re.search(message, complaint(capsys, *arguments))
+    assert re.search(message, complaint(capsys, *arguments.split()))
     assert sorted(folder.iterdir()) == before
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["none.nrrd"], "none.nrrd cannot be read .*No such file"),
-        (["none.vti"], "none.vti does not exist: check the volume's path"),
-        (["x" * 300], "x does not exist: check the volume's path"),
-        (["x" * 300 + "_4x4x4_uint8.raw"], "raw does not exist: check the volume's path"),
-        (["a.vdi"], "a.vdi is a VDI, not a volume"),
-        (["a.html"], "a.html is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"),
-        (["camera.json"], "camera.json cannot be read as a volume"),
-        (["v.nrrd", "--scalars", "density"], "no array 'density'"),
-        (["v.nrrd", "--cmap", "viridys"], "cmap='viridys' .*did you mean 'viridis'"),
-        (["v.nrrd", "--max-supersegments", "0"], "max_supersegments must be .* 1 to 4096; got 0"),
-        (["v.nrrd", "--max-supersegments", "4097"], "from 1 to 4096; got 4097"),
-        (["v.nrrd", "--criterion", "depth"], "criterion must be one of .*; got 'depth'"),
-        (["v.nrrd", "--elevation", "80"], "elevation must lie between -90 and 90"),
-        (["v.nrrd", "--position", "1", "1", "1", "--focal-point", "1", "1", "1"], "the same point"),
+        ("none.nrrd", "none.nrrd cannot be read .*No such file"),
+        ("none.vti", "none.vti does not exist: check the volume's path"),
+        ("x" * 300, "x does not exist: check the volume's path"),
+        ("x" * 300 + "_4x4x4_uint8.raw", "raw does not exist: check the volume's path"),
+        ("a.vdi", "a.vdi is a VDI, not a volume"),
+        ("a.html", "a.html is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"),
+        ("camera.json", "camera.json cannot be read as a volume"),
+        ("v.nrrd --scalars density", "no array 'density'"),
+        ("v.nrrd --cmap viridys", "cmap='viridys' .*did you mean 'viridis'"),
+        ("v.nrrd --max-supersegments 0", "max_supersegments must be .* 1 to 4096; got 0"),
+        ("v.nrrd --max-supersegments 4097", "from 1 to 4096; got 4097"),
+        ("v.nrrd --criterion depth", "criterion must be one of .*; got 'depth'"),
+        ("v.nrrd --elevation 80", "elevation must lie between -90 and 90"),
+        ("v.nrrd --position 1 1 1 --focal-point 1 1 1", "the same point"),
     ],
 )
 def test_mistakes_that_need_pyvista_to_be_found(arguments, message, folder, capsys, monkeypatch):
     pytest.importorskip("pyvista")
     monkeypatch.chdir(folder)
     before = sorted(folder.iterdir())
-    status = cli.main(["generate", *arguments, "-o", "b.vdi"])
+    status = cli.main(["generate", *arguments.split(), "-o", "b.vdi"])
     last = capsys.readouterr().err.splitlines()[-1]  # the memory needed may have been said before
     assert status == 1
     assert re.search(f"pyvista-vdi: error: .*{message}", last)
@@ -262,14 +252,11 @@ def test_a_volume_that_is_not_there_leaves_no_folder(verb, tmp_path, capsys):
 
 
 def test_a_device_that_is_absent(folder, capsys, default_runtime):
-    message = complaint(
-        capsys, "render", folder / "a.vdi", "-o", folder / "x.png", "--device", "no such"
-    )
+    absent = ("--device", "no such")
+    message = complaint(capsys, "render", folder / "a.vdi", "-o", folder / "x.png", *absent)
     assert default_runtime.info.name in message  # it lists what exists
-
-
-def test_a_device_that_is_absent_is_said_before_anything_is_read(capsys, default_runtime):
-    message = complaint(capsys, "generate", "none.nrrd", "-o", "x.vdi", "--device", "no such")
+    # Said before anything is read
+    message = complaint(capsys, "generate", "none.nrrd", "-o", "x.vdi", *absent)
     assert "there is no such OpenCL device" in message
     assert default_runtime.info.selector in message
     assert "not probed" not in message
@@ -281,49 +268,38 @@ def test_debug_lets_the_traceback_through(monkeypatch):
         cli.main(["info", "none.vdi"])
 
 
-def test_memory_is_named(folder, capsys, monkeypatch):
-    def too_much(*_, **__):
-        raise MemoryError("Unable to allocate 96.0 GiB")
+@pytest.mark.parametrize(
+    ("error", "status", "message"),
+    [
+        (
+            MemoryError("Unable to allocate 96.0 GiB"),
+            1,
+            r"not enough memory \(Unable to allocate 96.0 GiB\): lower --size",
+        ),
+        (KeyboardInterrupt(), 130, "interrupted; nothing was left half done$"),
+    ],
+)
+def test_what_ends_the_work_is_one_line(folder, capsys, monkeypatch, error, status, message):
+    def ends(*_, **__):
+        raise error
 
-    monkeypatch.setattr("pyvista_vdi.cli.render.render_vdi", too_much)
-    message = complaint(capsys, "render", folder / "a.vdi", "-o", folder / "x.png")
-    assert message.startswith("not enough memory (Unable to allocate 96.0 GiB): lower --size")
-
-
-def test_an_interrupt_is_one_line_and_leaves_nothing(folder, capsys, monkeypatch):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("pyvista_vdi.cli.render.render_vdi", interrupted)
+    monkeypatch.setattr("pyvista_vdi.cli.render.render_vdi", ends)
     before = sorted(folder.iterdir())
-    message = complaint(capsys, "render", folder / "a.vdi", "-o", folder / "x.png", status=130)
-    assert message == "interrupted; nothing was left half done"
+    arguments = ("render", folder / "a.vdi", "-o", folder / "x.png")
+    assert re.match(message, complaint(capsys, *arguments, status=status))
     assert sorted(folder.iterdir()) == before
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="file names of any bytes")
-def test_nothing_that_a_file_says_reaches_the_terminal_raw(folder, capsys, tmp_path):
+def test_nothing_that_a_file_says_reaches_the_terminal_raw(capsys, tmp_path):
     """Names and text in a file may hold what moves the cursor, or what cannot be written."""
-    vdi = io.read(folder / "a.vdi")
-    named = pvdi.VDI(
-        vdi.camera,
-        vdi.window_size,
-        vdi.offsets,
-        vdi.front,
-        vdi.back,
-        vdi.color,
-        vdi.optical_depth,
-        vdi.bounds,
-        metadata={"\x1b[31mred\n": "\x1b]0;title\x07"},
-    )
     path = tmp_path / "\udcff.vdi"  # a byte that is no UTF-8
-    named.save(path)
-    status, out, _ = run(capsys, "info", path)
-    assert status == 0
+    vdi_of(200, metadata={"\x1b[31mred\n": "\x1b]0;title\x07"}).save(path)
+    out = said(capsys, "info", path)
     assert r"\udcff.vdi" in out
     assert r"\x1b[31mred\n" in out
     assert all(c.isprintable() for c in out.replace("\n", ""))
-    assert run(capsys, "convert", path, "-o", tmp_path / "\udcfe.exr")[0] == 0
+    said(capsys, "convert", path, "-o", tmp_path / "\udcfe.exr")
     assert complaint(capsys, "info", tmp_path / "\x1b[2J.vdi").startswith(str(tmp_path))
 
 
@@ -337,30 +313,28 @@ def test_no_zero_has_a_sign(capsys, tmp_path):
         depth_origin=-0.0,
     )
     vdi.save(tmp_path / "a.vdi")
-    status, out, _ = run(capsys, "info", tmp_path / "a.vdi")
-    assert status == 0
+    out = said(capsys, "info", tmp_path / "a.vdi")
     assert re.search(r"^depth origin +0$", out, re.MULTILINE)
     assert re.search(r"^eye +\(0, 0, 5\)$", out, re.MULTILINE)
     # The file's own path may end a number so: pytest's first folder on a machine is pytest-0
     assert not re.search(r"-0\b(?!\.)", out.replace(str(tmp_path), ""))
 
 
-# -- verbs -----------------------------------------------------------------------------------------
-
-
 def test_info(folder, capsys):
-    status, out, _ = run(capsys, "info", folder / "a.vdi")
-    assert status == 0
+    out = said(capsys, "info", folder / "a.vdi")
     lines = dict(line.split("  ", 1) for line in out.splitlines())
     assert lines["lists"].strip() == "24 x 16"
     assert lines["supersegments"].strip() == "200, 0.52 per list"
     assert lines["criterion"].strip() == '"none"'
+    out = said(capsys, "info", folder / "a.vdi", "--json")
+    about = json.loads(out)
+    assert about["n_supersegments"] == 200
+    assert pvdi.Camera.from_dict(about["camera"]) == io.read(folder / "a.vdi").camera
 
 
 def test_info_of_a_volume(folder, capsys):
     arguments = ("info", folder / "v.nrrd", "--spacing", "1", "2", "3", "--origin", "0", "0", "5")
-    status, out, _ = run(capsys, *arguments)
-    assert status == 0
+    out = said(capsys, *arguments)
     lines = {name: text.strip() for name, text in (x.split("  ", 1) for x in out.splitlines())}
     volume = read_file(folder / "v.nrrd")
     nx, ny, nz = volume.dimensions
@@ -378,9 +352,9 @@ def test_view_of_a_volume(folder, capsys, default_runtime, tmp_path):
     pv = pytest.importorskip("pyvista")
     looks = ("--cmap", "bone", "--opacity", "linear", "--size", "40x30")
     direct, file, by_file = (tmp_path / name for name in ("a.png", "v.vdi", "b.png"))
-    assert run(capsys, "view", folder / "v.nrrd", "--screenshot", direct, *looks)[0] == 0
-    assert run(capsys, "generate", folder / "v.nrrd", "-o", file, *looks)[0] == 0
-    assert run(capsys, "view", file, "--screenshot", by_file)[0] == 0
+    said(capsys, "view", folder / "v.nrrd", "--screenshot", direct, *looks)
+    said(capsys, "generate", folder / "v.nrrd", "-o", file, *looks)
+    said(capsys, "view", file, "--screenshot", by_file)
     one, other = (pv.read(name).active_scalars.astype(int) for name in (direct, by_file))
     below = one.reshape(30, 40, -1)[12:]  # scalar bars may differ in what they are told
     assert np.abs(below - other.reshape(30, 40, -1)[12:]).max() <= 1
@@ -388,19 +362,18 @@ def test_view_of_a_volume(folder, capsys, default_runtime, tmp_path):
 
 
 def test_a_page_is_taken_as_a_vdi_is(folder, capsys, default_runtime, tmp_path):
-    """What verbs do with x.html is what they do with the .vdi that it holds."""
     page, file = folder / "a.html", tmp_path / "a.vdi"
-    assert run(capsys, "convert", page, "-o", file)[0] == 0
+    said(capsys, "convert", page, "-o", file)
     assert io.read(file).equals(io.read(page))
     again = tmp_path / "again.html"
-    assert run(capsys, "convert", file, "-o", again)[0] == 0
+    said(capsys, "convert", file, "-o", again)
     assert io.read(again).equals(io.read(page))
     for verb, option in (("render", "-o"), ("view", "--screenshot")):
         if verb == "view":
             pytest.importorskip("pyvista")
         pictures = [tmp_path / f"{verb}-{kind}.png" for kind in ("page", "file")]
         for source, picture in zip((page, file), pictures, strict=True):
-            assert run(capsys, verb, source, option, picture)[0] == 0
+            said(capsys, verb, source, option, picture)
         assert pictures[0].read_bytes() == pictures[1].read_bytes()
     about = [json.loads(run(capsys, "info", name, "--json")[1]) for name in (page, file)]
     own = ("path", "file_bytes")
@@ -408,20 +381,10 @@ def test_a_page_is_taken_as_a_vdi_is(folder, capsys, default_runtime, tmp_path):
     assert one == {**other, "codec": "deflate", "format_version": 4}
 
 
-def test_info_as_json(folder, capsys):
-    status, out, _ = run(capsys, "info", folder / "a.vdi", "--json")
-    assert status == 0
-    about = json.loads(out)
-    assert about["n_supersegments"] == 200
-    assert pvdi.Camera.from_dict(about["camera"]) == io.read(folder / "a.vdi").camera
-
-
 def test_devices(capsys, default_runtime):
-    status, out, _ = run(capsys, "devices")
-    assert status == 0
+    out = said(capsys, "devices")
     assert default_runtime.info.name in out
-    status, out, _ = run(capsys, "devices", "--json")
-    assert status == 0
+    out = said(capsys, "devices", "--json")
     assert default_runtime.info.name in [device["name"] for device in json.loads(out)]
 
 
@@ -436,9 +399,8 @@ def test_generate_by_a_dial(folder, capsys, default_runtime, tmp_path):
     arguments = ("generate", folder / "v.nrrd", "--transfer-function", folder / "tf.json")
     arguments = (*arguments, "--size", "60x40", "-o", target)
     asked = ("--quality", "fast", "--max-bytes", "1e9", "--target-angle", "20")
-    status, out, err = run(capsys, *arguments, *asked)
-    assert status == 0
-    assert "settings are chosen by a measurement" in err
+    out = said(capsys, *arguments, *asked)
+    assert "settings are chosen by a measurement" in out
     vdi = io.read(target)
     width, height = vdi.window_size
     assert f"{width} x {height} lists, " in out
@@ -449,27 +411,20 @@ def test_generate_by_a_dial(folder, capsys, default_runtime, tmp_path):
     # Pictures have the window that was asked for, not that of the lists
     assert vdi.window_size != (60, 40)
     picture = tmp_path / "a.png"
-    status, out, _ = run(capsys, "render", target, "-o", picture)
-    assert (status, out) == (0, f"{picture}: 60 x 40\n")
+    assert said(capsys, "render", target, "-o", picture) == f"{picture}: 60 x 40\n"
     # The precision alone is no dial
-    status, out, _ = run(capsys, *arguments, "--precision", "16-byte")
-    assert (status, io.read(target).precision) == (0, "16-byte")
-    assert "chosen" not in out
+    assert "chosen" not in said(capsys, *arguments, "--precision", "16-byte")
+    assert io.read(target).precision == "16-byte"
 
 
 def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_path):
-    target = tmp_path / "b.vdi"
-    options = ["--size", "20x12", "--max-supersegments", "7", "--compression", "lz4"]
-    options += ["--criterion", "length"]
-    options += ["--ambient-occlusion", "--occlusion-strength", "0.4"]
-    status, out, err = run(
-        capsys,
-        *("generate", folder / "v.nrrd", "-o", target),
-        *("--transfer-function", folder / "tf.json", "--azimuth", "30", *options),
-    )
-    assert status == 0
+    target, picture = tmp_path / "b.vdi", tmp_path / "b.png"
+    options = "--azimuth 30 --size 20x12 --max-supersegments 7 --compression lz4"
+    options += " --criterion length --ambient-occlusion --occlusion-strength 0.4"
+    table = ("--transfer-function", folder / "tf.json")
+    out = said(capsys, "generate", folder / "v.nrrd", "-o", target, *table, *options.split())
     assert "20 x 12 lists" in out
-    assert "up to" in err
+    assert "up to" in out
     vdi = io.read(target)
     assert vdi.window_size == (20, 12)
     assert vdi.counts.max() <= 7
@@ -477,12 +432,8 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
     occlusion = vdi.metadata["ambient_occlusion"]
     assert (occlusion["strength"], occlusion["directions"]) == (0.4, 32)
     assert vdi.camera == filling_camera(vdi.bounds, (20, 12), azimuth=30)
-
-    picture = tmp_path / "b.png"
-    status, out, _ = run(capsys, "render", target, "-o", picture, "--size", "30x10")
-    assert (status, out) == (0, f"{picture}: 30 x 10\n")
-    from PIL import Image
-
+    out = said(capsys, "render", target, "-o", picture, "--size", "30x10")
+    assert out == f"{picture}: 30 x 10\n"
     with Image.open(picture) as image:
         assert (image.mode, image.size) == ("RGBA", (30, 10))
         expected = io.to_bytes(pvdi.render(vdi, vdi.camera, (30, 10)))
@@ -491,17 +442,13 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
 
 
 def test_generate_within_a_memory_limit(folder, capsys, default_runtime, tmp_path):
-    """The file is that without a limit; one that is too little for a brick is refused."""
-    import nrrd
-
     array = np.random.default_rng(1).integers(0, 256, (80, 90, 200), dtype=np.uint8)
     nrrd.write(str(tmp_path / "v.nrrd"), array, index_order="C")
     arguments = ["generate", tmp_path / "v.nrrd", "--transfer-function", folder / "tf.json"]
     arguments += ["--size", "12x8"]
     for name, more in (("whole", []), ("bricks", ["--memory-limit", "2.3 MiB"])):
-        status, _, err = run(capsys, *arguments, "-o", tmp_path / f"{name}.vdi", *more)
-        assert status == 0, err
-    assert "up to 2 MiB" in err
+        out = said(capsys, *arguments, "-o", tmp_path / f"{name}.vdi", *more)
+    assert "up to 2 MiB" in out
     assert io.read(tmp_path / "bricks.vdi").equals(io.read(tmp_path / "whole.vdi"))
     few = [*arguments, "-o", tmp_path / "few.vdi", "--memory-limit", "900KB"]
     status, _, err = run(capsys, *few)
@@ -511,112 +458,83 @@ def test_generate_within_a_memory_limit(folder, capsys, default_runtime, tmp_pat
 
 
 def test_render_several(capsys, default_runtime, tmp_path):
-    from PIL import Image
-
-    camera = filling_camera((0, 7, 0, 9, 0, 11), (24, 16))
     matrix = np.eye(4)
     matrix[0, 3] = 0.5
-    one, other = (
-        pvdi.VDI(
-            view,
-            (24, 16),
-            np.arange(24 * 16 + 1),
-            np.full(384, front),
-            np.full(384, front + 2),
-            np.full((384, 3), color),
-            np.full(384, 0.7),
-            (0, 7, 0, 9, 0, 11),
-        )
-        for view, front, color in (
-            (camera, 26.0, (1.0, 0.5, 0.0)),
-            (camera.replace(model_transform=matrix), 27.0, (0.0, 0.5, 1.0)),
-        )
-    )
-    files = (tmp_path / "a.vdi", tmp_path / "b.vdi")
-    for vdi, file in zip((one, other), files, strict=True):
-        vdi.save(file)
+    one = vdi_of(384, front=26.0, thickness=2.0)
+    moved = VIEW.replace(model_transform=matrix)
+    other = vdi_of(384, moved, front=27.0, thickness=2.0, color=(0.0, 0.5, 1.0))
+    files = (one.save(tmp_path / "a.vdi"), other.save(tmp_path / "b.vdi"))
     picture = tmp_path / "both.png"
-    assert run(capsys, "render", *files, "-o", picture)[0] == 0
-    transforms = [np.eye(4), matrix]
-    expected = pvdi.render([one, other], one.camera, model_transforms=transforms)
+    said(capsys, "render", *files, "-o", picture)
+    expected = pvdi.render([one, other], one.camera, model_transforms=[np.eye(4), matrix])
     with Image.open(picture) as image:
         assert np.array_equal(np.asarray(image), io.to_bytes(expected))
     assert not np.array_equal(expected, pvdi.render(one, one.camera))
 
 
 def test_render_over_a_background(folder, capsys, default_runtime, tmp_path):
-    from PIL import Image
-
+    picture = tmp_path / "a.png"
     for text, corner in (("white", 255), ("#ff0000", (255, 0, 0)), ("0,0,0.2", (0, 0, 51))):
-        picture = tmp_path / "a.png"
-        assert run(capsys, "render", folder / "a.vdi", "-o", picture, "--background", text)[0] == 0
+        said(capsys, "render", folder / "a.vdi", "-o", picture, "--background", text)
         with Image.open(picture) as image:
             assert image.mode == "RGB"
             assert (np.asarray(image)[0, 0] == corner).all()
 
 
 def test_render_rays_that_end_earlier(folder, capsys, default_runtime, tmp_path):
-    files, picture = folder / "a.vdi", tmp_path / "a.png"
-    status, _, error = run(capsys, "render", files, "-o", picture, "--transmittance-cutoff", "1")
+    file, picture = folder / "a.vdi", tmp_path / "a.png"
+
+    def rendered(*files, cutoff):
+        return run(capsys, "render", *files, "-o", picture, "--transmittance-cutoff", cutoff)
+
+    status, _, error = rendered(file, cutoff="1")
     assert status == 1
     assert "transmittance_cutoff must be a number" in error
     assert not picture.exists()
-    assert run(capsys, "render", files, "-o", picture, "--transmittance-cutoff", "0.01")[0] == 0
-    status, _, error = run(
-        capsys, "render", files, files, "-o", picture, "--transmittance-cutoff", "0.01"
-    )
+    assert rendered(file, cutoff="0.01")[0] == 0
+    status, _, error = rendered(file, file, cutoff="0.01")
     assert status == 1
     assert "for a single VDI" in error
 
 
 def test_camera_options(folder):
-    from pyvista_vdi.cli.inputs import camera
-
     default = pvdi.Camera((0, -10, 0), (0, 0, 0), (0, 0, 1))
 
-    def view(*options):
-        return camera(parser.parse(["render", "a", "-o", "b", *options]), default)
+    def view(options):
+        return inputs.camera(parser.parse(f"render a -o b {options}".split()), default)
 
-    assert view() == default
-    assert view("--azimuth", "30", "--elevation", "-5") == default.azimuth(30).elevation(-5)
-    moved = view("--position", "-1", "-2.5", "3", "--view-angle", "20")
+    assert view("") == default
+    assert view("--azimuth 30 --elevation -5") == default.azimuth(30).elevation(-5)
+    moved = view("--position -1 -2.5 3 --view-angle 20")
     assert (moved.position, moved.view_angle) == ((-1, -2.5, 3), 20)
-    parallel = view("--parallel-scale", "4")
+    parallel = view("--parallel-scale 4")
     assert (parallel.parallel_projection, parallel.parallel_scale) == (True, 4)
-    stored = pvdi.Camera.from_dict(json.loads((folder / "camera.json").read_text()))
-    assert view("--camera-json", str(folder / "camera.json")) == stored
+    assert view(f"--camera-json {folder / 'camera.json'}") == VIEW
+    options = parser.parse(["render", "a", "-o", "b", "--view-angle", "20"])
+    assert not inputs.camera(options, parallel).parallel_projection
 
 
-def test_standard_transfer_functions_and_their_changes():
-    from pyvista_vdi.cli.inputs import classification
-
-    def arguments(*options):
-        return classification(parser.parse(["generate", "a", "-o", "b.vdi", *options]))
-
-    assert arguments() == {}
-    assert arguments("--tf", "steep") == {"cmap": "viridis", "opacity": "sigmoid_10"}
-    assert arguments("--tf", "soft", "--opacity", "0,0.5,1", "--clim", "-1", "2.5") == {
-        "cmap": "bone",
-        "opacity": [0, 0.5, 1],
-        "clim": [-1, 2.5],
-    }
-    assert arguments("--log-scale", "--n-colors", "9") == {"log_scale": True, "n_colors": 9}
-    assert arguments("--shade", "--specular-power", "4") == {"shade": True, "specular_power": 4}
-
-
-def test_ambient_occlusion_is_off_unless_asked_for():
-    from pyvista_vdi.cli.inputs import ambient_occlusion
-
-    def occlusion(*options):
-        return ambient_occlusion(parser.parse(["generate", "a", "-o", "b.vdi", *options]))
-
-    assert occlusion() is None
-    assert occlusion("--ambient-occlusion") == pvdi.AmbientOcclusion()
-    assert occlusion("--occlusion-radius", "3") == pvdi.AmbientOcclusion(3)
-    assert occlusion("--occlusion-strength", "0.5") == pvdi.AmbientOcclusion(strength=0.5)
-
-
-# -- processes -------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("asked", "looks", "occlusion"),
+    [
+        ("", {}, None),
+        ("--tf steep", {"cmap": "viridis", "opacity": "sigmoid_10"}, None),
+        (
+            "--tf soft --opacity 0,0.5,1 --clim -1 2.5",
+            {"cmap": "bone", "opacity": [0, 0.5, 1], "clim": [-1, 2.5]},
+            None,
+        ),
+        ("--log-scale --n-colors 9", {"log_scale": True, "n_colors": 9}, None),
+        ("--shade --specular-power 4", {"shade": True, "specular_power": 4}, None),
+        ("--ambient-occlusion", {}, pvdi.AmbientOcclusion()),
+        ("--occlusion-radius 3", {}, pvdi.AmbientOcclusion(3)),
+        ("--occlusion-strength 0.5", {}, pvdi.AmbientOcclusion(strength=0.5)),
+    ],
+)
+def test_looks_and_their_changes(asked, looks, occlusion):
+    options = parser.parse(f"generate a -o b.vdi {asked}".split())
+    assert inputs.classification(options) == looks
+    assert inputs.ambient_occlusion(options) == occlusion
 
 
 def test_help_loads_nothing_slow():
@@ -637,68 +555,29 @@ def test_the_module_is_the_command():
     assert result.stderr.startswith("pyvista-vdi: error: there is no verb 'generat'")
 
 
-@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
-def test_ctrl_c_while_generating(folder, default_runtime, tmp_path):
-    """The interrupt comes when the target is being written: what was there stays."""
-    target = tmp_path / "b.vdi"
-    target.write_bytes(b"old")
-    code = (
-        "import sys, time\n"
-        "from pyvista_vdi.cli import main\n"
-        "from pyvista_vdi.io.vdi_file import writer\n"
-        "def slow(stream, *_):\n"
-        "    stream.write(b'half'); print('writing', flush=True); time.sleep(60)\n"
-        "writer.write_chunks = slow\n"
-        "sys.exit(main(sys.argv[1:]))\n"
-    )
-    process = subprocess.Popen(
-        [
-            *(sys.executable, "-c", code, "generate", str(folder / "v.nrrd"), "-o", str(target)),
-            *("--size", "16x16", "--transfer-function", str(folder / "tf.json")),
-        ],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert process.stdout.readline() == "writing\n"
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=PATIENCE)
-    finally:
-        process.kill()
-    assert process.returncode == 130
-    assert err.splitlines()[-1] == "pyvista-vdi: error: interrupted; nothing was left half done"
-    assert "Traceback" not in err
-    assert target.read_bytes() == b"old"
-    assert [path.name for path in tmp_path.iterdir()] == ["b.vdi"]
-
-
-# -- paraview --------------------------------------------------------------------------------------
-
-
 @pytest.fixture
 def plain_installation(tmp_path, monkeypatch):
     """An environment that holds the package and no VTK, in a folder that a shell must quote."""
-    from pyvista_vdi.cli import paraview
-
     package = tmp_path / "a folder" / "pyvista_vdi"
-    (package / "opencl").mkdir(parents=True)
+    for room in ("opencl", "cli"):
+        (package / room).mkdir(parents=True)
     (package / "opencl" / "__init__.py").touch()
-    monkeypatch.setattr(paraview, "_PACKAGE", package)
-    monkeypatch.setattr(paraview, "PLUGIN", package / "paraview" / "vdi_plugin.py")
-    monkeypatch.setattr(paraview.sysconfig, "get_path", lambda name: str(package.parent))
+    copied = shutil.copy(paraview.__file__, package / "cli")
+    specification = importlib.util.spec_from_file_location(paraview.__name__, copied)
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    monkeypatch.setitem(sys.modules, paraview.__name__, module)
+    monkeypatch.setattr(module.sysconfig, "get_path", lambda name: str(package.parent))
     return package
 
 
 def test_paraview_prints_the_plugins_path(capsys):
-    status, out, _ = run(capsys, "paraview")
-    assert status == 0
+    out = said(capsys, "paraview")
     assert Path(out.strip()).is_file()
 
 
 def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
-    status, out, _ = run(capsys, "paraview", "--environment")
-    assert status == 0
+    out = said(capsys, "paraview", "--environment")
     shown = subprocess.run(
         ["sh", "-c", f'{out}echo "$PYTHONPATH"; echo "$PV_PLUGIN_PATH"'],
         env={"PYTHONPATH": "/before"},
@@ -711,7 +590,7 @@ def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
 
 
 @pytest.mark.parametrize(
-    ("does", "said"),
+    ("does", "message"),
     [
         ('echo "$PYTHONPATH:$PV_PLUGIN_PATH"', None),
         ("exit 3", "loads the plugin, and finds no OpenCL device"),
@@ -719,31 +598,26 @@ def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
     ],
 )
 def test_paraview_is_asked_whether_it_finds_a_device(
-    plain_installation, tmp_path, capfd, monkeypatch, does, said
+    plain_installation, tmp_path, capfd, monkeypatch, does, message
 ):
     monkeypatch.setenv("PYTHONPATH", "/before")
     monkeypatch.delenv("PV_PLUGIN_PATH", raising=False)
     pvpython = tmp_path / "pvpython"
     pvpython.write_text(f"#!/bin/sh\n{does}\n")
     pvpython.chmod(0o755)
-    if said is None:
+    if message is None:
         site = plain_installation.parent
         expected = f"{site}:/before:{site}/pyvista_vdi/paraview\n"
         assert run(capfd, "paraview", "--check", pvpython) == (0, expected, "")
     else:
-        assert said in complaint(capfd, "paraview", "--check", pvpython)
+        assert message in complaint(capfd, "paraview", "--check", pvpython)
 
 
-def test_paraview_that_is_not_there(plain_installation, capsys):
+def test_paraview_is_not_shown_what_it_cannot_use(plain_installation, capsys):
     assert "does not start" in complaint(capsys, "paraview", "--check", "/no/pvpython")
-
-
-def test_paraview_is_not_shown_a_second_vtk(plain_installation, capsys):
+    (plain_installation / "opencl" / "__init__.py").unlink()
+    assert "is an editable installation" in complaint(capsys, "paraview", "--environment")
+    (plain_installation / "opencl" / "__init__.py").touch()
     (plain_installation.parent / "vtkmodules").mkdir()
     message = complaint(capsys, "paraview", "--environment")
     assert "holds a VTK of its own" in message
-
-
-def test_paraview_is_not_shown_half_a_package(plain_installation, capsys):
-    (plain_installation / "opencl" / "__init__.py").unlink()
-    assert "is an editable installation" in complaint(capsys, "paraview", "--environment")

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 from command_line import run
-from PIL import Image
+from PIL import Image, ImageSequence
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.cli.movie import camera_path
@@ -37,9 +37,8 @@ def volume(tmp_path_factory):
 def saved(volume, default_runtime):
     path = volume.with_name("v.vdi")
     view = pvdi.Camera((2, -25, 12), (4, 4, 4), (0, 0, 1))
-    table = pvdi.TransferFunction(
-        np.linspace([0, 0, 1], [1, 1, 0], 4), [0, 0.2, 0.4, 0.6], (0, 250)
-    )
+    colors = np.linspace([0, 0, 1], [1, 1, 0], 4)
+    table = pvdi.TransferFunction(colors, [0, 0.2, 0.4, 0.6], (0, 250))
     pvdi.generate(pvdi.Volume(np.load(volume)), view, SIZE, transfer_function=table).save(path)
     return path
 
@@ -81,24 +80,24 @@ def test_a_series_plays_and_turns_meanwhile(saved, capsys, tmp_path):
     vdi = pvdi.read(saved)
     steps = [vdi, vdi.with_precision("8-byte"), vdi]
     pvdi.VDISeries(steps, (0.0, 1.0, 2.0)).save(tmp_path / "run.vdis")
-    target = tmp_path / "f_{:02d}.png"
-    run(capsys, "movie", tmp_path / "run.vdis", "-o", target, "--turn", 30)
+    run(capsys, "movie", tmp_path / "run.vdis", "-o", tmp_path / "f_{:02d}.png", "--turn", 30)
     series = pvdi.read(tmp_path / "run.vdis")
     for k in range(3):
         found = np.asarray(Image.open(tmp_path / f"f_{k:02d}.png")).astype(int)
-        view = vdi.camera.azimuth(15 * k)
-        np.testing.assert_array_equal(found, expected(series[k], view))
+        np.testing.assert_array_equal(found, expected(series[k], vdi.camera.azimuth(15 * k)))
+
+
+def write_views(folder, **views):
+    for name, view in views.items():
+        (folder / name).write_text(json.dumps(view.to_dict()))
+    return [folder / name for name in views]
 
 
 def test_a_path_passes_its_views(saved, capsys, tmp_path):
     vdi = pvdi.read(saved)
     keys = [vdi.camera, vdi.camera.azimuth(20), vdi.camera.azimuth(40).elevation(20)]
-    files = []
-    for k, key in enumerate(keys):
-        files.append(tmp_path / f"{k}.json")
-        files[-1].write_text(json.dumps(key.to_dict()))
-    target = tmp_path / "p{}.png"
-    run(capsys, "movie", saved, "-o", target, "--frames", 5, "--path", *files)
+    files = write_views(tmp_path, **dict(zip("abc", keys, strict=True)))
+    run(capsys, "movie", saved, "-o", tmp_path / "p{}.png", "--frames", 5, "--path", *files)
     for frame, key in ((0, keys[0]), (2, keys[1]), (4, keys[2])):
         found = np.asarray(Image.open(tmp_path / f"p{frame}.png")).astype(int)
         # The spline's rounding moves few samples over borders
@@ -123,22 +122,16 @@ def test_frames_of_a_gif_last_as_long_as_was_asked_for(saved, capsys, tmp_path):
     target = tmp_path / "v.gif"
     run(capsys, "turntable", saved, "-o", target, "--frames", 6, "--fps", 30)
     with Image.open(target) as movie:
-        times = []
-        for k in range(6):
-            movie.seek(k)
-            times.append(movie.info["duration"])
-    assert times == [30, 40, 30, 30, 40, 30]
-
-
-def test_a_movie_has_a_frame_however_slow_it_is(saved, capsys, tmp_path):
+        frames = ImageSequence.Iterator(movie)
+        assert [frame.info["duration"] for frame in frames] == [30, 40, 30, 30, 40, 30]
+    # However slow it is, it has one
     run(capsys, "turntable", saved, "-o", tmp_path / "f_{}.png", "--fps", 0.1)
-    run(capsys, "turntable", saved, "-o", tmp_path / "v.gif", "--fps", 0.1)
+    run(capsys, "turntable", saved, "-o", target, "--fps", 0.1)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["f_0.png", "v.gif"]
 
 
 @needs_films
 def test_frames_of_a_film_are_not_kept(saved, capsys, monkeypatch, tmp_path):
-    """Each is handed to the encoder before the next is drawn."""
     done = []
 
     def writer(*_, **__):
@@ -178,31 +171,27 @@ def test_a_film_has_its_frames(saved, capsys, tmp_path, suffix):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["turntable", "v.vdi", "-o", "v.avi"], "is no moving picture"),
-        (["turntable", "v.vdi", "-o", "v.png"], "frame_{:04d}.png"),
-        (["movie", "v.vdi", "-o", "v.gif"], "nothing moves"),
-        (["movie", "v.vdi", "-o", "v.gif", "--path", "a.json"], "two views at least"),
-        (["movie", "v.vdi", "-o", "absent/v.gif", "--turn", "9"], "absent"),
-        (["movie", "v.vdi", "-o", "v.gif", "--path", "a", "b", "--azimuth", "9"], "--azimuth is"),
-        (["turntable", "v.vdi", "-o", "v.gif", "--cmap", "bone"], "--cmap is for volumes"),
-        (["turntable", "v.vdi", "-o", "v.gif", "--fps", "0"], "above 0"),
-        (["turntable", "v.vdi", "-o", "v.gif", "--fps", "60"], "0.01 to 50 frames a second"),
+        ("turntable v.vdi -o v.avi", "is no moving picture"),
+        ("turntable v.vdi -o v.png", "frame_{:04d}.png"),
+        ("movie v.vdi -o v.gif", "nothing moves"),
+        ("movie v.vdi -o v.gif --path a.json", "two views at least"),
+        ("movie v.vdi -o absent/v.gif --turn 9", "absent"),
+        ("movie v.vdi -o v.gif --path a b --azimuth 9", "--azimuth is"),
+        ("turntable v.vdi -o v.gif --cmap bone", "--cmap is for volumes"),
+        ("turntable v.vdi -o v.gif --fps 0", "above 0"),
+        ("turntable v.vdi -o v.gif --fps 60", "0.01 to 50 frames a second"),
     ],
 )
-def test_mistakes_are_said_before_anything_is_drawn(
-    saved, capsys, monkeypatch, tmp_path, arguments, said
-):
+def test_mistakes_are_said_before_anything_is_drawn(saved, capsys, monkeypatch, arguments, said):
     monkeypatch.chdir(saved.parent)
     before = sorted(saved.parent.iterdir())
-    assert said in run(capsys, *arguments, status=2 if said == "above 0" else 1)
+    assert said in run(capsys, *arguments.split(), status=2 if said == "above 0" else 1)
     assert sorted(saved.parent.iterdir()) == before
 
 
 def test_a_path_has_one_projection(saved, capsys, tmp_path):
     first = pvdi.read(saved).camera
-    for name, key in (("a", first), ("b", first.replace(parallel_projection=True))):
-        (tmp_path / name).write_text(json.dumps(key.to_dict()))
-    names = tmp_path / "a", tmp_path / "b"
+    names = write_views(tmp_path, a=first, b=first.replace(parallel_projection=True))
     said = run(capsys, "movie", saved, "-o", tmp_path / "v.gif", "--path", *names, status=1)
     assert f"{names[0]}: perspective, {names[1]}: parallel" in said
     assert sorted(tmp_path.iterdir()) == sorted(names)

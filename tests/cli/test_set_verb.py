@@ -28,11 +28,11 @@ def volume(tmp_path_factory):
 def saved(volume, tmp_path_factory, default_runtime):
     pytest.importorskip("pyvista")
     path = tmp_path_factory.mktemp("sets") / "a.vdiset"
-    arguments = ["set", volume, "-o", path, "--size", "32x24", "--cmap", "bone", "--lists", "1"]
-    arguments += ["--max-supersegments", "3", "--target-ssim", "0.7", "--max-views", "9"]
+    options = "--size 32x24 --cmap bone --lists 1 --max-supersegments 3 --target-ssim 0.7"
     with pytest.MonkeyPatch.context() as fewer:
         fewer.setattr(generate, "DIRECTIONS", 10)
-        assert cli.main([str(argument) for argument in arguments]) == 0
+        arguments = ["set", str(volume), "-o", str(path), *options.split(), "--max-views", "9"]
+        assert cli.main(arguments) == 0
     return path
 
 

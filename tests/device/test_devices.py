@@ -5,11 +5,9 @@ from __future__ import annotations
 import importlib.util
 import os
 import sys
-import threading
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from fresh_python import run_python
 
@@ -19,23 +17,11 @@ from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError
 
 
 def fake(platform: str, name: str, kind: str, index: tuple[int, int], **more) -> ocl.DeviceInfo:
-    fields = {
-        "name": name,
-        "platform": platform,
-        "vendor": "V",
-        "version": "OpenCL 3.0",
-        "driver": "1",
-        "kind": kind,
-        "compute_units": 4,
-        "global_memory": 2**33,
-        "max_allocation": 2**31,
-        "has_fp64": True,
-        "usable": True,
-        "reason": "",
-        "platform_index": index[0],
-        "device_index": index[1],
-    }
-    return ocl.DeviceInfo(**{**fields, **more})
+    names = {"name": name, "platform": platform, "vendor": "V", "version": "OpenCL 3.0"}
+    sizes = {"compute_units": 4, "global_memory": 2**33, "max_allocation": 2**31}
+    state = {"driver": "1", "kind": kind, "has_fp64": True, "usable": True, "reason": ""}
+    place = {"platform_index": index[0], "device_index": index[1]}
+    return ocl.DeviceInfo(**{**names, **sizes, **state, **place, **more})
 
 
 POCL = fake(
@@ -47,9 +33,6 @@ NV_A = fake("NVIDIA CUDA", "H200", "GPU", (3, 0), compute_units=132)
 NV_B = fake("NVIDIA CUDA", "T4", "GPU", (3, 1), compute_units=40)
 FPGA = fake("Intel(R) FPGA Emulation", "Emulator", "accelerator", (4, 0), compute_units=99)
 ALL = devices.with_selectors([POCL, INTEL, IGPU, NV_A, NV_B, FPGA])
-
-
-# -- choosing ----------------------------------------------------------------------------------
 
 
 def test_preference_is_gpu_then_intel_cpu_then_other_cpu_then_accelerator():
@@ -90,27 +73,37 @@ def test_every_device_is_selected_by_its_own_selector():
     assert [info.selector for info in twins] == ["1:0", "2:0"]
 
 
-def test_absent_device_lists_what_exists():
+def test_absent_and_ambiguous_devices_list_what_exists():
     with pytest.raises(NoDeviceError, match=r"device='radeon'.*H200 \(GPU, selected by 'nvidia"):
         devices.select(ALL, "radeon", "device=")
     with pytest.raises(NoDeviceError, match=r"no device at all; install a CPU runtime"):
         devices.select([], "radeon", "device=")
-
-
-def test_ambiguous_device_lists_the_matches():
     with pytest.raises(NoDeviceError, match=r"'nvidia' means 2 devices.*H200.*T4") as caught:
         devices.select(ALL, "nvidia", "PYVISTA_VDI_DEVICE=")
     assert "Iris" not in str(caught.value)
 
 
-def test_named_device_that_fails_its_probe_is_an_error(runtime, monkeypatch):
-    broken = replace(runtime.info, usable=False, reason="it gave 3, not 4")
-    monkeypatch.setitem(choice._probed, runtime.info.index, (broken, None))
-    with pytest.raises(NoDeviceError, match="not usable: it gave 3, not 4"):
-        ocl.get_runtime(runtime.info.selector)
+def test_a_device_that_fails_its_probe_is_described_and_refused(runtime):
+    done = run_python(
+        "from pyvista_vdi.device import choice\n"
+        "from pyvista_vdi.errors import NoDeviceError\n"
+        "choice.run_probe = lambda runtime: 'it gave 3, not 4'\n"
+        "assert all(info.reason == 'it gave 3, not 4' for info in choice.list_devices())\n"
+        "print(choice.describe_devices())\n"
+        f"try:\n    choice.get_runtime({runtime.info.selector!r})\n"
+        "except NoDeviceError as exc:\n    print('caught', exc)\n"
+    )
+    assert done.returncode == 0, done.stderr
+    described, message = done.stdout.split("caught ")
+    assert "not used: it gave 3, not 4" in described
+    assert "not usable: it gave 3, not 4" in message
 
 
 def test_environment_names_the_device(runtime, monkeypatch):
+    monkeypatch.delenv("PYVISTA_VDI_DEVICE", raising=False)
+    best = choice.default_device(ocl.list_devices())
+    marked = f"* [{best.platform_index}:{best.device_index}] {best.full_name}"
+    assert marked in ocl.describe_devices()
     monkeypatch.setenv("PYVISTA_VDI_DEVICE", runtime.info.selector)
     assert ocl.get_runtime() is runtime
     assert f"Default: {runtime.info.full_name}, because" in ocl.describe_devices()
@@ -121,83 +114,71 @@ def test_environment_names_the_device(runtime, monkeypatch):
 
 
 def test_every_form_of_device_gives_the_same_runtime(runtime):
-    assert ocl.get_runtime(runtime) is runtime
-    assert ocl.get_runtime(runtime.info) is runtime
-    assert ocl.get_runtime(runtime._device) is runtime
-    shared = ocl.get_runtime(runtime._context)
-    assert shared._context is runtime._context
-    assert ocl.get_runtime(runtime._context) is shared
+    (device,) = (
+        c.device for c in devices.find_candidates()[0] if c.info.index == runtime.info.index
+    )
+    for form in (runtime, runtime.info, device):
+        assert ocl.get_runtime(form) is runtime
+    context = devices.opencl().Context([device])
+    shared = ocl.get_runtime(context)
+    assert ocl.get_runtime(context) is shared
+    with shared.buffer(4) as one, runtime.buffer(4) as other:
+        assert one.memory.context == context != other.memory.context
     with pytest.raises(InvalidArgumentError, match="device=3 of type int"):
         ocl.get_runtime(3)
     with pytest.raises(NoDeviceError, match="does not exist in this process"):
         ocl.get_runtime(replace(runtime.info, name="another"))
+    with pytest.raises(NoDeviceError, match="there is no such OpenCL device") as caught:
+        ocl.get_runtime("quantum")
+    assert runtime.info.full_name in str(caught.value)
 
 
-def test_description_marks_the_default_and_explains_the_others(runtime, monkeypatch):
-    monkeypatch.delenv("PYVISTA_VDI_DEVICE", raising=False)
-    best = choice.default_device(ocl.list_devices())
-    assert best is not None
-    text = ocl.describe_devices()
-    assert f"* [{best.platform_index}:{best.device_index}] {best.full_name}" in text
-    broken = replace(best, usable=False, reason="the probe kernel's fma is wrong")
-    monkeypatch.setitem(choice._probed, best.index, (broken, None))
-    assert "not used: the probe kernel's fma is wrong" in ocl.describe_devices()
+#: Columns of what the probe kernel computes.
+FUNCTIONS = ["expm1", "log1p", "exp", "fma"]
 
 
-@pytest.mark.parametrize("where", ["expm1", "log1p", "exp", "fma", "local memory", "atomic"])
-def test_probe_notices_wrong_numbers(where):
-    x = np.linspace(0.01, 0.99, 64, dtype=np.float32)
-    wide = x.astype(np.float64)
-    square = (x * x).astype(np.float64)
-    values = np.stack([np.expm1(-wide), np.log1p(-wide), np.exp(-wide), wide * wide - square], 1)
-    values = values.astype(np.float32)
-    sums = np.arange(64, dtype=np.uint32).reshape(2, 32).sum(axis=1)
-    total = np.array([64 * 65 // 2], np.uint32)
-    assert choice._check_probe(x, values, sums, total) == ""
-    if where == "local memory":
-        sums[1] += 1
-    elif where == "atomic":
-        total[0] -= 1
-    else:
-        values[7, ["expm1", "log1p", "exp", "fma"].index(where)] *= 1.00001
-    assert where in choice._check_probe(x, values, sums, total)
+@pytest.mark.parametrize("where", ["", "expm1", "log1p", "exp", "fma", "local memory", "atomic"])
+def test_probe_notices_wrong_numbers(runtime, monkeypatch, where):
+    download = runtime.download
+
+    def wrong(buffer):
+        values = download(buffer)
+        if (buffer.name, where) == ("probe sums", "local memory"):
+            values[1] += 1
+        elif (buffer.name, where) == ("probe total", "atomic"):
+            values[0] -= 1
+        elif buffer.name == "probe values" and where in FUNCTIONS:
+            values[7, FUNCTIONS.index(where)] *= 1.00001
+        return values
+
+    monkeypatch.setattr(runtime, "download", wrong)
+    found = choice.run_probe(runtime)
+    assert where in found
+    assert bool(found) == bool(where)
 
 
-# -- finding drivers ---------------------------------------------------------------------------
-
-
-def test_import_touches_no_environment_and_loads_no_driver():
-    code = (
+def test_import_and_listing_leave_the_environment_as_it_was():
+    done = run_python(
         "import os, sys; before = dict(os.environ)\n"
         "import pyvista_vdi.device\n"
         "assert 'pyopencl' not in sys.modules\n"
-        "assert dict(os.environ) == before"
+        "assert dict(os.environ) == before\n"
+        "pyvista_vdi.device.list_devices()\n"
+        "changed = set(os.environ.items()) ^ set(before.items())\n"
+        "assert not [name for name, _ in changed if 'OCL' in name]"
     )
-    done = run_python(code)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
-def test_listing_devices_puts_the_environment_back():
-    code = (
-        "import os; before = dict(os.environ)\n"
-        "from pyvista_vdi.device import list_devices; list_devices()\n"
-        "changed = set(os.environ.items()) ^ set(before.items())\n"
-        "print(sorted(name for name, _ in changed if 'OCL' in name))"
-    )
-    done = run_python(code)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip() == "[]"
-
-
 def test_no_device_says_what_was_found_and_the_remedy(tmp_path):
-    code = (
+    done = run_python(
         "from pyvista_vdi.errors import NoDeviceError\n"
         "from pyvista_vdi.device import get_runtime, list_devices, describe_devices\n"
         "assert list_devices() == []\n"
         "print(describe_devices())\n"
-        "try:\n    get_runtime()\nexcept NoDeviceError as exc:\n    print('caught', exc)\n"
+        "try:\n    get_runtime()\nexcept NoDeviceError as exc:\n    print('caught', exc)\n",
+        OCL_ICD_VENDORS=str(tmp_path),
     )
-    done = run_python(code, OCL_ICD_VENDORS=str(tmp_path))
     assert done.returncode == 0, done.stderr
     described, message = done.stdout.split("caught ")
     for text in (described, message):
@@ -205,12 +186,6 @@ def test_no_device_says_what_was_found_and_the_remedy(tmp_path):
         assert 'pip install "pyvista-vdi[cpu]"' in text
         assert "pocl-opencl-icd" in text
         assert f"OCL_ICD_VENDORS={str(tmp_path)!r} is set and obeyed" in text
-
-
-def test_named_device_absent_end_to_end(runtime):
-    with pytest.raises(NoDeviceError, match="there is no such OpenCL device") as caught:
-        ocl.get_runtime("quantum")
-    assert runtime.info.full_name in str(caught.value)
 
 
 @pytest.fixture
@@ -242,9 +217,6 @@ def test_pip_driver_is_shown_beside_the_system_ones(vendors):
         assert discovery.added == library
     assert "OCL_ICD_VENDORS" not in os.environ
     assert not folder.exists()
-
-
-def test_environment_is_put_back_when_listing_fails(vendors):
     with pytest.raises(ZeroDivisionError), icd.drivers_visible():
         raise ZeroDivisionError
     assert "OCL_ICD_VENDORS" not in os.environ
@@ -305,13 +277,22 @@ def test_programs_with_a_loader_of_their_own_see_every_driver(tmp_path):
 
 def test_once_listed_devices_come_without_a_lock():
     """A finalizer that frees device memory may come here wherever its thread holds one."""
-    devices.find_candidates()
-    found = []
-    with devices._lock:
-        asks = threading.Thread(
-            target=lambda: found.extend([devices.opencl().__name__, *devices.find_candidates()]),
-            daemon=True,
-        )
-        asks.start()
-        asks.join(600)
-    assert found[:1] == ["pyopencl"]
+    done = run_python(
+        "import contextlib, threading\n"
+        "made, make = [], threading.RLock\n"
+        "threading.RLock = lambda: made.append(make()) or made[-1]\n"
+        "from pyvista_vdi.device import devices\n"
+        "threading.RLock = make\n"
+        "devices.find_candidates()\n"
+        "found = []\n"
+        "asks = threading.Thread(\n"
+        "    target=lambda: found.extend([devices.opencl().__name__, devices.find_candidates()]),\n"
+        "    daemon=True)\n"
+        "with contextlib.ExitStack() as held:\n"
+        "    assert made\n"
+        "    for lock in made: held.enter_context(lock)\n"
+        "    asks.start()\n"
+        "    asks.join(60)\n"
+        "print(*found[:1])"
+    )
+    assert done.stdout == "pyopencl\n", done.stderr

@@ -10,30 +10,27 @@ from strategies import camera_around, random_bounds, random_transform, world_cor
 
 from pyvista_vdi import Camera
 from pyvista_vdi.device import ray_forms as rays
-from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
+from pyvista_vdi.errors import InvalidCameraError
 from pyvista_vdi.model.render_options import RenderOptions
 
 EPS64 = np.finfo(np.float64).eps
-SEEDS = range(12)
+SEEDS = range(6)
 WINDOW = (40, 30)
 
 
 def scene(seed):
+    """Random bounds and a view of them: rays, points inside, and where these are in the window."""
     rng = np.random.default_rng(seed)
     bounds = random_bounds(rng)
-    return rng, bounds, camera_around(rng, bounds, random_transform(rng))
-
-
-def direct_depths(camera, points):
-    """View depth of model points: along the direction of projection, from the eye."""
-    forward = np.subtract(camera.focal_point, camera.position)
-    forward = forward / np.linalg.norm(forward)
-    world = points @ camera.model_transform[:3, :3].T
-    return (world + (camera.model_transform[:3, 3] - camera.position)) @ forward
+    camera = camera_around(rng, bounds, random_transform(rng))
+    low, high = np.reshape(bounds, (3, 2)).T
+    points = low + rng.random((200, 3)) * (high - low)
+    made = rays.pixel_rays(camera, WINDOW, bounds)
+    return rng, bounds, camera, made, points
 
 
 def direct_pixels(camera, window, points):
-    """Pixel offsets from the window's centre and view depth of model points (DESIGN section 3)."""
+    """Pixel offsets from the window's centre and view depth of model points."""
     width, height = window
     forward = np.subtract(camera.focal_point, camera.position)
     forward = forward / np.linalg.norm(forward)
@@ -57,6 +54,10 @@ def direct_pixels(camera, window, points):
     return u * width / 2, v * height / 2, z
 
 
+CUBE = (-1, 1, -1, 1, -1, 1)
+AT_TEN = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
+
+
 def points_on_rays(made, a, b, depth):
     """P(t) as PixelRays documents it."""
     pixel = np.column_stack([np.ones_like(a), a, b])
@@ -64,23 +65,18 @@ def points_on_rays(made, a, b, depth):
     return pixel @ made.origin + t * (pixel @ made.direction)
 
 
-# -- depths ----------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("seed", SEEDS)
 def test_depth_range_is_that_of_the_corners(seed):
-    _, bounds, camera = scene(seed)
-    depths = direct_depths(camera, rays.corners(bounds))
+    _, bounds, camera, *_ = scene(seed)
+    corners = rays.corners(bounds)
+    sides = np.reshape(bounds, (3, 2))
+    assert {tuple(c) for c in corners} == set(itertools.product(*sides))
+    depths = direct_pixels(camera, WINDOW, corners)[2]
     # A dozen operations on numbers no larger than the corners' distance from the eye
     scale = np.abs(world_corners(bounds, camera.model_transform) - camera.position).max()
     low, high = rays.depth_range(camera, bounds)
     assert low == pytest.approx(depths.min(), abs=64 * EPS64 * scale)
     assert high == pytest.approx(depths.max(), abs=64 * EPS64 * scale)
-
-
-def test_corners_are_all_eight():
-    corners = rays.corners((0, 1, 2, 3, 4, 5))
-    assert {tuple(c) for c in corners} == set(itertools.product((0, 1), (2, 3), (4, 5)))
 
 
 @pytest.mark.parametrize(
@@ -95,23 +91,22 @@ def test_corners_are_all_eight():
         (-10, True, -11),
     ],
 )
-def test_reference_depth(distance, parallel, expected):
-    camera = Camera(
-        (0, 0, -distance), (0, 0, 1 - distance), (0, 1, 0), parallel_projection=parallel
-    )
-    assert rays.reference_depth(camera, (-1, 1, -1, 1, -1, 1)) == pytest.approx(expected, abs=1e-15)
-
-
-# -- rays ------------------------------------------------------------------------------------------
+def test_reference_depth_and_eye_plane(distance, parallel, expected):
+    place = {"position": (0, 0, -distance), "focal_point": (0, 0, 1 - distance)}
+    camera = AT_TEN.replace(parallel_projection=parallel, **place)
+    assert rays.reference_depth(camera, CUBE) == pytest.approx(expected, abs=1e-15)
+    made = rays.pixel_rays(camera, WINDOW, CUBE)
+    forms = rays.eye_plane(camera, made)
+    assert len(forms) == (0 if parallel else 1)
+    for form in forms:  # where depth is zero
+        for depth in (-1.0, 0.25, 3.0):
+            assert value_at(form, 3.5, -2.5, depth - made.reference_depth) == pytest.approx(depth)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_rays_pass_through_what_the_pixel_shows(seed):
-    rng, bounds, camera = scene(seed)
-    low, high = np.reshape(bounds, (3, 2)).T
-    points = low + rng.random((200, 3)) * (high - low)
+    rng, bounds, camera, made, points = scene(seed)
     a, b, depth = direct_pixels(camera, WINDOW, points)
-    made = rays.pixel_rays(camera, WINDOW, bounds)
     assert made.reference_depth == rays.reference_depth(camera, bounds)
     # A few dozen float64 operations; the inverse of the model transform has a condition of at
     # most some 30 here (scales between 1/2 and 2, a shear of 1/2)
@@ -119,16 +114,10 @@ def test_rays_pass_through_what_the_pixel_shows(seed):
     np.testing.assert_allclose(
         points_on_rays(made, a, b, depth), points, rtol=0, atol=1e4 * EPS64 * scale
     )
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_a_form_is_the_affine_function_along_the_ray(seed):
-    rng, bounds, camera = scene(seed)
-    made = rays.pixel_rays(camera, WINDOW, bounds)
+    # A form is the affine function along the ray, anywhere
     normal, offset = rng.normal(size=3), rng.normal()
-    form = made.form(normal, offset)
     a, b, t = rng.normal(size=(3, 50)) * 10
-    values = form[0] + a * form[1] + b * form[2] + t * (form[3] + a * form[4] + b * form[5])
+    values = value_at(made.form(normal, offset), a, b, t)
     at = points_on_rays(made, a, b, t + made.reference_depth)
     scale = np.abs(made.origin).sum() * 20 + np.abs(made.direction).sum() * 400
     np.testing.assert_allclose(values, at @ normal + offset, rtol=0, atol=64 * EPS64 * scale)
@@ -177,11 +166,8 @@ def test_a_far_eye_or_origin_costs_float32_nothing(far, extent, parallel):
         assert error.max() <= 64 * 2.0**-24 * extent + slack
 
 
-# -- matrices --------------------------------------------------------------------------------------
-
-
 @pytest.mark.extremes
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("exponents", [(-9, -9, -9), (9, 9, 9), (-9, 0, 9), (9, -9, 3)])
 def test_inverse_affine_of_any_scale(seed, exponents):
     """Turned, sheared and mirrored axes of lengths 1e-9 to 1e9."""
@@ -205,19 +191,13 @@ def test_inverse_affine_of_any_scale(seed, exponents):
     assert (np.abs(inverse[:3, :3] - exact) <= 1e3 * EPS64 * row).all()
 
 
-# -- planes ----------------------------------------------------------------------------------------
-
-
 def value_at(form, a, b, t):
     return form[0] + a * form[1] + b * form[2] + t * (form[3] + a * form[4] + b * form[5])
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_user_planes_are_in_world_coordinates(seed):
-    rng, bounds, camera = scene(seed)
-    made = rays.pixel_rays(camera, WINDOW, bounds)
-    low, high = np.reshape(bounds, (3, 2)).T
-    points = low + rng.random((200, 3)) * (high - low)
+    rng, _, camera, made, points = scene(seed)
     a, b, depth = direct_pixels(camera, WINDOW, points)
     world = points @ camera.model_transform[:3, :3].T + camera.model_transform[:3, 3]
     planes = np.column_stack([world[:5] + rng.normal(size=(5, 3)) * 0.1, rng.normal(size=(5, 3))])
@@ -231,57 +211,16 @@ def test_user_planes_are_in_world_coordinates(seed):
         np.testing.assert_array_equal(found[clear] > 0, distance[clear] > 0)
         kept |= set((distance > 0).tolist())
     assert kept == {True, False}
-
-
-@pytest.mark.parametrize("length", [1e-300, 1e-45, 1e-20, 1.0, 1e20, 1e50, 1e300])
-def test_a_normal_gives_a_direction_only(length):
-    """However long it is, the plane clips: in float32, too."""
-    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
-    bounds = (-1, 1, -1, 1, -1, 1)
-    made = rays.pixel_rays(camera, WINDOW, bounds)
-    planes = [[0, 0, 0.25, 0, 0, length], [0.5, 0, 0, -0.6 * length, 0.8 * length, 0]]
-    forms = rays.packed(rays.user_planes(camera, made, planes))
-    exact = [made.form((0, 0, 1), -0.25), made.form((-0.6, 0.8, 0), 0.3)]
-    # A form may be multiplied by any positive number
-    for form, same in zip(forms.astype(float), exact, strict=True):
-        ratio = np.abs(form).max() / np.abs(same).max()
-        assert ratio > 0
-        np.testing.assert_allclose(form / ratio, same, rtol=1e-6, atol=1e-6)
-
-
-def test_no_planes():
-    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
-    made = rays.pixel_rays(camera, WINDOW, (-1, 1, -1, 1, -1, 1))
     for none in (None, [], np.empty((0, 6))):
         assert rays.user_planes(camera, made, RenderOptions(none).clipping_planes) == []
 
 
-@pytest.mark.parametrize(
-    ("planes", "message"),
-    [
-        ([[0, 0, 0, 0, 0, 0]], "clipping plane's normal is zero"),
-        ([[0, 0, 0, 0, 0, 1], [1, 2, 3, 0, 0, 0]], "clipping plane's normal is zero"),
-        ([0, 0, 0, 0, 0, 1], r"clipping_planes must be \(k, 6\).*got shape \(6,\)"),
-        ([[0, 0, 0, 1]], r"clipping_planes must be \(k, 6\).*got shape \(1, 4\)"),
-        ([[[0, 0, 0, 0, 0, 1]]], r"clipping_planes must be \(k, 6\).*got shape \(1, 1, 6\)"),
-        ([[0, 0, np.nan, 0, 0, 1]], r"clipping_planes must be \(k, 6\) finite"),
-        ([[0, 0, 0, 0, 0, np.inf]], r"clipping_planes must be \(k, 6\) finite"),
-        ([[0, 0, 0, 0, 0, 1], [1, 2]], r"clipping_planes must be \(k, 6\)"),
-        ("x < 0", r"clipping_planes must be \(k, 6\).*'x < 0'"),
-    ],
-)
-def test_bad_planes_are_refused(planes, message):
-    with pytest.raises(InvalidArgumentError, match=message):
-        RenderOptions(planes)
-
-
 @pytest.mark.parametrize("seed", SEEDS)
 def test_box_planes_keep_what_is_inside(seed):
-    rng, bounds, camera = scene(seed)
-    made = rays.pixel_rays(camera, WINDOW, bounds)
+    rng, bounds, camera, made, _ = scene(seed)
     low, high = np.reshape(bounds, (3, 2)).T
     points = low + rng.uniform(-0.5, 1.5, (400, 3)) * (high - low)
-    points = points[direct_depths(camera, points) > 0.05]
+    points = points[direct_pixels(camera, WINDOW, points)[2] > 0.05]
     a, b, depth = direct_pixels(camera, WINDOW, points)
     forms = rays.box_planes(made, bounds)
     assert len(forms) == 6
@@ -291,24 +230,9 @@ def test_box_planes_keep_what_is_inside(seed):
     )
 
 
-def test_eye_plane_is_where_depth_is_zero():
-    bounds = (-1, 1, -1, 1, -1, 1)
-    for distance in (10.0, 0.5):
-        camera = Camera((0, 0, distance), (0, 0, distance - 1), (0, 1, 0))
-        made = rays.pixel_rays(camera, WINDOW, bounds)
-        (form,) = rays.eye_plane(camera, made)
-        for depth in (-1.0, 0.25, 3.0):
-            assert value_at(form, 3.5, -2.5, depth - made.reference_depth) == pytest.approx(depth)
-        parallel = camera.replace(parallel_projection=True)
-        assert rays.eye_plane(parallel, rays.pixel_rays(parallel, WINDOW, bounds)) == []
-
-
-# -- points in the window --------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("seed", SEEDS)
 def test_pixels_of_points_hold_what_the_points_surround(seed):
-    rng, bounds, camera = scene(seed)
+    rng, bounds, camera, *_ = scene(seed)
     points = rays.corners(bounds)
     part = rays.pixels_of_points(camera, WINDOW, points)
     inside = np.dot(rng.dirichlet(np.ones(8), 200), points)
@@ -317,29 +241,19 @@ def test_pixels_of_points_hold_what_the_points_surround(seed):
     low = np.clip([x.min(), y.min()], 0, WINDOW)
     high = np.clip([x.max(), y.max()], 0, WINDOW)
     first, last = (part.x0, part.y0), (part.x1, part.y1)
-    assert (first <= low).all()
-    assert (last >= high).all()
     # Two pixels more, and whole ones
-    assert (low - first <= 3).all()
-    assert (last - high <= 3).all()
+    assert ((low - first >= 0) & (low - first <= 3)).all()
+    assert ((last - high >= 0) & (last - high <= 3)).all()
 
 
 def test_pixels_of_points_that_are_not_all_in_front():
-    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
     whole = (0, WINDOW[0], 0, WINDOW[1])
     for z in (10.0, 11.0):  # at the eye, and behind it
         points = np.array([[0.0, 0, 0], [0, 0, z]])
-        assert rays.pixels_of_points(camera, WINDOW, points) == whole
-    parallel = camera.replace(parallel_projection=True, parallel_scale=100)
+        assert rays.pixels_of_points(AT_TEN, WINDOW, points) == whole
+    parallel = AT_TEN.replace(parallel_projection=True, parallel_scale=100)
     assert rays.pixels_of_points(parallel, WINDOW, points) == (18, 22, 13, 17)
-
-
-def test_pixels_of_no_points():
-    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
-    assert rays.pixels_of_points(camera, WINDOW, np.empty((0, 3))).pixels == 0
-
-
-# -- what float32 cannot hold ----------------------------------------------------------------------
+    assert rays.pixels_of_points(AT_TEN, WINDOW, np.empty((0, 3))).pixels == 0
 
 
 def test_a_view_beyond_float32_is_refused():
@@ -351,40 +265,13 @@ def test_a_view_beyond_float32_is_refused():
 
 def test_opaque_depth_is_relative_to_the_reference():
     camera = Camera((0, 0, 1e7), (0, 0, 0), (0, 1, 0), view_angle=1e-5)
-    made = rays.pixel_rays(camera, (2, 2), (-1, 1, -1, 1, -1, 1))
+    made = rays.pixel_rays(camera, (2, 2), CUBE)
     depth = np.array([[1e7 - 1, 1e7 + 0.125], [np.inf, -np.inf]])
     found = rays.checked_opaque_depth(depth, (2, 2), made)
     # The difference is made in float64, which knows 1e7 to 2e-9
     np.testing.assert_allclose(found, [[0, 1.125], [np.inf, -np.inf]], atol=1e-7)
     assert found.dtype == np.float32
     assert rays.checked_opaque_depth(None, (2, 2), made) is None
-
-
-def test_opaque_depth_beyond_float32_is_far_away():
-    """VTK and others mark "nothing" by the largest number of their own type."""
-    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
-    made = rays.pixel_rays(camera, (1, 1), (-1, 1, -1, 1, -1, 1))
+    # VTK and others mark "nothing" by the largest number of their own type
     found = rays.checked_opaque_depth([[np.finfo(np.float64).max]], (1, 1), made)
     assert found[0, 0] == np.inf
-
-
-@pytest.mark.parametrize(
-    ("depth", "message"),
-    [
-        (
-            np.ones((3, 4)),
-            r"opaque_depth must have shape \(height, width\) = \(2, 4\); got \(3, 4\)",
-        ),
-        (np.ones((4, 2)), r"got \(4, 2\)"),
-        (np.ones((2, 4, 1)), r"got \(2, 4, 1\)"),
-        (5.0, r"got \(\)"),
-        (np.full((2, 4), np.nan), "opaque_depth holds NaN: use inf"),
-        ([[1, 2], [3]], r"opaque_depth must have shape \(height, width\) = \(2, 4\)"),
-        ("far", r"opaque_depth must have shape \(height, width\) = \(2, 4\).*'far'"),
-    ],
-)
-def test_bad_opaque_depths_are_refused(depth, message):
-    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
-    made = rays.pixel_rays(camera, (4, 2), (-1, 1, -1, 1, -1, 1))
-    with pytest.raises(InvalidArgumentError, match=message):
-        rays.checked_opaque_depth(depth, (4, 2), made)

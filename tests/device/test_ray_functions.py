@@ -118,33 +118,32 @@ def test_clip_by_hand(call, planes, interval, expected):
         np.testing.assert_array_equal(found[0], np.float32(expected))
 
 
-WIDTHS = [1, 2, 3, 4, 5, 7, 8, 15, 16, 17, 33, 100]
+def drawn(call, kernel, items, *arguments):
+    return call(FILE, kernel, items, *arguments, call.empty(items, 2, dtype=np.int32))
 
 
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", [1, 2, 3, 4, 5, 7, 8, 15, 16, 17, 33, 100])
 def test_every_pixel_has_one_work_item(call, width):
     for height in (1, 2, 3, 4, 5, 9, 31):
         items = block_items(width, height)
-        pixels = call(
-            FILE, "block_pixels", items, np.int32(width), np.uint32(0),
-            call.empty(items, 2, dtype=np.int32),
-        )  # fmt: skip
+        pixels = drawn(call, "block_pixels", items, np.int32(width), np.uint32(0))
         assert (pixels >= 0).all()
         assert len(np.unique(pixels, axis=0)) == items  # no pixel twice, outside ones included
         inside = (pixels[:, 0] < width) & (pixels[:, 1] < height)
         assert inside.sum() == width * height
 
 
-def test_every_pixel_of_a_cell_has_one_work_item(call):
+def test_blocks_are_four_by_four(call):
+    blocks = drawn(call, "block_pixels", 64, np.int32(9), np.uint32(0)).reshape(4, 16, 2)
+    for block, corner in zip(blocks, [(0, 0), (4, 0), (8, 0), (0, 4)], strict=True):
+        assert {tuple(p) for p in block - corner} == {(x, y) for x in range(4) for y in range(4)}
+
+
+def test_pixels_of_cells(call):
     cells = np.int32([[3, 0], [0, 2], [7, 5]])
-    items = len(cells) * CELL_ITEMS
-    pixels = call(FILE, "cell_pixels", items, cells, call.empty(items, 2, dtype=np.int32))
-    assert len(np.unique(pixels, axis=0)) == items  # no pixel twice
-    owner = np.repeat(cells, CELL_ITEMS, axis=0)
-    np.testing.assert_array_equal(pixels // CELL, owner)
-    blocks = pixels.reshape(-1, 16, 2)
-    assert (np.ptp(blocks, axis=1) == 3).all()
-    assert (blocks.min(axis=1) % 4 == 0).all()
+    pixels = drawn(call, "cell_pixels", len(cells) * CELL_ITEMS, cells)
+    assert len(np.unique(pixels, axis=0)) == len(pixels)  # no pixel twice
+    np.testing.assert_array_equal(pixels // CELL, np.repeat(cells, CELL_ITEMS, axis=0))
 
 
 @pytest.mark.parametrize(
@@ -154,45 +153,29 @@ def test_every_pixel_of_a_part_has_one_work_item(call, part):
     part = Rectangle(*part)
     columns = part_columns(part)
     items = GROUP * int(columns[2] * columns[3])
-    pixels = call(FILE, "part_pixels", items, columns, call.empty(items, 2, dtype=np.int32))
+    pixels = drawn(call, "part_pixels", items, columns)
     assert len(np.unique(pixels, axis=0)) == items  # no pixel twice
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     # Whole columns of strips, 4 x 16 pixels, and no more of them than hold the part
     np.testing.assert_array_equal(low, [part.x0 // 4 * 4, part.y0 // 16 * 16])
     np.testing.assert_array_equal(high, [-(-part.x1 // 4) * 4 - 1, -(-part.y1 // 16) * 16 - 1])
     assert items == np.prod(high + 1 - low)
-    blocks = pixels.reshape(-1, 16, 2)
-    assert (np.ptp(blocks, axis=1) == 3).all()
+    assert (np.ptp(pixels.reshape(-1, 16, 2), axis=1) == 3).all()
 
 
 def test_columns_of_strips_are_four_blocks_high(call):
-    """And lie side by side; so do those of cells."""
-    columns = part_columns(Rectangle(0, 16, 0, 32))
-    pixels = call(FILE, "part_pixels", 512, columns, call.empty(512, 2, dtype=np.int32))
+    pixels = drawn(call, "part_pixels", 512, part_columns(Rectangle(0, 16, 0, 32)))
     corners = pixels.reshape(32, 16, 2).min(axis=1)
     expected = [[4 * (k // 4 % 4), 4 * (k % 4) + 16 * (k // 16)] for k in range(32)]
     assert corners.tolist() == expected
-    cells = np.int32([[0, 0], [0, 1]])
-    of_cells = call(FILE, "cell_pixels", 512, cells, call.empty(512, 2, dtype=np.int32))
+    of_cells = drawn(call, "cell_pixels", 512, np.int32([[0, 0], [0, 1]]))
     np.testing.assert_array_equal(of_cells, pixels)
-
-
-def test_blocks_are_four_by_four(call):
-    pixels = call(
-        FILE, "block_pixels", 64, np.int32(9), np.uint32(0), call.empty(64, 2, dtype=np.int32)
-    )
-    blocks = pixels.reshape(4, 16, 2)
-    for block, corner in zip(blocks, [(0, 0), (4, 0), (8, 0), (0, 4)], strict=True):
-        assert {tuple(p) for p in block - corner} == {(x, y) for x in range(4) for y in range(4)}
 
 
 def test_the_largest_window_does_not_overflow(call):
     """65536 x 65536 has 2^32 pixels: the last work-item's index is the largest uint."""
     last = 2**32 - 64
-    pixels = call(
-        FILE, "block_pixels", 64, np.int32(65536), np.uint32(last),
-        call.empty(64, 2, dtype=np.int32),
-    )  # fmt: skip
+    pixels = drawn(call, "block_pixels", 64, np.int32(65536), np.uint32(last))
     item = last + np.arange(64, dtype=np.int64)
     block, lane = item // 16, item % 16
     expected = np.column_stack([block % 16384 * 4 + lane % 4, block // 16384 * 4 + lane // 4])

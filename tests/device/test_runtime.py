@@ -5,22 +5,21 @@ from __future__ import annotations
 import os
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from fresh_python import run_python
+from runtimes import fresh_runtime
 
 from pyvista_vdi import device as ocl
 from pyvista_vdi.device import devices, profiling, programs, sources
-from pyvista_vdi.device.runtime import Runtime
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, KernelBuildError
-
-# -- sources -----------------------------------------------------------------------------------
 
 
 @pytest.fixture
 def texts(monkeypatch):
-    """Kernel files in memory in place of the package's."""
+    """Kernel files in memory in place of the package's; what is expanded once is kept."""
     files: dict[str, str] = {}
 
     def read(path: str) -> str:
@@ -29,9 +28,7 @@ def texts(monkeypatch):
         return files[path]
 
     monkeypatch.setattr(sources, "read_resource", read)
-    sources._expand_resource.cache_clear()
-    yield files
-    sources._expand_resource.cache_clear()
+    return files
 
 
 def test_includes_are_expanded_once_with_line_marks(texts):
@@ -49,23 +46,24 @@ def test_includes_are_expanded_once_with_line_marks(texts):
         '#line 3 "vdi/main.cl"',
         "int main_c;",
     ]
+    texts["itself.cl"] = '#include "b.cl"\nint a;'
+    texts["b.cl"] = '#include "itself.cl"\nint b;'
+    assert sources.expand("itself.cl").count("int a;") == 1
 
 
-def test_a_file_that_includes_itself_ends(texts):
-    texts["a.cl"] = '#include "b.cl"\nint a;'
-    texts["b.cl"] = '#include "a.cl"\nint b;'
-    assert sources.expand("a.cl").count("int a;") == 1
-
-
-def test_missing_and_conditional_includes_name_the_place(texts):
-    texts["a.cl"] = '\n#include "nowhere.cl"\n'
-    with pytest.raises(KernelBuildError, match=r'a\.cl:2: #include "nowhere.cl": no such file'):
-        sources.expand("a.cl")
-    texts["c.cl"] = '#ifdef X\n#include "d.cl"\n#endif\n'
-    with pytest.raises(KernelBuildError, match=r"c\.cl:2: .* stands inside #if"):
-        sources.expand("c.cl")
-    with pytest.raises(KernelBuildError, match="no kernel file 'z.cl'"):
-        sources.expand("z.cl")
+@pytest.mark.parametrize(
+    ("path", "text", "message"),
+    [
+        ("a.cl", '\n#include "nowhere.cl"\n', r'a\.cl:2: #include "nowhere.cl": no such file'),
+        ("c.cl", '#ifdef X\n#include "d.cl"\n#endif\n', r"c\.cl:2: .* stands inside #if"),
+        ("z.cl", None, "no kernel file 'z.cl'"),
+    ],
+)
+def test_missing_and_conditional_includes_name_the_place(texts, path, text, message):
+    if text is not None:
+        texts[path] = text
+    with pytest.raises(KernelBuildError, match=message):
+        sources.expand(path)
 
 
 @pytest.mark.parametrize("path", ["../setup.py", "/etc/passwd", "", "common"])
@@ -73,8 +71,6 @@ def test_resources_outside_the_package_are_not_read(path):
     with pytest.raises(FileNotFoundError):
         sources.read_resource(path)
 
-
-# -- programs ----------------------------------------------------------------------------------
 
 SCALE = """\
 #include "lib/probe.cl"
@@ -101,20 +97,32 @@ def scale_file(tmp_path):
     return path
 
 
-def test_build_error_names_file_and_line(runtime, texts, tmp_path):
+def test_build_error_names_file_and_line(runtime, texts, monkeypatch, tmp_path):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     texts["common/good.cl"] = "int good(int a);\n" * 7
-    texts["vdi/bad.cl"] = (
-        '#include "common/good.cl"\n\n__kernel void bad()\n{\n    missing_it();\n}\n'
-    )
+    wrong = "".join(f"    missing_it{n}();\n" for n in range(40))
+    texts["vdi/bad.cl"] = f'#include "common/good.cl"\n\n__kernel void bad()\n{{\n{wrong}}}\n'
     with pytest.raises(KernelBuildError) as caught:
         runtime.kernel("vdi/bad.cl", "bad", {"N": 3})
     error = caught.value
     assert "vdi/bad.cl:5" in error.log
-    assert "missing_it" in str(error)
+    assert "missing_it0" in str(error)
+    more = len([line for line in error.log.splitlines() if line.strip()]) - programs.LOG_LINES_SHOWN
+    assert str(error).endswith(f"... {more} more lines in the error's .log")
     assert runtime.info.name in str(error)
     assert "-DN=3" in error.options
     assert '#line 2 "vdi/bad.cl"' in error.source
     assert error.__cause__ is not None
+    assert not list(tmp_path.glob("*.cl"))
+    # Where the device can, divisions are rounded correctly; and nothing is relaxed
+    cl = devices.opencl()
+    (device,) = (
+        c.device for c in devices.find_candidates()[0] if c.info.index == runtime.info.index
+    )
+    offered = device.single_fp_config & cl.device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT
+    assert ("-cl-fp32-correctly-rounded-divide-sqrt" in error.options) == bool(offered)
+    assert "relaxed" not in error.options
+    assert "unsafe" not in error.options
 
 
 def test_build_error_inside_an_include_names_the_include(runtime, texts):
@@ -122,24 +130,8 @@ def test_build_error_inside_an_include_names_the_include(runtime, texts):
     texts["vdi/outer.cl"] = '// head\n#include "common/wrong.cl"\n__kernel void k() {}\n'
     with pytest.raises(KernelBuildError, match=r"common/wrong\.cl:2"):
         runtime.kernel("vdi/outer.cl", "k")
-
-
-def test_failed_builds_leave_no_files(runtime, texts, monkeypatch, tmp_path):
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    texts["vdi/bad.cl"] = "__kernel void bad() { not_there(); }"
-    with pytest.raises(KernelBuildError):
-        runtime.kernel("vdi/bad.cl", "bad")
-    assert not list(tmp_path.glob("*.cl"))
-
-
-def test_unknown_kernel_lists_those_there_are(runtime):
     with pytest.raises(KernelBuildError, match="has no kernel 'nix'.*it has: probe"):
         runtime.kernel("lib/probe.cl", "nix")
-
-
-def test_long_logs_are_trimmed():
-    text = programs._trimmed("\n".join(f"line {i}" for i in range(100)))
-    assert text.endswith("... 70 more lines in the error's .log")
 
 
 def test_programs_are_built_once_per_source_and_defines(runtime, scale_file, monkeypatch):
@@ -180,52 +172,33 @@ def test_float_defines_are_exact(runtime, scale_file):
 def test_threads_may_launch_the_same_kernel(runtime, scale_file):
     kernel = runtime.kernel(scale_file, "scale", {"ADD": 0})
     start = threading.Barrier(4)
-    wrong: list[object] = []
 
     def work(factor: int) -> None:
-        try:
-            data = np.full(100, factor, np.float32)
-            with runtime.buffer(data.shape, data.dtype) as x:
-                start.wait()
-                for _ in range(200):
-                    runtime.write(x, data)
-                    runtime.launch(kernel, 100, None, x, np.float32(factor), np.uint32(100))
-                    result = runtime.download(x)
-                    if not np.all(result == factor * factor):
-                        wrong.append((factor, result))
-        except Exception as exc:  # an assertion in a thread would be lost
-            wrong.append(exc)
+        data = np.full(100, factor, np.float32)
+        with runtime.buffer(data.shape, data.dtype) as x:
+            start.wait()
+            for _ in range(200):
+                runtime.write(x, data)
+                runtime.launch(kernel, 100, None, x, np.float32(factor), np.uint32(100))
+                assert np.all(runtime.download(x) == factor * factor)
 
-    threads = [threading.Thread(target=work, args=(factor,)) for factor in (2, 3, 5, 7)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert wrong == []
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(work, (2, 3, 5, 7)))
 
 
-def test_every_kind_of_argument(runtime, scale_file):
-    kernel = runtime.kernel(scale_file, "spread", {"ADD": 0})
-    data = np.arange(8, dtype=np.float32)
-    vector = np.array([1, 2, 3, 4], np.float32)
-    with runtime.upload(data) as x, runtime.buffer(x.shape) as y:
-        runtime.launch(kernel, 8, 4, x, y, vector, ocl.LocalMemory(16))
-        np.testing.assert_array_equal(runtime.download(y), [3, 2, 1, 0, 7, 6, 5, 4])
-        runtime.launch(kernel, (8,), (4,), None, y, vector, ocl.LocalMemory(16))
-        np.testing.assert_array_equal(runtime.download(y), np.full(8, 4))
-
-
-def test_a_launch_takes_the_arguments_of_its_own_and_not_of_the_launch_before(runtime, scale_file):
+def test_a_launch_takes_every_kind_of_argument_of_its_own(runtime, scale_file):
     """Only what changes is given to the driver: also signs of 0, arrays changed in place."""
     kernel = runtime.kernel(scale_file, "spread", {"ADD": 0})
-    vector = np.array([1, 2, 3, 4], np.float32)
-    with runtime.upload(np.zeros(4, np.float32)) as x, runtime.buffer(x.shape) as y:
+    vector, room = np.array([1, 2, 3, 4], np.float32), ocl.LocalMemory(16)
+    with runtime.upload(np.arange(8, dtype=np.float32)) as x, runtime.buffer(x.shape) as y:
+        runtime.launch(kernel, 8, 4, x, y, vector, room)
+        np.testing.assert_array_equal(runtime.download(y), [3, 2, 1, 0, 7, 6, 5, 4])
         for last in (4.0, 0.0, -0.0, np.nan, 7.0):
             vector[3] = last
-            runtime.launch(kernel, 4, 4, None, y, vector, ocl.LocalMemory(16))
-            assert runtime.download(y).tobytes() == np.full(4, last, np.float32).tobytes()
-        runtime.launch(kernel, 4, 4, x, y, vector, ocl.LocalMemory(16))
-        np.testing.assert_array_equal(runtime.download(y), np.zeros(4))
+            runtime.launch(kernel, (8,), (4,), None, y, vector, room)
+            assert runtime.download(y).tobytes() == np.full(8, last, np.float32).tobytes()
+        runtime.launch(kernel, 8, 4, x, y, vector, room)
+        np.testing.assert_array_equal(runtime.download(y), [3, 2, 1, 0, 7, 6, 5, 4])
     scale = runtime.kernel(scale_file, "scale", {"ADD": 0})
     for value in range(1, 6):  # a buffer that takes the place of one that has gone
         with runtime.buffer((3,)) as x:
@@ -261,35 +234,36 @@ def test_padded():
     assert ocl.padded(0, 64) == (0,)
 
 
-def test_preferred_group_is_allowed(runtime):
-    width, height = runtime.preferred_group
-    assert width * height <= runtime._device.max_work_group_size
+def test_queue_scope_gives_a_thread_its_own_queue(runtime, scale_file, monkeypatch):
+    cl, queues = devices.opencl(), []
+    launch = cl.enqueue_nd_range_kernel
 
+    def noted(queue, *args, **kwargs):
+        queues.append(queue.int_ptr)
+        return launch(queue, *args, **kwargs)
 
-# -- queues and profiling ----------------------------------------------------------------------
-
-
-def test_queue_scope_gives_a_thread_its_own_queue(runtime, scale_file):
+    monkeypatch.setattr(cl, "enqueue_nd_range_kernel", noted)
     kernel = runtime.kernel(scale_file, "scale", {"ADD": 1})
-    outer = runtime._queue
     with runtime.buffer((4,)) as x:
         runtime.fill(x, 0)
+        args = (kernel, 4, None, x, np.float32(1), np.uint32(4))
+        runtime.launch(*args)
         with runtime.queue_scope():
-            assert runtime._queue is not outer
             with runtime.queue_scope():
-                runtime.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
-            runtime.launch(kernel, 4, None, x, np.float32(2), np.uint32(4))
-            assert len(runtime._queues) == 2
-        assert runtime._queue is outer
-        assert len(runtime._queues) == 1
-        assert np.all(runtime.download(x) == 3)
+                runtime.launch(*args)
+            runtime.launch(*args)
+        runtime.launch(*args)
+        assert np.all(runtime.download(x) == 4)
+    outer, innermost, inner, last = queues
+    assert outer == last
+    assert len({outer, innermost, inner}) == 3
 
 
 def test_profile_counts_calls_and_sums_times(runtime, scale_file, monkeypatch):
     monkeypatch.setattr("atexit.register", lambda function: None)
     monkeypatch.setattr(profiling, "PENDING_LIMIT", 3)
     monkeypatch.setenv("PYVISTA_VDI_PROFILE", "1")
-    profiled = Runtime(devices.Candidate(runtime.info, runtime._device))
+    profiled = fresh_runtime(runtime)
     kernel = profiled.kernel(scale_file, "scale", {"ADD": 1})
     with profiled.buffer((4,)) as x:
         profiled.fill(x, 0)
@@ -309,12 +283,13 @@ def test_a_scope_can_be_profiled_by_itself(runtime, scale_file):
     profile = profiling.Profile()
     with runtime.buffer((4,)) as x:
         runtime.fill(x, 0)
+        args = (kernel, 4, None, x, np.float32(1), np.uint32(4))
         with runtime.queue_scope(profile):
-            runtime.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
+            runtime.launch(*args)
             with runtime.queue_scope():  # another's work, in the same thread
-                runtime.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
+                runtime.launch(*args)
             runtime.download(x)
-        runtime.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
+        runtime.launch(*args)
         assert np.all(runtime.download(x) == 3)
     calls = {row.name: row.calls for row in profile.figures()}
     assert calls == {"scale": 1, "[read]": 1}
@@ -334,34 +309,29 @@ def test_profile_table_is_printed_at_exit(runtime):
     assert run_python(code, PYVISTA_VDI_PROFILE="0").stderr == ""
 
 
-def test_no_rounding_option_is_left_out_or_invented(runtime):
-    cl = devices.opencl()
-    offered = runtime._device.single_fp_config & cl.device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT
-    options = runtime._programs._base_options
-    assert ("-cl-fp32-correctly-rounded-divide-sqrt" in options) == bool(offered)
-    assert not any("relaxed" in option or "unsafe" in option for option in options)
+@pytest.fixture
+def new_kernel(tmp_path):
+    """A file that no cache knows."""
+    path = tmp_path / "new.cl"
+    path.write_text(f"// {tmp_path}\n__kernel void twice(__global float *x) {{ *x *= 2; }}")
+    return path
 
 
 def test_a_lock_that_a_killed_process_left_does_not_hold_up_builds(
-    runtime, tmp_path, monkeypatch, caplog
+    runtime, new_kernel, tmp_path, monkeypatch, caplog
 ):
     monkeypatch.setattr(programs, "cache_folder", lambda: tmp_path)
     lock = tmp_path / "lock"
     lock.touch()
     killed = time.time() - 2 * programs.STALE_LOCK
     os.utime(lock, (killed, killed))
-    source = tmp_path / "twice.cl"
-    source.write_text("__kernel void twice(__global float *x) { x[get_global_id(0)] *= 2; }")
     with caplog.at_level("DEBUG", "pyvista_vdi"):
-        runtime.kernel(source, "twice")
+        runtime.kernel(new_kernel, "twice")
     assert not lock.exists()
     assert "cache lock" not in caplog.text  # of pyopencl, when it has waited ten seconds
 
 
-def test_kernels_are_built_where_nothing_can_be_cached(runtime, tmp_path, monkeypatch):
-    occupied = tmp_path / "a file"
-    occupied.touch()
-    monkeypatch.setattr(programs, "cache_folder", lambda: occupied / "folder")
-    source = tmp_path / "thrice.cl"
-    source.write_text("__kernel void thrice(__global float *x) { x[get_global_id(0)] *= 3; }")
-    assert runtime.kernel(source, "thrice").argument_count == 1
+def test_kernels_are_built_where_nothing_can_be_cached(runtime, new_kernel, monkeypatch):
+    # A folder cannot be made below a file
+    monkeypatch.setattr(programs, "cache_folder", lambda: new_kernel / "folder")
+    assert runtime.kernel(new_kernel, "twice").argument_count == 1

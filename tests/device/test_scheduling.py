@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pyvista_vdi import device as ocl
-from pyvista_vdi.device import runtime as runtime_module
+from pyvista_vdi.device import devices, programs
 from pyvista_vdi.device import scheduling as turns
 from pyvista_vdi.device.scheduling import Turns
 from pyvista_vdi.errors import Cancelled
 
 #: Seconds after which a test that waits for another thread gives up: it would wait for ever.
-PATIENCE = 600
+PATIENCE = 120
 
 
 class InThread(threading.Thread):
@@ -49,7 +50,29 @@ def wait(event):
     assert event.wait(PATIENCE)
 
 
-# -- turns -----------------------------------------------------------------------------------------
+@pytest.fixture
+def clock(monkeypatch):
+    """Seconds that pass when a test says so: add to ``clock[0]``."""
+    now = [0.0]
+    monkeypatch.setattr(turns, "time", SimpleNamespace(perf_counter=lambda: now[0]))
+    return now
+
+
+def assert_free(each):
+    """A frame and background work can both be begun, and each has an end."""
+
+    def frame():
+        with each.foreground():
+            return "frame"
+
+    def work():
+        with each.background(never):
+            return "work"
+
+    assert [InThread(function).value() for function in (work, frame, work)] == [
+        "work", "frame", "work",
+    ]  # fmt: skip
+    assert each.worker is None
 
 
 def test_background_work_waits_for_the_end_of_a_frame():
@@ -70,29 +93,20 @@ def test_background_work_waits_for_the_end_of_a_frame():
     assert order == ["frame", "work"]
 
 
-def test_a_workers_clock_stands_still_while_a_frame_goes_first():
-    each, held = Turns(), threading.Event()
-
-    def work():
-        with each.background(never):
-            began = each.clock()
-            held.set()
-            while not each._arriving:  # the frame knocks
-                pass
-            before = each.clock() - began
-            each._end_turn(each.worker)
-            each._take_turn(each.worker)
-            return before, each.clock() - began
-
-    thread = InThread(work)
-    wait(held)
-    with each.foreground():
-        began = each.clock()  # of no worker: seconds
-        while each.clock() < began + 0.2:
-            pass
-    before, after = thread.value()
-    # A frame of .2 s lies between the two: a tenth of it is for a busy machine
-    assert 0 < before <= after < before + 0.02
+def test_a_workers_clock_stands_still_while_others_go_first(clock):
+    each = Turns()
+    clock[0] = 7.0
+    assert each.clock() == 7  # of no worker: that of the system
+    with each.background(never):
+        began = each.clock()
+        clock[0] += 1
+        assert each.clock() - began == 1
+        for _ in range(2):
+            with each.aside():
+                clock[0] += 10
+        assert each.clock() - began == 1
+        clock[0] += 2
+        assert each.clock() - began == 3
 
 
 def test_a_frame_waits_for_the_piece_in_progress_and_no_longer():
@@ -103,8 +117,7 @@ def test_a_frame_waits_for_the_piece_in_progress_and_no_longer():
         with each.background(never):
             piece.set()
             wait(arrived)
-            while not each._arriving:  # the frame knocks
-                pass
+            threading.Event().wait(3 * turns.POLL)  # the frame would be drawn by now
             order.append("piece")
             while order == ["piece"]:
                 each.checkpoint()
@@ -120,17 +133,17 @@ def test_a_frame_waits_for_the_piece_in_progress_and_no_longer():
 
 
 def test_frames_without_pause_leave_a_turn_each(monkeypatch):
+    for limit in ("FIRST_TURN", "SHORTEST_TURN", "SHARE"):
+        monkeypatch.setattr(turns, limit, 0.0)  # a turn is over at every checkpoint
     each, frames_before = Turns(), []
-    monkeypatch.setattr(each, "_turn", lambda: 0.0)  # over at every checkpoint
     begun, done = threading.Event(), threading.Event()
 
     def work():
         with each.background(never):
             begun.set()
-            for _ in range(20):
-                while not each._arriving:  # a frame knocks
-                    pass
-                each.checkpoint()
+            for k in range(20):
+                while frames == k:
+                    each.checkpoint()
                 frames_before.append(frames)
         done.set()
 
@@ -145,25 +158,38 @@ def test_frames_without_pause_leave_a_turn_each(monkeypatch):
     assert frames_before == list(range(1, 21))
 
 
-def test_a_turn_is_a_share_of_a_recent_frame_within_limits():
+@pytest.mark.parametrize(
+    ("frames", "turn"),
+    [
+        ((), turns.FIRST_TURN),
+        ((1e-4,), turns.SHORTEST_TURN),
+        ((0.05,), 0.05 * turns.SHARE),
+        ((0.05, 3.0, 0.05, 0.0, 0.05), 0.05 * turns.SHARE),  # the median
+        ((0.0,) + (0.05,) * turns.RECENT_FRAMES, 0.05 * turns.SHARE),
+        ((10.0,) * 9 + (0.05,) * turns.RECENT_FRAMES, 0.05 * turns.SHARE),  # of the last
+        ((10.0,), turns.LONGEST_PIECE),
+    ],
+)
+def test_a_turn_is_a_share_of_a_recent_frame_within_limits(clock, frames, turn):
     each = Turns()
     assert each.checkpoint() == np.inf  # no background work
+    for frame in frames:
+        with each.foreground():
+            clock[0] += frame
     with each.background(never):
-        assert 0 < each.checkpoint() <= turns.FIRST_TURN
-        for frame, longest in (
-            (0.0001, turns.SHORTEST_TURN),
-            (0.05, 0.05 * turns.SHARE),
-            (10.0, turns.LONGEST_PIECE),
-        ):
-            each._recent.extend([frame] * turns.RECENT_FRAMES)
-            assert 0 < each.checkpoint() <= longest
+        assert each.checkpoint() == pytest.approx(turn)
+        if turn < turns.LONGEST_PIECE:
+            clock[0] += 0.75 * turn
+            assert each.checkpoint() == pytest.approx(0.25 * turn)
+            clock[0] += (0.26 - turns.LEAST_REMAINDER) * turn  # no useful piece fits: a new turn
+            assert each.checkpoint() == pytest.approx(turn)
 
 
 def test_pieces_follow_the_slowest_of_the_last():
     worker = turns.Worker(never)
     assert worker.piece("march", 0.01) is None
-    worker.took("march", 1000, 0.001)
     worker.took("march", 1000, 0.01)
+    worker.took("march", 1000, 0.001)
     assert worker.piece("march", 0.01) == int(1000 * turns.CAUTION)
     assert worker.piece("pack", 0.01) is None
     assert worker.piece("march", 1e-9) == 1
@@ -180,9 +206,8 @@ def test_frames_of_two_threads_are_side_by_side():
         with each.foreground():
             both.wait()
 
-    first, second = InThread(frame), InThread(frame)
-    first.value()
-    second.value()
+    for thread in [InThread(frame), InThread(frame)]:
+        thread.value()
 
 
 def test_workers_take_turns_with_each_other():
@@ -205,22 +230,27 @@ def test_workers_take_turns_with_each_other():
 
 def test_blocks_inside_blocks():
     each = Turns()
-    with each.foreground(), each.foreground():
-        assert each._frames == 1
-        with pytest.raises(RuntimeError, match="inside a frame"), each.background(never):
-            pass
-    assert each._frames == 0
+
+    def frame():
+        with each.foreground():
+            with each.foreground():
+                pass  # its end is not that of the frame
+            with inside, each.background(never):
+                pass
+
+    inside = pytest.raises(RuntimeError, match="inside a frame")
+    InThread(frame).value()
     with each.background(never):
         with each.foreground():  # part of the background work
-            assert each._frames == 0
+            assert each.worker is not None
+        assert each.worker is not None
         with pytest.raises(RuntimeError, match="background work"), each.background(never):
             pass
-    assert each.worker is None
+    assert_free(each)
 
 
 def test_cancelled_work_ends_while_a_frame_waits_for_it():
-    each = Turns()
-    cancelled = threading.Event()
+    each, cancelled = Turns(), threading.Event()
 
     def work():
         with each.background(cancelled.is_set):
@@ -231,28 +261,20 @@ def test_cancelled_work_ends_while_a_frame_waits_for_it():
         cancelled.set()
         with pytest.raises(Cancelled):
             thread.value()
-    assert not each._waiting
-    with each.foreground():  # nothing is left that a frame would wait for
-        pass
-
-
-def test_cancelled_work_ends_at_its_next_checkpoint():
-    each = Turns()
+    assert_free(each)
+    # And else at its next checkpoint
     with pytest.raises(Cancelled), each.background(lambda: True):
         each.checkpoint()
-    assert each._holder is None
+    assert_free(each)
 
 
 @pytest.mark.parametrize("error", [ValueError, Cancelled])
 def test_errors_leave_nothing_behind(error):
     each = Turns()
-    with pytest.raises(error), each.foreground(), each.aside():
-        raise error
-    with pytest.raises(error), each.background(never), each.aside():
-        raise error
-    assert (each._frames, each._arriving, len(each._waiting)) == (0, 0, 0)
-    assert each._holder is None
-    assert each.worker is None
+    for block in (each.foreground, lambda: each.background(never)):
+        with pytest.raises(error), block(), each.aside():
+            raise error
+        assert_free(each)
 
 
 def test_a_lock_is_handed_over_between_frame_and_work():
@@ -263,9 +285,8 @@ def test_a_lock_is_handed_over_between_frame_and_work():
     def work():
         with each.background(never), each.holding(lock):
             held.set()
-            each._end_turn(each.worker)
-            wait(in_frame)
-            each.checkpoint()
+            while not in_frame.is_set():
+                each.checkpoint()
             order.append("work")
 
     def frame():
@@ -275,30 +296,18 @@ def test_a_lock_is_handed_over_between_frame_and_work():
             with each.holding(lock):
                 order.append("frame")
 
-    threads = [InThread(work), InThread(frame)]
-    for thread in threads:
+    for thread in [InThread(work), InThread(frame)]:
         thread.value()
     assert order == ["work", "frame"]
     assert not lock.locked()
 
 
-# -- the runtime's launches and copies in turns ----------------------------------------------------
-
-INDEX = """\
+KERNELS = """\
 __kernel void index(__global uint *x, const uint wide)
 {
     const uint i = get_global_id(1) * wide + get_global_id(0);
     x[i] += 1 + i;
 }
-"""
-GROUP_SUM = """\
-__kernel void group_numbers(__global uint *x)
-{
-    x[get_global_id(0)] = get_group_id(0) * 1000 + get_num_groups(0);
-}
-"""
-
-CHASE = """\
 __kernel void chase(__global const uint *next, __global uint *end, const uint steps)
 {
     uint at = get_global_id(0);
@@ -307,14 +316,19 @@ __kernel void chase(__global const uint *next, __global uint *end, const uint st
     end[get_global_id(0)] = at;
 }
 """
+GROUP_NUMBERS = """\
+__kernel void group_numbers(__global uint *x)
+{
+    x[get_global_id(0)] = get_group_id(0) * 1000 + get_num_groups(0);
+}
+"""
 
 
 @pytest.fixture
 def kernels(tmp_path):
-    (tmp_path / "index.cl").write_text(INDEX)
-    (tmp_path / "chase.cl").write_text(CHASE)
-    (tmp_path / "group.cl").write_text(GROUP_SUM)
-    return tmp_path
+    path = tmp_path / "kernels.cl"
+    path.write_text(KERNELS)
+    return path
 
 
 @pytest.mark.parametrize(
@@ -322,11 +336,10 @@ def kernels(tmp_path):
     [((40960,), (64,)), ((4097,), None), ((64, 96), (8, 4)), ((31, 50), None), ((64,), (64,))],
 )
 def test_launches_in_pieces_cover_everything_once(runtime, kernels, monkeypatch, size, group):
-    monkeypatch.setattr(runtime_module, "_FIRST_GROUPS", 1)
-    monkeypatch.setattr(turns.Worker, "piece", lambda *_: 2048)
     pieces = []
+    monkeypatch.setattr(turns.Worker, "piece", lambda *_: 2048)
     monkeypatch.setattr(turns.Worker, "took", lambda self, kind, items, _: pieces.append(items))
-    kernel = runtime.kernel(kernels / "index.cl", "index")
+    kernel = runtime.kernel(kernels, "index")
     assert kernel.divisible
     n = int(np.prod(size))
     with runtime.buffer((n,), np.uint32) as x:
@@ -340,17 +353,17 @@ def test_launches_in_pieces_cover_everything_once(runtime, kernels, monkeypatch,
 
 def test_a_kernel_that_asks_for_its_groups_number_is_launched_whole(runtime, kernels, monkeypatch):
     monkeypatch.setattr(turns.Worker, "piece", lambda *_: 64)
-    kernel = runtime.kernel(kernels / "group.cl", "group_numbers")
+    kernels.write_text(GROUP_NUMBERS)
+    kernel = runtime.kernel(kernels, "group_numbers")
     with runtime.background(), runtime.buffer((640,), np.uint32) as x:
         runtime.launch(kernel, 640, 64, x)
         expected = np.repeat(np.arange(10), 64) * 1000 + 10
         np.testing.assert_array_equal(runtime.download(x), expected)
 
 
-def test_copies_in_pieces(runtime, monkeypatch):
-    monkeypatch.setattr(runtime_module, "_COPY_BYTES", 1024)
+def test_copies_in_pieces(runtime):
     rng = np.random.default_rng(3)
-    array = rng.integers(0, 2**32, (11, 7, 13), dtype=np.uint32)
+    array = rng.integers(0, 2**32, (11, 70, 3001), dtype=np.uint32)  # 9 MB: three pieces
     unaligned = ocl.aligned_empty(array.size + 1, np.uint32)[1:].reshape(array.shape)
     unaligned[...] = array
     before = runtime.allocated
@@ -362,14 +375,15 @@ def test_copies_in_pieces(runtime, monkeypatch):
         assert runtime.allocated - before == 2 * array.nbytes
         assert not uploaded.writable
         np.testing.assert_array_equal(runtime.download(uploaded), array)
-        np.testing.assert_array_equal(runtime.download(uploaded, count=500), array.ravel()[:500])
+        part = runtime.download(uploaded, count=1_500_000)
+        np.testing.assert_array_equal(part, array.ravel()[: len(part)])
         runtime.write(written, array)
         np.testing.assert_array_equal(runtime.download(written), array)
     assert runtime.allocated == before
 
 
 def test_every_use_of_the_device_asks_whether_the_work_is_wanted(runtime, kernels):
-    kernel = runtime.kernel(kernels / "index.cl", "index")
+    kernel = runtime.kernel(kernels, "index")
     array = np.zeros(2**21, np.uint32)
     unwanted = threading.Event()
     with runtime.background(unwanted.is_set), runtime.buffer(array.shape, np.uint32) as x:
@@ -391,25 +405,21 @@ def test_every_use_of_the_device_asks_whether_the_work_is_wanted(runtime, kernel
 
 
 def test_compiling_lets_frames_go_on(runtime, kernels, monkeypatch):
-    compile_it = runtime._programs.kernel
-    frames = []
+    build, frames = programs.build, []
 
-    def compile_beside_a_frame(*args):
-        frames.append(InThread(lambda: frame(runtime)).value())
-        return compile_it(*args)
+    def frame():
+        with runtime.foreground():
+            return "drawn"
 
-    monkeypatch.setattr(runtime._programs, "kernel", compile_beside_a_frame)
+    def build_beside_a_frame(*args):
+        frames.append(InThread(frame).value())
+        return build(*args)
+
+    monkeypatch.setattr(programs, "build", build_beside_a_frame)
+    kernels.write_text(KERNELS + "// not compiled before\n")
     with runtime.background():
-        runtime.kernel(kernels / "index.cl", "index")
+        runtime.kernel(kernels, "index")
     assert frames == ["drawn"]
-
-
-def frame(runtime):
-    with runtime.foreground():
-        return "drawn"
-
-
-# -- queues ----------------------------------------------------------------------------------------
 
 
 def ring():
@@ -419,14 +429,8 @@ def ring():
     return array
 
 
-def test_memory_in_place_knows_the_queues_that_read_it(runtime, kernels, monkeypatch):
-    kernel = runtime.kernel(kernels / "chase.cl", "chase")
-    finish, finished = runtime._finish, []
-
-    def noted(numbers):
-        finished.append(set(numbers))
-        finish(numbers)  # a kernel that still runs when its memory is freed corrupts the heap
-
+def test_memory_in_place_knows_the_queues_that_read_it(runtime, kernels):
+    kernel = runtime.kernel(kernels, "chase")
     with runtime.upload(ring()) as shared, runtime.buffer((64,), np.uint32) as own:
         launch = (kernel, 64, 64, shared, own, np.uint32(1))
         assert own.readers is None
@@ -434,20 +438,17 @@ def test_memory_in_place_knows_the_queues_that_read_it(runtime, kernels, monkeyp
         if not runtime.is_cpu:
             return
         with runtime.queue_scope():
-            inner = runtime._queue_number
             runtime.launch(*launch)
-            assert shared.readers == {inner}
+            (inner,) = shared.readers
         runtime.launch(*launch)
-        assert shared.readers == {runtime._main_queue}  # the other queue is gone
-        monkeypatch.setattr(runtime, "_finish", noted)
-        shared.release()
-    assert finished == [{runtime._main_queue}]
+        assert len(shared.readers) == 1  # the other queue is gone
+        assert inner not in shared.readers
 
 
 @pytest.mark.parametrize("own_queue", [False, True])
 def test_memory_in_place_is_free_when_its_buffer_is_released(runtime, kernels, own_queue):
     """Whatever thread releases it, and whichever queue reads it."""
-    kernel = runtime.kernel(kernels / "chase.cl", "chase")
+    kernel = runtime.kernel(kernels, "chase")
     array, steps = ring(), 2**20  # tens of milliseconds: the kernel runs when release() is called
     with (
         runtime.buffer((64,), np.uint32) as end,
@@ -460,18 +461,44 @@ def test_memory_in_place_is_free_when_its_buffer_is_released(runtime, kernels, o
         np.testing.assert_array_equal(runtime.download(end), (np.arange(64) + steps) % 64)
 
 
-def test_a_thread_waits_for_its_own_queue_only(runtime, monkeypatch):
-    class Queue:
-        def __init__(self):
-            self.finished = 0
+@pytest.fixture
+def finished(monkeypatch):
+    """How often each queue that is made from now on was finished, in the order of making."""
+    cl, made = devices.opencl(), []
+
+    class Counted(cl.CommandQueue):
+        def __init__(self, *args):
+            super().__init__(*args)
+            self.place = len(made)
+            made.append(0)
 
         def finish(self):
-            self.finished += 1
+            made[self.place] += 1
+            super().finish()
 
-    main, inner = Queue(), Queue()
-    monkeypatch.setattr(runtime, "_queues", {runtime._main_queue: main, -1: inner})
-    runtime.finish()
-    assert (main.finished, inner.finished) == (1, 0)
-    monkeypatch.setattr(runtime._local, "queue_number", -1, raising=False)
-    runtime.finish()
-    assert (main.finished, inner.finished) == (1, 1)
+    monkeypatch.setattr(cl, "CommandQueue", Counted)
+    return made
+
+
+def test_a_thread_waits_for_its_own_queue_only(runtime, finished):
+    with runtime.queue_scope():
+        InThread(runtime.finish).value()
+        assert finished == [0]
+        runtime.finish()
+        assert finished == [1]
+        with runtime.queue_scope():
+            assert finished == [2, 0]
+            runtime.finish()
+        assert finished == [2, 2]
+    assert finished == [3, 2]
+
+
+def test_a_result_that_is_never_read_is_finished_before_its_memory_goes(runtime, kernels, finished):
+    kernel = runtime.kernel(kernels, "index")
+    with runtime.queue_scope():
+        buffer = runtime.result((64,), np.uint32)
+        runtime.launch(kernel, 64, 64, buffer, np.uint32(64))
+        runtime.finish()
+        before = sum(finished)
+        buffer.release()
+        assert (sum(finished) > before) == runtime.is_cpu

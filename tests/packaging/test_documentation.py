@@ -32,21 +32,23 @@ def _pages():
     return sorted(pages)
 
 
+def _script(name):
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
 def test_diagrams_are_those_that_the_script_draws():
-    spec = importlib.util.spec_from_file_location("diagrams", DOCS / "diagrams.py")
-    diagrams = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(diagrams)
-    for name, text in diagrams.draw().items():
+    for name, text in _script("diagrams").draw().items():
         drawn = DOCS / "images" / name
         assert drawn.read_bytes() == text.encode(), f"{name}: run python docs/diagrams.py"
 
 
 def test_terms_are_typeset_and_names_are_not():
     pytest.importorskip("sphinx")
-    spec = importlib.util.spec_from_file_location("terms", DOCS / "terms.py")
-    terms = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(terms)
-    parts = terms.typeset("V_O's lists have N_S; a.V_O, V_Old, t_near_far and t_near() are names")
+    text = "V_O's lists have N_S; a.V_O, V_Old, t_near_far and t_near() are names"
+    parts = _script("terms").typeset(text)
     assert [part.astext() for part in parts if part.tagname == "inline"] == ["VO", "NS"]
     assert "".join(part.astext() for part in parts).endswith("are names")
 
@@ -69,9 +71,6 @@ def test_included_tables_bring_no_headings():
             assert not re.search(r"^#", text, re.MULTILINE), f"{page.name}: headings of {name}"
             included += 1
     assert included > 5
-
-
-# -- where is what ---------------------------------------------------------------------------------
 
 
 def _rows():
@@ -101,10 +100,6 @@ def _is_importable(name):
     return True
 
 
-def _defines(text, pattern):
-    return re.search(pattern, text, re.MULTILINE) is not None
-
-
 def _anchors(page):
     """Return the anchors of a page: those of its headings, and those that it names."""
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
@@ -122,20 +117,18 @@ def test_where_is_what_names_python_that_exists():
 
 def test_where_is_what_names_kernels_tests_and_pages_that_exist():
     missing = []
+    # A definition, or a macro that makes one, begins its line or names itself in one
+    kernel, test = r"^(?!\s|//)[^;\n]*\b{}\s*[(,]", r"^def {}\("
     for _step, _python, kernels, tests, page in _rows():
-        for name in _named(kernels):
-            file, _, function = name.partition("::")
-            path = CHECKOUT / "opencl" / file
-            # A definition, or a macro that makes one, begins its line or names itself in one
-            defined = rf"^(?!\s|//)[^;\n]*\b{function}\s*[(,]"
-            if not path.is_file() or not _defines(path.read_text(encoding="utf-8"), defined):
-                missing.append(name)
-        for name in _named(tests):
-            file, _, function = name.partition("::")
-            path = CHECKOUT / "tests" / file
-            defined = rf"^def {function}\(" if function else ""
-            if not path.is_file() or not _defines(path.read_text(encoding="utf-8"), defined):
-                missing.append(name)
+        for folder, cell, pattern in (("opencl", kernels, kernel), ("tests", tests, test)):
+            for name in _named(cell):
+                file, _, function = name.partition("::")
+                path = CHECKOUT / folder / file
+                defined = pattern.format(function) if function or folder == "opencl" else ""
+                if not path.is_file() or not re.search(
+                    defined, path.read_text(encoding="utf-8"), re.MULTILINE
+                ):
+                    missing.append(name)
         target = re.search(r"\]\(([^)#]+)#?([^)]*)\)", page)
         assert target, page
         file, anchor = target.groups()
@@ -145,7 +138,6 @@ def test_where_is_what_names_kernels_tests_and_pages_that_exist():
 
 
 def test_pages_name_files_that_exist():
-    """Paths of this repository in the pages lead somewhere."""
     missing = set()
     for page in _pages():
         if page.name == "changelog.md":

@@ -15,7 +15,6 @@ from pathlib import Path
 import pytest
 
 import pyvista_vdi
-from pyvista_vdi._version import __version__
 
 CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
 PACKAGE = Path(pyvista_vdi.__file__).parent
@@ -60,7 +59,6 @@ def test_the_package_is_imported_where_posix_modules_are_absent():
 
 @pytest.fixture
 def names():
-    """Return the names of the checkout's files."""
     if not (CHECKOUT / ".git").exists():
         pytest.skip("no checkout at hand: set PYVISTA_VDI_CHECKOUT to one")
     listing = subprocess.run(
@@ -70,7 +68,6 @@ def names():
 
 
 def test_every_file_can_be_checked_out_on_windows_and_macos(names):
-    """No character or name that they refuse, no two names that differ by case, none too long."""
     parts = {part for name in names for part in name.split("/")}
     assert not [p for p in parts if re.search(r'[<>:"\\|?*\x00-\x1f]|[. ]$', p)]
     assert not [p for p in parts if RESERVED.fullmatch(p)]
@@ -79,7 +76,6 @@ def test_every_file_can_be_checked_out_on_windows_and_macos(names):
 
 
 def test_text_is_opened_with_its_encoding():
-    """Windows' default is not UTF-8."""
     found = []
     for path in PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -102,7 +98,7 @@ def test_one_version():
         ("tools/conda/recipe.yaml", r'^  version: "(\S+)"$'),
     ):
         text = (CHECKOUT / name).read_text(encoding="utf-8")
-        assert re.findall(pattern, text, re.MULTILINE) == [__version__], name
+        assert re.findall(pattern, text, re.MULTILINE) == [pyvista_vdi.__version__], name
 
 
 def test_the_conda_recipe_has_the_wheel_s_requirements():

@@ -80,6 +80,27 @@ def show_picture(picture, size, representation="Slice"):
     return view
 
 
+def show_volume(source, view):
+    """Show the volume of a source by ParaView itself, by the same transfer functions."""
+    shown = simple.Show(source.Input, view, "UniformGridRepresentation")
+    shown.Representation = "Volume"
+    simple.ColorBy(shown, ("POINTS", "ImageScalars"))
+    shown.LookupTable = source.ColorFunction
+    shown.ScalarOpacityFunction = source.OpacityFunction
+    shown.ScalarOpacityUnitDistance = UNIT_DISTANCE
+    shown.SetScalarBarVisibility(view, False)
+
+
+def take_view(source, view):
+    view.CameraPosition = [380, -330, 300]
+    view.CameraFocalPoint = [90, 108, 90]
+    view.CameraViewUp = [0, 0, 1]
+    view.CameraViewAngle = 28
+    simple.SetActiveView(view)
+    simple.Render(view)
+    source.SMProxy.InvokeCommand("TakeActiveView")
+
+
 def fetched(proxy):
     return simple.servermanager.Fetch(proxy)
 
@@ -138,20 +159,8 @@ def volume(folder):
     """Draw the volume by ParaView and by a VDI, from the view on the screen."""
     source = brain_source()
     view = black_view(SIZE)
-    shown = simple.Show(source.Input, view, "UniformGridRepresentation")
-    shown.Representation = "Volume"
-    simple.ColorBy(shown, ("POINTS", "ImageScalars"))
-    shown.LookupTable = source.ColorFunction
-    shown.ScalarOpacityFunction = source.OpacityFunction
-    shown.ScalarOpacityUnitDistance = UNIT_DISTANCE
-    shown.SetScalarBarVisibility(view, False)
-    view.CameraPosition = [380, -330, 300]
-    view.CameraFocalPoint = [90, 108, 90]
-    view.CameraViewUp = [0, 0, 1]
-    view.CameraViewAngle = 28
-    simple.SetActiveView(view)
-    simple.Render(view)
-    source.SMProxy.InvokeCommand("TakeActiveView")
+    show_volume(source, view)
+    take_view(source, view)
     simple.SaveScreenshot(str(folder / "volume.png"), view, ImageResolution=SIZE)
     picture = simple.VDIToImage(Input=source)
     flat = show_picture(picture, SIZE)
@@ -164,22 +173,10 @@ def scene(folder):
     source = brain_source()
     other = black_view(SIZE)
     view = black_view(SIZE)
-    shown = simple.Show(source.Input, view, "UniformGridRepresentation")
-    shown.Representation = "Volume"
-    simple.ColorBy(shown, ("POINTS", "ImageScalars"))
-    shown.LookupTable = source.ColorFunction
-    shown.ScalarOpacityFunction = source.OpacityFunction
-    shown.ScalarOpacityUnitDistance = UNIT_DISTANCE
-    shown.SetScalarBarVisibility(view, False)
+    show_volume(source, view)
     ball = simple.Show(simple.Sphere(Center=[90, 20, 90], Radius=40), view)
     ball.Ambient, ball.Diffuse = 1, 0
-    view.CameraPosition = [380, -330, 300]
-    view.CameraFocalPoint = [90, 108, 90]
-    view.CameraViewUp = [0, 0, 1]
-    view.CameraViewAngle = 28
-    simple.SetActiveView(view)
-    simple.Render(view)
-    source.SMProxy.InvokeCommand("TakeActiveView")
+    take_view(source, view)
 
     def shot(name, where=view):
         simple.SaveScreenshot(str(folder / f"{name}.png"), where, ImageResolution=SIZE)

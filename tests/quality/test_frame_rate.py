@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pyvista_vdi.errors import InvalidArgumentError
@@ -45,7 +45,6 @@ class Recorded:
 
     @property
     def share_mean(self):
-        """The same of the rate over five measured frames."""
         mean = np.convolve(self.measured, np.full(5, 1 / 5), "valid")[self.attainable[4:]]
         return np.mean(np.abs(PERIOD / mean - 1) <= THRESHOLD)
 
@@ -87,13 +86,9 @@ def simulate(work, frames=400, overhead=OVERHEAD, noise=0.0, stalls=(), seed=0, 
 
 
 def pooled(work, seeds=range(5), **arguments):
-    """Several runs, one after the other, each without its first frames."""
     runs = [simulate(work, seed=seed, **arguments).after() for seed in seeds]
     columns = zip(*(vars(run).values() for run in runs), strict=True)
     return Recorded(*(np.concatenate(values) for values in columns))
-
-
-# -- costs: seconds of work at a frame, for a number of samples ------------------------------------
 
 
 def linear(full_seconds):
@@ -133,48 +128,46 @@ def steps(every=60, factor=3):
     return lambda i, n: 0.09 * (factor if i // every % 2 else 1) * n / FULL
 
 
-# -- keeps the rate --------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("work", "noise", "stalls", "of_the_mean"),
+    [
+        (linear(0.09), 0.08, (), True),
+        (camera_path, 0.0, (), True),
+        (camera_path, 0.04, (), True),
+        (sublinear, 0.04, (), True),
+        (past_the_generating_view, 0.0, (), True),
+        (past_the_generating_view, 0.03, (), True),
+        (warming, 0.08, (), True),
+        (around_full, 0.08, (), True),
+        (steps(), 0.05, (), False),  # two frames in sixty go to the step itself
+        (camera_path, 0.04, range(5, 400, 20), False),
+    ],
+)
+def test_keeps_the_rate_where_it_is_attainable(work, noise, stalls, of_the_mean):
+    run = pooled(work, noise=noise, stalls=stalls)
+    assert np.count_nonzero(run.attainable) >= 300
+    assert run.share_true >= 0.95
+    assert run.share_mean >= 0.95 or not of_the_mean
 
 
 @pytest.mark.parametrize(
-    ("work", "noise"),
+    ("work", "noise", "changes", "reversals"),
     [
-        (linear(0.09), 0.08),
-        (camera_path, 0.0),
-        (camera_path, 0.04),
-        (sublinear, 0.0),
-        (sublinear, 0.04),
-        (past_the_generating_view, 0.0),
-        (past_the_generating_view, 0.03),
-        (warming, 0.08),
-        (around_full, 0.08),
+        # A cycle of two frames would turn in each. The mean of eight frames is itself off by
+        # noise / sqrt(8); at 20 % noise 16 % of the frames change, 10 % turn
+        (linear(0.09), 0.1, 0.2, 0.13),
+        (linear(0.09), 0.2, 0.2, 0.13),
+        # The path's cost itself turns 12 times in 400 frames, 3 %; the noise adds as much
+        (camera_path, 0.0, 0.25, 0.09),
+        (camera_path, 0.05, 0.25, 0.09),
     ],
 )
-def test_keeps_the_rate_where_it_is_attainable(work, noise):
+def test_noise_makes_no_oscillation(work, noise, changes, reversals):
     run = pooled(work, noise=noise)
-    assert np.count_nonzero(run.attainable) >= 300
-    assert run.share_true >= 0.95
-    assert run.share_mean >= 0.95
-
-
-@pytest.mark.parametrize("noise", [0.1, 0.15, 0.2])
-def test_heavy_noise_makes_no_oscillation(noise):
-    """A cycle of two frames would turn in each. At 20 % noise 16 % of the frames change, 10 % turn.
-
-    The mean of eight frames is itself off by noise / sqrt(8), 7 % then.
-    """
-    run = pooled(linear(0.09), noise=noise)
-    assert run.changes < 0.2
-    assert run.reversals < 0.13
-    assert np.mean(np.abs(PERIOD / run.true - 1) <= 2 * THRESHOLD) >= 0.93
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.05])
-def test_noise_along_a_camera_path_makes_no_oscillation(noise):
-    """The path's cost itself turns 12 times in 400 frames, 3 %; the noise adds as much."""
-    run = pooled(camera_path, noise=noise)
-    assert run.changes < 0.25
-    assert run.reversals < 0.09
+    assert run.changes < changes
+    assert run.reversals < reversals
+    if noise >= 0.1:
+        assert np.mean(np.abs(PERIOD / run.true - 1) <= 2 * THRESHOLD) >= 0.93
 
 
 @pytest.mark.parametrize("work", [linear(0.09), linear(0.25), lambda i, n: sublinear(0, n)])
@@ -184,9 +177,6 @@ def test_constant_cost_gives_a_constant_choice(work):
     assert run.share_true == 1
 
 
-# -- steps and stalls ------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("factor", [3, 1 / 3])
 def test_a_step_of_the_cost_is_followed_after_two_frames(factor):
     run = simulate(steps(60, factor), frames=120)
@@ -194,33 +184,25 @@ def test_a_step_of_the_cost_is_followed_after_two_frames(factor):
     assert np.all(np.abs(PERIOD / run.true[62:] - 1) <= THRESHOLD)
 
 
-@pytest.mark.parametrize("factor", [1.5, 1 / 1.5])
-def test_a_small_step_is_followed_within_ten_frames(factor):
-    """It could be noise: the mean of five tells, and ten frames later nothing older is averaged."""
-    run = simulate(steps(60, factor), frames=120)
-    assert np.all(np.abs(PERIOD / run.true[60 + 2 * RECENT_FRAMES :] - 1) <= THRESHOLD)
+@pytest.mark.parametrize(
+    ("work", "within"),
+    [
+        # It could be noise: the mean of five tells, and then nothing older is averaged
+        (steps(60, 1.5), 2 * RECENT_FRAMES),
+        (steps(60, 1 / 1.5), 2 * RECENT_FRAMES),
+        (lambda i, n: 0.02 * (3 if i >= 60 else 1) * (n / FULL) ** 0.8 + 3e-3, RECENT_FRAMES),
+    ],
+)
+def test_other_steps_are_followed_soon(work, within):
+    run = simulate(work, frames=120)
+    assert np.all(np.abs(PERIOD / run.true[60 + within :] - 1) <= THRESHOLD)
     assert run.after(60).reversals <= 2 / 60
-
-
-def test_a_step_is_followed_where_cost_is_not_linear():
-    run = simulate(lambda i, n: 0.02 * (3 if i >= 60 else 1) * (n / FULL) ** 0.8 + 3e-3)
-    assert np.all(np.abs(PERIOD / run.true[60 + RECENT_FRAMES :] - 1) <= THRESHOLD)
-
-
-def test_steps_among_noise():
-    """Two frames in sixty go to the step itself."""
-    assert pooled(steps(), noise=0.05).share_true >= 0.95
 
 
 def test_a_stall_changes_nothing():
     calm = simulate(linear(0.09))
     stalled = simulate(linear(0.09), stalls=range(5, 400, 20))
     np.testing.assert_array_equal(stalled.samples, calm.samples)
-
-
-def test_stalls_along_a_noisy_path_do_not_matter():
-    run = pooled(camera_path, noise=0.04, stalls=range(5, 400, 20))
-    assert run.share_true >= 0.95
 
 
 @pytest.mark.parametrize("stalls", [(0,), (0, 1), (50, 51), (50, 51, 52)])
@@ -230,15 +212,9 @@ def test_longer_stalls_are_over_after_two_frames(stalls):
     assert np.all(np.abs(PERIOD / run.true[stalls[-1] + 3 :] - 1) <= THRESHOLD)
 
 
-# -- full quality ----------------------------------------------------------------------------------
-
-
-def test_starts_in_full_quality():
-    assert FrameRateController().choose(FULL) == FULL
-
-
 def test_a_recorded_full_frame_tells_the_first_choice():
     controller = FrameRateController(TARGET)
+    assert controller.choose(FULL) == FULL
     controller.record(FULL, 0.1, 0.1)
     assert controller.choose(FULL) == pytest.approx(FULL / 3, abs=1)
 
@@ -258,8 +234,7 @@ def test_full_quality_is_neither_left_nor_taken_on_the_brink():
     assert run.changes == 0
 
 
-@pytest.mark.parametrize("excess", [1.3, 2, 4])
-@pytest.mark.parametrize("noise", [0.0, 0.05])
+@pytest.mark.parametrize(("excess", "noise"), [(1.3, 0.05), (2, 0.0), (4, 0.05)])
 def test_dearer_full_frames_make_no_limit_cycle(excess, noise):
     """Reduced frames come from another kernel; what they cost says that full quality would fit."""
     work = lambda i, n: 0.025 * (excess if n == FULL else 1) * n / FULL  # noqa: E731
@@ -286,9 +261,6 @@ def test_follows_the_size_of_the_window():
         assert samples == pytest.approx(max(floor, min(full, fitting)), rel=THRESHOLD)
 
 
-# -- out of reach ----------------------------------------------------------------------------------
-
-
 def test_stays_at_the_floor_where_the_target_is_out_of_reach():
     run = simulate(linear(10), noise=0.1).after()
     assert not run.attainable.any()
@@ -311,9 +283,7 @@ def test_an_overhead_just_below_the_period_does_not_miss_the_target():
     assert run.samples.min() > FLOOR * FULL
 
 
-# -- any device ------------------------------------------------------------------------------------
-
-
+@settings(max_examples=40)
 @given(
     seconds=st.floats(1e-6, 1e3),
     overhead=st.floats(0, 1),
@@ -344,11 +314,8 @@ def test_any_cost_is_kept_within_bounds_and_settles(
         assert abs(work + overhead - aim) <= threshold * aim
 
 
-@given(
-    durations=st.lists(
-        st.tuples(st.floats(allow_nan=True), st.floats(allow_nan=True)), min_size=1, max_size=30
-    )
-)
+@settings(max_examples=40)
+@given(durations=st.lists(st.tuples(st.floats(), st.floats()), min_size=1, max_size=30))
 def test_no_duration_breaks_it(durations):
     controller = FrameRateController()
     for work, seconds in durations:
@@ -358,7 +325,13 @@ def test_no_duration_breaks_it(durations):
         assert math.isfinite(controller.seconds_per_sample)
 
 
-# -- interface -------------------------------------------------------------------------------------
+@pytest.mark.parametrize("work", [0, -1, math.nan, math.inf, None])
+def test_a_clock_at_fault_is_ignored(work):
+    controller = FrameRateController()
+    for seconds in (0, -1, math.nan, math.inf, 0.01):
+        controller.record(1000, work, seconds)
+    assert controller.fps == 0
+    assert controller.choose(FULL) == FULL
 
 
 def test_says_what_it_measured():
@@ -369,6 +342,9 @@ def test_says_what_it_measured():
         controller.record(1000, 0.01, seconds)
     assert controller.fps == pytest.approx(5 / 0.125)
     assert controller.seconds_per_sample == pytest.approx(1e-5)
+    controller = FrameRateController()
+    controller.record(1000, 0.02, 0.01)  # a frame takes no less than its work
+    assert controller.fps == pytest.approx(50)
 
 
 def test_the_next_interaction_starts_from_what_was_learned():
@@ -389,46 +365,42 @@ def test_target_and_threshold_can_be_set():
     assert controller.choose(FULL) == pytest.approx(FULL / 60 / 0.09, abs=1)
 
 
-@pytest.mark.parametrize("work", [0, -1, math.nan, math.inf, None])
-@pytest.mark.parametrize("seconds", [0, -1, math.nan, math.inf, 0.01])
-def test_a_clock_at_fault_is_ignored(work, seconds):
-    controller = FrameRateController()
-    controller.record(1000, work, seconds)
-    assert controller.fps == 0
-    assert controller.choose(FULL) == FULL
-
-
-def test_a_frame_takes_no_less_than_its_work():
-    controller = FrameRateController()
-    controller.record(1000, 0.02, 0.01)
-    assert controller.fps == pytest.approx(50)
-
-
-@pytest.mark.parametrize("value", [0, -30, math.nan, math.inf, None, "fast"])
-def test_target_is_checked(value):
-    with pytest.raises(InvalidArgumentError, match=r"target_fps must be .* above 0; got"):
-        FrameRateController(value)
-    controller = FrameRateController()
-    with pytest.raises(InvalidArgumentError, match="target_fps"):
-        controller.target_fps = value
-    assert controller.target_fps == 30
-
-
-@pytest.mark.parametrize("value", [0, 1, -0.1, math.nan, None])
-def test_threshold_is_checked(value):
-    with pytest.raises(InvalidArgumentError, match=r"threshold must be .* such as 0\.1; got"):
-        FrameRateController(threshold=value)
-
-
-@pytest.mark.parametrize("value", [0, 1.1, -0.1, math.nan, None])
-def test_floor_is_checked(value):
-    with pytest.raises(InvalidArgumentError, match=r"floor must be a share .*; got"):
-        FrameRateController(floor=value)
-
-
-@pytest.mark.parametrize("value", [0, -1, math.nan, math.inf, None])
-def test_counts_are_checked(value):
-    with pytest.raises(InvalidArgumentError, match="full must be a count of at least 1; got"):
-        FrameRateController().choose(value)
-    with pytest.raises(InvalidArgumentError, match="samples must be a count of at least 1; got"):
-        FrameRateController().record(value, 0.01, 0.01)
+@pytest.mark.parametrize(
+    ("use", "values", "message"),
+    [
+        (
+            FrameRateController,
+            (0, -30, math.nan, math.inf, None, "fast"),
+            r"target_fps must be .* above 0; got",
+        ),
+        (
+            lambda value: setattr(FrameRateController(), "target_fps", value),
+            (0, -30, math.nan, math.inf, None, "fast"),
+            "target_fps",
+        ),
+        (
+            lambda value: FrameRateController(threshold=value),
+            (0, 1, -0.1, math.nan, None),
+            r"threshold must be .* such as 0\.1; got",
+        ),
+        (
+            lambda value: FrameRateController(floor=value),
+            (0, 1.1, -0.1, math.nan, None),
+            "floor must be a share .*; got",
+        ),
+        (
+            FrameRateController().choose,
+            (0, -1, math.nan, math.inf, None),
+            "full must be a count of at least 1; got",
+        ),
+        (
+            lambda value: FrameRateController().record(value, 0.01, 0.01),
+            (0, -1, math.nan, math.inf, None),
+            "samples must be a count of at least 1; got",
+        ),
+    ],
+)
+def test_arguments_are_checked(use, values, message):
+    for value in values:
+        with pytest.raises(InvalidArgumentError, match=message):
+            use(value)

@@ -34,28 +34,29 @@ def test_the_vdi_until_both_are_known():
     assert ways.choose(90.0, PIXELS, TARGET) == "volume"
 
 
-def test_near_v_o_the_vdi_and_far_from_it_the_volume():
-    ways = used()
-    assert ways.choose(0.0, PIXELS, TARGET) == "vdi"
-    assert ways.choose(60.0, PIXELS, TARGET) == "volume"
-    assert ways.choose(0.0, PIXELS, TARGET) == "vdi"
-
-
-def test_what_missing_pixels_lose_is_weighed_against_what_the_vdi_loses():
-    ways = used(vdi=1.0)  # 24 ms at 30 degrees: all pixels within the target
-    assert ways.choose(30.0, PIXELS, TARGET, ssim=0.99) == "vdi"
-    assert ways.choose(30.0, PIXELS, TARGET, ssim=0.90) == "volume"
-
-
-def test_both_too_slow_the_faster_is_drawn():
-    assert used(vdi=1e4, volume=1e5).choose(0.0, PIXELS, TARGET) == "vdi"
-    assert used(vdi=1e4, volume=1e5).choose(90.0, PIXELS, TARGET) == "volume"
-
-
-def test_at_rest_what_does_is_there_sooner():
-    assert used().choose(0.0, PIXELS, None, ssim=0.99, bound=0.95) == "vdi"
-    assert used().choose(60.0, PIXELS, None, ssim=0.99, bound=0.95) == "volume"
-    assert used().choose(0.0, PIXELS, None, ssim=0.90, bound=0.95) == "volume"
+@pytest.mark.parametrize(
+    ("times", "angle", "seconds", "options", "way"),
+    [
+        ({}, 0.0, TARGET, {}, "vdi"),
+        ({}, 60.0, TARGET, {}, "volume"),
+        # What missing pixels lose is weighed against what the VDI loses; 24 ms at 30 degrees: all
+        # pixels within the target
+        ({"vdi": 1.0}, 30.0, TARGET, {"ssim": 0.99}, "vdi"),
+        ({"vdi": 1.0}, 30.0, TARGET, {"ssim": 0.90}, "volume"),
+        # Both too slow: the faster
+        ({"vdi": 1e4, "volume": 1e5}, 0.0, TARGET, {}, "vdi"),
+        ({"vdi": 1e4, "volume": 1e5}, 90.0, TARGET, {}, "volume"),
+        # At rest, what does and is there sooner
+        ({}, 0.0, None, {"ssim": 0.99, "bound": 0.95}, "vdi"),
+        ({}, 60.0, None, {"ssim": 0.99, "bound": 0.95}, "volume"),
+        ({}, 0.0, None, {"ssim": 0.90, "bound": 0.95}, "volume"),
+    ],
+)
+def test_what_is_drawn(times, angle, seconds, options, way):
+    ways = used(**times)
+    assert ways.choose(angle, PIXELS, seconds, **options) == way
+    if not options:
+        assert ways.choose(0.0, PIXELS, seconds) == "vdi"  # back there
 
 
 def test_nothing_flickers_where_both_are_as_good():

@@ -16,7 +16,6 @@ MOST = 16
 
 @pytest.mark.parametrize("share", [0.0, 0.001, 0.05, 0.9])
 def test_distances_of_blocks_are_chessboard_distances(runtime, share):
-    """As SciPy's chessboard transform has them, up to a limit."""
     rng = np.random.default_rng(7)
     shape = (23, 9, 40)
     visible = rng.random(shape) < share

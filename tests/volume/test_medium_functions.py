@@ -1,4 +1,4 @@
-"""opencl/lib/classification.cl against float64 (DESIGN section 3, "From volume to medium")."""
+"""opencl/lib/classification.cl against float64."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH
-from pyvista_vdi.volume.classified_volume import _per_scalar
 
 EPS = 2.0**-24  # unit roundoff of float32
 FILE = "medium_functions.cl"
@@ -14,10 +13,12 @@ FILE = "medium_functions.cl"
 
 def classified(call, scalars, table, low, high):
     scalars = np.asarray(scalars, np.float32)
-    per_scalar = np.float32(_per_scalar(len(table), float(high) - float(low)))
+    # As the engine computes it: a huge number where the range is a single scalar
+    steps, span = len(table) - 1, float(high) - float(low)
+    per_scalar = steps / span if span > 0 else np.finfo(np.float32).max * (steps > 0)
     return call(
         FILE, "classified", len(scalars), scalars, np.asarray(table, np.float32),
-        np.int32(len(table)), np.float32(low), per_scalar, call.empty(len(scalars), 4),
+        np.int32(len(table)), np.float32(low), np.float32(per_scalar), call.empty(len(scalars), 4),
     )  # fmt: skip
 
 
@@ -57,18 +58,7 @@ def test_ends_are_the_end_entries_to_the_last_bit(call):
     np.testing.assert_array_equal(found[:3], np.broadcast_to(table[0], (3, 4)))
     # mix(x, y, 1) is x + (y - x), a rounding of the difference and one of the sum
     assert np.abs(found[3:] - table[-1]).max() <= 2 * EPS
-
-
-def test_nan_is_transparent(call):
-    table = np.ones((4, 4), np.float32)
-    for low, high in ((0.0, 1.0), (0.5, 0.5)):
-        found = classified(call, [np.nan, -np.nan, 0.5], table, low, high)
-        np.testing.assert_array_equal(found, [[0] * 4, [0] * 4, [1] * 4])
-
-
-def test_a_range_of_one_scalar_is_a_step(call):
-    """At or below it the first entry, above it the last: TransferFunction's rule."""
-    table = random_table(np.random.default_rng(6), 256)
+    # A range of one scalar is a step: at or below it the first entry, above it the last
     for at in (0.0, 7.0, -1e6, 3e-5):
         near = np.float32(at)
         above = np.nextafter(near, np.float32(np.inf)) if at else np.float32(1e-30)
@@ -76,6 +66,13 @@ def test_a_range_of_one_scalar_is_a_step(call):
         found = classified(call, [-1e30, below, near, above, 1e30], table, near, near)
         np.testing.assert_array_equal(found[:3], np.broadcast_to(table[0], (3, 4)))
         assert np.abs(found[3:] - table[-1]).max() <= 2 * EPS
+
+
+def test_nan_is_transparent(call):
+    table = np.ones((4, 4), np.float32)
+    for low, high in ((0.0, 1.0), (0.5, 0.5)):
+        found = classified(call, [np.nan, -np.nan, 0.5], table, low, high)
+        np.testing.assert_array_equal(found, [[0] * 4, [0] * 4, [1] * 4])
 
 
 @pytest.mark.parametrize("span", [(0.0, 1.0), (0.5, 0.5)])
@@ -86,7 +83,6 @@ def test_one_entry_is_constant(call, span):
 
 
 def test_step_optical_depth(call):
-    """-log1p(-a) units, and at least 30 where the sample is opaque."""
     rng = np.random.default_rng(7)
     below_one = 1 - 2.0**-24
     opacities = np.concatenate(

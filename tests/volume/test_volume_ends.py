@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 from drawing import raycast_volume
@@ -21,46 +23,59 @@ CAMERA = Camera(
 MEDIUM = TransferFunction(np.ones((1, 3)), [OPACITY], (0, 1), unit_distance=1.0)
 
 
-def constant_volume() -> Volume:
-    return Volume(np.ones((10, 10, 10), dtype=np.float32))
-
-
 def opacity_over(length: float) -> float:
     return float(-np.expm1(-SIGMA * length))
 
 
+@pytest.fixture
+def opacity(runtime):
+    """Draw the constant volume, whose medium lies between view depths 20 and 29."""
+
+    def drawn(**options):
+        volume = Volume(np.ones((10, 10, 10), dtype=np.float32))
+        return raycast_volume(volume, CAMERA, (6, 5), MEDIUM, device=runtime, **options)
+
+    return drawn
+
+
 @pytest.mark.parametrize("end", [-3.0, 20.0, 22.75, 29.0, 31.0, np.inf])
-def test_a_ray_ends_at_opaque_geometry(runtime, end):
-    """The medium lies between view depths 20 and 29."""
-    depth = np.full((5, 6), end)
-    image = raycast_volume(
-        constant_volume(), CAMERA, (6, 5), MEDIUM, opaque_depth=depth, device=runtime
-    )
+def test_a_ray_ends_at_opaque_geometry(opacity, end):
     expected = opacity_over(np.clip(end - 20, 0, SIZE))
+    image = opacity(opaque_depth=np.full((5, 6), end))
     np.testing.assert_allclose(image, expected, rtol=RTOL, atol=1e-7)
 
 
-def test_opaque_geometry_ends_only_its_own_rays_top_row_first(runtime):
+@pytest.mark.parametrize(
+    ("planes", "end", "length"),
+    [
+        ([[0, 2.5, 0, 0, 1, 0], [0, 7.0, 0, 0, -2, 0]], np.inf, 4.5),
+        ([[0, 2.5, 0, 0, 1, 0]], 24.5, 2.0),
+        ([[0, 9.5, 0, 0, 1, 0]], np.inf, 0.0),
+        ([[20, 0, 0, 1, 0, 0]], np.inf, 0.0),  # parallel to the rays
+        ([[-20, 0, 0, 1, 0, 0]], np.inf, 9.0),
+    ],
+)
+def test_clipping_planes_keep_the_side_their_normal_points_to(opacity, planes, end, length):
+    image = opacity(clipping_planes=planes, opaque_depth=np.full((5, 6), end))
+    np.testing.assert_allclose(image, opacity_over(length), rtol=RTOL)
+
+
+def test_opaque_geometry_ends_only_its_own_rays_top_row_first(opacity):
     depth = np.full((5, 6), np.inf)
     depth[0, 2] = 21.0
-    image = raycast_volume(
-        constant_volume(), CAMERA, (6, 5), MEDIUM, opaque_depth=depth, device=runtime
-    )
     expected = np.full((5, 6), opacity_over(SIZE))
     expected[0, 2] = opacity_over(1.0)
-    np.testing.assert_allclose(image[..., 3], expected, rtol=RTOL)
+    np.testing.assert_allclose(opacity(opaque_depth=depth)[..., 3], expected, rtol=RTOL)
 
 
-def test_clipping_planes_keep_the_side_their_normal_points_to(runtime):
-    planes = [[0, 2.5, 0, 0, 1, 0], [0, 7.0, 0, 0, -2, 0]]
-    image = raycast_volume(
-        constant_volume(), CAMERA, (6, 5), MEDIUM, clipping_planes=planes, device=runtime
-    )
-    np.testing.assert_allclose(image, opacity_over(4.5), rtol=RTOL)
-
-
-@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
-@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.float32, np.float64])
+@pytest.mark.parametrize(
+    ("dtype", "interpolation"),
+    [
+        (np.uint8, "nearest"),
+        (float, "linear"),
+        pytest.param(np.int16, "linear", marks=pytest.mark.slow),
+    ],
+)
 def test_passing_by_transparent_blocks_changes_no_bit(runtime, monkeypatch, interpolation, dtype):
     rng = np.random.default_rng(7)
     values = np.zeros((41, 35, 50))
@@ -71,39 +86,20 @@ def test_passing_by_transparent_blocks_changes_no_bit(runtime, monkeypatch, inte
         values[:4] = np.nan
     volume = Volume(values.astype(dtype), spacing=(1.0, 0.7, 1.3), origin=(5, -3, 2))
     ramp = np.linspace(0, 1, 64)
-    transfer_function = TransferFunction(
-        np.stack([ramp, 1 - ramp, ramp**2], axis=1),
-        np.where(ramp < 0.04, 0, 0.5 * ramp),
-        (0, 100),
-        interpolation=interpolation,
-    )
+    colors = np.stack([ramp, 1 - ramp, ramp**2], axis=1)
+    opacities = np.where(ramp < 0.04, 0, 0.5 * ramp)
+    table = TransferFunction(colors, opacities, (0, 100), interpolation=interpolation)
     centre = np.reshape(volume.bounds, (3, 2)).mean(axis=1)
     camera = Camera(centre + np.array([30, -80, 45]), centre, (0, 0, 1), view_angle=40)
-    window = (61, 47)
-
-    def draw(skip_empty: bool):
-        return raycast_volume(
-            volume, camera, window, transfer_function, skip_empty=skip_empty, device=runtime
-        )
-
-    plain = draw(False)
+    scene = (volume, camera, (61, 47), table)
+    plain, skipping = (
+        raycast_volume(*scene, skip_empty=skip, device=runtime) for skip in (False, True)
+    )
     assert plain[..., 3].max() > 0.5
-    np.testing.assert_array_equal(draw(True), plain)
+    np.testing.assert_array_equal(skipping, plain)
 
-    def make():
-        return generate_vdi(
-            volume, camera, window, transfer_function, max_supersegments=6, device=runtime
-        )
-
-    skipping = make()
-    monkeypatch.setattr(generation, "DeviceVolume", _without_skipping(generation.DeviceVolume))
-    assert skipping.n_supersegments > 0
-    assert make().equals(skipping)
-
-
-def _without_skipping(device_volume):
-    class LooksAtEverything(device_volume):
-        def __init__(self, *arguments, **keywords):
-            super().__init__(*arguments, skip_empty=False, **keywords)
-
-    return LooksAtEverything
+    made = generate_vdi(*scene, max_supersegments=6, device=runtime)
+    without_skipping = functools.partial(generation.DeviceVolume, skip_empty=False)
+    monkeypatch.setattr(generation, "DeviceVolume", without_skipping)
+    assert made.n_supersegments > 0
+    assert generate_vdi(*scene, max_supersegments=6, device=runtime).equals(made)
