@@ -400,6 +400,7 @@ PACKING = "pyvista_vdi/model/packing.py"
 REGENERATION = "pyvista_vdi/vtk_pipeline/interaction/regeneration.py"
 WHEN, WAYS = "pyvista_vdi/quality/when_anew.py", "pyvista_vdi/quality/ways.py"
 SET, SHOWER = "pyvista_vdi/sets/vdi_set.py", "pyvista_vdi/sets/shower.py"
+VIEWER = "pyvista_vdi/web/viewer/"
 PLAYER, SERIES = "pyvista_vdi/series/player.py", "pyvista_vdi/series/series.py"
 
 PYTHON_MUTANTS = (
@@ -640,6 +641,48 @@ PYTHON_MUTANTS = (
         "(bits + 0x8000 >> 16) - TAU_BASE + 1, 0, TAU_CODES)",
         "(bits >> 16) - TAU_BASE + 1, 0, TAU_CODES)",
         ("series",),
+    ),
+    _m(
+        "viewer: zooming in takes one away",
+        VIEWER + "camera.js",
+        "from, 1 / factor)",
+        "from, factor)",
+        ("web",),
+    ),
+    _m(
+        "viewer: pinching apart takes one away",
+        VIEWER + "interaction.js",
+        "nearer(rolled(camera, turn), pinch)",
+        "nearer(rolled(camera, turn), 1 / pinch)",
+        ("web",),
+    ),
+    _m(
+        "viewer: the step farthest in time is shown",
+        VIEWER + "series.js",
+        "if (Math.abs(frame.time - time) < Math",
+        "if (Math.abs(frame.time - time) > Math",
+        ("web",),
+    ),
+    _m(
+        "viewer: what was played to its end does not begin anew",
+        VIEWER + "player.js",
+        "if (!loop && this.#place === n - 1) this.#moveTo(0);",
+        "",
+        ("web",),
+    ),
+    _m(
+        "viewer: a served picture waits for its drawing for ever",
+        VIEWER + "remote.js",
+        "await Promise.race([this.viewer.showBytes(file), drawn])",
+        "await this.viewer.showBytes(file)",
+        ("web",),
+    ),
+    _m(
+        "viewer: damaged bytes are shown",
+        VIEWER + "decode.js",
+        "if (crc32(bytes) !== crc) damaged",
+        "if (false) damaged",
+        ("web",),
     ),
 )
 
