@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import threading
 import time
 import weakref
@@ -63,7 +62,7 @@ class Steps(Sequence):
         return vdi
 
     def living(self):
-        gc.collect()
+        _settled()
         return sum(made() is not None for made in self.made)
 
 
@@ -152,7 +151,7 @@ def test_what_is_decoded_slowly_is_shown_in_its_time(player, steps, clock):
     steps.seconds = 0.25  # two and a half steps
     player.memory = 0
     player.play(rate=10)
-    began, place = clock.now, 0
+    began = clock.now
     late = []
     for _ in range(12):
         player.advance()
@@ -160,8 +159,7 @@ def test_what_is_decoded_slowly_is_shown_in_its_time(player, steps, clock):
         clock.now += 0.0001
         looked = clock.now  # the thread may go on when it has been shown
         if player.advance():
-            place += (player.step - place) % N  # rounds go on
-            late.append((looked - began) * 10 - place)
+            late.append(((looked - began) * 10 - player.step) % N)
     # The first is decoded before it is known what one takes; then a step is shown while it is due,
     # which is for one step's time, and the look comes .001 of it later
     assert len(late) > 3
