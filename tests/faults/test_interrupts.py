@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import weakref
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -40,22 +41,18 @@ ON_A_DEVICE = {
 }
 #: Verbs that do not, or not any more in this process; a function that each calls.
 ON_THE_HOST = {
-    "devices": (("devices",), "pyvista_vdi.device.describe_devices"),
-    "info": (("info", "a.vdi"), "pyvista_vdi.io.vdi_file.reader.from_json"),
-    "info of an .exr": (("info", "a.exr"), "pyvista_vdi.io.deep_exr.files.media"),
-    "convert": (("convert", "a.vdi", "-o", "out.exr"), "pyvista_vdi.io.deep_exr.files.write_image"),
-    "convert back": (
-        ("convert", "a.exr", "-o", "out.vdi"),
-        "pyvista_vdi.io.deep_exr.files.read_image",
-    ),
+    "devices": (("devices",), "device.describe_devices"),
+    "info": (("info", "a.vdi"), "io.vdi_file.reader.from_json"),
+    "info of an .exr": (("info", "a.exr"), "io.deep_exr.files.media"),
+    "convert": (("convert", "a.vdi", "-o", "out.exr"), "io.deep_exr.files.write_image"),
+    "convert back": (("convert", "a.exr", "-o", "out.vdi"), "io.deep_exr.files.read_image"),
 }
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
+    nrrd = pytest.importorskip("nrrd")
     path = tmp_path_factory.mktemp("interrupts")
-    import nrrd
-
     z, y, x = np.mgrid[:12, :10, :8]
     nrrd.write(str(path / "v.nrrd"), (x * y + z).astype(np.uint8), index_order="C")
     table = pvdi.TransferFunction([(0, 0, 0.2), (1, 0.5, 0)], [0, 0.5], (0, 74))
@@ -128,18 +125,52 @@ def test_a_picture_that_cannot_be_drawn_is_not_written(here, driver, capsys, def
     assert files_in(here) == before
 
 
-@pytest.mark.parametrize("verb", ON_THE_HOST)
-def test_ctrl_c_in_the_middle_of_a_verb(verb, here, capsys, monkeypatch):
-    arguments, function = ON_THE_HOST[verb]
-    before = files_in(here)
-    called = []
+class Interrupted:
+    """Ctrl-C comes in its destructor, from where Python lets no error through."""
 
-    def interrupted(*_, **__):
-        called.append(1)
+    def __del__(self):
         signal.raise_signal(signal.SIGINT)
-        pytest.fail("the interrupt was lost")
 
-    monkeypatch.setattr(function, interrupted)
+
+class Referred:
+    """Ctrl-C comes in a callback of a weak reference to it, as there are in every import."""
+
+    kept: ClassVar[list[object]] = []
+
+    def __init__(self):
+        self.kept.append(weakref.ref(self, lambda _: signal.raise_signal(signal.SIGINT)))
+
+
+def lose(*_, **__):
+    signal.raise_signal(signal.SIGINT)
+    pytest.fail("the interrupt was lost")
+
+
+def lose_in_a_destructor(*_, **__):
+    Interrupted()
+    pytest.fail("the interrupt was lost")
+
+
+def lose_in_a_callback(*_, **__):
+    Referred()
+    pytest.fail("the interrupt was lost")
+
+
+@pytest.mark.parametrize(
+    ("verb", "interrupted"),
+    [
+        *((verb, lose) for verb in ON_THE_HOST),
+        ("info", lose_in_a_destructor),
+        ("info", lose_in_a_callback),
+    ],
+)
+def test_ctrl_c_in_the_middle_of_a_verb(verb, interrupted, here, capsys, monkeypatch):
+    """Also where Python can raise nothing: it is noticed at once, or it would be lost."""
+    arguments, function = ON_THE_HOST[verb]
+    before, called = files_in(here), []
+    monkeypatch.setattr(
+        f"pyvista_vdi.{function}", lambda *_, **__: (called.append(1), interrupted())[1]
+    )
     status = cli.main([*arguments])
     assert called
     check_interrupted(capsys, status)
@@ -201,41 +232,6 @@ def test_ctrl_c_while_a_verb_imports(verb, moments, here):
         # Behind it, libraries that were half imported may complain at exit
         assert SENTENCE in said.splitlines(), moment
         assert "KeyboardInterrupt" not in said, moment
-
-
-class Interrupted:
-    """Ctrl-C comes in its destructor, from where Python lets no error through."""
-
-    def __del__(self):
-        signal.raise_signal(signal.SIGINT)
-
-
-class Referred:
-    """Ctrl-C comes in a callback of a weak reference to it, as there are in every import."""
-
-    def __init__(self):
-        self.reference = weakref.ref(self, lambda _: signal.raise_signal(signal.SIGINT))
-        KEPT.append(self.reference)
-
-
-KEPT: list[object] = []
-
-
-@pytest.mark.parametrize("thing", [Interrupted, Referred])
-def test_ctrl_c_where_python_can_raise_nothing(thing, here, capsys, monkeypatch):
-    arguments, function = ON_THE_HOST["info"]
-    went_on = []
-
-    def interrupted(*_, **__):
-        made = thing()
-        del made
-        went_on.append(len(went_on))
-        pytest.fail("the interrupt was lost")
-
-    monkeypatch.setattr(function, interrupted)
-    status = cli.main([*arguments])
-    check_interrupted(capsys, status)
-    assert went_on == []
 
 
 def test_other_errors_that_python_cannot_raise_are_printed(here, capsys, monkeypatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 import sys
 import threading
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 from drawing import raycast_volume, render_vdi
 from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume, state_of
+from fresh_python import run_python
 from strategies import random_vdi
 
 import pyvista_vdi as pvdi
@@ -21,23 +23,16 @@ from pyvista_vdi.generation.generate import generate_vdi
 #: Seconds after which a process counts as one that hangs.
 PATIENCE = 600
 
+SUPPORT = str(Path(__file__).parents[1] / "support")
+
 
 def finished(code, *arguments):
     """Run code in a new process, which must end; its output."""
-    tests = str(Path(__file__).parents[1] / "support")
-    head = f"import sys\nsys.path.insert(0, {tests!r})\n"
-    done = subprocess.run(
-        [sys.executable, "-c", head + code, *arguments],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
+    head = f"import sys, warnings\nsys.path.insert(0, {SUPPORT!r})\n"
+    head += "warnings.simplefilter('ignore', DeprecationWarning)  # Python's of forks\n"
+    done = run_python(head + code, *arguments)
     assert done.returncode == 0, f"{done.returncode}: {done.stdout}{done.stderr}"
     return done.stdout
-
-
-# -- threads ---------------------------------------------------------------------------------------
 
 
 def test_one_vdi_drawn_by_many_threads(runtime):
@@ -58,10 +53,11 @@ def test_one_vdi_drawn_by_many_threads(runtime):
         for images, image in zip(pool.map(draw, views), expected, strict=True):
             for drawn in images:
                 np.testing.assert_array_equal(drawn, image)
-    names = [name for name, _ in state_of(runtime)[0]]
-    assert names.count("supersegment media") == 1 + [n for n, _ in before[0]].count(
-        "supersegment media"
-    )
+
+    def media(state):
+        return [name for name, _ in state[0]].count("supersegment media")
+
+    assert media(state_of(runtime)) == 1 + media(before)
     del shared, draw
     assert state_of(runtime) == before
 
@@ -232,36 +228,27 @@ def test_a_fork_before_a_device_is_used(runtime):
     assert finished(FORK_BEFORE, runtime.info.selector) == "well\n"
 
 
-def test_spawned_processes(default_runtime, tmp_path):
-    """What the message recommends."""
-    path = random_vdi(np.random.default_rng(2)).save(tmp_path / "a.vdi")
-    (tmp_path / "work.py").write_text(
-        "import multiprocessing, sys\n"
-        "import pyvista_vdi as pvdi\n"
-        "def draw(angle):\n"
-        "    vdi = pvdi.read(sys.argv[1])\n"
-        "    return pvdi.render(vdi, vdi.camera.azimuth(angle)).sum()\n"
-        "if __name__ == '__main__':\n"
-        "    here = draw(5)\n"
-        "    with multiprocessing.get_context('spawn').Pool(1) as pool:\n"
-        "        assert pool.map(draw, [5]) == [here]\n"
-        "    print('the same')\n"
-    )
-    done = subprocess.run(
-        [sys.executable, str(tmp_path / "work.py"), str(path)],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert (done.returncode, done.stdout) == (0, "the same\n"), done.stderr
+SPAWN = """
+import multiprocessing, sys
+import pyvista_vdi as pvdi
+def draw(angle):
+    vdi = pvdi.read(sys.argv[1])
+    return pvdi.render(vdi, vdi.camera.azimuth(angle)).sum()
+if __name__ == "__main__":
+    here = draw(5)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.map(draw, [5]) == [here]
+    print("the same")
+"""
 
 
-def test_vdis_go_to_other_processes():
-    """By pickling, as multiprocessing does: arrays and view, to the last bit."""
-    import pickle
-
-    vdi = random_vdi(np.random.default_rng(6))
+def test_spawned_processes_draw_and_take_vdis(default_runtime, tmp_path):
+    """What the message recommends; VDIs go there by pickling, to the last bit."""
+    vdi = random_vdi(np.random.default_rng(2))
     back = pickle.loads(pickle.dumps(vdi))
     assert isinstance(back, pvdi.VDI)
     assert back.equals(vdi)
+    (tmp_path / "work.py").write_text(SPAWN)
+    program = [sys.executable, str(tmp_path / "work.py"), str(vdi.save(tmp_path / "a.vdi"))]
+    done = subprocess.run(program, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert (done.returncode, done.stdout) == (0, "the same\n"), done.stderr
