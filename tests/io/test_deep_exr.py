@@ -147,13 +147,10 @@ def test_parallel_projection_with_negative_depths(tmp_path):
     assert point[2] == pytest.approx(image.channels["Z"][0], abs=1e-6)
 
 
-def test_an_empty_vdi(tmp_path):
+def test_an_empty_vdi_and_what_the_file_says(file, tmp_path):
     vdi = VDI(VIEW, (4, 3), np.zeros(13, int), [], [], np.empty((0, 3)), [], BOX)
     assert pvdi.read(vdi.save(tmp_path / "a.exr")).equals(vdi)
     assert pvdi.read(vdi.save(tmp_path / "b.exr", exact=False)).n_supersegments == 0
-
-
-def test_info(file):
     vdi, info = small_vdi(), io.read_info(file)
     assert (info.camera, info.window_size) == (vdi.camera, vdi.window_size)
     assert (info.n_supersegments, info.bounds) == (vdi.n_supersegments, vdi.bounds)
@@ -228,12 +225,6 @@ def test_standard_channels_lose_what_is_stated(seed, tmp_path):
         depth = getattr(vdi, name).astype(np.float64)[seen] + vdi.depth_origin
         again = getattr(back, name).astype(np.float64) + back.depth_origin
         assert np.allclose(again, depth, rtol=ROUNDING * 1.01, atol=1e-6 * ROUNDING)
-
-
-def test_tau_alone_is_used(tmp_path):
-    names, sample = ("Z", "ZBack", "A", "R", "G", "B", "tau"), [1, 2, 1, 0.5, 0.5, 0.5, 77.0]
-    path = write_foreign(tmp_path / "a.exr", {(0, 0): [sample]}, names=names)
-    assert pvdi.read(path).optical_depth.tolist() == [77.0]
 
 
 @pytest.mark.parametrize("compression", ["zips", "none"])
@@ -361,13 +352,16 @@ def test_colours_outside_the_range(tmp_path):
     assert vdi.front.tolist() == [1, 3]
 
 
-def test_half_floats(tmp_path):
+def test_half_floats_and_tau(tmp_path):
     types = dict.fromkeys("ARGB", np.float16)
     path = write_foreign(tmp_path / "a.exr", {(0, 0): [[1, 2, 0.3, 0.3, 0.1, 0]]}, types=types)
     vdi = pvdi.read(path)
     # float16 rounds by 2**-11 of the value at most; the colour is a quotient of two
     assert vdi.color[0] == pytest.approx([1, 1 / 3, 0], rel=2**-10)
     assert vdi.optical_depth[0] == pytest.approx(-np.log(0.7), rel=2**-10)
+    names, sample = ("Z", "ZBack", "A", "R", "G", "B", "tau"), [1, 2, 1, 0.5, 0.5, 0.5, 77.0]
+    write_foreign(path, {(0, 0): [sample]}, names=names)
+    assert pvdi.read(path).optical_depth.tolist() == [77.0]
 
 
 @pytest.mark.parametrize(
