@@ -86,9 +86,7 @@ def put(name, index, value, kind="<u2"):
 
 @settings(max_examples=60)
 @given(
-    seed=st.integers(0, 2**32),
-    codec=st.sampled_from(CODECS),
-    precision=st.sampled_from(PRECISIONS),
+    seed=st.integers(0, 2**32), codec=st.sampled_from(CODECS), precision=st.sampled_from(PRECISIONS)
 )
 def test_reading_gives_back_every_bit(seed, codec, precision, tmp_path_factory):
     path = tmp_path_factory.getbasetemp() / f"round_trip_{os.getpid()}.vdi"

@@ -33,10 +33,7 @@ def client(tmp_path_factory):
         # for good, even where it was back in between and was killed again
         dask.config.set({"distributed.deploy.lost-worker-timeout": "1 hour"}),
         LocalCluster(
-            n_workers=2,
-            threads_per_worker=1,
-            dashboard_address=":0",
-            local_directory=str(folder),
+            n_workers=2, threads_per_worker=1, dashboard_address=":0", local_directory=str(folder)
         ) as cluster,
         Client(cluster) as client,
     ):
