@@ -23,8 +23,7 @@ def zarr_store(path):
 
 
 def hdf5_store(path):
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w") as file:
+    with pytest.importorskip("h5py").File(path, "w") as file:
         file.create_dataset("x", data=VALUES, chunks=CHUNKS)
 
 
@@ -43,8 +42,7 @@ def kept(store):
 
 def change_one_value(store):
     if store.name == "x.h5":
-        h5py = pytest.importorskip("h5py")
-        with h5py.File(store, "a") as file:
+        with pytest.importorskip("h5py").File(store, "a") as file:
             file["x"][5, 5, 5] = 99
     else:
         pytest.importorskip("zarr").open(str(store), mode="a")[5, 5, 5] = 99

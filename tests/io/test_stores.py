@@ -5,7 +5,9 @@ from __future__ import annotations
 import copy
 import json
 import pickle
+import shutil
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -80,14 +82,21 @@ def change(path, edit):
     file.write_text(json.dumps(attributes))
 
 
-@pytest.fixture(params=["0.4", "0.5"])
-def image(request, tmp_path):
-    return write_ome(tmp_path / "x.ome.zarr", request.param), request.param
+@pytest.fixture(scope="module", params=["0.4", "0.5"])
+def image(request, tmp_path_factory):
+    path = tmp_path_factory.mktemp("stores") / "x.ome.zarr"
+    return write_ome(path, request.param), request.param
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    return write_ome(tmp_path_factory.mktemp("stores") / "x.ome.zarr")
 
 
 @pytest.fixture
-def ome(tmp_path):
-    return write_ome(tmp_path / "x.ome.zarr")
+def ome(written, tmp_path):
+    """An image that a test may change."""
+    return Path(shutil.copytree(written, tmp_path / "x.ome.zarr"))
 
 
 def test_spacing_axes_levels_time_and_channel(image):
@@ -117,19 +126,15 @@ def test_spacing_axes_levels_time_and_channel(image):
 
 def test_opacities_of_all_levels_refer_to_the_finest(image):
     finest, coarsest = (pvdi.open_volume(image[0], level=k) for k in (0, 2))
-    assert (
-        finest.default_unit_distance
-        == pvdi.Volume(VALUES[0, 0], finest.spacing).default_unit_distance
-    )
-    for volume in (coarsest, coarsest.load(), pickle.loads(pickle.dumps(coarsest))):
-        assert volume.default_unit_distance == finest.default_unit_distance
+    expected = pvdi.Volume(VALUES[0, 0], finest.spacing).default_unit_distance
+    again = pickle.loads(pickle.dumps(coarsest))
     other = as_volume(coarsest, scalars=np.zeros(coarsest.array.size))
-    assert other.default_unit_distance == finest.default_unit_distance
+    for volume in (finest, coarsest, coarsest.load(), again, other):
+        assert volume.default_unit_distance == expected
 
 
 def test_three_axes_alone(tmp_path):
-    path = write_ome(tmp_path / "x.zarr", "0.4", VALUES[0, 0], AXES[2:])
-    volume = pvdi.open_volume(path)
+    volume = pvdi.open_volume(write_ome(tmp_path / "x.zarr", "0.4", VALUES[0, 0], AXES[2:]))
     assert volume.store.axes == ("z", "y", "x")
     assert volume.spacing == (0.25, 0.5, 2.0)
     np.testing.assert_array_equal(volume.load().array, VALUES[0, 0])
@@ -234,14 +239,11 @@ def test_format_3_is_refused_by_name_where_zarr_is_older(tmp_path, monkeypatch):
         pvdi.open_volume(folder)
 
 
-def test_nothing_is_read_when_a_store_is_opened(image):
+def test_nothing_is_read_when_a_store_is_opened(image, tmp_path):
     """Chunks that cannot be decoded are only missed when they are asked for."""
-    path, _ = image
-    chunks = [
-        file
-        for file in path.rglob("*")
-        if file.is_file() and not file.name.startswith(".") and file.name != "zarr.json"
-    ]
+    path = Path(shutil.copytree(image[0], tmp_path / "x.ome.zarr"))
+    files = (file for file in path.rglob("*") if file.is_file() and file.name[0] != ".")
+    chunks = [file for file in files if file.name != "zarr.json"]
     assert len(chunks) > 80
     for file in chunks:
         file.write_bytes(b"rubbish")
@@ -256,15 +258,9 @@ def test_nothing_is_read_when_a_store_is_opened(image):
 def test_zarr_array_and_group(tmp_path):
     zarr = pytest.importorskip("zarr")
     group = zarr.open_group(str(tmp_path / "x.zarr"), mode="w")
-    for name in ("a", "b"):
-        array = zarr.open(
-            str(tmp_path / "x.zarr" / name),
-            mode="w",
-            shape=(8, 16, 24),
-            chunks=(4, 8, 8),
-            dtype="u2",
-        )
-        array[...] = VALUES[0, "ab".index(name)]
+    kind = {"mode": "w", "chunks": (4, 8, 8), "dtype": "u2"}
+    for name, values in zip("ab", VALUES[0], strict=False):
+        zarr.open(str(tmp_path / "x.zarr" / name), shape=values.shape, **kind)[...] = values
     group["b"].attrs["spacing"] = [3.0, 2.0, 1.0]
     with pytest.raises(InvalidVolumeError, match=r"holds several: open one of .*x\.zarr::a, "):
         pvdi.open_volume(tmp_path / "x.zarr")
