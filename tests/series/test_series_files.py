@@ -30,7 +30,7 @@ ARRAYS = ("offsets", "front", "back", "color", "optical_depth")
 
 @pytest.fixture(scope="module")
 def steps():
-    return [stepped_vdi(step=k // 2).with_precision("8-byte") for k in range(24)]
+    return [step for step in packed_steps(12) for _ in range(2)]
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +137,7 @@ def test_noise_costs_no_more_than_single_files(tmp_path):
 
 
 def test_a_seek_decodes_three_steps_at_most(tmp_path):
-    steps = packed_steps(20)
+    steps = packed_steps(20, size=(12, 7))
     path = VDISeries.of(steps).save(tmp_path / "a.vdis")
     for i in range(20):
         fresh = reader.StepsReader(path)

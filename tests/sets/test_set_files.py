@@ -82,7 +82,7 @@ def test_every_byte_counts(saved):
     content = saved.read_bytes()
     rng = np.random.default_rng(0)
     before = list(pvdi.read(saved))
-    for at in rng.integers(0, len(content), 40):
+    for at in rng.integers(0, len(content), 25):
         path = damaged(saved, lambda data, at=int(at): data.__setitem__(at, data[at] ^ 0x55))
         try:
             read = pvdi.read(path)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 import pyvista_vdi as pvdi
@@ -74,7 +76,11 @@ def damaged(path, change):
 
 def packed_steps(n, **options):
     """The first steps of a scene, packed."""
-    return [stepped_vdi(step=k, **options).with_precision("8-byte") for k in range(n)]
+    made = stepped_vdi if "metadata" in options else _kept
+    return [made(step=k, **options).with_precision("8-byte") for k in range(n)]
+
+
+_kept = functools.cache(stepped_vdi)
 
 
 def frames_of(path):
