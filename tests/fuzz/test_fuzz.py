@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import ast
-import hashlib
 from pathlib import Path
 
 import pytest
@@ -64,19 +63,6 @@ def test_new_inputs(target):
         target(data)
 
     fuzz()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("target", TARGETS, indirect=True)
-def test_many_more_inputs(target):
-    """Random bytes by number: what hypothesis' small examples hardly reach."""
-    for number in range(20 * EXAMPLES.get(target.__name__, 50)):
-        seed = hashlib.sha512(number.to_bytes(4, "little")).digest()
-        data = (seed * 8)[: 20 + seed[0] * 2]
-        try:
-            target(data)
-        except BaseException as error:
-            raise AssertionError(f"input {number}: {data!r}") from error
 
 
 def test_the_corpus_is_small_and_known():

@@ -40,9 +40,8 @@ def test_every_point_is_in_one_block(points, chunks):
 
 def test_blocks_grow_up_to_the_bytes_that_they_may_have():
     grid = Volume(np.zeros((64, 64, 64), np.uint8))
-    assert Blocks.of(grid, (8, 8, 8), 1, 16 * 16 * 16).counts == (4, 4, 4)
-    assert Blocks.of(grid, (8, 8, 8), 2, 16 * 16 * 16).counts == (4, 4, 8)
-    assert Blocks.of(grid, (8, 8, 8), 1, 1).counts == (8, 8, 8)
+    for item, most, counts in ((1, 16**3, (4, 4, 4)), (2, 16**3, (4, 4, 8)), (1, 1, (8, 8, 8))):
+        assert Blocks.of(grid, (8, 8, 8), item, most).counts == counts
 
 
 @pytest.mark.parametrize("halo", HALOS, ids=str)

@@ -71,18 +71,6 @@ def test_whoever_makes_it_the_bytes_are_the_same(client, scene, expected):
 
 
 @pytest.mark.slow
-def test_four_workers_make_the_same_bytes(scene, expected):
-    arguments, options = scene
-    with (
-        LocalCluster(
-            n_workers=4, threads_per_worker=1, memory_limit="2GB", dashboard_address=":0"
-        ) as cluster,
-        Client(cluster) as four,
-    ):
-        check_same(generate_on_dask(*arguments, client=four, **options), expected)
-
-
-@pytest.mark.slow
 def test_occlusion_is_the_same_by_workers(client, scene, default_runtime):
     arguments, options = scene
     options = {**options, "ambient_occlusion": 8.0}

@@ -41,10 +41,8 @@ def made(monkeypatch, default_runtime):
     return counts
 
 
-def _by_numpy(path, monkeypatch):
-    with monkeypatch.context() as patch:
-        patch.setattr(reader, "runtime_for_decoding", lambda: None)
-        return [(vdi.offsets, vdi.packing, vdi) for vdi in pvdi.read(path)]
+def numpy_alone(patch):
+    patch.setattr(reader, "runtime_for_decoding", lambda: None)
 
 
 @pytest.mark.every(5)
@@ -53,7 +51,9 @@ def _by_numpy(path, monkeypatch):
 def test_kernel_and_numpy_give_the_same_bits(case, tolerance, made, monkeypatch, tmp_path):
     steps = packed_steps(6, **CASES[case])
     path = VDISeries.of(steps).save(tmp_path / "a.vdis", tolerance=tolerance, key_every=8)
-    by_numpy = _by_numpy(path, monkeypatch)
+    with monkeypatch.context() as patch:
+        numpy_alone(patch)
+        by_numpy = [(vdi.offsets, vdi.packing, vdi) for vdi in pvdi.read(path)]
     assert not made[True]
     for (offsets, packing, vdi), read in zip(by_numpy, pvdi.read(path), strict=True):
         np.testing.assert_array_equal(read.offsets, offsets)
@@ -110,7 +110,7 @@ def test_numbers_that_contradict_each_other_are_refused_alike(seed, made, tmp_pa
     monkeypatch.setattr(layout, "read_arrays", changed)
     i = int(random.integers(3))
     found = outcome(i)
-    monkeypatch.setattr(reader, "runtime_for_decoding", lambda: None)
+    numpy_alone(monkeypatch)
     assert outcome(i) == found
 
 
