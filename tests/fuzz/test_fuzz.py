@@ -23,8 +23,8 @@ EXAMPLES = {
     "vdis_frames": 20,
     "vdiset_heads": 20,
     "served_messages": 200,
-    "validator": 200,
-    "vtk_form": 120,
+    "validator": 250,
+    "vtk_form": 150,
 }
 #: Those that need a device, or VTK.
 ON_A_DEVICE = ("command_line", "public_functions")

@@ -455,6 +455,8 @@ def test_a_window_larger_than_the_file(last, message, file):
     box = struct.pack("<4i", 0, 0, width - 1, height - 1)
     data = file.read_bytes().replace(box, struct.pack("<4i", 0, 0, last, last))
     check_refused_in(2**21, file, data, message)
+    data = data.replace(b"dataWindow\0box2i", b"dataWindoX\0box2i")
+    check_refused_in(2**21, file, data, "its dataWindow is missing")
 
 
 def test_a_line_that_does_not_unpack_is_named(tmp_path):

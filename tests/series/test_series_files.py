@@ -195,21 +195,28 @@ def test_frames_that_say_nonsense_are_refused(kind, text, saved, tmp_path):
 
 
 class Stream(FileIO):
-    """A file whose next use fails."""
+    """A file of which reading, writing or flushing fails: ``error`` at ``fails``."""
 
-    reading = writing = None
+    fails = error = None
+
+    def _use(self, name):
+        if name == Stream.fails:
+            error, Stream.fails = Stream.error, None
+            raise error
 
     def seek(self, *place):
-        if Stream.reading is not None:
-            raise Stream.reading
+        self._use("seek")
         return super().seek(*place)
 
     def write(self, data):
-        if Stream.writing is None:
-            return super().write(data)
-        super().write(data[: len(data) // 2])
-        error, Stream.writing = Stream.writing, None
-        raise error
+        if Stream.fails == "write":
+            super().write(data[: len(data) // 2])
+        self._use("write")
+        return super().write(data)
+
+    def flush(self):
+        self._use("flush")
+        super().flush()
 
 
 @pytest.fixture
@@ -221,24 +228,28 @@ def stream(monkeypatch):
         return Stream(path, mode) if mode in ("rb", "r+b") else original(path, mode, *arguments)
 
     monkeypatch.setattr(Path, "open", opened)
-    monkeypatch.setattr(Stream, "reading", None)
-    monkeypatch.setattr(Stream, "writing", None)
-    return Stream
+
+    def fail(fails, error):
+        monkeypatch.setattr(Stream, "error", error)
+        monkeypatch.setattr(Stream, "fails", fails)
+
+    return fail
 
 
 def test_a_disk_that_fails_while_a_step_is_read_is_named(saved, stream):
     steps = reader.StepsReader(saved)
-    stream.reading = OSError(5, "Input/output error")
+    stream("seek", OSError(5, "Input/output error"))
     with pytest.raises(VDIFileError, match=r"a\.vdis cannot be read: Input/output error"):
         steps[3]
 
 
-def test_a_step_that_does_not_fit_is_not_counted(tmp_path, stream):
+@pytest.mark.parametrize("use", ["write", "flush"])
+def test_a_step_that_does_not_fit_is_not_counted(use, tmp_path, stream):
     steps, path = packed_steps(2, size=(6, 4)), tmp_path / "a.vdis"
     with pvdi.SeriesWriter(path) as out:
         out.append(steps[0])
         size = path.stat().st_size
-        stream.writing = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        stream(use, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
         with pytest.raises(VDIFileError, match="No space left on device; its 1 steps can be read"):
             out.append(steps[1])
     assert len(out) == 1
@@ -251,7 +262,7 @@ def test_an_interrupt_leaves_no_half_step(steps, tmp_path, stream):
     path = tmp_path / "a.vdis"
     with pvdi.SeriesWriter(path) as out:
         out.append(steps[0])
-        stream.writing = KeyboardInterrupt()
+        stream("write", KeyboardInterrupt())
         with pytest.raises(KeyboardInterrupt):
             out.append(steps[1])
         out.append(steps[2])
@@ -360,6 +371,12 @@ def test_a_step_without_its_header_is_told(tmp_path):
         series = pvdi.read(cut)
     assert series.times == (0.0, 2.0, 3.0)
     assert series[1].equals(small[2])
+
+
+def test_a_damaged_index_is_not_needed(saved, steps):
+    path = damaged(saved, lambda data: data.__setitem__(-30, data[-30] ^ 1))
+    assert all_same(pvdi.read(path), steps)
+    assert not reader.read_info(path).closed
 
 
 @pytest.mark.parametrize(
