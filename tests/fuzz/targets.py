@@ -510,35 +510,31 @@ _TEXTS = (
 #: Lengths of steps: none is so short that a ray takes millions.
 _STEPS = ("0.5", "1", "0", "-1", "nan", "inf", "1e300", "1e-12", "x", "2")
 
-_VERBS: dict[str, tuple[tuple[Any, ...], tuple[str, ...]]] = {
+#: Of each verb: what it needs, and options.
+_VERBS: dict[str, tuple[tuple[Any, ...], str]] = {
     "generate": (
         ((_VOLUMES,), ("-o", _OUTPUTS), ("--size", _SIZES)),
         (
-            *("--max-supersegments", "--tolerance", "--view-cone", "--clim", "--opacity", "--cmap"),
-            *("--level", "--channel", "--time-index", "--compression-level", "--compression"),
-            *("--position", "--focal-point", "--view-up", "--azimuth"),
-            *("--elevation", "--view-angle", "--parallel-scale", "--camera-json", "--n-colors"),
-            *("--transfer-function", "--sample-distance", "--scalars", "--preference", "--tf"),
-            *("--device", "--opacity-unit-distance", "--log-scale", "--flip-scalars"),
-            "--memory-limit",
+            "--max-supersegments --tolerance --view-cone --clim --opacity --cmap --level --channel "
+            "--time-index --compression-level --compression --position --focal-point --view-up "
+            "--azimuth --elevation --view-angle --parallel-scale --camera-json --n-colors "
+            "--transfer-function --sample-distance --scalars --preference --tf --device "
+            "--opacity-unit-distance --log-scale --flip-scalars --memory-limit"
         ),
     ),
     "render": (
         ((_INPUTS,), ("-o", _OUTPUTS), ("--size", _SIZES)),
         (
-            *("--background", "--position", "--focal-point", "--view-up", "--azimuth", "--device"),
-            *("--elevation", "--view-angle", "--parallel-scale", "--camera-json"),
+            "--background --position --focal-point --view-up --azimuth --device --elevation "
+            "--view-angle --parallel-scale --camera-json"
         ),
     ),
     "convert": (
         ((_INPUTS,), ("-o", _OUTPUTS)),
-        (
-            *("--compression-level", "--compression", "--camera-json", "--thickness"),
-            "--standard-channels",
-        ),
+        "--compression-level --compression --camera-json --thickness --standard-channels",
     ),
-    "info": (((_INPUTS,),), ("--json",)),
-    "devices": ((), ("--json",)),
+    "info": (((_INPUTS,),), "--json"),
+    "devices": ((), "--json"),
 }
 #: Which verb: what does most is tried most.
 _TRIED = ("generate", "generate", "generate", "render", "render", "convert", "convert", "info")
@@ -555,7 +551,7 @@ def _arguments(choices: Choices) -> list[str]:
             *flag, values = wanted
             arguments += [*flag, choices.pick(values)]
     for _ in range(choices.integer(0, 4)):
-        name = choices.pick(optional)
+        name = choices.pick(optional.split())
         arguments.append(name)
         if name in _SWITCHES:
             continue
