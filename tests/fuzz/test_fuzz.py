@@ -22,6 +22,8 @@ CORPUS = Path(__file__).parent / "corpus"
 EXAMPLES = {
     "vdis_frames": 20,
     "vdiset_heads": 20,
+    "command_line": 30,
+    "public_functions": 25,
     "served_messages": 200,
     "validator": 250,
     "vtk_form": 150,

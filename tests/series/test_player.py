@@ -91,6 +91,13 @@ def _settled():
         time.sleep(0.001)
 
 
+def look(player, clock, seconds=0.1001):
+    """Go on by some seconds when all is ready; by default a little more than a tenth."""
+    _settled()
+    clock.now += seconds
+    return player.advance()
+
+
 def test_a_step_is_shown_by_its_index_or_by_its_time(player, steps):
     assert (player.step, player.time, player.vdi) == (0, 0.0, steps.vdis[0])
     player.step = -1
@@ -129,9 +136,7 @@ def test_every_step_is_shown_when_it_is_due(player, steps, clock):
     for _ in range(2 * N):
         _settled()
         assert not player.advance()  # not yet
-        _settled()
-        clock.now += 0.1001
-        assert player.advance()
+        assert look(player, clock)
         shown.append(player.step)
         assert player.vdi is steps.vdis[player.step]
     assert shown == [(1 + k) % N for k in range(2 * N)]
@@ -141,9 +146,7 @@ def test_every_step_is_shown_when_it_is_due(player, steps, clock):
 def test_steps_are_left_out_where_frames_take_longer(player, clock):
     player.play(rate=10)
     player.advance()
-    _settled()
-    clock.now += 0.31
-    assert player.advance()
+    assert look(player, clock, 0.31)
     assert (player.step, player.dropped) == (3, 2)
 
 
@@ -172,9 +175,7 @@ def test_without_a_loop_the_last_step_is_the_end(player, clock):
     player.play(rate=10, loop=False)
     player.advance()
     for _ in range(10):
-        _settled()
-        clock.now += 0.1
-        player.advance()
+        look(player, clock, 0.1)
     assert (player.step, player.playing) == (N - 1, False)
     player.play(rate=10, loop=False)  # anew
     assert (player.step, player.playing) == (0, True)
@@ -187,10 +188,8 @@ def test_the_end_comes_although_the_last_step_is_damaged(player, steps, clock):
     player.advance()
     told = 0
     for _ in range(10):
-        _settled()
-        clock.now += 0.1
         try:
-            player.advance()
+            look(player, clock, 0.1)
         except VDIFileError:
             told += 1
     assert (player.step, player.playing, told) == (N - 2, False, 1)
@@ -203,9 +202,7 @@ def test_a_seek_goes_on_playing_from_there(player, clock):
     player.step = 5
     assert player.playing
     player.advance()
-    _settled()
-    clock.now += 0.1001
-    assert player.advance()
+    assert look(player, clock)
     assert player.step == 6
 
 
@@ -215,10 +212,8 @@ def test_a_damaged_step_is_told_once_and_left_out(player, steps, clock):
     player.advance()
     told, shown = [], []
     for _ in range(2 * N):
-        _settled()
-        clock.now += 0.1001
         try:
-            if player.advance():
+            if look(player, clock):
                 shown.append(player.step)
         except VDIFileError as error:
             told.append(str(error))
@@ -236,9 +231,7 @@ def test_few_steps_are_held_where_memory_is_short(player, steps, clock):
     player.play(rate=10, memory_limit=1)
     player.advance()
     for _ in range(N - 1):
-        _settled()
-        clock.now += 0.1001
-        player.advance()
+        look(player, clock)
         assert steps.living() <= 4
     assert steps.asked[: N - 1] == list(range(1, N))
 
@@ -252,9 +245,7 @@ def test_what_is_kept_is_not_decoded_in_the_next_round(player, steps, clock, kep
     for turn in range(3 * N):
         if turn == 2 * N:
             steps.asked.clear()
-        _settled()
-        clock.now += 0.1001
-        assert player.advance()
+        assert look(player, clock)
         assert steps.living() <= kept
         assert player.vdi.equals(steps.vdis[player.step])
     # Of a round that does not fit, some are the same in each
