@@ -26,11 +26,23 @@ PATIENCE = 600
 SUPPORT = str(Path(__file__).parents[1] / "support")
 
 
+#: What every program begins with.
+HEAD = f"""
+import multiprocessing, sys, warnings
+sys.path.insert(0, {SUPPORT!r})
+warnings.simplefilter("ignore", DeprecationWarning)  # Python's of forks
+import numpy as np
+import pyvista_vdi as pvdi
+from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.generation.generate import generate_vdi
+fork = multiprocessing.get_context("fork")
+"""
+
+
 def finished(code, *arguments):
     """Run code in a new process, which must end; its output."""
-    head = f"import sys, warnings\nsys.path.insert(0, {SUPPORT!r})\n"
-    head += "warnings.simplefilter('ignore', DeprecationWarning)  # Python's of forks\n"
-    done = run_python(head + code, *arguments)
+    done = run_python(HEAD + code, *arguments)
     assert done.returncode == 0, f"{done.returncode}: {done.stdout}{done.stderr}"
     return done.stdout
 
@@ -85,24 +97,19 @@ def test_threads_that_do_different_things(runtime):
 
 
 TWO_PLOTTERS = """
-import threading
-import numpy as np
+from concurrent.futures import ThreadPoolExecutor
 import pyvista as pv
-import pyvista_vdi as pvdi
 from strategies import random_vdi
 
-pv.OFF_SCREEN = True
 vdi = random_vdi(np.random.default_rng(4), max_window=(40, 30))
 corners = np.reshape(vdi.bounds, (3, 2))
-centre = corners.mean(axis=1)
-size = np.ptp(corners, axis=1).max()
+centre, size = corners.mean(axis=1), np.ptp(corners, axis=1).max()
 
 def pictures(first):
-    plotter = pv.Plotter(window_size=(120, 90))
+    plotter = pv.Plotter(window_size=(120, 90), off_screen=True)
     plotter.add_vdi(vdi, regenerate="never", show_scalar_bar=False)
     shown = []
-    for i in range(12):
-        angle = np.radians(first + 10 * i)
+    for angle in np.radians(np.arange(first, first + 120, 10)):
         eye = centre + 3 * size * np.array([np.cos(angle), np.sin(angle), 0.3])
         plotter.camera_position = (tuple(eye), tuple(centre), (0, 0, 1))
         shown.append(plotter.screenshot(return_img=True))
@@ -111,19 +118,9 @@ def pictures(first):
 
 alone = [pictures(0), pictures(90)]
 assert len(np.unique(alone[0][0])) > 10
-together = [None, None]
-
-def work(i):
-    together[i] = pictures(90 * i)
-
-threads = [threading.Thread(target=work, args=(i,)) for i in range(2)]
-for thread in threads:
-    thread.start()
-for thread in threads:
-    thread.join()
-for first, second in zip(alone, together):
-    for one, other in zip(first, second):
-        assert np.array_equal(one, other)
+with ThreadPoolExecutor(2) as pool:
+    together = list(pool.map(pictures, (0, 90)))
+assert np.array_equal(alone, together)
 print("the same")
 """
 
@@ -138,12 +135,8 @@ def test_two_plotters_in_two_threads(default_runtime):
 # -- forks -----------------------------------------------------------------------------------------
 
 FORK = """
-import gc, multiprocessing, os
-import numpy as np
-import pyvista_vdi as pvdi
-from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
-from pyvista_vdi.device import aligned_empty, get_runtime, list_devices
-from pyvista_vdi.generation.generate import generate_vdi
+import gc, os
+from pyvista_vdi.device import aligned_empty, list_devices
 from drawing import render_vdi
 
 runtime = get_runtime(sys.argv[1])
@@ -158,9 +151,9 @@ def child():
         lambda: render_vdi(vdi, CAMERA, device=runtime),
         lambda: pvdi.render(vdi, CAMERA),
         lambda: generate_vdi(volume, CAMERA, WINDOW, TRANSFER, device=runtime),
-        lambda: list_devices(),
+        list_devices,
         lambda: runtime.buffer((4,)),
-        lambda: runtime.finish(),
+        runtime.finish,
     ):
         try:
             use()
@@ -176,7 +169,6 @@ def child():
         globals().pop(name)
     gc.collect()
 
-fork = multiprocessing.get_context("fork")
 for _ in range(2):
     process = fork.Process(target=child)
     process.start()
@@ -192,17 +184,10 @@ print("well")
 """
 
 FORK_BEFORE = """
-import multiprocessing
-import pyvista_vdi as pvdi
-from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
-from pyvista_vdi.device import get_runtime
-from pyvista_vdi.generation.generate import generate_vdi
-
 def child(queue):
     runtime = get_runtime(sys.argv[1])
     queue.put(generate_vdi(fresh_volume(), CAMERA, WINDOW, TRANSFER, device=runtime))
 
-fork = multiprocessing.get_context("fork")
 queue = fork.Queue()
 process = fork.Process(target=child, args=(queue,))
 process.start()
