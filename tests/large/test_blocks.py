@@ -10,11 +10,12 @@ from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_o
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Shading, TransferFunction, Volume
+from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.large.blocks import Blocks, Halo
 from pyvista_vdi.large.generate import generate_chunked, task_of
-from pyvista_vdi.large.passes import light_entering
+from pyvista_vdi.large.passes import Piece, light_entering
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.options import CRITERIA, GenerationOptions
 from pyvista_vdi.quality.probe import turned
@@ -303,6 +304,18 @@ def test_rows_do_not_depend_on_where_they_are_cut():
         rows = [task.merge(y0, y1, pieces) for y0, y1 in itertools.pairwise(cuts)]
         for k, expected in enumerate(whole):
             np.testing.assert_array_equal(np.concatenate([part[k] for part in rows]), expected)
+
+
+def test_rows_of_a_piece():
+    counts = np.array([[1, 0], [2, 1], [0, 0], [1, 1]], np.uint16)
+    runs = np.arange(6 * 8, dtype=np.float32).reshape(6, 8)
+    piece = Piece(Rectangle(3, 5, 10, 14), counts, runs)
+    part = piece.rows(11, 13)
+    assert part.window == Rectangle(3, 5, 11, 13)
+    np.testing.assert_array_equal(part.counts, counts[1:3])
+    np.testing.assert_array_equal(part.runs, runs[1:4])
+    assert piece.rows(0, 10).counts.shape == (0, 2)
+    assert len(piece.rows(14, 20).runs) == 0
 
 
 def test_known_ranges_leave_blocks_unread():
