@@ -649,11 +649,17 @@ def test_arrays_that_break_a_rule(compression, edit, message, tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_members_that_are_compressed_or_there_twice_are_refused(file):
+def test_members_that_are_compressed_elsewhere_or_there_twice_are_refused(file):
     whole = file.read_bytes()
     with zipfile.ZipFile(file, "a") as archive:
         archive.writestr("color", b"")
     with pytest.raises(VDIFileError, match="two of its members have the same name"):
+        io.read(file)
+    moved = bytearray(whole)
+    at = moved.rindex(b"color") - 4  # where the directory has the member's place
+    moved[at : at + 4] = (len(moved) - 10).to_bytes(4, "little")
+    file.write_bytes(moved)
+    with pytest.raises(VDIFileError, match="member 'color' is not where its directory says"):
         io.read(file)
     file.write_bytes(rewritten(whole, lambda _: None, compress_type=zipfile.ZIP_DEFLATED))
     with pytest.raises(VDIFileError, match="its member 'vdi.json' is not stored plainly"):
