@@ -13,15 +13,17 @@ from faulty_driver import (
     CAMERA,
     LAUNCHES,
     OPERATIONS,
+    TRANSFER,
+    WAITS,
     WINDOW,
-    living_buffers,
+    fresh_volume,
     same,
     state_of,
 )
 
-import pyvista_vdi as pvdi
-from pyvista_vdi.device import devices, programs
+from pyvista_vdi.device import devices, get_runtime, programs
 from pyvista_vdi.errors import Cancelled, DeviceError, DeviceMemoryError, KernelBuildError
+from pyvista_vdi.generation.generate import generate_vdi
 
 #: Buffers of a volume and of a VDI that are on the device, and those that are always small.
 VOLUME = {"volume 'values'", "ranges of macrocells"}
@@ -31,7 +33,9 @@ VDI = {
 }
 SMALL = {"transfer function", "visible macrocells"}
 
-every_operation = pytest.mark.parametrize("operation", OPERATIONS, ids=lambda o: o.name)
+every_operation = pytest.mark.parametrize(
+    "operation", list(OPERATIONS.values()), ids=list(OPERATIONS)
+)
 
 
 def calls_of(driver, names, operation, runtime):
@@ -42,9 +46,6 @@ def calls_of(driver, names, operation, runtime):
     calls = driver.calls
     driver.work()
     return calls, expected
-
-
-# -- memory, launches, copies ----------------------------------------------------------------------
 
 
 #: How many calls of the driver lie between two that fail: every one is tried in the long run.
@@ -68,7 +69,7 @@ def test_memory_that_runs_out_at_each_allocation(runtime, driver, operation, cod
         assert "for the buffer" in message
         assert "smaller volume, window size or max_supersegments" in message
         # A volume or a VDI on the device is there for its next frame; nothing is there by half
-        kept = {name for name, _ in living_buffers()} - {name for name, _ in before[0]}
+        kept = {name for name, _ in state_of(runtime)[0]} - {name for name, _ in before[0]}
         for cached in (VOLUME, VDI):
             assert kept.isdisjoint(cached) or kept >= cached, (k, message)
         assert kept <= SMALL | VOLUME | VDI, (k, message)
@@ -77,13 +78,16 @@ def test_memory_that_runs_out_at_each_allocation(runtime, driver, operation, cod
     assert same(operation(runtime), expected)
 
 
+LOST = "start the program again, or use another device"
+
+
 @pytest.mark.every(4)
 @every_operation
 @pytest.mark.parametrize(
     ("code", "error", "remedy"),
     [
-        ("DEVICE_NOT_AVAILABLE", DeviceError, "start the program again, or use another device"),
-        ("INVALID_COMMAND_QUEUE", DeviceError, "start the program again, or use another device"),
+        ("DEVICE_NOT_AVAILABLE", DeviceError, LOST),
+        ("INVALID_COMMAND_QUEUE", DeviceError, LOST),
         ("INVALID_OPERATION", DeviceError, "try again, or use another device"),
         ("OUT_OF_RESOURCES", DeviceMemoryError, "use a smaller volume"),
     ],
@@ -104,100 +108,68 @@ def test_a_device_that_is_lost_in_the_middle(runtime, driver, operation, code, e
 
 
 @every_operation
-def test_a_device_that_is_lost_while_it_is_waited_for(runtime, driver, operation, monkeypatch):
-    """``finish`` is where drivers report what went wrong in a kernel."""
+def test_a_device_that_is_lost_while_it_is_waited_for(runtime, driver, operation):
+    """Where drivers report what went wrong in a kernel."""
     expected = operation(runtime)
     before = state_of(runtime)
-
-    class Lost:
-        def __init__(self, queue):
-            self.queue = queue
-
-        def finish(self):
-            self.queue.finish()
-            raise driver.error("DEVICE_NOT_AVAILABLE")
-
-    queue = runtime._queues[runtime._main_queue]
-    lost = Lost(queue)
-    # Commands go to the driver's own queue; only waiting for them fails
-    monkeypatch.setattr(type(runtime), "_queue", property(lambda _: lost))
-    functions = {name: getattr(devices.opencl(), name) for name in LAUNCHES}
-    for name, function in functions.items():
-        monkeypatch.setattr(
-            devices.opencl(),
-            name,
-            lambda q, *a, _call=function, **k: _call(q.queue if q is lost else q, *a, **k),
-        )
-    message = "while waiting for enqueued work.*start the program again"
-    with pytest.raises(DeviceError, match=message):
+    driver.fail(WAITS, "each", "DEVICE_NOT_AVAILABLE")
+    with pytest.raises(DeviceError, match=f"while waiting for enqueued work.*{LOST}"):
         operation(runtime)
-    monkeypatch.undo()
+    driver.work()
     assert state_of(runtime) == before
     assert same(operation(runtime), expected)
 
 
 def test_a_frame_and_background_work_go_on_after_a_loss(runtime, driver):
     """The turns on the device are given back."""
-    operation = OPERATIONS[2]
-    _, expected = calls_of(driver, LAUNCHES, operation, runtime)
-    driver.fail(LAUNCHES, 3, "DEVICE_NOT_AVAILABLE")
-    with pytest.raises(DeviceError), runtime.foreground():
-        operation(runtime)
-    driver.fail(LAUNCHES, 3, "DEVICE_NOT_AVAILABLE")
-    with pytest.raises(DeviceError), runtime.background():
-        operation(runtime)
+    operation = OPERATIONS["render"]
+    expected = operation(runtime)
+    for turn in (runtime.foreground, runtime.background):
+        driver.fail(LAUNCHES, 3, "DEVICE_NOT_AVAILABLE")
+        with pytest.raises(DeviceError), turn():
+            operation(runtime)
     driver.work()
-    with runtime.foreground():
-        assert same(operation(runtime), expected)
-    with runtime.background():
-        assert same(operation(runtime), expected)
-
-
-# -- compilers -------------------------------------------------------------------------------------
+    for turn in (runtime.foreground, runtime.background):
+        with turn():
+            assert same(operation(runtime), expected)
 
 
 @pytest.mark.parametrize(
     ("operation", "broken"),
     [
-        *((0, name) for name in ("volume/macrocells.cl", "generation/march_lists.cl")),
-        *(
-            (2, name)
-            for name in (
-                "raycasting/prepare.cl",
-                "raycasting/occupancy.cl",
-                "raycasting/raycast.cl",
-            )
-        ),
-        (3, "volume/render_volume.cl"),
+        ("generate", "volume/macrocells.cl"),
+        ("generate", "generation/march_lists.cl"),
+        ("render", "raycasting/prepare.cl"),
+        ("render", "raycasting/occupancy.cl"),
+        ("render", "raycasting/raycast.cl"),
+        ("render_volume", "volume/render_volume.cl"),
     ],
 )
 def test_a_kernel_that_does_not_compile(runtime, operation, broken, monkeypatch):
     """The message names the file and shows the compiler's log; nothing half made is kept."""
     operation = OPERATIONS[operation]
     expected = operation(runtime)
-    before = state_of(runtime)
     expand = programs.sources.expand
 
     def spoiled(path):
         return expand(path) + ("int broken = missing_name;\n" if str(path) == broken else "")
 
+    # In a context of its own nothing is compiled yet
+    cl, info = devices.opencl(), runtime.info
+    device = cl.get_platforms()[info.platform_index].get_devices()[info.device_index]
+    fresh = get_runtime(cl.Context([device]))
+    before = state_of(fresh)
     with monkeypatch.context() as patched:
-        empty = programs.ProgramCache(runtime._context, runtime._device)
-        patched.setattr(runtime, "_programs", empty)
         patched.setattr(programs.sources, "expand", spoiled)
         with pytest.raises(KernelBuildError, match=f"{broken} does not compile on") as caught:
-            operation(runtime)
+            operation(fresh)
     error = caught.value
-    assert "missing_name" in str(error)
-    assert "missing_name" in error.log
-    assert "missing_name" in error.source
+    for said in (str(error), error.log, error.source):
+        assert "missing_name" in said
     assert "-D" in error.options
     del caught, error
-    assert state_of(runtime) == before
-    assert same(operation(runtime), expected)
-
-
-# -- Ctrl-C ----------------------------------------------------------------------------------------
+    assert state_of(fresh) == before
+    assert same(operation(fresh), expected)
 
 
 @every_operation
@@ -265,10 +237,7 @@ LONG = [pytest.mark.slow, pytest.mark.timeout(3600)]
 @pytest.mark.parametrize("samples", [8, pytest.param(1000, marks=LONG)])
 def test_ctrl_c_at_lines_of_the_package(default_runtime, operation, samples):
     """As a signal may come anywhere: at some lines here, at a thousand in the long run."""
-    _interrupt_lines(default_runtime, operation, samples)
-
-
-def _interrupt_lines(runtime, operation, samples):
+    runtime = default_runtime
     expected = operation(runtime)
     counter = _LineInterrupt()
     with counter.tracing():
@@ -289,14 +258,13 @@ def _interrupt_lines(runtime, operation, samples):
     assert same(operation(runtime), expected)
 
 
-def test_cancelling_at_each_report(runtime, monkeypatch):
+def test_cancelling_at_each_report(runtime):
     """``progress`` that returns False, at every call."""
-    from faulty_driver import TRANSFER, fresh_volume
-
-    monkeypatch.setattr("pyvista_vdi.generation.slices._SLICE_BYTES", 1)
-    fractions = []
     arguments = (fresh_volume(), CAMERA, WINDOW, TRANSFER)
-    pvdi.generation.generate.generate_vdi(*arguments, device=runtime, progress=fractions.append)
+    options = {"device": runtime, "memory_limit": 2**21}  # slices of a few rows
+    fractions = []
+    generate_vdi(*arguments, progress=fractions.append, **options)
+    assert len(fractions) > 5
     before = state_of(runtime)
     for last in range(len(fractions)):
         calls = []
@@ -306,5 +274,5 @@ def test_cancelling_at_each_report(runtime, monkeypatch):
             return len(calls) <= last
 
         with pytest.raises(Cancelled):
-            pvdi.generation.generate.generate_vdi(*arguments, device=runtime, progress=progress)
+            generate_vdi(*arguments, progress=progress, **options)
         assert state_of(runtime) == before

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 import sys
 import threading
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 from drawing import raycast_volume, render_vdi
 from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume, state_of
+from fresh_python import run_python
 from strategies import random_vdi
 
 import pyvista_vdi as pvdi
@@ -21,23 +23,28 @@ from pyvista_vdi.generation.generate import generate_vdi
 #: Seconds after which a process counts as one that hangs.
 PATIENCE = 600
 
+SUPPORT = str(Path(__file__).parents[1] / "support")
+
+
+#: What every program begins with.
+HEAD = f"""
+import multiprocessing, sys, warnings
+sys.path.insert(0, {SUPPORT!r})
+warnings.simplefilter("ignore", DeprecationWarning)  # Python's of forks
+import numpy as np
+import pyvista_vdi as pvdi
+from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.generation.generate import generate_vdi
+fork = multiprocessing.get_context("fork")
+"""
+
 
 def finished(code, *arguments):
     """Run code in a new process, which must end; its output."""
-    tests = str(Path(__file__).parents[1] / "support")
-    head = f"import sys\nsys.path.insert(0, {tests!r})\n"
-    done = subprocess.run(
-        [sys.executable, "-c", head + code, *arguments],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
+    done = run_python(HEAD + code, *arguments)
     assert done.returncode == 0, f"{done.returncode}: {done.stdout}{done.stderr}"
     return done.stdout
-
-
-# -- threads ---------------------------------------------------------------------------------------
 
 
 def test_one_vdi_drawn_by_many_threads(runtime):
@@ -58,10 +65,11 @@ def test_one_vdi_drawn_by_many_threads(runtime):
         for images, image in zip(pool.map(draw, views), expected, strict=True):
             for drawn in images:
                 np.testing.assert_array_equal(drawn, image)
-    names = [name for name, _ in state_of(runtime)[0]]
-    assert names.count("supersegment media") == 1 + [n for n, _ in before[0]].count(
-        "supersegment media"
-    )
+
+    def media(state):
+        return [name for name, _ in state[0]].count("supersegment media")
+
+    assert media(state_of(runtime)) == 1 + media(before)
     del shared, draw
     assert state_of(runtime) == before
 
@@ -89,24 +97,19 @@ def test_threads_that_do_different_things(runtime):
 
 
 TWO_PLOTTERS = """
-import threading
-import numpy as np
+from concurrent.futures import ThreadPoolExecutor
 import pyvista as pv
-import pyvista_vdi as pvdi
 from strategies import random_vdi
 
-pv.OFF_SCREEN = True
 vdi = random_vdi(np.random.default_rng(4), max_window=(40, 30))
 corners = np.reshape(vdi.bounds, (3, 2))
-centre = corners.mean(axis=1)
-size = np.ptp(corners, axis=1).max()
+centre, size = corners.mean(axis=1), np.ptp(corners, axis=1).max()
 
 def pictures(first):
-    plotter = pv.Plotter(window_size=(120, 90))
+    plotter = pv.Plotter(window_size=(120, 90), off_screen=True)
     plotter.add_vdi(vdi, regenerate="never", show_scalar_bar=False)
     shown = []
-    for i in range(12):
-        angle = np.radians(first + 10 * i)
+    for angle in np.radians(np.arange(first, first + 120, 10)):
         eye = centre + 3 * size * np.array([np.cos(angle), np.sin(angle), 0.3])
         plotter.camera_position = (tuple(eye), tuple(centre), (0, 0, 1))
         shown.append(plotter.screenshot(return_img=True))
@@ -115,19 +118,9 @@ def pictures(first):
 
 alone = [pictures(0), pictures(90)]
 assert len(np.unique(alone[0][0])) > 10
-together = [None, None]
-
-def work(i):
-    together[i] = pictures(90 * i)
-
-threads = [threading.Thread(target=work, args=(i,)) for i in range(2)]
-for thread in threads:
-    thread.start()
-for thread in threads:
-    thread.join()
-for first, second in zip(alone, together):
-    for one, other in zip(first, second):
-        assert np.array_equal(one, other)
+with ThreadPoolExecutor(2) as pool:
+    together = list(pool.map(pictures, (0, 90)))
+assert np.array_equal(alone, together)
 print("the same")
 """
 
@@ -142,12 +135,8 @@ def test_two_plotters_in_two_threads(default_runtime):
 # -- forks -----------------------------------------------------------------------------------------
 
 FORK = """
-import gc, multiprocessing, os
-import numpy as np
-import pyvista_vdi as pvdi
-from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
-from pyvista_vdi.device import aligned_empty, get_runtime, list_devices
-from pyvista_vdi.generation.generate import generate_vdi
+import gc, os
+from pyvista_vdi.device import aligned_empty, list_devices
 from drawing import render_vdi
 
 runtime = get_runtime(sys.argv[1])
@@ -162,9 +151,9 @@ def child():
         lambda: render_vdi(vdi, CAMERA, device=runtime),
         lambda: pvdi.render(vdi, CAMERA),
         lambda: generate_vdi(volume, CAMERA, WINDOW, TRANSFER, device=runtime),
-        lambda: list_devices(),
+        list_devices,
         lambda: runtime.buffer((4,)),
-        lambda: runtime.finish(),
+        runtime.finish,
     ):
         try:
             use()
@@ -180,7 +169,6 @@ def child():
         globals().pop(name)
     gc.collect()
 
-fork = multiprocessing.get_context("fork")
 for _ in range(2):
     process = fork.Process(target=child)
     process.start()
@@ -196,17 +184,10 @@ print("well")
 """
 
 FORK_BEFORE = """
-import multiprocessing
-import pyvista_vdi as pvdi
-from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
-from pyvista_vdi.device import get_runtime
-from pyvista_vdi.generation.generate import generate_vdi
-
 def child(queue):
     runtime = get_runtime(sys.argv[1])
     queue.put(generate_vdi(fresh_volume(), CAMERA, WINDOW, TRANSFER, device=runtime))
 
-fork = multiprocessing.get_context("fork")
 queue = fork.Queue()
 process = fork.Process(target=child, args=(queue,))
 process.start()
@@ -232,36 +213,27 @@ def test_a_fork_before_a_device_is_used(runtime):
     assert finished(FORK_BEFORE, runtime.info.selector) == "well\n"
 
 
-def test_spawned_processes(default_runtime, tmp_path):
-    """What the message recommends."""
-    path = random_vdi(np.random.default_rng(2)).save(tmp_path / "a.vdi")
-    (tmp_path / "work.py").write_text(
-        "import multiprocessing, sys\n"
-        "import pyvista_vdi as pvdi\n"
-        "def draw(angle):\n"
-        "    vdi = pvdi.read(sys.argv[1])\n"
-        "    return pvdi.render(vdi, vdi.camera.azimuth(angle)).sum()\n"
-        "if __name__ == '__main__':\n"
-        "    here = draw(5)\n"
-        "    with multiprocessing.get_context('spawn').Pool(1) as pool:\n"
-        "        assert pool.map(draw, [5]) == [here]\n"
-        "    print('the same')\n"
-    )
-    done = subprocess.run(
-        [sys.executable, str(tmp_path / "work.py"), str(path)],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert (done.returncode, done.stdout) == (0, "the same\n"), done.stderr
+SPAWN = """
+import multiprocessing, sys
+import pyvista_vdi as pvdi
+def draw(angle):
+    vdi = pvdi.read(sys.argv[1])
+    return pvdi.render(vdi, vdi.camera.azimuth(angle)).sum()
+if __name__ == "__main__":
+    here = draw(5)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.map(draw, [5]) == [here]
+    print("the same")
+"""
 
 
-def test_vdis_go_to_other_processes():
-    """By pickling, as multiprocessing does: arrays and view, to the last bit."""
-    import pickle
-
-    vdi = random_vdi(np.random.default_rng(6))
+def test_spawned_processes_draw_and_take_vdis(default_runtime, tmp_path):
+    """What the message recommends; VDIs go there by pickling, to the last bit."""
+    vdi = random_vdi(np.random.default_rng(2))
     back = pickle.loads(pickle.dumps(vdi))
     assert isinstance(back, pvdi.VDI)
     assert back.equals(vdi)
+    (tmp_path / "work.py").write_text(SPAWN)
+    program = [sys.executable, str(tmp_path / "work.py"), str(vdi.save(tmp_path / "a.vdi"))]
+    done = subprocess.run(program, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert (done.returncode, done.stdout) == (0, "the same\n"), done.stderr

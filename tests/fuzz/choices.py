@@ -3,92 +3,38 @@
 from __future__ import annotations
 
 import struct
+import sys
 from collections.abc import Sequence
 from typing import Any
 
 #: Numbers at which arithmetic, ranges and types end.
 NUMBERS: tuple[Any, ...] = (
-    0,
-    1,
-    -1,
-    2,
-    3,
-    7,
-    16,
-    255,
-    256,
-    65535,
-    65536,
-    2**31 - 1,
-    2**31,
-    2**32,
-    2**53 + 1,
-    2**63,
-    2**64,
-    10**30,
-    0.0,
-    -0.0,
-    0.5,
-    1.0,
-    1e-300,
-    1e-45,
-    5e-324,
-    1e-9,
-    1e9,
-    3.5e38,
-    1e300,
-    1.7976931348623157e308,
-    float("inf"),
-    float("-inf"),
-    float("nan"),
+    *(0, 1, -1, 2, 3, 7, 16, 255, 256, 65535, 65536, 2**31 - 1, 2**31, 2**32, 2**53 + 1, 2**63),
+    *(2**64, 10**30, 0.0, -0.0, 0.5, 1.0, 1e-300, 1e-45, 5e-324, 1e-9, 1e9, 3.5e38, 1e300),
+    *(sys.float_info.max, float("inf"), float("-inf"), float("nan")),
 )
 
 #: What stands where something else belongs.
 JUNK: tuple[Any, ...] = (
-    *NUMBERS,
-    None,
-    True,
-    False,
-    "",
-    "x",
-    "a\0b",
-    "\x1b[31m",
-    "ü" * 40,
-    "9" * 400,
-    [],
-    {},
-    [1],
-    [[]],
-    [None, "x", 2.5],
-    [[1, 2], [3]],
-    {"a": 1},
-    [0] * 7,
-    [1e400] * 3,
+    *(*NUMBERS, None, True, False, "", "x", "a\0b", "\x1b[31m", "ü" * 40, "9" * 400),
+    *([], {}, [1], [[]], [None, "x", 2.5], [[1, 2], [3]], {"a": 1}, [0] * 7, [1e400] * 3),
 )
 
 
 class Choices:
     """Draws from bytes; when they are used up, everything drawn is the first of its kind.
 
-    Parameters
-    ----------
-    data : bytes
-        From a fuzzer. Any bytes make sense, and a changed byte changes one choice as a rule.
+    Any bytes make sense, and a changed byte changes one choice as a rule.
     """
 
     def __init__(self, data: bytes) -> None:
-        self._data = data
-        self._at = 0
-
-    @property
-    def left(self) -> int:
-        """Bytes that were not drawn yet."""
-        return max(0, len(self._data) - self._at)
+        self.data = data
+        self.at = 0
 
     def take(self, n: int) -> bytes:
         """The next n bytes, fewer at the end."""
-        piece = self._data[self._at : self._at + n]
-        self._at += n
+        piece = self.data[self.at : self.at + n]
+        self.at += n
         return piece
 
     def integer(self, low: int, high: int) -> int:

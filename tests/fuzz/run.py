@@ -35,7 +35,7 @@ def main() -> int:
         _import_instrumented()
     options = _parse()
     if options.replay is not None:
-        _target(options.targets[0])(options.replay.read_bytes())
+        _targets()[options.targets[0]](options.replay.read_bytes())
         print(f"{options.replay}: no promise is broken")
         return 0
     if options.here:
@@ -63,63 +63,50 @@ def _import_instrumented() -> None:
         import pyvista_vdi.vtk_pipeline.filters.convert  # noqa: F401
 
 
-def _parse() -> argparse.Namespace:
+def _targets() -> dict[str, Callable[[bytes], None]]:
     from fuzz.targets import TARGETS
 
+    return TARGETS
+
+
+def _parse() -> argparse.Namespace:
+    names = list(_targets())
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(TARGETS))
+    parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(names))
     parser.add_argument("--seconds", type=int, default=60, help="for each target (default: 60)")
     parser.add_argument("--corpus", type=Path, help="folder for inputs that reach new code")
     parser.add_argument("--crashes", type=Path, default=Path("fuzz_crashes"))
     parser.add_argument("--replay", type=Path, metavar="FILE", help="run TARGET on this input")
     parser.add_argument(HERE_ONLY, action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    options.targets = options.targets or list(TARGETS)
-    unknown = sorted(set(options.targets) - set(TARGETS))
+    options.targets = options.targets or names
+    unknown = sorted(set(options.targets) - set(names))
     if unknown:
-        parser.error(f"unknown targets {', '.join(unknown)}; there are {', '.join(TARGETS)}")
+        parser.error(f"unknown targets {', '.join(unknown)}; there are {', '.join(names)}")
     return options
-
-
-def _target(name: str) -> Callable[[bytes], None]:
-    from fuzz.targets import TARGETS
-
-    return TARGETS[name]
 
 
 def _fuzz(name: str, options: argparse.Namespace) -> int:
     import atheris
 
-    target = _target(name)
+    target = _targets()[name]
     options.crashes.mkdir(parents=True, exist_ok=True)
     folders = []
-    if options.corpus:  # libFuzzer writes into the first folder, and reads all
-        found = options.corpus / name
-        found.mkdir(parents=True, exist_ok=True)
-        folders.append(str(found))
+    if options.corpus or (CORPUS / name).is_dir():  # libFuzzer writes into the first, and reads all
+        own = options.corpus / name if options.corpus else options.crashes / f"{name}.corpus"
+        own.mkdir(parents=True, exist_ok=True)
+        folders.append(str(own))
     if (CORPUS / name).is_dir():
         folders.append(str(CORPUS / name))
-    if folders == [str(CORPUS / name)]:
-        folders.insert(0, str(_scratch(options.crashes / f"{name}.corpus")))
-    prefix = f"-artifact_prefix={options.crashes}/{name}-"
     arguments = [
-        __file__,
-        *LIMITS,
-        f"-max_total_time={options.seconds}",
-        "-max_len=2500",
-        "-len_control=20",
-        prefix,
+        *(__file__, *LIMITS, f"-max_total_time={options.seconds}", "-max_len=2500"),
+        *("-len_control=20", f"-artifact_prefix={options.crashes}/{name}-"),
     ]
     atheris.Setup([*arguments, *folders], target)
     atheris.Fuzz()  # ends the process
     return 0
-
-
-def _scratch(folder: Path) -> Path:
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
 
 
 if __name__ == "__main__":

@@ -4,8 +4,6 @@ A target draws what it does from :class:`~fuzz.choices.Choices`, so that any eng
 hypothesis in the test suite (``test_fuzz.py``), atheris by ``run.py``. The promises are those of
 ``docs/robustness.md``: whatever comes in, only the package's own errors come out; nothing is
 written but the target that was named; memory stays within what a file could hold.
-
-A target is one function, and they draw from each other's: hence one file of more than 500 lines.
 """
 
 from __future__ import annotations
@@ -17,6 +15,7 @@ import io as text_io
 import itertools
 import json
 import os
+import re
 import struct
 import tempfile
 import tracemalloc
@@ -31,6 +30,7 @@ from typing import Any
 
 import numpy as np
 from fuzz.choices import JUNK, NUMBERS, Choices
+from stepped_vdis import frames_of
 from strategies import random_vdi
 
 import pyvista_vdi as pvdi
@@ -43,7 +43,7 @@ from pyvista_vdi.series import layout
 from pyvista_vdi.series import reader as series_reader
 from pyvista_vdi.sets import files as set_files
 from pyvista_vdi.web import messages
-from pyvista_vdi.web.page import _DATA
+from pyvista_vdi.web.page import DATA_TYPE
 from pyvista_vdi.web.page import page as page_of
 
 #: Bytes that a byte of a file may become (docs/robustness.md): a block of 128 KiB from 4 bytes is
@@ -59,6 +59,9 @@ OWN_BYTES = 8 * 2**20
 
 #: What a device may be asked for while fuzzing: pictures and VDIs stay small.
 DEVICE_BYTES = 64 * 2**20
+
+#: A page's element with the VDI, in base64.
+_DATA = re.compile(rb'<script type="%b">([^<]*)' % re.escape(DATA_TYPE).encode())
 
 COMPRESSIONS = ("zstd", "lz4", "deflate", "none")
 
@@ -102,19 +105,38 @@ def limited(device_bytes: int = DEVICE_BYTES) -> Iterator[None]:
         runtime.info, host_memory.physical_memory = info, memory
 
 
-# -- files -----------------------------------------------------------------------------------------
+def _steps_of(path: Path) -> Iterator[VDI]:
+    """The steps of a series that can be read; the first ones, where it has many."""
+    steps = series_reader.StepsReader(path)
+    for i in range(min(len(steps), 6)):
+        with contextlib.suppress(VDIError):
+            yield steps[i]
 
 
-def _read_all(
-    name: str,
-    content: bytes,
-    ratio: int,
-    about: Callable[[Path], Any] = io.read_info,
-    vdis: Callable[[Path], Iterable[VDI]] = lambda path: [io.read(path)],
-) -> None:
-    """Read content as a file of that name, within the memory that it could hold."""
+def _views_of(path: Path) -> Iterator[VDI]:
+    """The VDIs of a set that can be read."""
+    vdi_set = set_files.read(path)
+    vdi_set.weights(vdi_set.cameras[0])
+    for i in range(min(len(vdi_set), 6)):
+        with contextlib.suppress(VDIError):
+            yield vdi_set[i]
+
+
+#: Of each kind of file: bytes that a byte may become, what says what is in it, what reads it.
+READERS: dict[str, tuple[int, Callable[[Path], Any], Callable[[Path], Iterable[VDI]]]] = {
+    "vdi": (VDI_RATIO, io.read_info, lambda path: [io.read(path)]),
+    "exr": (EXR_RATIO, io.read_info, lambda path: [io.read(path)]),
+    "html": (VDI_RATIO, io.read_info, lambda path: [io.read(path)]),
+    "vdis": (VDIS_RATIO, series_reader.read_info, _steps_of),
+    "vdiset": (VDIS_RATIO, set_files.read_info, _views_of),
+}
+
+
+def _read_all(kind: str, content: bytes) -> None:
+    """Read content as a file of that kind, within the memory that it could hold."""
+    ratio, about, vdis = READERS[kind]
     folder = work_folder()
-    path = folder / name
+    path = folder / f"content.{kind}"
     path.write_bytes(content)
     before = sorted(folder.iterdir())
     tracing = tracemalloc.is_tracing()
@@ -138,16 +160,20 @@ def _read_all(
     assert sorted(folder.iterdir()) == before, "reading left files behind"
 
 
-def vdi_bytes(data: bytes) -> None:
-    """Any bytes as a ``.vdi`` file."""
-    _read_all("bytes.vdi", data, VDI_RATIO)
+def _any_bytes(kind: str) -> Callable[[bytes], None]:
+    """Any bytes as a file of a kind."""
+
+    def target(data: bytes) -> None:
+        _read_all(kind, data)
+
+    target.__name__ = f"{kind}_bytes"
+    return target
 
 
 @cache
 def _vdi_members(index: int, compression: str, precision: str) -> dict[str, bytes]:
-    path = base_vdi(index).save(
-        work_folder() / "base.vdi", compression=compression, precision=precision
-    )
+    options = {"compression": compression, "precision": precision}
+    path = base_vdi(index).save(work_folder() / "base.vdi", **options)
     with zipfile.ZipFile(path) as archive:
         members = {info.filename: archive.read(info) for info in archive.infolist()}
     path.unlink()
@@ -158,8 +184,7 @@ def vdi_members(data: bytes) -> None:
     """A ``.vdi`` file whose members were changed, with checksums that fit."""
     choices = Choices(data)
     precision = choices.pick(("exact", "16-byte", "8-byte"))
-    base = _vdi_members(choices.integer(0, 7), choices.pick(COMPRESSIONS), precision)
-    members = dict(base)
+    members = dict(_vdi_members(choices.integer(0, 7), choices.pick(COMPRESSIONS), precision))
     description = json.loads(members["vdi.json"])
     for _ in range(choices.integer(0, 3)):
         description = choices.edited(description)
@@ -173,49 +198,27 @@ def vdi_members(data: bytes) -> None:
         for name, content in members.items():
             archive.writestr(zipfile.ZipInfo(name), content)
     content = buffer.getvalue()
-    _read_all("members.vdi", choices.patched(content) if choices.chance(8) else content, VDI_RATIO)
-
-
-def _steps_of(path: Path) -> Iterator[VDI]:
-    """The steps of a series that can be read; the first ones, where it has many."""
-    steps = series_reader.StepsReader(path)
-    for i in range(min(len(steps), 6)):
-        with contextlib.suppress(VDIError):
-            yield steps[i]
-
-
-def vdis_bytes(data: bytes) -> None:
-    """Any bytes as a ``.vdis`` file."""
-    _read_all("bytes.vdis", data, VDIS_RATIO, series_reader.read_info, _steps_of)
+    _read_all("vdi", choices.patched(content) if choices.chance(8) else content)
 
 
 @cache
 def _series_parts(index: int, compression: str, tolerance: float) -> tuple[bytes, list[Any]]:
     """A small series' head, and each frame's header, text, arrays."""
-    first, kept = base_vdi(index), {}
-    rng = np.random.default_rng(index)
+    first, rng = base_vdi(index), np.random.default_rng(index)
+    arrays = _arrays(first)
     for name in ("color", "optical_depth"):
-        kept[name] = getattr(first, name) * rng.random(getattr(first, name).shape)
-    arrays = {**_arrays(first), **kept}
-    second = VDI(
-        first.camera,
-        first.window_size,
-        **arrays,
-        bounds=first.bounds,
-        depth_origin=first.depth_origin,
-        metadata={"sample_distance": 0.5},
-    )
+        arrays[name] = arrays[name] * rng.random(arrays[name].shape)
+    second = _with(first, metadata={"sample_distance": 0.5}, **arrays)
     steps = [step.with_precision("8-byte") for step in (first, second, second, first)]
     path = work_folder() / "base.vdis"
     pvdi.VDISeries.of(steps).save(path, compression=compression, tolerance=tolerance)
-    content = path.read_bytes()
-    frames, reader = [], series_reader.StepsReader(path)
-    for place, header in reader._frames:
+    content, frames, found = path.read_bytes(), [], frames_of(path)
+    path.unlink()
+    for place, header in found:
         data = memoryview(content)[place + layout.HEADER_BYTES :][: header.n_bytes]
         codec = "none" if header.kind == layout.VDI_FILE else compression
         frames.append((header, layout.read_text(data)[0], layout.read_arrays(data, codec)))
-    path.unlink()
-    return content[: reader._frames[0][0]], frames
+    return content[: found[0][0]], frames
 
 
 def vdis_frames(data: bytes) -> None:
@@ -243,48 +246,27 @@ def vdis_frames(data: bytes) -> None:
         codec = "none" if header.kind == layout.VDI_FILE else compression
         with contextlib.suppress(VDIError):  # what JSON does not hold
             frame = layout.Content(text, arrays).to_bytes(codec, 1)
-            header = header._replace(n_bytes=len(frame), checksum=zlib.crc32(frame))
+            kind, by = header.kind, header.by
             if choices.chance(6):
-                header = header._replace(by=choices.integer(-1, 4), kind=choices.integer(0, 3))
+                by, kind = choices.integer(-1, 4), choices.integer(0, 3)
+            header = layout.FrameHeader(
+                *(header.what, header.number, kind, by),
+                *(header.time, len(frame), zlib.crc32(frame)),
+            )
             content += header.to_bytes() + frame
     content = choices.patched(content) if choices.chance(8) else content
-    _read_all("frames.vdis", content, VDIS_RATIO, series_reader.read_info, _steps_of)
-
-
-def _views_of(path: Path) -> Iterator[VDI]:
-    """The VDIs of a set that can be read."""
-    vdi_set = set_files.read(path)
-    vdi_set.weights(vdi_set.cameras[0])
-    for i in range(min(len(vdi_set), 6)):
-        with contextlib.suppress(VDIError):
-            yield vdi_set[i]
-
-
-def vdiset_bytes(data: bytes) -> None:
-    """Any bytes as a ``.vdiset`` file."""
-    _read_all("bytes.vdiset", data, VDIS_RATIO, set_files.read_info, _views_of)
+    _read_all("vdis", content)
 
 
 @cache
 def _set_parts(index: int, compression: str) -> tuple[dict[str, Any], bytes]:
     """A small set's head, and the bytes behind it."""
     first = base_vdi(index)
-    vdis = [_seen_from(first, first.camera.azimuth(angle)) for angle in (0, 20, 40)]
+    vdis = [_with(first, camera=first.camera.azimuth(angle)) for angle in (0, 20, 40)]
     path = pvdi.VDISet.of(vdis).save(work_folder() / "base.vdiset", compression=compression)
-    views = set_files.SetReader(path)
-    content = path.read_bytes()[views._frames[0][0] :]
+    content, begin = path.read_bytes(), frames_of(path)[0][0]
     path.unlink()
-    return views._head, content
-
-
-def _seen_from(vdi: VDI, camera: Camera) -> VDI:
-    return VDI(
-        camera,
-        vdi.window_size,
-        **_arrays(vdi),
-        bounds=vdi.bounds,
-        depth_origin=vdi.depth_origin,
-    )
+    return json.loads(content[len(set_files.MAGIC) + layout.HEAD.size : begin]), content[begin:]
 
 
 def vdiset_heads(data: bytes) -> None:
@@ -298,12 +280,7 @@ def vdiset_heads(data: bytes) -> None:
     checksum = zlib.crc32(text, zlib.crc32(begin))
     content = set_files.MAGIC + begin + struct.pack("<I", checksum) + text + content
     content = choices.patched(content) if choices.chance(4) else content
-    _read_all("heads.vdiset", content, VDIS_RATIO, set_files.read_info, _views_of)
-
-
-def exr_bytes(data: bytes) -> None:
-    """Any bytes as an ``.exr`` file."""
-    _read_all("bytes.exr", data, EXR_RATIO)
+    _read_all("vdiset", content)
 
 
 @cache
@@ -321,12 +298,7 @@ def exr_patches(data: bytes) -> None:
     base = _exr_file(choices.integer(0, 7), choices.pick(("none", "zips")), choices.chance(2))
     for _ in range(choices.integer(1, 3)):
         base = choices.patched(base)
-    _read_all("patches.exr", base, EXR_RATIO)
-
-
-def html_bytes(data: bytes) -> None:
-    """Any bytes as a page."""
-    _read_all("bytes.html", data, VDI_RATIO)
+    _read_all("exr", base)
 
 
 @cache
@@ -356,15 +328,18 @@ def html_patches(data: bytes) -> None:
             place = choices.integer(0, len(page))
             piece = page[begin:end] + b"</script>"
             page = choices.pick((page[:begin] + page[end:], page[:place] + piece + page[place:]))
-    _read_all("patches.html", page, VDI_RATIO)
-
-
-# -- the validator, and the VTK form ---------------------------------------------------------------
+    _read_all("html", page)
 
 
 def _arrays(vdi: VDI) -> dict[str, Any]:
     names = ("offsets", "front", "back", "color", "optical_depth")
     return {name: np.array(getattr(vdi, name)) for name in names}
+
+
+def _with(vdi: VDI, **changes: Any) -> VDI:
+    """A VDI with other arguments, without its metadata."""
+    names = ("camera", "window_size", "bounds", "depth_origin")
+    return VDI(**{**{name: getattr(vdi, name) for name in names}, **_arrays(vdi), **changes})
 
 
 def _changed_array(choices: Choices, array: Any) -> Any:
@@ -384,12 +359,12 @@ def _changed_array(choices: Choices, array: Any) -> Any:
                 return array
     if kind == 2:
         return array[: choices.integer(0, len(array))]
+    if kind == 5:
+        return array.reshape(-1, *([1] * choices.integer(0, 2)), *array.shape[1:])
     if kind == 3:
         return array[::-1]
     if kind == 4:
         return np.concatenate([array, array])
-    if kind == 5:
-        return array.reshape(-1, *([1] * choices.integer(0, 2)), *array.shape[1:])
     if kind == 6:
         return array.tolist()
     if kind == 7:
@@ -403,7 +378,7 @@ def _changed_array(choices: Choices, array: Any) -> Any:
 
 
 def _check_valid(vdi: VDI) -> None:
-    """Check a VDI that was accepted by the rules of DESIGN section 2, written another way."""
+    """Check a VDI that was accepted by the rules of docs/conventions.md, written another way."""
     width, height = vdi.window_size
     starts = [int(o) for o in vdi.offsets]
     assert len(starts) == width * height + 1
@@ -427,14 +402,9 @@ def validator(data: bytes) -> None:
     """``VDI(...)`` of arguments made wrong, or right in another way."""
     choices = Choices(data)
     base = base_vdi(choices.integer(0, 15))
-    arguments: dict[str, Any] = {
-        "camera": base.camera,
-        "window_size": base.window_size,
-        **_arrays(base),
-        "bounds": base.bounds,
-        "depth_origin": base.depth_origin,
-        "metadata": {"made": "up"},
-    }
+    arguments: dict[str, Any] = {**_arrays(base), "metadata": {"made": "up"}}
+    for name in ("camera", "window_size", "bounds", "depth_origin"):
+        arguments[name] = getattr(base, name)
     for _ in range(choices.integer(1, 3)):
         name = choices.pick(sorted(arguments))
         value = arguments[name]
@@ -499,9 +469,6 @@ def vtk_form(data: bytes) -> None:
         _check_valid(vdi_from_image(image))
 
 
-# -- the command line ------------------------------------------------------------------------------
-
-
 @cache
 def command_folder() -> Path:
     """A folder with what commands may be given: a volume, tables, views, VDIs and rubbish."""
@@ -543,35 +510,31 @@ _TEXTS = (
 #: Lengths of steps: none is so short that a ray takes millions.
 _STEPS = ("0.5", "1", "0", "-1", "nan", "inf", "1e300", "1e-12", "x", "2")
 
-_VERBS: dict[str, tuple[tuple[Any, ...], tuple[str, ...]]] = {
+#: Of each verb: what it needs, and options.
+_VERBS: dict[str, tuple[tuple[Any, ...], str]] = {
     "generate": (
         ((_VOLUMES,), ("-o", _OUTPUTS), ("--size", _SIZES)),
         (
-            *("--max-supersegments", "--tolerance", "--view-cone", "--clim", "--opacity", "--cmap"),
-            *("--level", "--channel", "--time-index", "--compression-level", "--compression"),
-            *("--position", "--focal-point", "--view-up", "--azimuth"),
-            *("--elevation", "--view-angle", "--parallel-scale", "--camera-json", "--n-colors"),
-            *("--transfer-function", "--sample-distance", "--scalars", "--preference", "--tf"),
-            *("--device", "--opacity-unit-distance", "--log-scale", "--flip-scalars"),
-            "--memory-limit",
+            "--max-supersegments --tolerance --view-cone --clim --opacity --cmap --level --channel "
+            "--time-index --compression-level --compression --position --focal-point --view-up "
+            "--azimuth --elevation --view-angle --parallel-scale --camera-json --n-colors "
+            "--transfer-function --sample-distance --scalars --preference --tf --device "
+            "--opacity-unit-distance --log-scale --flip-scalars --memory-limit"
         ),
     ),
     "render": (
         ((_INPUTS,), ("-o", _OUTPUTS), ("--size", _SIZES)),
         (
-            *("--background", "--position", "--focal-point", "--view-up", "--azimuth", "--device"),
-            *("--elevation", "--view-angle", "--parallel-scale", "--camera-json"),
+            "--background --position --focal-point --view-up --azimuth --device --elevation "
+            "--view-angle --parallel-scale --camera-json"
         ),
     ),
     "convert": (
         ((_INPUTS,), ("-o", _OUTPUTS)),
-        (
-            *("--compression-level", "--compression", "--camera-json", "--thickness"),
-            "--standard-channels",
-        ),
+        "--compression-level --compression --camera-json --thickness --standard-channels",
     ),
-    "info": (((_INPUTS,),), ("--json",)),
-    "devices": ((), ("--json",)),
+    "info": (((_INPUTS,),), "--json"),
+    "devices": ((), "--json"),
 }
 #: Which verb: what does most is tried most.
 _TRIED = ("generate", "generate", "generate", "render", "render", "convert", "convert", "info")
@@ -588,7 +551,7 @@ def _arguments(choices: Choices) -> list[str]:
             *flag, values = wanted
             arguments += [*flag, choices.pick(values)]
     for _ in range(choices.integer(0, 4)):
-        name = choices.pick(optional)
+        name = choices.pick(optional.split())
         arguments.append(name)
         if name in _SWITCHES:
             continue
@@ -651,9 +614,6 @@ def command_line(data: bytes) -> None:
         assert not unprintable, f"{arguments}: control characters {unprintable} in the message"
 
 
-# -- the public functions one after the other ------------------------------------------------------
-
-
 class _Session:
     """A user who does one thing after the other, some of them wrong."""
 
@@ -664,16 +624,8 @@ class _Session:
         self.table = TransferFunction(np.eye(3), [0.0, 0.3, 0.6], (0, 60), interpolation="linear")
         self.vdi = base_vdi(1)
         self.steps: tuple[Callable[[], None], ...] = (
-            self.generate,
-            self.render,
-            self.render_volume,
-            self.take_camera,
-            self.take_volume,
-            self.take_table,
-            self.save_and_read,
-            self.through_vtk,
-            self.edit_vdi,
-            self.classify,
+            *(self.generate, self.render, self.render_volume, self.take_camera, self.take_volume),
+            *(self.take_table, self.save_and_read, self.through_vtk, self.edit_vdi, self.classify),
             self.estimate,
         )
 
@@ -690,14 +642,17 @@ class _Session:
     def planes(self) -> Any:
         if not self.choices.chance(3):
             return None
-        return [
-            [self.choices.number() for _ in range(6)] for _ in range(self.choices.integer(0, 2))
-        ]
+        n_planes = self.choices.integer(0, 2)
+        return [[self.choices.number() for _ in range(6)] for _ in range(n_planes)]
 
     def ends(self, size: Any) -> Any:
         if not self.choices.chance(3) or not isinstance(size, tuple) or max(size) > 100:
             return None
         return np.full(size[::-1], self.choices.number(), np.float64)
+
+    def cuts(self, size: Any) -> dict[str, Any]:
+        ends = {"clipping_planes": self.planes(), "opaque_depth": self.ends(size)}
+        return {**ends, "skip_empty": self.choices.chance(2)}
 
     def options(self, known: dict[str, tuple[Any, ...]]) -> dict[str, Any]:
         given = {}
@@ -724,22 +679,14 @@ class _Session:
         size = self.size()
         samples = self.choices.pick((None, None, 1, 30, 0, "x", 2.5, float("inf")))
         image = pvdi.render(
-            *(self.vdi, self.camera, size),
-            clipping_planes=self.planes(),
-            opaque_depth=self.ends(size),
-            skip_empty=self.choices.chance(2),
-            preview_samples=samples,
+            *(self.vdi, self.camera, size), **self.cuts(size), preview_samples=samples
         )
         self.check_image(image, size or self.vdi.window_size)
 
     def render_volume(self) -> None:
         size = self.size()
         image = pvdi.render_volume(
-            *(self.volume, self.camera, size),
-            transfer_function=self.table,
-            clipping_planes=self.planes(),
-            opaque_depth=self.ends(size),
-            skip_empty=self.choices.chance(2),
+            *(self.volume, self.camera, size), transfer_function=self.table, **self.cuts(size)
         )
         self.check_image(image, size)
 
@@ -834,9 +781,7 @@ class _Session:
         name = choices.pick(sorted(arrays))
         arrays[name] = _changed_array(choices, arrays[name])
         origin = choices.pick((vdi.depth_origin, 0.0, choices.number()))
-        self.vdi = VDI(
-            vdi.camera, vdi.window_size, **arrays, bounds=vdi.bounds, depth_origin=origin
-        )
+        self.vdi = _with(vdi, depth_origin=origin, **arrays)
 
     def classify(self) -> None:
         given = self.options(
@@ -865,17 +810,8 @@ class _Session:
 
 # -- what clients of a server say ------------------------------------------------------------------
 
-_VIEW = {
-    "type": "view",
-    "camera": {
-        "position": [0, -5, 0],
-        "focal_point": [0, 0, 0],
-        "view_up": [0, 0, 1],
-        "view_angle": 30,
-    },
-    "size": [64, 48],
-    "moving": True,
-}
+_CAMERA = {"position": [0, -5, 0], "focal_point": [0, 0, 0], "view_up": [0, 0, 1], "view_angle": 30}
+_VIEW = {"type": "view", "camera": _CAMERA, "size": [64, 48], "moving": True}
 _SAID = (
     _VIEW,
     {**_VIEW, "camera": {**_VIEW["camera"], "parallel_scale": 2.0}},
@@ -939,10 +875,8 @@ def public_functions(data: bytes) -> None:
 TARGETS: dict[str, Callable[[bytes], None]] = {
     target.__name__: target
     for target in (
-        *(vdi_bytes, vdi_members, exr_bytes, exr_patches),
-        *(vdis_bytes, vdis_frames),
-        *(vdiset_bytes, vdiset_heads),
-        *(html_bytes, html_patches, served_messages),
+        *map(_any_bytes, READERS),
+        *(vdi_members, exr_patches, vdis_frames, vdiset_heads, html_patches, served_messages),
         *(validator, vtk_form, command_line, public_functions),
     )
 }

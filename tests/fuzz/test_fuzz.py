@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import ast
-import hashlib
 from pathlib import Path
 
 import pytest
@@ -18,32 +17,20 @@ import pyvista_vdi
 
 CORPUS = Path(__file__).parent / "corpus"
 
-#: Inputs of each target: together some ten seconds on two cores; nightly runs run.py.
+#: Inputs of each target, where they are not 50: together some ten seconds on two cores; nightly
+#: runs run.py.
 EXAMPLES = {
-    "vdi_bytes": 50,
-    "vdi_members": 100,
-    "exr_bytes": 50,
-    "exr_patches": 100,
-    "vdis_bytes": 50,
     "vdis_frames": 20,
-    "vdiset_bytes": 30,
     "vdiset_heads": 20,
-    "html_bytes": 25,
-    "html_patches": 75,
+    "command_line": 30,
+    "public_functions": 25,
     "served_messages": 200,
     "validator": 250,
     "vtk_form": 150,
-    "command_line": 75,
-    "public_functions": 50,
 }
 #: Those that need a device, or VTK.
 ON_A_DEVICE = ("command_line", "public_functions")
-WITH_VTK = ("vtk_form", "command_line", "public_functions")
-
-
-def kept(target):
-    folder = CORPUS / target
-    return sorted(folder.iterdir()) if folder.is_dir() else []
+WITH_VTK = ("vtk_form", *ON_A_DEVICE)
 
 
 @pytest.fixture
@@ -59,14 +46,14 @@ def target(request):
 @pytest.mark.parametrize("target", TARGETS, indirect=True)
 def test_inputs_that_were_kept(target):
     """Seeds that reach far into the code, and every input that once broke a promise."""
-    for path in kept(target.__name__):
+    for path in sorted((CORPUS / target.__name__).glob("*")):
         target(path.read_bytes())
 
 
 @pytest.mark.parametrize("target", TARGETS, indirect=True)
 def test_new_inputs(target):
     @settings(
-        max_examples=EXAMPLES[target.__name__],
+        max_examples=EXAMPLES.get(target.__name__, 50),
         derandomize=True,
         deadline=None,
         database=None,
@@ -80,49 +67,22 @@ def test_new_inputs(target):
     fuzz()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("target", TARGETS, indirect=True)
-def test_many_more_inputs(target):
-    """Random bytes by number: what hypothesis' small examples hardly reach."""
-    for number in range(20 * EXAMPLES[target.__name__]):
-        seed = hashlib.sha512(number.to_bytes(4, "little")).digest()
-        data = (seed * 8)[: 20 + seed[0] * 2]
-        try:
-            target(data)
-        except BaseException as error:
-            raise AssertionError(f"input {number}: {data!r}") from error
-
-
 def test_the_corpus_is_small_and_known():
     files = [path for path in CORPUS.rglob("*") if path.is_file()]
     assert {path.parent.name for path in files} <= set(TARGETS)
     assert sum(path.stat().st_size for path in files) < 200_000
-    assert set(EXAMPLES) == set(TARGETS)
+    assert set(EXAMPLES) <= set(TARGETS)
 
 
 # -- nothing is executed --------------------------------------------------------------------------
 
-#: Modules that make objects or code of data, and functions that do.
-_MODULES = {
-    "pickle",
-    "cPickle",
-    "dill",
-    "cloudpickle",
-    "marshal",
-    "shelve",
-    "yaml",
-    "runpy",
-    "code",
+#: Modules that make objects or code of data, or start programs, and functions that do.
+MODULES = {
+    *("pickle", "cPickle", "dill", "cloudpickle", "marshal", "shelve", "yaml", "runpy", "code"),
+    "subprocess",
 }
-_FUNCTIONS = {"eval", "exec", "compile", "__import__"}
-#: Those of JSON apart; the others start programs.
-_METHODS = {"loads", "system", "popen", "Popen", "memmap"}
-
-
-def _calls(tree):
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call):
-            yield node
+FUNCTIONS = {"eval", "exec", "compile", "__import__"}
+METHODS = {"loads", "system", "popen", "Popen", "memmap"}
 
 
 def test_nothing_in_the_package_makes_code_or_objects_of_data():
@@ -131,26 +91,24 @@ def test_nothing_in_the_package_makes_code_or_objects_of_data():
     sources = sorted(package.rglob("*.py"))
     assert len(sources) > 50
     for path in sources:
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        for node in ast.walk(tree):
+        # ParaView's own Python is asked for its devices, by a text that is part of the package
+        allowed = {"subprocess"} if path.parts[-2:] == ("cli", "paraview.py") else set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             names = []
             if isinstance(node, ast.Import):
                 names = [alias.name for alias in node.names]
             elif isinstance(node, ast.ImportFrom):
                 names = [node.module or ""]
-            # ParaView's own Python is asked for its devices, by a text that is part of the package
-            others = set() if path.parts[-2:] == ("cli", "paraview.py") else {"subprocess"}
-            used = {name.split(".")[0] for name in names} & (_MODULES | others)
+            used = {name.split(".")[0] for name in names} & (MODULES - allowed)
             assert not used, f"{path}:{node.lineno} imports {used}"
-        for call in _calls(tree):
-            function = call.func
-            where = f"{path}:{call.lineno}"
+            if not isinstance(node, ast.Call):
+                continue
+            where, function = f"{path}:{node.lineno}", node.func
+            assert not any(k.arg == "allow_pickle" for k in node.keywords), where
             if isinstance(function, ast.Name):
-                assert function.id not in _FUNCTIONS, where
-            elif isinstance(function, ast.Attribute) and function.attr in _METHODS:
+                assert function.id not in FUNCTIONS, where
+            elif isinstance(function, ast.Attribute):
                 owner = function.value.id if isinstance(function.value, ast.Name) else ""
-                assert owner in ("json", "platform"), f"{where}: {owner}.{function.attr}"
-            elif isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
-                # It reads pickles if it is told to
-                assert (function.value.id, function.attr) != ("np", "load"), where
-            assert not any(k.arg == "allow_pickle" for k in call.keywords), where
+                if function.attr in METHODS:  # JSON's loads makes no objects
+                    assert owner in ("json", "platform"), f"{where}: {owner}.{function.attr}"
+                assert (owner, function.attr) != ("np", "load"), where  # which may read pickles

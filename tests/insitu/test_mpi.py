@@ -18,6 +18,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.insitu import InSitu
+from pyvista_vdi.large.generate import generate_chunked
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.quality.probe import turned
 
@@ -30,11 +31,7 @@ needs_mpi = pytest.mark.skipif(
 )
 
 
-def run(case, folder):
-    run_program(4, PROGRAM, case, folder)
-
-
-def run_program(ranks, program, *arguments):
+def run(ranks, program, *arguments):
     mpirun = ["mpirun", "--oversubscribe", "--allow-run-as-root", "-n", str(ranks)]
     done = subprocess.run(
         [*mpirun, sys.executable, program, *arguments],
@@ -48,14 +45,19 @@ def run_program(ranks, program, *arguments):
 
 
 @needs_mpi
-def test_four_ranks_make_the_vdi_of_the_same_blocks(tmp_path, default_runtime):
-    run("same", tmp_path)
-    found = pvdi.read(tmp_path / "mpi.vdi")
+def test_four_ranks_make_the_vdi_of_the_same_blocks_and_all_say_what_fails(
+    tmp_path, default_runtime
+):
     volume = volume_of("uint8")
     function = transfer_for(volume, "linear", gradient_opacities=[0.2, 1], gradient_range=(0, 30))
     camera = VIEWS["all of it"](volume)
-    options = {"max_supersegments": 8, "device": default_runtime.info.selector}
-    whole = generate_vdi(volume, camera, WINDOW, function, ambient_occlusion=8.0, **options)
+    arguments = (volume, camera, WINDOW, function)
+    options = {"max_supersegments": 8, "ambient_occlusion": 8.0, "device": default_runtime}
+    # Here, so that not each rank compiles the kernels
+    generate_chunked(*arguments, chunks=(20, 41, 27), block_bytes=1, **options)
+    run(4, PROGRAM, "failing,same", tmp_path)
+    found = pvdi.read(tmp_path / "mpi.vdi")
+    whole = generate_vdi(*arguments, **options)
     assert found.metadata["blocks"] == [2, 1, 2]
     assert found.n_supersegments > 1000
     # float32 sums of up to 200 steps, in another order: 200 x 2^-24, and as much for the other
@@ -66,15 +68,10 @@ def test_four_ranks_make_the_vdi_of_the_same_blocks(tmp_path, default_runtime):
     assert compare_images(*(pvdi.render(vdi, view) for vdi in (found, whole))).ssim > 0.99
 
 
-@needs_mpi
-def test_what_fails_on_one_rank_is_said_by_all(tmp_path):
-    run("failing", tmp_path)
-
-
 @pytest.mark.slow
 @needs_mpi
 def test_a_simulation_writes_a_series_and_single_files(tmp_path):
-    run("series", tmp_path)
+    run(4, PROGRAM, "series", tmp_path)
     series = pvdi.read(tmp_path / "run.vdis")
     assert list(series.times) == [0.0, 1.0]
     assert sorted(path.name for path in tmp_path.glob("*.vdi")) == ["s00.vdi", "s02.vdi"]
@@ -88,7 +85,7 @@ def test_a_simulation_writes_a_series_and_single_files(tmp_path):
 @needs_mpi
 @pytest.mark.slow
 def test_the_example_writes_a_picture_and_says_what_it_costs(tmp_path):
-    said = run_program(2, EXAMPLE, tmp_path / "smoke.png")
+    said = run(2, EXAMPLE, tmp_path / "smoke.png")
     assert re.search(r"solver: \d+ ms a step; in situ: \d+ ms a VDI", said), said
     picture = np.asarray(Image.open(tmp_path / "smoke.png").convert("RGB")).astype(int)
     assert (picture[..., 0] - picture[..., 2] > 60).sum() > 200  # orange, in the spiral's middle
@@ -103,9 +100,9 @@ class OneRank:
     def allgather(self, value):
         return [value]
 
-    gather = alltoall = allgather
+    gather = allgather
 
-    def alltoall(self, values):  # noqa: F811
+    def alltoall(self, values):
         return values
 
     def scatter(self, values):
@@ -115,35 +112,38 @@ class OneRank:
         return value
 
 
-def test_one_rank_is_one_piece(tmp_path, default_runtime):
+@pytest.fixture
+def scene(default_runtime):
     volume = volume_of("uint8")
-    camera = VIEWS["all of it"](volume)
+    return volume, VIEWS["all of it"](volume), WINDOW
+
+
+def test_one_rank_is_one_piece(tmp_path, scene):
+    volume, *view = scene
+    options = {"clim": (0, 200), "precision": "exact"}
     path = str(tmp_path / "{}.vdi")
-    options = {"clim": (0, 200), "precision": "exact", "device": default_runtime.info.selector}
-    with InSitu(path, camera, WINDOW, volume.dimensions, comm=OneRank(), **options) as show:
+    with InSitu(path, *view, volume.dimensions, comm=OneRank(), **options) as show:
         show(volume.array, (0, 0, 0), 0.0)
     found = pvdi.read(tmp_path / "0.vdi")
-    expected = pvdi.generate(volume, camera, WINDOW, **options)
+    expected = pvdi.generate(*scene, **options)
     assert found.n_supersegments == expected.n_supersegments
     np.testing.assert_array_equal(found.front, expected.front)
 
 
 @pytest.mark.parametrize("precision", ["exact", "16-byte"])
-def test_a_series_has_the_precision_that_is_asked_for(precision, tmp_path, default_runtime):
-    volume = volume_of("uint8")
-    camera = VIEWS["all of it"](volume)
+def test_a_series_has_the_precision_that_is_asked_for(precision, tmp_path, scene):
+    volume, *view = scene
     options = {"clim": (0, 200), "precision": precision}
     path = tmp_path / "RUN.VDIS"
-    with InSitu(path, camera, WINDOW, volume.dimensions, comm=OneRank(), **options) as show:
+    with InSitu(path, *view, volume.dimensions, comm=OneRank(), **options) as show:
         show(volume.array, (0, 0, 0), 0.0)
     found = pvdi.read(path)[0]
     assert found.precision == precision
     assert found.n_supersegments > 1000
 
 
-def test_a_step_that_cannot_be_written_is_told_to_all_ranks(tmp_path, default_runtime):
-    volume = volume_of("uint8")
-    camera = VIEWS["all of it"](volume)
+def test_a_step_that_cannot_be_written_is_told_to_all_ranks(tmp_path, scene):
+    volume, *view = scene
     told = []
 
     class Told(OneRank):
@@ -151,26 +151,28 @@ def test_a_step_that_cannot_be_written_is_told_to_all_ranks(tmp_path, default_ru
             told.append(value)
             return [value]
 
-    show = InSitu(
-        tmp_path / "none" / "x.vdis", camera, WINDOW, volume.dimensions, comm=Told(), clim=(0, 200)
-    )
+    path = tmp_path / "none" / "x.vdis"
+    show = InSitu(path, *view, volume.dimensions, comm=Told(), clim=(0, 200))
     with pytest.raises(DeviceError, match=r"writing step 0 failed on 1 of 1 ranks.*does not exist"):
         show(volume.array, (0, 0, 0), 0.0)
     assert "does not exist" in told[-1]
 
 
-def test_what_is_missing_is_said(tmp_path):
+@pytest.mark.parametrize(
+    ("name", "dimensions", "options", "error", "message"),
+    [
+        ("x.vdis", (8, 8, 8), {}, InvalidArgumentError, "clim"),
+        *(
+            (name, (8, 8, 8), {"clim": (0, 1)}, InvalidArgumentError, "place for the step")
+            for name in ("x.vdi", "{}_{}.vdi", "{step}.vdi", "x{.vdi")
+        ),
+        ("x.vdis", (8, 8, 8), {"clim": (0, 1), "every": 0}, InvalidArgumentError, "every"),
+        ("x.vdis", (8, 8, 8), {"clim": (0, 1), "every": "often"}, InvalidArgumentError, "every"),
+        ("x.vdis", (8, 8), {"clim": (0, 1)}, InvalidArgumentError, "three whole numbers"),
+        ("x.vdis", (8, 8, 8), {"clim": (0, 1), "colour": "red"}, TypeError, "colour"),
+    ],
+)
+def test_what_is_missing_is_said(name, dimensions, options, error, message, tmp_path):
     camera = VIEWS["all of it"](volume_of("uint8"))
-    arguments = (camera, WINDOW, (8, 8, 8))
-    with pytest.raises(InvalidArgumentError, match="clim"):
-        InSitu(tmp_path / "x.vdis", *arguments, comm=OneRank())
-    for name in ("x.vdi", "{}_{}.vdi", "{step}.vdi", "x{.vdi"):
-        with pytest.raises(InvalidArgumentError, match="place for the step"):
-            InSitu(tmp_path / name, *arguments, comm=OneRank(), clim=(0, 1))
-    for every in (0, "often"):
-        with pytest.raises(InvalidArgumentError, match="every"):
-            InSitu(tmp_path / "x.vdis", *arguments, comm=OneRank(), clim=(0, 1), every=every)
-    with pytest.raises(InvalidArgumentError, match="three whole numbers"):
-        InSitu(tmp_path / "x.vdis", camera, WINDOW, (8, 8), comm=OneRank(), clim=(0, 1))
-    with pytest.raises(TypeError, match="colour"):
-        InSitu(tmp_path / "x.vdis", *arguments, comm=OneRank(), clim=(0, 1), colour="red")
+    with pytest.raises(error, match=message):
+        InSitu(tmp_path / name, camera, WINDOW, dimensions, comm=OneRank(), **options)

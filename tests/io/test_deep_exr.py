@@ -1,7 +1,4 @@
-"""OpenEXR deep images: ours come back to the last bit, others' within what is stated.
-
-One format, and the images by which each way of writing it is tried: hence more than 500 lines.
-"""
+"""OpenEXR deep images: ours come back to the last bit, others' within what is stated."""
 
 from __future__ import annotations
 
@@ -13,15 +10,18 @@ import struct
 import subprocess
 import sys
 import tracemalloc
+import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from deep_images import MATRICES, change, matrices_of, read_deep, write_deep
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import random_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import VDI, Camera, cli, io
+from pyvista_vdi import VDI, Camera, cli, examples, io
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     MissingDependencyError,
@@ -29,9 +29,9 @@ from pyvista_vdi.errors import (
     VDIWarning,
 )
 from pyvista_vdi.io.deep_exr import files as exr
-from pyvista_vdi.io.deep_exr import layout as exr_layout
-from pyvista_vdi.io.deep_exr import record as exr_record
-from pyvista_vdi.io.deep_exr import view as exr_view
+from pyvista_vdi.io.deep_exr.layout import MAGIC
+from pyvista_vdi.io.deep_exr.record import ATTRIBUTE
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH
 
 ARRAYS = ("offsets", "front", "back", "color", "optical_depth")
@@ -40,6 +40,9 @@ BOX = (-9, 9, -9, 9, -9, 9)
 
 #: Half the spacing of float32 at 1: what one rounding costs, relative to the value.
 ROUNDING = 2.0**-24
+
+#: A sample's Z, ZBack, A, R, G and B.
+GOOD = [5, 6, 0.5, 0.25, 0.5, 0.0]
 
 
 def same_bits(first, second):
@@ -57,40 +60,25 @@ def one_list(front, back, tau, color=0.5, **options):
     return VDI(camera, (1, 1), [0, n], front, back, colors, tau, BOX, **options)
 
 
-def write_foreign(path, pixels, size=(3, 2), *, view=VIEW, attributes=None, types=None, **options):
+NAMES = ("Z", "ZBack", "A", "R", "G", "B")
+
+
+def write_foreign(
+    path, pixels, size=(3, 2), *, view=VIEW, names=NAMES, types=None, compression="zips", **header
+):
     """Write a deep image as another program might.
 
     ``pixels`` has the samples (n, channels) of pixels (x, y), y = 0 at the bottom.
     """
-    names = options.pop("names", ("Z", "ZBack", "A", "R", "G", "B"))
-    counts = np.zeros(size[::-1], int)
-    rows = []
+    counts, rows = np.zeros(size[::-1], int), []
     for (x, y), samples in sorted(pixels.items(), key=lambda item: item[0][::-1]):
         counts[y, x] = len(samples)
         rows += samples
-    table = np.array(rows, float).reshape(-1, len(names))
-    types = dict.fromkeys(names, np.float32) | (types or {})
-    arrays = {name: table[:, i].astype(types[name]) for i, name in enumerate(names)}
-    matrices = {}
-    if view is not None:
-        to_camera, to_ndc = exr_view.view_matrices(view, size, 0.0)
-        matrices["worldToCamera"] = exr_layout.matrix_attribute(to_camera)
-        matrices["worldToNDC"] = exr_layout.matrix_attribute(to_ndc)
-    zero = {
-        "screenWindowCenter": ("v2f", bytes(8)),
-        "screenWindowWidth": ("float", struct.pack("<f", 1)),
-    }
-    with path.open("wb") as stream:
-        exr_layout.write_image(
-            stream,
-            counts,
-            types,
-            lambda first, last: {name: array[first:last] for name, array in arrays.items()},
-            zero | matrices | (attributes or {}),
-            compression=options.pop("compression", "zips"),
-            level=1,
-        )
-    return path
+    table = np.array(rows, float).reshape(-1, len(names)).T
+    kinds = dict.fromkeys(names, np.float32) | (types or {})
+    channels = {name: row.astype(kinds[name]) for name, row in zip(names, table, strict=True)}
+    matrices = {} if view is None else matrices_of(view, size)
+    return write_deep(path, counts, channels, matrices | header, compression)
 
 
 @pytest.fixture
@@ -103,16 +91,7 @@ def openexr():
     return pytest.importorskip("OpenEXR")
 
 
-def tool(name):
-    path = shutil.which(name)
-    if path is None:
-        pytest.skip(f"{name} is not installed")
-    return path
-
-
-# -- our own files ---------------------------------------------------------------------------------
-
-
+@settings(max_examples=50)
 @given(seed=st.integers(0, 2**32), compression=st.sampled_from(exr.COMPRESSIONS))
 def test_reading_gives_back_every_bit(seed, compression, tmp_path_factory):
     path = tmp_path_factory.getbasetemp() / f"round_trip_{os.getpid()}.exr"
@@ -145,7 +124,7 @@ def test_parallel_projection_with_negative_depths(tmp_path):
     view = VIEW.replace(parallel_projection=True, parallel_scale=2.0)
     vdi = one_list([-2.0, -0.0, 1e-38], [-1.0, 1e-40, 3e38], [0.5] * 3, camera=view)
     path = vdi.save(tmp_path / "a.exr")
-    image = exr_layout.read_image(path, lambda name: True)
+    image = read_deep(path)
     assert image.channels["Z"].min() >= 0  # as the standard demands
     assert same_bits(pvdi.read(path), vdi)
     # The eye in the matrices is where Z counts from
@@ -153,13 +132,10 @@ def test_parallel_projection_with_negative_depths(tmp_path):
     assert point[2] == pytest.approx(image.channels["Z"][0], abs=1e-6)
 
 
-def test_an_empty_vdi(tmp_path):
+def test_an_empty_vdi_and_what_the_file_says(file, tmp_path):
     vdi = VDI(VIEW, (4, 3), np.zeros(13, int), [], [], np.empty((0, 3)), [], BOX)
     assert pvdi.read(vdi.save(tmp_path / "a.exr")).equals(vdi)
     assert pvdi.read(vdi.save(tmp_path / "b.exr", exact=False)).n_supersegments == 0
-
-
-def test_info(file):
     vdi, info = small_vdi(), io.read_info(file)
     assert (info.camera, info.window_size) == (vdi.camera, vdi.window_size)
     assert (info.n_supersegments, info.bounds) == (vdi.n_supersegments, vdi.bounds)
@@ -179,7 +155,7 @@ def test_rows_run_from_the_top(tmp_path):
 def test_the_matrices_are_the_standards(file):
     """x right, y up, z forward; NDC (0, 0) at the upper left; row vectors."""
     vdi = small_vdi()
-    attributes = exr_layout.read_image(file, lambda name: False).attributes
+    attributes = read_deep(file).attributes
     rng, view = np.random.default_rng(3), vdi.camera
     points = np.append(np.asarray(view.focal_point) + rng.normal(size=(20, 3)), np.ones((20, 1)), 1)
     seen = points @ view.view_matrix.T
@@ -193,7 +169,7 @@ def test_the_matrices_are_the_standards(file):
 
 
 def test_the_standards_channels_are_everybodys(file):
-    vdi, image = small_vdi(), exr_layout.read_image(file, lambda name: True)
+    vdi, image = small_vdi(), read_deep(file)
     channels, tau = image.channels, vdi.optical_depth.astype(np.float64)
     depth = vdi.front.astype(np.float64) + vdi.depth_origin
     assert np.allclose(channels["Z"], depth, rtol=ROUNDING, atol=0)
@@ -202,43 +178,16 @@ def test_the_standards_channels_are_everybodys(file):
     assert np.allclose(channels["R"], red, rtol=ROUNDING * 1.01, atol=1e-45)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"compression": "zstd"}, r"of .*a\.exr must be one of zips and none; got 'zstd'"),
-        ({"level": 0}, "level must be a whole number from 1 to 9; got 0"),
-        ({"color": "half"}, "options compression, level, exact, linear; got color"),
-    ],
-)
-def test_options_that_are_unknown(options, message, tmp_path):
-    with pytest.raises(InvalidArgumentError, match=message):
-        small_vdi().save(tmp_path / "a.exr", **options)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_options_of_the_other_format(file, tmp_path):
-    with pytest.raises(
-        InvalidArgumentError, match="options compression, level, precision; got exact"
-    ):
-        small_vdi().save(tmp_path / "a.vdi", exact=True)
-    path = small_vdi().save(tmp_path / "a.vdi")
-    with pytest.raises(InvalidArgumentError, match="options none; got thickness"):
-        pvdi.read(path, thickness=1.0)
-
-
 def test_a_failure_leaves_the_old_file(file, monkeypatch):
     before = file.read_bytes()
-    monkeypatch.setattr(exr_layout, "_packed", lambda *_: (_ for _ in ()).throw(MemoryError()))
+    monkeypatch.setattr(zlib, "compress", lambda *_: (_ for _ in ()).throw(MemoryError()))
     with pytest.raises(MemoryError):
-        small_vdi(2).save(file)
+        small_vdi(2).save(file, compression="zips")
     assert file.read_bytes() == before
     assert [p.name for p in file.parent.iterdir()] == [file.name]
 
 
-# -- what is lost without our channels -------------------------------------------------------------
-
-
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(12))
 def test_standard_channels_lose_what_is_stated(seed, tmp_path):
     vdi = small_vdi(seed)
     back = pvdi.read(vdi.save(tmp_path / "a.exr", exact=False))
@@ -263,45 +212,9 @@ def test_standard_channels_lose_what_is_stated(seed, tmp_path):
         assert np.allclose(again, depth, rtol=ROUNDING * 1.01, atol=1e-6 * ROUNDING)
 
 
-def test_tau_alone_is_used(tmp_path):
-    names = ("Z", "ZBack", "A", "R", "G", "B", "tau")
-    path = write_foreign(
-        tmp_path / "a.exr", {(0, 0): [[1, 2, 1, 0.5, 0.5, 0.5, 77.0]]}, names=names
-    )
-    assert pvdi.read(path).optical_depth.tolist() == [77.0]
-
-
-def test_a_changed_file_is_read_by_its_standard_channels(tmp_path):
-    """Another program halved the opacity and kept our channels and attributes."""
-    vdi = one_list([1.0, 3.0], [2.0, 4.0], [1.0, 2.0])
-    path = vdi.save(tmp_path / "a.exr")
-    image = exr_layout.read_image(path, lambda name: True)
-    channels = dict(image.channels)
-    for name in "ARGB":
-        channels[name] = channels[name] / 2
-    description = image.attributes[exr_record.ATTRIBUTE].encode()
-    names = tuple(channels)
-    write_foreign(
-        path,
-        {(0, 0): np.stack(list(channels.values()), axis=1).tolist()},
-        (1, 1),
-        names=names,
-        types=image.channel_types,
-        attributes={exr_record.ATTRIBUTE: ("string", description)},
-    )
-    with pytest.warns(VDIWarning, match=r"a\.exr was changed after pyvista-vdi wrote it"):
-        back = pvdi.read(path)
-    assert np.allclose(-np.expm1(-back.optical_depth), -np.expm1([-1.0, -2.0]) / 2, rtol=1e-6)
-    assert np.allclose(back.color, 0.5, atol=1e-6)
-    assert back.camera == vdi.camera
-
-
-# -- other programs' files -------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("compression", ["zips", "none"])
 def test_a_foreign_file(compression, tmp_path):
-    samples = {(2, 1): [[5, 6, 0.5, 0.25, 0.5, 0.0], [6, 7, 1.0, 1.0, 0.5, 0.25]]}
+    samples = {(2, 1): [GOOD, [6, 7, 1.0, 1.0, 0.5, 0.25]]}
     path = write_foreign(tmp_path / "a.exr", samples, compression=compression)
     vdi = pvdi.read(path)
     assert vdi.window_size == (3, 2)
@@ -313,12 +226,11 @@ def test_a_foreign_file(compression, tmp_path):
     assert vdi.metadata == {"read_from": "a.exr"}
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(10))
 def test_the_view_comes_from_the_matrices(seed, tmp_path):
     vdi = small_vdi(seed)
     view = vdi.camera.replace(model_transform=np.eye(4))
-    pixels = {(0, 0): [[5, 6, 0.5, 0.25, 0.5, 0.0]]}
-    path = write_foreign(tmp_path / "a.exr", pixels, vdi.window_size, view=view)
+    path = write_foreign(tmp_path / "a.exr", {(0, 0): [GOOD]}, vdi.window_size, view=view)
     found = pvdi.read(path).camera
     # As matrices of the same pixels, to float32 of the matrix's own size
     want = view.viewport_matrix(vdi.window_size) @ view.view_matrix
@@ -338,16 +250,12 @@ def test_bounds_hold_everything(tmp_path):
 
 def test_windows_that_differ(tmp_path):
     """Samples outside the display window are left out; those inside stay in their pixels."""
-    sample = [5, 6, 0.5, 0.25, 0.5, 0.0]
-    pixels = {(x, y): [[5 + x, 6 + x, *sample[2:]]] for x in range(3) for y in range(2)}
-    path = write_foreign(
-        tmp_path / "a.exr",
-        pixels,
-        attributes={
-            "dataWindow": ("box2i", struct.pack("<4i", 0, 0, 2, 1)),
-            "displayWindow": ("box2i", struct.pack("<4i", 1, -2, 4, 0)),
-        },
-    )
+    pixels = {(x, y): [[5 + x, 6 + x, *GOOD[2:]]] for x in range(3) for y in range(2)}
+    boxes = {
+        "dataWindow": ("box2i", struct.pack("<4i", 0, 0, 2, 1)),
+        "displayWindow": ("box2i", struct.pack("<4i", 1, -2, 4, 0)),
+    }
+    path = write_foreign(tmp_path / "a.exr", pixels, **boxes)
     vdi = pvdi.read(path, camera=VIEW)
     assert vdi.window_size == (4, 3)
     # Data columns 1 and 2 are display columns 0 and 1; the upper data row is the lowest one shown
@@ -356,34 +264,26 @@ def test_windows_that_differ(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("view", "message"),
+    ("matrix", "message"),
     [
         (None, "does not say from where .* worldToNDC is missing; give the view: .*camera="),
         (np.zeros((4, 4)), r"flatten"),
         (np.full((4, 4), np.nan), "not finite"),
         (np.diag([1.0, 1, 1, 1]), "parallel projection.*worldToCamera"),
+        (matrices_of(VIEW, (6, 2))["worldToNDC"], "pixels are not square"),
     ],
 )
-def test_no_view(view, message, tmp_path):
-    attributes = {} if view is None else {"worldToNDC": exr_layout.matrix_attribute(view)}
-    path = write_foreign(
-        tmp_path / "a.exr", {(0, 0): [[5, 6, 0.5, 0, 0, 0]]}, view=None, attributes=attributes
-    )
+def test_no_view(matrix, message, tmp_path):
+    header = {} if matrix is None else {"worldToNDC": matrix}
+    path = write_foreign(tmp_path / "a.exr", {(0, 0): [GOOD]}, view=None, **header)
     with pytest.raises(VDIFileError, match=message):
         pvdi.read(path)
     assert pvdi.read(path, camera=VIEW).camera == VIEW
 
 
-def test_pixels_that_are_not_square(tmp_path):
-    wide = exr_layout.matrix_attribute(exr_view.view_matrices(VIEW, (6, 2), 0.0)[1])
-    path = write_foreign(tmp_path / "a.exr", {}, attributes={"worldToNDC": wide})
-    with pytest.raises(VDIFileError, match="pixels are not square"):
-        pvdi.read(path)
-
-
 @pytest.mark.parametrize("with_back", [True, False])
 def test_samples_without_thickness(with_back, tmp_path):
-    names = ("Z", "ZBack", "A", "R", "G", "B") if with_back else ("Z", "A", "R", "G", "B")
+    names = NAMES if with_back else [name for name in NAMES if name != "ZBack"]
     # ZBack before Z also means a point (the standard's "Sample Locations")
     sample = [5, *([4] if with_back else []), 0.5, 0.25, 0.5, 0.0]
     path = write_foreign(tmp_path / "a.exr", {(1, 1): [sample]}, names=names)
@@ -392,10 +292,9 @@ def test_samples_without_thickness(with_back, tmp_path):
     vdi = pvdi.read(path, thickness=0.5)
     assert (vdi.front.tolist(), vdi.back.tolist()) == ([5], [5.5])
     assert vdi.optical_depth[0] == pytest.approx(np.log(2))
-    with pytest.raises(InvalidArgumentError, match="thickness must be a positive length"):
-        pvdi.read(path, thickness=-1)
-    with pytest.raises(InvalidArgumentError, match="thickness must be .* got 'thin'"):
-        pvdi.read(path, thickness="thin")
+    for thickness in (-1, "thin"):
+        with pytest.raises(InvalidArgumentError, match=f"a positive length.* got {thickness!r}"):
+            pvdi.read(path, thickness=thickness)
 
 
 def test_unsorted_and_overlapping_samples_are_tidied(tmp_path):
@@ -418,13 +317,6 @@ def test_unsorted_and_overlapping_samples_are_tidied(tmp_path):
     assert vdi.color[3] == pytest.approx([2 / 3, 1 / 3, 0], abs=1e-5)
 
 
-def test_one_pixel_with_too_many_overlaps(tmp_path):
-    samples = [[1, 1000 + i, 0.5, 0, 0, 0] for i in range(4097)]
-    path = write_foreign(tmp_path / "a.exr", {(0, 0): samples})
-    with pytest.raises(VDIFileError, match="4097 overlapping samples in one pixel"):
-        pvdi.read(path)
-
-
 def test_colours_outside_the_range(tmp_path):
     samples = [[1, 2, 0.5, 2.0, 0.25, -0.5], [2, 3, 0.0, 1.0, 0, 0], [3, 4, 0.5, 0, 0, 0]]
     path = write_foreign(tmp_path / "a.exr", {(0, 0): samples})
@@ -434,59 +326,45 @@ def test_colours_outside_the_range(tmp_path):
     assert vdi.front.tolist() == [1, 3]
 
 
-def test_half_floats(tmp_path):
+def test_half_floats_and_tau(tmp_path):
     types = dict.fromkeys("ARGB", np.float16)
     path = write_foreign(tmp_path / "a.exr", {(0, 0): [[1, 2, 0.3, 0.3, 0.1, 0]]}, types=types)
     vdi = pvdi.read(path)
     # float16 rounds by 2**-11 of the value at most; the colour is a quotient of two
     assert vdi.color[0] == pytest.approx([1, 1 / 3, 0], rel=2**-10)
     assert vdi.optical_depth[0] == pytest.approx(-np.log(0.7), rel=2**-10)
+    write_foreign(path, {(0, 0): [[1, 2, 1, 0.5, 0.5, 0.5, 77.0]]}, names=(*NAMES, "tau"))
+    assert pvdi.read(path).optical_depth.tolist() == [77.0]
 
 
-# -- files that say nonsense -----------------------------------------------------------------------
-
-
-GOOD = [5, 6, 0.5, 0.25, 0.5, 0.0]
-
-
-@pytest.mark.parametrize(
-    ("place", "value", "message"),
-    [
-        (0, np.nan, "'Z and ZBack finite'.*Z nan"),
-        (1, np.inf, "'Z and ZBack finite'"),
-        (0, -1, "'Z not negative'"),
-        (2, -0.1, "'A from 0 to 1'.*A -0.1"),
-        (2, 1.1, "'A from 0 to 1'"),
-        (2, np.nan, "'A from 0 to 1'"),
-        (4, np.nan, "'R, G and B finite'"),
-        (5, -np.inf, "'R, G and B finite'"),
-    ],
-)
-def test_values_that_mean_nothing(place, value, message, tmp_path):
-    bad = list(GOOD)
-    bad[place] = value
-    path = write_foreign(tmp_path / "a.exr", {(0, 0): [bad]})
-    with pytest.raises(VDIFileError, match=message):
-        pvdi.read(path)
+def but(place, value):
+    return [[*GOOD[:place], value, *GOOD[place + 1 :]]]
 
 
 @pytest.mark.parametrize(
-    ("names", "types", "message"),
+    ("samples", "names", "types", "message"),
     [
-        (("A", "B", "G", "R", "ZBack"), {}, r"has no channel Z; it has A, B, G, R, ZBack"),
-        (("A", "Y", "Z"), {}, r"has no channel R, G, B; it has A, Y, Z"),
-        (("A", "B", "G", "R", "Z"), {"A": np.uint32}, "its channel A is of type uint32"),
+        (but(0, np.nan), NAMES, {}, "'Z and ZBack finite'.*Z nan"),
+        (but(1, np.inf), NAMES, {}, "'Z and ZBack finite'"),
+        (but(0, -1), NAMES, {}, "'Z not negative'"),
+        (but(2, -0.1), NAMES, {}, "'A from 0 to 1'.*A -0.1"),
+        (but(2, 1.1), NAMES, {}, "'A from 0 to 1'"),
+        (but(2, np.nan), NAMES, {}, "'A from 0 to 1'"),
+        (but(4, np.nan), NAMES, {}, "'R, G and B finite'"),
+        (but(5, -np.inf), NAMES, {}, "'R, G and B finite'"),
+        ([[1] * 5], ("A", "B", "G", "R", "ZBack"), {}, "has no channel Z; it has A, B, G, R, ZBa"),
+        ([[1] * 3], ("A", "Y", "Z"), {}, "has no channel R, G, B; it has A, Y, Z"),
+        ([[1] * 6], NAMES, {"A": np.uint32}, "its channel A is of type uint32"),
+        (
+            [[1, 1000 + i, 0.5, 0, 0, 0] for i in range(4097)],
+            *(NAMES, {}, "4097 overlapping samples in one pixel"),
+        ),
     ],
 )
-def test_wrong_channels(names, types, message, tmp_path):
-    path = write_foreign(tmp_path / "a.exr", {(0, 0): [[1] * len(names)]}, names=names, types=types)
+def test_samples_that_mean_nothing(samples, names, types, message, tmp_path):
+    path = write_foreign(tmp_path / "a.exr", {(0, 0): samples}, names=names, types=types)
     with pytest.raises(VDIFileError, match=message):
         pvdi.read(path)
-
-
-def test_an_absent_file(tmp_path):
-    with pytest.raises(VDIFileError, match=r"none\.exr cannot be read: No such file"):
-        pvdi.read(tmp_path / "none.exr")
 
 
 @pytest.mark.parametrize(
@@ -494,21 +372,23 @@ def test_an_absent_file(tmp_path):
     [
         (b"", "it is empty"),
         (b"PK\x03\x04" + bytes(100), "is not an OpenEXR file"),
-        (exr_layout.MAGIC + struct.pack("<I", 2) + bytes(50), "a flat image"),
-        (exr_layout.MAGIC + struct.pack("<I", 0x803) + bytes(50), "its version is 3"),
-        (exr_layout.MAGIC + struct.pack("<I", 0x802) + b"x" * 100, "a name .* has no end"),
-        (exr_layout.MAGIC + struct.pack("<I", 0x802) + bytes(50), "its type is None"),
+        (MAGIC + struct.pack("<I", 2) + bytes(50), "a flat image"),
+        (MAGIC + struct.pack("<I", 0x803) + bytes(50), "its version is 3"),
+        (MAGIC + struct.pack("<I", 0x802) + b"x" * 100, "a name .* has no end"),
+        (MAGIC + struct.pack("<I", 0x802) + bytes(50), "its type is None"),
     ],
 )
 def test_other_files(content, message, tmp_path):
     (tmp_path / "a.exr").write_bytes(content)
     with pytest.raises(VDIFileError, match=message):
         pvdi.read(tmp_path / "a.exr")
+    with pytest.raises(VDIFileError, match=r"none\.exr cannot be read: No such file"):
+        pvdi.read(tmp_path / "none.exr")
 
 
 def test_every_truncation_is_noticed(file):
     whole = file.read_bytes()
-    for cut in sorted({*range(0, 1200, 7), *range(0, len(whole), 331), len(whole) - 1}):
+    for cut in sorted({*range(0, 1200, 17), *range(0, len(whole), 631), len(whole) - 1}):
         file.write_bytes(whole[:cut])
         with pytest.raises(VDIFileError):
             pvdi.read(file)
@@ -531,43 +411,19 @@ def test_changed_bytes_never_crash(file):
     assert refused > 0.8 * len(positions)
 
 
-JUNK = (None, -1, True, 2**70, "x", [], {}, [1])
+KEYS = (
+    *("format", "version", "window_size", "n_supersegments", "camera", "bounds", "depth_origin"),
+    *("depth_offset", "exact", "linear", "checksums", "metadata"),
+)
 
 
 @pytest.mark.filterwarnings("ignore::pyvista_vdi.errors.VDIWarning")
-@pytest.mark.parametrize(
-    "key",
-    [
-        "format",
-        "version",
-        "window_size",
-        "n_supersegments",
-        "camera",
-        "bounds",
-        "depth_origin",
-        "depth_offset",
-        "exact",
-        "linear",
-        "checksums",
-        "metadata",
-    ],
-)
+@pytest.mark.parametrize("key", KEYS)
 def test_junk_in_the_description(key, tmp_path):
-    vdi = one_list([1.0], [2.0], [1.0])
-    path = vdi.save(tmp_path / "a.exr")
-    image = exr_layout.read_image(path, lambda name: True)
-    for value in JUNK:
-        description = json.loads(image.attributes[exr_record.ATTRIBUTE])
-        description[key] = value
-        rows = np.stack([a.astype(float) for a in image.channels.values()], axis=1).tolist()
-        write_foreign(
-            path,
-            {(0, 0): rows},
-            (1, 1),
-            names=tuple(image.channels),
-            types=image.channel_types,
-            attributes={exr_record.ATTRIBUTE: ("string", json.dumps(description).encode())},
-        )
+    path = one_list([1.0], [2.0], [1.0]).save(tmp_path / "a.exr")
+    description = json.loads(read_deep(path).attributes[ATTRIBUTE])
+    for value in (None, -1, True, 2**70, "x", [], {}, [1]):
+        change(path, **{ATTRIBUTE: json.dumps({**description, key: value})})
         try:
             back = pvdi.read(path)
         except VDIFileError:
@@ -575,36 +431,43 @@ def test_junk_in_the_description(key, tmp_path):
         assert back.n_supersegments == 1, (key, value)
 
 
-def _peak_of_refusal(path, message):
+def check_refused_in(most, path, data, message):
+    """Hold the bytes of memory that a file's refusal takes against a limit."""
+    path.write_bytes(data)
     tracemalloc.start()
     try:
         with pytest.raises(VDIFileError, match=message):
             pvdi.read(path)
-        return tracemalloc.get_traced_memory()[1]
+        assert tracemalloc.get_traced_memory()[1] < most
     finally:
         tracemalloc.stop()
 
 
-def test_a_window_larger_than_the_file(file):
+@pytest.mark.parametrize(
+    ("last", "message"),
+    [
+        (65535, "it ends within its header|scan line"),
+        (2**31 - 1, "its dataWindow is 2147483648 x 2147483648"),
+    ],
+)
+def test_a_window_larger_than_the_file(last, message, file):
     width, height = small_vdi().window_size
     box = struct.pack("<4i", 0, 0, width - 1, height - 1)
-    data = file.read_bytes()
-    file.write_bytes(data.replace(box, struct.pack("<4i", 0, 0, 65535, 65535)))
-    assert _peak_of_refusal(file, "it ends within its header|scan line") < 2**21
-    file.write_bytes(data.replace(box, struct.pack("<4i", 0, 0, 2**31 - 1, 2**31 - 1)))
-    assert _peak_of_refusal(file, "its dataWindow is 2147483648 x 2147483648") < 2**21
+    data = file.read_bytes().replace(box, struct.pack("<4i", 0, 0, last, last))
+    check_refused_in(2**21, file, data, message)
+    data = data.replace(b"dataWindow\0box2i", b"dataWindoX\0box2i")
+    check_refused_in(2**21, file, data, "its dataWindow is missing")
 
 
 def test_a_line_that_does_not_unpack_is_named(tmp_path):
-    vdi = VDI(VIEW, (1, 3), [0, 0, 1, 99], np.arange(1.0, 100), np.arange(2.0, 101),
-              np.full((99, 3), 0.5), np.ones(99), BOX)  # fmt: skip
-    path = vdi.save(tmp_path / "a.exr", exact=False)
+    front = np.arange(1.0, 100)
+    arrays = (front, front + 1, np.full((99, 3), 0.5), np.ones(99))
+    path = VDI(VIEW, (1, 3), [0, 0, 1, 99], *arrays, BOX).save(tmp_path / "a.exr", exact=False)
     data = bytearray(path.read_bytes())
-    offset = exr_layout._Image(path)._at  # where the table of scan lines begins
-    (at,) = struct.unpack_from("<Q", data, offset)  # the upper line
+    # The table of three scan lines begins where the first one is right behind it: the upper line
+    at = next(i + 24 for i in range(len(data)) if data[i : i + 8] == struct.pack("<Q", i + 24))
     sums, packed = struct.unpack_from("<QQ", data, at + 4)
-    begin = at + 28 + sums
-    data[begin : begin + packed] = bytes(packed)
+    data[at + 28 + sums : at + 28 + sums + packed] = bytes(packed)
     path.write_bytes(data)
     with pytest.raises(VDIFileError, match="scan line 0 does not hold"):
         pvdi.read(path)
@@ -612,21 +475,14 @@ def test_a_line_that_does_not_unpack_is_named(tmp_path):
 
 def test_more_samples_than_the_file_can_hold(tmp_path):
     """A scan line declares two billion samples, and its packed bytes cannot be that many."""
-    vdi = one_list([1.0], [2.0], [1.0])
-    path = vdi.save(tmp_path / "a.exr", compression="none")
+    path = one_list([1.0], [2.0], [1.0]).save(tmp_path / "a.exr", compression="none")
     n, bytes_each = 2**31 - 1, 40
     data = bytearray(path.read_bytes())
     at = data.index(struct.pack("<iQQQ", 0, 4, 40, 40))
-    data[at + 20 : at + 28] = struct.pack("<Q", n * bytes_each)
-    data[at + 28 : at + 32] = struct.pack("<i", n)
-    path.write_bytes(data)
-    assert _peak_of_refusal(path, "which 40 packed bytes cannot hold") < 2**20
+    data[at + 20 : at + 32] = struct.pack("<Qi", n * bytes_each, n)
+    check_refused_in(2**20, path, data, "which 40 packed bytes cannot hold")
     data[at + 28 : at + 32] = struct.pack("<i", -1)
-    path.write_bytes(data)
-    assert _peak_of_refusal(path, "fewer than 0 samples") < 2**20
-
-
-# -- other forms, and other programs ---------------------------------------------------------------
+    check_refused_in(2**20, path, data, "fewer than 0 samples")
 
 
 def package_arrays(image):
@@ -638,23 +494,17 @@ def package_arrays(image):
         yield name, np.ascontiguousarray(pixels.reshape(image.counts.shape)[::-1])
 
 
-def write_by_package(openexr, image, path, **header):
-    attributes = {
-        n: v.astype("f4") if isinstance(v, np.ndarray) else v
-        for n, v in image.attributes.items()
-        if n in (exr_record.ATTRIBUTE, "worldToCamera", "worldToNDC")
-    }
-    header = {"type": openexr.deepscanline, **attributes, **header}
-    openexr.File(header, dict(package_arrays(image))).write(str(path))
-
-
 @pytest.mark.parametrize("compression", ["ZIPS", "RLE", "NO"])
-def test_what_the_package_writes_we_read(openexr, compression, file, tmp_path):
-    image = exr_layout.read_image(file, lambda name: True)
-    path = tmp_path / "other.exr"
-    method = getattr(openexr, f"{compression}_COMPRESSION")
-    write_by_package(openexr, image, path, compression=method)
-    back = pvdi.read(path)
+def test_what_the_package_writes_we_read(openexr, compression, file):
+    image = read_deep(file)
+    header = {
+        "type": openexr.deepscanline,
+        "compression": getattr(openexr, f"{compression}_COMPRESSION"),
+        ATTRIBUTE: image.attributes[ATTRIBUTE],
+        **{name: image.attributes[name].astype("f4") for name in MATRICES},
+    }
+    openexr.File(header, dict(package_arrays(image))).write(str(file))
+    back = pvdi.read(file)
     assert back.equals(small_vdi())
     assert same_bits(back, small_vdi())
 
@@ -662,7 +512,7 @@ def test_what_the_package_writes_we_read(openexr, compression, file, tmp_path):
 @pytest.mark.parametrize("compression", exr.COMPRESSIONS)
 def test_what_we_write_the_package_reads(openexr, compression, tmp_path):
     path = small_vdi().save(tmp_path / "a.exr", compression=compression)
-    image = exr_layout.read_image(path, lambda name: True)
+    image = read_deep(path)
     channels = openexr.File(str(path), separate_channels=True).channels()
     assert sorted(channels) == sorted(image.channels)
     for name, array in image.channels.items():
@@ -673,14 +523,14 @@ def test_what_we_write_the_package_reads(openexr, compression, tmp_path):
 
 
 def test_several_parts_are_read_by_the_package(openexr, file, tmp_path):
-    image = exr_layout.read_image(file, lambda name: True)
+    image = read_deep(file)
     path = tmp_path / "parts.exr"
     depth = {"Z": np.zeros(image.counts.shape, "f4")}
     flat = openexr.Part({"type": openexr.scanlineimage}, depth, "flat")
     header = {
         "type": openexr.deepscanline,
         "compression": openexr.ZIPS_COMPRESSION,
-        exr_record.ATTRIBUTE: image.attributes[exr_record.ATTRIBUTE],
+        ATTRIBUTE: image.attributes[ATTRIBUTE],
     }
     deep = openexr.Part(header, dict(package_arrays(image)), "deep")
     openexr.File([flat, deep]).write(str(path))
@@ -691,24 +541,19 @@ def test_several_parts_are_read_by_the_package(openexr, file, tmp_path):
         pvdi.read(path)
 
 
-def test_without_the_package_it_is_named(file, monkeypatch):
-    monkeypatch.setitem(sys.modules, "OpenEXR", None)
-    assert pvdi.read(file).equals(small_vdi())  # ours do not need it
+def test_several_parts_need_the_package(openexr, file, monkeypatch):
     data = bytearray(file.read_bytes())
     data[5] |= 0x10  # the flag of several parts
-    file.write_bytes(data)
+    broken = file.with_name("parts.exr")
+    broken.write_bytes(data)
+    with pytest.raises(VDIFileError, match="several parts, and the OpenEXR package cannot read"):
+        pvdi.read(broken)
+    monkeypatch.setitem(sys.modules, "OpenEXR", None)
+    assert pvdi.read(file).equals(small_vdi())  # ours do not need it
     with pytest.raises(
         MissingDependencyError, match=r'has several parts.*pip install "pyvista-vdi\[exr\]"'
     ):
-        pvdi.read(file)
-
-
-def test_the_package_refuses_nonsense_in_one_error(openexr, file):
-    data = bytearray(file.read_bytes())
-    data[5] |= 0x10
-    file.write_bytes(data)
-    with pytest.raises(VDIFileError, match="several parts, and the OpenEXR package cannot read"):
-        pvdi.read(file)
+        pvdi.read(broken)
 
 
 def test_openexrs_own_check_accepts_our_files(tmp_path):
@@ -728,9 +573,9 @@ def test_openexrs_own_check_accepts_our_files(tmp_path):
 
 
 def test_exrinfo_accepts_our_files(file):
-    result = subprocess.run(
-        [tool("exrinfo"), "-v", "-s", str(file)], capture_output=True, text=True, check=False
-    )
+    program = shutil.which("exrinfo") or pytest.skip("exrinfo is not installed")
+    command = [program, "-v", "-s", str(file)]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
     # Debian's 3.1.5 returns a number at random for any file, and says ERROR where there is one
     assert "ERROR" not in result.stderr
     assert "compression 'zips'" in result.stdout
@@ -739,10 +584,8 @@ def test_exrinfo_accepts_our_files(file):
 
 def test_oiiotool_flattens_to_the_picture_from_the_generating_view(tmp_path, default_runtime):
     """Within 2/255 of ``render`` at V_O."""
-    from pyvista_vdi import examples
-    from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
-
-    program, openexr = tool("oiiotool"), pytest.importorskip("OpenEXR")
+    program = shutil.which("oiiotool") or pytest.skip("oiiotool is not installed")
+    openexr = pytest.importorskip("OpenEXR")
     volume, size = examples.load_data("brain", as_volume=True), (160, 90)
     view = filling_camera(volume.bounds, size)
     pytest.importorskip("pyvista")  # colour maps by name
@@ -755,9 +598,6 @@ def test_oiiotool_flattens_to_the_picture_from_the_generating_view(tmp_path, def
         picture = pvdi.render(vdi, view)
         assert picture.max() > 0.3, name  # something is there
         assert np.abs(pixels - picture).max() <= 2 / 255, name
-
-
-# -- the command line ------------------------------------------------------------------------------
 
 
 def run(capsys, *arguments):
@@ -774,7 +614,10 @@ def test_convert_there_and_back(capsys, tmp_path):
     assert (status, f"{vdi.n_supersegments} supersegments" in out) == (0, True)
     assert same_bits(pvdi.read(tmp_path / "c.vdi"), vdi)
     assert run(capsys, "convert", first, "-o", there, "--standard-channels")[0] == 0
-    assert "tau" not in exr_layout.read_image(there, lambda name: True).channels
+    assert "tau" not in read_deep(there).channels
+    arguments = ["generate", "--example", "no such volume", "-o", there, "--compression", "zstd"]
+    status, _, error = run(capsys, *arguments)  # refused before the work
+    assert (status, "must be one of zips and none; got 'zstd'" in error) == (1, True)
 
 
 def test_convert_a_foreign_file(capsys, tmp_path):
@@ -789,12 +632,6 @@ def test_convert_a_foreign_file(capsys, tmp_path):
     assert pvdi.read(target).camera == VIEW
 
 
-def test_options_of_the_file_are_refused_before_the_work(capsys, tmp_path):
-    arguments = ["generate", "--example", "no such volume", "-o", tmp_path / "a.exr"]
-    status, _, error = run(capsys, *arguments, "--compression", "zstd")
-    assert (status, "must be one of zips and none; got 'zstd'" in error) == (1, True)
-
-
 def test_info_and_render_take_exr(capsys, file, tmp_path, default_runtime):
     status, out, _ = run(capsys, "info", file)
     assert (status, "OpenEXR zips" in out) == (0, True)
@@ -805,14 +642,11 @@ def test_info_and_render_take_exr(capsys, file, tmp_path, default_runtime):
 
 def test_the_files_are_documented_as_they_are(file):
     """docs/files.md names every channel and every attribute of ours."""
-    from pathlib import Path
-
     page = Path(__file__).parents[2] / "docs" / "files.md"
     if not page.is_file():
         pytest.skip("the documentation is not beside the tests")
     text = page.read_text(encoding="utf-8")
-    image = exr_layout.read_image(file, lambda name: True)
-    entries = json.loads(image.attributes[exr_record.ATTRIBUTE])
-    names = {*image.channels, *entries, exr_record.ATTRIBUTE, "worldToCamera", "worldToNDC"}
-    missing = [name for name in sorted(names) if f"`{name}`" not in text]
-    assert not missing, missing
+    image = read_deep(file)
+    entries = json.loads(image.attributes[ATTRIBUTE])
+    names = {*image.channels, *entries, ATTRIBUTE, *MATRICES}
+    assert [name for name in sorted(names) if f"`{name}`" not in text] == []

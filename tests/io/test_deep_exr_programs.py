@@ -7,17 +7,18 @@ anew and must hold the same samples.
 from __future__ import annotations
 
 import shutil
-import struct
+import sys
 import warnings
 
 import numpy as np
 import pytest
+from deep_images import MATRICES, change, matrices_of, read_deep, write_deep
 from deep_programs import COMMANDS, RECORDED, SIZE, VIEW, make, operate, pair
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
 from pyvista_vdi.errors import MissingDependencyError, VDIFileError, VDIWarning
-from pyvista_vdi.io.deep_exr import layout, record
+from pyvista_vdi.io.deep_exr.layout import OtherFormError
 from pyvista_vdi.io.deep_exr.linear_light import to_display, to_linear
 
 A, B = pair()
@@ -63,14 +64,14 @@ def test_oiiotool_makes_what_is_recorded(name, tmp_path):
     if program is None:
         pytest.skip("oiiotool is not installed")
     try:
-        old = layout.read_image(recorded(name), lambda _: True)
-    except (layout.OtherFormError, VDIFileError):  # of tiles, parts and flat images the header says
+        old = read_deep(recorded(name))
+    except (OtherFormError, VDIFileError):  # of tiles, parts and flat images the header says
         old = None
     made = make(name, tmp_path, program)
     if old is None:
         assert abs(made.stat().st_size - recorded(name).stat().st_size) < 100  # time and version
         return
-    new = layout.read_image(made, lambda _: True)
+    new = read_deep(made)
     assert (new.data_window, new.display_window) == (old.data_window, old.display_window)
     assert np.array_equal(new.counts, old.counts)
     assert new.channel_types == old.channel_types
@@ -78,28 +79,22 @@ def test_oiiotool_makes_what_is_recorded(name, tmp_path):
         assert np.allclose(new.channels[channel], array, rtol=1e-5, atol=1e-7), channel
 
 
-# -- rewritten: the same to the last bit -----------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["rewritten", "run_lengths", "upwards", "no_matrices"])
 def test_rewritten_files_give_back_every_bit(name):
     """Though oiiotool made floats of the corrections, k / (2**32 - 1)."""
-    assert layout.read_image(recorded(name), lambda _: True).channels["bits.back"].dtype == "f4"
+    assert read_deep(recorded(name)).channels["bits.back"].dtype == "f4"
     vdi = read(name)
     assert vdi.equals(A)
     assert vdi.metadata == A.metadata
 
 
-def test_tiles_give_back_every_bit():
+def test_tiles_and_larger_display_windows_change_no_bit():
+    assert read("canvas").equals(A)
     pytest.importorskip("OpenEXR")
     assert read("tiled").equals(A)
 
 
-def test_a_display_window_that_was_enlarged_changes_no_pixel():
-    assert read("canvas").equals(A)
-
-
-def test_of_several_deep_parts_the_first_is_read_and_the_others_are_named(tmp_path):
+def test_of_several_deep_parts_the_first_is_read_and_the_others_are_named():
     pytest.importorskip("OpenEXR")
     assert read("parts", "has 2 deep parts, of which the first is read").equals(A)
 
@@ -107,46 +102,30 @@ def test_of_several_deep_parts_the_first_is_read_and_the_others_are_named(tmp_pa
 def test_corrections_too_large_for_floats_fall_back(tmp_path):
     """Where front is tiny and the origin large, the correction has all 32 bits."""
     front = np.array([0x0DA24261], np.uint32).view(np.float32)  # 1e-30; no bit of it is 0 by chance
-    vdi = pvdi.VDI(
-        VIEW, (1, 1), [0, 1], front, [2.0], np.ones((1, 3)), [1], A.bounds, depth_origin=5.0
-    )
+    arrays = ([0, 1], front, [2.0], np.ones((1, 3)), [1])
+    vdi = pvdi.VDI(VIEW, (1, 1), *arrays, A.bounds, depth_origin=5.0)
     path = vdi.save(tmp_path / "a.exr")
-    image = layout.read_image(path, lambda _: True)
-    assert image.channels["bits.front"][0] > 2**24
-    rewrite(path, image, bits_as_floats=True)
+    channels = read_deep(path).channels
+    assert channels["bits.front"][0] > 2**24
+    bits = {n: a / (2.0**32 - 1) for n, a in channels.items() if n.startswith("bits.")}
+    change(path, **{name: array.astype(np.float32) for name, array in bits.items()})
     with pytest.warns(VDIWarning, match=r"wrote it \(bits.front\): its standard channels"):
         back = pvdi.read(path)
     assert near_depths(back, [[5.0], [7.0]])
     assert (back.bounds, back.metadata) == (vdi.bounds, vdi.metadata)
 
 
-def rewrite(path, image, bits_as_floats=False, **changes):
-    """Write a deep image again with other channels and attributes."""
-    channels = dict(image.channels)
-    for name in [n for n in channels if n.startswith("bits.") and bits_as_floats]:
-        channels[name] = (channels[name] / (2.0**32 - 1)).astype(np.float32)
-    channels |= {n: a for n, a in changes.items() if n in channels}
-    attributes = {
-        record.ATTRIBUTE: ("string", image.attributes[record.ATTRIBUTE].encode()),
-        "screenWindowCenter": ("v2f", bytes(8)),
-        "screenWindowWidth": ("float", struct.pack("<f", 1)),
-    }
-    for name in ("worldToCamera", "worldToNDC"):
-        matrix = changes.get(name, image.attributes[name].T)
-        attributes[name] = layout.matrix_attribute(matrix)
-    with path.open("wb") as stream:
-        layout.write_image(
-            stream,
-            image.counts,
-            {name: array.dtype for name, array in channels.items()},
-            lambda first, last: {name: array[first:last] for name, array in channels.items()},
-            attributes,
-            compression="none",
-            level=1,
-        )
+def check_shows_both(vdi, view, vdis, size, most):
+    """Hold pictures of a merged VDI against those of its two in one scene."""
+    truth = pvdi.render(vdis, view, size)
+    assert np.abs(pvdi.render(vdi, view, size) - truth).max() < most
+    assert truth.max() > 0.3  # something is there
 
 
-# -- merged ----------------------------------------------------------------------------------------
+#: A is rounded to float32 when it is written and again when a sample is split. At tau = 12 that
+#: moves tau by 2**-24 exp(12) = .0097 each time; over a part x of its length that is
+#: .0097 x exp(-12 x) of the opacity, at most .0097 / 12 e = 3e-4. Elsewhere it is far less.
+ROUNDED_TWICE = 6e-4
 
 
 @pytest.mark.parametrize(
@@ -160,39 +139,26 @@ def test_merged_files_show_both(name, warning, default_runtime):
     assert np.allclose(vdi.bounds[1::2], high, atol=1e-5)
     assert vdi.metadata == {"read_from": f"oiiotool_{name}.exr"}
     for angle in (0, 15, -40, 90):
-        view = VIEW.azimuth(angle)
-        truth = pvdi.render([A, B], view, (80, 60))
-        # A is rounded to float32 when it is written and again when a sample is split. At tau = 12
-        # that moves tau by 2**-24 exp(12) = .0097 each time; over a part x of its length that is
-        # .0097 x exp(-12 x) of the opacity, at most .0097 / 12 e = 3e-4. Elsewhere it is far less.
-        difference = np.abs(pvdi.render(vdi, view, (80, 60)) - truth).max()
-        assert difference < (6e-4 if angle else 1e-5), angle
-        assert truth.max() > 0.5
+        most = ROUNDED_TWICE if angle else 1e-5
+        check_shows_both(vdi, VIEW.azimuth(angle), [A, B], (80, 60), most)
     right = pvdi.render(B, VIEW, SIZE)[..., 3] > 0  # what the first file's box cut away
     assert (pvdi.render(vdi, VIEW, SIZE)[..., 3] > 0)[right].all()
 
 
-def test_a_merged_file_flattened_by_oiiotool_is_the_picture(default_runtime):
+def test_a_merged_file_flattened_by_oiiotool_is_the_picture(tmp_path, default_runtime):
     openexr = pytest.importorskip("OpenEXR")
     flat = openexr.File(str(recorded("merged_flat"))).channels()["RGBA"].pixels
     vdi = read("merged", "the number of samples")
     assert np.abs(pvdi.render(vdi, VIEW, SIZE) - flat).max() < 1e-5
     assert np.abs(pvdi.render([A, B], VIEW, SIZE) - flat).max() < 1e-5
-
-
-def test_a_merged_file_in_the_command_line(tmp_path, default_runtime):
-    arguments = ["render", str(recorded("merged")), "-o", str(tmp_path / "a.png")]
     with pytest.warns(VDIWarning, match="the number of samples"):
-        assert cli.main(arguments) == 0
+        assert cli.main(["render", str(recorded("merged")), "-o", str(tmp_path / "a.png")]) == 0
     assert (tmp_path / "a.png").stat().st_size > 0
 
 
 def test_samples_that_were_only_gathered(tmp_path, default_runtime):
     """As Nuke's DeepMerge leaves them: unsorted and overlapping."""
-    images = [
-        layout.read_image(vdi.save(tmp_path / "a.exr", exact=False), lambda _: True)
-        for vdi in (B, A)
-    ]
+    images = [read_deep(vdi.save(tmp_path / "a.exr", exact=False)) for vdi in (B, A)]
     counts = sum(image.counts for image in images)
     pixel = [np.repeat(np.arange(counts.size), image.counts.ravel()) for image in images]
     order = np.argsort(np.concatenate(pixel), kind="stable")
@@ -200,26 +166,11 @@ def test_samples_that_were_only_gathered(tmp_path, default_runtime):
         name: np.concatenate([image.channels[name] for image in images])[order]
         for name in images[0].channels
     }
-    matrices = ("worldToCamera", "worldToNDC")
-    path = tmp_path / "gathered.exr"
-    with path.open("wb") as stream:
-        layout.write_image(
-            stream,
-            counts,
-            dict.fromkeys(channels, np.float32),
-            lambda first, last: {name: array[first:last] for name, array in channels.items()},
-            {n: layout.matrix_attribute(images[0].attributes[n].T) for n in matrices},
-            compression="zips",
-            level=1,
-        )
-    vdi = pvdi.read(path)
+    matrices = {name: images[0].attributes[name].T for name in MATRICES}
+    vdi = pvdi.read(write_deep(tmp_path / "gathered.exr", counts, channels, matrices))
     assert vdi.n_supersegments > A.n_supersegments + B.n_supersegments  # taken apart at every face
-    for angle in (0, 25):
-        view = VIEW.azimuth(angle)
-        truth = pvdi.render([A, B], view, (80, 60))
-        # As in test_merged_files_show_both
-        difference = np.abs(pvdi.render(vdi, view, (80, 60)) - truth).max()
-        assert difference < (6e-4 if angle else 1e-5), angle
+    for angle, most in ((0, 1e-5), (25, ROUNDED_TWICE)):
+        check_shows_both(vdi, VIEW.azimuth(angle), [A, B], (80, 60), most)
 
 
 def test_volumes_merged_by_oiiotool(tmp_path, default_runtime):
@@ -247,14 +198,8 @@ def test_volumes_merged_by_oiiotool(tmp_path, default_runtime):
     pixels = openexr.File(str(flat)).channels()["RGBA"].pixels
     assert np.abs(pvdi.render(vdis, view, (64, 48)) - pixels).max() < 1e-5
     for angle in (0, 20, 90):
-        turned = view.azimuth(angle)
-        truth = pvdi.render(vdis, turned, (64, 48))
         # Boxes of lists are wider than those of volumes, by less than a list, where both are thin
-        assert np.abs(pvdi.render(vdi, turned, (64, 48)) - truth).max() < 1e-4, angle
-        assert truth.max() > 0.3
-
-
-# -- changed: what the samples say now -------------------------------------------------------------
+        check_shows_both(vdi, view.azimuth(angle), vdis, (64, 48), 1e-4)
 
 
 def test_half_floats():
@@ -302,13 +247,10 @@ def test_depths_that_were_changed_have_other_bounds():
     assert vdi.bounds != A.bounds
 
 
-def test_the_standard_channels_alone():
-    vdi = read("plain", "(tau, bits.red, bits.green, bits.blue, bits.front, bits.back): its")
-    assert (vdi.bounds, vdi.metadata, vdi.camera) == (A.bounds, A.metadata, A.camera)
-    assert near_depths(vdi, depths(A))
-
-
-def test_a_file_without_our_attribute_is_anybodys():
+def test_without_our_channels_or_our_attribute():
+    plain = read("plain", "(tau, bits.red, bits.green, bits.blue, bits.front, bits.back): its")
+    assert (plain.bounds, plain.metadata, plain.camera) == (A.bounds, A.metadata, A.camera)
+    assert near_depths(plain, depths(A))
     vdi = read("no_record")
     assert vdi.metadata == {"read_from": "oiiotool_no_record.exr"}
     assert near_depths(vdi, depths(A))
@@ -318,13 +260,9 @@ def test_a_file_without_our_attribute_is_anybodys():
 
 def test_another_view_in_the_header_counts(tmp_path):
     """A program that knows of matrices, and not of our attribute, moved the camera."""
-    from pyvista_vdi.io.deep_exr.view import view_matrices
-
     path = A.save(tmp_path / "a.exr")
-    image = layout.read_image(path, lambda _: True)
     moved = VIEW.replace(position=(3.5, -0.25, 4), focal_point=(3.5, 0, -1))
-    to_camera, to_ndc = view_matrices(moved, SIZE, 0.0)
-    rewrite(path, image, worldToCamera=to_camera, worldToNDC=to_ndc)
+    change(path, **matrices_of(moved, SIZE))
     with pytest.warns(VDIWarning, match=r"wrote it \(its matrices\): its"):
         vdi = pvdi.read(path)
     assert np.allclose(vdi.camera.position, moved.position, atol=1e-5)
@@ -334,16 +272,13 @@ def test_another_view_in_the_header_counts(tmp_path):
 @pytest.mark.parametrize("channel", ["A", "R", "Z", "ZBack", "tau", "bits.red", "bits.back"])
 def test_a_channel_that_was_changed_by_one_bit_is_noticed(channel, tmp_path):
     path = A.save(tmp_path / "a.exr")
-    image = layout.read_image(path, lambda _: True)
-    array = image.channels[channel].copy()
+    array = read_deep(path).channels[channel].copy()
     array.view(np.uint32)[7] += 1
-    rewrite(path, image, **{channel: array})
-    with pytest.warns(VDIWarning, match=rf"wrote it \({channel}\): its standard channels"):
+    change(path, **{channel: array})
+    said = rf"was changed after pyvista-vdi wrote it \({channel}\): its standard channels"
+    with pytest.warns(VDIWarning, match=said):
         vdi = pvdi.read(path)
     assert near_depths(vdi, depths(A))
-
-
-# -- refused ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -376,24 +311,16 @@ def test_the_remedies_help(tmp_path):
         assert near_depths(vdi, depths(A))
 
 
-def test_depths_in_half_floats_that_leave_no_thickness(tmp_path):
+def test_depths_in_half_floats_and_colours_in_whole_numbers(tmp_path):
     path = A.save(tmp_path / "a.exr", exact=False)
-    image = layout.read_image(path, lambda _: True)
-    far = {n: (image.channels[n] + 4000).astype(np.float16) for n in ("Z", "ZBack")}
-    rewrite(path, image, **far)
+    channels = read_deep(path).channels
+    change(path, **{n: (channels[n] + 4000).astype(np.float16) for n in ("Z", "ZBack")})
     with pytest.raises(VDIFileError, match="depths are half floats, too coarse .* Z as float"):
         pvdi.read(path)
-
-
-def test_whole_numbers_are_no_colours(tmp_path):
-    path = A.save(tmp_path / "a.exr", exact=False)
-    image = layout.read_image(path, lambda _: True)
-    rewrite(path, image, G=np.ones(A.n_supersegments, np.uint32))
+    A.save(path, exact=False)
+    change(path, G=np.ones(A.n_supersegments, np.uint32))
     with pytest.raises(VDIFileError, match="its channel G is of type uint32, and must be float32"):
         pvdi.read(path)
-
-
-# -- before checksums ------------------------------------------------------------------------------
 
 
 def test_files_of_version_1_are_read():
@@ -405,9 +332,6 @@ def test_files_of_version_1_are_read():
     plain = pvdi.read(RECORDED / "version_1_standard.exr")
     assert np.allclose(plain.front + plain.depth_origin, vdi.front + vdi.depth_origin)
     assert plain.metadata == {"read_from": "version_1_standard.exr"}  # nothing vouches for it
-
-
-# -- linear light ----------------------------------------------------------------------------------
 
 
 def test_srgbs_curve():
@@ -423,7 +347,7 @@ def test_srgbs_curve():
 def test_linear_files_give_back_every_bit(tmp_path):
     path = A.save(tmp_path / "a.exr", linear=True)
     assert pvdi.read(path).equals(A)
-    image = layout.read_image(path, lambda _: True)
+    image = read_deep(path)
     light = image.channels["R"] / image.channels["A"].astype(float)
     color = A.color[:, 0].astype(float)
     assert np.allclose(light, ((color + 0.055) / 1.055) ** 2.4, atol=1e-6) or color.min() < 0.04045
@@ -454,7 +378,7 @@ def test_linear_in_the_command_line(tmp_path, capsys):
     first = A.save(tmp_path / "a.vdi")
     there, back = tmp_path / "b.exr", tmp_path / "c.vdi"
     assert cli.main(["convert", str(first), "-o", str(there), "--linear"]) == 0
-    channels = layout.read_image(there, lambda _: True).channels
+    channels = read_deep(there).channels
     assert np.allclose(channels["G"], to_linear(A.color[:, 1]) * alphas(A), rtol=1e-6, atol=1e-7)
     assert cli.main(["convert", str(there), "-o", str(back)]) == 0
     assert pvdi.read(back).equals(A)
@@ -468,8 +392,6 @@ def test_linear_in_the_command_line(tmp_path, capsys):
 
 
 def test_without_openexr_other_forms_say_what_to_install(monkeypatch):
-    import sys
-
     monkeypatch.setitem(sys.modules, "OpenEXR", None)
     with pytest.raises(MissingDependencyError, match="is stored in tiles"):
         pvdi.read(recorded("tiled"))

@@ -23,8 +23,7 @@ def zarr_store(path):
 
 
 def hdf5_store(path):
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w") as file:
+    with pytest.importorskip("h5py").File(path, "w") as file:
         file.create_dataset("x", data=VALUES, chunks=CHUNKS)
 
 
@@ -43,8 +42,7 @@ def kept(store):
 
 def change_one_value(store):
     if store.name == "x.h5":
-        h5py = pytest.importorskip("h5py")
-        with h5py.File(store, "a") as file:
+        with pytest.importorskip("h5py").File(store, "a") as file:
             file["x"][5, 5, 5] = 99
     else:
         pytest.importorskip("zarr").open(str(store), mode="a")[5, 5, 5] = 99
@@ -124,7 +122,7 @@ def test_no_changed_byte_keeps_a_store_from_being_opened(store):
     pvdi.open_volume(store).finite_range()
     (file,) = kept(store)
     whole = file.read_bytes()
-    for place in range(0, len(whole), 3):
+    for place in range(0, len(whole), 7):
         file.write_bytes(whole[:place] + bytes([whole[place] ^ 0x55]) + whole[place + 1 :])
         found = pvdi.open_volume(store).array.ranges()
         if found is not None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import copy
 import json
 import pickle
+import shutil
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -48,7 +50,7 @@ def placed(count, dimensions=5, spacing=(2.0, 0.5, 0.25), origin=(10.0, 20.0, 30
     ]
 
 
-def write_ome(path, version, values=VALUES, axes=AXES):
+def write_ome(path, version="0.4", values=VALUES, axes=AXES):
     """Write an image by ome-zarr-py."""
     writer = pytest.importorskip("ome_zarr.writer", reason="ome-zarr is not installed")
     zarr = pytest.importorskip("zarr")
@@ -80,9 +82,21 @@ def change(path, edit):
     file.write_text(json.dumps(attributes))
 
 
-@pytest.fixture(params=["0.4", "0.5"])
-def image(request, tmp_path):
-    return write_ome(tmp_path / "x.ome.zarr", request.param), request.param
+@pytest.fixture(scope="module", params=["0.4", "0.5"])
+def image(request, tmp_path_factory):
+    path = tmp_path_factory.mktemp("stores") / "x.ome.zarr"
+    return write_ome(path, request.param), request.param
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    return write_ome(tmp_path_factory.mktemp("stores") / "x.ome.zarr")
+
+
+@pytest.fixture
+def ome(written, tmp_path):
+    """An image that a test may change."""
+    return Path(shutil.copytree(written, tmp_path / "x.ome.zarr"))
 
 
 def test_spacing_axes_levels_time_and_channel(image):
@@ -112,19 +126,15 @@ def test_spacing_axes_levels_time_and_channel(image):
 
 def test_opacities_of_all_levels_refer_to_the_finest(image):
     finest, coarsest = (pvdi.open_volume(image[0], level=k) for k in (0, 2))
-    assert (
-        finest.default_unit_distance
-        == pvdi.Volume(VALUES[0, 0], finest.spacing).default_unit_distance
-    )
-    for volume in (coarsest, coarsest.load(), pickle.loads(pickle.dumps(coarsest))):
-        assert volume.default_unit_distance == finest.default_unit_distance
+    expected = pvdi.Volume(VALUES[0, 0], finest.spacing).default_unit_distance
+    again = pickle.loads(pickle.dumps(coarsest))
     other = as_volume(coarsest, scalars=np.zeros(coarsest.array.size))
-    assert other.default_unit_distance == finest.default_unit_distance
+    for volume in (finest, coarsest, coarsest.load(), again, other):
+        assert volume.default_unit_distance == expected
 
 
 def test_three_axes_alone(tmp_path):
-    path = write_ome(tmp_path / "x.zarr", "0.4", VALUES[0, 0], AXES[2:])
-    volume = pvdi.open_volume(path)
+    volume = pvdi.open_volume(write_ome(tmp_path / "x.zarr", "0.4", VALUES[0, 0], AXES[2:]))
     assert volume.store.axes == ("z", "y", "x")
     assert volume.spacing == (0.25, 0.5, 2.0)
     np.testing.assert_array_equal(volume.load().array, VALUES[0, 0])
@@ -157,77 +167,66 @@ def test_level_of_a_view_says_why(image):
         ({"window_size": (9, 9)}, r"give both"),
     ],
 )
-def test_what_is_not_there_is_named(asked, message, tmp_path):
-    path = write_ome(tmp_path / "x.ome.zarr", "0.4")
+def test_what_is_not_there_is_named(asked, message, ome):
     with pytest.raises(InvalidArgumentError, match=message):
-        pvdi.open_volume(path, **asked)
+        pvdi.open_volume(ome, **asked)
 
 
-def test_channels_by_name(tmp_path):
-    path = write_ome(tmp_path / "x.ome.zarr", "0.4")
-    file = path / ".zattrs"
+def test_channels_by_name(ome):
+    file = ome / ".zattrs"
     attributes = json.loads(file.read_text())
     attributes["omero"] = {"channels": [{"label": n} for n in ("dapi", "gfp", "red")]}
     file.write_text(json.dumps(attributes))
-    volume = pvdi.open_volume(path, channel="gfp")
+    volume = pvdi.open_volume(ome, channel="gfp")
     assert volume.name == "gfp"
     np.testing.assert_array_equal(volume.load().array, VALUES[0, 1])
 
 
-def test_transformations_of_the_whole_image_come_last(tmp_path):
-    path = write_ome(tmp_path / "x.ome.zarr", "0.4")
+def test_transformations_of_the_whole_image_come_last(ome):
     more = [
         {"type": "scale", "scale": [1, 1, 1, 1, 2]},
         {"type": "translation", "translation": [0, 0, 0, 0, 5]},
     ]
-    change(path, lambda image: image.update(coordinateTransformations=more))
-    volume = pvdi.open_volume(path)
+    change(ome, lambda image: image.update(coordinateTransformations=more))
+    volume = pvdi.open_volume(ome)
     assert volume.spacing == (0.5, 0.5, 2.0)
     assert volume.origin == (65.0, 20.0, 10.0)
 
 
-def test_lengths_in_several_units_become_one(tmp_path):
-    path = write_ome(tmp_path / "x.ome.zarr", "0.4")
-    change(path, lambda image: image["axes"][2].update(unit="nanometer"))
-    volume = pvdi.open_volume(path)
+def test_lengths_in_several_units_become_one(ome):
+    change(ome, lambda image: image["axes"][2].update(unit="nanometer"))
+    volume = pvdi.open_volume(ome)
     assert volume.store.unit == "micrometer"
     assert volume.spacing == pytest.approx((0.25, 0.5, 0.002), rel=1e-12)
     assert volume.origin == pytest.approx((30.0, 20.0, 0.01), rel=1e-12)
-    change(path, lambda image: image["axes"][2].update(unit="parsnip"))
+    change(ome, lambda image: image["axes"][2].update(unit="parsnip"))
     with pytest.raises(UnsupportedError, match="parsnip, micrometer, micrometer"):
-        pvdi.open_volume(path)
+        pvdi.open_volume(ome)
 
 
-def _swap(image):
-    image["axes"][3], image["axes"][4] = image["axes"][4], image["axes"][3]
+def with_transformation(entry):
+    return lambda image: image["datasets"][0].update(coordinateTransformations=[entry])
 
 
 @pytest.mark.parametrize(
     ("edit", "error", "message"),
     [
         (lambda i: i.update(version="0.2"), UnsupportedError, "OME-Zarr 0.2: 0.4 and 0.5"),
-        (_swap, UnsupportedError, "last three must be z, y, x"),
+        (lambda i: i["axes"].append(i["axes"].pop(3)), UnsupportedError, "last three must be z, y"),
         (lambda i: i.pop("axes"), InvalidVolumeError, "break OME-Zarr .KeyError: 'axes'"),
         (lambda i: i.update(datasets=[{"path": "7"}]), InvalidVolumeError, "break OME-Zarr"),
+        (with_transformation({"type": "affine"}), UnsupportedError, "type 'affine'"),
         (
-            lambda i: i["datasets"][0].update(coordinateTransformations=[{"type": "affine"}]),
-            UnsupportedError,
-            "type 'affine'",
-        ),
-        (
-            lambda i: i["datasets"][0].update(
-                coordinateTransformations=[{"type": "scale", "scale": [1, 2]}]
-            ),
+            with_transformation({"type": "scale", "scale": [1, 2]}),
             InvalidVolumeError,
             "2 numbers for 5 axes",
         ),
     ],
 )
-def test_metadata_that_cannot_be_followed_are_refused(edit, error, message, tmp_path):
-    path = write_ome(tmp_path / "x.ome.zarr", "0.4")
-    change(path, edit)
+def test_metadata_that_cannot_be_followed_are_refused(edit, error, message, ome):
+    change(ome, edit)
     with pytest.raises(error, match=message):
-        pvdi.open_volume(path)
+        pvdi.open_volume(ome)
 
 
 def test_format_3_is_refused_by_name_where_zarr_is_older(tmp_path, monkeypatch):
@@ -240,14 +239,11 @@ def test_format_3_is_refused_by_name_where_zarr_is_older(tmp_path, monkeypatch):
         pvdi.open_volume(folder)
 
 
-def test_nothing_is_read_when_a_store_is_opened(image):
+def test_nothing_is_read_when_a_store_is_opened(image, tmp_path):
     """Chunks that cannot be decoded are only missed when they are asked for."""
-    path, _ = image
-    chunks = [
-        file
-        for file in path.rglob("*")
-        if file.is_file() and not file.name.startswith(".") and file.name != "zarr.json"
-    ]
+    path = Path(shutil.copytree(image[0], tmp_path / "x.ome.zarr"))
+    files = (file for file in path.rglob("*") if file.is_file() and file.name[0] != ".")
+    chunks = [file for file in files if file.name != "zarr.json"]
     assert len(chunks) > 80
     for file in chunks:
         file.write_bytes(b"rubbish")
@@ -259,21 +255,12 @@ def test_nothing_is_read_when_a_store_is_opened(image):
         volume.load()
 
 
-# -- arrays that stand by themselves ---------------------------------------------------------------
-
-
 def test_zarr_array_and_group(tmp_path):
     zarr = pytest.importorskip("zarr")
     group = zarr.open_group(str(tmp_path / "x.zarr"), mode="w")
-    for name in ("a", "b"):
-        array = zarr.open(
-            str(tmp_path / "x.zarr" / name),
-            mode="w",
-            shape=(8, 16, 24),
-            chunks=(4, 8, 8),
-            dtype="u2",
-        )
-        array[...] = VALUES[0, "ab".index(name)]
+    kind = {"mode": "w", "chunks": (4, 8, 8), "dtype": "u2"}
+    for name, values in zip("ab", VALUES[0], strict=False):
+        zarr.open(str(tmp_path / "x.zarr" / name), shape=values.shape, **kind)[...] = values
     group["b"].attrs["spacing"] = [3.0, 2.0, 1.0]
     with pytest.raises(InvalidVolumeError, match=r"holds several: open one of .*x\.zarr::a, "):
         pvdi.open_volume(tmp_path / "x.zarr")

@@ -24,9 +24,6 @@ HALOS = [Halo(0, 1), Halo(1, 3)]
 CUTS = [(16, 16, 16), (47, 9, 50), (20, 41, 13)]
 
 
-# -- how a grid is cut ---------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("points", [(5, 6, 7), (33, 16, 17), (40, 19, 64)])
 @pytest.mark.parametrize("chunks", [(4, 4, 4), (16, 7, 100)])
 def test_every_point_is_in_one_block(points, chunks):
@@ -43,9 +40,8 @@ def test_every_point_is_in_one_block(points, chunks):
 
 def test_blocks_grow_up_to_the_bytes_that_they_may_have():
     grid = Volume(np.zeros((64, 64, 64), np.uint8))
-    assert Blocks.of(grid, (8, 8, 8), 1, 16 * 16 * 16).counts == (4, 4, 4)
-    assert Blocks.of(grid, (8, 8, 8), 2, 16 * 16 * 16).counts == (4, 4, 8)
-    assert Blocks.of(grid, (8, 8, 8), 1, 1).counts == (8, 8, 8)
+    for item, most, counts in ((1, 16**3, (4, 4, 4)), (2, 16**3, (4, 4, 8)), (1, 1, (8, 8, 8))):
+        assert Blocks.of(grid, (8, 8, 8), item, most).counts == counts
 
 
 @pytest.mark.parametrize("halo", HALOS, ids=str)
@@ -86,6 +82,16 @@ def test_ranges_of_chunks_come_together_and_apart():
 
 
 @pytest.mark.parametrize("view", VIEWS)
+def points_along(camera, x, y):
+    """Homogeneous points of the model frame along the ray of a pixel."""
+    t = np.linspace(0.01, 250, 2000)
+    across = (np.array([x, y]) + 0.5) / WINDOW * 2 - 1 + camera.window_center
+    u, v = across * np.array(camera.half_extent(WINDOW))
+    scale = np.ones_like(t) if camera.parallel_projection else t
+    return np.linalg.inv(camera.model_to_view) @ [u * scale, v * scale, t, np.ones_like(t)]
+
+
+@pytest.mark.parametrize("view", VIEWS)
 def test_rays_meet_blocks_in_their_order_and_windows(view):
     volume = volume_of("uint8")
     camera = VIEWS[view](volume)
@@ -94,24 +100,14 @@ def test_rays_meet_blocks_in_their_order_and_windows(view):
     windows = blocks.windows(camera, WINDOW)
     assert sorted(order) == sorted(blocks)
     met = 0
-    index_to_model = np.linalg.inv(volume.index_to_model)
-    to_model = np.linalg.inv(camera.model_to_view)
-    width, height = WINDOW
-    half = np.array(camera.half_extent(WINDOW))
-    for x, y in itertools.product(range(0, width, 4), range(0, height, 3)):
-        across = (np.array([x, y]) + 0.5) / WINDOW * 2 - 1 + camera.window_center
-        t = np.linspace(0.01, 250, 2000)
-        plane = across * half
-        points = (
-            np.stack([0 * t + plane[0], 0 * t + plane[1], t, 0 * t + 1])
-            if camera.parallel_projection
-            else np.stack([plane[0] * t, plane[1] * t, t, 0 * t + 1])
-        )
-        at = (index_to_model @ to_model @ points)[:3]
-        inside = ((at >= 0) & (at <= np.array(volume.dimensions)[:, None] - 1)).all(axis=0)
+    to_index = np.linalg.inv(volume.index_to_model)
+    last = np.array(volume.dimensions)[:, None] - 1
+    for x, y in itertools.product(range(0, WINDOW[0], 4), range(0, WINDOW[1], 3)):
+        at = (to_index @ points_along(camera, x, y))[:3]
+        at = at[::-1, ((at >= 0) & (at <= last)).all(axis=0)]
         numbers = [
             np.clip(np.searchsorted(cuts[1:-1], positions, side="right"), 0, len(cuts) - 2)
-            for cuts, positions in zip(blocks.cuts, at[::-1, inside], strict=True)
+            for cuts, positions in zip(blocks.cuts, at, strict=True)
         ]
         passed = [
             block for block, _ in itertools.groupby(zip(*np.array(numbers).tolist(), strict=True))
@@ -126,7 +122,24 @@ def test_rays_meet_blocks_in_their_order_and_windows(view):
     assert met > 200
 
 
-# -- what is made ---------------------------------------------------------------------------------
+def in_blocks(volume, camera, function, chunks=(16, 16, 16), **options):
+    return generate_chunked(
+        volume, camera, WINDOW, function, chunks=chunks, block_bytes=1, **options
+    )
+
+
+def both_ways(volume, camera, function, chunks=(16, 16, 16), **options):
+    """Return the VDI of one piece, and that of blocks."""
+    whole = generate_vdi(volume, camera, WINDOW, function, **options)
+    return whole, in_blocks(volume, camera, function, chunks, **options)
+
+
+def check_ray_depths(found, whole):
+    """Optical depths add up whatever is merged: a step that is lost or taken twice shows.
+
+    float32 sums of up to 200 steps, in another order: 200 x 2^-24, and as much for the reference.
+    """
+    np.testing.assert_allclose(ray_depths(found), ray_depths(whole), rtol=2.4e-5, atol=1e-7)
 
 
 @pytest.mark.every(3)
@@ -135,36 +148,24 @@ def test_rays_meet_blocks_in_their_order_and_windows(view):
     "cuts", [CUTS[0], *(pytest.param(c, marks=pytest.mark.slow) for c in CUTS[1:])], ids=str
 )
 def test_every_step_belongs_to_one_block(runtime, view, cuts):
-    """Optical depths add up whatever is merged: a step that is lost or taken twice shows."""
     volume = volume_of("uint8", (1, 1.3, 0.8))
     camera = VIEWS[view](volume)
-    function = transfer_for(volume, "linear")
     options = {"max_supersegments": 12, "device": runtime.info.selector}
-    whole = generate_vdi(volume, camera, WINDOW, function, **options)
-    found = generate_chunked(
-        volume, camera, WINDOW, function, chunks=cuts, block_bytes=1, **options
-    )
+    whole, found = both_ways(volume, camera, transfer_for(volume, "linear"), cuts, **options)
     assert whole.n_supersegments > 500
     assert found.metadata["blocks"] != [1, 1, 1]
     assert np.diff(found.offsets.astype(np.int64)).max() <= 12
-    # float32 sums of up to 200 steps, in another order: 200 x 2^-24, and as much for the reference
-    np.testing.assert_allclose(ray_depths(found), ray_depths(whole), rtol=2.4e-5, atol=1e-7)
+    check_ray_depths(found, whole)
 
 
+BY_GRADIENT = {"gradient_opacities": np.linspace(0, 1, 8), "gradient_range": (0.0, 40.0)}
 KINDS = {
-    "bytes": ("uint8", {}),
-    "words": ("uint16", {"interpolation": "linear"}),
-    "floats with NaN": ("float32", {"interpolation": "linear"}),
-    "scaled": ("float64", {"interpolation": "linear"}),
-    "shaded": ("uint8", {"interpolation": "linear", "shading": Shading()}),
-    "gradient opacity": (
-        "int16",
-        {
-            "interpolation": "linear",
-            "gradient_opacities": np.linspace(0, 1, 8),
-            "gradient_range": (0.0, 40.0),
-        },
-    ),
+    "bytes": ("uint8", "nearest", {}),
+    "words": ("uint16", "linear", {}),
+    "floats with NaN": ("float32", "linear", {}),
+    "scaled": ("float64", "linear", {}),
+    "shaded": ("uint8", "linear", {"shading": Shading()}),
+    "gradient opacity": ("int16", "linear", BY_GRADIENT),
 }
 
 
@@ -176,15 +177,12 @@ def test_pictures_are_those_of_one_piece(runtime, kind):
     Noise in lists that are several voxels wide is the worst case: less is changed than by marching
     with steps that are two hundredths shorter.
     """
-    dtype, options = KINDS[kind]
+    dtype, interpolation, options = KINDS[kind]
     volume = volume_of(dtype)
     camera = VIEWS["all of it"](volume)
-    function = transfer_for(volume, **options)
+    function = transfer_for(volume, interpolation, **options)
     device = runtime.info.selector
-    whole = generate_vdi(volume, camera, WINDOW, function, device=device)
-    found = generate_chunked(
-        volume, camera, WINDOW, function, chunks=(16, 16, 16), block_bytes=1, device=device
-    )
+    whole, found = both_ways(volume, camera, function, device=device)
     other = generate_vdi(volume, camera, WINDOW, function, device=device, sample_distance=0.49)
     for degrees in (0, 5, 30):
         view = turned(camera, volume.bounds, degrees)
@@ -202,12 +200,8 @@ def test_pictures_are_those_of_one_piece(runtime, kind):
 def test_every_criterion(criterion):
     volume = volume_of("uint8")
     camera = VIEWS["all of it"](volume)
-    function = transfer_for(volume)
     options = {"criterion": criterion, "max_supersegments": 6}
-    whole = generate_vdi(volume, camera, WINDOW, function, **options)
-    found = generate_chunked(
-        volume, camera, WINDOW, function, chunks=(16, 16, 16), block_bytes=1, **options
-    )
+    whole, found = both_ways(volume, camera, transfer_for(volume), **options)
     assert np.diff(found.offsets.astype(np.int64)).max() <= 6
     assert abs(found.n_supersegments / whole.n_supersegments - 1) < 0.01
     expected, drawn = (pvdi.render(vdi, turned(camera, volume.bounds, 5)) for vdi in (whole, found))
@@ -224,20 +218,28 @@ def test_what_is_visible_only_between_two_blocks_is_seen():
     opacities[80:120] = 0.8
     function = TransferFunction(np.ones((256, 3)), opacities, (0, 255), interpolation="linear")
     camera = VIEWS["all of it"](volume)
-    whole = generate_vdi(volume, camera, WINDOW, function)
-    found = generate_chunked(volume, camera, WINDOW, function, chunks=(8, 8, 8), block_bytes=1)
+    whole, found = both_ways(volume, camera, function, (8, 8, 8))
     assert whole.n_supersegments > 50
     np.testing.assert_allclose(ray_depths(found), ray_depths(whole), rtol=1e-5)
+
+
+def first_passes(task, volume, blocks=None):
+    """What the first pass finds in all blocks, or in some."""
+    windows = task.blocks.windows(task.camera, WINDOW)
+    return windows, {
+        block: task.first_pass(block, volume.array[task.blocks.own(block)], windows[block])
+        for block in (blocks or windows)
+    }
 
 
 def first_depths(volume, camera, function, chunks):
     """Return the sums of the optical depths that the first pass finds in all blocks."""
     task = task_of(volume, camera, WINDOW, function, GenerationOptions(), chunks, 1)
     total = np.zeros(WINDOW[::-1])
-    for block, window in task.blocks.windows(camera, WINDOW).items():
-        seen = task.first_pass(block, volume.array[task.blocks.own(block)], window)
-        if seen.depths is not None:
-            total[window.y0 : window.y1, window.x0 : window.x1] += seen.depths
+    windows, seen = first_passes(task, volume)
+    for block, window in windows.items():
+        if seen[block].depths is not None:
+            total[window.y0 : window.y1, window.x0 : window.x1] += seen[block].depths
     return total
 
 
@@ -273,11 +275,8 @@ def test_runs_are_joined_at_faces_where_they_are_alike(interpolation, behind, ex
         position=(7.5, 7.5, 60), focal_point=(7.5, 7.5, 7.5), parallel_scale=6
     )
     options = {"sample_distance": 0.5, "max_supersegments": 20}
-    vdi = generate_chunked(
-        volume, camera, WINDOW, function, chunks=(8, 16, 16), block_bytes=1, **options
-    )
+    whole, vdi = both_ways(volume, camera, function, (8, 16, 16), **options)
     assert vdi.metadata["blocks"] == [2, 1, 1]
-    whole = generate_vdi(volume, camera, WINDOW, function, **options)
     found, of_whole = (np.diff(each.offsets.astype(int)) for each in (vdi, whole))
     assert (of_whole > 0).sum() > 500
     np.testing.assert_array_equal(of_whole[of_whole > 0], expected)
@@ -290,11 +289,7 @@ def test_rows_do_not_depend_on_where_they_are_cut():
     options = GenerationOptions(max_supersegments=5)
     task = task_of(volume, camera, WINDOW, transfer_for(volume), options, (8, 8, 8), 1)
     blocks, halo = task.blocks, task.halo
-    windows = blocks.windows(camera, WINDOW)
-    seen = {
-        block: task.first_pass(block, volume.array[blocks.own(block)], windows[block])
-        for block in task.to_read(windows, None)
-    }
+    windows, seen = first_passes(task, volume)
     pieces = []
     for block, light in light_entering(task, windows, seen).items():
         parts = {
@@ -305,7 +300,7 @@ def test_rows_do_not_depend_on_where_they_are_cut():
         pieces.append(task.second_pass(block, values, windows[block], light))
     height = WINDOW[1]
     whole = task.merge(0, height, pieces)
-    for cuts in ((0, 20, height), (0, 4, 8, 28, height)):
+    for cuts in ((0, 20, height), (0, 4, 8, 28, height), range(height + 1)):
         rows = [task.merge(y0, y1, pieces) for y0, y1 in itertools.pairwise(cuts)]
         for k, expected in enumerate(whole):
             np.testing.assert_array_equal(np.concatenate([part[k] for part in rows]), expected)
@@ -328,16 +323,12 @@ def test_known_ranges_leave_blocks_unread():
     camera = VIEWS["all of it"](volume)
     task = task_of(volume, camera, WINDOW, transfer_for(volume), GenerationOptions(), (8, 8, 8), 1)
     blocks = task.blocks
-    windows = blocks.windows(camera, WINDOW)
+    windows, seen = first_passes(task, volume)
     ranges = blocks.to_chunks(
         {block: blocks.ranges(volume.array[blocks.own(block)]) for block in blocks}
     )
     some = task.to_read(windows, ranges)
     assert 0 < len(some) < len(blocks) == len(task.to_read(windows, None))
-    seen = {
-        block: task.first_pass(block, volume.array[blocks.own(block)], windows[block])
-        for block in task.to_read(windows, None)
-    }
     assert set(light_entering(task, windows, seen)) <= set(some)
 
 
@@ -379,10 +370,9 @@ def test_what_nothing_shows_of_is_read_once(default_runtime, interpolation):
         made.append(vdi)
     assert read[0] > values.size
     assert read[1] < 0.6 * read[0]  # most of the noise is, where it touches what is seen
-    for name in ("offsets", "front", "back", "color", "optical_depth"):
-        np.testing.assert_array_equal(getattr(made[0], name), getattr(made[1], name), name)
+    assert made[1].equals(made[0])
     whole = generate_vdi(Volume(values), camera, WINDOW, function)
-    np.testing.assert_allclose(ray_depths(made[1]), ray_depths(whole), rtol=2.4e-5, atol=1e-7)
+    check_ray_depths(made[1], whole)
 
 
 def test_nan_beside_one_value_stays_nan(default_runtime):
@@ -403,12 +393,11 @@ def test_ranges_are_of_the_array_s_own_chunks(default_runtime):
     volume = Volume(Store(values))
     function = TransferFunction(np.ones((2, 3)), [0, 0.3], (0, 255))
     camera = VIEWS["all of it"](volume)
-    generate_chunked(volume, camera, WINDOW, function, chunks=(12, 12, 12), block_bytes=1)
+    in_blocks(volume, camera, function, (12, 12, 12))
     assert volume.chunks.ranges() is None
     generate_chunked(volume, camera, WINDOW, function, block_bytes=1)
     assert volume.chunks.ranges()[0].shape == (3, 3, 3)
-    other = generate_chunked(volume, camera, WINDOW, function, chunks=(12, 12, 12), block_bytes=1)
-    assert other.metadata["points_read"] > values.size
+    assert in_blocks(volume, camera, function, (12, 12, 12)).metadata["points_read"] > values.size
 
 
 @pytest.mark.parametrize(("radius", "view"), [(6.0, "all of it"), (20.0, "from inside")])
@@ -416,9 +405,9 @@ def test_occlusion_is_that_of_one_piece(default_runtime, radius, view):
     """Cells of one voxel and of two; what is out of sight darkens what is seen."""
     volume = volume_of("uint8")
     camera = VIEWS[view](volume)
-    arguments = (volume, camera, WINDOW, transfer_for(volume, "linear"))
-    bare, whole = (generate_vdi(*arguments, ambient_occlusion=r) for r in (None, radius))
-    vdi = generate_chunked(*arguments, chunks=(12, 10, 9), block_bytes=1, ambient_occlusion=radius)
+    arguments = (volume, camera, transfer_for(volume, "linear"))
+    bare = generate_vdi(volume, camera, WINDOW, arguments[-1])
+    whole, vdi = both_ways(*arguments, (12, 10, 9), ambient_occlusion=radius)
     without, expected, found = (pvdi.render(each, camera) for each in (bare, whole, vdi))
     assert np.abs(without - expected).max() > 0.1
     # Opacities in the last cell before a neighbour are those of the last point: 0.3 / 255 measured
@@ -431,16 +420,14 @@ def test_a_grid_of_occlusion_that_is_too_large_is_refused_before_anything_is_rea
     store.shape = (4096, 4096, 4096)
     volume = Volume(store)
     function = TransferFunction(np.ones((2, 3)), [0, 1], (0, 255))
+    camera = VIEWS["all of it"](volume)
     with pytest.raises(DeviceMemoryError, match=r"radius of 8.*larger radius"):
-        generate_chunked(
-            volume, VIEWS["all of it"](volume), WINDOW, function, ambient_occlusion=8.0
-        )
+        generate_chunked(volume, camera, WINDOW, function, ambient_occlusion=8.0)
     assert store.points == 0
 
 
 def test_it_is_given_up_when_it_is_asked_to():
     volume = volume_of("uint8")
-    camera = VIEWS["all of it"](volume)
     told = []
 
     def progress(fraction):
@@ -448,14 +435,6 @@ def test_it_is_given_up_when_it_is_asked_to():
         return fraction < 0.5
 
     with pytest.raises(Cancelled):
-        generate_chunked(
-            volume,
-            camera,
-            WINDOW,
-            transfer_for(volume),
-            chunks=(16, 16, 16),
-            block_bytes=1,
-            progress=progress,
-        )
+        in_blocks(volume, VIEWS["all of it"](volume), transfer_for(volume), progress=progress)
     assert told == sorted(told)
     assert 0.5 <= told[-1] < 0.9

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+import weakref
 from collections.abc import Sequence
 
 import numpy as np
@@ -34,11 +35,16 @@ class Clock:
 
 
 class Steps(Sequence):
-    """Steps that count how often they are decoded, take their time, or are damaged."""
+    """Steps that count how often they are decoded, take their time, or are damaged.
+
+    ``copies``: each is made anew when it is asked for, as those of a file are; ``living`` are those
+    that somebody holds.
+    """
 
     def __init__(self, clock):
         self.vdis = [_vdi(k) for k in range(N)]
         self.asked = []
+        self.copies, self.made = False, []
         self.seconds, self.damaged, self._clock = 0.0, (), clock
 
     def __len__(self):
@@ -49,7 +55,15 @@ class Steps(Sequence):
         self._clock.now += self.seconds
         if k in self.damaged:
             raise VDIFileError(f"step {k} is damaged")
-        return self.vdis[k]
+        if not self.copies:
+            return self.vdis[k]
+        vdi = _vdi(k)
+        self.made.append(weakref.ref(vdi))
+        return vdi
+
+    def living(self):
+        _settled()
+        return sum(made() is not None for made in self.made)
 
 
 @pytest.fixture
@@ -69,16 +83,19 @@ def player(steps, clock, default_runtime):
     player.close()
 
 
-def _until(happened):
+def _settled():
+    """Wait until the thread has decoded all that it wants now: then it ends."""
     end = time.monotonic() + LONG
-    while not happened():
-        assert time.monotonic() < end, "it has not happened"
+    while any(thread.name == "pyvista-vdi series" for thread in threading.enumerate()):
+        assert time.monotonic() < end, "it has not ended"
         time.sleep(0.001)
 
 
-def _settled(player):
-    """Wait until the thread has decoded all that it wants now."""
-    _until(lambda: not player._worker.running)
+def look(player, clock, seconds=0.1001):
+    """Go on by some seconds when all is ready; by default a little more than a tenth."""
+    _settled()
+    clock.now += seconds
+    return player.advance()
 
 
 def test_a_step_is_shown_by_its_index_or_by_its_time(player, steps):
@@ -99,10 +116,16 @@ def test_steps_that_there_are_not(player, step):
         player.step = step
 
 
-@pytest.mark.parametrize("rate", [0, -1, float("nan"), float("inf"), "fast", True])
-def test_rates_that_are_none(player, rate):
-    with pytest.raises(InvalidArgumentError, match="rate"):
-        player.play(rate)
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        *(({"rate": rate}, "rate") for rate in (0, -1, float("nan"), float("inf"), "fast", True)),
+        ({"memory_limit": "much"}, "memory_limit"),
+    ],
+)
+def test_rates_and_limits_that_are_none(player, arguments, named):
+    with pytest.raises(InvalidArgumentError, match=named):
+        player.play(**arguments)
     assert not player.playing
 
 
@@ -111,11 +134,9 @@ def test_every_step_is_shown_when_it_is_due(player, steps, clock):
     player.advance()
     shown = []
     for _ in range(2 * N):
-        _settled(player)
+        _settled()
         assert not player.advance()  # not yet
-        _settled(player)
-        clock.now += 0.1001
-        assert player.advance()
+        assert look(player, clock)
         shown.append(player.step)
         assert player.vdi is steps.vdis[player.step]
     assert shown == [(1 + k) % N for k in range(2 * N)]
@@ -125,9 +146,7 @@ def test_every_step_is_shown_when_it_is_due(player, steps, clock):
 def test_steps_are_left_out_where_frames_take_longer(player, clock):
     player.play(rate=10)
     player.advance()
-    _settled(player)
-    clock.now += 0.31
-    assert player.advance()
+    assert look(player, clock, 0.31)
     assert (player.step, player.dropped) == (3, 2)
 
 
@@ -139,11 +158,11 @@ def test_what_is_decoded_slowly_is_shown_in_its_time(player, steps, clock):
     late = []
     for _ in range(12):
         player.advance()
-        _settled(player)
+        _settled()
         clock.now += 0.0001
         looked = clock.now  # the thread may go on when it has been shown
         if player.advance():
-            late.append((looked - began) * 10 - player._place)
+            late.append(((looked - began) * 10 - player.step) % N)
     # The first is decoded before it is known what one takes; then a step is shown while it is due,
     # which is for one step's time, and the look comes .001 of it later
     assert len(late) > 3
@@ -156,9 +175,7 @@ def test_without_a_loop_the_last_step_is_the_end(player, clock):
     player.play(rate=10, loop=False)
     player.advance()
     for _ in range(10):
-        _settled(player)
-        clock.now += 0.1
-        player.advance()
+        look(player, clock, 0.1)
     assert (player.step, player.playing) == (N - 1, False)
     player.play(rate=10, loop=False)  # anew
     assert (player.step, player.playing) == (0, True)
@@ -171,10 +188,8 @@ def test_the_end_comes_although_the_last_step_is_damaged(player, steps, clock):
     player.advance()
     told = 0
     for _ in range(10):
-        _settled(player)
-        clock.now += 0.1
         try:
-            player.advance()
+            look(player, clock, 0.1)
         except VDIFileError:
             told += 1
     assert (player.step, player.playing, told) == (N - 2, False, 1)
@@ -187,9 +202,7 @@ def test_a_seek_goes_on_playing_from_there(player, clock):
     player.step = 5
     assert player.playing
     player.advance()
-    _settled(player)
-    clock.now += 0.1001
-    assert player.advance()
+    assert look(player, clock)
     assert player.step == 6
 
 
@@ -199,10 +212,8 @@ def test_a_damaged_step_is_told_once_and_left_out(player, steps, clock):
     player.advance()
     told, shown = [], []
     for _ in range(2 * N):
-        _settled(player)
-        clock.now += 0.1001
         try:
-            if player.advance():
+            if look(player, clock):
                 shown.append(player.step)
         except VDIFileError as error:
             told.append(str(error))
@@ -216,44 +227,36 @@ def test_a_damaged_step_is_told_once_and_left_out(player, steps, clock):
 
 
 def test_few_steps_are_held_where_memory_is_short(player, steps, clock):
+    steps.copies = True
     player.play(rate=10, memory_limit=1)
     player.advance()
     for _ in range(N - 1):
-        _settled(player)
-        clock.now += 0.1001
-        player.advance()
-        assert len(player._ready) <= 4
+        look(player, clock)
+        assert steps.living() <= 4
     assert steps.asked[: N - 1] == list(range(1, N))
 
 
 @pytest.mark.parametrize("kept", [N, 6])
 def test_what_is_kept_is_not_decoded_in_the_next_round(player, steps, clock, kept):
+    steps.copies = True
     taken = steps.vdis[0].nbytes * 2.2
     player.play(rate=10, memory_limit=kept * taken)
     player.advance()
     for turn in range(3 * N):
         if turn == 2 * N:
             steps.asked.clear()
-        _settled(player)
-        clock.now += 0.1001
-        assert player.advance()
-        assert len(player._ready) <= kept
-        assert player.vdi is steps.vdis[player.step]
+        assert look(player, clock)
+        assert steps.living() <= kept
+        assert player.vdi.equals(steps.vdis[player.step])
     # Of a round that does not fit, some are the same in each
     assert len(steps.asked) == 0 if kept == N else len(set(steps.asked)) < N
-
-
-def test_a_limit_that_is_none(player):
-    with pytest.raises(InvalidArgumentError, match="memory_limit"):
-        player.play(memory_limit="much")
-    assert not player.playing
 
 
 def test_nobody_looks_and_nothing_goes_on(player, steps, clock):
     steps.seconds = 1.0
     player.play(rate=10)
     player.advance()
-    _settled(player)
+    _settled()
     assert len(steps.asked) <= 3
     player.close()
     assert not [t for t in threading.enumerate() if t.name == "pyvista-vdi series"]

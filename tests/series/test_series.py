@@ -13,11 +13,6 @@ SIZE = (20, 12)
 SPACING = (1.0, 1.0, 0.5)
 
 
-def _steps(n=4):
-    z, y, x = np.mgrid[:9, :8, :7]
-    return [(x * y + z + 3 * k).astype(np.float32) for k in range(n)]
-
-
 def _table():
     shades = np.linspace(0, 1, 16)
     colors = np.stack([shades, shades**2, 1 - shades], axis=1)
@@ -26,7 +21,8 @@ def _table():
 
 @pytest.fixture(scope="module")
 def volumes():
-    return [pvdi.Volume(step, SPACING) for step in _steps()]
+    z, y, x = np.mgrid[:9, :8, :7]
+    return [pvdi.Volume((x * y + z + 3 * k).astype(np.float32), SPACING) for k in range(4)]
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +72,7 @@ def test_nearest_is_the_step_nearest_in_time(series):
 
 def test_volumes_in_many_shapes_are_the_same_series(series, volumes, camera):
     looks = {"transfer_function": _table()}
-    stack = np.stack(_steps())
+    stack = np.stack([volume.array for volume in volumes])
     called = []
     shapes = {
         "iterator": (iter(volumes), {}),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-from dataclasses import dataclass
 
 import numpy as np
 from drawing import raycast_volume, render_vdi
@@ -16,6 +15,7 @@ from pyvista_vdi.raycasting.prepared import prepared_vdi
 #: The driver's functions that the runtime calls, by what they are for.
 ALLOCATIONS = ("Buffer",)
 LAUNCHES = ("enqueue_nd_range_kernel", "enqueue_copy", "enqueue_fill_buffer")
+WAITS = ("finish",)
 
 WINDOW = (24, 17)
 CAMERA = Camera((3.5, 3.5, 30), (3.5, 3.5, 3.5), (0, 1, 0))
@@ -27,17 +27,6 @@ def fresh_volume():
     """A new object: nothing of it is on a device."""
     rng = np.random.default_rng(1)
     return Volume((rng.random((8, 9, 10)) * 100).astype(np.float32))
-
-
-@dataclass(frozen=True)
-class Operation:
-    """A public operation on objects that the device has not seen, and its result as bytes."""
-
-    name: str
-    run: object
-
-    def __call__(self, runtime):
-        return self.run(runtime)
 
 
 def _generate(runtime):
@@ -60,12 +49,13 @@ def _render_volume(runtime):
     return [raycast_volume(fresh_volume(), TURNED, WINDOW, TRANSFER, device=runtime)]
 
 
-OPERATIONS = [
-    Operation("generate", _generate),
-    Operation("prepare", _prepare),
-    Operation("render", _render),
-    Operation("render_volume", _render_volume),
-]
+#: Public operations on objects that the device has not seen, and their results as bytes.
+OPERATIONS = {
+    "generate": _generate,
+    "prepare": _prepare,
+    "render": _render,
+    "render_volume": _render_volume,
+}
 
 
 class Driver:
@@ -79,12 +69,14 @@ class Driver:
         self._names = ()
         for name in (*ALLOCATIONS, *LAUNCHES):
             monkeypatch.setattr(self._cl, name, self._wrapped(name, getattr(self._cl, name)))
+        queue = self._cl.CommandQueue
+        monkeypatch.setattr(queue, "finish", self._wrapped("finish", queue.finish))
 
     def _wrapped(self, name, function):
         def call(*args, **kwargs):
             if name in self._names:
                 self.calls += 1
-                if self.calls - 1 == self._fail_at:
+                if self._fail_at in (self.calls - 1, "each"):
                     self._fail()
             return function(*args, **kwargs)
 
@@ -110,7 +102,7 @@ class Driver:
         self._names, self._fail_at, self.calls = names, None, 0
 
     def fail(self, names, at, error):
-        """Let call number ``at`` of some functions fail by a code, or call ``error``."""
+        """Let call number ``at`` of some functions, or each, fail by a code, or call ``error``."""
         self._names, self._fail_at, self._error, self.calls = names, at, error, 0
 
     def work(self):
@@ -118,17 +110,14 @@ class Driver:
         self._names, self._fail_at = (), None
 
 
-def living_buffers():
-    """Buffers that were not released, with the memory that each holds."""
-    gc.collect()
-    return sorted(
-        (o.name, o.nbytes) for o in gc.get_objects() if type(o) is DeviceBuffer and not o.released
-    )
-
-
 def state_of(runtime):
-    """What must be as before when something went wrong."""
-    return living_buffers(), runtime.allocated, len(runtime._queues)
+    """What must be as before when something went wrong: buffers, memory, command queues."""
+    gc.collect()
+    objects = gc.get_objects()
+    living = (o for o in objects if type(o) is DeviceBuffer and not o.released)
+    buffers = sorted((o.name, o.nbytes) for o in living)
+    queues = sum(isinstance(o, devices.opencl().CommandQueue) for o in objects)
+    return buffers, runtime.allocated, queues
 
 
 def same(first, second):

@@ -1,4 +1,4 @@
-"""What ``tests/insitu/test_mpi.py`` runs on several ranks, by a case's name and a folder."""
+"""What ``tests/insitu/test_mpi.py`` runs on several ranks, by the names of cases and a folder."""
 
 from __future__ import annotations
 
@@ -88,4 +88,5 @@ def series(folder):
 
 
 if __name__ == "__main__":
-    {"same": same, "failing": failing, "series": series}[sys.argv[1]](Path(sys.argv[2]))
+    for case in sys.argv[1].split(","):
+        {"same": same, "failing": failing, "series": series}[case](Path(sys.argv[2]))

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.series import layout
 
 SIZE = (24, 14)
 
@@ -69,3 +72,23 @@ def damaged(path, change):
     other = path.with_name(f"damaged{path.suffix}")
     other.write_bytes(data)
     return other
+
+
+def packed_steps(n, **options):
+    """The first steps of a scene, packed."""
+    made = stepped_vdi if "metadata" in options else _kept
+    return [made(step=k, **options).with_precision("8-byte") for k in range(n)]
+
+
+_kept = functools.cache(stepped_vdi)
+
+
+def frames_of(path):
+    """Where a file's frames of steps begin, and their headers."""
+    data, found = path.read_bytes(), []
+    place = len(layout.MAGIC) + layout.HEAD.size + layout.HEAD.unpack_from(data, 8)[1]
+    while header := layout.FrameHeader.of_bytes(data[place : place + layout.HEADER_BYTES]):
+        if header.what == layout.STEP:
+            found.append((place, header))
+        place += layout.HEADER_BYTES + header.n_bytes
+    return found
