@@ -105,7 +105,7 @@ LENGTHY = {
     "extremes": "entries lighting media vdis views volumes worlds",
     "faults": "device_faults",
     "generation": "criterion_functions generation_oracle march_blocks run_functions",
-    "io": "deep_exr packed_files vdi_files",
+    "io": "deep_exr vdi_files",
     "large": "blocks",
     "measure": "benchmark_scripts baselines",
     "model": "packing",
@@ -131,7 +131,7 @@ LENGTHIEST = {
     "packaging": "distributions documentation",
     "plotting": "example_scripts in_browser on_screen scenes",
     "quality": "background dial",
-    "vtk_pipeline": "interactive long_load overlap previews regeneration",
+    "vtk_pipeline": "long_load overlap previews regeneration",
     "web": "notebook server",
 }
 

@@ -133,7 +133,7 @@ def test_options_are_set_one_by_one_or_all_at_once():
         ("SetInputDataObject", (vtkSphereSource(),), errors.UnsupportedError, "not a uniform grid"),
         ("SetScalars", ("v", "edge"), errors.InvalidArgumentError, "'point' or 'cell'"),
     ],
-    ids=str,
+    ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_settings_are_checked_when_they_are_set(method, value, error, message):
     source = ready_source()

@@ -5,7 +5,7 @@ import base64
 import numpy as np
 import pytest
 from browsers import assert_decoded, in_base64
-from frames import frames_of
+from stored_frames import frames_of
 from stepped_vdis import stepped_vdi
 
 import pyvista_vdi as pvdi

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from browsers import WITHOUT_WORKERS, file_of, in_base64
-from frames import frames_of
+from stored_frames import frames_of
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.cli import main

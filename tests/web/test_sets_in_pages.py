@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from browsers import in_base64
-from frames import frames_of
+from stored_frames import frames_of
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.model.standard_cases import filling_camera
