@@ -14,7 +14,7 @@ from pyvista_vdi.device.choice import describe_devices
 from pyvista_vdi.errors import VDIError
 
 #: Extras for those who work on this project, which nobody else misses.
-_FOR_DEVELOPERS = ("browser", "dev", "docs", "fuzz", "qt", "test")
+_FOR_DEVELOPERS = ("browser", "dev", "docs", "fuzz", "ome-zarr", "qt", "test")
 _EXTRA = re.compile(r"""extra\s*==\s*["']([\w-]+)["']""")
 
 
