@@ -58,58 +58,31 @@ def check(runtime, worst, volume, function, lights=None, **options):
     check_scene(runtime, worst, volume, function, camera, views, lights=lights, **options)
 
 
-WORLDS = [(1e-9, 0), (1e9, 0), (1, 1e7), (1e-9, 1e7), (1e9, 1e7)]
-QUICK = {(1e-9, 1e7), (1e9, 1e7)}
-
-
 @pytest.mark.every(4)
-@pytest.mark.parametrize("look", LOOKS)
-@pytest.mark.parametrize("lit_by", ["headlight", "lamps"])
 @pytest.mark.parametrize(
-    ("scale", "offset"),
-    [pytest.param(*w, marks=() if w in QUICK else pytest.mark.slow) for w in WORLDS],
+    ("lit_by", "look"), [*(("headlight", look) for look in LOOKS), ("lamps", "both")]
 )
-def test_worlds(runtime, worst, scale, offset, lit_by, look):
-    if look == "gradient" and lit_by == "lamps":
-        pytest.skip("lights do nothing without shading")
-    volume = field_volume(scale, offset)
-    function = transfer(unit_distance=scale, **LOOKS[look])
-    check(runtime, worst, volume, function, None if lit_by == "headlight" else lamps(volume))
-
-
-@pytest.mark.every(8)
 @pytest.mark.parametrize(
-    ("lit_by", "look"),
-    [
-        *(("headlight", look) for look in LOOKS),
-        ("lamps", "both"),
-        pytest.param("lamps", "shaded", marks=pytest.mark.slow),  # "both" is shaded as well
-    ],
+    ("spacing", "offset"),
+    [(1e-9, 1e7), (1e9, 1e7), ((1, 1, 1000), 0), ((1000, 1, 1), 0), ((1, 0.001, 1), 0)],
+    ids=["tiny", "huge", "along z", "along x", "plate"],
 )
-@pytest.mark.parametrize("spacing", [(1, 1, 1000), (1000, 1, 1), (1, 0.001, 1)], ids=str)
-def test_anisotropy(runtime, worst, spacing, lit_by, look):
-    """Normals are transformed as normals: those of a needle or of a plate.
+def test_worlds(runtime, worst, spacing, offset, lit_by, look):
+    """Normals are transformed as normals: those of a needle or of a plate, too.
 
     A highlight or a table of gradient opacities changes by half in a voxel, and rays enter some
     thousand voxels from where they are formed.
     """
-    volume = field_volume(spacing)
-    function = transfer(unit_distance=5 * min(spacing), **LOOKS[look])
+    volume, even = field_volume(spacing, offset), np.ndim(spacing) == 0
+    function = transfer(unit_distance=np.min(spacing) * (1 if even else 5), **LOOKS[look])
     lights = lamps(volume) if lit_by == "lamps" else None
-    check(runtime, worst, volume, function, lights, zoom=True, least_drawn=1)
+    least_drawn = 3 if even else 1
+    check(runtime, worst, volume, function, lights, zoom=not even, least_drawn=least_drawn)
 
 
-SCALES = (1e-45, 1e-40, 1e-30, 1e-24, 1e-20, 1e20, 1e30, 3e38)
-
-
+@pytest.mark.every(2)
 @pytest.mark.parametrize("look", LOOKS)
-@pytest.mark.parametrize(
-    "scale",
-    [
-        s if s in (1e-40, 1e-24, 3e38) else pytest.param(s, marks=pytest.mark.slow)
-        for s in SCALES[1:]
-    ],
-)
+@pytest.mark.parametrize("scale", [1e-40, 1e-24, 1e-20, 1e20, 3e38])
 def test_gradients_from_denormal_to_huge(runtime, worst, scale, look):
     """Gradients whose squares float32 does not hold: densities in kg/m3, or counts of atoms."""
     volume = Volume((FIELD * scale).astype(np.float32))
@@ -132,16 +105,13 @@ def test_a_light_inside_the_volume(runtime, worst, attenuation):
 
 @pytest.mark.every(4)
 @pytest.mark.parametrize("look", ["plain", *LOOKS])
-@pytest.mark.parametrize(
-    ("scale", "offset"), [(1e-9, 1e7), pytest.param(1e9, 1e7, marks=pytest.mark.slow)]
-)
-def test_rgba(runtime, worst, scale, offset, look):
+def test_rgba(runtime, worst, look):
     colors = [FIELD, 1 - FIELD, np.roll(FIELD, 3), FIELD]
     rgba = np.round(np.stack(colors, axis=-1) * 255).astype(np.uint8)
-    own = field_volume(scale, offset)
+    own = field_volume(1e-9, 1e7)
     volume = Volume(rgba, own.spacing, own.origin)
     options = {} if look == "plain" else scaled_look(look, 255)
-    check(runtime, worst, volume, transfer(0, 255, unit_distance=scale, **options))
+    check(runtime, worst, volume, transfer(0, 255, unit_distance=1e-9, **options))
 
 
 def test_rgba_of_one_opacity(runtime, worst):
@@ -153,15 +123,15 @@ def test_rgba_of_one_opacity(runtime, worst):
         check(runtime, worst, Volume(rgba), function)
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize("power", [0.0, 1e-3, 1e3, 1e6])
+@pytest.mark.parametrize("power", [0.0, 1e-3, 1e6])
 def test_specular_powers(runtime, worst, power):
     """From a highlight everywhere to one that hardly a sample is in."""
     check(runtime, worst, field_volume(), transfer(shading=Shading(0.1, 0.5, 1.0, power)))
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("lit_by", ["headlight", "lamp", "back lamp"])
-@pytest.mark.parametrize("power", [99.0, 101.0, 1e3, 1e4, 1e5, 1e6])
+@pytest.mark.parametrize("power", [99.0, 101.0, 1e4, 1e6])
 def test_the_middle_of_a_highlight(runtime, worst, power, lit_by):
     """A ramp seen along its gradient, and nothing but its highlight, from the middle to its rim."""
     ramp = np.broadcast_to(np.linspace(0.2, 1, 9)[:, None, None], (9, 4, 5))

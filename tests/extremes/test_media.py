@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 from drawing import raycast_volume, render_vdi, render_vdis
@@ -31,16 +29,16 @@ from pyvista_vdi.model.volume import Volume
 
 pytestmark = pytest.mark.extremes
 
-UNITS = (1e-8, 1e-4, 1.0, 1e4, 1e8)
-OPACITIES = (1e-7, 0.5, 1 - 2.0**-24, 1.0)
-QUICK = {(1e-8, 1e-7), (1e-8, 1.0), (1.0, 1 - 2.0**-24), (1e8, 0.5), (1.0, 1e-7)}
-
 
 @pytest.mark.parametrize(
     ("unit", "opacity"),
     [
-        pytest.param(*case, marks=() if case in QUICK else pytest.mark.slow)
-        for case in itertools.product(UNITS, OPACITIES)
+        (1e-8, 1e-7),
+        (1e-8, 1.0),
+        (1.0, 1 - 2.0**-24),
+        (1.0, 1e-7),
+        (1e8, 0.5),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in [(1e-4, 0.5), (1e4, 1.0)]),
     ],
 )
 def test_unit_distance_and_opacity(runtime, worst, unit, opacity):
@@ -82,7 +80,7 @@ def test_opacity_of_exactly_nothing(runtime, interpolation):
     assert vdi.back.max() <= 5.5
 
 
-@pytest.mark.parametrize("unit", [1e-300, 1e-45, 1e-30, 1e30, 1e300])
+@pytest.mark.parametrize("unit", [1e-300, 1e-45, 1e300])
 def test_unit_distances_beyond_float32(runtime, unit):
     """As opaque, or as transparent, as those that it holds."""
     volume = field_volume()
@@ -109,34 +107,28 @@ def test_optical_depth_of_one_supersegment(runtime, worst, optical_depth):
     check_views(runtime, worst, vdi, views)
 
 
-# -- transfer functions ----------------------------------------------------------------------------
-
-
-def table(kind):
-    """A table of 33 opacities over 0..1 and what to draw with it."""
-    opacities = np.zeros(33)
-    if kind == "one entry":
-        opacities[17] = 0.9
-    elif kind == "step at a bin edge":
-        opacities[17:] = 0.7
-    elif kind == "all one":
-        opacities[:] = 1.0
-    shares = np.linspace(0, 1, 33)
-    colors = np.stack([shares, 1 - shares, 0.5 + 0 * shares], axis=1)
-    return lambda interpolation: TransferFunction(
-        colors, opacities, (0, 1), unit_distance=1.0, interpolation=interpolation
-    )
+#: Tables of 33 opacities over 0..1.
+TABLES = {
+    "one entry": np.where(np.arange(33) == 17, 0.9, 0),
+    "step at a bin edge": np.where(np.arange(33) >= 17, 0.7, 0),
+    "all zero": np.zeros(33),
+    "all one": np.ones(33),
+}
 
 
 @pytest.mark.every(3)
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
-@pytest.mark.parametrize("kind", ["one entry", "step at a bin edge", "all zero", "all one"])
+@pytest.mark.parametrize("kind", TABLES)
 def test_transfer_functions(runtime, worst, kind, interpolation):
     # Whole multiples of a bin: nearest samples lie exactly on its edges
     field = np.round(FIELD * 32) / 32 if interpolation == "nearest" else FIELD
     volume = Volume(field.astype(np.float32))
     camera = view(volume)
-    function = table(kind)(interpolation)
+    shares = np.linspace(0, 1, 33)
+    colors = np.stack([shares, 1 - shares, 0.5 + 0 * shares], axis=1)
+    function = TransferFunction(
+        colors, TABLES[kind], (0, 1), unit_distance=1.0, interpolation=interpolation
+    )
     if kind == "all zero":
         assert not raycast_volume(volume, camera, WINDOW, function, device=runtime).any()
         assert generate_vdi(volume, camera, WINDOW, function, device=runtime).n_supersegments == 0
@@ -144,8 +136,6 @@ def test_transfer_functions(runtime, worst, kind, interpolation):
     views = turned(camera, volume, (0, 25, 180))
     check_scene(runtime, worst, volume, function, camera, views)
 
-
-# -- accumulated rounding --------------------------------------------------------------------------
 
 EYE = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=10)
 BOUNDS = (-1, 1, -1, 1, -1, 1)
@@ -224,9 +214,9 @@ def test_several_vdis_of_nearly_transparent_supersegments(runtime, worst):
 
 
 @pytest.mark.every(4)
-@pytest.mark.parametrize("opacity", [1e-6, 0.01, 0.5, 0.9])
+@pytest.mark.parametrize("opacity", [1e-6, 0.01, 0.9])
 @pytest.mark.parametrize(
-    "steps", [1000, 8000, 10_000, pytest.param(MOST_STEPS, marks=pytest.mark.slow)]
+    "steps", [1000, 10_000, pytest.param(MOST_STEPS, marks=pytest.mark.slow)]
 )
 def test_very_many_steps_through_a_constant_volume(runtime, worst, steps, opacity):
     """Closed form: the opacity of a slab is what the table says, however it is cut."""

@@ -86,25 +86,16 @@ def test_touching_supersegments_leave_no_gap(runtime, worst, parallel):
 @pytest.mark.every(6)
 @pytest.mark.parametrize("origin", [9.0, 0.0])
 @pytest.mark.parametrize("parallel", [False, True])
-@pytest.mark.parametrize(
-    "optical_depth",
-    [
-        1.0,
-        3e38,
-        pytest.param(1e-6, marks=pytest.mark.slow),
-        pytest.param(1e6, marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.parametrize("optical_depth", [1.0, 3e38])
 def test_supersegments_one_ulp_thick(runtime, worst, optical_depth, origin, parallel):
     """From a denormal number thick: within what rounding of its faces makes of it, and finite."""
     camera = EYE.replace(parallel_projection=parallel)
     for depth in (0.0, 1e-40, 0.5, 1.5):
         front = np.float32(9.0 - origin + depth)
         back = np.nextafter(front, np.float32(99))
-        vdi = VDI(
-            camera, (3, 3), np.arange(10), [front] * 9, [back] * 9, [[0.3, 0.5, 0.7]] * 9,
-            [optical_depth] * 9, BOUNDS, depth_origin=origin,
-        )  # fmt: skip
+        vdi = slabs_vdi(
+            camera, [front, back], optical_depth, window=(3, 3), bounds=BOUNDS, depth_origin=origin
+        )
         check_views(runtime, worst, vdi, AROUND, size=(3, 3), least_drawn=0)
 
 

@@ -9,13 +9,6 @@ __kernel void merged(int count, __global const float8 *a, __global const float8 
         results[i] = merged_runs(a[i], b[i]);
 }
 
-__kernel void features(int count, __global const float8 *runs, float per_reference, __global float4 *results)
-{
-    const int i = get_global_id(0);
-    if (i < count)
-        results[i] = run_feature(runs[i], per_reference);
-}
-
 __kernel void merge_errors(int count, __global const float8 *a, __global const float8 *b, float per_reference,
                            float hidden_weight, __global float *results)
 {
@@ -23,19 +16,6 @@ __kernel void merge_errors(int count, __global const float8 *a, __global const f
     if (i < count)
         results[i] = merge_error(1, a[i], run_feature(a[i], per_reference), b[i], run_feature(b[i], per_reference),
                                  per_reference, hidden_weight);
-}
-
-// Runs from (record, k) order to the records' own layout, and back.
-__kernel void stored(int count, __global const float8 *runs, int capacity, __global float *records, __global float8 *back)
-{
-    const int i = get_global_id(0);
-    if (i >= count)
-        return;
-    __global float *record = records + record_start((uint)i, capacity);
-    for (int k = 0; k < capacity; ++k)
-        store_run(record, k, runs[(size_t)i * capacity + k]);
-    for (int k = 0; k < capacity; ++k)
-        back[(size_t)i * capacity + k] = load_run(record, k);
 }
 
 #define WITHIN 0

@@ -1,35 +1,7 @@
-// Entry points to opencl/raycasting/stacks.cl and to list_space.cl's depth coordinate, one work-item per query.
+// Entry point to opencl/raycasting/stacks.cl and to list_space.cl's depth coordinate, one work-item per query.
 #include "lib/list_space.cl"
 #include "raycasting/stacks.cl"
 #pragma OPENCL FP_CONTRACT OFF
-
-__kernel void slabs(int count, __global const float *offsets, float first_depth, float slabs_per_depth,
-                    __global int *results)
-{
-    const int i = get_global_id(0);
-    if (i < count)
-        results[i] = slab_of(offsets[i], first_depth, slabs_per_depth);
-}
-
-__kernel void sets_of_slabs(int count, __global const int *slabs, __global ulong *from, __global ulong *to)
-{
-    const int i = get_global_id(0);
-    if (i < count) {
-        from[i] = slabs_from(slabs[i]);
-        to[i] = slabs_to(slabs[i]);
-    }
-}
-
-__kernel void depths(int count, __global const float *offsets, float depth_origin, __global float *coordinates,
-                     __global float *found, __global float *reciprocals)
-{
-    const int i = get_global_id(0);
-    if (i < count) {
-        coordinates[i] = depth_coordinate(offsets[i], depth_origin);
-        found[i] = depth_offset(coordinates[i], depth_origin);
-        reciprocals[i] = reciprocal_depth(coordinates[i], depth_origin);
-    }
-}
 
 // What the raycaster compares at the near face of slab slabs[i]. A ray reaches over the offsets rays[i], from V_O's side to
 // the deep one. It has skipped up to that face, away from V_O or back towards it, when it is at the depth coordinate until[i].

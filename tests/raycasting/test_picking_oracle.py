@@ -19,7 +19,7 @@ from pyvista_vdi.reference import raycast as oracle
 VIEWS = [kind for kind in strategies.VIEWS if kind != "half"]
 
 #: VDIs per kind of view.
-N_CASES = 6
+N_CASES = 4
 #: Every so many pixels of a picture.
 STRIDE = 4
 
@@ -75,34 +75,25 @@ def test_the_hit_is_the_first_that_the_oracle_meets(kind, monkeypatch):
                 assert hit.accumulated_optical_depth == pytest.approx(
                     tau[: k + 1].sum(), rel=1e-6, abs=1e-12
                 )
-    assert hits > 30  # a comparison of nothing with nothing proves nothing
+    assert hits > 20  # a comparison of nothing with nothing proves nothing
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("kind", VIEWS)
-def test_before_the_hit_lies_what_is_not_enough(kind):
+def test_the_position_lies_in_the_supersegment_and_on_the_ray(kind):
+    """And before it lies what is not enough for a hit."""
     for vdi, camera, size, pixels in cases(kind):
-        for x, y in pixels[::3]:
+        for x, y in pixels:
             hit = pvdi.pick(vdi, camera, (x, y), size, opacity_threshold=0.3)
             if hit is None:
                 continue
             ends = np.full(size[::-1], np.inf)
             ends[size[1] - 1 - y, x] = hit.depth
-            before = reference.raycast.render_pixels(
-                vdi, camera, size, [(x, y)], opaque_depth=ends
-            )[0, 3]
+            before = reference.render_pixels(vdi, camera, size, [(x, y)], opaque_depth=ends)[0, 3]
             own = hit.accumulated_optical_depth - hit.optical_depth
             assert before == pytest.approx(-np.expm1(-own), abs=1e-6)
             assert before < 0.3
             assert hit.accumulated_opacity >= 0.3
-
-
-@pytest.mark.parametrize("kind", VIEWS)
-def test_the_position_lies_in_the_supersegment_and_on_the_ray(kind):
-    for vdi, camera, size, pixels in cases(kind):
-        for x, y in pixels:
-            hit = pvdi.pick(vdi, camera, (x, y), size)
-            if hit is None:
-                continue
             world = np.append(hit.position, 1.0)
             # On the ray: the pixel's centre, at the depth told
             place = camera.viewport_matrix(size) @ camera.view_matrix @ world
@@ -149,7 +140,7 @@ def test_the_kernel_sees_the_same_depth(runtime, kind):
                 hits += hit is not None
                 slack = 2e-5 * max(abs(expected), 1e-3)
                 different += not (drawn == expected or abs(drawn - expected) <= slack)
-    assert hits > 30
+    assert hits > 20
     assert different <= 0.005 * total
 
 
@@ -162,24 +153,14 @@ def test_options_reach_the_kernel(runtime):
         camera, size = strategies.random_view(rng, vdi, "around")
         corners = strategies.world_corners(vdi.bounds, camera.model_transform)
         planes = [[*corners.mean(axis=0), *rng.normal(size=3)]]
-        middle = (corners - camera.position) @ camera.axes[2]
-        ends = np.full(size[::-1], middle.mean())
+        ends = np.full(size[::-1], ((corners - camera.position) @ camera.axes[2]).mean())
         ends[:, ::2] = np.inf
-        depth = pvdi.render_depth(
-            vdi, camera, size, clipping_planes=planes, opaque_depth=ends, device=runtime
-        )
-        for y in range(size[1]):
-            for x in range(size[0]):
-                hit = pvdi.pick(
-                    vdi,
-                    camera,
-                    (x, y),
-                    size,
-                    clipping_planes=planes,
-                    opaque_depth=ends[size[1] - 1 - y, x],
-                )
-                drawn = depth[size[1] - 1 - y, x]
-                expected = np.inf if hit is None else hit.depth
-                assert drawn == pytest.approx(expected, rel=2e-5)
-                compared += hit is not None
+        shown = {"clipping_planes": planes, "opaque_depth": ends}
+        depth = pvdi.render_depth(vdi, camera, size, device=runtime, **shown)
+        for row, x in np.ndindex(depth.shape):
+            shown["opaque_depth"] = ends[row, x]
+            hit = pvdi.pick(vdi, camera, (x, size[1] - 1 - row), size, **shown)
+            expected = np.inf if hit is None else hit.depth
+            assert depth[row, x] == pytest.approx(expected, rel=2e-5)
+            compared += hit is not None
     assert compared > 20
