@@ -168,7 +168,7 @@ def lens(angle, fill=1.0):
     [
         (0.01, 170),
         (170, 0.01),
-        *(pytest.param(*case, marks=pytest.mark.slow) for case in [(0.01, 30), (30, 170), (170, 1)]),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in [(0.01, 30), (30, 170)]),
     ],
 )
 def test_fields_of_view(runtime, worst, own, new):
@@ -186,9 +186,13 @@ def test_windows_of_extreme_aspect(runtime, worst, size):
     check_scene(runtime, worst, VOLUME, transfer(), camera, views, size=size, least_drawn=1)
 
 
-@pytest.mark.every(2)
-@pytest.mark.parametrize("origin", [0.0, 1.0])
-@pytest.mark.parametrize("distance", [1.01, 2.9, 2.99, 3.0, 3.01, 3.1, 1e3, 1e6])
+@pytest.mark.parametrize(
+    ("distance", "origin"),
+    [
+        *((distance, 1.0) for distance in (1.01, 2.9, 2.99, 3.0, 3.01, 3.1, 1e3, 1e6)),
+        *((distance, 0.0) for distance in (2.99, 3.01, 1e3)),
+    ],
+)
 def test_both_depth_coordinates_at_the_border_of_their_choice(runtime, worst, distance, origin):
     """Far depth over near depth from long lenses to over 2: 3 half depths away it is 2.
 
@@ -206,5 +210,3 @@ def test_both_depth_coordinates_at_the_border_of_their_choice(runtime, worst, di
     assert ("SHIFTED" in PreparedVDI(runtime, vdi).defines) == (distance >= 3 and origin == 1)
     around = Camera((1.5, 1, 5), (0, 0, 0), (0, 1, 0))
     check_views(runtime, worst, vdi, [camera, around, around.azimuth(90), around.azimuth(180)])
-
-

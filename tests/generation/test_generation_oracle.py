@@ -18,7 +18,7 @@ from drawing import raycast_volume, render_vdi
 from sampling_uncertainty import uncertainties
 
 from pyvista_vdi import reference
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError
+from pyvista_vdi.errors import Cancelled
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import CRITERIA
@@ -308,22 +308,3 @@ def test_progress_runs_from_0_to_1_and_can_cancel(runtime):
         generate_vdi(
             volume, camera, WINDOW, transfer_function, device=runtime, progress=lambda _: False
         )
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"max_supersegments": 0}, "max_supersegments.*got 0"),
-        ({"max_supersegments": 4097}, "max_supersegments.*4096.*got 4097"),
-        ({"max_supersegments": 2.5}, "max_supersegments.*got 2.5"),
-        ({"tolerance": -1.0}, "tolerance.*got -1"),
-        ({"view_cone": 91.0}, "view_cone.*got 91"),
-        ({"criterion": "depth"}, "criterion must be one of least-error, .*got 'depth'"),
-        ({"sample_distance": 0.0}, "sample_distance.*got 0"),
-        ({"sample_distance": float("nan")}, "sample_distance.*got nan"),
-    ],
-)
-def test_bad_arguments_are_refused_by_name(runtime, arguments, message):
-    volume, camera, transfer_function = cases([9, 7000], "uint8", "nearest")
-    with pytest.raises(InvalidArgumentError, match=message):
-        generate_vdi(volume, camera, WINDOW, transfer_function, device=runtime, **arguments)

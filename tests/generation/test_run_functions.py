@@ -1,5 +1,5 @@
-"""opencl/generation/runs.cl: what merging two runs gives and costs, and the three ways of shortening
-a record.
+"""opencl/generation/runs.cl: what merging two runs gives and costs, and three ways of shortening a
+record.
 
 The reference is float64 and written from docs/conventions.md and the head of the kernel file: a run
 is a homogeneous medium of straight colour c and optical depth tau over a length; it looks like

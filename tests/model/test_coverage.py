@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 
@@ -114,9 +113,3 @@ def test_a_volume_smaller_than_a_pixel_gets_one_list():
     camera = Camera((0.0, 0.0, 1e6), (0.1, 0.1, 0), (0, 1, 0))
     _, lists = covering_view(camera, (101, 101), BOX)
     assert lists == (1, 1)
-
-
-def test_a_limit_of_nothing_is_refused():
-    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0))
-    with pytest.raises(InvalidArgumentError, match="max_lists_per_pixel must be positive; got 0"):
-        covering_view(camera, (100, 100), BOX, max_lists_per_pixel=0)

@@ -9,9 +9,7 @@ from drawing import render_vdi
 from extreme_scenes import slabs_vdi
 from ray_scenes import rebuilt
 
-from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.render_options import MAX_PREVIEW_SAMPLES
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.reference.raycast import centre_ray_scale
 
@@ -108,10 +106,3 @@ def test_opaque_depth_and_clipping_planes_end_the_ray(runtime):
 def test_an_empty_vdi_is_transparent(runtime):
     empty = slabs_vdi(ACROSS, [], [], window=(4, 3), bounds=BOUNDS)
     assert not render_vdi(empty, ACROSS.azimuth(30), preview_samples=8, device=runtime).any()
-
-
-@pytest.mark.parametrize("samples", [0, -1, 1.5, "many", float("nan"), MAX_PREVIEW_SAMPLES + 1])
-def test_a_number_of_samples_that_is_none_is_refused(samples):
-    vdi = solid_vdi(window=(2, 2))
-    with pytest.raises(InvalidArgumentError, match="preview_samples"):
-        render_vdi(vdi, vdi.camera, preview_samples=samples)
