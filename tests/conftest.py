@@ -102,7 +102,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 LENGTHY = {
     "api": "api engine_errors",
     "cli": "cli",
-    "extremes": "entries lighting media vdis views volumes worlds",
+    "extremes": "entries media scenes vdis views volumes",
     "faults": "device_faults",
     "generation": "criterion_functions generation_oracle march_blocks run_functions",
     "io": "deep_exr packed_files vdi_files",

@@ -45,25 +45,19 @@ def test_from_what_users_have():
     assert hash(Cropping(list(THIRDS), "fence")) == hash(fence)
 
 
-def test_sub_volume_is_a_box():
-    within = Cropping(THIRDS).within(BOX)
-    np.testing.assert_array_equal(within.box, [[1, 2]] * 3)
-
-
-def test_planes_outside_the_bounds_and_infinite_ones_make_no_regions():
+def test_which_croppings_are_boxes():
+    np.testing.assert_array_equal(Cropping(THIRDS).within(BOX).box, [[1, 2]] * 3)
+    for name in set(PRESETS) - {"subvolume"}:
+        within = Cropping(THIRDS, name).within(BOX)
+        assert within.box is None
+        np.testing.assert_array_equal(within.cuts, [[1, 2]] * 3)
+    # Planes outside the bounds and infinite ones make no regions
     within = Cropping((-math.inf, 2, -5, 9, 1, math.inf), "subvolume").within(BOX)
     np.testing.assert_array_equal(within.box, [[0, 2], [0, 3], [1, 3]])
     # of a cross there is only its middle then
     within = Cropping((-1, 4, -1, 4, -1, 4), "cross").within(BOX)
     np.testing.assert_array_equal(within.box.ravel(), BOX)
     assert np.isnan(Cropping((5, 6, 0, 3, 0, 3)).within(BOX).box).all()
-
-
-def test_fence_and_cross_take_the_regions_to_say():
-    for name in set(PRESETS) - {"subvolume"}:
-        within = Cropping(THIRDS, name).within(BOX)
-        assert within.box is None
-        np.testing.assert_array_equal(within.cuts, [[1, 2]] * 3)
 
 
 @given(

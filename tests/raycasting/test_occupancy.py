@@ -111,22 +111,6 @@ def occupied_slabs(runtime, *faces, **options):
     return {int(slab): int(counts[0, 0, slab]) for slab in np.flatnonzero(counts)}
 
 
-@pytest.mark.parametrize(
-    ("faces", "slabs"),
-    [
-        ([(3.25, 3.75)], {3: 1}),
-        ([(3.25, 6.75)], {3: 1, 4: 1, 5: 1, 6: 1}),
-        ([(3.25, 3.5), (3.5, 4.5), (5.5, 5.75)], {3: 2, 4: 1, 5: 1}),
-        # What is beyond the bounds counts at their ends
-        ([(-9, -8), (0.25, 0.5)], {0: 2}),
-        ([(63.5, 63.75), (70, 1e9)], {63: 2}),
-        ([(-1e9, 1e9)], dict.fromkeys(range(SLABS), 1)),
-    ],
-)
-def test_a_supersegment_counts_in_every_slab_that_it_reaches(runtime, faces, slabs):
-    assert occupied_slabs(runtime, *faces) == slabs
-
-
 def test_a_face_on_a_slabs_face_counts_on_both_sides(runtime):
     grid, _, _ = grid_of(runtime, by_hand([]))
     assert 1e-5 < grid.margin < 1e-3  # slabs
@@ -137,18 +121,6 @@ def test_a_face_on_a_slabs_face_counts_on_both_sides(runtime):
     assert occupied_slabs(runtime, (3.5, 4.0)) == {3: 1, 4: 1}
     assert occupied_slabs(runtime, (3.5, 4.0 - inside)) == {3: 1, 4: 1}
     assert occupied_slabs(runtime, (3.5, 4.0 - outside)) == {3: 1}
-
-
-def test_a_list_counts_in_its_own_tile(runtime):
-    """Tiles begin at list (0, 0), bottom left; the last column and the last row are cut off."""
-    everywhere = by_hand([(3.25, 3.75)], (40, 20))
-    for x, y, tile in [(0, 0, (0, 0)), (15, 15, (0, 0)), (16, 15, (0, 1)), (39, 19, (1, 2))]:
-        kept = np.zeros((20, 40), bool)
-        kept[y, x] = True
-        _, counts, _ = grid_of(runtime, with_lists(everywhere, kept))
-        assert counts.shape == (2, 3, SLABS)
-        assert counts.sum() == 1
-        assert counts[(*tile, 3)] == 1
 
 
 FACES = np.array([(3.25, 3.75), (40.5, 50.5)])
@@ -194,40 +166,6 @@ def test_bounds_without_depth(runtime, view):
     grid, counts, _ = grid_of(runtime, by_hand([(31.99, 32.01)], camera=view, bounds=bounds))
     assert counts[0, 0, 0] == 1
     assert np.isfinite(grid.occupied)
-
-
-@pytest.mark.every(6)
-@pytest.mark.parametrize("kind", strategies.VIEWS)
-def test_nothing_is_seen_beside_the_occupied_cells(runtime, kind):
-    """Pictures by all rays, and where the cells' corners are: V_O in all the ways of above."""
-    size = (90, 70)
-    smaller = 0
-    for case, view in enumerate(VIEWS * 2):
-        rng = np.random.default_rng([case, 23])
-        bounds, own = generating_view(rng, view)
-        vdi = strategies.random_vdi(
-            rng, max_window=(120, 90), max_supersegments=2, camera=own, bounds=bounds
-        )
-        # The lists of a random rectangle of its window alone
-        kept = np.zeros(vdi.counts.shape, bool)
-        (y0, y1), (x0, x1) = (np.sort(rng.integers(0, edge + 1, 2)) for edge in kept.shape)
-        kept[y0:y1, x0:x1] = True
-        vdi = with_lists(vdi, kept)
-        camera, _ = strategies.random_view(rng, vdi, kind)
-        prepared = PreparedVDI(runtime, vdi)
-        images = []
-        for skip_empty in (False, True):
-            with runtime.buffer((size[1], size[0], 4)) as image:
-                draw(prepared, camera, size, image, skip_empty=skip_empty)
-                images.append(runtime.download(image))
-        assert np.array_equal(*images)
-        part = rays.pixels_of_points(camera, size, prepared.occupancy.corners)
-        rows, x = np.nonzero(images[0][..., 3])
-        y = size[1] - 1 - rows
-        assert ((x >= part.x0) & (x < part.x1) & (y >= part.y0) & (y < part.y1)).all()
-        smaller += part.pixels < size[0] * size[1]
-    # An eye inside of V_O's frustum may have a corner behind it: then it is all of the window
-    assert smaller
 
 
 def drawn(runtime, prepared, camera, size, **options):

@@ -20,13 +20,10 @@ import strategies
 from drawing import render_vdi
 from extreme_scenes import slabs_vdi
 from ray_scenes import generating_view, random_ends, rebuilt, with_lists
-from real_data import require_data
 
-from pyvista_vdi import examples, generate
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.constants import SLABS, STACK
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.occupancy import OccupancyGrid
 from pyvista_vdi.raycasting.prepared import prepared_vdi
@@ -359,26 +356,3 @@ def test_vdis_of_one_list_and_of_none(runtime):
     for new in (camera, camera.azimuth(70), camera.azimuth(180)):
         assert assert_same_bits(runtime, one, new, (50, 40)).any()
         assert not assert_same_bits(runtime, none, new, (50, 40)).any()
-
-
-REAL = [
-    ("brain", "soft"),
-    ("rayleigh_taylor", "steep"),
-    ("brain", "nearly-opaque"),
-    *(
-        pytest.param(name, "soft", marks=(pytest.mark.slow, pytest.mark.real_data))
-        for name in examples.WHOLE
-        if name not in ("brain", "rayleigh_taylor")
-    ),
-]
-
-
-@pytest.mark.parametrize(("name", "look"), REAL)
-def test_real_volumes(runtime, name, look):
-    pytest.importorskip("pyvista")
-    volume, size = require_data(name), (320, 180)
-    camera = filling_camera(volume.bounds, size)
-    vdi = generate(volume, camera, size, device=runtime, **TRANSFER_FUNCTIONS[look])
-    for angle in (0, 5, 60, 180):
-        image = assert_same_bits(runtime, vdi, camera.azimuth(angle), size, name=f"{angle} degrees")
-        assert image.any()
