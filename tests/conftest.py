@@ -104,7 +104,7 @@ LENGTHY = {
     "cli": "cli",
     "extremes": "entries media scenes vdis views volumes",
     "faults": "device_faults",
-    "generation": "criterion_functions generation_oracle march_blocks run_functions",
+    "generation": "generation_oracle march_blocks records",
     "io": "deep_exr packed_files vdi_files",
     "large": "blocks",
     "measure": "benchmark_model rivals",

@@ -1,4 +1,6 @@
-// Entry points to opencl/generation/runs.cl, one work-item per case or record.
+// Entry points to opencl/generation/runs.cl, shorten_lists.cl and criteria.cl (-D CRITERION), one work-item per case or
+// record.
+#include "generation/criteria.cl"
 #include "generation/shorten_lists.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -21,8 +23,9 @@ __kernel void merge_errors(int count, __global const float8 *a, __global const f
 #define WITHIN 0
 #define ROOM 1
 #define LIMIT 2
+#define CUT 3
 
-// Shorten record i by one of three ways; `runs` are in (record, k) order, before and after.
+// Shorten record i by one of these; `runs` are in (record, k) order, before and after.
 __kernel void shortened(int count, int way, int limit, int capacity, float per_reference, float hidden_weight,
                         __global float8 *runs, __global int *lengths, __global float *thresholds,
                         __global float *records, __global float *all_errors)
@@ -31,18 +34,20 @@ __kernel void shortened(int count, int way, int limit, int capacity, float per_r
     if (i >= count)
         return;
     __global float *record = records + record_start((uint)i, capacity);
-    __global float *errors = all_errors + errors_start((uint)i, capacity);
-    const Places start = {0};
     int n = lengths[i];
     for (int k = 0; k < n; ++k)
         store_run(record, k, runs[(size_t)i * capacity + k]);
+    __global float *errors = all_errors + errors_start((uint)i, capacity);
+    const Places start = {0};
     float threshold = thresholds[i];
     if (way == WITHIN)
         n = merge_within(record, &start, n, threshold, 1, per_reference, hidden_weight);
     else if (way == ROOM)
         n = make_room(record, &start, errors, n, limit, &threshold, per_reference, hidden_weight);
-    else
+    else if (way == LIMIT)
         n = merge_to_limit(record, &start, errors, n, limit, per_reference, hidden_weight);
+    else
+        n = cut_to_limit(record, n, limit, per_reference);
     thresholds[i] = threshold;
     lengths[i] = n;
     for (int k = 0; k < n; ++k)
