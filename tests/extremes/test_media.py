@@ -8,6 +8,7 @@ from drawing import raycast_volume, render_vdi, render_vdis
 from extreme_scenes import (
     BOUND,
     WINDOW,
+    assert_within,
     check_views,
     field_volume,
     slabs_vdi,
@@ -152,10 +153,8 @@ def test_several_vdis_of_nearly_transparent_supersegments(runtime, worst):
     vdis = [crowded(3000, 2e-8), crowded(2999, 2e-8)]
     image = render_vdis(vdis, EYE, (1, 1), device=runtime)[0, 0]
     exact = -np.expm1(-5999 * np.float64(np.float32(2e-8))) * np.array([0.2, 0.5, 0.8, 1.0])
-    error = np.abs(image - exact).max()
-    worst("5999 supersegments", error)
     # A piece of one may be as short as a rounding of its ends, and its share of tau is as uncertain
-    assert error <= 2e-6
+    assert_within(worst, "5999 supersegments", image, exact, 2e-6)
 
 
 @pytest.mark.every(4)
@@ -172,12 +171,9 @@ def test_very_many_steps_through_a_constant_volume(runtime, worst, steps, opacit
     step = max(2.0 / steps, volume.length / MOST_STEPS)
     exact = float(np.float32(opacity)) * np.array([color, color, color, 1.0])
     image = raycast_volume(volume, camera, (1, 1), function, sample_distance=step, device=runtime)
-    worst("volume", np.abs(image - exact).max())
+    assert_within(worst, "volume", image, exact)
     vdi = generate_vdi(volume, camera, (1, 1), function, sample_distance=step, device=runtime)
-    seen = composite(vdi.color, vdi.optical_depth)
-    worst("VDI", np.abs(seen - exact).max())
-    assert np.abs(image - exact).max() <= BOUND
-    assert np.abs(seen - exact).max() <= BOUND
+    assert_within(worst, "VDI", composite(vdi.color, vdi.optical_depth), exact)
 
 
 @pytest.mark.parametrize(

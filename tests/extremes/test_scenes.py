@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from drawing import raycast_volume, render_vdi
 from extreme_scenes import (
-    BOUND,
     FIELD,
     WINDOW,
+    assert_within,
     check_scene,
     field_volume,
     transfer,
@@ -164,8 +164,7 @@ def test_direct_rendering_goes_further_than_lists(runtime, worst, exponent):
     image = raycast_volume(volume, view(volume), WINDOW, transfer(), device=runtime)
     exact = reference.volume_image(volume, view(volume), WINDOW, transfer())
     assert exact[..., 3].max() > 0.5
-    worst("volume", np.abs(image - exact).max())
-    assert np.abs(image - exact).max() <= BOUND
+    assert_within(worst, "volume", image, exact)
 
 
 @pytest.mark.parametrize(
@@ -358,9 +357,7 @@ def test_the_middle_of_a_highlight(runtime, worst, power, lit_by):
     image = raycast_volume(*scene, lights=lights, device=runtime)
     assert exact[..., 0].max() > 0.3
     assert exact[..., 0].min() < 0.2
-    off = np.abs(image - exact).max()
-    worst(f"power {power:g}", off)
-    assert off <= BOUND
+    assert_within(worst, f"power {power:g}", image, exact)
 
 
 @pytest.mark.parametrize(("parallel", "two_sided"), [(False, True), (True, False)])

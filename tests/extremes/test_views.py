@@ -60,13 +60,12 @@ def along(vdi, first, last):
     """
     origin, direction = vdi.camera.ray_coefficients(vdi.window_size)
     to_world = np.linalg.inv(vdi.camera.view_matrix)
-    ends = []
-    for u, v, depth in (first, last):
-        point = np.array([1, u, v]) @ origin + depth * (np.array([1, u, v]) @ direction)
-        ends.append(to_world[:3, :3] @ point + to_world[:3, 3])
+    pixels = np.array([[1, u, v] for u, v, _ in (first, last)])
+    points = pixels @ origin + [[first[2]], [last[2]]] * (pixels @ direction)
+    ends = points @ to_world[:3, :3].T + to_world[:3, 3]
     forward = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     up = (0, 1, 0) if abs(forward[1]) < 0.9 else (1, 0, 0)
-    return Camera(ends[0], ends[1], up, parallel_projection=True, parallel_scale=1e-3)
+    return Camera(*ends, up, parallel_projection=True, parallel_scale=1e-3)
 
 
 @pytest.mark.parametrize("parallel", [False, True])
@@ -142,34 +141,22 @@ def test_at_v_o_s_eye_and_on_its_eye_plane(runtime, worst):
     right, up, forward = own.axes
     eye = np.array(own.position)
     vdi = vdi_from(runtime, own)
-    aside = [own.replace(focal_point=own.focal_point + 0.1 * REACH * d) for d in (right, up)]
-    beside = [
-        view_towards(eye + step * REACH, own) for step in (5 * right, -3 * up, 4 * right + 3 * up)
-    ]
-    behind = [view_towards(eye - 20 * REACH * forward, own)]
-    check_views(runtime, worst, vdi, [*aside, *beside, *behind])
+    views = [own.replace(focal_point=own.focal_point + 0.1 * REACH * d) for d in (right, up)]
+    for step in (5 * right, -3 * up, 4 * right + 3 * up, -20 * forward):
+        position = eye + step * REACH
+        angle = 2 * math.degrees(math.atan(REACH / np.linalg.norm(CENTRE - position)))
+        views.append(own.replace(position=position, focal_point=CENTRE, view_angle=angle))
+    check_views(runtime, worst, vdi, views)
 
 
-def view_towards(eye, own):
-    distance = np.linalg.norm(CENTRE - eye)
-    return own.replace(
-        position=eye, focal_point=CENTRE, view_angle=2 * math.degrees(math.atan(REACH / distance))
-    )
-
-
-def lens(angle, fill=1.0):
-    """A view whose half angle holds ``fill`` half diagonals; from inside where it is wide."""
-    distance = fill / math.tan(math.radians(angle) / 2)
+def lens(angle):
+    """A view whose half angle holds half a diagonal; from inside where it is wide."""
+    distance = 1 / math.tan(math.radians(angle) / 2)
     return view(VOLUME, distance=max(distance, 1.02)).replace(view_angle=angle)
 
 
 @pytest.mark.parametrize(
-    ("own", "new"),
-    [
-        (0.01, 170),
-        (170, 0.01),
-        *(pytest.param(*case, marks=pytest.mark.slow) for case in [(0.01, 30), (30, 170)]),
-    ],
+    ("own", "new"), [(0.01, 170), (170, 0.01), pytest.param(30, 170, marks=pytest.mark.slow)]
 )
 def test_fields_of_view(runtime, worst, own, new):
     size = (19, 15)  # what is near covers a few pixels of the widest lens

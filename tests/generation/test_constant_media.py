@@ -17,6 +17,7 @@ from pyvista_vdi import reference
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.compositing import composite
+from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 
@@ -115,7 +116,7 @@ def test_a_constant_volume_obeys_beer_lambert(runtime, seed):
     volume = constant_volume(seed, ("uint8", "float32", "int32", "float64")[seed])
     # The table holds float32: what its colour is of the colour meant
     held = np.append(CONSTANT.colors[0].astype(float) / COLOR, 1.0)
-    for camera in views(seed, volume):
+    for number, camera in enumerate(views(seed, volume)):
         lengths = chords(camera, WINDOW, volume)
         expected = beer_lambert(lengths)
         assert expected.any()
@@ -126,7 +127,8 @@ def test_a_constant_volume_obeys_beer_lambert(runtime, seed):
             np.testing.assert_allclose(image, expected * held, rtol=0, atol=1e-7)
         image = raycast_volume(volume, camera, WINDOW, CONSTANT, device=runtime)
         np.testing.assert_allclose(image, expected, rtol=0, atol=FLOAT32)
-        vdi = generate_vdi(volume, camera, WINDOW, CONSTANT, device=runtime)
+        criterion = CRITERIA[(seed + 2 * number) % len(CRITERIA)]  # which would cut the medium
+        vdi = generate_vdi(volume, camera, WINDOW, CONSTANT, criterion=criterion, device=runtime)
         assert vdi.counts.max() == 1
         tau = np.zeros(WINDOW[::-1])
         tau[vdi.counts > 0] = vdi.optical_depth

@@ -237,19 +237,6 @@ def test_a_ray_may_have_more_runs_than_are_recorded(runtime, criterion, budget):
     assert np.abs(seen[0] - seen[1]).max() <= 2400 * ROUNDOFF
 
 
-@pytest.mark.parametrize("criterion", CRITERIA[1:])
-def test_what_is_homogeneous_needs_no_cut(runtime, criterion):
-    """A medium that is the same throughout stays one supersegment, whatever would cut it."""
-    volume = Volume(np.full((6, 6, 6), 0.5, np.float32))
-    looks = TransferFunction(np.full((2, 3), 0.5), (0.3, 0.3), (0.0, 1.0))
-    camera = Camera((2.5, -20, 2.5), (2.5, 2.5, 2.5), (0, 0, 1))
-    vdi = generate_vdi(
-        volume, camera, WINDOW, looks, max_supersegments=20, criterion=criterion, device=runtime
-    )
-    assert vdi.n_supersegments > 0
-    assert vdi.counts.max() == 1
-
-
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
 def test_opaque_samples_are_opaque_whatever_the_unit_distance(runtime, interpolation):
     """a = 1 gets tau >= 30 per step, even where U is a thousand volumes."""

@@ -96,13 +96,6 @@ def test_bands_are_the_picture(vdi, n):
         assert np.abs(found - expected).mean() < 1e-6, camera
 
 
-def test_bands_have_all_lists(vdi):
-    cuts = [0, 10, 11, WINDOW[1]]
-    parts = [bands.band(vdi, a, b) for a, b in zip(cuts, cuts[1:])]  # noqa: B905, RUF007
-    assert sum(part.n_supersegments for part in parts) == vdi.n_supersegments
-    np.testing.assert_array_equal(np.concatenate([part.front for part in parts]), vdi.front)
-
-
 def test_what_does_not_fit_is_drawn_in_bands(vdi, monkeypatch):
     expected = pvdi.render(vdi, vdi.camera, (70, 60))
     drawn, most = [], vdi.n_supersegments / 3

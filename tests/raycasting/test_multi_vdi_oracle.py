@@ -129,15 +129,14 @@ def test_ends_of_rays_and_each_vdi_s_own_looks(runtime, kind, dealt):
         turned = {name: v[::-1] if isinstance(v, list) else v for name, v in shown.items()}
         again = draw(runtime, vdis[::-1], cameras[::-1], size, **turned)
         np.testing.assert_array_equal(again, image)
-
-
-def test_planes_for_all_are_each_one_s_planes(runtime):
-    vdis, cameras, size = scene(9, "around")
-    corners = strategies.world_corners(vdis[0].bounds, cameras[0].model_transform)
-    table = [[*corners.mean(axis=0), 1.0, 0.2, -0.4]]
-    image = draw(runtime, vdis, cameras, size, clipping_planes=table)
-    assert np.array_equal(image, draw(runtime, vdis, cameras, size, clipping_planes=[table, table]))
-    assert not np.array_equal(image, draw(runtime, vdis, cameras, size))
+    # One table of planes for all is each one's
+    table = ends["clipping_planes"]
+    for_all, of_each = (
+        draw(runtime, vdis, cameras, size, clipping_planes=planes)
+        for planes in (table, [table] * 2)
+    )
+    np.testing.assert_array_equal(for_all, of_each)
+    assert not np.array_equal(for_all, plain)
 
 
 @in_two_ways
