@@ -62,7 +62,8 @@ def test_splitting_supersegments_changes_nothing(kind):
             segment = Segment(front, back, vdi.color[k], float(vdi.optical_depth[k]))
             depth = np.float32(front + rng.uniform(0.2, 0.8) * (back - front))
             pieces += split(segment, float(depth))
-        parts = {name: [getattr(p, name) for p in pieces] for name in Segment._fields}
+        names = ("front", "back", "color", "optical_depth")
+        parts = {name: [getattr(piece, name) for piece in pieces] for name in names}
         twice = rebuilt(vdi, offsets=vdi.offsets * np.uint64(2), **parts)
         # Optical depths up to 100 are stored in float32: relative 6e-8 each, times
         # tau exp(-tau) < 0.4
