@@ -6,6 +6,8 @@ That they meet what rays that are followed one by one meet is tested where those
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 import strategies
@@ -18,7 +20,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting import packets
 from pyvista_vdi.raycasting.picking import FirstHit
-from pyvista_vdi.raycasting.prepared import PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI, prepared_vdi
 from pyvista_vdi.raycasting.scene import Scene
 from pyvista_vdi.raycasting.strategies import strategy_for
 
@@ -29,15 +31,17 @@ WINDOW = (480, 360)
 DEPTHS = rays.depth_range(CAMERA, BOUNDS)
 
 
-def slab_vdi(optical_depth=0.1, window=WINDOW):
+@functools.cache
+def slab_vdi(optical_depth=0.1, window=WINDOW, precision="exact"):
     """Each list has one supersegment, in the front half of the bounds."""
     faces = np.interp([0.1, 0.3], [0, 1], DEPTHS)
-    return slabs_vdi(CAMERA, faces, optical_depth, window=window, bounds=BOUNDS)
+    vdi = slabs_vdi(CAMERA, faces, optical_depth, window=window, bounds=BOUNDS)
+    return vdi.with_precision(precision)
 
 
 def scene_of(runtime, vdi, camera, size=SIZE, first_hit=None, **options):
     request = frame(vdi, camera, size, **{"skip_empty": False, **options})
-    return Scene.of(PreparedVDI(runtime, vdi), request, first_hit)
+    return Scene.of(prepared_vdi(runtime, vdi), request, first_hit)
 
 
 @pytest.fixture
@@ -97,8 +101,8 @@ REGIONS = {"cropping": ((-0.5, 0.5, -0.5, 0.5, -0.5, 0.5), "fence")}
 def test_which_kernel_follows_rays(cpu, camera, size, options, kernels):
     """Blocks near V_O, packets far from it; where there are no blocks, packets from nearer on."""
     for precision, kernel in zip(("exact", "16-byte", "8-byte"), kernels, strict=True):
-        vdi = slab_vdi().with_precision(precision)
-        assert strategy_for(scene_of(cpu, vdi, camera, size, **options)).kernel == kernel
+        scene = scene_of(cpu, slab_vdi(precision=precision), camera, size, **options)
+        assert strategy_for(scene).kernel == kernel
 
 
 def test_how_far_light_gets():
