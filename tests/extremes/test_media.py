@@ -9,7 +9,6 @@ from extreme_scenes import (
     BOUND,
     WINDOW,
     assert_within,
-    check_views,
     field_volume,
     slabs_vdi,
     transfer,
@@ -72,15 +71,6 @@ def test_unit_distances_beyond_float32(runtime, unit):
     ]
     np.testing.assert_allclose(*images, atol=1e-6)
     assert images[0][..., 3].max() == (1.0 if unit < 1 else pytest.approx(0.0, abs=1e-6))
-
-
-@pytest.mark.parametrize("optical_depth", [1e-7, 1.0, 30.0, 1e6, 3e38])
-def test_optical_depth_of_one_supersegment(runtime, worst, optical_depth):
-    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=16)
-    bounds = (-1, 1, -1, 1, -1, 1)
-    vdi = slabs_vdi(camera, [[9.3, 10.4]], optical_depth, window=(3, 3), bounds=bounds)
-    views = [camera, camera.azimuth(40), camera.azimuth(90), camera.azimuth(180)]
-    check_views(runtime, worst, vdi, views)
 
 
 EYE = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=10)
