@@ -13,9 +13,9 @@ import pytest
 from drawing import render_vdi
 from extreme_scenes import transfer, turned, view
 
+from pyvista_vdi import Volume
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.render_options import FrameRequest
-from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.render import raycast_volume
 
 pytestmark = pytest.mark.extremes

@@ -21,13 +21,10 @@ from extreme_scenes import (
 )
 from oracle import assert_explained
 
-from pyvista_vdi import Cropping, Shading, reference
+from pyvista_vdi import Camera, Cropping, Shading, TransferFunction, Volume, reference
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model import float32_limits as numerics
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.cropping import PRESETS
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 from pyvista_vdi.reference.rays import pixel_ray
 from pyvista_vdi.volume.classified_volume import DeviceVolume, march_forms

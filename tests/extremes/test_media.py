@@ -15,14 +15,10 @@ from extreme_scenes import (
     view,
 )
 
-from pyvista_vdi import reference
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi import Camera, InvalidArgumentError, TransferFunction, Volume, reference
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.float32_limits import MANY_MEDIA, MOST_STEPS, VERY_MANY_MEDIA
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.volume import Volume
 
 pytestmark = pytest.mark.extremes
 

@@ -22,13 +22,18 @@ from extreme_scenes import (
     view,
 )
 
-from pyvista_vdi import Light, Lights, Shading, reference
-from pyvista_vdi.errors import InvalidCameraError
+from pyvista_vdi import (
+    Camera,
+    InvalidCameraError,
+    Light,
+    Lights,
+    Shading,
+    TransferFunction,
+    Volume,
+    reference,
+)
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import scalars_suit_float32
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.light_tables import GRADIENT_SHARE
 
 pytestmark = pytest.mark.extremes

@@ -16,11 +16,8 @@ from extreme_scenes import (
     view,
 )
 
-from pyvista_vdi import reference
+from pyvista_vdi import VDI, Camera, Volume, reference
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import Volume
 
 pytestmark = pytest.mark.extremes
 

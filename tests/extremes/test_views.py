@@ -18,9 +18,9 @@ from extreme_scenes import (
     view,
 )
 
+from pyvista_vdi import Camera
 from pyvista_vdi.device.constants import STACK
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 pytestmark = pytest.mark.extremes

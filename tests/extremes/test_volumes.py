@@ -18,13 +18,9 @@ from extreme_scenes import (
     view,
 )
 
-from pyvista_vdi import reference
+from pyvista_vdi import Camera, DeviceMemoryError, TransferFunction, Volume, reference
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume import upload
 
 pytestmark = pytest.mark.extremes

@@ -13,13 +13,10 @@ import strategies
 from drawing import raycast_volume, render_vdi
 from extreme_scenes import slabs_vdi
 
-from pyvista_vdi import reference
+from pyvista_vdi import Camera, TransferFunction, Volume, reference
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.options import CRITERIA
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.volume import Volume
 
 WINDOW = (12, 9)
 OPACITY = 0.35

@@ -17,10 +17,8 @@ import strategies
 from drawing import raycast_volume, render_vdi
 from sampling_uncertainty import uncertainties
 
-from pyvista_vdi import reference
-from pyvista_vdi.errors import Cancelled
+from pyvista_vdi import Camera, Cancelled, reference
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume

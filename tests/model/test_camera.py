@@ -12,7 +12,7 @@ import strategies
 from hypothesis import given
 from strategies import GENERATORS
 
-from pyvista_vdi.errors import UnsupportedError
+from pyvista_vdi import UnsupportedError
 from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
 
 WINDOW = (160, 90)

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import Camera, TransferFunction, Volume
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
+from pyvista_vdi import Camera, InvalidVolumeError, TransferFunction, UnsupportedError, Volume
 from pyvista_vdi.large.generate import generate_chunked
 from pyvista_vdi.model.chunked import ChunkedArray
 

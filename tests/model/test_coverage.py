@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pyvista_vdi.model.camera import Camera
+from pyvista_vdi import Camera
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 
 BOX = bounds_corners((-1, 1, -2, 2, -0.5, 0.5))

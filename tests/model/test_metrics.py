@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera
+from pyvista_vdi import Camera, InvalidArgumentError
 from pyvista_vdi.model.metrics import (
     SSIM_ARGUMENTS,
     ListEdges,

@@ -11,10 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import assert_explained, total
 
-from pyvista_vdi import reference, render
-from pyvista_vdi.model.camera import Camera
+from pyvista_vdi import VDI, Camera, reference, render
 from pyvista_vdi.model.packing import DEPTH_CODES, Packed8, Packed16, gaps_and_thicknesses, packed_8
-from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 PACKED = ("16-byte", "8-byte")

@@ -10,7 +10,7 @@ import math
 import numpy as np
 import pytest
 
-from pyvista_vdi import AmbientOcclusion, Cropping, Light
+from pyvista_vdi import VDI, AmbientOcclusion, Cropping, Light, TransferFunction, Volume
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidCameraError,
@@ -32,9 +32,6 @@ from pyvista_vdi.model.render_options import (
     RenderOptions,
 )
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import Volume
 
 pytestmark = pytest.mark.fast
 

@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.cropping import Cropping
+from pyvista_vdi import Camera, Cropping
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 
 PLANES = np.array([[0, 0, 1, 0, 0, 1.0], [0, 0, 2, 0, 0, -1.0]])

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi import TransferFunction
 
 COLORS = [[0, 0, 0], [0.5, 0.25, 1]]
 OPACITIES = [0.0, 0.75]

@@ -9,8 +9,7 @@ from hypothesis import given
 from ray_scenes import rebuilt
 from strategies import GENERATORS
 
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi import VDI, Camera
 
 CAMERA = Camera((0, 0, 9), (0, 0, 0), (0, 1, 0))
 

@@ -8,7 +8,7 @@ import strategies
 from hypothesis import given
 from strategies import GENERATORS
 
-from pyvista_vdi.errors import InvalidVolumeError
+from pyvista_vdi import InvalidVolumeError
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
 
 

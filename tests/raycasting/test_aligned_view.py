@@ -15,10 +15,9 @@ from drawing import draw, render_vdi
 from oracle import assert_explained
 from ray_scenes import generating_view, random_ends
 
+from pyvista_vdi import VDI, Camera
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.packing import PRECISIONS
-from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 #: Most that a channel of these random VDIs may differ from rays that are followed one by one, whose

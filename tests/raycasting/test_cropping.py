@@ -14,12 +14,10 @@ from drawing import pick_vdi, raycast_volume, render_first_hits, render_vdi
 from oracle import assert_explained, total
 from ray_scenes import random_ends, random_planes
 
+from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.cropping import PRESETS, Cropping
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.reference.raycast import kept_parts
 from pyvista_vdi.reference.rays import clip, inside_box, pixel_ray

@@ -10,8 +10,8 @@ from oracle import TOLERANCE
 from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 
 import pyvista_vdi as pvdi
+from pyvista_vdi import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.device import aligned_empty
-from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest
 from pyvista_vdi.raycasting import bands, raycast
 

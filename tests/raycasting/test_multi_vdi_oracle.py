@@ -19,11 +19,8 @@ from oracle import assert_explained
 from ray_scenes import random_ends, with_some
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import reference
+from pyvista_vdi import Camera, Cropping, InvalidArgumentError, reference
 from pyvista_vdi.device.ray_forms import cells_of_points
-from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.raycasting import multi_vdi
 from pyvista_vdi.raycasting.occupancy import OccupancyGrid
 from pyvista_vdi.raycasting.placed import PlacedVDI

@@ -14,10 +14,9 @@ import strategies
 from drawing import draw, frame
 from extreme_scenes import slabs_vdi
 
+from pyvista_vdi import VDI, Camera
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.device import ray_forms as rays
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting import packets
 from pyvista_vdi.raycasting.picking import FirstHit
 from pyvista_vdi.raycasting.prepared import PreparedVDI, prepared_vdi

@@ -9,7 +9,7 @@ import pytest
 from extreme_scenes import slabs_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
+from pyvista_vdi import InvalidArgumentError, InvalidVDIError
 
 #: The bounds of the slabs below, and the planes of their faces.
 BOUNDS = (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0)

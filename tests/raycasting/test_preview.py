@@ -9,7 +9,7 @@ from drawing import render_vdi
 from extreme_scenes import slabs_vdi
 from ray_scenes import rebuilt
 
-from pyvista_vdi.model.camera import Camera
+from pyvista_vdi import Camera
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.reference.raycast import centre_ray_scale
 

@@ -8,9 +8,7 @@ import strategies
 from extreme_scenes import slabs_vdi
 from ray_scenes import rebuilt
 
-from pyvista_vdi import reference
-from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera
+from pyvista_vdi import Camera, InvalidArgumentError, reference
 from pyvista_vdi.model.compositing import Segment, composite, split
 from pyvista_vdi.reference.raycast import centre_ray_scale, near_limit
 

@@ -15,12 +15,8 @@ from drawing import raycast_volume, render_vdi
 from oracle import explain
 from sampling_uncertainty import uncertainties
 
-from pyvista_vdi import reference
+from pyvista_vdi import VDI, Camera, TransferFunction, Volume, reference
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import Volume
 
 #: Odd, so that what is thinner than a pixel and lies in the middle is seen.
 WINDOW = (9, 7)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import strategies
 
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi import VDI, Camera
 
 #: Lenses of :func:`generating_view` that differ from a perspective three radii away.
 _LENSES = {
