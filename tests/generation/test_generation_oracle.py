@@ -33,12 +33,18 @@ TYPICAL = 1e-5
 
 
 def cases(seed, dtype, interpolation, **volume_options):
+    """A random volume, its looks and a view of it: what generation and reference are given."""
     rng = np.random.default_rng(seed)
     volume = strategies.random_volume(rng, dtype, **volume_options)
-    transfer_function = strategies.random_transfer_function(
-        rng, volume, interpolation=interpolation
-    )
-    return volume, strategies.random_camera(rng, volume.bounds), transfer_function
+    looks = strategies.random_transfer_function(rng, volume, interpolation=interpolation)
+    return volume, strategies.random_camera(rng, volume.bounds), WINDOW, looks
+
+
+def noise(seed, edge, interpolation):
+    rng = np.random.default_rng(seed)
+    volume = Volume(rng.random((edge,) * 3).astype(np.float32))
+    looks = strategies.random_transfer_function(rng, volume, interpolation=interpolation)
+    return volume, strategies.camera_around(rng, volume.bounds, np.eye(4)), WINDOW, looks
 
 
 def eye_loss(volume, camera, uncertain):
@@ -50,30 +56,18 @@ def eye_loss(volume, camera, uncertain):
 
 
 def list_sums(vdi):
-    starts = vdi.offsets[:-1].astype(int)
-    sums = np.zeros(len(starts))
-    np.add.at(
-        sums, np.repeat(np.arange(len(starts)), np.diff(vdi.offsets.astype(int))), vdi.optical_depth
-    )
-    return sums
+    lists = np.repeat(np.arange(vdi.counts.size), vdi.counts.ravel())
+    return np.bincount(lists, vdi.optical_depth, vdi.counts.size)
 
 
-def check_against_reference(
-    runtime, seed, volume, camera, transfer_function, budget, criterion="least-error"
-):
+def check_against_reference(runtime, seed, scene, budget, criterion="least-error"):
     """All the laws of a generated VDI and of the volume's image, on one case."""
+    volume, camera, _, _ = scene
     name = f"seed {seed}, {volume}, {camera}"
-    vdi = generate_vdi(
-        volume,
-        camera,
-        WINDOW,
-        transfer_function,
-        max_supersegments=budget,
-        criterion=criterion,
-        device=runtime,
-    )
-    rays = list(reference.samples(volume, camera, WINDOW, transfer_function))
-    uncertain = uncertainties(volume, camera, WINDOW, transfer_function, rays)
+    options = {"max_supersegments": budget, "criterion": criterion}
+    vdi = generate_vdi(*scene, device=runtime, **options)
+    rays = list(reference.samples(*scene))
+    uncertain = uncertainties(*scene, rays)
 
     # The promise
     assert vdi.counts.max(initial=0) <= budget, name
@@ -99,11 +93,9 @@ def check_against_reference(
         assert held.any(axis=0).all(), f"{name}: list {ray.pixel} leaves samples out"
 
     # The picture from V_O
-    exact = reference.volume_image(volume, camera, WINDOW, transfer_function)
+    exact = reference.volume_image(*scene)
     bound = np.array([unsure.color for unsure in uncertain]).reshape(WINDOW[::-1])[::-1]
-    drawn = raycast_volume(
-        volume, camera, WINDOW, transfer_function, early_termination=False, device=runtime
-    )
+    drawn = raycast_volume(*scene, early_termination=False, device=runtime)
     assert (np.abs(drawn - exact).max(axis=-1) <= bound).all(), name
     # Merging by transmittance is exact from V_O: one more rounding per merged sample and channel
     merged = 2 * bound + eye_loss(volume, camera, uncertain)
@@ -122,13 +114,13 @@ def test_every_voxel_type(runtime, dtype, interpolation):
     drawn = 0.0
     for number in range(2):
         seed = [number, VOXEL_TYPES.index(dtype), interpolation == "linear"]
-        volume, camera, looks = cases(seed, dtype, interpolation, direction=np.eye(3))
+        volume, camera, _, looks = cases(seed, dtype, interpolation, direction=np.eye(3))
         if number and volume.array.dtype.kind == "f":
             holes = np.array(volume.array)
             holes[np.random.default_rng(seed).random(holes.shape) < 0.2] = np.nan
             volume = Volume(holes, volume.spacing, volume.origin)
-        budget = (3, 20)[number]
-        drawn += check_against_reference(runtime, seed, volume, camera, looks, budget).max()
+        scene = volume, camera, WINDOW, looks
+        drawn += check_against_reference(runtime, seed, scene, (3, 20)[number]).max()
     assert drawn > 0
 
 
@@ -138,8 +130,8 @@ def test_direction_matrix(runtime, number):
     direction = strategies.random_rotation(np.random.default_rng(seed))
     if number % 2:
         direction = direction @ np.diag([1, 1, -1])  # mirrored
-    case = cases(seed, None, None, direction=direction)
-    check_against_reference(runtime, seed, *case, budget=(1, 7, 20)[number % 3])
+    scene = cases(seed, None, None, direction=direction)
+    check_against_reference(runtime, seed, scene, (1, 7, 20)[number % 3])
 
 
 @pytest.mark.every(3)
@@ -149,35 +141,24 @@ def test_direction_matrix(runtime, number):
 )
 def test_the_budget_is_a_promise_and_the_picture_stays(runtime, criterion, budget):
     """In data of many runs per list, and in data of few, which are cut where they could stay."""
-    for number, smooth in enumerate((False, True)):
-        seed = [budget, number, 2500]
-        rng = np.random.default_rng(seed)
-        volume = Volume(rng.random((12, 12, 12)).astype(np.float32))
-        if smooth:
-            volume, camera, looks = cases(seed, "uint8", "linear", direction=np.eye(3))
-        else:
-            looks = strategies.random_transfer_function(rng, volume, interpolation="nearest")
-            camera = strategies.camera_around(rng, volume.bounds, np.eye(4))
-        check_against_reference(runtime, seed, volume, camera, looks, budget, criterion)
+    seed = [budget, 0, 2500]
+    check_against_reference(runtime, seed, noise(seed, 12, "nearest"), budget, criterion)
+    seed = [budget, 1, 2500]
+    smooth = cases(seed, "uint8", "linear", direction=np.eye(3))
+    check_against_reference(runtime, seed, smooth, budget, criterion)
 
 
 @pytest.mark.parametrize("criterion", CRITERIA[1:])
 def test_every_criterion_cuts_where_the_reference_does(runtime, criterion):
     """The device merges what no picture tells apart, before and after; the rest is the same."""
-    rng = np.random.default_rng(2600)
-    noise = Volume(rng.random((10, 10, 10)).astype(np.float32))
-    looks = strategies.random_transfer_function(rng, noise, interpolation="linear")
-    camera = strategies.camera_around(rng, noise.bounds, np.eye(4))
-    made = generate_vdi(
-        noise, camera, WINDOW, looks, max_supersegments=6, criterion=criterion, device=runtime
-    )
-    exact = reference.build_vdi(
-        noise, camera, WINDOW, looks, max_supersegments=6, criterion=criterion
-    )
+    scene = noise(2600, 10, "linear")
+    options = {"max_supersegments": 6, "criterion": criterion}
+    made = generate_vdi(*scene, device=runtime, **options)
+    exact = reference.build_vdi(*scene, **options)
     assert made.metadata["criterion"] == criterion
     assert made.n_supersegments <= exact.n_supersegments
     assert made.n_supersegments > 0.8 * exact.n_supersegments  # measured: 0.9 and more
-    step = min(noise.spacing) / 2
+    step = min(scene[0].spacing) / 2
     near, total = 0, 0
     for x, y in itertools.product(range(WINDOW[0]), range(WINDOW[1])):
         mine, other = made.list_at(x, y), exact.list_at(x, y)
@@ -193,11 +174,9 @@ def test_every_criterion_cuts_where_the_reference_does(runtime, criterion):
     ("criterion", "tolerance"), [(CRITERIA[0], 0.01), *((name, 0.3) for name in CRITERIA)]
 )
 def test_a_tolerance_shortens_lists_and_keeps_optical_depth(runtime, criterion, tolerance):
-    volume, camera, looks = cases([3, 3000], "uint8", "linear", direction=np.eye(3))
+    scene = cases([3, 3000], "uint8", "linear", direction=np.eye(3))
     exact, loose = (
-        generate_vdi(
-            volume, camera, WINDOW, looks, criterion=criterion, tolerance=t, device=runtime
-        )
+        generate_vdi(*scene, criterion=criterion, tolerance=t, device=runtime)
         for t in (0.0, tolerance)
     )
     assert loose.n_supersegments < exact.n_supersegments
@@ -214,16 +193,9 @@ def test_a_ray_may_have_more_runs_than_are_recorded(runtime, criterion, budget):
     volume = Volume(rng.random((3, 3, 900)).astype(np.float32))
     looks = TransferFunction(np.eye(3), (0.2, 0.6, 0.9), (0.0, 1.0), unit_distance=100.0)
     camera = Camera((-900, 1, 1), (450, 1, 1), (0, 0, 1), view_angle=0.1)
+    scene = volume, camera, WINDOW, looks
     merged, cut = (
-        generate_vdi(
-            volume,
-            camera,
-            WINDOW,
-            looks,
-            max_supersegments=budget,
-            criterion=name,
-            device=runtime,
-        )
+        generate_vdi(*scene, max_supersegments=budget, criterion=name, device=runtime)
         for name in (CRITERIA[0], criterion)
     )
     assert cut.counts.max() <= budget
@@ -239,17 +211,17 @@ def test_a_ray_may_have_more_runs_than_are_recorded(runtime, criterion, budget):
 def test_opaque_samples_are_opaque_whatever_the_unit_distance(runtime, interpolation):
     """a = 1 gets tau >= 30 per step, even where U is a thousand volumes."""
     volume = Volume(np.full((5, 5, 5), 200, dtype=np.uint8))
-    transfer_function = TransferFunction(
+    looks = TransferFunction(
         [[0.1, 0.6, 0.3]] * 2, [0.0, 1.0], (0, 200), unit_distance=4e3, interpolation=interpolation
     )
-    camera = Camera((2, 2, 14), (2, 2, 2), (0, 1, 0), view_angle=10)
-    vdi = generate_vdi(volume, camera, WINDOW, transfer_function, device=runtime)
+    scene = volume, Camera((2, 2, 14), (2, 2, 2), (0, 1, 0), view_angle=10), WINDOW, looks
+    vdi = generate_vdi(*scene, device=runtime)
     assert (list_sums(vdi) >= OPAQUE_OPTICAL_DEPTH).all()
     wanted = np.array([0.1, 0.6, 0.3, 1.0])
     for image in (
-        render_vdi(vdi, camera, device=runtime),
-        raycast_volume(volume, camera, WINDOW, transfer_function, device=runtime),
-        reference.volume_image(volume, camera, WINDOW, transfer_function),
+        render_vdi(vdi, vdi.camera, device=runtime),
+        raycast_volume(*scene, device=runtime),
+        reference.volume_image(*scene),
     ):
         np.testing.assert_allclose(image - wanted, 0, atol=4 * ROUNDOFF)
 
@@ -260,11 +232,9 @@ def test_early_termination_drops_no_more_than_its_cutoff(runtime):
     dense = TransferFunction(
         rng.random((8, 3)), np.linspace(0.9, 0.9999, 8), (0, 255), unit_distance=0.3
     )
-    camera = strategies.camera_around(rng, volume.bounds, np.eye(4))
+    scene = volume, strategies.camera_around(rng, volume.bounds, np.eye(4)), WINDOW, dense
     whole, early = (
-        raycast_volume(
-            volume, camera, WINDOW, dense, early_termination=stop, device=runtime
-        ).astype(float)
+        raycast_volume(*scene, early_termination=stop, device=runtime).astype(float)
         for stop in (False, True)
     )
     assert whole[..., 3].max() > 0.999
@@ -283,13 +253,10 @@ def test_what_sees_nothing_makes_empty_lists(runtime, opacity, focal_point):
 
 
 def test_progress_runs_from_0_to_1_and_can_cancel(runtime):
-    volume, camera, transfer_function = cases([9, 6000], "uint8", "nearest")
-    seen = []
-    generate_vdi(volume, camera, WINDOW, transfer_function, device=runtime, progress=seen.append)
+    scene, seen = cases([9, 6000], "uint8", "nearest"), []
+    generate_vdi(*scene, device=runtime, progress=seen.append)
     assert seen == sorted(seen)
     assert seen[0] >= 0
     assert seen[-1] == 1
     with pytest.raises(Cancelled):
-        generate_vdi(
-            volume, camera, WINDOW, transfer_function, device=runtime, progress=lambda _: False
-        )
+        generate_vdi(*scene, device=runtime, progress=lambda _: False)
