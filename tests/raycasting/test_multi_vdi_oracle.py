@@ -89,7 +89,7 @@ def check(vdis, cameras, size, image, name, **ends):
 
 @in_two_ways
 @pytest.mark.every(6)
-@pytest.mark.parametrize("kind", strategies.VIEWS)
+@pytest.mark.parametrize("kind", [*strategies.VIEWS[2:], *strategies.VIEWS[:2]])
 def test_every_pixel_is_within_the_range_of_the_moved_rays(runtime, kind, dealt):
     moved = drawn = pixels = 0
     for case in range(5):

@@ -31,7 +31,7 @@ def compare(runtime, cases):
 
 
 @pytest.mark.every(6)
-@pytest.mark.parametrize("kind", strategies.VIEWS)
+@pytest.mark.parametrize("kind", [*strategies.VIEWS[2:], *strategies.VIEWS[:2]])
 def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, dealt, kind):
     def cases():
         for case in range(N_CASES):
