@@ -32,7 +32,7 @@ from pyvista_vdi.reference import criteria
 
 FILE = "record_functions.cl"
 #: Ways of shortening a record.
-WITHIN, ROOM, LIMIT, CUT = range(4)
+WITHIN, ROOM, LIMIT = range(3)
 #: The kernels' names of the criteria that cut one, and the reference of each.
 CUTS = {
     "EQUAL_LENGTH": criteria.cut_at_equal_lengths,
@@ -85,11 +85,12 @@ def shortened(call, way, records, limit, *, per_reference=1.0, hidden_weight=0.5
         target[: len(record)] = record
     padded = -(-capacity // ERRORS_AT_A_TIME) * ERRORS_AT_A_TIME
     lengths = np.array([len(r) for r in records], np.int32)
+    kernel = ("cut_functions.cl", "cut") if cut else (FILE, "shortened")
     runs, lengths, thresholds, *_ = call(
-        FILE, "shortened", n, np.int32(CUT if cut else way), np.int32(limit), np.int32(capacity),
+        *kernel, n, np.int32(0 if cut else way), np.int32(limit), np.int32(capacity),
         np.float32(per_reference), np.float32(hidden_weight), call.out(runs), call.out(lengths),
         call.out(np.full(n, threshold, np.float32)), call.empty(n * capacity * 8),
-        call.empty(n * padded), CRITERION=way if cut else "HOMOGENEITY",
+        call.empty(n * padded), **({"CRITERION": way} if cut else {}),
     )  # fmt: skip
     return [r[:k] for r, k in zip(runs, lengths, strict=True)], thresholds
 
@@ -145,7 +146,7 @@ def pairs(seed, n=2000):
 
 def test_merged_runs_follow_the_colour_law(call):
     segments, a, b = pairs(41)
-    found = call(FILE, "merged", len(a), a, b, call.empty(len(a), 8), CRITERION="HOMOGENEITY")
+    found = call(FILE, "merged", len(a), a, b, call.empty(len(a), 8))
     np.testing.assert_array_equal(found[:, TAU], a[:, TAU] + b[:, TAU])
     np.testing.assert_array_equal(found[:, FRONT], a[:, FRONT])
     np.testing.assert_array_equal(found[:, BACK], b[:, BACK])
@@ -161,8 +162,7 @@ def test_merged_runs_follow_the_colour_law(call):
 
 def errors(call, a, b, per_reference=1.0, hidden_weight=0.5):
     how = np.float32(per_reference), np.float32(hidden_weight)
-    written = call.empty(len(a))
-    return call(FILE, "merge_errors", len(a), a, b, *how, written, CRITERION="HOMOGENEITY")
+    return call(FILE, "merge_errors", len(a), a, b, *how, call.empty(len(a)))
 
 
 @pytest.mark.every(3)
