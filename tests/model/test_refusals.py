@@ -97,6 +97,10 @@ def long_list(count):
     return VDI(CAMERA, (1, 1), [0, count], faces[:-1], faces[1:], *media, PLANES)
 
 
+def lists_of_a_window(size):
+    return VDI(**{**GOOD[VDI], "window_size": size})
+
+
 def covering_lists(most):
     return covering_view(CAMERA, (9, 9), bounds_corners(PLANES), max_lists_per_pixel=most)
 
@@ -324,6 +328,7 @@ REFUSED = {
         ({"elevation": 90}, "elevation must lie between -90 and 90"),
         ({"view_angle": 180}, "view_angle must lie between 0 and 180"),
     ],
+    lists_of_a_window: each("got 0 x 1", (0, 1)),
     covering_lists: [((0,), "max_lists_per_pixel must be positive; got 0")],
     compositing.split: [((NEAR, 2.0), "from 1.0 to 2.0 cannot be split at 2.0")],
     compositing.merge: [
