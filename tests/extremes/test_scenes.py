@@ -107,7 +107,7 @@ def test_worlds(runtime, worst, world):
     check(runtime, worst, volume, function, (0, 25, 180) if even else (0, 8), zoom=not even)
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(7)
 @pytest.mark.parametrize("name", ["shaded", "gradient", "both", "both, lit by lamps"])
 @pytest.mark.parametrize("world", ["tiny", "huge", "needle along z", "needle along x", "plate"])
 def test_lit_worlds(runtime, worst, world, name):
@@ -260,7 +260,7 @@ def test_a_range_of_one_scalar(runtime, worst, at, dtype):
     check(runtime, worst, Volume(cube), function)
 
 
-@pytest.mark.every(6)
+@pytest.mark.every(8)
 @pytest.mark.parametrize("dtype", ["float32", "float64", "int32"])
 @pytest.mark.parametrize("name", ["plain", "gradient", "shaded"])
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
@@ -293,7 +293,7 @@ def test_gradients_see_scalars_taken_relative(runtime, worst):
     check(runtime, worst, volume, transfer(1e4, 1e4 + 1, **steep))
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", ["shaded", "gradient", "both"])
 @pytest.mark.parametrize("scale", [1e-40, 1e-24, 1e-20, 1e20, 3e38])
 def test_gradients_from_denormal_to_huge(runtime, worst, scale, name):
@@ -302,7 +302,7 @@ def test_gradients_from_denormal_to_huge(runtime, worst, scale, name):
     check(runtime, worst, volume, transfer(0, scale, **function), (0, 8), lit=True)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", LOOKS)
 def test_rgba(runtime, worst, name):
     colors = [FIELD, 1 - FIELD, np.roll(FIELD, 3), FIELD]
@@ -333,14 +333,14 @@ def test_a_light_inside_the_volume(runtime, worst, attenuation):
     check(runtime, worst, volume, transfer(shading=SHINY), (0, 8), lit=Lights((bulb,)))
 
 
-@pytest.mark.parametrize("power", [0.0, 1e-3, 1e6])
+@pytest.mark.parametrize("power", [0.0, 1e6])
 def test_specular_powers(runtime, worst, power):
     """From a highlight everywhere to one that hardly a sample is in."""
     function = transfer(shading=Shading(0.1, 0.5, 1.0, power))
     check(runtime, worst, field_volume(), function, (0, 8))
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 @pytest.mark.parametrize("lit_by", ["headlight", "lamp", "back lamp"])
 @pytest.mark.parametrize("power", [99.0, 101.0, 1e4, 1e6])
 def test_the_middle_of_a_highlight(runtime, worst, power, lit_by):
