@@ -151,7 +151,7 @@ def test_far_entries_are_clipped_cropped_and_ended(runtime, worst, end):
 EYE = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=16)
 
 
-@pytest.mark.every(6)
+@pytest.mark.every(8)
 @pytest.mark.parametrize("precision", ["exact", "16-byte"])
 @pytest.mark.parametrize("parallel", [False, True])
 @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ def test_lists_far_away_but_not_thin_are_computed_in_float32_alone(runtime):
     assert "DOUBLE_FLOAT_RAYS" not in PreparedVDI(runtime, vdi).defines
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(5)
 @pytest.mark.parametrize("precision", ["exact", "16-byte", "8-byte"])
 @pytest.mark.parametrize("kind", ["near", "around", "parallel"])
 def test_any_vdi_may_be_drawn_by_depths_relative_to_the_ray(

@@ -209,7 +209,7 @@ SCALARS = {
 }
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("name", SCALARS)
 def test_scalars(runtime, worst, name):
     values, dtype, low, high = SCALARS[name]
@@ -220,7 +220,7 @@ def test_scalars(runtime, worst, name):
         check(runtime, worst, Volume(values.astype(dtype)), function)
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
 @pytest.mark.parametrize(
     ("value", "dtype"),
@@ -246,7 +246,7 @@ def test_voxels_that_are_not_numbers_or_no_data(runtime, worst, value, interpola
     assert np.isfinite(render_vdi(vdi, camera.azimuth(90), device=runtime)).all()
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("dtype", ["float32", "float64", "int32"])
 @pytest.mark.parametrize("at", [0.1, 0.0, 7.0])
 def test_a_range_of_one_scalar(runtime, worst, at, dtype):
@@ -399,7 +399,7 @@ TABLES = {
 }
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
 @pytest.mark.parametrize("kind", TABLES)
 def test_transfer_functions(runtime, worst, kind, interpolation):
