@@ -102,9 +102,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 LENGTHY = {
     "api": "api engine_errors",
     "cli": "cli",
-    "extremes": "entries lighting media vdis views volumes worlds",
+    "extremes": "entries media scenes vdis views volumes",
     "faults": "device_faults",
-    "generation": "criterion_functions generation_oracle march_blocks run_functions",
+    "generation": "generation_oracle march_blocks records",
     "io": "deep_exr vdi_files",
     "large": "blocks",
     "measure": "benchmark_scripts baselines",

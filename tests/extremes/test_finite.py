@@ -1,4 +1,4 @@
-"""That the suite would notice an output that is not finite."""
+"""That the suite would notice an output that is not finite, whatever test drew it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.extremes
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_an_image_that_is_not_finite_fails_whatever_test_drew_it(runtime, value):
+def test_what_is_not_finite_fails(runtime, value):
     with runtime.buffer((3, 4, 4), name="image") as image:
         values = np.zeros((3, 4, 4), np.float32)
         values[1, 2, 3] = value
@@ -24,8 +24,7 @@ def test_an_image_that_is_not_finite_fails_whatever_test_drew_it(runtime, value)
 
 def test_images_and_vdis_pass_through_it(runtime, monkeypatch):
     """The names that are looked for are those that the engine gives."""
-    seen = set()
-    download = type(runtime).download
+    seen, download = set(), type(runtime).download
 
     def noting(self, buffer, *args, **kwargs):
         seen.add(buffer.name)
@@ -35,5 +34,10 @@ def test_images_and_vdis_pass_through_it(runtime, monkeypatch):
     volume = field_volume()
     vdi = generate_vdi(volume, view(volume), WINDOW, transfer(), device=runtime)
     render_vdi(vdi, view(volume), device=runtime)
-    expected = {"image", "front depths", "back depths", "supersegment colours", "optical depths"}
-    assert expected <= seen
+    assert seen >= {
+        "image",
+        "front depths",
+        "back depths",
+        "supersegment colours",
+        "optical depths",
+    }

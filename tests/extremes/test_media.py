@@ -2,56 +2,25 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 from drawing import raycast_volume, render_vdi, render_vdis
 from extreme_scenes import (
     BOUND,
-    FIELD,
     WINDOW,
-    check_scene,
-    check_views,
+    assert_within,
     field_volume,
     slabs_vdi,
     transfer,
-    turned,
     view,
 )
 
-from pyvista_vdi import reference
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi import Camera, InvalidArgumentError, TransferFunction, Volume, reference
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.float32_limits import MANY_MEDIA, MOST_STEPS, VERY_MANY_MEDIA
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.volume import Volume
 
 pytestmark = pytest.mark.extremes
-
-UNITS = (1e-8, 1e-4, 1.0, 1e4, 1e8)
-OPACITIES = (1e-7, 0.5, 1 - 2.0**-24, 1.0)
-QUICK = {(1e-8, 1e-7), (1e-8, 1.0), (1.0, 1 - 2.0**-24), (1e8, 0.5), (1.0, 1e-7)}
-
-
-@pytest.mark.parametrize(
-    ("unit", "opacity"),
-    [
-        pytest.param(*case, marks=() if case in QUICK else pytest.mark.slow)
-        for case in itertools.product(UNITS, OPACITIES)
-    ],
-)
-def test_unit_distance_and_opacity(runtime, worst, unit, opacity):
-    """Unit distances per extent, and extinctions with them; opacities from hardly any to all."""
-    volume = field_volume()
-    function = transfer(unit_distance=unit * volume.length, opacity=opacity)
-    camera = view(volume)
-    # Even what is nearly nothing is there to a few digits: below 2^-25 alpha alone would be 0
-    drawn = 0 if opacity / unit < 1e-6 or unit > 1 else 3
-    views = turned(camera, volume, (0, 25, 180))
-    check_scene(runtime, worst, volume, function, camera, views, least_drawn=drawn)
 
 
 @pytest.mark.parametrize("interpolation", ["nearest", "linear"])
@@ -82,7 +51,7 @@ def test_opacity_of_exactly_nothing(runtime, interpolation):
     assert vdi.back.max() <= 5.5
 
 
-@pytest.mark.parametrize("unit", [1e-300, 1e-45, 1e-30, 1e30, 1e300])
+@pytest.mark.parametrize("unit", [1e-300, 1e-45, 1e300])
 def test_unit_distances_beyond_float32(runtime, unit):
     """As opaque, or as transparent, as those that it holds."""
     volume = field_volume()
@@ -99,53 +68,6 @@ def test_unit_distances_beyond_float32(runtime, unit):
     np.testing.assert_allclose(*images, atol=1e-6)
     assert images[0][..., 3].max() == (1.0 if unit < 1 else pytest.approx(0.0, abs=1e-6))
 
-
-@pytest.mark.parametrize("optical_depth", [1e-7, 1.0, 30.0, 1e6, 3e38])
-def test_optical_depth_of_one_supersegment(runtime, worst, optical_depth):
-    camera = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=16)
-    bounds = (-1, 1, -1, 1, -1, 1)
-    vdi = slabs_vdi(camera, [[9.3, 10.4]], optical_depth, window=(3, 3), bounds=bounds)
-    views = [camera, camera.azimuth(40), camera.azimuth(90), camera.azimuth(180)]
-    check_views(runtime, worst, vdi, views)
-
-
-# -- transfer functions ----------------------------------------------------------------------------
-
-
-def table(kind):
-    """A table of 33 opacities over 0..1 and what to draw with it."""
-    opacities = np.zeros(33)
-    if kind == "one entry":
-        opacities[17] = 0.9
-    elif kind == "step at a bin edge":
-        opacities[17:] = 0.7
-    elif kind == "all one":
-        opacities[:] = 1.0
-    shares = np.linspace(0, 1, 33)
-    colors = np.stack([shares, 1 - shares, 0.5 + 0 * shares], axis=1)
-    return lambda interpolation: TransferFunction(
-        colors, opacities, (0, 1), unit_distance=1.0, interpolation=interpolation
-    )
-
-
-@pytest.mark.every(3)
-@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
-@pytest.mark.parametrize("kind", ["one entry", "step at a bin edge", "all zero", "all one"])
-def test_transfer_functions(runtime, worst, kind, interpolation):
-    # Whole multiples of a bin: nearest samples lie exactly on its edges
-    field = np.round(FIELD * 32) / 32 if interpolation == "nearest" else FIELD
-    volume = Volume(field.astype(np.float32))
-    camera = view(volume)
-    function = table(kind)(interpolation)
-    if kind == "all zero":
-        assert not raycast_volume(volume, camera, WINDOW, function, device=runtime).any()
-        assert generate_vdi(volume, camera, WINDOW, function, device=runtime).n_supersegments == 0
-        return
-    views = turned(camera, volume, (0, 25, 180))
-    check_scene(runtime, worst, volume, function, camera, views)
-
-
-# -- accumulated rounding --------------------------------------------------------------------------
 
 EYE = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=10)
 BOUNDS = (-1, 1, -1, 1, -1, 1)
@@ -217,17 +139,13 @@ def test_several_vdis_of_nearly_transparent_supersegments(runtime, worst):
     vdis = [crowded(3000, 2e-8), crowded(2999, 2e-8)]
     image = render_vdis(vdis, EYE, (1, 1), device=runtime)[0, 0]
     exact = -np.expm1(-5999 * np.float64(np.float32(2e-8))) * np.array([0.2, 0.5, 0.8, 1.0])
-    error = np.abs(image - exact).max()
-    worst("5999 supersegments", error)
     # A piece of one may be as short as a rounding of its ends, and its share of tau is as uncertain
-    assert error <= 2e-6
+    assert_within(worst, "5999 supersegments", image, exact, 2e-6)
 
 
 @pytest.mark.every(4)
-@pytest.mark.parametrize("opacity", [1e-6, 0.01, 0.5, 0.9])
-@pytest.mark.parametrize(
-    "steps", [1000, 8000, 10_000, pytest.param(MOST_STEPS, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("opacity", [1e-6, 0.01, 0.9])
+@pytest.mark.parametrize("steps", [1000, 10_000, pytest.param(MOST_STEPS, marks=pytest.mark.slow)])
 def test_very_many_steps_through_a_constant_volume(runtime, worst, steps, opacity):
     """Closed form: the opacity of a slab is what the table says, however it is cut."""
     volume = Volume(np.full((3, 3, 3), 0.5, np.float32))
@@ -239,22 +157,21 @@ def test_very_many_steps_through_a_constant_volume(runtime, worst, steps, opacit
     step = max(2.0 / steps, volume.length / MOST_STEPS)
     exact = float(np.float32(opacity)) * np.array([color, color, color, 1.0])
     image = raycast_volume(volume, camera, (1, 1), function, sample_distance=step, device=runtime)
-    worst("volume", np.abs(image - exact).max())
+    assert_within(worst, "volume", image, exact)
     vdi = generate_vdi(volume, camera, (1, 1), function, sample_distance=step, device=runtime)
-    seen = composite(vdi.color, vdi.optical_depth)
-    worst("VDI", np.abs(seen - exact).max())
-    assert np.abs(image - exact).max() <= BOUND
-    assert np.abs(seen - exact).max() <= BOUND
+    assert_within(worst, "VDI", composite(vdi.color, vdi.optical_depth), exact)
 
 
-def test_more_steps_than_float32_sums_up_are_refused(runtime):
+@pytest.mark.parametrize(
+    ("share", "message"),
+    [
+        (0.99 / MOST_STEPS, r"at least .*2\^-19 of the volume"),  # more steps than are summed up
+        (0.0, "sample_distance.*got 0"),
+        (np.nan, "sample_distance.*got nan"),
+    ],
+)
+def test_impossible_steps_are_refused(runtime, share, message):
     volume = field_volume()
-    with pytest.raises(InvalidArgumentError, match=r"at least .*2\^-19 of the volume"):
-        generate_vdi(
-            volume,
-            view(volume),
-            WINDOW,
-            transfer(),
-            sample_distance=volume.length / MOST_STEPS * 0.99,
-            device=runtime,
-        )
+    scene = volume, view(volume), WINDOW, transfer()
+    with pytest.raises(InvalidArgumentError, match=message):
+        generate_vdi(*scene, sample_distance=share * volume.length, device=runtime)

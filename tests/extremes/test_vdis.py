@@ -5,13 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from drawing import render_vdi
-from extreme_scenes import WINDOW, check_views, field_volume, slabs_vdi, transfer, turned, view
+from extreme_scenes import (
+    WINDOW,
+    assert_within,
+    check_views,
+    field_volume,
+    slabs_vdi,
+    transfer,
+    turned,
+    view,
+)
 
-from pyvista_vdi import reference
+from pyvista_vdi import VDI, Camera, Volume, reference
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import Volume
 
 pytestmark = pytest.mark.extremes
 
@@ -54,16 +60,48 @@ def test_4096_supersegments_in_every_list(runtime, worst):
     check_views(runtime, worst, vdi, AROUND, size=(5, 3))
 
 
-@pytest.mark.parametrize("window", [(1, 1), (1, 7), (7, 1)], ids=str)
-def test_one_list_and_one_row(runtime, worst, window):
-    vdi = slabs_vdi(EYE, [[9.2, 9.9], [9.9, 10.6]], [0.5, 1.0], window=window, bounds=BOUNDS)
-    check_views(runtime, worst, vdi, AROUND, size=(5, 4), least_drawn=1)
+#: Faces less a depth origin of 9, optical depths, windows; least pixels that must be drawn.
+LISTS = {
+    "one list": ([(0.2, 0.9), (0.9, 1.6)], [0.5, 1.0], (1, 1), 1),
+    "one column": ([(0.2, 0.9), (0.9, 1.6)], [0.5, 1.0], (1, 7), 1),
+    "one row": ([(0.2, 0.9), (0.9, 1.6)], [0.5, 1.0], (7, 1), 1),
+    "as deep as float32 holds": ([(0.0, 0.5), (0.5, 3e38)], [1.0, 3e38], (3, 3), 3),
+    **{
+        f"optical depth {tau:g}": ([(0.3, 1.4)], tau, (3, 3), 3)
+        for tau in (1e-7, 1.0, 30.0, 1e6, 3e38)
+    },
+    "nothing": ([], [], (4, 3), 0),
+}
 
 
-def test_empty_vdis(runtime):
-    vdi = slabs_vdi(EYE, np.empty((0, 2)), [], window=(4, 3), bounds=BOUNDS, color=np.empty((0, 3)))
-    for camera in AROUND:
-        assert not render_vdi(vdi, camera, (5, 4), device=runtime).any()
+@pytest.mark.parametrize("name", LISTS)
+def test_extreme_lists(runtime, worst, name):
+    faces, optical_depth, window, drawn = LISTS[name]
+    vdi = slabs_vdi(EYE, faces, optical_depth, window=window, bounds=BOUNDS, depth_origin=9.0)
+    check_views(runtime, worst, vdi, AROUND, size=(5, 4), least_drawn=drawn)
+
+
+def test_lists_from_as_deep_as_float32_holds(runtime, worst):
+    """What is in the bounds counts."""
+    camera = EYE.replace(parallel_projection=True)
+    faces = [(-3e38, -1e38), (-1e38, 0.5), (0.5, 3e38)]
+    vdi = slabs_vdi(camera, faces, [1.0, 3e38, 3e38], window=(3, 3), bounds=BOUNDS)
+    check_views(runtime, worst, vdi, AROUND, size=(3, 3), least_drawn=0)
+
+
+@pytest.mark.every(6)
+@pytest.mark.parametrize("origin", [9.0, 0.0])
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize("optical_depth", [1.0, 3e38])
+def test_supersegments_one_ulp_thick(runtime, worst, optical_depth, origin, parallel):
+    """From a denormal number thick: within what rounding of its faces makes of it, and finite."""
+    camera = EYE.replace(parallel_projection=parallel)
+    for depth in (0.0, 1e-40, 0.5, 1.5):
+        front = np.float32(9.0 - origin + depth)
+        faces = [front, np.nextafter(front, np.float32(99))]
+        where = {"window": (3, 3), "bounds": BOUNDS, "depth_origin": origin}
+        vdi = slabs_vdi(camera, faces, optical_depth, **where)
+        check_views(runtime, worst, vdi, AROUND, size=(3, 3), least_drawn=0)
 
 
 @pytest.mark.parametrize("parallel", [False, True])
@@ -83,75 +121,29 @@ def test_touching_supersegments_leave_no_gap(runtime, worst, parallel):
         np.testing.assert_allclose(*images, atol=2e-5)
 
 
-@pytest.mark.every(6)
-@pytest.mark.parametrize("origin", [9.0, 0.0])
-@pytest.mark.parametrize("parallel", [False, True])
-@pytest.mark.parametrize(
-    "optical_depth",
-    [
-        1.0,
-        3e38,
-        pytest.param(1e-6, marks=pytest.mark.slow),
-        pytest.param(1e6, marks=pytest.mark.slow),
-    ],
-)
-def test_supersegments_one_ulp_thick(runtime, worst, optical_depth, origin, parallel):
-    """From a denormal number thick: within what rounding of its faces makes of it, and finite."""
-    camera = EYE.replace(parallel_projection=parallel)
-    for depth in (0.0, 1e-40, 0.5, 1.5):
-        front = np.float32(9.0 - origin + depth)
-        back = np.nextafter(front, np.float32(99))
-        vdi = VDI(
-            camera, (3, 3), np.arange(10), [front] * 9, [back] * 9, [[0.3, 0.5, 0.7]] * 9,
-            [optical_depth] * 9, BOUNDS, depth_origin=origin,
-        )  # fmt: skip
-        check_views(runtime, worst, vdi, AROUND, size=(3, 3), least_drawn=0)
-
-
-def test_faces_beyond_everything(runtime, worst):
-    """Depths as large as float32 holds: what is in the bounds counts."""
-    faces = [[0.0, 0.5], [0.5, 3e38]]
-    vdi = slabs_vdi(EYE, faces, [1.0, 3e38], window=(3, 3), bounds=BOUNDS, depth_origin=9.0)
-    check_views(runtime, worst, vdi, AROUND, size=(3, 3))
-    camera = EYE.replace(parallel_projection=True)
-    faces = [[-3e38, -1e38], [-1e38, 0.5], [0.5, 3e38]]
-    vdi = slabs_vdi(camera, faces, [1.0, 3e38, 3e38], window=(3, 3), bounds=BOUNDS)
-    check_views(runtime, worst, vdi, AROUND, size=(3, 3), least_drawn=0)
-
-
-def large_vdi(width, height):
-    """One supersegment in every 16th list, its depth and colour those of its place."""
-    lists = np.arange(0, width * height, 16)
-    n = len(lists)
-    counts = np.zeros(width * height, np.uint64)
-    counts[lists] = 1
-    x, y = lists % width / width, lists // width / height
-    front = (0.3 + x + 0.3 * y).astype(np.float32)
-    return VDI(
-        Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=11.4),
-        (width, height),
-        np.concatenate([[0], np.cumsum(counts)]).astype(np.uint64),
-        front,
-        front + np.float32(0.2),
-        np.stack([x, y, np.full(n, 0.5)], axis=1).astype(np.float32),
-        np.full(n, 2.0, np.float32),
-        (-2.5, 2.5, -1.5, 1.5, -1, 1),
-        depth_origin=9.0,
-    )
-
-
 @pytest.mark.slow
 def test_8192_by_4320_lists(runtime, worst):
     """From V_O all of them against the list itself; turned, through a small window."""
-    width, height = 8192, 4320
-    vdi = large_vdi(width, height)
+    width, height = window = 8192, 4320
+    # One supersegment in every 16th list, its depth and colour those of its place
+    y, x = np.divmod(np.arange(0, width * height, 16), width)
+    front = (0.3 + x / width + 0.3 * y / height).astype(np.float32)
+    color = np.stack([x / width, y / height, np.full(len(x), 0.5)], axis=1)
+    vdi = VDI(
+        EYE.replace(view_angle=11.4),
+        window,
+        (np.arange(width * height + 1, dtype=np.uint64) + 15) // 16,
+        front,
+        front + np.float32(0.2),
+        color,
+        np.full(len(x), 2.0),
+        (-2.5, 2.5, -1.5, 1.5, -1, 1),
+        depth_origin=9.0,
+    )
     image = render_vdi(vdi, vdi.camera, device=runtime)[::-1]
     drawn = image.reshape(-1, 4)[::16]
-    x, y = np.divmod(np.arange(0, width * height, 16), width)[::-1]
-    expected = -np.expm1(-2.0) * np.stack([x / width, y / height, 0 * x + 0.5], axis=1)
-    error = np.abs(drawn[:, :3] - expected).max()
-    worst("8192 x 4320 from V_O", error)
-    assert error <= 2e-5
+    expected = -np.expm1(-2.0) * color
+    assert_within(worst, "8192 x 4320 from V_O", drawn[:, :3], expected, 2e-5)
     assert not image.reshape(-1, 4)[8::16].any()
     # The oracle looks at every list of a row: a few pixels
     for camera in (vdi.camera.azimuth(0.3), vdi.camera.azimuth(60)):

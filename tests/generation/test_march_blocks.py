@@ -1,6 +1,6 @@
-"""A CPU device marches in blocks of rays: the VDI is the same.
+"""A CPU device marches, and shortens records, in blocks of rays: the VDI is the same.
 
-``generation/march_lists.cl`` of 16 lanes against one, to the last bit.
+Kernels of 16 lanes against one, as other devices have them, to the last bit.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import pytest
 from march_ways import VIEWS, WINDOW, both_ways, transfer_for, volume_of
 
 from pyvista_vdi import Volume
-from pyvista_vdi.generation import slices
 from pyvista_vdi.generation.generate import generate_vdi
 
 
@@ -18,7 +17,7 @@ from pyvista_vdi.generation.generate import generate_vdi
 def check(monkeypatch, runtime):
     """Make a VDI by both forms of the march, compare, and return it."""
 
-    def checked(volume, view, interpolation="nearest", **options):
+    def checked(volume, view="all of it", interpolation="nearest", **options):
         arguments = (volume, VIEWS[view](volume), WINDOW, transfer_for(volume, interpolation))
         found, expected, launches = both_ways(
             monkeypatch,
@@ -45,13 +44,13 @@ def test_views_and_types(check, dtype, view):
 @pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.float32])
 @pytest.mark.parametrize("step", [0.5, 1.0])
 def test_linear_samples(check, dtype, step):
-    vdi = check(volume_of(dtype), "all of it", "linear", sample_distance=step)
+    vdi = check(volume_of(dtype), interpolation="linear", sample_distance=step)
     assert vdi.n_supersegments > 5000
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.int32])
 def test_nearest_samples_that_are_classified(check, dtype):
-    check(volume_of(dtype), "all of it")
+    check(volume_of(dtype))
 
 
 @pytest.mark.parametrize(
@@ -65,17 +64,13 @@ def test_nearest_samples_that_are_classified(check, dtype):
         {"view_cone": 0.0},
         {"criterion": "homogeneity"},
         {"criterion": "length"},
+        {"memory_limit": "4 MiB"},  # slices of four rows
     ],
     ids=str,
 )
 def test_options(check, options):
-    check(volume_of(np.uint8, spacing=(1, 0.8, 1.3)), "all of it", **options)
+    check(volume_of(np.uint8, spacing=(1, 0.8, 1.3)), **options)
 
 
 def test_volumes_without_empty_blocks(check):
-    check(Volume(np.maximum(volume_of(np.uint8).array, 120)), "all of it")
-
-
-def test_a_slice_of_four_rows(check, monkeypatch):
-    monkeypatch.setattr(slices, "_SLICE_BYTES", 1)
-    check(volume_of(np.uint8), "all of it")
+    check(Volume(np.maximum(volume_of(np.uint8).array, 120)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 import pytest
 
@@ -25,9 +27,8 @@ def summed(runtime, slices, group):
     kernels = [
         runtime.kernel("generation/offsets.cl", name) for name in ("sum_lengths", "list_offsets")
     ]
-    total = sum(map(len, slices))
     most = max(map(len, slices))
-    room = np.full(total + 3, UNTOUCHED)
+    room = np.full(sum(map(len, slices)) + 3, UNTOUCHED)
     room[0] = 0
     with (
         runtime.buffer(room.shape, np.uint64) as offsets,
@@ -45,30 +46,17 @@ def summed(runtime, slices, group):
         return runtime.download(offsets)
 
 
-@pytest.fixture(params=[1, 3, 64, 100, "most"])
-def group(request, runtime):
-    allowed = runtime._device
-    most = min(allowed.max_work_group_size, allowed.max_work_item_sizes[0], 1024)
-    return most if request.param == "most" else min(request.param, most)
-
-
 @pytest.mark.parametrize("kind", ["mixed", "empty", "longest"])
 @pytest.mark.parametrize(
     "sizes", [(1,), (15, 16, 17), (1024, 1, 1023, 1025), (2**16 + 7, 3, 70001)], ids=str
 )
-def test_offsets_are_the_running_sum(runtime, group, kind, sizes):
+def test_offsets_are_the_running_sum(runtime, kind, sizes):
+    """Also where a launch is cut into several, as behind frames."""
     slices = [lengths_of(kind, n, 70 + n) for n in sizes]
-    found = summed(runtime, slices, group)
     n = sum(sizes)
-    np.testing.assert_array_equal(found[n + 1 :], UNTOUCHED)
-    expected = np.cumsum(np.concatenate(slices), dtype=np.uint64)
-    np.testing.assert_array_equal(found[: n + 1], np.concatenate([[0], expected]).astype(np.uint64))
-
-
-def test_offsets_in_pieces(runtime):
-    """Behind frames a launch is cut into several with offsets."""
-    slices = [lengths_of("mixed", n, n) for n in (30011, 2049)]
-    with runtime.background():
-        found = summed(runtime, slices, 64)
-    expected = np.cumsum(np.concatenate(slices), dtype=np.uint64)
-    np.testing.assert_array_equal(found[1 : len(expected) + 1], expected)
+    expected = np.cumsum(np.concatenate([[0], *slices]), dtype=np.uint64)
+    for group, aside in ((1, False), (64, False), (100, False), (64, True)):
+        with runtime.background() if aside else contextlib.nullcontext():
+            found = summed(runtime, slices, group)
+        np.testing.assert_array_equal(found[n + 1 :], UNTOUCHED)
+        np.testing.assert_array_equal(found[: n + 1], expected)

@@ -77,7 +77,7 @@ def check_the_same(runtime, records, limit, exactly, **options):
 
 @pytest.mark.every(3)
 @pytest.mark.parametrize("exactly", [False, True], ids=["room", "exactly"])
-@pytest.mark.parametrize("limit", [1, 2, 7, 20, 52])
+@pytest.mark.parametrize("limit", [1, 7, 20, 52])
 def test_records_of_all_lengths(runtime, limit, exactly):
     rng = np.random.default_rng(5)
     records = [as_runs(s) for s in random_records(6, 40, 60)]
@@ -89,7 +89,7 @@ def test_records_of_all_lengths(runtime, limit, exactly):
 
 
 @pytest.mark.parametrize("exactly", [False, True], ids=["room", "exactly"])
-@pytest.mark.parametrize("hidden_weight", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("hidden_weight", [0.0, 1.0])
 def test_equal_errors_are_merged_in_the_same_order(runtime, exactly, hidden_weight):
     """Of equal errors the first is merged first."""
     alike = [EXTREMES[name] for name in ("all equal", "all equal, apart", "black")]
@@ -104,7 +104,6 @@ def test_a_slice_with_nothing_to_shorten_stays(runtime):
 
 @pytest.mark.extremes
 @pytest.mark.parametrize("exactly", [False, True], ids=["room", "exactly"])
-@pytest.mark.parametrize("limit", [1, 7, 39])
-@pytest.mark.parametrize("reference", [1e-30, 1.0, 1e30])
+@pytest.mark.parametrize(("limit", "reference"), [(1, 1e-30), (7, 1.0), (39, 1e30)])
 def test_any_finite_record(runtime, reference, limit, exactly):
     check_the_same(runtime, list(EXTREMES.values()), limit, exactly, reference=reference)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pyvista_vdi import AmbientOcclusion, InvalidArgumentError, Volume, api
+from pyvista_vdi import AmbientOcclusion, Volume, api
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid, spread_directions
 
 
@@ -24,31 +24,6 @@ def test_what_is_taken():
     assert AmbientOcclusion.from_any(np.float32(0.5)) == AmbientOcclusion(radius=0.5)
     assert AmbientOcclusion.from_any(AmbientOcclusion(2, 0.5)).strength == 0.5
     assert AmbientOcclusion.from_any(AmbientOcclusion(strength=0)) is None
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"radius": 0}, "a positive length in model units; got 0"),
-        ({"radius": -1}, "a positive length in model units; got -1"),
-        ({"radius": math.inf}, "a positive length in model units; got inf"),
-        ({"radius": "far"}, "a positive length in model units; got 'far'"),
-        ({"radius": True}, "a positive length in model units; got True"),
-        ({"strength": 1.5}, "strength .* from 0 to 1; got 1.5"),
-        ({"strength": math.nan}, "strength .* from 0 to 1; got nan"),
-        ({"directions": 11}, "from 12 to 4096; got 11"),
-        ({"directions": 16.5}, "from 12 to 4096; got 16.5"),
-    ],
-)
-def test_what_is_refused(arguments, message):
-    with pytest.raises(InvalidArgumentError, match=message):
-        AmbientOcclusion(**arguments)
-
-
-@pytest.mark.parametrize("value", ["much", (1, 2), {"radius": 1}])
-def test_other_things_are_refused(value):
-    with pytest.raises(InvalidArgumentError, match="True, a radius in model units or a pyvista_v"):
-        AmbientOcclusion.from_any(value)
 
 
 @pytest.mark.parametrize("n", [12, 32, 129])

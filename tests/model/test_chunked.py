@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import Camera, TransferFunction, Volume
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
+from pyvista_vdi import Camera, InvalidVolumeError, TransferFunction, UnsupportedError, Volume
 from pyvista_vdi.large.generate import generate_chunked
 from pyvista_vdi.model.chunked import ChunkedArray
 
@@ -23,9 +22,9 @@ def dask_array(values, _folder):
 
 
 def zarr_array(values, folder):
-    zarr = pytest.importorskip("zarr")
-    array = zarr.open(
-        str(folder / "x.zarr"), mode="w", shape=values.shape, chunks=CHUNKS, dtype=values.dtype
+    place, chunks = str(folder / "x.zarr"), (*(1,) * (values.ndim - 3), *CHUNKS)
+    array = pytest.importorskip("zarr").open(
+        place, mode="w", shape=values.shape, chunks=chunks, dtype=values.dtype
     )
     array[...] = values
     return array
@@ -39,19 +38,6 @@ def hdf5_data(values, folder):
 
 
 SOURCES = {"dask": dask_array, "zarr": zarr_array, "h5py": hdf5_data}
-
-
-@pytest.mark.parametrize("source", ["dask", "h5py"])
-def test_colours_are_refused_by_name(source, tmp_path):
-    colours = np.zeros((4, 5, 6, 4), dtype=np.uint8)
-    if source == "dask":
-        array = pytest.importorskip("dask.array").from_array(colours)
-    else:
-        file = pytest.importorskip("h5py").File(tmp_path / "x.h5", "w")
-        array = file.create_dataset("colours", data=colours)
-    with pytest.raises(InvalidVolumeError, match=r"RGBA: .*Volume\(numpy\.asarray\(array\)\)"):
-        Volume(array)
-    assert Volume(np.asarray(array)).rgba
 
 
 @pytest.mark.parametrize("source", SOURCES)
@@ -122,13 +108,7 @@ def test_ranges_leave_nan_out():
 
 def test_time_and_channel_are_chosen_by_index(tmp_path):
     values = np.stack([VALUES, VALUES + 1])[:, None]
-    array = SOURCES["zarr"](VALUES, tmp_path)
-    del array
-    zarr = pytest.importorskip("zarr")
-    array = zarr.open(
-        str(tmp_path / "tc.zarr"), mode="w", shape=values.shape, chunks=(1, 1, *CHUNKS), dtype="u1"
-    )
-    array[...] = values
+    array = zarr_array(values, tmp_path)
     with pytest.raises(InvalidVolumeError, match="three-dimensional.*choose time and channel"):
         Volume(array)
     chosen = ChunkedArray(array, index=(1, 0, slice(None), slice(None), slice(None)))
@@ -140,27 +120,34 @@ def test_what_needs_the_whole_array_says_so():
     volume = Volume(Counted())
     camera = Camera((60, 50, 70), (13, 10, 15), (0, 1, 0))
     function = TransferFunction(np.ones((2, 3)), [0, 0.1], (0, 255))
-    with pytest.raises(InvalidVolumeError, match=r"read chunk by chunk.*volume\.load\(\)"):
-        np.asarray(volume.array)
-    with pytest.raises(InvalidVolumeError, match=r"read chunk by chunk.*volume\.load\(\)"):
-        pvdi.render_volume(volume, camera, (16, 9), transfer_function=function)
+    scene = volume, camera, (16, 9)
+    pv = pytest.importorskip("pyvista")
+    for use in (
+        lambda: np.asarray(volume.array),
+        lambda: pvdi.render_volume(*scene, transfer_function=function),
+        lambda: volume.array.reshape(-1),
+        lambda: pv.Plotter(off_screen=True).add_vdi(volume, cmap="bone"),
+    ):
+        with pytest.raises(InvalidVolumeError, match=r"read chunk by chunk.*volume\.load\(\)"):
+            use()
     with pytest.raises(UnsupportedError, match="target_ssim.*chunked"):
-        pvdi.generate(volume, camera, (16, 9), transfer_function=function, target_ssim=0.9)
+        pvdi.generate(*scene, transfer_function=function, target_ssim=0.9)
     with pytest.raises(InvalidVolumeError, match="three slices of step 1"):
         volume.array[0]
-    with pytest.raises(InvalidVolumeError, match=r"read chunk by chunk.*volume\.load\(\)"):
-        volume.array.reshape(-1)
-    assert not hasattr(volume.array, "_something")
+    assert not hasattr(volume.array, "something")
 
 
-def test_add_vdi_says_that_it_needs_the_whole_array():
-    pv = pytest.importorskip("pyvista")
-    with pytest.raises(InvalidVolumeError, match=r"read chunk by chunk.*volume\.load\(\)"):
-        pv.Plotter(off_screen=True).add_vdi(Volume(Counted()), cmap="bone")
-
-
-def test_uneven_chunks_are_refused():
+@pytest.mark.parametrize("source", ["dask", "h5py"])
+def test_colours_and_uneven_chunks_are_refused_by_name(source, tmp_path):
     dask = pytest.importorskip("dask.array")
+    colours = np.zeros((4, 5, 6, 4), dtype=np.uint8)
+    array = dask.from_array(colours)
+    if source == "h5py":
+        file = pytest.importorskip("h5py").File(tmp_path / "x.h5", "w")
+        array = file.create_dataset("colours", data=colours)
+    with pytest.raises(InvalidVolumeError, match=r"RGBA: .*Volume\(numpy\.asarray\(array\)\)"):
+        Volume(array)
+    assert Volume(np.asarray(array)).rgba
     with pytest.raises(InvalidVolumeError, match="different lengths.*rechunk"):
         Volume(dask.from_array(VALUES, chunks=((8, 12, 10), 9, 10)))
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from strategies import random_vdi
+from extreme_scenes import slabs_vdi
+from ray_scenes import rebuilt
 
 from pyvista_vdi import VDI, Camera
 from pyvista_vdi.model.coarser import coarser
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.reference.raycast import centre_ray_scale, render
 
+BOUNDS = (-1, 1, -1, 1, -1, 1)
 STRETCHED = np.diag([1.0, 2.0, 3.0, 1.0])
 
 
@@ -59,14 +61,12 @@ def test_the_medium_is_the_same(window, parallel):
 
 
 def test_lists_are_those_in_the_middle():
-    vdi = random_vdi(np.random.default_rng(3), max_window=(1, 1))
-    camera = vdi.camera.replace(window_center=(0, 0), model_transform=np.eye(4))
-    n = 64
-    faces = np.arange(n, dtype=np.float32)
-    fine = VDI(camera, (8, 8), np.arange(n + 1), faces + 1, faces + 1.5, np.ones((n, 3)),
-               np.ones(n), vdi.bounds)  # fmt: skip
-    taken = coarser(fine).front.reshape(2, 2) - 1
-    np.testing.assert_array_equal(taken, [[18, 22], [50, 54]])
+    fine = slabs_vdi(
+        Camera((0, 0, 9), (0, 0, 0), (0, 1, 0)), [1, 1.5], 1, window=(8, 8), bounds=BOUNDS
+    )
+    places = np.arange(64)
+    taken = coarser(rebuilt(fine, front=fine.front + places, back=fine.back + places)).front - 1
+    np.testing.assert_array_equal(taken, [18, 22, 50, 54])
 
 
 def test_the_picture_is_near():
@@ -79,7 +79,6 @@ def test_the_picture_is_near():
 
 
 def test_an_empty_vdi_stays_empty():
-    vdi = random_vdi(np.random.default_rng(1))
-    empty = VDI(vdi.camera, (5, 4), [0] * 21, [], [], [], [], vdi.bounds)
+    empty = slabs_vdi(Camera((0, 0, 9), (0, 0, 0), (0, 1, 0)), [], [], window=(5, 4), bounds=BOUNDS)
     assert coarser(empty).window_size == (2, 1)
     assert coarser(empty).n_supersegments == 0

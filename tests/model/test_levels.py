@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pyvista_vdi.model.camera import Camera
+from pyvista_vdi import Camera
 from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.levels import nearest_depth, nearest_list_width, required_level
 

@@ -8,7 +8,7 @@ import strategies
 from hypothesis import given
 from strategies import GENERATORS
 
-from pyvista_vdi.errors import InvalidVolumeError
+from pyvista_vdi import InvalidVolumeError
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
 
 
@@ -33,19 +33,9 @@ def test_other_types_are_widened_without_loss(given_type, held):
     assert volume.array.dtype == np.dtype(held)
     assert volume.array.dtype.isnative
     np.testing.assert_array_equal(volume.array, array)
-
-
-def test_arrays_that_are_not_contiguous_are_copied():
-    array = np.arange(60, dtype=np.uint8).reshape(3, 4, 5)
-    volume = Volume(array.transpose(2, 1, 0))
-    assert volume.array.flags.c_contiguous
-    assert volume.dimensions == (3, 4, 5)
-    np.testing.assert_array_equal(volume.array, array.T)
-
-
-def test_whole_numbers_beyond_float64_are_refused():
-    with pytest.raises(InvalidVolumeError, match="hold values up to 9007199254740993"):
-        Volume(np.full((2, 2, 2), 2**53 + 1))
+    turned = Volume(array.T)  # is copied
+    assert turned.array.flags.c_contiguous
+    np.testing.assert_array_equal(turned.array, array.T)
 
 
 @given(GENERATORS)
@@ -79,55 +69,10 @@ def test_length_and_unit_distance_are_pyvista_s():
 @pytest.mark.parametrize("dtype", ["uint8", "int16", "float32", "float64"])
 def test_finite_range_leaves_nan_out(dtype):
     array = np.arange(8).reshape(2, 2, 2).astype(dtype)
+    assert Volume(array).finite_range() == (0, 7)
     if array.dtype.kind == "f":
         array[0, 0, 0] = np.nan
         assert Volume(array).finite_range() == (1, 7)
-    else:
-        assert Volume(array).finite_range() == (0, 7)
-
-
-def test_a_volume_of_nan_is_refused_when_its_range_is_asked():
-    volume = Volume(np.full((2, 2, 2), np.nan), name="density")
-    with pytest.raises(InvalidVolumeError, match="every value of 'density' is NaN"):
-        volume.finite_range()
-
-
-@pytest.mark.parametrize(
-    ("array", "message"),
-    [
-        (np.zeros((3, 3)), r"three-dimensional array; got shape \(3, 3\)$"),
-        (np.zeros((3, 3, 3, 4)), r"got shape \(3, 3, 3, 4\): give one scalar per point"),
-        (np.zeros((0, 3, 3)), r"the volume is empty: its shape is \(0, 3, 3\)"),
-        (np.zeros((1, 3, 3)), "only one plane of points.* at least two points along each axis"),
-        (np.zeros((3, 3, 1)), "only one plane of points"),
-        (np.zeros((2, 2, 2), dtype=complex), "voxels of type complex128 are not supported"),
-        (np.full((2, 2, 2), "a"), "are not supported: convert to one of uint8"),
-        (np.full((2, 2, 2), None), "voxels of type object are not supported"),
-    ],
-)
-def test_arrays_that_are_no_volume_are_refused(array, message):
-    with pytest.raises(InvalidVolumeError, match=message):
-        Volume(array)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"spacing": (1, 0, 1)}, r"spacing must be positive .* got \(1.0, 0.0, 1.0\)"),
-        ({"spacing": (1, 1, -1)}, "flip the array"),
-        ({"spacing": (1, 1)}, "spacing must be three finite numbers"),
-        ({"spacing": "thin"}, "spacing must be three finite numbers; got 'thin'"),
-        ({"origin": (0, 0, np.inf)}, "origin must be three finite numbers"),
-        ({"direction": np.eye(4)}, "direction must be 3 x 3 finite numbers"),
-        ({"direction": np.full((3, 3), np.nan)}, "direction must be 3 x 3 finite numbers"),
-        ({"direction": np.diag([1, 1, 0])}, "cannot be inverted"),
-    ],
-)
-def test_impossible_grids_are_refused(changes, message):
-    with pytest.raises(InvalidVolumeError, match=message):
-        Volume(np.zeros((2, 2, 2)), **changes)
-
-
-def test_lists_of_different_lengths_are_no_volume():
-    with pytest.raises(InvalidVolumeError, match="a volume is an array of numbers"):
-        Volume([[1, 2], [3]])
+        array[...] = np.nan
+        with pytest.raises(InvalidVolumeError, match="every value of 'density' is NaN"):
+            Volume(array, name="density").finite_range()

@@ -1,8 +1,8 @@
 """Cropping and the opacity multiplier: the device against the float64 oracle, and against laws.
 
-The bound for each channel is that of tests/support/oracle.py: crossings of
-cropping planes are found with as many roundings as the ends of a ray, and the oracle's range moves
-the ends of every part that cropping leaves of it.
+The bound for each channel is that of tests/support/oracle.py: crossings of cropping planes are
+found with as many roundings as the ends of a ray, and the oracle's range moves the ends of every
+part that cropping leaves of it.
 """
 
 from __future__ import annotations
@@ -11,22 +11,18 @@ import numpy as np
 import pytest
 import strategies
 from drawing import pick_vdi, raycast_volume, render_first_hits, render_vdi
-from oracle import explain, total
+from oracle import assert_explained, total
+from ray_scenes import random_ends, random_planes
 
+from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.cropping import PRESETS, Cropping
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.reference.raycast import kept_parts
 from pyvista_vdi.reference.rays import clip, inside_box, pixel_ray
 
-
-def planes_in(rng, bounds):
-    """Two planes per axis, some of them outside the bounds."""
-    box = np.reshape(bounds, (3, 2))
-    shares = np.sort(rng.uniform(-0.1, 1.1, size=(3, 2)), axis=1)
-    return (box[:, :1] + shares * (box[:, 1:] - box[:, :1])).ravel()
+in_two_ways = pytest.mark.parametrize("dealt", ["one by one", "blocks"], indirect=True)
 
 
 def case(seed, **options):
@@ -37,85 +33,47 @@ def case(seed, **options):
     return rng, vdi, camera, size, f"seed {[seed, 600]}, view {kind!r}"
 
 
-@pytest.fixture(params=["one by one", "blocks"])
-def _dealt(request, monkeypatch):
-    strategies.deal_rays(monkeypatch, request.param)
-
-
+@in_two_ways
 @pytest.mark.every(3)
-@pytest.mark.usefixtures("_dealt")
 @pytest.mark.parametrize("kind", ["flags", *PRESETS])
-def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind):
+def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind, dealt):
+    """With and without what else ends rays."""
     parts = []
     for seed in range(20 if kind == "flags" else 6):
         rng, vdi, camera, size, name = case(seed)
         regions = int(rng.integers(Cropping.ALL + 1)) if kind == "flags" else kind
         shown = {
-            "cropping": Cropping(planes_in(rng, vdi.bounds), regions),
+            "cropping": Cropping(random_planes(rng, vdi.bounds), regions),
             "opacity_multiplier": float(2 ** rng.uniform(-3, 3)),
         }
+        if seed % 3 == 2:
+            shown |= random_ends(rng, vdi, camera, size)
         image = render_vdi(vdi, camera, size, device=runtime, **shown)
         plain = render_vdi(vdi, camera, size, device=runtime, skip_empty=False, **shown)
         np.testing.assert_array_equal(image, plain)
-        parts.append(explain(vdi, camera, size, image, name=name, **shown))
-        if parts[-1].failures:
-            break
-    result = total(parts)
-    assert not result.failures, "\n".join(result.failures)
-    assert result.drawn > result.pixels / 50
+        parts.append(assert_explained(vdi, camera, size, image, name=name, **shown))
+    assert total(parts).drawn > total(parts).pixels / 50
 
 
-@pytest.mark.usefixtures("_dealt")
-def test_with_opaque_depth_and_clipping_planes(runtime):
-    for seed in range(4):
-        rng, vdi, camera, size, name = case(seed)
-        near, far = strategies.view_depths(camera, vdi.bounds)
-        corners = strategies.world_corners(vdi.bounds, camera.model_transform)
-        shown = {
-            "opaque_depth": rng.uniform(near, far, size=size[::-1]).astype(np.float32),
-            "clipping_planes": [[*corners.mean(axis=0), *rng.normal(size=3)]],
-            "cropping": (planes_in(rng, vdi.bounds), "inverted_cross"),
-            "opacity_multiplier": 3.0,
-        }
-        image = render_vdi(vdi, camera, size, device=runtime, **shown)
-        result = explain(vdi, camera, size, image, name=name, **shown)
-        assert not result.failures, "\n".join(result.failures)
-
-
-@pytest.mark.usefixtures("_dealt")
-def test_what_is_kept_and_what_is_not_absorb_together_what_everything_does(runtime):
-    drawn = 0
-    for seed in range(10):
-        rng, vdi, camera, size, name = case(seed)
-        planes, regions = planes_in(rng, vdi.bounds), int(rng.integers(1, Cropping.ALL))
-        passes = [
-            1.0 - render_vdi(vdi, camera, size, cropping=c, device=runtime)[..., 3].astype(float)
-            for c in (None, (planes, regions), (planes, Cropping.ALL & ~regions))
-        ]
-        # Thirty to a hundred roundings each, and what is left below the cut-off
-        np.testing.assert_allclose(passes[1] * passes[2], passes[0], atol=4e-5, err_msg=name)
-        drawn += np.count_nonzero((passes[1] < 0.99) & (passes[2] < 0.99))
-    assert drawn > 50
-
-
-@pytest.mark.usefixtures("_dealt")
-def test_all_regions_are_everything_and_none_is_nothing(runtime):
+@in_two_ways
+def test_all_regions_are_everything_and_none_is_nothing(runtime, dealt):
     rng, vdi, camera, size, _ = case(2)
-    planes = planes_in(rng, vdi.bounds)
+    planes = random_planes(rng, vdi.bounds)
     whole = render_vdi(vdi, camera, size, device=runtime)
     assert whole.any()
     for cropping in ((planes, Cropping.ALL), tuple(vdi.bounds)):
         np.testing.assert_array_equal(
             render_vdi(vdi, camera, size, cropping=cropping, device=runtime), whole
         )
-    assert not render_vdi(vdi, camera, size, cropping=(planes, 0), device=runtime).any()
+    for nothing in ({"cropping": (planes, 0)}, {"opacity_multiplier": 0.0}):
+        assert not render_vdi(vdi, camera, size, device=runtime, **nothing).any()
 
 
 def test_only_what_is_used_is_compiled():
     _, vdi, camera, size, _ = case(2)
     pixel_rays = rays.pixel_rays(camera, size, vdi.bounds)
-    box = np.reshape(vdi.bounds, (3, 2))
-    inside = (box.mean(axis=1)[:, None] + (box - box.mean(axis=1)[:, None]) / 3).ravel()
+    middle = np.reshape(vdi.bounds, (3, 2)).mean(axis=1)[:, None]
+    inside = (middle + (np.reshape(vdi.bounds, (3, 2)) - middle) / 3).ravel()
     for cropping, planes, defines in (
         (None, 0, {}),
         (Cropping(inside, Cropping.ALL), 0, {}),
@@ -127,27 +85,12 @@ def test_only_what_is_used_is_compiled():
         assert (len(cropped.planes), cropped.defines) == (planes, defines)
 
 
-def test_multiplier_is_a_power_of_the_transmittance(runtime):
-    for seed in range(5):
-        _, vdi, camera, size, name = case(seed)
-        one, three, none = (
-            1.0
-            - render_vdi(vdi, camera, size, opacity_multiplier=m, device=runtime)[..., 3].astype(
-                float
-            )
-            for m in (1.0, 3.0, 0.0)
-        )
-        # three times the rounding of `one`, and the cut-off
-        np.testing.assert_allclose(three, one**3, atol=5e-5, err_msg=name)
-        np.testing.assert_array_equal(none, 1.0)
-
-
 def test_previews_are_cropped_and_multiplied(runtime):
     differences = []
     for seed in range(6):
         rng, vdi, camera, size, _ = case(seed, thinnest=0.3, max_supersegments=3)
         shown = {
-            "cropping": (planes_in(rng, vdi.bounds), int(rng.integers(Cropping.ALL))),
+            "cropping": (random_planes(rng, vdi.bounds), int(rng.integers(Cropping.ALL))),
             "opacity_multiplier": 0.3,
         }
         exact = render_vdi(vdi, camera, size, device=runtime, **shown)
@@ -157,19 +100,11 @@ def test_previews_are_cropped_and_multiplied(runtime):
     assert np.concatenate(differences).mean() < 0.01
 
 
-# -- volumes ---------------------------------------------------------------------------------------
-
-
-def constant_medium():
-    volume = Volume(np.ones((5, 6, 7), np.uint8), (0.5, 0.4, 0.3), (1.0, 2.0, -1.0))
-    look = TransferFunction([[0.2, 0.5, 0.8]] * 2, [0.7, 0.7], (0, 2), unit_distance=1.0)
-    return volume, look, -np.log1p(-0.7)
-
-
 @pytest.mark.parametrize("regions", [*PRESETS, 0x2A55A3C, 0x0000001, 0])
 def test_a_constant_volume_absorbs_by_the_length_that_is_kept(runtime, regions):
     rng = np.random.default_rng(5)
-    volume, look, extinction = constant_medium()
+    volume = Volume(np.ones((5, 6, 7), np.uint8), (0.5, 0.4, 0.3), (1.0, 2.0, -1.0))
+    look = TransferFunction([[0.2, 0.5, 0.8]] * 2, [0.7, 0.7], (0, 2), unit_distance=1.0)
     box = np.reshape(volume.bounds, (3, 2))
     planes = box[:, :1] + [[0.2, 0.75]] * (box[:, 1:] - box[:, :1])
     cropping = Cropping(planes.ravel(), regions)
@@ -177,48 +112,24 @@ def test_a_constant_volume_absorbs_by_the_length_that_is_kept(runtime, regions):
         rng, np.array(volume.bounds), strategies.random_transform(rng)
     )
     size = (21, 17)
+    shown = {"cropping": cropping, "opacity_multiplier": 1.7, "early_termination": False}
     image = raycast_volume(
-        volume,
-        camera,
-        size,
-        look,
-        sample_distance=0.05,
-        cropping=cropping,
-        opacity_multiplier=1.7,
-        early_termination=False,
-        device=runtime,
+        volume, camera, size, look, sample_distance=0.05, device=runtime, **shown
     )
     expected = np.zeros(size[::-1])
-    for y in range(size[1]):
-        for x in range(size[0]):
-            ray = pixel_ray(camera, size, x, y)
-            span = clip(inside_box(ray, volume.bounds))
-            parts = [] if span is None else kept_parts(ray, *span, cropping)
-            length = sum(b - a for a, b in parts) * np.linalg.norm(ray.direction)
-            expected[size[1] - 1 - y, x] = -np.expm1(-1.7 * extinction * length)
+    for y, x in np.ndindex(expected.shape):
+        ray = pixel_ray(camera, size, x, y)
+        span = clip(inside_box(ray, volume.bounds))
+        parts = [] if span is None else kept_parts(ray, *span, cropping)
+        length = sum(b - a for a, b in parts) * np.linalg.norm(ray.direction)
+        expected[size[1] - 1 - y, x] = -np.expm1(1.7 * np.log1p(-0.7) * length)
     # Sixty steps of three roundings; where a ray grazes an edge, its ends are as exact as that
     np.testing.assert_allclose(image[..., 3], expected, atol=2e-5)
     assert regions == 0 or expected.max() > 0.1
 
 
-def test_multiplier_of_a_volume_is_its_unit_distance(runtime):
-    rng = np.random.default_rng(6)
-    volume = strategies.random_volume(rng, "uint8")
-    look = strategies.random_transfer_function(rng, volume).replace(unit_distance=1.5)
-    camera = strategies.camera_around(rng, np.array(volume.bounds), np.eye(4))
-    thinner = raycast_volume(volume, camera, (24, 18), look, opacity_multiplier=0.5, device=runtime)
-    other = raycast_volume(
-        volume, camera, (24, 18), look.replace(unit_distance=3.0), device=runtime
-    )
-    np.testing.assert_allclose(thinner, other, atol=1e-5)
-    assert other.any()
-
-
 def test_an_estimate_compares_the_pictures_that_are_shown(default_runtime):
     """Where a volume has changed, and what has changed is cropped away, nothing is lost."""
-    from pyvista_vdi.generation.generate import generate_vdi
-    from pyvista_vdi.model.camera import Camera
-
     rng = np.random.default_rng(7)
     before = rng.random((16, 16, 16), dtype=np.float32)
     after = before.copy()
@@ -235,17 +146,14 @@ def test_an_estimate_compares_the_pictures_that_are_shown(default_runtime):
     assert estimator.estimate(vdi, camera, opacity_multiplier=0).ssim == 1.0
 
 
-# -- first hits ------------------------------------------------------------------------------------
-
-
 def test_what_is_picked_is_what_is_shown(runtime):
     """The device and the host agree, and nothing is hit where nothing is kept."""
     pixels = hits = moved = different = 0
-    for seed in range(15):
+    for seed in range(12):
         if strategies.VIEWS[seed % len(strategies.VIEWS)] == "half":
             continue  # every ray runs along borders
         rng, vdi, camera, size, _ = case(seed, thinnest=0.05)
-        cropping = Cropping(planes_in(rng, vdi.bounds), int(rng.integers(Cropping.ALL)))
+        cropping = Cropping(random_planes(rng, vdi.bounds), int(rng.integers(Cropping.ALL)))
         shown = {"cropping": cropping, "opacity_multiplier": 2.0, "opacity_threshold": 0.3}
         depth = render_first_hits(vdi, camera, size, device=runtime, **shown)[::-1]
         whole = pick_depths(vdi, camera, size, opacity_threshold=0.3)
@@ -260,25 +168,22 @@ def test_what_is_picked_is_what_is_shown(runtime):
         hits += both.sum()
         moved += np.count_nonzero(both & (whole != picked))
     assert different < 0.01 * pixels  # seen: 0 of 918
-    assert hits > 100
-    assert moved > 50
+    assert hits > 80
+    assert moved > 40
 
 
-def pick_depths(vdi, camera, size, **shown):
+def pick_depths(vdi, camera, size, cropping=None, **shown):
     """View depth of what each pixel picks, (H, W), bottom row first; inf for nothing."""
     depth = np.full(size[::-1], np.inf)
-    for y in range(size[1]):
-        for x in range(size[0]):
-            hit = pick_vdi(vdi, camera, (x, y), size, **shown)
-            if hit is None:
-                continue
-            depth[y, x] = hit.depth
-            cropping = shown.get("cropping")
-            if cropping is not None:
-                to_model = np.linalg.inv(camera.model_transform)
-                beyond = 1e-9 * (np.array(hit.position) - camera.position)
-                point = (to_model @ [*(np.array(hit.position) + beyond), 1])[:3]
-                planes = np.reshape(cropping.planes, (3, 2))
-                region = [int((point[axis] >= planes[axis]).sum()) for axis in range(3)]
-                assert cropping.keeps(*region)
+    for y, x in np.ndindex(depth.shape):
+        hit = pick_vdi(vdi, camera, (x, y), size, cropping=cropping, **shown)
+        if hit is None:
+            continue
+        depth[y, x] = hit.depth
+        if cropping is not None:
+            to_model = np.linalg.inv(camera.model_transform)
+            beyond = 1e-9 * (np.array(hit.position) - camera.position)
+            point = (to_model @ [*(np.array(hit.position) + beyond), 1])[:3]
+            planes = np.reshape(cropping.planes, (3, 2))
+            assert cropping.keeps(*(int((point[a] >= planes[a]).sum()) for a in range(3)))
     return depth

@@ -1,19 +1,8 @@
 """opencl/raycasting/lists.cl: the first supersegment that a ray meets in a list, against a linear
 scan.
 
-The paper's Algorithm 1 as printed is not what is tested here, but what it is for; docs give the
-errata. Supersegments (front, back) with depth growing away from V_O:
-
-- List (1, 2), (4, 5); a ray goes away from V_O and is in the list from 3 to 4.5. It meets the
-  second supersegment, whose front (4) lies before the exit (4.5). Line 16 as printed, "if f(S_j) >
-  i_exit return j", is false for it: the answer is -1. For a ray in the list from 2.2 to 3 it
-  returns the second supersegment, which begins behind the exit.
-- The same list, entered at 3. ``BinS`` as defined gives j with b(S_j) < 3 < b(S_j+1), j = 0: the
-  supersegment that the ray has passed. Entered at 0.5 or at 5.5 no such j exists.
-- List (0, 1), (2, 3), (4, 5), (6, 7), guess p = 3, entered at 0.5: b(S_2) and b(S_1) are both
-  behind the entry, so that neither line 4 nor line 7 holds and j is never set.
-- All comparisons are those of a ray that goes away from V_O; one that comes back meets the last
-  supersegment whose front lies before its entry.
+The paper's Algorithm 1 as printed is not what is tested here, but what it is for; the
+documentation gives the errata.
 """
 
 from __future__ import annotations
@@ -32,40 +21,29 @@ def linear_scan(faces, depth, away):
     Going away: those that end before or at ``depth``. Coming back: those that begin before it,
     which are the ones still ahead.
     """
-    n = 0
-    for front, back in faces:
-        if not (back <= depth if away else front < depth):
-            break
-        n += 1
-    return n
+    behind = [back <= depth if away else front < depth for front, back in faces]
+    return len(list(itertools.takewhile(bool, behind)))
 
 
-def counts(call, lists, queries):
-    """``queries``: (list, depth, away, guess)."""
-    stride = int(
-        call(FILE, "lists_per_bundle", 1, call.empty(1, dtype=np.int32), OFFSET_T="int")[0]
-    )
+def check(call, lists, queries):
+    """Compare answers with the scan. ``queries``: (list, depth, away, guess)."""
+    stride = call(FILE, "lists_per_bundle", 1, call.empty(1, dtype=np.int32), OFFSET_T="int")[0]
     faces = np.float32([face for faces in lists for face in faces]).reshape(-1, 2)
     flat = np.full((stride * len(faces) + 1, 2), np.nan, np.float32)  # nothing else is read
     flat[: stride * len(faces) : stride] = faces
     begin = np.cumsum([0, *(len(faces) for faces in lists)])
-    which = np.array([q[0] for q in queries])
-    places = np.column_stack([begin[which], [len(lists[w]) for w in which]]).astype(np.int32)
-    how = np.array([(q[2], q[3]) for q in queries], np.int32)
-    depths = np.array([q[1] for q in queries], np.float32)
-    n = len(queries)
-    results = call.empty(n, dtype=np.int32)
-    return call(FILE, "counts_passing", n, flat, places, depths, how, results, OFFSET_T="int")
-
-
-def check(call, lists, queries):
-    """Compare each answer with the scan, made once for all guesses of a query."""
-    expected = {
-        key: linear_scan(lists[key[0]], key[1], key[2])
-        for key in {(which, depth, away) for which, depth, away, _ in queries}
-    }
+    which, depths, away, guesses = (np.array(values) for values in zip(*queries, strict=True))
+    counts = np.array([len(faces) for faces in lists])
+    places = np.column_stack([begin[which], counts[which]]).astype(np.int32)
+    how = np.column_stack([away, guesses]).astype(np.int32)
+    results = call.empty(len(queries), dtype=np.int32)
+    found = call(
+        FILE, "counts_passing", len(queries), flat, places, np.float32(depths), how, results,
+        OFFSET_T="int",
+    )  # fmt: skip
+    # Made once for all guesses
+    expected = {key: linear_scan(lists[key[0]], *key[1:]) for key in {q[:3] for q in queries}}
     wanted = np.array([expected[q[:3]] for q in queries])
-    found = counts(call, lists, queries)
     wrong = np.flatnonzero(found != wanted)
     assert not len(wrong), [
         (lists[queries[i][0]], queries[i][1:], int(found[i]), int(wanted[i])) for i in wrong[:3]
@@ -101,7 +79,7 @@ def test_long_lists(call, sign):
     """
     rng = np.random.default_rng(11)
     lists, queries = [], []
-    for which, n in enumerate([0, 1, 2, 3, 5, 17, 64, 65, 128, 255, 256, 299, 300]):
+    for which, n in enumerate([0, 1, 5, 40, 65, 128, 255, 256, 300]):
         faces = np.sort(rng.choice(100_000, 2 * n, replace=False).astype(np.float32) / 1000)
         faces = np.sort(sign * faces).reshape(n, 2)
         touching = rng.random(n) < 0.3  # begins where the one before ends
@@ -112,41 +90,11 @@ def test_long_lists(call, sign):
         middles = sign * rng.uniform(0, 100, 12).astype(np.float32)
         ends = [-np.inf, np.inf, -1e30, 1e30, 0.0]
         for depth in np.concatenate([on_faces, middles, ends]).astype(np.float32).tolist():
-            guesses = rng.integers(0, n + 1, 8).tolist()
+            guesses = range(n) if n == 40 else rng.integers(0, n + 1, 8).tolist()
             for away in (False, True):
                 near = linear_scan(lists[-1], depth, away) + np.arange(-3, 4)
-                for guess in {*guesses, *near[near >= 0].tolist(), 0, n, n + 1, n + 1000}:
+                near = near[near >= 0].tolist()
+                for guess in {*guesses, *near, 0, n, n + 1, n + 1000, 2**31 - 1}:
                     queries.append((which, depth, away, int(guess)))
     assert len(queries) > 4000
     check(call, lists, queries)
-
-
-def test_every_guess_gives_the_same_answer(call):
-    rng = np.random.default_rng(12)
-    faces = np.sort(rng.random(80)).reshape(40, 2).astype(np.float32).tolist()
-    depths = rng.random(20).astype(np.float32).tolist() + faces[7] + faces[39]
-    queries = [
-        (0, depth, away, guess)
-        for depth in depths
-        for away in (False, True)
-        for guess in [*range(44), 2**31 - 1]
-    ]
-    check(call, [faces], queries)
-
-
-@pytest.mark.parametrize(
-    ("faces", "depth", "away", "guess", "expected"),
-    [
-        ([(1, 2), (4, 5)], 3, True, 0, 1),
-        ([(1, 2), (4, 5)], 2.2, True, 1, 1),
-        ([(1, 2), (4, 5)], 0.5, True, 2, 0),
-        ([(1, 2), (4, 5)], 5.5, True, 0, 2),
-        ([(0, 1), (2, 3), (4, 5), (6, 7)], 0.5, True, 3, 0),
-        ([(1, 2), (4, 5)], 4.5, False, 0, 2),  # coming back, the second comes first
-        ([(1, 2), (4, 5)], 4, False, 0, 1),  # entered on its front face: nothing of it is ahead
-        ([(1, 2), (2, 3)], 2, True, 0, 1),  # on the face between two that touch
-        ([(1, 2), (2, 3)], 2, False, 0, 1),
-    ],
-)
-def test_cases_of_the_paper_by_hand(call, faces, depth, away, guess, expected):
-    assert counts(call, [faces], [(0, depth, away, guess)]).tolist() == [expected]

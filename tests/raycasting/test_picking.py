@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from extreme_scenes import slabs_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
+from pyvista_vdi import InvalidArgumentError, InvalidVDIError
 
 #: The bounds of the slabs below, and the planes of their faces.
 BOUNDS = (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
@@ -19,25 +20,19 @@ SOLID = (0.25, 0.75)
 ROUNDING = 1e-13
 
 
-def slabs(camera=None, thin=0.02, solid=30.0, transform=None, edge=8):
-    """Two slabs across the cube, a haze and something solid, seen from below along z."""
-    if camera is None:
-        camera = pvdi.Camera(
-            (0, 0, -5), (0, 0, 0), (0, 1, 0), parallel_projection=True, parallel_scale=1.0
-        )
-    n = edge * edge
-    distance = -camera.position[2]
-    front = np.tile([THIN[0] + distance, SOLID[0] + distance], n)
-    back = np.tile([THIN[1] + distance, SOLID[1] + distance], n)
-    return pvdi.VDI(
-        camera if transform is None else camera.replace(model_transform=transform),
-        (edge, edge),
-        np.arange(n + 1) * 2,
-        front,
-        back,
-        np.tile([[1, 0.5, 0], [0, 0.5, 1]], (n, 1)),
-        np.tile([thin, solid], n),
-        BOUNDS,
+#: A parallel view along z, from below, of which +x lies on the left.
+FACING = pvdi.Camera((0, 0, -5), (0, 0, 0), (0, 1, 0), parallel_projection=True, parallel_scale=1.0)
+
+
+def slabs(thin=0.02, solid=30.0, edge=8, camera=FACING):
+    """Two slabs across the cube, a haze and something solid."""
+    return slabs_vdi(
+        camera,
+        np.add([THIN, SOLID], 5),
+        [thin, solid],
+        window=(edge, edge),
+        bounds=BOUNDS,
+        color=[[1, 0.5, 0], [0, 0.5, 1]],
     )
 
 
@@ -54,112 +49,70 @@ def ray(camera, pixel, size):
     return np.array(camera.position), direction / np.linalg.norm(direction)
 
 
+OBLIQUE, SIZE, PIXEL = view((0.4, 0.3, -6)), (64, 48), (31, 20)
+
+
 def test_a_slab_in_a_cube_is_hit_on_its_face():
-    camera, size, pixel = view((0.4, 0.3, -6)), (64, 48), (31, 20)
-    hit = pvdi.pick(slabs(), camera, pixel, size, opacity_threshold=0.5)
-    eye, direction = ray(camera, pixel, size)
+    hit = pvdi.pick(slabs(), OBLIQUE, PIXEL, SIZE, opacity_threshold=0.5)
+    eye, direction = ray(OBLIQUE, PIXEL, SIZE)
     expected = eye + (SOLID[0] - eye[2]) / direction[2] * direction
+    assert isinstance(hit, pvdi.Pick)
     assert hit.position == pytest.approx(expected, abs=ROUNDING)
     assert hit.position[2] == pytest.approx(SOLID[0], abs=ROUNDING)
-    assert hit.depth == pytest.approx((expected - eye) @ camera.axes[2], abs=ROUNDING)
+    assert hit.depth == pytest.approx((expected - eye) @ OBLIQUE.axes[2], abs=ROUNDING)
     assert hit.color == (0, 0.5, 1)
+    # Crossed over lists' borders, by the length along the ray; the haze before it has tau 0.02
+    assert hit.opacity == pytest.approx(-math.expm1(-hit.optical_depth), rel=1e-12)
+    before = hit.accumulated_optical_depth - hit.optical_depth
+    assert before == pytest.approx(0.02 / direction[2], rel=1e-6)  # stored in float32
+    with pytest.raises(AttributeError):
+        hit.depth = 0.0
 
 
-def test_haze_is_hit_where_so_little_is_asked_for():
-    hit = pvdi.pick(slabs(), view((0.4, 0.3, -6)), (31, 20), (64, 48), opacity_threshold=0)
-    assert hit.position[2] == pytest.approx(THIN[0], abs=ROUNDING)
-    assert hit.index == 0
-    assert hit.color == (1, 0.5, 0)
-
-
-def test_from_behind_the_far_face_is_the_first():
-    hit = pvdi.pick(slabs(), view((0.4, 0.3, 6)), (31, 20), (64, 48))
-    assert hit.position[2] == pytest.approx(SOLID[1], abs=ROUNDING)
-    assert hit.index == 1
-
-
-def test_from_beside_the_bounds_are_hit_first():
-    camera = pvdi.Camera((6, 0, 0.5), (0, 0, 0.5), (0, 1, 0))
-    hit = pvdi.pick(slabs(), camera, (10, 10), (21, 21))
-    assert hit.position[0] == pytest.approx(1.0, abs=ROUNDING)
-    assert hit.list[0] == 0  # the outermost column: V_O looks along +z and has +x on its left
-
-
-def test_list_index_and_place_in_the_arrays_agree():
-    vdi = slabs()
-    hit = pvdi.pick(vdi, vdi.camera, (5, 2), opacity_threshold=0.5)
-    assert hit.list == (5, 2)
-    assert hit.index == 1
-    assert hit.supersegment == vdi.list_at(5, 2).start + 1
-    # The middle of list (5, 2): lists are a quarter wide, and V_O looks along +z, x to the left
-    right = vdi.camera.axes[0][0]
-    assert hit.position == pytest.approx((right * 0.375, -0.375, SOLID[0]), abs=ROUNDING)
-
-
-def test_opacity_is_that_of_the_length_crossed():
-    vdi = slabs(thin=0.3)
-    straight = pvdi.pick(vdi, vdi.camera, (3, 3), opacity_threshold=0.1)
-    assert straight.optical_depth == pytest.approx(0.3, rel=1e-6)  # stored in float32
-    assert straight.opacity == pytest.approx(-math.expm1(-0.3), rel=1e-6)
-    # One list wide, so that the ray stays in it
-    wide = slabs(thin=0.3, edge=1)
-    camera, size, pixel = view((1.5, 0, -6)), (21, 21), (10, 10)
-    oblique = pvdi.pick(wide, camera, pixel, size, opacity_threshold=0.1)
-    _, direction = ray(camera, pixel, size)
-    assert oblique.optical_depth == pytest.approx(0.3 / direction[2], rel=1e-6)
-    assert oblique.accumulated_optical_depth == oblique.optical_depth
+@pytest.mark.parametrize(
+    ("camera", "options", "axis", "place", "index"),
+    [
+        (OBLIQUE, {"opacity_threshold": 0}, 2, THIN[0], 0),  # haze, where so little is asked for
+        (view((0.4, 0.3, 6)), {}, 2, SOLID[1], 1),  # from behind the far face is the first
+        (OBLIQUE, {"clipping_planes": [[0, 0, 0.5, 0, 0, 1]]}, 2, 0.5, 1),
+        # From beside, the bounds are hit first, in the outermost column
+        (pvdi.Camera((6, 0, 0.5), (0, 0, 0.5), (0, 1, 0)), {}, 0, 1.0, 1),
+    ],
+    ids=["haze", "from behind", "clipped", "from beside"],
+)
+def test_which_face_is_hit(camera, options, axis, place, index):
+    # The middle of a window: from beside, a ray along no list
+    pixel, size = (PIXEL, SIZE) if axis == 2 else ((10, 10), (21, 21))
+    hit = pvdi.pick(slabs(), camera, pixel, size, **options)
+    assert hit.position[axis] == pytest.approx(place, abs=ROUNDING)
+    assert hit.index == index
+    assert hit.color == ((1, 0.5, 0), (0, 0.5, 1))[index]
+    assert axis == 2 or hit.list[0] == 0
+    if "clipping_planes" in options:  # what is cut away absorbs nothing
+        assert hit.accumulated_optical_depth == hit.optical_depth
 
 
 def test_accumulated_opacity_does_not_depend_on_how_a_list_is_cut():
     """Ten supersegments of which none is seen by itself."""
-    camera = slabs().camera
     z = 4 + np.arange(11) / 5
-    haze = pvdi.VDI(
-        camera, (1, 1), [0, 10], z[:-1], z[1:], np.full((10, 3), 0.5), np.full(10, 0.04), BOUNDS
-    )
+    haze = slabs_vdi(FACING, np.column_stack([z[:-1], z[1:]]), 0.04, bounds=BOUNDS)
     # 0.04 k >= -log(1 - 0.15) = 0.1625: five
-    hit = pvdi.pick(haze, camera, (0, 0), opacity_threshold=0.15)
+    hit = pvdi.pick(haze, FACING, (0, 0), opacity_threshold=0.15)
     assert hit.index == 4
     assert hit.accumulated_opacity == pytest.approx(-math.expm1(-0.2), rel=1e-6)
-    assert pvdi.pick(haze, camera, (0, 0), opacity_threshold=0.15, accumulated=False) is None
-    by_itself = pvdi.pick(haze, camera, (0, 0), opacity_threshold=0.03, accumulated=False)
+    assert pvdi.pick(haze, FACING, (0, 0), opacity_threshold=0.15, accumulated=False) is None
+    by_itself = pvdi.pick(haze, FACING, (0, 0), opacity_threshold=0.03, accumulated=False)
     assert by_itself.index == 0
-
-
-def test_by_itself_a_supersegment_is_seen_through_haze():
-    vdi = slabs(thin=0.2)
-    assert pvdi.pick(vdi, vdi.camera, (3, 3), opacity_threshold=0.5, accumulated=False).index == 1
-
-
-def test_clipping_planes_move_the_hit():
-    vdi, size = slabs(), (64, 48)
-    camera = view((0.4, 0.3, -6))
-    plane = [[0, 0, 0.5, 0, 0, 1]]
-    hit = pvdi.pick(vdi, camera, (31, 20), size, clipping_planes=plane)
-    assert hit.position[2] == pytest.approx(0.5, abs=ROUNDING)
-    # What is cut away absorbs nothing
-    assert hit.accumulated_optical_depth == hit.optical_depth
+    hazy = slabs(thin=0.2)
+    assert pvdi.pick(hazy, FACING, (3, 3), opacity_threshold=0.5, accumulated=False).index == 1
 
 
 def test_a_ray_ends_at_opaque_geometry():
-    vdi = slabs()
-    depth = 5 + SOLID[0]
-    assert pvdi.pick(vdi, vdi.camera, (3, 3), opaque_depth=depth - 1e-6) is None
+    vdi, depth = slabs(), 5 + SOLID[0]
+    assert pvdi.pick(vdi, FACING, (3, 3), opaque_depth=depth - 1e-6) is None
     # tau is 60 per unit, and 0.0513 are an opacity of 0.05
-    assert pvdi.pick(vdi, vdi.camera, (3, 3), opaque_depth=depth + 1e-3).index == 1
-    assert pvdi.pick(vdi, vdi.camera, (3, 3), opaque_depth=math.inf).index == 1
-
-
-def test_model_transform_places_the_hit_in_the_world():
-    matrix = np.diag([2.0, 1.0, 3.0, 1.0])
-    matrix[:3, 3] = (10, -5, 2)
-    target = matrix[:3, 3]
-    camera = pvdi.Camera(target + np.array([1, 1, -20]), target, (0, 1, 0), model_transform=matrix)
-    hit = pvdi.pick(slabs(), camera, (16, 16), (33, 33))
-    assert hit.position[2] == pytest.approx(3 * SOLID[0] + 2, abs=10 * ROUNDING)
-    # V_O's own model transform does not say where it is now, only where it was
-    moved = slabs(transform=np.eye(4))
-    assert pvdi.pick(moved, camera, (16, 16), (33, 33)).position == hit.position
+    assert pvdi.pick(vdi, FACING, (3, 3), opaque_depth=depth + 1e-3).index == 1
+    assert pvdi.pick(vdi, FACING, (3, 3), opaque_depth=math.inf).index == 1
 
 
 def test_an_origin_far_away_costs_no_digits_of_the_world():
@@ -167,64 +120,48 @@ def test_an_origin_far_away_costs_no_digits_of_the_world():
     matrix = np.eye(4)
     matrix[2, 3] = far
     camera = pvdi.Camera((0.4, 0.3, far - 6), (0, 0, far), (0, 1, 0), model_transform=matrix)
-    hit = pvdi.pick(slabs(), camera, (31, 20), (64, 48))
+    hit = pvdi.pick(slabs(), camera, PIXEL, SIZE)
     assert hit.position[2] - far == pytest.approx(SOLID[0], abs=4 * np.spacing(far))
 
 
-def test_inside_a_medium_it_is_hit_at_the_eye():
-    eye = (0.1, 0.2, 0.5)
-    camera = pvdi.Camera(eye, (0.1, 0.2, 1), (0, 1, 0))
-    hit = pvdi.pick(slabs(), camera, (4, 4), (9, 9))
-    assert hit.depth == pytest.approx(0, abs=ROUNDING)
-    assert hit.position == pytest.approx(eye, abs=ROUNDING)
-
-
 def test_beside_it_nothing_is_hit():
-    assert pvdi.pick(slabs(), view((0.4, 0.3, -6)), (0, 0), (64, 48)) is None
-    empty = pvdi.VDI(slabs().camera, (1, 1), [0, 0], [], [], np.empty((0, 3)), [], BOUNDS)
-    assert pvdi.pick(empty, empty.camera, (0, 0)) is None
-    transparent = slabs(thin=0, solid=0)
-    assert pvdi.pick(transparent, transparent.camera, (3, 3), opacity_threshold=0) is None
+    assert pvdi.pick(slabs(), OBLIQUE, (0, 0), SIZE) is None
+    assert pvdi.pick(slabs_vdi(FACING, [], [], bounds=BOUNDS), FACING, (0, 0)) is None
+    assert pvdi.pick(slabs(thin=0, solid=0), FACING, (3, 3), opacity_threshold=0) is None
 
 
-@pytest.mark.parametrize("threshold", [-0.1, 1, 1.5, math.nan, "much", None])
-def test_an_impossible_threshold_is_refused(threshold):
-    vdi = slabs()
-    with pytest.raises(InvalidArgumentError, match="opacity_threshold must be at least 0"):
-        pvdi.pick(vdi, vdi.camera, (0, 0), opacity_threshold=threshold)
+DEPTH = "opaque_depth must be a view depth"
+WINDOW = "pixel must be .* inside the window of 8 x 8"
 
 
-@pytest.mark.parametrize("pixel", [(8, 0), (0, -1), (math.nan, 0), (1, 2, 3), 5, None])
-def test_a_pixel_outside_the_window_is_refused(pixel):
-    vdi = slabs()
-    with pytest.raises(InvalidArgumentError, match="pixel must be .* inside the window of 8 x 8"):
-        pvdi.pick(vdi, vdi.camera, pixel)
+@pytest.mark.parametrize(
+    ("pixel", "options", "message"),
+    [
+        *(
+            ((0, 0), {"opacity_threshold": threshold}, "opacity_threshold must be at least 0")
+            for threshold in (-0.1, 1, 1.5, math.nan, "much", None)
+        ),
+        *((pixel, {}, WINDOW) for pixel in ((8, 0), (0, -1), (math.nan, 0), (1, 2, 3), 5, None)),
+        ((0, 0), {"opaque_depth": math.nan}, DEPTH),
+        ((0, 0), {"opaque_depth": [1.0, 2.0]}, DEPTH),
+        ((0, 0), {"clipping_planes": [[1, 2]]}, "clipping_planes"),
+    ],
+)
+def test_impossible_arguments_are_refused_by_name(pixel, options, message):
+    with pytest.raises(InvalidArgumentError, match=message):
+        pvdi.pick(slabs(), FACING, pixel, **options)
 
 
-def test_other_arguments_are_refused_by_name():
-    vdi = slabs()
-    with pytest.raises(InvalidArgumentError, match="opaque_depth must be a view depth"):
-        pvdi.pick(vdi, vdi.camera, (0, 0), opaque_depth=math.nan)
-    with pytest.raises(InvalidArgumentError, match="opaque_depth must be a view depth"):
-        pvdi.pick(vdi, vdi.camera, (0, 0), opaque_depth=[1.0, 2.0])
-    with pytest.raises(InvalidArgumentError, match="clipping_planes"):
-        pvdi.pick(vdi, vdi.camera, (0, 0), clipping_planes=[[1, 2]])
+def test_other_things_are_refused():
     with pytest.raises(InvalidVDIError, match="expected a VDI"):
-        pvdi.pick("knee.vdi", vdi.camera, (0, 0))
-
-
-def test_a_pick_cannot_be_changed():
-    vdi = slabs()
-    hit = pvdi.pick(vdi, vdi.camera, (0, 0))
-    assert isinstance(hit, pvdi.Pick)
-    with pytest.raises(AttributeError):
-        hit.depth = 0.0
+        pvdi.pick("knee.vdi", FACING, (0, 0))
+    with pytest.raises(InvalidArgumentError, match="opacity_threshold"):
+        pvdi.render_depth(slabs(), FACING, opacity_threshold=1.0)
 
 
 def test_depth_image_of_a_slab(runtime):
     """The kernel's depth of a plane at right angles to the view is the same everywhere."""
-    vdi = slabs()
-    depth = pvdi.render_depth(vdi, vdi.camera, (20, 10), device=runtime)
+    depth = pvdi.render_depth(slabs(), FACING, (20, 10), device=runtime)
     assert depth.shape == (10, 20)
     assert depth.dtype == np.float32
     # The window is twice as wide as the VDI's: on either side there is nothing
@@ -235,18 +172,11 @@ def test_depth_image_of_a_slab(runtime):
 
 
 def test_depth_image_ends_rays_of_another_picture(runtime):
-    vdi, size = slabs(), (32, 24)
-    camera = view((0.4, 0.3, -6))
-    depth = pvdi.render_depth(vdi, camera, size, opacity_threshold=0.5, device=runtime)
-    alone = pvdi.render(vdi, camera, size, opaque_depth=depth, device=runtime)[..., 3]
+    scene = slabs(), OBLIQUE, (32, 24)
+    depth = pvdi.render_depth(*scene, opacity_threshold=0.5, device=runtime)
+    alone = pvdi.render(*scene, opaque_depth=depth, device=runtime)[..., 3]
     seen = np.isfinite(depth)
     assert seen.any()
     # Mostly only the haze is left before it, tau 0.02; over a list's border something solid, too
     assert alone[seen].max() < 0.5
     assert np.median(alone[seen]) == pytest.approx(0.02, abs=1e-3)
-
-
-def test_depth_image_refuses_what_is_no_threshold(runtime):
-    vdi = slabs()
-    with pytest.raises(InvalidArgumentError, match="opacity_threshold"):
-        pvdi.render_depth(vdi, vdi.camera, opacity_threshold=1.0, device=runtime)

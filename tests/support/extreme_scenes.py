@@ -15,12 +15,8 @@ from drawing import raycast_volume, render_vdi
 from oracle import explain
 from sampling_uncertainty import uncertainties
 
-from pyvista_vdi import reference
+from pyvista_vdi import VDI, Camera, TransferFunction, Volume, reference
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import Volume
 
 #: Odd, so that what is thinner than a pixel and lies in the middle is seen.
 WINDOW = (9, 7)
@@ -121,17 +117,20 @@ def check_scene(
     direct = raycast_volume(*scene, **options)
     exact = reference.volume_image(*scene, sample_distance, lights)
     assert (exact[..., 3] > 1e-9).sum() >= least_drawn
-    off = np.abs(direct - exact).max()
-    worst("volume", off)
     if bound is None:
         bound = derived_bound(*scene, sample_distance, lights)
-    assert off <= bound
+    assert_within(worst, "volume", direct, exact, bound)
     vdi = generate_vdi(*scene, max_supersegments=8, **options)
-    at_v_o = np.abs(render_vdi(vdi, camera, device=runtime) - exact).max()
-    worst("VDI at V_O", at_v_o)
-    assert at_v_o <= bound
+    assert_within(worst, "VDI at V_O", render_vdi(vdi, camera, device=runtime), exact, bound)
     check_views(runtime, worst, vdi, views, size=size, least_drawn=least_drawn)
     return vdi
+
+
+def assert_within(worst, what, image, exact, bound=BOUND):
+    """Keep the largest difference, and hold it within the bound."""
+    off = np.abs(image - exact).max()
+    worst(what, off)
+    assert off <= bound
 
 
 def derived_bound(volume, camera, size, function, sample_distance, lights):

@@ -9,7 +9,6 @@ from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.device.work_order import BLOCK_RAYS, GROUP
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.volume import march_step
 
 WINDOW = (53, 39)  # no multiple of a block's edge
 CENTER = (24.5, 20.0, 23.0)
@@ -68,7 +67,7 @@ def both_ways(monkeypatch, runtime, name, make):
     with monkeypatch.context() as patch:
         patch.setattr(Runtime, "launch", counted)
         found = make()
-        patch.setattr(march_step, "_IN_BLOCKS", {})
+        patch.setattr(runtime, "is_cpu", False)
         expected = make()
     return found, expected, (launches[GROUP // BLOCK_RAYS], launches[GROUP])
 

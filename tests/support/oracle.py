@@ -1,7 +1,7 @@
 """A device's picture against the float64 oracle's range over the moved ray.
 
 Every channel of every pixel lies within 2e-5 of the range over the ray moved by the roundings of
-list coordinates (DESIGN section 3, "Borders"; the number of roundings is derived in
+list coordinates (docs/conventions.md; the number of roundings is derived in
 ``pyvista_vdi.reference.ranges``). 2e-5 is 336 unit roundoffs of float32: a ray in these tests
 composites up to about 100 supersegments, each with three roundings that reach the image, and the
 raycaster may drop what lies behind a transmittance of 1e-6.
@@ -35,9 +35,22 @@ class Comparison(NamedTuple):
     worst: float  # largest difference from the oracle, or from its range where a ray was moved
 
 
-def explain(vdi, camera, size, image, *, name, escalation=ESCALATION, tolerance=TOLERANCE, **ends):
+def explain(
+    vdi,
+    camera,
+    size,
+    image,
+    *,
+    name,
+    escalation=ESCALATION,
+    most_pixels=MAX_PIXELS,
+    tolerance=TOLERANCE,
+    render=reference.render,
+    render_range=reference.render_range,
+    **ends,
+):
     """Compare an image with the oracle; say which pixels no ray within rounding explains."""
-    exact = reference.render(vdi, camera, size, **ends)
+    exact = render(vdi, camera, size, **ends)
     assert image.shape == exact.shape
     assert image.dtype == np.float32
     # Written so that NaN is a difference
@@ -47,10 +60,10 @@ def explain(vdi, camera, size, image, *, name, escalation=ESCALATION, tolerance=
     rows, columns = np.nonzero(differs)
     pixels = [(int(x), size[1] - 1 - int(row)) for row, x in zip(rows, columns, strict=True)]
     low = high = drawn = image[differs].astype(np.float64)
-    for n_random, most in zip(escalation, MAX_PIXELS, strict=False):
+    for n_random, most in zip(escalation, most_pixels, strict=False):
         if not pixels or len(pixels) > most:
             break
-        low, high = reference.render_range(vdi, camera, size, pixels, n_random=n_random, **ends)
+        low, high = render_range(vdi, camera, size, pixels, n_random=n_random, **ends)
         beyond = np.maximum(low - drawn, drawn - high).max(axis=1)
         outside = ~(beyond <= tolerance)
         worst = max(worst, float(beyond[~outside].max(initial=0.0)))
@@ -73,3 +86,10 @@ def total(comparisons):
         [failure for part in parts for failure in part.failures],
         max((part.worst for part in parts), default=0.0),
     )
+
+
+def assert_explained(vdi, camera, size, image, **options):
+    """Fail with the first pixels that no ray within rounding explains; else the comparison."""
+    result = explain(vdi, camera, size, image, **options)
+    assert not result.failures, "\n".join(result.failures[:5])
+    return result

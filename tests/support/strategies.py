@@ -18,8 +18,7 @@ from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
-from pyvista_vdi.raycasting import multi_vdi, packets
-from pyvista_vdi.raycasting.scene import Scene
+from pyvista_vdi.raycasting import packets
 
 #: Views of a VDI that :func:`random_view` draws; the hard ones by name.
 VIEWS = (
@@ -174,7 +173,7 @@ def random_view(rng, vdi, kind):
 DEALT = ("one by one", "blocks", "packets")
 
 
-def deal_rays(patch, dealt):
+def deal_rays(patch, runtime, dealt):
     """Have rays followed one by one, or in blocks or packets wherever they can be.
 
     ``patch`` undoes it. One by one is how a GPU follows all of them, and merges what they cross of
@@ -184,8 +183,7 @@ def deal_rays(patch, dealt):
     for name in ("LEAST_IN_COMMON", "LEAST_IN_COMMON_WITHOUT_BLOCKS", "LEAST_PIXELS"):
         patch.setattr(packets, name, least)
     if dealt == "one by one":
-        patch.setattr(Scene, "in_vectors", False)
-        patch.setattr(multi_vdi, "_in_rows", lambda runtime: False)
+        patch.setattr(runtime, "is_cpu", False)
 
 
 # -- VDIs ------------------------------------------------------------------------------------------

@@ -5,8 +5,8 @@ import base64
 import numpy as np
 import pytest
 from browsers import assert_decoded, in_base64
-from stored_frames import frames_of
 from stepped_vdis import stepped_vdi
+from stored_frames import frames_of
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import VDIFileError

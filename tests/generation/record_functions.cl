@@ -1,4 +1,4 @@
-// Entry points to opencl/generation/runs.cl, one work-item per case or record.
+// Entry points to opencl/generation/runs.cl and shorten_lists.cl, one work-item per case or record.
 #include "generation/shorten_lists.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -7,13 +7,6 @@ __kernel void merged(int count, __global const float8 *a, __global const float8 
     const int i = get_global_id(0);
     if (i < count)
         results[i] = merged_runs(a[i], b[i]);
-}
-
-__kernel void features(int count, __global const float8 *runs, float per_reference, __global float4 *results)
-{
-    const int i = get_global_id(0);
-    if (i < count)
-        results[i] = run_feature(runs[i], per_reference);
 }
 
 __kernel void merge_errors(int count, __global const float8 *a, __global const float8 *b, float per_reference,
@@ -25,24 +18,11 @@ __kernel void merge_errors(int count, __global const float8 *a, __global const f
                                  per_reference, hidden_weight);
 }
 
-// Runs from (record, k) order to the records' own layout, and back.
-__kernel void stored(int count, __global const float8 *runs, int capacity, __global float *records, __global float8 *back)
-{
-    const int i = get_global_id(0);
-    if (i >= count)
-        return;
-    __global float *record = records + record_start((uint)i, capacity);
-    for (int k = 0; k < capacity; ++k)
-        store_run(record, k, runs[(size_t)i * capacity + k]);
-    for (int k = 0; k < capacity; ++k)
-        back[(size_t)i * capacity + k] = load_run(record, k);
-}
-
 #define WITHIN 0
 #define ROOM 1
 #define LIMIT 2
 
-// Shorten record i by one of three ways; `runs` are in (record, k) order, before and after.
+// Shorten record i by one of these; `runs` are in (record, k) order, before and after.
 __kernel void shortened(int count, int way, int limit, int capacity, float per_reference, float hidden_weight,
                         __global float8 *runs, __global int *lengths, __global float *thresholds,
                         __global float *records, __global float *all_errors)
@@ -51,11 +31,11 @@ __kernel void shortened(int count, int way, int limit, int capacity, float per_r
     if (i >= count)
         return;
     __global float *record = records + record_start((uint)i, capacity);
-    __global float *errors = all_errors + errors_start((uint)i, capacity);
-    const Places start = {0};
     int n = lengths[i];
     for (int k = 0; k < n; ++k)
         store_run(record, k, runs[(size_t)i * capacity + k]);
+    __global float *errors = all_errors + errors_start((uint)i, capacity);
+    const Places start = {0};
     float threshold = thresholds[i];
     if (way == WITHIN)
         n = merge_within(record, &start, n, threshold, 1, per_reference, hidden_weight);

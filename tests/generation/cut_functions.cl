@@ -2,9 +2,10 @@
 #include "generation/criteria.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Cut record i; `runs` are in (record, k) order, before and after.
-__kernel void cut(int count, int limit, int capacity, float per_reference, __global float8 *runs, __global int *lengths,
-                  __global float *records)
+// Cut record i; arguments are those of record_functions.cl's shortened().
+__kernel void cut(int count, int way, int limit, int capacity, float per_reference, float hidden_weight,
+                  __global float8 *runs, __global int *lengths, __global float *thresholds, __global float *records,
+                  __global float *all_errors)
 {
     const int i = get_global_id(0);
     if (i >= count)

@@ -1,0 +1,377 @@
+"""Records of runs (opencl/generation/runs.cl, shorten_lists.cl and criteria.cl): what merging two
+runs gives and costs, the three ways of shortening a record, and the criteria that cut one.
+
+The reference is float64 and written from docs/conventions.md and the head of the kernel file: a run
+is a homogeneous medium of straight colour c and optical depth tau over a length; it looks like
+(c f, f) per reference length l with f = tau / (tau + l); merging costs what the sum of squares
+about the mean, along the ray, grows by. Cuts are those of pyvista_vdi.reference.criteria.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from recorded_runs import (
+    BACK,
+    COLOR,
+    EPS,
+    EXTREMES,
+    FRONT,
+    OPACITY,
+    TAU,
+    TRANSMITTANCE,
+    as_runs,
+    disjoint,
+    random_records,
+    random_segments,
+)
+
+from pyvista_vdi.model import compositing
+from pyvista_vdi.model.compositing import Segment
+from pyvista_vdi.reference import criteria
+
+FILE = "record_functions.cl"
+#: Ways of shortening a record.
+WITHIN, ROOM, LIMIT = range(3)
+#: The kernels' names of the criteria that cut one, and the reference of each.
+CUTS = {
+    "EQUAL_LENGTH": criteria.cut_at_equal_lengths,
+    "EQUAL_TRANSMITTANCE": criteria.cut_at_equal_transmittance,
+    "EQUAL_OPTICAL_DEPTH": criteria.cut_at_equal_optical_depths,
+    "HOMOGENEITY": criteria.cut_where_unlike,
+}
+ERRORS_AT_A_TIME = 8  # see generation/runs.cl
+
+
+def merging_cost(near, far, transmittance, per_reference, hidden_weight):
+    """Sum of squares about their mean of two media and the nothing between them, as it is seen."""
+    ends = (near.front, near.back, far.front, far.back)
+    lengths = per_reference * np.diff(ends)
+    tau = np.array([near.optical_depth, 0, far.optical_depth])
+    with np.errstate(invalid="ignore"):
+        features = np.nan_to_num(tau / (tau + lengths))[:, None]
+    features = features * [[*near.color, 1.0], [0, 0, 0, 0], [*far.color, 1.0]]
+    mean = lengths @ features / lengths.sum()
+    seen = hidden_weight + (1 - hidden_weight) * transmittance
+    return seen * (lengths @ ((features - mean) ** 2).sum(axis=1))
+
+
+def greedy(segments, limit, per_reference, hidden_weight):
+    """Merge, least cost first. Returns segments and the least relative distance of a choice."""
+    segments, margin = list(segments), np.inf
+    while len(segments) > limit:
+        before = np.exp(-np.cumsum([0.0, *(s.optical_depth for s in segments)]))
+        costs = [
+            merging_cost(a, b, t, per_reference, hidden_weight)
+            for a, b, t in zip(segments[:-1], segments[1:], before, strict=False)
+        ]
+        k = int(np.argmin(costs))
+        if len(costs) > 1:
+            second = np.partition(costs, 1)[1]
+            margin = min(margin, (second - costs[k]) / second)
+        segments[k : k + 2] = [compositing.merge(segments[k], segments[k + 1])]
+    return segments, margin
+
+
+def shortened(call, way, records, limit, *, per_reference=1.0, hidden_weight=0.5, threshold=1e-6):
+    """Records (float32 (n, 8) each) shortened on the device, and the thresholds they ended with.
+
+    ``way`` is one of three, or the name of a criterion.
+    """
+    cut = way in CUTS
+    n, capacity = len(records), max(len(r) for r in records) + (limit if cut else 0)
+    runs = np.full((n, capacity, 8), np.nan, np.float32)
+    for target, record in zip(runs, records, strict=True):
+        target[: len(record)] = record
+    padded = -(-capacity // ERRORS_AT_A_TIME) * ERRORS_AT_A_TIME
+    lengths = np.array([len(r) for r in records], np.int32)
+    kernel = ("cut_functions.cl", "cut") if cut else (FILE, "shortened")
+    runs, lengths, thresholds, *_ = call(
+        *kernel, n, np.int32(0 if cut else way), np.int32(limit), np.int32(capacity),
+        np.float32(per_reference), np.float32(hidden_weight), call.out(runs), call.out(lengths),
+        call.out(np.full(n, threshold, np.float32)), call.empty(n * capacity * 8),
+        call.empty(n * padded), **({"CRITERION": way} if cut else {}),
+    )  # fmt: skip
+    return [r[:k] for r, k in zip(runs, lengths, strict=True)], thresholds
+
+
+def composited(record):
+    """What the eye of V_O sees of a record."""
+    return compositing.composite(
+        record[:, COLOR].astype(float) / record[:, OPACITY, None], record[:, TAU].astype(float)
+    )
+
+
+def check_shortened(before, after):
+    """Each run that is left is a whole number of neighbours, composited; none is missing."""
+    starts = np.searchsorted(before[:, FRONT], after[:, FRONT])
+    np.testing.assert_array_equal(before[starts, FRONT], after[:, FRONT])
+    assert starts[0] == 0
+    ends = np.append(starts[1:], len(before))
+    assert (ends > starts).all()
+    assert disjoint(after)
+    np.testing.assert_array_equal(after[:, BACK], before[ends - 1, BACK])
+    np.testing.assert_array_equal(after[:, TRANSMITTANCE], before[starts, TRANSMITTANCE])
+    for run, first, last in zip(after.astype(np.float64), starts, ends, strict=True):
+        members = before[first:last]
+        tau, n = members[:, TAU].sum(dtype=float), len(members)
+        assert abs(run[TAU] - tau) <= n * EPS * tau
+        # Each opacity was rounded once and each merge rounds twice, of numbers up to 1
+        assert np.abs(run[4:] - composited(members)).max() <= 4 * n * EPS
+
+
+def check_cut(before, after, limit, name):
+    """The promise; nothing is dropped; and the eye of V_O sees what it saw."""
+    assert 1 <= len(after) <= limit, name
+    assert disjoint(after), name
+    assert after[0, FRONT] == before[0, FRONT], name
+    assert after[-1, BACK] == before[-1, BACK], name
+    assert (after[:, [TAU, OPACITY]] > 0).all(), name
+    # Each cut rounds both parts' optical depths, each merge their sum, all relative to the whole
+    n = len(before) + 2 * limit
+    total = before[:, TAU].sum(dtype=float)
+    assert abs(after[:, TAU].sum(dtype=float) - total) <= n * EPS * total, name
+    assert np.abs(composited(before) - composited(after)).max() <= 8 * n * EPS, name
+
+
+def pairs(seed, n=2000):
+    """Segments side by side, and both runs of each."""
+    rng = np.random.default_rng(seed)
+    segments = [random_segments(rng, 2, gaps=0.5, thickest=rng.uniform(0.1, 20)) for _ in range(n)]
+    runs = np.array([as_runs(pair) for pair in segments])
+    # The transmittance in front of the first is anything
+    runs[:, 0, TRANSMITTANCE] = rng.random(n)
+    return segments, np.ascontiguousarray(runs[:, 0]), np.ascontiguousarray(runs[:, 1])
+
+
+def test_merged_runs_follow_the_colour_law(call):
+    segments, a, b = pairs(41)
+    found = call(FILE, "merged", len(a), a, b, call.empty(len(a), 8))
+    np.testing.assert_array_equal(found[:, TAU], a[:, TAU] + b[:, TAU])
+    np.testing.assert_array_equal(found[:, FRONT], a[:, FRONT])
+    np.testing.assert_array_equal(found[:, BACK], b[:, BACK])
+    np.testing.assert_array_equal(found[:, TRANSMITTANCE], a[:, TRANSMITTANCE])
+    for run, (near, far) in zip(found.astype(np.float64), segments, strict=True):
+        whole = compositing.merge(near, far)
+        # Rounded: both runs' colours and opacities, 1 - opacity, a product and a sum
+        alpha = compositing.opacity(whole.optical_depth)
+        assert run[OPACITY] == pytest.approx(alpha, abs=4 * EPS, rel=4 * EPS)
+        color = run[COLOR] / run[OPACITY]
+        np.testing.assert_allclose(color, whole.color, rtol=0, atol=10 * EPS)
+
+
+def errors(call, a, b, per_reference=1.0, hidden_weight=0.5):
+    how = np.float32(per_reference), np.float32(hidden_weight)
+    return call(FILE, "merge_errors", len(a), a, b, *how, call.empty(len(a)))
+
+
+@pytest.mark.every(3)
+@pytest.mark.parametrize("per_reference", [0.02, 1.0, 50.0])
+@pytest.mark.parametrize("hidden_weight", [0.0, 0.5, 1.0])
+def test_merge_error_is_the_growth_of_the_sum_of_squares(call, per_reference, hidden_weight):
+    segments, a, b = pairs(44)
+    found = errors(call, a, b, per_reference, hidden_weight)
+    exact = np.array(
+        [
+            merging_cost(near, far, float(run[TRANSMITTANCE]), per_reference, hidden_weight)
+            for (near, far), run in zip(segments, a, strict=True)
+        ]
+    )
+    # Features of up to 2 in length, 12 EPS off each, are subtracted before they are squared:
+    # d(x^2) = 2 x dx, with lengths of up to 2 and gaps of up to 2; the rest is relative
+    bound = 64 * EPS * np.sqrt(exact * 4 * per_reference) * 2 + 16 * EPS * exact + 1e-12
+    assert (np.abs(found - exact) <= bound).all()
+    if hidden_weight > 0:
+        unlike = exact > 1e-6
+        assert unlike.mean() > 0.5
+        assert (found[unlike] > 0).all()
+    assert (found >= 0).all()
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_merging_parts_of_one_medium_costs_nothing(call, even):
+    rng = np.random.default_rng(45)
+    lengths, taus = rng.uniform(0.1, 10, 500), 10 ** rng.uniform(-6, 1, 500)
+    cuts = lengths * (0.5 if even else rng.uniform(0.01, 0.99, 500))
+    runs = np.array(
+        [
+            as_runs(compositing.split(Segment(0.0, length, rng.random(3), tau), cut))
+            for length, tau, cut in zip(lengths, taus, cuts, strict=True)
+        ]
+    )
+    runs[:, :, TRANSMITTANCE] = 1
+    a, b = (np.ascontiguousarray(runs[:, i]) for i in (0, 1))
+    if even:  # the same numbers to the last bit but for the place
+        b[:, [TAU, 4, 5, 6, OPACITY]] = a[:, [TAU, 4, 5, 6, OPACITY]]
+    length = runs[:, 1, BACK] - runs[:, 0, FRONT]
+    # Features differ by their rounding: 24 EPS of at most 2, squared, over a quarter length.
+    # Halves: only their lengths can differ, by the rounding of the far end less the middle
+    assert (errors(call, a, b) <= (48 * EPS) ** 2 * length / 4).all()
+
+
+@pytest.mark.parametrize("threshold", [1e-6, 1e-3, 0.1, 1e30])
+def test_merge_within(call, threshold):
+    rng = np.random.default_rng(42)
+    many = [Segment(k, k + 1, rng.random(3), 10 ** -rng.uniform(1, 6)) for k in range(1000)]
+    records = [as_runs(s) for s in [*random_records(61, 64, 40), many]]
+    found, _ = shortened(call, WITHIN, records, 1, threshold=threshold)
+    for before, after in zip(records, found, strict=True):
+        check_shortened(before, after)
+        assert threshold < 1e30 or len(after) == 1
+    left = sum(map(len, found[:-1])) / sum(map(len, records[:-1]))
+    # Unlike media: next to nothing at a millionth, something at a tenth
+    assert {1e-6: left > 0.99, 1e-3: left < 0.99, 0.1: left < 0.8}.get(threshold, True), left
+
+
+def test_merge_within_takes_what_is_homogeneous_and_no_more(call):
+    """Three media in ten parts each: three runs are left, cut where the media change."""
+    media = [((1.0, 0, 0), 0.5), ((0, 1.0, 0), 0.5), ((0, 0, 0), 3.0)]
+    parts = [Segment(k, k + 1, np.array(media[k // 10][0]), media[k // 10][1]) for k in range(30)]
+    (after,), _ = shortened(call, WITHIN, [as_runs(parts)], 1, threshold=1e-6, hidden_weight=1.0)
+    np.testing.assert_array_equal(after[:, [FRONT, BACK]], [[0, 10], [10, 20], [20, 30]])
+
+
+@pytest.mark.parametrize("limit", [1, 2, 20, 39])
+def test_make_room(call, limit):
+    records = [as_runs(s) for s in random_records(62, 64, 100)]
+    found, thresholds = shortened(call, ROOM, records, limit)
+    for before, after, threshold in zip(records, found, thresholds, strict=True):
+        assert 1 <= len(after) <= limit
+        check_shortened(before, after)
+        if len(before) <= limit:
+            np.testing.assert_array_equal(after, before)
+            assert threshold == np.float32(1e-6)
+        else:
+            steps = np.log(threshold / np.float32(1e-6)) / np.log(4)
+            assert steps == pytest.approx(round(steps), abs=1e-3)  # raised, by factors of 4
+            assert steps >= 0
+    # It merges only as far as it must: on the whole a good part of the room stays in use
+    if limit >= 20:
+        long = [len(a) for a, b in zip(found, records, strict=True) if len(b) > limit]
+        assert np.mean(long) > limit / 4
+
+
+@pytest.mark.every(5)
+@pytest.mark.parametrize("hidden_weight", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("limit", [1, 2, 5, 20])
+def test_merge_to_limit_is_greedy(call, limit, hidden_weight):
+    segments = random_records(63, 48, 45)
+    records = [as_runs(s) for s in segments]
+    how = {"per_reference": 0.7, "hidden_weight": hidden_weight}
+    found, _ = shortened(call, LIMIT, records, limit, **how)
+    clear = 0
+    for given, before, after in zip(segments, records, found, strict=True):
+        assert len(after) == min(limit, len(before))
+        check_shortened(before, after)
+        expected, margin = greedy(given, limit, 0.7, hidden_weight)
+        # Two errors that agree to some 64 EPS over what they are made of may go either way
+        if margin > 1e-3:
+            clear += 1
+            faces = np.float32([(s.front, s.back) for s in expected])
+            np.testing.assert_array_equal(after[:, [FRONT, BACK]], faces)
+    assert clear > len(records) / 2, clear
+
+
+@pytest.mark.every(4)
+@pytest.mark.parametrize("limit", [1, 2, 5, 20])
+@pytest.mark.parametrize("criterion", CUTS)
+def test_cuts_are_the_references(call, criterion, limit):
+    """As many supersegments, at the same depths, with the same optical depth in each."""
+    records = [as_runs(s) for s in random_records(71, 64, 40)]
+    equal = criterion != "HOMOGENEITY"
+    found, _ = shortened(call, criterion, records, limit, per_reference=0.7)
+    same = 0
+    for k, (before, after) in enumerate(zip(records, found, strict=True)):
+        check_cut(before, after, limit, k)
+        exact = [  # the very numbers that the device has
+            Segment(r[FRONT], r[BACK], r[COLOR] / r[OPACITY], r[TAU]) for r in before.astype(float)
+        ]
+        expected = CUTS[criterion](exact, limit, *([] if equal else [0.7]))
+        if not equal and len(before) <= limit:
+            np.testing.assert_array_equal(after, before)
+        if len(expected) != len(after):
+            continue  # a cut within rounding of a face
+        faces = np.array([(s.front, s.back) for s in expected])
+        if not equal:
+            # Whole runs are merged, so that a face is one of theirs or another choice was made:
+            # the thresholds are a thousandth apart at most; a difference may lie between them
+            same += (after[:, [FRONT, BACK]] == np.float32(faces)).all()
+            continue
+        same += 1
+        # A depth moves by the rounding of the share, relative to the densest run's: measured,
+        # 3e-5 of a depth of up to 100 at most; the same of its optical depth
+        np.testing.assert_allclose(after[:, [FRONT, BACK]], faces, atol=2e-2, rtol=1e-5)
+        tau = [s.optical_depth for s in expected]
+        np.testing.assert_allclose(after[:, TAU], tau, atol=1e-3 * before[:, TAU].sum())
+    assert same >= 0.9 * len(records), same
+
+
+@pytest.mark.parametrize("criterion", list(CUTS)[:3])
+def test_one_medium_is_cut_into_equal_shares(call, criterion):
+    whole = Segment(2.0, 10.0, np.array([0.2, 0.5, 0.9]), 3.0)
+    ((after,), _) = shortened(call, criterion, [as_runs([whole])], 8)
+    assert len(after) == 8
+    alpha = compositing.opacity(after[:, TAU].astype(float))
+    before = np.exp(-np.concatenate([[0], np.cumsum(after[:-1, TAU].astype(float))]))
+    share = {
+        "EQUAL_LENGTH": after[:, BACK] - after[:, FRONT],
+        "EQUAL_TRANSMITTANCE": before * alpha,
+        "EQUAL_OPTICAL_DEPTH": after[:, TAU],
+    }[criterion]
+    # A share is the difference of two of eight roundings or so
+    np.testing.assert_allclose(share, share.mean(), rtol=64 * EPS * 8)
+    np.testing.assert_array_equal(after[1:, FRONT], after[:-1, BACK])
+    np.testing.assert_allclose(after[:, TRANSMITTANCE], before, rtol=32 * EPS)
+    np.testing.assert_allclose(
+        after[:, COLOR] / after[:, OPACITY, None], np.tile(whole.color, (8, 1)), rtol=8 * EPS
+    )
+
+
+def test_empty_stretches_make_no_supersegment(call):
+    """Two thin media far apart: of ten equal lengths only the two that hold something are left."""
+    parts = [Segment(0.0, 1.0, np.ones(3), 1.0), Segment(19.5, 20.0, np.ones(3), 1.0)]
+    ((after,), _) = shortened(call, "EQUAL_LENGTH", [as_runs(parts)], 10)
+    np.testing.assert_array_equal(after[:, [FRONT, BACK]], [[0, 1], [19.5, 20]])
+
+
+@pytest.mark.parametrize("way", [LIMIT, "HOMOGENEITY"])
+def test_what_differs_most_is_kept(call, way):
+    """Dense red in thin grey survives down to three runs, and no threshold need be told."""
+    parts = [Segment(k, k + 1, np.full(3, 0.5 * (1 + 1e-3 * (k % 3))), 0.01) for k in range(60)]
+    parts[30] = Segment(30, 31, np.array([1.0, 0, 0]), 2.0)
+    ((after,), _) = shortened(call, way, [as_runs(parts)], 3)
+    np.testing.assert_array_equal(after[:, [FRONT, BACK]], [[0, 30], [30, 31], [31, 60]])
+
+
+@pytest.mark.extremes
+@pytest.mark.every(2)
+@pytest.mark.parametrize("way", [WITHIN, ROOM, LIMIT, *CUTS])
+@pytest.mark.parametrize("limit", [1, 7, 39, 64])
+def test_any_finite_record_is_shortened(call, way, limit):
+    """It ends (pytest's timeout says so), within the limit, in order, with the ends it had.
+
+    Errors are finite, or there would be no least one.
+    """
+    limit = limit if way in CUTS else min(limit, 39)
+    for per_reference in (1e-30, 1.0, 1e30):
+        how = {"per_reference": per_reference, "hidden_weight": 0.25}
+        found, _ = shortened(call, way, list(EXTREMES.values()), limit, **how)
+        for (name, before), after in zip(EXTREMES.items(), found, strict=True):
+            assert 1 <= len(after) <= (len(before) if way == WITHIN else limit), name
+            assert way != LIMIT or len(after) == limit, name
+            # Only places and optical depths: what is denormal may be taken for zero
+            assert np.isfinite(after[:, [FRONT, BACK, TAU]]).all(), name
+            assert after[0, FRONT] == before[0, FRONT], name
+            assert after[-1, BACK] == before[-1, BACK], name
+            assert (after[1:, FRONT] >= after[:-1, BACK]).all(), name
+            if way not in CUTS:  # whole neighbours
+                starts = np.searchsorted(before[:, FRONT], after[:, FRONT])
+                np.testing.assert_array_equal(after[:, FRONT], before[starts, FRONT], name)
+                ends = np.append(starts[1:], len(before)) - 1
+                np.testing.assert_array_equal(after[:, BACK], before[ends, BACK], name)
+            total, tau = before[:, TAU].sum(dtype=float), after[:, TAU].sum(dtype=float)
+            n = len(before) + (2 * limit if way in CUTS else 0)
+            assert tau == pytest.approx(total, rel=n * EPS, abs=1e-37), name
+            for hidden_weight in (0.0, 0.5):
+                parts = before[:-1].copy(), before[1:].copy(), per_reference, hidden_weight
+                assert np.isfinite(errors(call, *parts)).all(), name
