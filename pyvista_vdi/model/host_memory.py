@@ -8,7 +8,6 @@ import mmap
 from typing import Any
 
 import numpy as np
-import psutil
 from numpy.typing import DTypeLike, NDArray
 
 from pyvista_vdi.errors import DeviceMemoryError
@@ -70,11 +69,15 @@ def _in_huge_pages(nbytes: int) -> tuple[NDArray[np.uint8], int]:
 
 def physical_memory() -> int:
     """Return the host's memory, bytes."""
+    import psutil  # where it is asked for: importing the package loads little
+
     return int(psutil.virtual_memory().total)
 
 
 def free_memory() -> int:
     """Return the bytes that can be had without swapping."""
+    import psutil
+
     return int(psutil.virtual_memory().available)
 
 

@@ -118,7 +118,7 @@ def test_where_is_what_names_python_that_exists():
 def test_where_is_what_names_kernels_tests_and_pages_that_exist():
     missing = []
     # A definition, or a macro that makes one, begins its line or names itself in one
-    kernel, test = r"^(?!\s|//)[^;\n]*\b{}\s*[(,]", r"^def {}\("
+    kernel, test = r"^(?!\s|//)[^;\n]*\b{}\s*[(,]", r"^(?:async )?def {}\("
     for _step, _python, kernels, tests, page in _rows():
         for folder, cell, pattern in (("opencl", kernels, kernel), ("tests", tests, test)):
             for name in _named(cell):
