@@ -438,13 +438,11 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
     declare.option(
         parser,
         "--out",
-        ".json to write; a table (.md) and a plot (.png) go beside it (default: benchmark.json)",
+        ".json to write; the tables (.md) go beside it (default: benchmark.json)",
         "FILE",
         default="benchmark.json",
     )
     declare.switch(parser, "--resume", "go on with FILE where it was left")
-    changed = "measure nothing: say what changed between two files beyond noise"
-    declare.option(parser, "--compare", changed, ("A", "B"), nargs=2)
     group = parser.add_argument_group("what is measured", "In place of the profile's.")
     declare.option(
         group,
