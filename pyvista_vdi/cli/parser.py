@@ -496,9 +496,6 @@ def _add_tradeoff(parser: argparse.ArgumentParser) -> None:
         "AXIS[=A,B,...]",
         nargs="+",
     )
-    among = parser.add_mutually_exclusive_group()
-    declare.switch(among, "--alone", "change one setting at a time, and no two together")
-    declare.switch(among, "--product", "measure every combination")
     declare.repeats(parser, "timed frames (default: 5)", 5)
     generations = "timed generations of each VDI (default: 5)"
     declare.option(parser, "--generations", generations, "N", declare.parse_count, default=5)
