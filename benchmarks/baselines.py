@@ -1,7 +1,7 @@
-"""The paper's baselines beside ours: time by N_S, lists, angle and emptiness; SSIM and memory.
+"""Rays in the world beside ours: time by N_S, lists, angle and emptiness; SSIM and memory.
 
-Frusta, rays in the world and two-phase rendering (``baselines/``) draw the same VDI as ours; frames
-end on the host, raycast alone. Tests hold their pictures to the oracle. See docs/baselines.md.
+They (``baselines/``) draw the same VDI as ours; frames end on the host, raycast alone. Tests hold
+their pictures to the oracle. See docs/baselines.md, which has the paper's other baselines as well.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from typing import Any, NamedTuple
 from unittest import mock
 
 import numpy as np
-from baselines.frusta import Frusta
-from baselines.two_phase import TwoPhase
 from baselines.world_rays import WorldRays
 from scaling import fitted
 from shared import execute, load, parser_of  # beside this file
@@ -35,8 +33,6 @@ WAYS: Mapping[str, str] = {
     "rays": "ours, f, ray by ray",
     "world": "world rays, halving",
     "linear": "world rays, linear",
-    "levels": "two-phase",
-    "frusta": "frusta",
 }
 
 #: What is changed of N_S 15, as many lists as pixels, 30 degrees, nothing transparent by a
@@ -53,7 +49,7 @@ AXES: Mapping[str, tuple[tuple[str, ...], Sequence[Any]]] = {
 SAMPLED, POWERS = 3, ("N_S", "lists", "lists and pixels")
 
 #: Each system's own criterion for cutting lists.
-OWN = {"f": "least-error", "world": "transmittance", "frusta": "homogeneity", "levels": "length"}
+OWN = {"f": "least-error", "world": "transmittance"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -87,11 +83,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if case.what == "ssim":
             truth, found = bench.reference(camera), {}
             for way, criterion in OWN.items():
-                drawn = ways_of(bench, vdis(*key, criterion), size, key[2], (way,))
+                drawn = ways_of(bench, vdis(*key, criterion), size, (way,))
                 found[way] = accuracy(drawn[way].draw(camera), truth)["ssim"]
             return {"ssim": found}
         vdi = vdis(*key, "least-error")
-        ways = ways_of(bench, vdi, size, key[2], tuple(WAYS))
+        ways = ways_of(bench, vdi, size, tuple(WAYS))
         steps = {name: partial(way.draw, camera) for name, way in ways.items()}
         taken = take_turns(steps, options.repeats)
         return {
@@ -133,9 +129,7 @@ class Way(NamedTuple):
     nbytes: int
 
 
-def ways_of(
-    bench: Bench, vdi: Any, size: tuple[int, int], levels: int, wanted: Sequence[str]
-) -> dict[str, Way]:
+def ways_of(bench: Bench, vdi: Any, size: tuple[int, int], wanted: Sequence[str]) -> dict[str, Way]:
     """Return who draws a VDI."""
     runtime, found = bench.runtime, {}
 
@@ -154,8 +148,6 @@ def ways_of(
     makers: dict[str, Callable[[], Any]] = {
         "world": lambda: WorldRays(runtime, vdi),
         "linear": lambda: WorldRays(runtime, vdi, binary=False),
-        "levels": lambda: TwoPhase(runtime, vdi, levels),
-        "frusta": lambda: Frusta(runtime, vdi),
     }
     for name in [name for name in makers if name in wanted]:
         begin = time.perf_counter()

@@ -1,9 +1,8 @@
-"""The verb ``benchmark``: the paper's tables as JSON, Markdown and a plot; or two runs compared."""
+"""The verb ``benchmark``: the paper's tables as JSON and Markdown."""
 
 from __future__ import annotations
 
 import argparse
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -16,30 +15,24 @@ from pyvista_vdi.measure.paper import (
     Plan,
     Results,
     describe,
-    describe_changes,
     find_dataset,
     open_results,
-    read_results,
     run,
 )
-from pyvista_vdi.measure.paper.report import write_plot
 from pyvista_vdi.measure.report import write_text
 
 
 def benchmark(options: argparse.Namespace) -> int:
-    """Measure and write, or compare two files."""
-    if options.compare is not None:
-        before, after = (read_results(path).data for path in options.compare)
-        print(describe_changes(before, after), end="")
-        return 0
+    """Measure and write."""
     plan = _plan(options)
     results = _results(options, plan)
     try:
         with measuring("benchmark", results.path) as bar:
             run(plan, results, options.device, bar)
     finally:
-        written = _write_tables(results)
-    say_written(written)
+        tables = results.path.with_suffix(".md")
+        write_text(tables, describe(results.data))
+    say_written([results.path, tables])
     return 0
 
 
@@ -95,20 +88,10 @@ def _results(options: argparse.Namespace, plan: Plan) -> Results:
     path = Path(options.out)
     if path.suffix.lower() != ".json":
         raise InvalidArgumentError(
-            f"--out must name a .json file (tables and plot go beside it); got {options.out!r}"
+            f"--out must name a .json file (the tables go beside it); got {options.out!r}"
         )
     require_new(path, options)
     check_writable(path)
     results = open_results(plan, path, options.device, resume=options.resume)
     results.save()
     return results
-
-
-def _write_tables(results: Results) -> list[Path]:
-    """Write the Markdown, and the plot where Matplotlib is installed."""
-    tables, plot = (results.path.with_suffix(suffix) for suffix in (".md", ".png"))
-    write_text(tables, describe(results.data))
-    written = [results.path, tables]
-    if find_spec("matplotlib") is not None and write_plot(results.data, plot):
-        written.append(plot)
-    return written

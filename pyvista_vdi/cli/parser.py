@@ -438,13 +438,11 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
     declare.option(
         parser,
         "--out",
-        ".json to write; a table (.md) and a plot (.png) go beside it (default: benchmark.json)",
+        ".json to write; the tables (.md) go beside it (default: benchmark.json)",
         "FILE",
         default="benchmark.json",
     )
     declare.switch(parser, "--resume", "go on with FILE where it was left")
-    changed = "measure nothing: say what changed between two files beyond noise"
-    declare.option(parser, "--compare", changed, ("A", "B"), nargs=2)
     group = parser.add_argument_group("what is measured", "In place of the profile's.")
     declare.option(
         group,
@@ -498,9 +496,6 @@ def _add_tradeoff(parser: argparse.ArgumentParser) -> None:
         "AXIS[=A,B,...]",
         nargs="+",
     )
-    among = parser.add_mutually_exclusive_group()
-    declare.switch(among, "--alone", "change one setting at a time, and no two together")
-    declare.switch(among, "--product", "measure every combination")
     declare.repeats(parser, "timed frames (default: 5)", 5)
     generations = "timed generations of each VDI (default: 5)"
     declare.option(parser, "--generations", generations, "N", declare.parse_count, default=5)

@@ -81,8 +81,7 @@ def _settings(options: argparse.Namespace) -> tuple[Setting, ...]:
         axes = {n: usual[n] for n in (QUICK_AXES if options.quick else DEFAULT_AXES)}
     else:
         axes = dict(_axis(text, usual) for text in options.sweep)
-    pairs = not (options.alone or options.quick)
-    return sweep(axes, pairs=pairs, product=options.product)
+    return sweep(axes, pairs=not options.quick)
 
 
 def _axis(text: str, usual: Mapping[str, tuple[Any, ...]]) -> tuple[str, tuple[Any, ...]]:

@@ -1,8 +1,7 @@
-"""The benchmark: tiny runs, the changes between two, data sets, and the paper's figures."""
+"""The benchmark: tiny runs, data sets, and the paper's figures."""
 
 from __future__ import annotations
 
-import copy
 import json
 import re
 from dataclasses import replace
@@ -15,21 +14,19 @@ from measured import SCHEMA, checked, made_up_results
 from pyvista_vdi import cli, examples
 from pyvista_vdi.cli import parser
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError
-from pyvista_vdi.measure.compare.bounds import SSIM_TO_VTK
 from pyvista_vdi.measure.paper import (
     PROFILES,
     Plan,
-    compare_results,
     describe,
-    describe_changes,
     find_dataset,
-    open_results,
     paper_cell,
 )
 from pyvista_vdi.measure.paper.procedural import PROCEDURAL, make
 from pyvista_vdi.measure.paper.published import paper_tables, paper_targets
-from pyvista_vdi.measure.paper.report import write_plot
 from pyvista_vdi.measure.results import Results
+
+#: Of our raycaster to VTK's GPU mapper, soft: that of test_real_volumes.
+SSIM_TO_VTK = 0.99
 
 #: 32 x 32 x 25 voxels, uint8.
 TINY = "kingsnake_like@32"
@@ -182,16 +179,16 @@ def test_the_parser_offers_the_profiles():
         parser.parse(["benchmark", "--profile", "other"])
 
 
-def results(times, *, ssim=0.98, repeats=5, refused=None, supersegments=1000):
+def results(times):
     """Make up results of one view; times of the VDI and of the volume, seconds."""
     vdi, volume = ({"clock": list(taken), "device": []} for taken in times)
     case = {"volume": "brain", "window_size": [1280, 720], "max_supersegments": 15}
     described = {"source": "file", "look": "ramp", "paper": "kingsnake", "description": "k"}
     described |= {"dimensions": [2, 2, 2], "spacing": [1, 1, 1], "dtype": "uint8"}
-    sizes = {"lists": 10, "occupied_lists": 5, "supersegments": supersegments, "mean_length": 3.0}
+    sizes = {"lists": 10, "occupied_lists": 5, "supersegments": 1000, "mean_length": 3.0}
     sizes |= {"longest_list": 4, "bytes_raw": 30000, "bytes_saved": None, "save_seconds": None}
     seconds = {"vdi": vdi, "vdi_skipping": {**vdi}, "volume": volume, "volume_skipping": {**volume}}
-    near = {"ssim": ssim, "psnr": 30.0, "worst_pixel": 9.0}
+    near = {"ssim": 0.98, "psnr": 30.0, "worst_pixel": 9.0}
     figures = [
         ({"what": "volume", "volume": "brain"}, {**described, "bytes": 8, "load_seconds": 1.0}),
         ({"what": "vdi", **case}, {**sizes, "generation_seconds": {"clock": [1.0], "device": []}}),
@@ -200,73 +197,16 @@ def results(times, *, ssim=0.98, repeats=5, refused=None, supersegments=1000):
             {"vdi_to_volume": near, "volume_to_vtk_gpu": None, "seconds": seconds, "left_out": {}},
         ),
     ]
-    rows = [{"case": case, **({"refused": refused} if refused else f)} for case, f in figures]
-    plan = {"profile": "quick", "repeats": repeats, "interpolation": "nearest", "seed": 1}
+    rows = [{"case": case, **f} for case, f in figures]
+    plan = {"profile": "quick", "repeats": 5, "interpolation": "nearest", "seed": 1}
     return made_up_results("benchmark", plan, rows)
 
 
 STEADY = np.array([1.0, 1.01, 0.99, 1.02, 0.98])
-DRIFT = np.array([1.0, 1.2, 1.5, 2.0, 3.0])
-NOISY = np.array([1.0, 1.6, 0.9, 1.7, 0.95])
-
-
-def changed(before, after):
-    found = {change.figure for change in compare_results(before, after) if change.changed}
-    return {figure for figure in found if "f_e" not in figure and "skipping" not in figure}
 
 
 def test_made_up_results_are_of_the_schema():
     assert faults(results((STEADY, STEADY)), json.loads(SCHEMA.read_text())) == []
-
-
-EXACT = np.linspace(1.0, 1.0001, 5)
-
-
-@pytest.mark.parametrize(
-    ("before", "vdi", "volume", "figures"),
-    [
-        pytest.param(STEADY, STEADY[::-1], STEADY, [], id="equal"),
-        pytest.param(
-            *(STEADY, 1.3 * STEADY, STEADY, ["VDI, f, s", "VDI, f / render_volume"]), id="slower"
-        ),
-        pytest.param(
-            *(STEADY, 1.3 * STEADY, 1.3 * STEADY, ["VDI, f, s", "render_volume, s"]),
-            id="slower machine",
-        ),
-        # Times change, pairs do not; the drift is beyond noise in both
-        pytest.param(STEADY, DRIFT, DRIFT * STEADY, [], id="a machine that slows down meanwhile"),
-        pytest.param(STEADY, NOISY, STEADY, [], id="overlapping"),
-        pytest.param(EXACT, 1.04 * EXACT, EXACT, [], id="less than a twentieth"),
-    ],
-)
-def test_what_changed_between_runs(before, vdi, volume, figures):
-    assert changed(results((before, before)), results((vdi, volume))) == set(figures)
-
-
-def test_too_few_repetitions_are_told():
-    before, after = results(([1.0], [1.0]), repeats=1), results(([9.0], [1.0]), repeats=1)
-    assert changed(before, after) == set()
-    assert "too few repetitions" in describe_changes(before, after)
-
-
-def test_accuracy_sizes_and_refusals_are_compared():
-    before = results((STEADY, STEADY))
-    after = results((STEADY, STEADY), ssim=0.97, supersegments=1100)
-    assert changed(before, after) == {"SSIM", "supersegments"}
-    text = describe_changes(before, after)
-    assert "brain/1280x720/15 at 5 degrees: SSIM 0.98 -> 0.97, 0.990 times" in text
-    refused = results((STEADY, STEADY), refused="too large")
-    assert "brain/1280x720/15: measured -> refused (too large)" in describe_changes(before, refused)
-    other = copy.deepcopy(before)
-    other["system"]["device"] = "b"
-    assert "The device differs: b; a." in describe_changes(other, after)
-
-
-def test_the_command_compares(default_runtime, tmp_path, capsys):
-    for name in ("a", "b"):
-        open_results(Plan("quick", (TINY,)), tmp_path / f"{name}.json").save()
-    assert benchmark("--compare", tmp_path / "a.json", tmp_path / "b.json") == 0
-    assert "Figures in both: 0; changed beyond noise: 0." in capsys.readouterr().out
 
 
 def test_the_papers_figures():
@@ -292,8 +232,7 @@ def test_the_papers_figures():
     assert [round(24 * ratio) for ratio, _ in paper_targets()] == [40, 50, 60, 70, 80]
 
 
-def test_tables_and_plots_have_the_papers_figures_beside_ours(tmp_path):
-    pytest.importorskip("matplotlib")
+def test_tables_have_the_papers_figures_beside_ours():
     data = results((STEADY, STEADY))
     (row,) = Results(data).rows(what="view")
     row["seconds"]["vdi_skipping"] = {"clock": (STEADY / 4).tolist(), "device": []}
@@ -301,8 +240,6 @@ def test_tables_and_plots_have_the_papers_figures_beside_ours(tmp_path):
     cells = [part.strip() for part in line.strip("|").split("|")]
     assert cells[10:14] == ["1.0", f"{231 / 31:.1f}", "4.0", f"{277 / 31:.1f}"]
     assert cells[15:17] == ["0.9800", "0.982"]
-    assert write_plot(data, tmp_path / "a.png")
-    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     assert "Measured from x to y of a sample of the cases, commit abc on: device a" in describe(
         data
     )

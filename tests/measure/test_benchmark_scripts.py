@@ -18,12 +18,6 @@ import pytest
 from browsers import NAMES, WITHOUT_WINDOWS, missing
 
 from pyvista_vdi.measure.harness import Case
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.reference import build_vdi
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 if not BENCHMARKS.is_dir():
@@ -31,17 +25,14 @@ if not BENCHMARKS.is_dir():
 pytest.importorskip("tqdm")
 sys.path.insert(0, str(BENCHMARKS))
 
-import floor  # noqa: E402
 import scaling  # noqa: E402
 import shared  # noqa: E402
-from floors import machine, work  # noqa: E402
 
 #: The least that reaches each script's end.
 RUNS = {
     "accuracy": "--volumes brain",
     "baselines": "--size 64x36 --repeats 1",
     "files": "--volumes brain --repeats 1",
-    "floor": "--volumes brain --repeats 1",
     "frames": "--volumes brain --repeats 1",
     "generation": "--volumes brain --repeats 1",
     "large": "--volumes brain --large kingsnake_like@8 --repeats 1",
@@ -51,9 +42,6 @@ RUNS = {
     "trees": "--other .. --volumes brain --repeats 1",
     "web": "--volumes brain --seconds 6 --repeats 1",
 }
-
-
-SIZE = (24, 18)
 
 
 def test_every_script_is_run_and_listed_with_the_question_that_it_answers():
@@ -165,162 +153,6 @@ def test_a_sample_of_scenes_has_all_cases_of_each(no_data, tmp_path):
     looks = [row["case"]["look"] for row in found.rows()]
     assert len(looks) == 6
     assert {looks.count(look) for look in looks} == {3}
-
-
-# Counts and floors
-
-
-def soft_volume():
-    """Return noise with an empty half, so that lists and samples are empty as well."""
-    array = np.random.default_rng(3).integers(60, 256, (19, 22, 21), dtype=np.uint8)
-    array[:, :, :10] = 0
-    return Volume(array, spacing=(1.0, 1.2, 0.9))
-
-
-def soft_function(opacity=0.3, interpolation="nearest"):
-    """Return a table that makes scalars below a fifth of the range transparent."""
-    opacities = np.interp(np.linspace(0, 1, 32), [0.2, 1.0], [0.0, opacity])
-    opacities[:6] = 0
-    colors = np.linspace((0.1, 0.2, 0.3), (0.9, 0.7, 0.5), 32)
-    return TransferFunction(colors, opacities, (0.0, 255.0), interpolation=interpolation)
-
-
-def row_of_lists(n, optical_depth):
-    """Return V_O in parallel projection with a row of lists, each of one whole supersegment."""
-    camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), parallel_projection=True, parallel_scale=1.0)
-    bounds = (-n, n, -1, 1, -1, 1)
-    ones = np.ones(n, np.float32)
-    colors = np.ones((n, 3), np.float32)
-    depths = optical_depth * ones
-    return camera, VDI(camera, (n, 1), range(n + 1), 4 * ones, 6 * ones, colors, depths, bounds)
-
-
-def test_rays_from_the_side_cross_every_list_until_their_light_ends():
-    camera, thin = row_of_lists(8, 0.01)
-    side = camera.replace(position=(20, 0, 0))
-    assert work.walked(thin, camera, (8, 1)) == (1, 1, 1, 1)
-    found = work.walked(thin, side, (1, 1))
-    assert (found.lists, found.filled, found.met) == (8, 8, 8)
-    assert found.tiles == -(-8 // work.STACK)
-    # Each of 1/1000: behind the second one less than the cutoff is left
-    _, opaque = row_of_lists(8, 2 * -np.log(1e-3))
-    found = work.walked(opaque, side, (1, 1))
-    assert found.lists < 8
-    assert found.met < 8
-
-
-def test_at_the_generating_view_a_ray_meets_its_list():
-    volume = soft_volume()
-    view = filling_camera(volume.bounds, SIZE)
-    vdi = build_vdi(volume, view, SIZE, soft_function(0.05), max_supersegments=6)
-    found = work.walked(vdi, view, SIZE)
-    rays = SIZE[0] * SIZE[1]
-    assert found.met == pytest.approx(vdi.n_supersegments / rays)
-    assert found.filled == pytest.approx(np.count_nonzero(vdi.counts) / rays)
-    assert found.filled < found.lists <= 1  # where the bounds are not, no list is entered
-    turned = work.walked(vdi, view.azimuth(30), SIZE)
-    assert turned.lists > 2 * found.lists
-
-
-def test_a_march_that_stops_takes_no_more_samples_than_one_that_does_not():
-    volume = soft_volume()
-    view = filling_camera(volume.bounds, SIZE)
-    given = volume, view, SIZE, soft_function(1.0), 0.45
-    whole, stopped = (work.marched(*given, stops=stops) for stops in (False, True))
-    assert stopped.steps < whole.steps
-    assert 0 < stopped.visible < whole.visible < whole.steps
-    clear = TransferFunction(np.zeros((2, 3)), np.zeros(2), (0.0, 255.0))
-    nothing = work.marched(*given[:3], clear, 0.45, stops=True)
-    assert nothing == (pytest.approx(whole.steps), 0)
-
-
-#: A machine with round figures: 10 and 5 GB/s, 10^9 gathers of 4 bytes from a cache, a tenth of
-#: that from memory and a quarter where each is waited for.
-MACHINE = {
-    "streams": {"read": 10e9, "write": 5e9},
-    "arithmetic": {"multiply_add": 100e9, "divide": 10e9, "exponential": 1e9},
-    "launches": {"waited": 1e-5},
-    "gathers": {
-        "near": {"4": [[2**14, 1e9], [2**28, 1e8]], "16": [[2**14, 5e8], [2**28, 5e7]]},
-        "near, chained": {"4": [[2**14, 2.5e8], [2**28, 2.5e7]], "16": [[2**14, 1e8]]},
-    },
-}
-
-
-@pytest.mark.parametrize(
-    ("size", "working_set", "rate"),
-    [
-        (4, 2**14, 1e9),
-        (4, 2**21, 1e8 * 10**0.5),  # half way by logarithms
-        (4, 1, 1e9),
-        (4, 2**40, 1e8),
-        (8, 2**14, 5e8),  # the next larger element
-        (32, 2**14, 5e8),
-    ],
-)
-def test_rates_are_interpolated_between_working_sets(size, working_set, rate):
-    assert machine.Rates(MACHINE).gather(size, working_set) == pytest.approx(rate)
-
-
-@pytest.mark.parametrize(
-    ("changed", "seconds", "bound"),
-    [
-        ({}, 0.5, "gathers"),
-        ({"gathers": ()}, 0.3, "memory"),
-        ({"gathers": (), "read": 0.0}, 0.21, "arithmetic"),
-    ],
-)
-def test_the_floor_is_the_slowest_resource_and_a_launch(changed, seconds, bound):
-    done = {
-        "read": 1e9,
-        "write": 1e9,
-        "gathers": (work.Gathers(5e8, 4, 2**14),),
-        "operations": work.operations(1e9, 1e9, 1e8),
-    }
-    if changed.get("read") == 0:
-        done["write"] = 0.0
-    found = work.floor_of(work.Work(**{**done, **changed}), machine.Rates(MACHINE))
-    assert found.seconds == pytest.approx(seconds + 1e-5)
-    assert found.bound == bound
-    assert found.waiting == pytest.approx((2.0 if not changed else seconds) + 1e-5)
-
-
-def test_the_work_of_a_frame_is_what_its_rays_meet():
-    each = work.Walked(lists=3.0, filled=1.0, met=2.0, tiles=0.5)
-    plain, skipping = (work.raycast_work(each, 100, 1e9, skips=skips) for skips in (False, True))
-    assert [g.elements for g in plain.gathers] == [300, 300, 200, 0]
-    assert [g.elements for g in skipping.gathers] == [100, 300, 200, 50]
-    assert plain.write == 16 * 100
-    assert plain.operations[2] == 200  # an exponential for each that is met
-    assert plain.read == 300 * 8 + 300 * 8 + 200 * 16
-    assert work.raycast_work(each, 100, 64.0, skips=False).read == 64
-
-
-@pytest.mark.parametrize(
-    ("interpolation", "voxels", "entries"), [("nearest", 1, 1), ("linear", 8, 2)]
-)
-def test_the_work_of_a_march_is_a_voxel_and_an_entry_a_sample(interpolation, voxels, entries):
-    volume, function = soft_volume(), soft_function(interpolation=interpolation)
-    each = work.Marched(steps=9.0, visible=2.0)
-    found = work.march_work(each, 100, volume, function, records=False)
-    assert [g.elements for g in found.gathers] == [200 * voxels, 200 * entries]
-    assert found.operations[2] == 200 * entries
-    assert found.read == min(volume.array.nbytes, 200 * voxels)
-    recorded = work.march_work(each, 100, volume, function, records=True)
-    assert recorded.write == 0
-    assert recorded.operations[1] > found.operations[1]
-    assert work.shorten_work(500, 200).operations[0] == 60 * 300
-
-
-def test_stages_are_known_by_their_kernels_names():
-    kernels = {
-        "march": ("longest_marches", "march_lists"),
-        "shorten": ("shorten_lists",),
-        "pack": ("sum_lengths", "list_offsets", "pack_lists"),
-        "": ("",),
-    }
-    for stage, names in kernels.items():
-        assert [floor.stage_of(name) for name in names] == [stage] * len(names)
 
 
 # Fits

@@ -12,8 +12,7 @@ from measured import SCHEMA, checked
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, MissingDependencyError
-from pyvista_vdi.measure.compare import Settings, contact_sheet, measure, table
-from pyvista_vdi.measure.compare.measure import NAMES
+from pyvista_vdi.measure.compare import NAMES, Settings, contact_sheet, measure, table
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import filling_camera
 

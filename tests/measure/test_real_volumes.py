@@ -6,7 +6,6 @@ checked small on every run.
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from itertools import product
 
@@ -15,16 +14,31 @@ import pytest
 from real_data import require_data
 
 from pyvista_vdi import examples
-from pyvista_vdi.measure.compare import Settings, judge_vdi, judge_vtk, measure
-from pyvista_vdi.measure.compare.bounds import (
-    BRIGHTNESS_TOLERANCE,
-    CONVERGED_STEPS,
-    PSNR_TO_VTK,
-    SSIM_TO_VTK,
-)
+from pyvista_vdi.measure.compare import AngleResult, Report, Settings, measure
+from pyvista_vdi.model.metrics import Comparison
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 
 SMALL = (320, 180)
+
+#: The project's bounds of the standard cases at 1280 x 720 with 20 supersegments. From V_O, against
+#: our raycaster at the same step: SSIM at least, worst pixel at most, in 1/255.
+AT_V_O = 0.999, 2.0
+#: SSIM at 5 and 30 degrees, by transfer function; and of a volume of two values that is solid
+#: everywhere, with all: its rays cross more faces than a list has supersegments.
+FROM_NEW_VIEWS = {"soft": (0.985, 0.97), "steep": (0.985, 0.97), "nearly-opaque": (0.975, 0.95)}
+BINARY_SOLID = {"berea": (0.94, 0.85)}
+#: How far mean brightness from a new view may be from the raycaster's, as a share of it.
+BRIGHTNESS_TOLERANCE = 0.02
+
+#: Our raycaster against VTK's GPU mapper with the soft transfer function; PSNR in dB.
+SSIM_TO_VTK, PSNR_TO_VTK = 0.99, 38.0
+#: With the others it may be so many times as far as VTK's own two mappers are from each other, in
+#: 1 - SSIM and in the root of the mean square.
+FACTOR_OF_VTK = 1.5
+#: Steps to a voxel at which two raycasters with samples at different places agree, where half a
+#: voxel is not enough: `aneurism` comes to 36.5 dB of VTK's at 2, to 41.6 at 4 and to 47.3 at 8,
+#: and each is as far from itself at half the steps.
+CONVERGED_STEPS = 8
 
 #: SSIM at 5 and 30 degrees from V_O at 320 x 180, measured with Intel's OpenCL. The bounds of the
 #: standard table do not apply: a list is four times as wide as at 1280 x 720, about two voxels, so
@@ -102,6 +116,59 @@ TOO_THIN = {
 }
 
 
+def missed_by_the_vdi(report, name, transfer_function):
+    """Return what is beyond its bound, of V_O, 5 and 30 degrees."""
+    at_v_o, *turned = (result.vdi_to_raycaster for result in report.angles)
+    if not (at_v_o.ssim >= AT_V_O[0] and at_v_o.worst_pixel <= AT_V_O[1]):
+        yield at_v_o
+    bounds = BINARY_SOLID.get(name, FROM_NEW_VIEWS[transfer_function])
+    for found, ssim in zip(turned, bounds, strict=True):
+        if not (
+            found.ssim >= ssim and abs(found.mean_brightness_ratio - 1) <= BRIGHTNESS_TOLERANCE
+        ):
+            yield found
+
+
+def missed_against_vtk(report, transfer_function):
+    """Return the comparisons with VTK's GPU mapper that are beyond their bounds."""
+    for result in report.angles:
+        ours, theirs = result.raycaster_to_gpu, result.fixed_point_to_gpu
+        ssim, psnr = SSIM_TO_VTK, PSNR_TO_VTK
+        if transfer_function != "soft":
+            ssim = 1 - FACTOR_OF_VTK * (1 - theirs.ssim)
+            psnr = theirs.psnr - 20 * np.log10(FACTOR_OF_VTK)
+        if not (ours.ssim >= ssim and ours.psnr >= psnr):
+            yield ours
+
+
+def test_bounds_are_those_of_a_case_and_a_missed_one_is_seen():
+    def report(ssim, psnr=60.0, brightness=1.0, theirs=1.0):
+        near = Comparison(ssim, psnr, 0.0, (0, 0), brightness)
+        vtk = Comparison(theirs, 40.0, 0.0, (0, 0), 1.0)
+        exact = Comparison(1.0, 60.0, 0.0, (0, 0), 1.0)
+        views = (AngleResult(angle, exact, exact, vtk, {}) for angle in (0.0, 5.0))
+        return Report({}, {}, {}, None, None, [*views, AngleResult(30.0, near, near, vtk, {})])
+
+    for name, look, bound in (
+        *(("brain", "soft", 0.97), ("brain", "steep", 0.97)),
+        *(("heptane", "nearly-opaque", 0.95), ("berea", "soft", 0.85)),
+    ):
+        assert not list(missed_by_the_vdi(report(bound), name, look))
+        assert len(list(missed_by_the_vdi(report(bound - 1e-6), name, look))) == 1
+    assert list(missed_by_the_vdi(report(1.0, brightness=1.0201), "brain", "soft"))
+    # 1.5 times the root mean square is 3.52 dB less
+    for look, ssim, psnr, theirs, count in (
+        ("soft", 0.991, 38.1, 0.5, 0),
+        ("soft", 0.989, 39, 0.5, 1),
+        ("soft", 0.991, 37.9, 0.5, 1),
+        ("steep", 0.986, 36.5, 0.99, 0),
+        ("steep", 0.984, 36.5, 0.99, 1),
+        ("steep", 0.986, 36.4, 0.99, 1),
+    ):
+        found = missed_against_vtk(report(ssim, psnr, theirs=theirs), look)
+        assert len(list(found)) == count
+
+
 def standard_cases():
     """Every volume with every transfer function at the nearest point, and with one trilinear.
 
@@ -126,13 +193,10 @@ def test_standard_table(name, transfer_function, interpolation, default_runtime)
     volume = require_data(name)
     settings = Settings(looks(transfer_function, interpolation), repeats=0)
     report, _, _ = measure(volume, settings)
-    checks = judge_vdi(report, name, transfer_function)
-    assert len(checks) == 6  # 2 at each view
-    to_vtk = judge_vtk(report, transfer_function)
-    assert len(to_vtk) == 6
-    if not all(check.passed for check in to_vtk):
+    assert [result.angle for result in report.angles] == [0, 5, 30]
+    missed = list(missed_by_the_vdi(report, name, transfer_function))
+    if list(missed_against_vtk(report, transfer_function)):
         finer = min(volume.spacing) / CONVERGED_STEPS
         report, _, _ = measure(volume, replace(settings, sample_distance=finer))
-        to_vtk = judge_vtk(report, transfer_function)
-    missed = [str(check) for check in (*checks, *to_vtk) if not check.passed]
-    assert not missed, os.linesep.join(missed)
+        missed += missed_against_vtk(report, transfer_function)
+    assert not missed

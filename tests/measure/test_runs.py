@@ -151,7 +151,6 @@ def test_ctrl_c_leaves_no_half_file(default_runtime, tmp_path):
         ("benchmark --datasets brain brain", "'brain' is given twice"),
         (f"benchmark --datasets {'x' * 5000}", "and there is no such file"),
         ("benchmark --angles 5,30,5", "an angle is given twice: (5.0, 30.0, 5.0)"),
-        ("benchmark --compare a.json b.json", "a.json cannot be read"),
         ("tradeoff ball.npy --sweep size", "--sweep knows no 'size': known are max-supersegments,"),
         ("tradeoff ball.npy --sweep lists=a", "--sweep lists takes a number; got 'a'"),
         ("tradeoff ball.npy --sweep max-supersegments=1.5", "takes a whole number; got '1.5'"),

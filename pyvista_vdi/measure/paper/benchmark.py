@@ -48,7 +48,7 @@ SIZES = ((1280, 720), (1920, 1080))
 LIMITS = (15, 30)
 ANGLES = (0.0, 5.0, 15.0, 30.0, 60.0, 90.0, 180.0)
 
-#: Frames of each kind at a view. Two runs of five are the fewest that ``--compare`` can tell apart.
+#: Frames of each kind at a view: two runs of five are the fewest that a rank sum can tell apart.
 REPEATS = 5
 
 #: Frames in which the controller may find its choice, and those that are measured afterwards.
@@ -168,11 +168,6 @@ def open_results(
     extent = "sample" if plan.profile == "quick" else "whole"
     more = {"rooms": (*ROOMS, "quality"), "extent": extent, "device": device, "resume": resume}
     return Results.begun("benchmark", plan.to_dict(), path=path, **more)
-
-
-def read_results(path: str | os.PathLike[str]) -> Results:
-    """Read a file of results; anything else raises InvalidArgumentError."""
-    return Results.read(path, "benchmark")
 
 
 def run(plan: Plan, results: Results, device: Any = None, progress: Progress | None = None) -> None:

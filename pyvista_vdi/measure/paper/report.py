@@ -1,9 +1,8 @@
-"""The results as Markdown, Table 1, what each VDI takes and Table 2, and as a plot."""
+"""The results as Markdown, Table 1, what each VDI takes and Table 2."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.measure import report
@@ -15,9 +14,6 @@ from pyvista_vdi.measure.results import Results
 
 #: What a row is of; a VDI has no angle.
 _ROW = ("data set", "window", "N_S", "angle")
-
-#: Candidates whose kernels are ours.
-_OURS = {name: label for name, label in CANDIDATES.items() if not name.startswith("vtk_")}
 
 #: Columns of Table 1 beside the times.
 _FIGURES = (
@@ -40,12 +36,6 @@ def describe(data: dict[str, Any]) -> str:
         *(line for text in _explanation(plan) for line in (text, "")),
         *section("Table 1"),
         *table((*_ROW, *CANDIDATES.values(), *_FIGURES), _table1(data)),
-        "",
-        *section(
-            "The same by device events",
-            "Milliseconds that our kernels ran, without transfers, launches and waiting.",
-        ),
-        *table((*_ROW, *_OURS.values(), "speed-up f", "speed-up f_e", "paper"), _by_events(data)),
         "",
         *section(
             "What each VDI takes",
@@ -95,19 +85,6 @@ def _table1(data: dict[str, Any]) -> Iterator[list[str]]:
             number(found["psnr"], ".1f"),
             number(found["worst_pixel"], ".1f"),
             number(vtk and vtk["ssim"], ".4f"),
-        ]
-
-
-def _by_events(data: dict[str, Any]) -> Iterator[list[str]]:
-    """Give the times of our kernels alone, by the driver's events."""
-    for row, paper in _views(data):
-        times = {n: median(row["seconds"].get(n, {}), "device") for n in _OURS}
-        yield [
-            *_named(row),
-            *(milliseconds(times[name]) for name in _OURS),
-            ratio(times["volume"], times["vdi"]),
-            ratio(times["volume"], times["vdi_skipping"]),
-            number(getattr(paper, "speed_up_skipping", None), ".1f"),
         ]
 
 
@@ -217,51 +194,3 @@ def _with_spread(taken: Times | None) -> str:
     if taken is None or not middle:
         return report.ABSENT
     return f"{milliseconds(middle)} ±{spread(taken['clock']):.0%}"
-
-
-def write_plot(data: dict[str, Any], target: Path) -> bool:
-    """Write a PNG: a column per window and N_S, speed-up above, SSIM below.
-
-    Returns whether there was anything to draw; without Matplotlib ImportError is raised.
-    """
-    columns: dict[tuple[str, int], dict[str, list[tuple[dict[str, Any], PaperCell | None]]]] = {}
-    for row, paper in _views(data):
-        case = row["case"]
-        column = columns.setdefault((across(case["window_size"]), case["max_supersegments"]), {})
-        column.setdefault(case["volume"], []).append((row, paper))
-    if not columns:
-        return False
-    figure = report.new_figure((1.5 + 3.6 * len(columns), 6.0), layout="constrained")
-    panels = figure.subplots(2, len(columns), squeeze=False, sharex=True, sharey="row")
-    names = list(dict.fromkeys(name for column in columns.values() for name in column))
-    for (speed, ssim), ((size, limit), column) in zip(panels.T, columns.items(), strict=True):
-        for name, views in column.items():
-            _draw(name, views, f"C{names.index(name)}", speed, ssim)
-        speed.set(title=f"{size}, N_S {limit}", yscale="log")
-        ssim.set(xlabel="degrees from V_O")
-        for panel in (speed, ssim):
-            panel.grid(alpha=0.3, which="both")
-    panels[0][0].set_ylabel("speed-up over render_volume\nwithout skipping (x: the paper's)")
-    panels[1][0].set_ylabel("SSIM to render_volume")
-    handles, labels = panels[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize="small")
-    report.save_figure(figure, target)
-    return True
-
-
-def _draw(
-    name: str, views: list[tuple[dict[str, Any], PaperCell | None]], color: str, *panels: Any
-) -> None:
-    """Draw a data set's speed-up and SSIM on the panels of both."""
-    speed, ssim = panels
-    angles = [row["case"]["angle"] for row, _ in views]
-    speed_ups = [
-        (median(row["seconds"]["volume"]) or 0) / (median(row["seconds"]["vdi_skipping"]) or 1)
-        for row, _ in views
-    ]
-    speed.plot(angles, speed_ups, label=name, color=color, marker=".")
-    ssim.plot(angles, [row["vdi_to_volume"]["ssim"] for row, _ in views], color=color, marker=".")
-    for angle, (_, paper) in zip(angles, views, strict=True):
-        if paper is not None:
-            speed.plot([angle], [paper.speed_up_skipping], color=color, marker="x")
-            ssim.plot([angle], [paper.ssim], color=color, marker="x")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
-from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
@@ -46,14 +45,6 @@ _TICKS = (
 #: 1 - SSIM below which all is drawn as the same: from V_O it may be 0.
 _LEAST_LOSS = 1e-5
 
-#: Distances of a label from its point, points of 1/72 inch, in the order in which they are tried.
-_DISTANCES = (7, 14, 22, 32, 44, 58, 74, 92, 112)
-#: Directions in which a label may stand, right and up.
-_DIRECTIONS = ((1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
-
-#: Where a label is held, by the direction in which it stands.
-_ACROSS, _UP = ("center", "left", "right"), ("center", "bottom", "top")
-
 
 def draw(data: dict[str, Any], points: Sequence[Point]) -> Figure:
     """Return the plot: a panel for each cost; see :meth:`.Tradeoff.plot`."""
@@ -64,14 +55,12 @@ def draw(data: dict[str, Any], points: Sequence[Point]) -> Figure:
         )
     if not points:
         raise InvalidArgumentError("nothing was measured, so there is nothing to draw")
-    figure = new_figure((15.5, 6.4))
+    figure = new_figure((19.0, 6.4))
     panels = figure.subplots(1, len(_PANELS), sharey=True)
     fronts = [best(points, kind) for kind in _PANELS]
     for panel, (kind, label), front in zip(panels, _PANELS.items(), fronts, strict=True):
         _draw_panel(panel, points, front, kind)
         panel.set_xlabel(label)
-        low, high = panel.get_xlim()  # room for names at the borders
-        panel.set_xlim(low / (high / low) ** 0.12, high * (high / low) ** 0.12)
         _draw_limits(panel, data, kind)
     least, most = sorted(panels[0].get_ylim())
     room = (most / least) ** 0.08
@@ -86,9 +75,9 @@ def draw(data: dict[str, Any], points: Sequence[Point]) -> Figure:
     labels = [(*style, True) for style in _STYLES.values() if style in there]
     handles = [_marker(*label) for label in (*labels, ("not on the front", "#777777", False))]
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), fontsize="small")
-    figure.subplots_adjust(left=0.062, right=0.99, top=0.92, bottom=0.15, wspace=0.06)
+    figure.subplots_adjust(left=0.05, right=0.9, top=0.92, bottom=0.15, wspace=0.42)
     for panel, kind, front in zip(panels, _PANELS, fronts, strict=True):
-        _name_front(figure, panel, points, front, kind)
+        _name_front(panel, front, kind)
     return figure
 
 
@@ -160,53 +149,17 @@ def _marker(label: str, color: str, on_front: bool) -> Any:
     )
 
 
-def _name_front(
-    figure: Figure, panel: Axes, points: Sequence[Point], front: Sequence[Point], kind: str
-) -> None:
-    """Write the names of the front's settings where they cover neither points nor each other."""
-    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
-    border = panel.get_window_extent(renderer).extents
-    places = [panel.transData.transform(_place(one, kind)) for one in points]
-    radius = 4.5 * figure.dpi / 72
-    taken = [(x - radius, y - radius, x + radius, y + radius) for x, y in places]
-    taken += [text.get_window_extent(renderer).extents for text in panel.texts]
-    for one in front:
-        label = panel.annotate(
-            one.name, _place(one, kind), (0, 0), textcoords="offset points", fontsize=8, zorder=4
-        )
-        tried: list[tuple[float, int, Any, dict[str, Any]]] = []
-        for distance, (right, up) in product(_DISTANCES, _DIRECTIONS):
-            way: dict[str, Any] = {
-                "position": (right * distance, up * distance),
-                "ha": _ACROSS[right],
-            }
-            label.set(**way, va=_UP[up])
-            box = label.get_window_extent(renderer).extents
-            outside = _overlap(box, box) - _overlap(box, border)
-            covered = outside + sum(_overlap(box, other) for other in taken)
-            tried.append((covered, len(tried), box, {**way, "va": _UP[up]}))
-            if covered == 0:
-                break
-        _, _, box, way = min(tried, key=lambda entry: entry[:2])
-        label.remove()
-        relative = {"left": 0.0, "bottom": 0.0, "center": 0.5, "right": 1.0, "top": 1.0}
-        line = {"arrowstyle": "-", "color": "#999999", "lw": 0.6, "shrinkA": 1, "shrinkB": 3}
-        line["relpos"] = relative[way["ha"]], relative[way["va"]]
+def _name_front(panel: Axes, front: Sequence[Point], kind: str) -> None:
+    """Write the names of the front's settings beside the panel, the cheapest lowest, with lines."""
+    line = {"arrowstyle": "-", "color": "#bbbbbb", "lw": 0.6, "relpos": (0, 0.5), "shrinkB": 3}
+    for i, one in enumerate(front):
         panel.annotate(
             one.name,
             _place(one, kind),
-            way.pop("position"),
-            textcoords="offset points",
+            (1.02, (i + 0.5) / len(front)),
+            textcoords="axes fraction",
             fontsize=8,
-            zorder=4,
+            va="center",
+            annotation_clip=False,
             arrowprops=line,
-            **way,
         )
-        taken.append(box)
-
-
-def _overlap(a: Sequence[float], b: Sequence[float]) -> float:
-    """Return the area that two boxes share, pixels squared."""
-    width = min(a[2], b[2]) - max(a[0], b[0])
-    height = min(a[3], b[3]) - max(a[1], b[1])
-    return float(max(0.0, width) * max(0.0, height))

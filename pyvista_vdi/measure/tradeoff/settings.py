@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from itertools import product as combinations
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
@@ -145,7 +144,6 @@ def sweep(
     *,
     base: Setting | None = None,
     pairs: bool = True,
-    product: bool = False,
 ) -> tuple[Setting, ...]:
     """Return the settings of a sweep: the base first, and every value of every axis by itself.
 
@@ -160,8 +158,6 @@ def sweep(
         Where all begins; the defaults of :func:`pyvista_vdi.generate` unless given.
     pairs : bool
         Add the pairs of values that are worth having together, of those axes that are swept.
-    product : bool
-        In place of both: every combination.
 
     Examples
     --------
@@ -174,18 +170,14 @@ def sweep(
         raise InvalidArgumentError(f"there is no axis {unknown[0]!r}: known are {', '.join(AXES)}")
     given = axes if isinstance(axes, Mapping) else AXES
     chosen = {name: tuple(given[name]) for name in axes}
-    if product:
-        values = [(getattr(base, name), *chosen[name]) for name in chosen]
-        changes = [dict(zip(chosen, v, strict=True)) for v in combinations(*values)]
-    else:
-        changes = [{}, *({n: value} for n, values in chosen.items() for value in values)]
-        if pairs:
-            every = (dict(pair) for pair in PAIRS)
-            changes += [p for p in every if all(v in chosen.get(n, ()) for n, v in p.items())]
+    changes = [{}, *({n: value} for n, values in chosen.items() for value in values)]
+    if pairs:
+        every = (dict(pair) for pair in PAIRS)
+        changes += [p for p in every if all(v in chosen.get(n, ()) for n, v in p.items())]
     settings = tuple(dict.fromkeys(replace(base, **change) for change in changes))
     if len(settings) > MOST_SETTINGS:
         raise InvalidArgumentError(
             f"the sweep has {len(settings)} settings, more than {MOST_SETTINGS}: name fewer axes "
-            "or values, or leave out the product"
+            "or values"
         )
     return settings

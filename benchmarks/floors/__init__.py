@@ -1,1 +1,0 @@
-"""The least that a machine could take for a stage: its rates, what rays meet, the work of that."""
