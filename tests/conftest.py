@@ -42,6 +42,14 @@ settings.load_profile(
 )
 
 
+def pytest_configure() -> None:
+    """Let Ctrl-C interrupt where a shell has commands in the background ignore it.
+
+    Before drivers are loaded: their compilers put back what they found.
+    """
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def pytest_sessionstart() -> None:
     """Refuse to test the sources where an installed copy is asked for."""
     place, site = Path(pyvista_vdi.__file__), Path(sysconfig.get_path("purelib"))
@@ -248,12 +256,3 @@ def _every_output_is_finite():
 
 class NotFiniteError(AssertionError):
     """An image or a VDI held a NaN or an infinity."""
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _ctrl_c_interrupts():
-    """Undo what a shell does to commands in the background: there, SIGINT is ignored."""
-    before = signal.getsignal(signal.SIGINT)
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
