@@ -234,24 +234,35 @@ OUTPUTS = {"image", "front depths", "back depths", "supersegment colours", "opti
 def _every_output_is_finite():
     """No test may see a NaN or an infinity in an image or a VDI without failing.
 
-    All of them leave a device by one method. Nothing that the package accepts leads to one.
+    All of them leave a device by two methods. Nothing that the package accepts leads to one.
     """
-    download = Runtime.download
+    download, download_later = Runtime.download, Runtime.download_later
 
-    @functools.wraps(download)
-    def checked(self, buffer, *args, **kwargs):
-        values = download(self, buffer, *args, **kwargs)
+    def check(buffer, values):
         if buffer.name in OUTPUTS and not np.isfinite(values).all():
             places = np.argwhere(~np.isfinite(values))
             raise NotFiniteError(
                 f"{len(places)} of {values.size} values of {buffer.name!r} are not finite, "
                 f"the first at {tuple(places[0].tolist())}"
             )
+
+    @functools.wraps(download)
+    def checked(self, buffer, *args, **kwargs):
+        values = download(self, buffer, *args, **kwargs)
+        check(buffer, values)
         return values
 
-    Runtime.download = checked
+    @functools.wraps(download_later)
+    def checked_later(self, buffer, out, **kwargs):
+        wait = download_later(self, buffer, out, **kwargs)
+        if buffer.name in OUTPUTS:
+            wait()  # not everybody waits by it
+            check(buffer, out)
+        return wait
+
+    Runtime.download, Runtime.download_later = checked, checked_later
     yield
-    Runtime.download = download
+    Runtime.download, Runtime.download_later = download, download_later
 
 
 class NotFiniteError(AssertionError):

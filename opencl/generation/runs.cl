@@ -26,12 +26,12 @@ typedef float8 Run;
 #define BLUE s6
 #define COLOR s456
 #define OPACITY s7       // 1 - exp(-tau), accumulated
-#define RUN(...) (float8)(__VA_ARGS__)
+#define RUN(front, back, tau, before, red, green, blue, opacity) (float8)(front, back, tau, before, red, green, blue, opacity)
 #else
 typedef struct {
     Real FRONT, BACK, TAU, TRANSMITTANCE, RED, GREEN, BLUE, OPACITY;
 } Run;
-#define RUN(...) ((Run){__VA_ARGS__})
+#define RUN(front, back, tau, before, red, green, blue, opacity) ((Run){front, back, tau, before, red, green, blue, opacity})
 #endif
 
 // Opacity-weighted colour and opacity (w) of one reference length of a run's medium.

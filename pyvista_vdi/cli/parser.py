@@ -432,7 +432,7 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
         "--profile",
         "quick (default): small volumes, minutes; full: the paper's sizes and all volumes at "
         "hand, hours",
-        choices=("quick", "full"),
+        choices=("quick", "full", "gpu"),
         default="quick",
     )
     declare.option(

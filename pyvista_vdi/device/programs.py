@@ -24,6 +24,7 @@ from pyvista_vdi.errors import InvalidArgumentError, KernelBuildError
 
 Define = str | int | float | bool | None
 LOG_LINES_SHOWN = 30
+_LINE_MARK = re.compile(r'#line (\d+) "(.*)"')
 #: Age in seconds from which pyopencl's lock on its cache belongs to no living process: it is held
 #: while a program's file is read or written, which takes milliseconds.
 STALE_LOCK = 20.0
@@ -256,7 +257,7 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
         try:
             program = cl.Program(context, source).build(list(options), cache_dir=str(cache))
         except cl.Error as exc:
-            log = _compiler_log(str(exc))
+            log = _placed(_compiler_log(str(exc)), source)
             raise KernelBuildError(
                 f"{path} does not compile on {device.platform.name.strip()} / "
                 f"{device.name.strip()} with {' '.join(options)}:\n{_trimmed(log)}",
@@ -290,6 +291,20 @@ def _compiler_log(message: str) -> str:
         message = message[: saved.start()]
     message = re.sub(r"\A.*?Build on [^\n]*:\n", "", message, count=1, flags=re.DOTALL)
     return re.sub(r"\n\(options: .*\)\s*$", "", message)
+
+
+def _placed(log: str, source: str) -> str:
+    """Name file and line where a compiler counts the lines of the whole source, as NVIDIA's."""
+    places, name, number = [""], "", 0
+    for line in source.splitlines():
+        mark = _LINE_MARK.match(line)
+        name, number = (mark[2], int(mark[1]) - 1) if mark else (name, number + 1)
+        places.append(f"{name}:{number}")
+
+    def place(found: re.Match[str]) -> str:
+        return places[int(found[1])] if int(found[1]) < len(places) else found[0]
+
+    return re.sub(r"<kernel>:(\d+)", place, log)
 
 
 def _trimmed(log: str) -> str:

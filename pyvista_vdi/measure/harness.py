@@ -10,7 +10,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -34,9 +34,10 @@ from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.raycast import render_vdi
+from pyvista_vdi.raycasting.prepared import prepared_vdi
+from pyvista_vdi.raycasting.raycast import draw, render_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume, checked_sample_distance
-from pyvista_vdi.volume.render import raycast_medium, raycast_volume
+from pyvista_vdi.volume.render import draw_medium, raycast_medium, raycast_volume
 
 #: Who draws, by the keys of the results, and what tables call them.
 CANDIDATES: Mapping[str, str] = {
@@ -475,17 +476,48 @@ class Bench:
         steps["volume_skipping"] = partial(self._volume_frame, camera, self.voxel)
         return steps | {name: partial(self._vtk_frame, name, camera) for name in self.vtk}
 
+    def queued(self, vdi: VDI, camera: Camera, count: int, repeats: int) -> dict[str, float]:
+        """Return the median seconds of a frame of ours of which ``count`` are enqueued at once.
+
+        Each of another view, a ten-thousandth of a degree on, and left on the device: what the
+        host does for a frame is in it, what brings its picture there is not.
+        """
+        prepared = prepared_vdi(self.runtime, vdi)
+        views = [camera.azimuth(1e-4 * n) for n in range(count)]
+        requests = [FrameRequest(view, self.size) for view in views]
+        plain = [replace(each, options=RenderOptions(skip_empty=False)) for each in requests]
+        media = {skips: self._medium(self.voxel, skip_empty=skips) for skips in (False, True)}
+        with self.runtime.buffer((*self.size[::-1], 4), name="image") as image:
+
+            def frames(draw: Callable[..., None], of: Any, asked: Sequence[FrameRequest]) -> None:
+                for request in asked:
+                    draw(of, request, image)
+                self.runtime.finish()
+
+            work: dict[str, Step] = {
+                "vdi": partial(frames, draw, prepared, plain),
+                "vdi_skipping": partial(frames, draw, prepared, requests),
+                "volume": partial(frames, draw_medium, media[False], plain),
+                "volume_skipping": partial(frames, draw_medium, media[True], requests),
+            }
+            times = take_turns(work, repeats)
+        return {name: statistics.median(taken["clock"]) / count for name, taken in times.items()}
+
     def _vtk_frame(self, name: str, camera: Camera) -> None:
         self.vtk[name].set_sample_distance(self.voxel)
         self.vtk[name].render(camera)
 
     def _volume_frame(self, camera: Camera, step: float, *, skip_empty: bool = True) -> Image:
-        """Draw the volume, which stays on the device with the bench."""
+        medium = self._medium(step, skip_empty=skip_empty)
+        return raycast_medium(medium, FrameRequest(camera, self.size))
+
+    def _medium(self, step: float, *, skip_empty: bool) -> DeviceVolume:
+        """Return the volume on the device, where it stays with the bench."""
         if (step, skip_empty) not in self._media:
             given = (self.runtime, self.volume, self.table)
             medium = DeviceVolume(*given, sample_distance=step, skip_empty=skip_empty)
             self._media[step, skip_empty] = medium
-        return raycast_medium(self._media[step, skip_empty], FrameRequest(camera, self.size))
+        return self._media[step, skip_empty]
 
     def _open_vtk(self, volume_property: Any) -> None:
         from pyvista_vdi.measure.vtk_baselines import (

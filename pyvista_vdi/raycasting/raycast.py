@@ -72,14 +72,14 @@ def checked_vdi(vdi: Any) -> VDI:
 def draw(
     prepared: PreparedVDI, request: FrameRequest, image: DeviceBuffer, hit: FirstHit | None = None
 ) -> None:
-    """Draw a frame into ``image``, float32 (H, W, 4) on the device, and wait for it.
+    """Enqueue the drawing of a frame into ``image``, float32 (H, W, 4) on the device.
 
     With ``hit``, t of each ray's first hit in its place, float32 (H, W).
     """
     scene = Scene.of(prepared, request, hit)
+    # Buffers that are host memory in use are waited for when they are released
     with scene.on_device() as (forms, ends):
         enqueue(scene, scene.walk_arguments(forms, ends, has_ends=scene.ends is not None), image)
-        prepared.runtime.finish()  # the buffers above may be host memory in use
 
 
 def enqueue(scene: Scene, walk: tuple[Any, ...], image: DeviceBuffer) -> None:

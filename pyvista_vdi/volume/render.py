@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import get_runtime
+from pyvista_vdi.device import DeviceBuffer, get_runtime
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.work_order import block_items
 from pyvista_vdi.model.camera import Camera
@@ -110,6 +110,19 @@ def raycast_medium(
     ``lit_from`` is the view that decides the light of a shaded volume in place of the request's.
     A cutoff of 0 ends no ray.
     """
+    with medium.runtime.result((*request.size[::-1], 4), name="image") as image:
+        draw_medium(medium, request, image, lit_from=lit_from)
+        return medium.runtime.download(image)
+
+
+def draw_medium(
+    medium: DeviceVolume,
+    request: FrameRequest,
+    image: DeviceBuffer,
+    *,
+    lit_from: Camera | None = None,
+) -> None:
+    """Enqueue the rendering of a frame into ``image``, float32 (H, W, 4) on the device."""
     runtime, camera, options = medium.runtime, request.camera, request.options
     width, height = size = request.size
     clipped = ClippedRays(medium, request)
@@ -126,7 +139,6 @@ def raycast_medium(
         form_buffer = keep(runtime.upload(clipped.forms, "rays"))
         no_ends = np.zeros(1, np.float32)
         depth = keep(runtime.upload(no_ends if ends is None else ends, "opaque depth"))
-        image = keep(runtime.result((height, width, 4), name="image"))
         begin = (
             form_buffer,
             np.int32(clipped.planes),
@@ -177,4 +189,3 @@ def raycast_medium(
                     sampled = sampler.sample(first_row, now, first_step, _PART_STEPS)
                     part = (np.int32(n) for n in (first_row, now, first_step, _PART_STEPS))
                     launch(block_items(width, now), sampled, (*part, states))
-        return runtime.download(image)

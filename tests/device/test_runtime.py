@@ -134,6 +134,17 @@ def test_build_error_inside_an_include_names_the_include(runtime, texts):
         runtime.kernel("lib/probe.cl", "nix")
 
 
+def test_lines_of_the_whole_source_become_places(texts):
+    """NVIDIA's compiler heeds no #line marks."""
+    texts["common/wrong.cl"] = "\nfloat wrong(void) { return missing_name; }\n"
+    texts["vdi/outer.cl"] = '// head\n#include "common/wrong.cl"\n__kernel void k() {}\n'
+    source = sources.expand("vdi/outer.cl")
+    at = 1 + source.split("\n").index("float wrong(void) { return missing_name; }")
+    log = f"<kernel>:{at}:28: error: use of undeclared identifier\n<kernel>:999:1: note"
+    assert programs._placed(log, source).startswith("common/wrong.cl:2:28: error")
+    assert "<kernel>:999" in programs._placed(log, source)
+
+
 def test_programs_are_built_once_per_source_and_defines(runtime, scale_file, monkeypatch):
     built = []
     build = programs.build

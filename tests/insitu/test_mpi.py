@@ -114,6 +114,7 @@ class OneRank:
 
 @pytest.fixture
 def scene(default_runtime):
+    pytest.importorskip("pyvista")  # its colour maps
     volume = volume_of("uint8")
     return volume, VIEWS["all of it"](volume), WINDOW
 

@@ -314,7 +314,7 @@ def test_random_vdis(runtime, kind):
         size = size if kind in ("same", "half") else (3 * size[0], 3 * size[1])
         image = assert_same_bits(runtime, vdi, camera, size, name=f"seed {seed}")
         drawn += (image[..., 3] > 0).sum()
-    assert drawn > 100
+    assert drawn > 20  # pixels; of windows of a few lists, see `half`, there are 40
 
 
 def test_rays_through_corners_of_tiles(runtime):

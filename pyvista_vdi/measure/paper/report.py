@@ -37,6 +37,7 @@ def describe(data: dict[str, Any]) -> str:
         *section("Table 1"),
         *table((*_ROW, *CANDIDATES.values(), *_FIGURES), _table1(data)),
         "",
+        *_queued(data),
         *section(
             "What each VDI takes",
             "Supersegments per list: the mean of lists that are not empty, and the longest. Raw: "
@@ -86,6 +87,36 @@ def _table1(data: dict[str, Any]) -> Iterator[list[str]]:
             number(found["worst_pixel"], ".1f"),
             number(vtk and vtk["ssim"], ".4f"),
         ]
+
+
+def _queued(data: dict[str, Any]) -> Iterator[str]:
+    """Yield frames per second of pictures that stay on the device, beside the paper's."""
+    views = [(row, paper) for row, paper in _views(data) if "queued_seconds" in row]
+    if not views:
+        return
+    yield from section(
+        "Frames that stay on the device",
+        f"Frames a second of {data['plan']['queued']} that are enqueued one after the other, each "
+        "of another view; in brackets, milliseconds that the driver's events say for the kernels. "
+        "Over volume: the VDI's better rate over `render_volume` without skipping, and the "
+        f"paper's ({paper_tables()['device']}).",
+    )
+    ours = list(CANDIDATES)[:4]
+    rows = []
+    for row, paper in views:
+        rates = {name: 1 / row["queued_seconds"][name] for name in ours}
+        kernels = {name: median(row["seconds"][name], "device") for name in ours}
+        rows.append(
+            [
+                *_named(row),
+                *(f"{rates[name]:.0f} ({milliseconds(kernels[name])})" for name in ours),
+                number(getattr(paper, "fps_skipping", None), ".0f"),
+                ratio(max(rates["vdi"], rates["vdi_skipping"]), rates["volume"]),
+                number(getattr(paper, "speed_up_skipping", None), ".1f"),
+            ]
+        )
+    heads = (*_ROW, *(CANDIDATES[name] for name in ours), "paper, f_e", "over volume", "paper")
+    yield from (*table(heads, rows), "")
 
 
 def _vdis(data: dict[str, Any]) -> Iterator[list[str]]:
