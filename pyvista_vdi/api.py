@@ -616,6 +616,7 @@ def estimate(
     criterion: str = "least-error",
     ambient_occlusion: Any = None,
     memory_limit: int | float | str | None = None,
+    device: Any = None,
     **classification: Any,
 ) -> Estimate:
     """Return how much memory generating a VDI takes, before it is taken.
@@ -634,6 +635,8 @@ def estimate(
         As for :func:`generate`.
     memory_limit : int, float or str, optional
         As for :func:`generate`; the volume's share is then what is left of it.
+    device : str, optional
+        As for :func:`generate`: a GPU makes more of a VDI at a time.
     **classification
         As for :func:`generate`: scalars whose range is narrow for how far it is from 0 take four
         bytes each.
@@ -647,6 +650,8 @@ def estimate(
     ------
     InvalidVolumeError, InvalidArgumentError
         If an argument cannot be used.
+    NoDeviceError
+        If there is no usable device, or not the one that was asked for.
     """
     looks = _looks(estimate, classification)
     volume = as_volume(volume, looks.scalars, looks.preference)
@@ -660,6 +665,7 @@ def estimate(
         ambient_occlusion=ambient_occlusion,
         memory_limit=memory_limit,
         transfer_function=looks.transfer_function(volume),
+        device=device,
     )
 
 

@@ -65,6 +65,7 @@ def generate(options: argparse.Namespace) -> int:
             ambient_occlusion=occlusion,
             memory_limit=options.memory_limit,
             transfer_function=looks.transfer_function(volume),
+            device=options.device,
         )
         needed = f"{width} x {height} lists: up to {most.total / 2**20:.0f} MiB"
     print(f"{nx} x {ny} x {nz} points, {needed}", file=sys.stderr)

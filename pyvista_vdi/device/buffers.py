@@ -18,6 +18,10 @@ from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentEr
 from pyvista_vdi.model.host_memory import HOST_ALIGNMENT
 
 
+#: Page-locked host memory that a device may have, and the least worth it, bytes.
+PINNED_BYTES, LEAST_PINNED = 256 * 2**20, 2**20
+
+
 @dataclass(frozen=True)
 class LocalMemory:
     """Local memory of a work-group, as a kernel argument.
@@ -37,6 +41,50 @@ def bytes_text(nbytes: int) -> str:
         if nbytes >= size:
             return f"{nbytes / size:.2f} {unit} ({nbytes} bytes)"
     return f"{nbytes} bytes"
+
+
+class PinnedArrays:
+    """Arrays in page-locked host memory, into which a GPU copies several times as fast.
+
+    Memory of an array that nobody has any more is given out again. It is scarce: what
+    :data:`PINNED_BYTES` has no room for is in ordinary memory.
+
+    Parameters
+    ----------
+    allocate : callable
+        Takes bytes and returns a uint8 array, and what gives its memory back.
+    """
+
+    def __init__(self, allocate: Callable[[int], tuple[NDArray[np.uint8], Callable[[], None]]]):
+        self._allocate = allocate
+        self._free: list[tuple[NDArray[np.uint8], Callable[[], None]]] = []
+        self._taken = 0  # bytes, those that are free included
+        self._lock = threading.Lock()
+
+    def empty(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
+        """Return an uninitialised array, ordinary memory where there is no room."""
+        nbytes = math.prod(shape) * dtype.itemsize
+        with self._lock:
+            places = (k for k, (memory, _) in enumerate(self._free) if memory.nbytes == nbytes)
+            place = next(places, None)
+            if place is not None:
+                block = self._free.pop(place)
+            else:
+                while self._free and self._taken + nbytes > PINNED_BYTES:
+                    memory, release = self._free.pop(0)
+                    self._taken -= memory.nbytes
+                    release()
+                if self._taken + nbytes > PINNED_BYTES:
+                    return np.empty(shape, dtype)
+                try:
+                    block = self._allocate(nbytes)
+                except DeviceMemoryError:
+                    return np.empty(shape, dtype)
+                self._taken += nbytes
+        # Views have this array as their base, so that it lives as long as they do
+        array = np.frombuffer(memoryview(block[0]), dtype)
+        weakref.finalize(array, self._free.append, block).atexit = False
+        return array.reshape(shape)
 
 
 class GrowingArray:

@@ -23,7 +23,14 @@ from pyvista_vdi.device.arguments import (
     preferred_group,
     set_arguments,
 )
-from pyvista_vdi.device.buffers import DeviceBuffer, Ledger, bytes_text, shape_of
+from pyvista_vdi.device.buffers import (
+    LEAST_PINNED,
+    DeviceBuffer,
+    Ledger,
+    PinnedArrays,
+    bytes_text,
+    shape_of,
+)
 from pyvista_vdi.device.devices import Candidate, DeviceInfo, drivers_lost, opencl
 from pyvista_vdi.device.profiling import KernelTime, Profile, profiling_wanted, table
 from pyvista_vdi.device.programs import Define, Kernel, ProgramCache
@@ -37,6 +44,8 @@ _COPY_BYTES = 4 * 2**20
 _FIRST_GROUPS = 4
 #: Where the driver chooses work-groups, pieces are a multiple of as much of this as divides all.
 _FREE_STEP = 256
+#: Bytes of the largest results whose memory on a GPU is kept for the next ones.
+MOST_POOLED = 64 * 2**20
 
 
 class Runtime:
@@ -75,6 +84,7 @@ class Runtime:
             self.preferred_group = preferred_group(self._device, self.is_cpu)
         self._programs = ProgramCache(self._context, self._device)
         self._ledger = Ledger(candidate.info.full_name)
+        self._pinned = PinnedArrays(self._pin)
         self._turns = Turns()
         self._local = threading.local()
         self._queues: dict[int, Any] = {}  # those that exist, numbered as they were made
@@ -85,6 +95,8 @@ class Runtime:
             self._profile = Profile()
             atexit.register(self._print_profile)
         self._main_queue = self._new_queue()
+        # Of pictures: to allocate one anew for each frame takes a GPU longer than to draw it
+        self._pool = opencl().tools.MemoryPool(opencl().tools.ImmediateAllocator(self._queue))
 
     def __repr__(self) -> str:
         return f"<Runtime on {self.info.full_name}>"
@@ -296,9 +308,12 @@ class Runtime:
         """
         dtype = np.dtype(dtype)
         shape = shape_of(shape, dtype)
-        if not self.is_cpu or 0 in shape:
-            return self.buffer(shape, dtype, name)
         flags = opencl().mem_flags
+        if not self.is_cpu or 0 in shape:
+            pooled = not lasting and 0 not in shape
+            return self._allocate(
+                flags.READ_WRITE, shape, dtype, name, None, writable=True, pooled=pooled
+            )
         access = flags.READ_WRITE | flags.USE_HOST_PTR
         return self._allocate(access, shape, dtype, name, None, writable=True, lasting=lasting)
 
@@ -435,7 +450,9 @@ class Runtime:
         if out is None and count is None and buffer.host is not None:
             out = buffer.host
         if out is None:
-            out = np.empty(buffer.shape if count is None else count, buffer.dtype)
+            shape = buffer.shape if count is None else (count,)
+            pins = not self.is_cpu and buffer.nbytes >= LEAST_PINNED and self._turns.worker is None
+            out = (self._pinned.empty if pins else np.empty)(shape, buffer.dtype)
         check_host_array(out, buffer, elements if count is None else count)
         if not out.flags.writeable:
             raise InvalidArgumentError(f"the target for {buffer.name!r} is not writable")
@@ -574,6 +591,21 @@ class Runtime:
         """The most bytes that were held at once."""
         return self._ledger.peak
 
+    def _pin(self, nbytes: int) -> tuple[NDArray[np.uint8], Callable[[], None]]:
+        """Return page-locked host memory, and what gives it back."""
+        cl = opencl()
+        flags = cl.mem_flags.READ_WRITE | cl.mem_flags.ALLOC_HOST_PTR
+        with self._driver(f"allocating {bytes_text(nbytes)} of page-locked host memory"):
+            memory = cl.Buffer(self._context, flags, nbytes)
+            access = cl.map_flags.READ | cl.map_flags.WRITE
+            mapped, _ = cl.enqueue_map_buffer(self._queue, memory, access, 0, (nbytes,), np.uint8)
+
+        def release() -> None:
+            mapped.base.release(self._queue)
+            memory.release()
+
+        return mapped, release
+
     def _allocate(
         self,
         flags: int,
@@ -584,6 +616,7 @@ class Runtime:
         *,
         writable: bool,
         lasting: bool = False,
+        pooled: bool = False,
     ) -> DeviceBuffer:
         cl = opencl()
         nbytes = int(np.prod(shape, dtype=object)) * dtype.itemsize
@@ -605,7 +638,9 @@ class Runtime:
                         "window size or max_supersegments"
                     ) from exc
             with self._driver(f"allocating {bytes_text(nbytes)} for the buffer {name!r}"):
-                if host is None or nbytes == 0:
+                if pooled and nbytes <= MOST_POOLED:
+                    memory = self._pool.allocate(nbytes)
+                elif host is None or nbytes == 0:
                     flags &= ~cl.mem_flags.COPY_HOST_PTR
                     memory = cl.Buffer(self._context, flags, size=taken)
                 else:

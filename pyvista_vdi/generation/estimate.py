@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pyvista_vdi.device import get_runtime
 from pyvista_vdi.generation.list_arrays import SUPERSEGMENT_BYTES
 from pyvista_vdi.generation.slices import Slices
 from pyvista_vdi.model.camera import check_window_size
@@ -50,17 +51,18 @@ def estimate(
     options: GenerationOptions | None = None,
     *,
     transfer_function: TransferFunction | None = None,
+    device: Any = None,
     **changes: Any,
 ) -> Estimate:
     """State the memory that :func:`~pyvista_vdi.generation.generate.generate_vdi` takes.
 
     Scalars whose range is narrow for how far it is from 0 are taken relative to it, which takes 4
     bytes a voxel on the device, and as much on the host while they are scaled. Without a transfer
-    function they are taken to be read as they are.
+    function they are taken to be read as they are. A GPU makes larger slices of a VDI at a time.
     """
     options = GenerationOptions.of(options, changes)
     width, height = size = check_window_size(window_size)
-    slices = Slices(size, options)
+    slices = Slices(get_runtime(device), size, options)
     nbytes = volume.array.size * voxel_bytes(volume, transfer_function)
     on_device, samples = volume_bytes(volume, nbytes, slices.room(volume))
     return Estimate(

@@ -85,7 +85,7 @@ def generate_vdi(
     width, height = size = check_window_size(window_size)
     require_room(0, size)
     runtime = get_runtime(device)
-    slices = Slices(size, options)
+    slices = Slices(runtime, size, options)
     medium = DeviceVolume(runtime, volume, transfer_function, options, room=slices.room(volume))
     with (
         medium.giving_bricks_back(),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from pyvista_vdi.device import Runtime
 from pyvista_vdi.device.constants import ERRORS_AT_A_TIME, RUN_WORDS
 from pyvista_vdi.device.work_order import block_items
 from pyvista_vdi.generation.list_arrays import SUPERSEGMENT_BYTES, blocks_to_sum
@@ -16,8 +17,10 @@ from pyvista_vdi.volume.bricks import Room
 CHUNK_STEPS = 128
 #: Bytes of one recorded run on the device, and of its merge error.
 _RUN_BYTES = (RUN_WORDS + 1) * 4
-#: Bytes of runs that one slice of rays records at a time; also how often progress is reported.
+#: Bytes of runs that one slice of rays records at a time; also how often progress is reported. On a
+#: GPU a share of its memory: a window's rays are few for one (docs/decisions/gpu.md).
 _SLICE_BYTES = 96 * 2**20
+_SLICES_IN_GPU = 16
 #: Slices that a memory limit has room for: the volume gets more than they do.
 _SLICES_IN_LIMIT = 4
 #: Runs that a ray's record keeps for the criteria other than least error: more than a ray through
@@ -38,6 +41,8 @@ class Slices:
 
     Parameters
     ----------
+    runtime : Runtime
+        The device.
     size : (int, int)
         Lists along the window's width and height.
     options : GenerationOptions
@@ -60,7 +65,11 @@ class Slices:
     """
 
     def __init__(
-        self, size: tuple[int, int], options: GenerationOptions, more: int = CHUNK_STEPS
+        self,
+        runtime: Runtime,
+        size: tuple[int, int],
+        options: GenerationOptions,
+        more: int = CHUNK_STEPS,
     ) -> None:
         limit = options.max_supersegments
         # Twice the budget: the records' thresholds then stay well below the final merges' errors
@@ -72,6 +81,8 @@ class Slices:
         self.capacity = -(-self.capacity // ERRORS_AT_A_TIME) * ERRORS_AT_A_TIME
         width, self._height = size
         most = _SLICE_BYTES
+        if not runtime.is_cpu:
+            most = max(most, runtime.info.global_memory // _SLICES_IN_GPU)
         if options.memory_limit is not None:
             most = min(most, options.memory_limit // _SLICES_IN_LIMIT)
         per_block_row = block_items(width, 4) * self.capacity * _RUN_BYTES

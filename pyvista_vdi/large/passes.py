@@ -386,7 +386,7 @@ class _Marched:
     def lists(self, light: NDArray[np.float16]) -> Piece:
         """Return the lists of the window's rays."""
         task, runtime, medium = self._task, self._runtime, self._medium
-        slices = Slices(self._size, task.options)
+        slices = Slices(runtime, self._size, task.options)
         counts, runs = [], []
         with (
             runtime.upload(light.astype(np.float32), "light that enters") as entering,
@@ -446,8 +446,8 @@ def _merged(task: Task, runtime: Runtime, y0: int, y1: int, pieces: list[Piece])
     window, options = Rectangle(0, width, y0, y1), task.options
     longest = options.max_supersegments
     if options.criterion != "least-error":  # what blocks record is cut when all of it is together
-        longest = Slices((width, y1 - y0), options).kept
-    slices = Slices((width, y1 - y0), options, max(CHUNK_STEPS, longest))
+        longest = Slices(runtime, (width, y1 - y0), options).kept
+    slices = Slices(runtime, (width, y1 - y0), options, max(CHUNK_STEPS, longest))
     medium = task.rays()
     with (
         Records(runtime, medium, task.camera, task.size, slices, options, window) as records,

@@ -59,6 +59,9 @@ WARM_UP_SIZE = (64, 36)
 #: and what it is filled from.
 _VTK_COPIES = 2
 
+#: Repetitions of frames that are enqueued at once.
+_QUEUES = 3
+
 #: What makes a row that says why it has no figures.
 REFUSALS = (VDIError, MemoryError)
 
@@ -476,7 +479,7 @@ class Bench:
         steps["volume_skipping"] = partial(self._volume_frame, camera, self.voxel)
         return steps | {name: partial(self._vtk_frame, name, camera) for name in self.vtk}
 
-    def queued(self, vdi: VDI, camera: Camera, count: int, repeats: int) -> dict[str, float]:
+    def queued(self, vdi: VDI, camera: Camera, count: int) -> dict[str, float]:
         """Return the median seconds of a frame of ours of which ``count`` are enqueued at once.
 
         Each of another view, a ten-thousandth of a degree on, and left on the device: what the
@@ -500,7 +503,7 @@ class Bench:
                 "volume": partial(frames, draw_medium, media[False], plain),
                 "volume_skipping": partial(frames, draw_medium, media[True], requests),
             }
-            times = take_turns(work, repeats)
+            times = take_turns(work, _QUEUES, warm_up=False)
         return {name: statistics.median(taken["clock"]) / count for name, taken in times.items()}
 
     def _vtk_frame(self, name: str, camera: Camera) -> None:

@@ -267,8 +267,7 @@ class _Rows:
     def _queued(self, bench: Bench, vdi: VDI, camera: Camera) -> dict[str, Any]:
         if not self._plan.queued:
             return {}
-        count, repeats = self._plan.queued, self._plan.repeats
-        return {"queued_seconds": bench.queued(vdi, camera, count, repeats)}
+        return {"queued_seconds": bench.queued(vdi, camera, self._plan.queued)}
 
     def _preview_row(self, case: Case) -> dict[str, Any]:
         """Keep each target rate of the paper's Table 2 in both ways, and look at the pictures."""
