@@ -431,7 +431,8 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
         parser,
         "--profile",
         "quick (default): small volumes, minutes; full: the paper's sizes and all volumes at "
-        "hand, hours",
+        "hand, hours; gpu: the paper's cells, frames that stay on the device, too, minutes on a "
+        "data centre's",
         choices=("quick", "full", "gpu"),
         default="quick",
     )

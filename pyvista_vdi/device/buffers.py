@@ -17,7 +17,6 @@ from numpy.typing import DTypeLike, NDArray
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.model.host_memory import HOST_ALIGNMENT
 
-
 #: Page-locked host memory that a device may have, and the least worth it, bytes.
 PINNED_BYTES, LEAST_PINNED = 256 * 2**20, 2**20
 
@@ -82,7 +81,7 @@ class PinnedArrays:
                     return np.empty(shape, dtype)
                 self._taken += nbytes
         # Views have this array as their base, so that it lives as long as they do
-        array = np.frombuffer(memoryview(block[0]), dtype)
+        array = np.frombuffer(memoryview(block[0]), dtype)  # type: ignore[arg-type]
         weakref.finalize(array, self._free.append, block).atexit = False
         return array.reshape(shape)
 

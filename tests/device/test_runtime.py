@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -132,6 +134,15 @@ def test_build_error_inside_an_include_names_the_include(runtime, texts):
         runtime.kernel("vdi/outer.cl", "k")
     with pytest.raises(KernelBuildError, match="has no kernel 'nix'.*it has: probe"):
         runtime.kernel("lib/probe.cl", "nix")
+
+
+def test_kernels_keep_to_what_every_compiler_takes():
+    """OpenCL C has no macros of any number of arguments; NVIDIA's compiler refuses them."""
+    folder = resources.files("pyvista_vdi.opencl")
+    kernels = [path for room in folder.iterdir() if room.is_dir() for path in room.iterdir()]
+    texts = {path.name: path.read_text() for path in kernels if path.name.endswith(".cl")}
+    assert len(texts) > 40
+    assert not [name for name, text in texts.items() if re.search(r"\.\.\.\)|__VA_ARGS__", text)]
 
 
 def test_lines_of_the_whole_source_become_places(texts):

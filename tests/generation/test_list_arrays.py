@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
@@ -12,6 +13,8 @@ from pyvista_vdi.device import GrowingArray, Runtime
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.generation.list_arrays import growing_lists
 from pyvista_vdi.generation.march import March
+from pyvista_vdi.generation.slices import Slices
+from pyvista_vdi.model.options import GenerationOptions
 
 #: Looks past the volume, so that first all and then no lists have something in them.
 HALF_BESIDE = Camera((3.5, -4.0, 30), (3.5, -4.0, 3.5), (0, 1, 0))
@@ -93,3 +96,18 @@ def test_offsets_that_no_buffer_holds_are_copied(monkeypatch, runtime):
         with growing_lists(runtime, (1000, 10), 2, 16):
             holds = most == 80008 and runtime.in_place_alignment is not None
             assert ("list offsets" in in_place) == holds
+
+
+def test_a_gpu_makes_larger_slices():
+    """As many rays at a time as a sixteenth of its memory holds, but no more than are allowed."""
+
+    def rows(is_cpu, memory, **options):
+        device = SimpleNamespace(is_cpu=is_cpu, info=SimpleNamespace(global_memory=memory))
+        return Slices(device, (1280, 720), GenerationOptions(**options)).rows
+
+    on_cpu = rows(True, 2**37)
+    assert on_cpu < 720 / 20
+    assert rows(False, 2**37) == 720
+    assert rows(False, 2**33) == pytest.approx(on_cpu * 2**29 / (96 * 2**20), abs=8)
+    assert rows(False, 2**30) == on_cpu
+    assert rows(False, 2**37, memory_limit="64 MiB") < on_cpu

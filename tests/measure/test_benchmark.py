@@ -75,6 +75,19 @@ def test_either_table_can_be_left_out(tables, whats, default_runtime, tmp_path):
     assert found == ["volume", *whats]
 
 
+def test_frames_that_stay_on_the_device(default_runtime, tmp_path, monkeypatch):
+    monkeypatch.setitem(PROFILES, "gpu", {**PROFILES["gpu"], "queued": 3})
+    out = tmp_path / "gpu.json"
+    run = ("--profile", "gpu", *TINY_RUN, "--angles", "5", "--no-vtk", "--tables", "1")
+    assert benchmark(*run, "--out", out) == 0
+    (row,) = checked(out).rows(what="view")
+    assert set(row["queued_seconds"]) == set(row["seconds"])
+    assert all(0 < seconds < 60 for seconds in row["queued_seconds"].values())
+    text = out.with_suffix(".md").read_text()
+    table = text[text.index("## Frames that stay on the device") :]
+    assert f"\n| {TINY} | 16x12 | 4 | 5 | " in table
+
+
 @pytest.mark.gl
 def test_vtk_takes_part_and_draws_the_same(default_runtime, tmp_path):
     out = tmp_path / "vtk.json"

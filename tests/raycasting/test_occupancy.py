@@ -206,6 +206,12 @@ def test_the_occupied_share_is_that_within_the_bounds(runtime):
     grid, _, occupied = grid_of(runtime, vdi)
     assert occupied.sum() == 4 * 32
     assert grid.occupied == pytest.approx(1 / 2)
+    assert grid.worthwhile == runtime.is_cpu
+    runtime.is_cpu, is_cpu = not runtime.is_cpu, runtime.is_cpu
+    try:
+        assert grid_of(runtime, vdi)[0].worthwhile == runtime.is_cpu
+    finally:
+        runtime.is_cpu = is_cpu
 
 
 BEHIND = {"camera": Camera((0, 0, 5), (0, 0, 10), (0, 1, 0)), "bounds": (-1, 1, -1, 1, -1, 1)}

@@ -39,6 +39,7 @@ from pyvista_vdi.measure.paper.datasets import (
 )
 from pyvista_vdi.measure.paper.published import paper_targets
 from pyvista_vdi.measure.results import Results
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.frame_rate import FrameRateController
