@@ -3,7 +3,8 @@
 Whole frames of off-screen plotters at PyVista's defaults, `add_vdi(draw="vdi")` beside
 `add_volume` with each of VTK's mappers and the same arguments, from V_O, 5 and 30 degrees; the same
 without multisampling; and the raycast alone: ours until the picture is on the host, VTK's mappers
-in windows of their own without multisampling, at steps of one voxel.
+in windows of their own without multisampling, at steps of one voxel. How alike the pictures of
+whole frames are says an SSIM of their 8-bit pixels: the mappers choose their steps themselves.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from typing import Any
 
+import numpy as np
 import pyvista as pv
 from shared import benches, execute, load, mean_of, parser_of  # beside this file
 
@@ -23,6 +25,7 @@ from pyvista_vdi.measure.harness import ROOMS, Case, Latest
 from pyvista_vdi.measure.report import table
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import ANGLES, TRANSFER_FUNCTIONS, filling_camera
 from pyvista_vdi.plotting.convert import to_image_data
 from pyvista_vdi.vtk_pipeline.filters.view import aim
@@ -52,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         def measure(case: Case) -> dict[str, Any]:
             if case.what != ALONE:
                 volume = volumes(case.volume)
-                return {"seconds": whole_frames(volume, case, options.repeats, options.device)}
+                return whole_frames(volume, case, options.repeats, options.device)
             bench = bench_of(case.volume, case.look)
             vdi, seconds = bench.generate(), {}
             for angle in ANGLES:
@@ -76,7 +79,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def whole_frames(volume: Any, case: Case, repeats: int, device: Any) -> dict[str, Any]:
-    """Return seconds of plotters' frames, by who draws the volume and by angle, in turns."""
+    """Return seconds of plotters' frames, by who draws the volume and by angle, in turns.
+
+    And the SSIM, by angle, of what `add_vdi` and `add_volume` with VTK's GPU mapper show.
+    """
     grid, view = to_image_data(volume), filling_camera(volume.bounds, case.window_size)
     look = {**TRANSFER_FUNCTIONS[case.look or ""], "show_scalar_bar": False}
     # All rays, and this VDI alone, however long a frame takes
@@ -106,7 +112,17 @@ def whole_frames(volume: Any, case: Case, repeats: int, device: Any) -> dict[str
                     taken = frame(plotter, view.azimuth(angle + TURN * repeat))
                     if repeat:
                         seconds[name][f"{angle:g}"].append(taken)
-    return seconds
+        alike = {}
+        for angle in ANGLES:
+            pictures = [shown(plotters[name], view.azimuth(angle)) for name in ("vdi", "vtk_gpu")]
+            alike[f"{angle:g}"] = compare_images(*pictures).ssim
+    return {"seconds": seconds, "ssim": alike}
+
+
+def shown(plotter: pv.Plotter, camera: Camera) -> Any:
+    """Return what a plotter shows from a view, RGB (H, W, 3), 0 to 1."""
+    frame(plotter, camera)
+    return np.float32(plotter.screenshot(return_img=True)[..., :3]) / 255
 
 
 def frame(plotter: pv.Plotter, camera: Camera) -> float:
@@ -143,7 +159,9 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
                 for taken in named.values()
             ]
             speeds = [f"{times_as_fast(row, angle):.2g}" for angle in angles]
-            rows.append([row["case"]["volume"], *speeds, *times])
+            alike = row.get("ssim")
+            alike = [f"{alike[angle]:.3f}" if alike else "-" for angle in angles]
+            rows.append([row["case"]["volume"], *speeds, *times, *alike])
         means = [
             mean_of(results, every, lambda row, a=angle: times_as_fast(row, a), what=what)
             for angle in angles
@@ -153,8 +171,10 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
         at_v_o = [
             f"{who}, ms at V_O" for who in ("VDI", "VTK GPU", "VTK fixed point", "empty scene")
         ]
+        last = [f"SSIM, {head}" for head in heads]
         yield from table(
-            ["volume", *heads, *at_v_o], [*rows, ["mean of all", *map(str, means), *["-"] * 4]]
+            ["volume", *heads, *at_v_o, *last],
+            [*rows, ["mean of all", *map(str, means), *["-"] * 7]],
         )
         yield ""
 
