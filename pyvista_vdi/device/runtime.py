@@ -44,8 +44,8 @@ _COPY_BYTES = 4 * 2**20
 _FIRST_GROUPS = 4
 #: Where the driver chooses work-groups, pieces are a multiple of as much of this as divides all.
 _FREE_STEP = 256
-#: Bytes of the largest results whose memory on a GPU is kept for the next ones.
-MOST_POOLED = 64 * 2**20
+#: Bytes of the largest results whose memory on a GPU is kept for the next ones, and how many.
+MOST_POOLED, BLOCKS_HELD = 64 * 2**20, 4
 
 
 class Runtime:
@@ -639,6 +639,8 @@ class Runtime:
                     ) from exc
             with self._driver(f"allocating {bytes_text(nbytes)} for the buffer {name!r}"):
                 if pooled and nbytes <= MOST_POOLED:
+                    if self._pool.held_blocks > BLOCKS_HELD:  # of windows that were larger once
+                        self._pool.free_held()
                     memory = self._pool.allocate(nbytes)
                 elif host is None or nbytes == 0:
                     flags &= ~cl.mem_flags.COPY_HOST_PTR
