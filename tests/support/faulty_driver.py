@@ -116,7 +116,8 @@ def state_of(runtime):
     objects = gc.get_objects()
     living = (o for o in objects if type(o) is DeviceBuffer and not o.released)
     buffers = sorted((o.name, o.nbytes) for o in living)
-    queues = sum(isinstance(o, devices.opencl().CommandQueue) for o in objects)
+    # By type: to ask a proxy whose object is gone raises
+    queues = sum(issubclass(type(o), devices.opencl().CommandQueue) for o in objects)
     return buffers, runtime.allocated, queues
 
 
