@@ -110,5 +110,11 @@ def filling_camera(
     signs = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)]) * 2 - 1
     x, y, z = towards.axes @ (signs * half).T
     t_x, t_y = (t * (1 - _MARGIN) for t in towards.half_extent((width, height)))
-    distance = float(np.max(np.maximum(np.abs(x) / t_x, np.abs(y) / t_y) - z))
+    with np.errstate(all="ignore"):
+        distance = float(np.max(np.maximum(np.abs(x) / t_x, np.abs(y) / t_y) - z))
+    if not math.isfinite(distance):
+        raise InvalidArgumentError(
+            f"view_angle {view_angle!r} is too narrow: no eye is far enough away to see the bounds "
+            "whole; choose a wider one"
+        )
     return towards.replace(position=centre + to_eye * distance)

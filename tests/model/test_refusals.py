@@ -327,6 +327,7 @@ REFUSED = {
         ({"bounds": (1,) * 6}, "are a point"),
         ({"elevation": 90}, "elevation must lie between -90 and 90"),
         ({"view_angle": 180}, "view_angle must lie between 0 and 180"),
+        ({"view_angle": 5e-324}, "view_angle 5e-324 is too narrow"),
     ],
     lists_of_a_window: each("got 0 x 1", (0, 1)),
     covering_lists: [((0,), "max_lists_per_pixel must be positive; got 0")],
