@@ -18,12 +18,13 @@ _LATE = 0.05
 class SlowLine:
     """Forwards connections to a port at so many bytes a second, so many seconds later.
 
-    ``port`` is where it listens.
+    ``port`` is where it listens, ``down`` the bytes that came from the other port so far.
     """
 
     def __init__(self, to, *, rate, latency):
         self._to, self._rate, self._latency = to, rate, latency
         self._ends = []
+        self.down = 0
 
     async def __aenter__(self):
         self._server = await asyncio.start_server(self._connected, "127.0.0.1", 0)
@@ -44,9 +45,9 @@ class SlowLine:
         there, back = await asyncio.open_connection(sock=way, limit=_PIECE)
         self._ends += [writer, back]
         with contextlib.suppress(ConnectionError, asyncio.CancelledError):
-            await asyncio.gather(self._carry(there, writer), self._carry(reader, back))
+            await asyncio.gather(self._carry(there, writer, down=True), self._carry(reader, back))
 
-    async def _carry(self, reader, writer):
+    async def _carry(self, reader, writer, *, down=False):
         loop = asyncio.get_running_loop()
         line = asyncio.Queue(max(1, int(self._rate * self._latency / _PIECE)))  # what is on it
 
@@ -64,6 +65,7 @@ class SlowLine:
             while data := await reader.read(_PIECE):
                 # Not from now on: sleeps last longer than asked for, which would slow the line
                 free = max(free, loop.time() - _LATE) + len(data) / self._rate
+                self.down += len(data) * down
                 await line.put((free + self._latency, data))
                 await asyncio.sleep(max(0.0, free - loop.time()))
             await line.put(None)
