@@ -432,7 +432,7 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
         "--profile",
         "quick (default): small volumes, minutes; full: the paper's sizes and all volumes at "
         "hand, hours; gpu: the paper's cells, frames that stay on the device, too, minutes on a "
-        "data centre's",
+        "data centre's GPU",
         choices=("quick", "full", "gpu"),
         default="quick",
     )

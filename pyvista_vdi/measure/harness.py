@@ -492,9 +492,11 @@ class Bench:
         media = {skips: self._medium(self.voxel, skip_empty=skips) for skips in (False, True)}
         with self.runtime.buffer((*self.size[::-1], 4), name="image") as image:
 
-            def frames(draw: Callable[..., None], of: Any, asked: Sequence[FrameRequest]) -> None:
+            def frames(
+                enqueue: Callable[..., None], of: Any, asked: Sequence[FrameRequest]
+            ) -> None:
                 for request in asked:
-                    draw(of, request, image)
+                    enqueue(of, request, image)
                 self.runtime.finish()
 
             work: dict[str, Step] = {

@@ -39,7 +39,6 @@ from pyvista_vdi.measure.paper.datasets import (
 )
 from pyvista_vdi.measure.paper.published import paper_targets
 from pyvista_vdi.measure.results import Results
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.frame_rate import FrameRateController
@@ -145,6 +144,11 @@ class Plan:
         return plain
 
 
+_AT_THE_PAPERS_SIZES: Mapping[str, Any] = {
+    "datasets": ("kingsnake_like", "beechnut_like", "richtmyer_meshkov_like"),
+    "preview": ("beechnut_like", SIZES[1], 15, 30.0),
+}
+
 #: Arguments of :class:`Plan` by the name of a profile. ``full`` also takes every volume in the
 #: folder that ``PYVISTA_VDI_DATA`` names.
 PROFILES: Mapping[str, Mapping[str, Any]] = {
@@ -159,17 +163,9 @@ PROFILES: Mapping[str, Mapping[str, Any]] = {
         "generations": 1,
         "preview": ("beechnut_like@4", SIZES[0], 15, 30.0),
     },
-    "full": {
-        "datasets": ("kingsnake_like", "beechnut_like", "richtmyer_meshkov_like"),
-        "preview": ("beechnut_like", SIZES[1], 15, 30.0),
-    },
+    "full": _AT_THE_PAPERS_SIZES,
     # The paper's cells, sized for five minutes on a data centre's GPU
-    "gpu": {
-        "datasets": ("kingsnake_like", "beechnut_like", "richtmyer_meshkov_like"),
-        "angles": (0.0, 5.0, 30.0),
-        "preview": ("beechnut_like", SIZES[1], 15, 30.0),
-        "queued": 200,
-    },
+    "gpu": {**_AT_THE_PAPERS_SIZES, "angles": (0.0, 5.0, 30.0), "queued": 200},
 }
 
 
@@ -256,19 +252,14 @@ class _Rows:
         bench, vdi, _ = self._made(case)
         camera = case.camera(bench.view)
         reference, near_vtk = bench.reference(camera), bench.near_vtk(camera)
-        frames = bench.frames(camera, vdi)
+        frames, count = bench.frames(camera, vdi), self._plan.queued
         return {
             "vdi_to_volume": accuracy(bench.draw(vdi, camera), reference),
             "volume_to_vtk_gpu": near_vtk,
             "seconds": take_turns(frames, self._plan.repeats, runtime=self._runtime),
-            **self._queued(bench, vdi, camera),
+            **({"queued_seconds": bench.queued(vdi, camera, count)} if count else {}),
             "left_out": {name: str(error) for name, error in bench.left_out.items()},
         }
-
-    def _queued(self, bench: Bench, vdi: VDI, camera: Camera) -> dict[str, Any]:
-        if not self._plan.queued:
-            return {}
-        return {"queued_seconds": bench.queued(vdi, camera, self._plan.queued)}
 
     def _preview_row(self, case: Case) -> dict[str, Any]:
         """Keep each target rate of the paper's Table 2 in both ways, and look at the pictures."""
