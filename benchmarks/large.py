@@ -118,7 +118,7 @@ def on_cluster(options: Any) -> dict[str, Any]:
         function = Classification(LOOKS, "a benchmark").transfer_function(volume)
         given = {"n_workers": 2, "threads_per_worker": 1, "memory_limit": WORKER_BYTES}
         with LocalCluster(dashboard_address=":0", **given) as cluster, Client(cluster) as client:
-            workers = list(client.scheduler_info()["workers"])
+            workers = list(client.nthreads())
             cores = sorted(os.sched_getaffinity(0))
             for k, at in enumerate(workers):
                 core = {cores[k % len(cores)]}

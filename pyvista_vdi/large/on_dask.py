@@ -17,7 +17,16 @@ from itertools import zip_longest
 from typing import Any
 
 import numpy as np
-from distributed import CancelledError, Client, Future, KilledWorker, as_completed, get_worker, wait
+from distributed import (
+    CancelledError,
+    Client,
+    Future,
+    KilledWorker,
+    Worker,
+    as_completed,
+    get_worker,
+    wait,
+)
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
@@ -137,12 +146,13 @@ class _Run:
         self._workers, self._device, self._progress = workers, device, progress
         self._token = uuid.uuid4().hex[:12]
         self._futures: list[Future[Any]] = []
-        known = client.scheduler_info(n_workers=-1)["workers"]
         # A worker that is started again has another address: tasks are tied to some only where
-        # others may not do them
+        # others may not do them. (Not asked of `scheduler_info`, whose answer the client replaces
+        # now and then by one without workers, from another thread.)
         some = {"workers": workers, "allow_other_workers": False}
-        self._where: dict[str, Any] = some if len(workers) < len(known) else {}
-        memory = sum(known[at]["memory_limit"] or np.inf for at in workers)
+        self._where: dict[str, Any] = some if len(workers) < len(client.nthreads()) else {}
+        limits = client.run(_memory_limit, workers=workers, on_error="ignore")
+        memory = sum(limit or np.inf for limit in limits.values())
         self._kept = volume.array.nbytes <= _SHARE_FOR_VALUES * memory
         self._done = 0.0
         self.counted: dict[str, int] = {}
@@ -309,8 +319,7 @@ class _Run:
             yield from done
 
     def _require_workers(self) -> None:
-        there = self._client.scheduler_info(n_workers=-1)["workers"]
-        if not set(there) & set(self._workers):
+        if not set(self._client.nthreads()) & set(self._workers):
             raise DeviceError(
                 f"the workers that may make the VDI are gone: {', '.join(self._workers)}"
             )
@@ -370,6 +379,11 @@ def _workers_with_device(
 
 def _device_name(device: Any) -> str:
     return get_runtime(device).info.name
+
+
+def _memory_limit(dask_worker: Worker) -> int | None:
+    """Return how many bytes a worker may take; Dask hands it in by the parameter's name."""
+    return dask_worker.memory_manager.memory_limit
 
 
 # What follows runs on workers

@@ -66,7 +66,7 @@ def test_whoever_makes_it_the_bytes_are_the_same(client, scene, expected):
     assert told == sorted(told)
     assert told[0] == 0
     assert told[-1] == pytest.approx(1)
-    one = list(client.scheduler_info()["workers"])[:1]
+    one = list(client.nthreads())[:1]
     check_same(generate_on_dask(*arguments, client=client, workers=one, **options), expected)
 
 
@@ -143,7 +143,7 @@ def test_what_cannot_be_read_is_named(client, scene):
 
 def test_workers_without_a_device_are_named(client, scene, expected):
     arguments, options = scene
-    workers = list(client.scheduler_info()["workers"])
+    workers = list(client.nthreads())
     before = os.environ.get("PYVISTA_VDI_DEVICE", "")
 
     def choose(name, only=None):
@@ -166,7 +166,7 @@ def test_workers_without_a_device_are_named(client, scene, expected):
 def test_nobody_waits_for_workers_that_are_gone(client, scene):
     arguments, options = scene
     client.wait_for_workers(2, timeout=STARTED)
-    one = list(client.scheduler_info()["workers"])[:1]
+    one = list(client.nthreads())[:1]
     pid = next(iter(client.run(os.getpid, workers=one).values()))
     progress = kill_once(lambda: pid, 0.2)
     with pytest.raises(DeviceError, match=f"are gone: {one[0]}"):
