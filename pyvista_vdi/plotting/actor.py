@@ -75,10 +75,10 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         """Return what is shown, and what of it the last frame drew."""
         if self.GetMapper() is None:
             return "PlotterVDIActor(without a mapper)"
-        if self.vdi is None:
-            return "PlotterVDIActor(makes its VDI in the first frame)"
-        hidden = "" if self.GetVisibility() else ", hidden"
-        return f"PlotterVDIActor({self.vdi!r}{hidden})"
+        vdi, hidden = self.GetMapper().GetVDI(), "" if self.GetVisibility() else ", hidden"
+        if vdi is None:
+            return f"PlotterVDIActor(a volume, of which actor.vdi makes a VDI{hidden})"
+        return f"PlotterVDIActor({vdi!r}{hidden})"
 
     def SetMapper(self, mapper: Any) -> None:  # noqa: N802
         """Set the mapper, and hold it: PyVista's lose their lookup table with the last reference.

@@ -114,7 +114,7 @@ class AddVDI(Component):
         coverage: Literal["bounds", "view"] = "bounds",
         target_fps: float | None = 30.0,
         regenerate: Policy = "auto",
-        regenerate_below: float = REGENERATE_BELOW,
+        regenerate_below: float | None = None,
         draw: Literal["auto", "vdi", "volume"] = "auto",
         status: bool = False,
         device: Any = None,
@@ -289,7 +289,8 @@ class AddVDI(Component):
         if target_fps is not None:
             checked_rate("target_fps", target_fps)
         checked_policy(regenerate)
-        checked_bound(regenerate_below)
+        if regenerate_below is not None:
+            checked_bound(regenerate_below)
         checked_draw(draw)
         dial = Dial.of(quality, target_ssim, full_fps, max_bytes, target_angle)
         options = GenerationOptions(
@@ -383,7 +384,8 @@ class AddVDI(Component):
         vdi_mapper.SetTargetFrameRate(target_fps)
         vdi_mapper.SetRegenerate(regenerate)
         if dial is not None and dial.ssim is not None:  # not above what the VDI is made for
-            regenerate_below = min(regenerate_below, max(0.0, dial.ssim - _BELOW_GOAL))
+            given = REGENERATE_BELOW if regenerate_below is None else regenerate_below
+            regenerate_below = min(given, max(0.0, dial.ssim - _BELOW_GOAL))
         vdi_mapper.SetRegenerateBelow(regenerate_below)
         vdi_mapper.SetDraw(draw)
         actor = self._actor(vdi_mapper, shown if several is None else several, prop, user_matrix)

@@ -21,6 +21,7 @@ from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_whole
+from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.metrics import SSIM_WINDOW, over_background
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
@@ -34,6 +35,7 @@ from pyvista_vdi.quality.tiles import (
     Floats,
     Region,
     TileSample,
+    contrast_ratio,
     seen_region,
     tiles_ssim,
 )
@@ -49,6 +51,9 @@ TILE_SIZE = 24
 
 #: Most pixels of a coarse picture in one launch, so that a frame does not wait long for its end.
 _COARSE_LAUNCH = 2048
+#: Rays along an edge of the window that tell what is covered, and by how much of V_O's window a
+#: point may lie outside of it by rounding.
+_COVERAGE_RAYS, _COVERAGE_SLACK = 33, 1e-5
 #: Distance of an eye from the centre, in diagonals of the bounds, below which it has no direction.
 _AT_CENTRE = 1e-6
 
@@ -70,6 +75,9 @@ class ViewError:
         Pixels per list, see :func:`magnification`.
     tiles : int
         Tiles that were rendered; 0 where the volume is not in view.
+    contrast : float
+        Of the VDI's picture within blocks of 4 x 4 pixels, over the volume's, in those tiles: below
+        1 where detail is missing, which SSIM hardly tells.
     """
 
     ssim: float
@@ -77,6 +85,7 @@ class ViewError:
     angle: float
     magnification: float
     tiles: int
+    contrast: float = 1.0
 
 
 def angle_from_generating_view(vdi: VDI, camera: Any) -> float:
@@ -146,6 +155,69 @@ def magnification(vdi: VDI, camera: Any, window_size: Sequence[int] | None = Non
     if pixel == math.inf:
         return 0.0
     return width / pixel
+
+
+def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
+    """Return the share of a view's rays through the volume that the VDI has all of.
+
+    Below 1 a part of the volume that the view shows lies outside V_O's window, or behind V_O's eye.
+
+    Parameters
+    ----------
+    vdi : VDI
+        Its camera and window say what it has.
+    camera : Camera or vtkCamera or pyvista.Camera
+        The new view V_N.
+    window_size : (int, int)
+        Width and height of its picture in pixels.
+
+    Returns
+    -------
+    float
+        0 to 1, of 33 x 33 rays that reach from edge to edge of the window, and of those through the
+        corners of the bounds; 1 where none of them meets the volume.
+
+    Notes
+    -----
+    V_O's window and what lies before its eye are convex: they contain a part of a ray if they
+    contain its two ends.
+    """
+    camera = Camera.from_any(camera)
+    to_window = camera.viewport_matrix(window_size) @ camera.model_to_view
+    u, v, _, w = to_window @ _homogeneous(bounds_corners(vdi.bounds))
+    before = w > 0
+    corners = np.stack([u[before], v[before]]) / w[before]
+    across = np.linspace(-1.0, 1.0, _COVERAGE_RAYS)
+    places = np.hstack([np.stack(np.meshgrid(across, across)).reshape(2, -1), corners])
+    places = places[:, (np.abs(places) <= 1).all(axis=0)]
+    # Points and directions in view space, taken to the model frame
+    to_model = np.linalg.inv(camera.model_to_view)
+    rays_of = np.vstack([np.ones(places.shape[1]), places]).T
+    origins, directions = (rays_of @ part for part in camera.ray_coefficients(window_size))
+    origins = (to_model @ _homogeneous(origins))[:3]
+    directions = to_model[:3, :3] @ directions.T
+    # The part of each that lies within the bounds, and before the eye
+    low, high = np.reshape(vdi.bounds, (3, 2)).T[:, :, np.newaxis]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.sort(np.stack([low - origins, high - origins]) / directions, axis=0)
+    ends = np.nan_to_num(ends, nan=0.0, posinf=np.inf, neginf=-np.inf)
+    first, last = ends[0].max(axis=0), ends[1].min(axis=0)
+    if not camera.parallel_projection:
+        first = np.maximum(first, 0.0)
+    meets = last > first
+    if not meets.any():
+        return 1.0
+    held = np.ones(np.count_nonzero(meets), dtype=bool)
+    to_lists = vdi.camera.viewport_matrix(vdi.window_size) @ vdi.camera.model_to_view
+    for end in (first, last):
+        points = origins[:, meets] + end[meets] * directions[:, meets]
+        u, v, _, w = to_lists @ _homogeneous(points.T)
+        held &= np.maximum(np.abs(u), np.abs(v)) <= w + _COVERAGE_SLACK * np.abs(w).max()
+    return float(held.mean())
+
+
+def _homogeneous(points: Floats) -> Floats:
+    return np.vstack([points.T, np.ones(len(points))])
 
 
 class ViewErrorEstimator:
@@ -279,8 +351,10 @@ class ViewErrorEstimator:
         tiles = self._sample(scene)
         if tiles is None:
             return ViewError(1.0, 0.0, *where, 0)
-        ssim = scene.tiles_ssim(tiles.corners, tiles.size)
-        return ViewError(*tiles.infer(ssim), *where, len(ssim))
+        old, new = scene.tiles(tiles)
+        ssim = tiles_ssim(old, new, background)
+        contrast = contrast_ratio(old, new, 1 / tiles.chances, background)
+        return ViewError(*tiles.infer(ssim), *where, len(ssim), contrast)
 
     def sample(self, vdi: VDI, camera: Camera, window_size: tuple[int, int]) -> TileSample | None:
         """Choose the tiles of a view, by a VDI that shows roughly where the error is.
@@ -361,16 +435,16 @@ class _Scene:
         )
         return old, new
 
-    def tiles_ssim(self, corners: NDArray[np.int64], tile_size: tuple[int, int]) -> Floats:
-        """Return the mean SSIM of each tile's inner pixels, float64 (n,)."""
-        width, height = tile_size
+    def tiles(self, sample: TileSample) -> tuple[list[Any], list[Any]]:
+        """Return each tile's pictures by VDI and volume, float32 (height, width, 4)."""
+        width, height = sample.size
         pairs = []
-        for column, row in corners.tolist():
-            lens = self.request.camera.tile(self.request.size, (column, row), tile_size)
+        for column, row in sample.corners.tolist():
+            lens = self.request.camera.tile(self.request.size, (column, row), sample.size)
             part = np.s_[row : row + height, column : column + width]
-            pairs.append(self._both(lens, tile_size, part))
+            pairs.append(self._both(lens, sample.size, part))
         old, new = zip(*pairs, strict=True)
-        return tiles_ssim(old, new, self.background)
+        return list(old), list(new)
 
     def _both(
         self, lens: Camera, size: tuple[int, int], part: Any

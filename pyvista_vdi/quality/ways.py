@@ -120,13 +120,13 @@ class Ways:
             the one that is there sooner. What was drawn last stays unless the other is better by
             more than predictions are wrong by.
         """
-        costs = {way: self.seconds_per_pixel(way, angle) for way in ("vdi", "volume")}  # type: ignore[arg-type]
-        if None in costs.values():
-            return "vdi"
         own = _loss_of_vdi(angle, ssim)
         if seconds is None and own > 1 - bound:
             self._way = "volume"
             return self._way
+        costs = {way: self.seconds_per_pixel(way, angle) for way in ("vdi", "volume")}  # type: ignore[arg-type]
+        if None in costs.values():
+            return "vdi"
         other: Way = "volume" if self._way == "vdi" else "vdi"
         times = {way: cost * max(pixels, 1.0) for way, cost in costs.items() if cost is not None}
         if seconds is None:

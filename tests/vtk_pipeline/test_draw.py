@@ -136,8 +136,9 @@ def test_in_motion_errors_are_estimated_of_vdis_that_are_drawn(
 def test_the_first_frame_of_a_volume_in_motion_is_no_slower_than_a_picture_has_told(
     plotter, chosen, monkeypatch
 ):
-    actor = watched(plotter, draw="auto")
+    actor = watched(plotter, draw="vdi")
     finish("stand-in")
+    actor.mapper.SetDraw("auto")
     each = Ways()
     each.took("volume", 0.0, 1.0, 1e-3)  # a millisecond per ray
     actor.mapper.painter.upkeep.ways = each
@@ -166,10 +167,10 @@ def test_auto_goes_by_what_frames_take(plotter, monkeypatch):
     assert actor.status.drawn == "vdi"
 
 
-def test_off_screen_and_beside_another_vdi_the_vdi_is_drawn(plotter, chosen):
+def test_volumes_that_overlap_are_drawn_by_their_vdis(plotter, chosen):
     actor = plotter.add_vdi(soft_ball(), **LOOKS)
     plotter.show(auto_close=False)
-    assert actor.status.drawn == "vdi"
+    assert actor.status.drawn == "volume"
     other = plotter.add_vdi(soft_ball(12), **LOOKS)
     for each in (actor, other):
         each.mapper.SetInteractiveOffScreen(True)

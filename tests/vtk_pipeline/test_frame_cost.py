@@ -54,7 +54,7 @@ def counts(monkeypatch):
 @pytest.fixture
 def plotter():
     plotter = pv.Plotter(window_size=WINDOW)
-    plotter.add_vdi(soft_ball(), **LOOKS)
+    plotter.add_vdi(soft_ball(), draw="vdi", **LOOKS)
     plotter.camera_position = VIEW
     yield plotter
     plotter.close()

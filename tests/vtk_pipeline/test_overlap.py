@@ -310,10 +310,10 @@ def test_previews_are_of_one_size():
 def test_what_cannot_be_drawn_leaves_the_other(raycasts, monkeypatch):
     plotter, actors = two_balls()
 
-    def fail():
+    def fail(request):
         raise RuntimeError("no such luck")
 
-    monkeypatch.setattr(actors[0].mapper.GetSource(), "GetVDI", fail)
+    monkeypatch.setattr(actors[0].mapper.GetSource(), "MakeVDI", fail)
     with pytest.warns(VDIWarning, match="no such luck"):
         plotter.show(auto_close=False)
     assert raycasts == []

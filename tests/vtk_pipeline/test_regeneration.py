@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 import pyvista as pv
-from plugin_scenes import LOOKS, soft_ball
+from plugin_scenes import CLASSIFICATION, LOOKS, soft_ball
 from vtk_sources import ready_source
 from vtkmodules.vtkCommonDataModel import vtkPlane
 from watched_windows import (
@@ -21,7 +21,6 @@ from watched_windows import (
     frames,
     frames_until,
     picture_of,
-    small_vdi,
     threads,
     turned,
     watched,
@@ -361,8 +360,12 @@ def test_what_cannot_be_made_any_more_is_said_and_the_old_stays(plotter):
     np.testing.assert_array_equal(frame(plotter), before)
 
 
-def test_a_vdi_without_its_volume_says_once_that_the_view_is_far(plotter):
-    actor = plotter.add_vdi(small_vdi(view_cone=50.0))
+def test_a_vdi_without_its_volume_says_once_for_each_cause_what_a_view_lacks(plotter):
+    def vdi(view_cone, **changes):
+        camera = pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1), **changes)
+        return pvdi.generate(soft_ball(12), camera, WINDOW, view_cone=view_cone, **CLASSIFICATION)
+
+    actor = plotter.add_vdi(vdi(50.0))
     plotter.camera_position = ((5, 4, 3), (0, 0, 0), (0, 0, 1))
     plotter.show(auto_close=False)
     plotter.camera.Azimuth(49)
@@ -373,11 +376,21 @@ def test_a_vdi_without_its_volume_says_once_that_the_view_is_far(plotter):
     assert len(said) == 1
     plotter.camera.Azimuth(20)
     plotter.render()  # warnings are errors: it is not said again
-    actor.mapper.SetVDI(small_vdi(view_cone=10.0))
+    plotter.camera.Zoom(2.5)
+    with pytest.warns(VDIWarning, match=r"2\.5 pixels of the view are as wide as one of the VDI's"):
+        plotter.render()
+    plotter.camera.Zoom(2)
+    plotter.render()
+    plotter.camera_position = ((5, 4, 3), (0, 0, 0), (0, 0, 1))
+    actor.mapper.SetVDI(vdi(10.0, view_angle=12.0))
+    with pytest.warns(VDIWarning, match=r"\d\d% of the view's rays through the volume leave"):
+        plotter.render()
+    assert 0.1 < actor.status.coverage < 0.9
+    plotter.camera.Azimuth(20)
     with pytest.warns(VDIWarning, match="was to serve 10"):
         plotter.render()
     actor.mapper.SetRegenerate("never")
-    actor.mapper.SetVDI(small_vdi(view_cone=10.0))
+    actor.mapper.SetVDI(vdi(10.0))
     plotter.render()
 
 

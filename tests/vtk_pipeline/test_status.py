@@ -48,8 +48,12 @@ def test_status_from_before_the_first_frame_on(plotter, gate, coarsest):
     assert (actor.status.vdi, actor.status.fps, actor.status.share) == (None, None, 0.0)
     actor.mapper.SetInteractiveOffScreen(True)
     plotter.show(auto_close=False)
+    assert (actor.status.mode, actor.status.generation, actor.status.vdi) == ("full", 0, None)
+    vdi = actor.vdi  # made now, and not when it comes from behind the frames
+    frame(plotter)
     status = actor.status
-    assert (status.mode, status.generation, status.vdi) == ("full", 1, actor.vdi)
+    assert (status.mode, status.generation, status.vdi) == ("full", 1, vdi)
+    assert (status.coverage, status.magnification) == (1.0, pytest.approx(1.0))
     assert status.fps > 0
     actor.prop.interpolation_type = "linear"
     frame(plotter)

@@ -49,13 +49,14 @@ class VDIActorMethods(PlayingMethods):
 
     @property
     def vdi(self: Any) -> VDI | None:
-        """The VDI that is shown; ``None`` until the first frame has made it.
+        """The VDI; ``None`` before the first frame.
 
-        Another one that is set is shown from the next frame on, and takes the place of what made
-        the one before: a volume, which is let go of.
+        Where pictures were drawn by the volume itself it is made now, of the first one's view
+        unless a camera was given, and waited for. Another one that is set is shown from the next
+        frame on, and takes the place of what made the one before: a volume, which is let go of.
         """
         mapper = self.GetMapper()
-        return None if mapper is None else mapper.GetVDI()
+        return None if mapper is None else mapper.painter.asked_for()
 
     @vdi.setter
     def vdi(self: Any, vdi: VDI) -> None:

@@ -143,13 +143,14 @@ def _overlapping(frames: Sequence[Frame]) -> list[list[Frame]]:
     rectangles = [frame.rectangle(frame.bounds) for frame in frames]
     groups: list[set[int]] = []
     for i, own in enumerate(rectangles):
-        touched = [g for g in groups if any(_touch(own, rectangles[j]) for j in g)]
+        touched = [g for g in groups if any(touch(own, rectangles[j]) for j in g)]
         groups = [g for g in groups if g not in touched]
         groups.append({i}.union(*touched))
     return [[frames[i] for i in sorted(group)] for group in groups]
 
 
-def _touch(a: Matrix | None, b: Matrix | None) -> bool:
+def touch(a: Matrix | None, b: Matrix | None) -> bool:
+    """Whether two rectangles of the picture, see :meth:`Frame.rectangle`, share pixels."""
     if a is None or b is None:
         return False
     return bool((a[0] <= b[1] + _APART).all() and (b[0] <= a[1] + _APART).all())

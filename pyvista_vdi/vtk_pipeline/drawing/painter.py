@@ -15,10 +15,9 @@ from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.device import Runtime, aligned_empty, get_runtime
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.view_error import angle_from_generating_view
+from pyvista_vdi.quality.view_error import angle_from_generating_view, coverage, magnification
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.sets.render import blended
 from pyvista_vdi.vtk_pipeline.drawing import passes
@@ -28,18 +27,20 @@ from pyvista_vdi.vtk_pipeline.drawing.frame import (
     Drawn,
     Frame,
     Image,
+    Matrix,
     Recent,
     consumers,
     same_depth,
     viewport,
 )
 from pyvista_vdi.vtk_pipeline.drawing.grabbing import Grabbing
-from pyvista_vdi.vtk_pipeline.drawing.overlap import Overlaps
+from pyvista_vdi.vtk_pipeline.drawing.overlap import Overlaps, touch
 from pyvista_vdi.vtk_pipeline.drawing.selection import Selection
 from pyvista_vdi.vtk_pipeline.drawing.shader import place_image
 from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture, NoDepth
 from pyvista_vdi.vtk_pipeline.drawing.upkeep import Upkeep
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
+from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.interaction.browser import SceneAtHand
 from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus, Warnings
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import (
@@ -86,7 +87,7 @@ class Painter:
         self._free: Image | None = None  # shown by no frame, not even the last
         self._raycasts = 0
         self._last = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
-        self._scene: tuple[Camera, weakref.ref[WindowClock]] | None = None
+        self._scene: tuple[View, weakref.ref[WindowClock]] | None = None
         self._trouble: BaseException | None = None
         self._scene_at_hand = SceneAtHand(self._say_not_exported)
 
@@ -183,20 +184,22 @@ class Painter:
 
     def status(self) -> VDIStatus:
         """Return how the last frame was drawn, and what goes on."""
-        vdi, last, angle, fps = self.upkeep.vdi, self._last, None, None
+        vdi, last, view, fps = self.upkeep.vdi, self._last, None, None
         if self._scene is not None:
-            camera, weak = self._scene
+            view, weak = self._scene
             clock = weak()
             fps = None if clock is None else clock.fps
-            angle = None if vdi is None else angle_from_generating_view(vdi, camera)
+        shown = None if vdi is None or view is None else (vdi, view.camera, view.size)
         wide, high = last.full_size or (0, 0)
         return VDIStatus(
             mode="none" if last.full_size is None else "preview" if last.preview else "full",
             samples=last.samples,
             full_samples=wide * high,
             fps=fps,
-            angle=angle,
-            ssim=self.upkeep.regeneration.ssim(vdi),
+            angle=None if shown is None else angle_from_generating_view(*shown[:2]),
+            magnification=None if shown is None else magnification(*shown),
+            coverage=None if shown is None else coverage(*shown),
+            ssim=self.upkeep.ssim(view),
             progress=self.upkeep.regeneration.progress,
             generation=self._generation,
             vdi=vdi,
@@ -204,6 +207,10 @@ class Painter:
             drawn=last.way,
             time=None if self.upkeep.player is None else self.upkeep.player.time,
         )
+
+    def asked_for(self) -> VDI | None:
+        """Return the VDI, made now where pictures were drawn without one."""
+        return self.upkeep.asked_for()
 
     def before_frame(self) -> None:
         """Take a VDI that was made in the background; between two frames of a window only."""
@@ -300,8 +307,10 @@ class Painter:
         """Return the frame of the VDI, brought up to date; ``None`` if there is no VDI."""
         frame = Frame.current(renderer, self._actor.Get(), mapper)
         frame.clock.join(self, renderer)
-        self._scene = (frame.view.camera, weakref.ref(frame.clock))
-        seen = self.upkeep.current(frame, self.status, only=len(self.renderers()) == 1)
+        self._scene = (frame.view, weakref.ref(frame.clock))
+        seen = self.upkeep.current(
+            frame, self.status, only=len(self.renderers()) == 1, joint=self._overlapped(frame)
+        )
         if seen is None:
             return None
         self._place_proxy(seen.bounds)
@@ -312,6 +321,20 @@ class Painter:
             self._counted = weakref.ref(seen)
             self._generation += 1
         return frame.showing(seen)
+
+    def _overlapped(self, frame: Frame) -> bool:
+        """Whether another volume of ours lies where this one does in the picture."""
+        props = frame.renderer.GetVolumes()
+        rectangles: list[Matrix | None] = []
+        for i in range(props.GetNumberOfItems() if props.GetNumberOfItems() > 1 else 0):
+            prop = props.GetItemAsObject(i)
+            painter = getattr(prop.GetMapper(), "painter", None)
+            source = painter.input if isinstance(painter, Painter) else None
+            bounds = None if source is None or not prop.GetVisibility() else source.bounds()
+            if bounds is not None:
+                rectangle = Frame.current(frame.renderer, prop, None).rectangle(bounds)
+                rectangles.insert(0 if painter is self else len(rectangles), rectangle)
+        return any(touch(rectangles[0], other) for other in rectangles[1:])
 
     def beside(self, mapper: Any, renderer: Any) -> Frame | None:
         """Return the VDI as it is to be seen beside another one; ``None`` if it is not.
@@ -336,11 +359,13 @@ class Painter:
         self.selection.enter(actor, renderer.GetSelector())
         seen = None
         try:
-            if not isinstance(self._counted(), VDI):
+            frame = Frame.current(renderer, actor, mapper)
+            vdi = self.upkeep.to_pick(frame)
+            if vdi is None:
                 self._last = self._paint(mapper, renderer)
-            vdi = self._counted()
-            if isinstance(vdi, VDI):
-                seen = Frame.current(renderer, actor, mapper).showing(vdi)
+                vdi = self.upkeep.to_pick(frame)
+            if vdi is not None:
+                seen = frame.showing(vdi)
             self.selection.show(actor, renderer, seen, self.device)
         except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
             self._warnings.warn(f"the VDI cannot be picked: {type(error).__name__}: {error}", error)
@@ -407,7 +432,9 @@ class Painter:
             frame.camera, frame.size, frame.options, frame.depth, self.device, out
         )
         if frame.stand_in is not None:
-            lasts = frame.stand_in.lasting and self.upkeep.draw == "volume"
+            # In a window the VDI's light, so that nothing jumps
+            behind = self.interaction.asynchronous(frame.renderer.GetRenderWindow())
+            lasts = frame.stand_in.lasting and (self.upkeep.draw == "volume" or not behind)
             image = frame.stand_in.picture(request, frame.view.camera if lasts else None)
         else:
             assert frame.vdi is not None
@@ -421,7 +448,8 @@ class Painter:
             frame.stand_in.took(width * height, seconds)
         if frame.stand_in is None or frame.stand_in.lasting:
             frame.clock.drawn(frame.size, frame.full_size, seconds, frame.cost, frame.effort)
-        if frame.few_lists is None:
+        # A volume's first picture has kernels compiled and voxels sent to the device
+        if frame.few_lists is None and (frame.stand_in is None or frame.stand_in.pictures > 1):
             self.upkeep.ways.took(frame.way, frame.angle, frame.covered(frame.bounds), seconds)
         self._raycasts += 1
         drawn = Drawn(
@@ -456,9 +484,11 @@ class Painter:
             active = self._active.Get()
             if active in renderers:
                 return active
-            # The first frame that shows the actor twice: tell them apart by their viewports
-            drawing = [r for r in renderers if r.GetRenderWindow() is not None and _is_viewport(r)]
-            renderers = drawing or renderers
+            # The first frame that shows the actor twice: tell them apart by their windows, of which
+            # one is drawing, and by their viewports
+            drawing = [r for r in renderers if _is_drawing(r)]
+            viewports = [r for r in drawing if _is_viewport(r)]
+            renderers = viewports or drawing or renderers
         return renderers[0] if renderers else None
 
     def renderers(self) -> list[Any]:
@@ -473,6 +503,11 @@ class Painter:
         active = self._active  # a VTK weak reference: no cycle through the observer
         renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
         renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
+
+
+def _is_drawing(renderer: Any) -> bool:
+    window = renderer.GetRenderWindow()
+    return window is not None and bool(window.CheckInRenderStatus())
 
 
 def _is_viewport(renderer: Any) -> bool:

@@ -11,7 +11,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.quality.frame_rate import FrameRateController
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.render import picture_room, raycast_medium
+from pyvista_vdi.volume.render import picture_room, raycast_medium, raycast_volume
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 
 
@@ -29,29 +29,46 @@ class StandIn:
         Knows what rays have cost before, and learns what these do.
     lasting : bool
         Whether it is drawn for its own sake, and not until a VDI has been made.
+    in_bricks : bool
+        Whether it may be brick by brick, where the device cannot hold it in one piece: a person
+        would wait too long for such a picture.
+
+    Attributes
+    ----------
+    pictures : int
+        How many were drawn.
 
     Raises
     ------
     VDIError
-        If the device cannot hold the volume in one piece: brick by brick a picture takes too long
-        for a person to wait for it.
+        If the device cannot hold the volume so.
     """
 
     def __init__(
-        self, request: Request, rate: FrameRateController, *, lasting: bool = False
+        self,
+        request: Request,
+        rate: FrameRateController,
+        *,
+        lasting: bool = False,
+        in_bricks: bool = False,
     ) -> None:
         self.request = request
         self.lasting = lasting
+        self.pictures = 0
         self._rate = rate
         volume, sampling = request.volume, request.options
         room = picture_room(
             request.screen.size, sampling.memory_limit, sampling.occlusion_bytes(volume)
         )
         runtime = get_runtime(request.device)
-        self._medium = DeviceVolume(runtime, volume, request.transfer_function, sampling, room=room)
-        if self._medium.bricks is not None:
-            with self._medium.giving_bricks_back():
-                raise DeviceMemoryError(f"the volume {volume.name!r} is held brick by brick")
+        look = request.transfer_function
+        medium = DeviceVolume(runtime, volume, look, sampling, room=room)
+        self._medium: DeviceVolume | None = medium
+        if medium.bricks is not None:
+            with medium.giving_bricks_back():  # to be taken by each picture, for its own size
+                self._medium = None
+                if not in_bricks:
+                    raise DeviceMemoryError(f"the volume {volume.name!r} is held brick by brick")
 
     @property
     def bounds(self) -> tuple[float, ...]:
@@ -68,10 +85,17 @@ class StandIn:
     def picture(self, frame: FrameRequest, lit_from: Camera | None = None) -> NDArray[np.float32]:
         """Return the picture, premultiplied RGBA, float32 (H, W, 4), top row first.
 
-        ``lit_from`` is the view whose light falls on it, in place of the VDI's.
+        ``lit_from`` is the view whose light falls on it, in place of the VDI's; brick by brick it
+        is the picture's own.
         """
+        if self._medium is None:
+            made = self.request
+            return raycast_volume(
+                made.volume, made.transfer_function, frame.replace(device=made.device), made.options
+            )
         return raycast_medium(self._medium, frame, lit_from=lit_from or self.request.generating[0])
 
     def took(self, pixels: int, seconds: float) -> None:
         """Note what a picture has taken."""
+        self.pictures += 1
         self._rate.record(pixels, seconds, seconds)

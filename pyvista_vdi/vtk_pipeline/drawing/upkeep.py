@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import logging
+import math
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, Literal
 
-from pyvista_vdi.device import Runtime
+from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import TRIAL_SIZE
 from pyvista_vdi.quality.frame_rate import FLOOR, FrameRateController
-from pyvista_vdi.quality.view_error import angle_from_generating_view
+from pyvista_vdi.quality.pictures import FINE_ENOUGH, SIMILAR, Pictures
+from pyvista_vdi.quality.view_error import (
+    ViewError,
+    angle_from_generating_view,
+    coverage,
+    magnification,
+)
 from pyvista_vdi.quality.ways import Ways
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.series.player import Player
@@ -25,6 +33,7 @@ from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SeriesInput, SetInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.interaction import browser
+from pyvista_vdi.vtk_pipeline.interaction.estimation import Estimators
 from pyvista_vdi.vtk_pipeline.interaction.regeneration import Regeneration
 from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus, Warnings
 from pyvista_vdi.vtk_pipeline.interaction.ticker import PERIOD, LoopTicker, Ticker, period_of
@@ -34,6 +43,11 @@ _log = logging.getLogger(__name__)
 
 #: Views that a VDI is made to serve, degrees from V_O, where its metadata do not say.
 _VIEW_CONE = 60.0
+
+#: Pixels as wide as one list from which on a VDI without its volume is said to be too coarse.
+_TOO_COARSE = 2.0
+#: What two equal sizes of pixels differ by at most.
+_ROUNDING = 1e-6
 
 #: Pictures that tell what a volume's rays cost, of which the fastest counts: what disturbs one by
 #: milliseconds has the volume seem too dear to be drawn, which no frame would ever correct.
@@ -54,6 +68,9 @@ class Upkeep:
         self.regeneration = Regeneration()
         self.draw: Literal["auto", "vdi", "volume"] = "auto"
         self.ways = Ways()
+        self._pictures = Pictures()
+        self._content: Any = None  # what they are of
+        self._estimators = Estimators()
         self._lasting: StandIn | None = None
         self._stand_in: StandIn | None = None
         self._stand_in_rate = FrameRateController()
@@ -66,9 +83,9 @@ class Upkeep:
         self._loop_ticker = LoopTicker(self._tick)
         self._clock: Callable[[], WindowClock | None] = lambda: None  # a weak reference
         self._looked_at = (0, 0)
+        self._behind = False  # whether VDIs are made behind the frames
         self._failed_at: Any = None
         self._made_at: Any = None
-        self._said_far = False
 
     def set_input(self, source: Input | None, changed: Callable[..., Any]) -> None:
         """Keep another input; ``changed`` is called when its bounds may be others."""
@@ -77,7 +94,7 @@ class Upkeep:
             self.input.rest()
         self.input = source
         self._failed_at = None
-        self._said_far = False
+        self._warnings.forget()
         self.regeneration.cancel()
         self._forget_volume()
         if source is not None:
@@ -87,6 +104,38 @@ class Upkeep:
     def vdi(self) -> VDI | None:
         """The VDI made last."""
         return None if self.input is None else self.input.last()
+
+    def asked_for(self) -> VDI | None:
+        """Return the VDI, made now where pictures have been drawn without one or of other data.
+
+        It is of the view that the first picture had, or that somebody chose; ``None`` before.
+        """
+        source = self.input
+        if not isinstance(source, SourceInput):
+            return self.vdi
+        if source.source.GetCamera() is None or source.source.GetWindowSize() is None:
+            return self.vdi
+        if self.vdi is None or (self.draw == "auto" and not self._behind):
+            self.regeneration.cancel()
+            return self._updated(source)
+        return self.vdi
+
+    def to_pick(self, frame: Frame) -> VDI | None:
+        """Return a VDI that has all of what a view shows; without the volume, that which is there.
+
+        ``None`` where no picture was drawn yet.
+        """
+        vdi, source, view = self.asked_for(), self.input, frame.view
+        if vdi is None or coverage(vdi, view.camera, view.size) == 1:
+            return vdi
+        if not isinstance(source, SourceInput):
+            return vdi
+        return self._of_this_view(source, source.source.MakeRequest(view), frame)
+
+    def ssim(self, view: View | None) -> float | None:
+        """Return the last estimate for the VDI that there is, in this view; None without one."""
+        error = None if view is None else self._pictures.error(view)
+        return self.regeneration.ssim(self.vdi) if error is None else error.ssim
 
     @property
     def player(self) -> Player | None:
@@ -127,12 +176,13 @@ class Upkeep:
         self._forget_volume()
 
     def current(
-        self, frame: Frame, ask: Callable[[], VDIStatus], *, only: bool
+        self, frame: Frame, ask: Callable[[], VDIStatus], *, only: bool, joint: bool
     ) -> VDI | StandIn | None:
-        """Return the VDI that a frame is to draw, or what stands in for the one to come.
+        """Return the VDI that a frame is to draw, or the volume where that is drawn in its place.
 
         ``ask`` gives the status, for a policy that is a callable; ``only`` says whether no other
-        renderer shows the actor.
+        renderer shows the actor, ``joint`` whether another one's volume overlaps it in the picture:
+        what is drawn together is merged by the lists of VDIs.
         """
         source = self.input
         if source is None:
@@ -146,31 +196,128 @@ class Upkeep:
             if isinstance(source, SetInput):
                 self._look_around(source.shower, frame)
             vdi = self._updated(source)
-            self._mind_the_angle(vdi, frame.view)
+            self._say_what_is_lacking(vdi, frame)
             return vdi
-        if self.draw == "volume" and (volume := self._volume(source.source.MakeRequest())):
+        if self.draw == "volume" and not joint and (volume := self._volume(source)):
             return volume
         # Once for both eyes of a stereo pair, and not between the tiles of a picture
         now = (frame.clock.number, id(frame.clock))
         decide, self._looked_at = frame.clock.whole_picture and now != self._looked_at, now
         # A VDI that is drawn in several views is out of date in none of them by itself
         one_view = only and source.alone
-        behind = one_view and self._interaction.asynchronous(frame.renderer.GetRenderWindow())
-        if source.last() is None:
-            vdi = self._updated(source)
-            if behind:
-                self._prepare(source.source.GetCurrentRequest())
-            return vdi
-        if behind:
-            if decide or self.regeneration.unseen(source.source, source.stamp()):
-                self._look(source, frame, ask)
-            return self._standing_in() or self._better(source, frame) or source.last()
+        window = frame.renderer.GetRenderWindow()
+        self._behind = one_view and self._interaction.asynchronous(window)
+        if self._behind:
+            return self._watched(source, frame, ask, decide=decide, joint=joint)
+        if source.last() is None and (self.draw != "auto" or callable(self.regeneration.policy)):
+            return self._updated(source)
         if one_view and decide and self._asked_for(ask):
             source.take_camera(frame.renderer, frame.model_transform)
             source.take_size(frame.renderer)
+            self._updated(source)
         elif one_view and decide:
             self._follow_changes(source, frame)
+        if self.draw == "auto":
+            return self._faithful(source, frame, one_view=one_view and decide, joint=joint)
         return self._updated(source)
+
+    def _watched(
+        self,
+        source: SourceInput,
+        frame: Frame,
+        ask: Callable[[], VDIStatus],
+        *,
+        decide: bool,
+        joint: bool,
+    ) -> VDI | StandIn | None:
+        """Return what is drawn where somebody watches: VDIs are made behind the frames."""
+        first = source.last() is None
+        if first and (joint or self.draw == "vdi"):
+            vdi = self._updated(source)
+            self._prepare(source.source.GetCurrentRequest())
+            return vdi
+        if decide or self.regeneration.unseen(source.source, source.stamp()):
+            self._look(source, frame, ask)
+        if first:
+            self._prepare(self.regeneration.changed)
+            return self._volume(source) or self._updated(source)
+        return self._standing_in() or self._better(source, frame, joint) or source.last()
+
+    def _faithful(
+        self, source: SourceInput, frame: Frame, *, one_view: bool, joint: bool
+    ) -> VDI | StandIn | None:
+        """Return what gives a right picture of this view: the same in every run."""
+        wanted = source.source.MakeRequest(frame.view)
+        if self._content != wanted.content:
+            self._content, self._pictures = wanted.content, Pictures()
+        vdi, made = source.last(), source.source.GetCurrentRequest()
+        same = made is not None and made.content == wanted.content
+        if same and self._serves(vdi, made, frame, joint=joint):
+            return vdi
+        may_make = self.regeneration.policy == "auto"
+        if joint:
+            return self._of_this_view(source, wanted, frame) if may_make else self._updated(source)
+        own_pixels = frame.full_size == frame.view.size
+        if one_view and may_make and own_pixels:
+            if self._pictures.deserves_vdi(frame.view, wanted.volume.bounds):
+                source.take_camera(frame.renderer, frame.model_transform)
+                source.take_size(frame.renderer)
+                return self._updated(source)
+            self._pictures.drawn_by_volume(frame.view)
+        return self._volume(source, in_bricks=True) or self._updated(source)
+
+    def _serves(self, vdi: VDI | None, made: Request | None, frame: Frame, *, joint: bool) -> bool:
+        """Whether the VDI's picture of the frame's view is as good as the volume's."""
+        if vdi is None or made is None:
+            return False
+        shown, renderer = frame.showing(vdi).world_options(), frame.renderer
+        detail = magnification(vdi, frame.camera, frame.full_size)
+
+        def estimate() -> ViewError:
+            if made.screen == frame.view and detail <= 1 + _ROUNDING:
+                return ViewError(1.0, 0.0, 0.0, 1.0, 0)
+            return self._estimators.of(made, get_runtime(made.device)).estimate(
+                vdi,
+                frame.view.camera,
+                frame.view.size,
+                clipping_planes=shown.clipping_planes or None,
+                cropping=shown.cropping,
+                opacity_multiplier=shown.opacity_multiplier,
+                background=renderer.GetBackground(),
+            )
+
+        try:
+            return self._pictures.serves(
+                vdi,
+                frame.view,
+                detail=detail,
+                bound=self.regeneration.bound,
+                options=shown,
+                estimate=estimate,
+                **({"within": 180.0} if joint else {}),
+            )
+        except VDIError:  # no memory for it, say: the volume's picture is right
+            _log.debug("the error of a view cannot be estimated", exc_info=True)
+            return False
+
+    def _of_this_view(self, source: SourceInput, wanted: Request, frame: Frame) -> VDI:
+        """Return a VDI of exactly this view, made now; of a tile it is not kept."""
+        whole = frame.full_size == frame.view.size
+        camera, size = (frame.view.camera, frame.view.size) if whole else (frame.camera, frame.size)
+        generating, lists = wanted.generating
+        # What covers all of a volume that is near has larger lists than the picture has pixels
+        pixels = math.prod(
+            high / low
+            for high, low in zip(
+                generating.half_extent(lists), camera.half_extent(size), strict=True
+            )
+        )
+        if not whole or pixels * math.prod(size) > math.prod(lists) * (1 + _ROUNDING):
+            wanted = replace(wanted, generating=(camera, size))
+        vdi = source.source.MakeVDI(wanted)
+        if whole:
+            source.source.TakeVDI(vdi, wanted)
+        return vdi
 
     def _look_around(self, shower: SetShower, frame: Frame) -> None:
         """Have a set show the frame's view, and grow where nobody turns and the picture lacks."""
@@ -216,42 +363,51 @@ class Upkeep:
 
         self._preparation.put(Job(draw_one, made.device))
 
-    def _better(self, source: SourceInput, frame: Frame) -> StandIn | None:
+    def _better(self, source: SourceInput, frame: Frame, joint: bool) -> StandIn | None:
         """Return the volume where it is expected to give the better frame; None: the VDI does."""
-        vdi, made = source.last(), source.source.GetCurrentRequest()
-        if self.draw != "auto" or not frame.clock.single or vdi is None or made is None:
+        vdi = source.last()
+        if self.draw != "auto" or joint or vdi is None:
             return None
-        window = frame.renderer.GetRenderWindow()
+        window, camera = frame.renderer.GetRenderWindow(), frame.view.camera
         moves = self._interaction.wants_preview(window)
+        fine = moves or magnification(vdi, frame.camera, frame.full_size) <= FINE_ENOUGH
+        if coverage(vdi, camera, frame.view.size) < 1 or not fine:
+            return self._volume(source)
+        bound = self.regeneration.bound
         way = self.ways.choose(
-            angle_from_generating_view(vdi, frame.view.camera),
+            angle_from_generating_view(vdi, camera),
             frame.covered(vdi.bounds),
             1 / frame.clock.aim(self._interaction) if moves else None,
             self.regeneration.ssim(vdi),
-            self.regeneration.bound,
+            SIMILAR if bound is None else bound,
         )
-        return self._volume(made) if way == "volume" else None
+        return self._volume(source) if way == "volume" else None
 
-    def _volume(self, request: Request) -> StandIn | None:
-        """Return the volume of a request, to be drawn for its own sake; None if it cannot be."""
+    def _volume(self, source: SourceInput, *, in_bricks: bool = False) -> StandIn | None:
+        """Return the volume, to be drawn for its own sake; None if it cannot be."""
+        request = source.source.MakeRequest()
         if self._lasting is not None and self._lasting.request.content != request.content:
             self._lasting = None  # its buffers go before others are taken
         if self._lasting is None:
-            self._lasting = self._drawn_itself(request, lasting=True)
+            self._lasting = self._drawn_itself(request, lasting=True, in_bricks=in_bricks)
         return self._lasting
 
-    def _drawn_itself(self, request: Request, *, lasting: bool) -> StandIn | None:
-        if request is self._refused:
+    def _drawn_itself(
+        self, request: Request, *, lasting: bool, in_bricks: bool = False
+    ) -> StandIn | None:
+        refused = None if in_bricks or self._refused is None else self._refused.content
+        if refused is not None and refused == request.content:
             return None
         try:
-            return StandIn(request, self._stand_in_rate, lasting=lasting)
+            return StandIn(request, self._stand_in_rate, lasting=lasting, in_bricks=in_bricks)
         except VDIError as error:  # then the VDI is what can be drawn
             self._refused = request
             _log.debug("the volume cannot be drawn in place of its VDI", exc_info=error)
             return None
 
     def _forget_volume(self) -> None:
-        self._stand_in = self._lasting = self._refused = None
+        self._stand_in = self._lasting = self._refused = self._content = None
+        self._estimators, self._pictures = Estimators(), Pictures()
         self.ways = Ways()
 
     def _standing_in(self) -> StandIn | None:
@@ -296,8 +452,7 @@ class Upkeep:
     def _look(self, source: SourceInput, frame: Frame, ask: Callable[[], VDIStatus]) -> None:
         moving = self._interaction.moving(frame.renderer.GetRenderWindow())
         vdi = source.last()
-        assert vdi is not None
-        options = frame.showing(vdi).world_options()
+        options = RenderOptions() if vdi is None else frame.showing(vdi).world_options()
         try:
             self.regeneration.look(
                 source.source,
@@ -311,26 +466,40 @@ class Upkeep:
         except Exception as error:  # what is shown can still be drawn
             self._complain(error)
 
-    def _mind_the_angle(self, vdi: VDI | None, view: View) -> None:
-        """Say once that a VDI without its volume is seen from where it was not made for."""
-        if vdi is None or self._said_far or self.regeneration.policy != "auto":
+    def _say_what_is_lacking(self, vdi: VDI | None, frame: Frame) -> None:
+        """Say once for each cause that a VDI without its volume is seen from where it lacks."""
+        if vdi is None or self.regeneration.policy != "auto":
             return
+        view, stored = frame.view, vdi.metadata.get("view_cone")
+        cone = stored if isinstance(stored, int | float) else _VIEW_CONE
         angle = angle_from_generating_view(vdi, view.camera)
-        stored = vdi.metadata.get("view_cone")
-        served = stored if isinstance(stored, int | float) else _VIEW_CONE
-        if angle > served:
-            self._said_far = True
-            volumes = None if self.player is None else self.player.series.volumes
-            why = (
-                "without its volume it cannot be made anew, and shows less"
-                if volumes is None
-                else "unless actor.regenerate() makes this step anew, it shows less"
-            )
-            self._warnings.warn(
+        covered = coverage(vdi, view.camera, view.size)
+        detail = magnification(vdi, frame.camera, frame.full_size)
+        volumes = None if self.player is None else self.player.series.volumes
+        remedy = (
+            "without its volume it cannot be made anew"
+            if volumes is None
+            else "actor.regenerate() makes this step anew"
+        )
+        lacking = {}
+        if angle > cone:
+            lacking["angle"] = (
                 f"the view is {angle:.0f} degrees from the VDI's generating view, which was to "
-                f"serve {served:.0f}: {why} and less of what was hidden; regenerate='never' takes "
-                "this as it is"
+                f"serve {cone:.0f}: it shows less, and less of what was hidden"
             )
+        if covered < 1:
+            lacking["coverage"] = (
+                f"{1 - covered:.0%} of the view's rays through the volume leave what the VDI "
+                "covers: there it shows nothing"
+            )
+        if detail > _TOO_COARSE:
+            lacking["magnification"] = (
+                f"{detail:.1f} pixels of the view are as wide as one of the VDI's lists: it shows "
+                "no finer detail"
+            )
+        for cause, what in lacking.items():
+            message = f"{what}; {remedy}; regenerate='never' takes this as it is"
+            self._warnings.warn(message, cause=cause)
 
     def collect(self) -> bool:
         """Take what was made in the background; whether there is another VDI to be drawn."""

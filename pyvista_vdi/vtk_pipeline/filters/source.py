@@ -179,6 +179,10 @@ class VDISource(SourceSettings):
         self._vdi, self._request = vdi, request
         self.Modified()  # the output is another
 
+    def MakeVDI(self, request: Request) -> VDI:
+        """Return the VDI of a request, made now; what the source has made stays."""
+        return self._generate(request)
+
     def GetVolume(self) -> Volume:
         """Return the volume at the input, read again only if it has changed; raises if none is."""
         return self._read(self.UpdateInput())

@@ -32,7 +32,7 @@ class Estimation:
 
     def __init__(self) -> None:
         self._worker = Worker("pyvista-vdi estimate")
-        self._estimators = _Estimators()
+        self._estimators = Estimators()
 
     @property
     def running(self) -> bool:
@@ -76,10 +76,10 @@ class Estimation:
         """Cancel, wait for the thread, and let go of the volume."""
         self._worker.clear()
         self._worker.join()
-        self._estimators = _Estimators()
+        self._estimators = Estimators()
 
 
-class _Estimators:
+class Estimators:
     """The estimator of the content that was judged last, which keeps the volume on the device."""
 
     def __init__(self) -> None:
@@ -87,6 +87,7 @@ class _Estimators:
         self._estimator: ViewErrorEstimator | None = None
 
     def of(self, request: Request, runtime: Runtime) -> ViewErrorEstimator:
+        """Return the estimator of what a VDI was made of."""
         if self._estimator is None or self._content != request.content:
             self._estimator = None  # its buffers go before others are taken
             self._estimator = ViewErrorEstimator(

@@ -53,13 +53,13 @@ class Regeneration:
     ----------
     policy : "auto", "never" or callable
         What decides that a view needs a VDI of its own. Changed data are always made anew.
-    bound : float
-        Estimated SSIM below which ``"auto"`` regenerates.
+    bound : float or None
+        Estimated SSIM below which ``"auto"`` regenerates; ``None``: ``REGENERATE_BELOW``.
     """
 
     def __init__(self) -> None:
         self.policy: Policy = "auto"
-        self.bound = REGENERATE_BELOW
+        self.bound: float | None = None
         self._background: BackgroundGeneration | None = None
         self._device: Any = None
         self._target: Request | None = None
@@ -88,10 +88,10 @@ class Regeneration:
 
     @property
     def changed(self) -> Request | None:
-        """What a VDI is being made of, where the one that there is was made of something else."""
+        """What a VDI is being made of, where there is none or one that is of something else."""
         source, target = self._source(), self._target
         made = None if source is None else source.GetCurrentRequest()
-        if target is None or made is None or target.content == made.content:
+        if target is None or (made is not None and target.content == made.content):
             return None
         return target
 
@@ -117,7 +117,7 @@ class Regeneration:
     ) -> None:
         """Look at the frame's view and at what the VDI was made of, and begin what is needed.
 
-        ``source`` has made a VDI, and ``stamp`` changes whenever it may have to make another.
+        ``stamp`` changes whenever ``source`` may have to make another VDI, or its first one.
         ``shown`` says whether the VDI is what is drawn, and not the volume in its place. ``ask``
         gives the status for a policy that is a callable. ``options`` say how the VDI is
         drawn (clipping planes in world coordinates), for the estimate: a change of them needs no
@@ -152,7 +152,10 @@ class Regeneration:
     def _follow_changes(self, source: VDISource, view: View) -> None:
         """Begin a VDI of what has changed, or give up one that nobody wants any more."""
         made, wanted = source.GetCurrentRequest(), source.MakeRequest()
-        assert made is not None
+        if made is None:
+            if self._target is None or self._target.content != wanted.content:
+                self._start(wanted)
+            return
         if wanted.key == made.key:
             if self._target is not None and self._target.content != made.content:
                 self._give_up()  # what had changed was changed back
@@ -207,7 +210,8 @@ class Regeneration:
                 self._estimated_at = now
                 self._estimation.start(vdi, made, view, self._options)
             return
-        if is_poor(estimate.error.ssim, self.bound, moving=not resting):
+        bound = REGENERATE_BELOW if self.bound is None else self.bound
+        if is_poor(estimate.error.ssim, bound, moving=not resting):
             self._start(source.MakeRequest(view), for_view=True)
 
     @property

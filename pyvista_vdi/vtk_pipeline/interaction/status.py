@@ -49,9 +49,14 @@ class VDIStatus:
         last frame would allow. ``None`` before the first whole frame.
     angle : float or None
         Between the view and V_O, degrees; ``None`` without a VDI.
+    magnification : float or None
+        Pixels of the view that are as wide as one of the VDI's lists; ``None`` without a VDI.
+    coverage : float or None
+        Share, 0 to 1, of the view's rays through the volume that the VDI has all of; ``None``
+        without a VDI.
     ssim : float or None
-        Estimated SSIM of the picture against volume rendering; ``None`` where it was not
-        estimated (``regenerate="auto"`` does, in windows that somebody watches).
+        Estimated SSIM of the VDI's picture of this view against volume rendering; ``None`` where
+        nothing asked for it.
     progress : float or None
         Share done, 0 to 1, of the VDI that is being made in the background; ``None`` if none is.
     generation : int
@@ -78,6 +83,8 @@ class VDIStatus:
     stand_in: bool = False
     drawn: Way = "vdi"
     time: float | None = None
+    magnification: float | None = None
+    coverage: float | None = None
 
     @property
     def share(self) -> float:
@@ -102,6 +109,8 @@ class VDIStatus:
             parts.append(f"{self.fps:.3g} frames/s")
         if self.angle is not None:
             parts.append(f"{self.angle:.0f}° from the generating view")
+        if self.coverage is not None and self.coverage < 1:
+            parts.append(f"{self.coverage:.0%} covered")
         if self.ssim is not None:
             parts.append(f"SSIM about {self.ssim:.3f}")
         if self.time is not None:
@@ -173,13 +182,15 @@ class Warnings:
     def __init__(self) -> None:
         self._said: set[str] = set()
 
-    def warn(self, message: str, error: BaseException | None = None) -> None:
-        """Say it, unless it was said before; the error's traceback goes to the log."""
+    def warn(
+        self, message: str, error: BaseException | None = None, *, cause: str | None = None
+    ) -> None:
+        """Say it, unless it, or its cause, was said before; a traceback goes to the log."""
         if error is not None:
             _log.debug("%s", message, exc_info=error)
-        if message in self._said:
+        if (cause or message) in self._said:
             return
-        self._said.add(message)
+        self._said.add(cause or message)
         try:
             warnings.warn(message, VDIWarning, stacklevel=3)
         except VDIWarning:  # warnings are errors: the log is what is left
