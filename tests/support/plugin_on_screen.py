@@ -123,6 +123,7 @@ def multisampling_goes_while_late_and_is_back_at_rest():
         time.sleep(0.1 if samples[-1] else 0.0)
 
     plotter.renderer.AddObserver("StartEvent", begun)
+    plotter.camera.Azimuth(1)
     plotter.render()
     full, view = pixels(plotter), plotter.camera_position
     hand = Hand(plotter)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import LOOKS, soft_ball
-from watched_windows import MOVING, frame, turned, watched
+from watched_windows import MOVING, frame, on_screen, turned, watched
 
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import HEADROOM
 
@@ -19,12 +19,16 @@ RATE = 30.0
 
 @pytest.fixture
 def taken(plotter, counted):
-    """Samples of each frame so far; with multisampling, a frame takes 40 ms of the clock's time."""
-    taken = []
+    """Samples of each frame so far; with them, it takes ``seconds`` more of the clock's time."""
+
+    class Taken(list):
+        seconds = 0.04
+
+    taken = Taken()
 
     def begun(*_):
         taken.append(plotter.render_window.GetMultiSamples())
-        counted.now += 0.04 if taken[-1] else 0.0
+        counted.now += taken.seconds if taken[-1] else 0.0
 
     plotter.renderer.AddObserver("StartEvent", begun)
     plotter.enable_anti_aliasing("msaa", multi_samples=SAMPLES)
@@ -56,15 +60,18 @@ def test_it_goes_before_rays_do_and_is_back_at_rest(plotter, taken):
 
 
 def test_it_stays_where_frames_are_in_time(plotter, taken, counted):
-    """And where only rays make them late."""
+    """And where one was held up by something else, or only rays make them late."""
     actor = watched(plotter, target_fps=15.0 / HEADROOM)
     turned(plotter, 1)
     assert moved(plotter, taken) == [SAMPLES] * 3
     assert actor.status.share == 1.0
-    plotter.renderer.RemoveObservers("StartEvent")
-    plotter.renderer.AddObserver(
-        "StartEvent", lambda *_: taken.append(plotter.render_window.GetMultiSamples())
-    )
+    taken.seconds = 0.0
+    frame(plotter)
+    moved(plotter, taken, frames=1)
+    taken.seconds = 0.2  # a frame that something held up
+    moved(plotter, taken, frames=1)
+    taken.seconds = 0.0
+    assert moved(plotter, taken) == [SAMPLES] * 3
     counted.dear = 100.0
     turned(plotter, 1)
     assert moved(plotter, taken) == [SAMPLES] * 3
@@ -76,23 +83,37 @@ def test_it_stays_where_frames_are_in_time(plotter, taken, counted):
     [
         lambda plotter, _: plotter.screenshot(return_img=True),
         lambda plotter, _: plotter.screenshot(return_img=True, scale=2),
+        lambda plotter, _: _quarter(plotter),
         lambda plotter, _: plotter.get_image_depth(),
         lambda plotter, path: _vector_graphics(plotter, path),
         lambda plotter, path: _movie_frame(plotter, path),
     ],
-    ids=["screenshot", "tiles", "depth", "vector graphics", "movie"],
+    ids=["screenshot", "tiles", "tile", "depth", "vector graphics", "movie"],
 )
 def test_pictures_in_a_motion_have_it(plotter, taken, shoot, tmp_path):
     watched(plotter, target_fps=RATE)
     turned(plotter, 1)
     moved(plotter, taken)
     frame(plotter)
-    at_rest = shoot(plotter, tmp_path)
-    assert moved(plotter, taken, degrees=120) == [0, 0, 0]  # once around
+    view, at_rest = plotter.camera_position, shoot(plotter, tmp_path)
+    moved(plotter, taken, degrees=5)
+    plotter.camera_position = view
+    frame(plotter, MOVING)
+    assert set(taken) == {0}
     in_motion = shoot(plotter, tmp_path)
     assert SAMPLES in taken
     np.testing.assert_array_equal(in_motion, at_rest)
     assert moved(plotter, taken) == [0, 0, 0], "the motion goes on"
+
+
+def _quarter(plotter):
+    window = plotter.render_window
+    window.SetTileScale(2)
+    window.SetTileViewport(0, 0, 0.5, 0.5)
+    plotter.render()
+    window.SetTileScale(1)
+    window.SetTileViewport(0, 0, 1, 1)
+    return on_screen(window)
 
 
 def _vector_graphics(plotter, path):

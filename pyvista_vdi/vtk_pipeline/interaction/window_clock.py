@@ -172,7 +172,7 @@ class WindowClock:
         self._target = 0.0
         self._headroom = HEADROOM
         self._dear_samples = False  # whether frames with multisampling and all rays would be late
-        self._beside = 0.0  # seconds beside the rays in the last frame that went without
+        self._beside = {True: 0.0, False: 0.0}  # seconds, of the last frame with it and without
         self._given_up: int | None = None  # the window's setting, in a frame that goes without
         self._started: float | None = None
         self._interacting = False
@@ -399,11 +399,13 @@ class WindowClock:
         self._judge_samples(frame, seconds)
 
     def _judge_samples(self, frame: _Frame, seconds: float) -> None:
-        """Learn from a frame with multisampling whether those of a motion go without."""
-        beside = seconds - frame.work
-        if not frame.multi_samples:
-            self._beside = beside
+        """Learn from a frame whether those of a motion go without multisampling."""
+        smooth = frame.multi_samples > 0
+        before, now = self._beside[smooth], seconds - frame.work
+        self._beside[smooth] = now
+        if not smooth:
             return
+        beside = min(before, now)  # a single frame may have been held up by anything
         # Before rays are given up: with all of them, would it be late?
         whole = beside + frame.work * frame.full_rays / frame.rays
         dear = whole * self._target > 1 and beside * self._target > _DEAR_BESIDE
@@ -421,7 +423,8 @@ class WindowClock:
             if cost in self._resting:
                 # What the last full frame took, so that an interaction does not begin with another
                 rays, work, seconds = self._resting[cost]
-                seconds = work + self._beside if self._dear_samples else seconds
+                if self._dear_samples:
+                    seconds = work + self._beside[False]
                 controller.record(rays, work, seconds)
         self._controllers[cost].target_fps = target
         return self._controllers[cost]
