@@ -113,6 +113,7 @@ class AddVDI(Component):
         camera: Any = None,
         coverage: Literal["bounds", "view"] = "bounds",
         target_fps: float | None = 30.0,
+        adjust_multi_samples: bool = True,
         regenerate: Policy = "auto",
         regenerate_below: float | None = None,
         draw: Literal["auto", "vdi", "volume"] = "auto",
@@ -218,6 +219,10 @@ class AddVDI(Component):
         target_fps : float, optional
             Frames per second to be kept while the view moves. ``None``: the interactor's
             ``DesiredUpdateRate``, as for VTK's own levels of detail; 0: every frame is full.
+        adjust_multi_samples : bool
+            Go without multisampling, which smooths the edges of meshes, while the view moves and
+            frames would be late for ``target_fps``. At rest, and in pictures that are kept, it is
+            as the plotter has it.
         regenerate : {"auto", "never"} or callable
             When a view gets a VDI of its own. ``"auto"``: where the estimated SSIM of its picture
             against volume rendering is below ``regenerate_below``; in windows on the screen only,
@@ -382,6 +387,7 @@ class AddVDI(Component):
         vdi_mapper.scalar_range = table.scalar_range
         vdi_mapper.SetDevice(device)
         vdi_mapper.SetTargetFrameRate(target_fps)
+        vdi_mapper.SetAutoAdjustMultiSamples(adjust_multi_samples)
         vdi_mapper.SetRegenerate(regenerate)
         if dial is not None and dial.ssim is not None:  # not above what the VDI is made for
             given = REGENERATE_BELOW if regenerate_below is None else regenerate_below

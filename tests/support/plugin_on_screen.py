@@ -109,6 +109,42 @@ def previews_and_screenshots():
     plotter.close()
 
 
+def multisampling_goes_while_late_and_is_back_at_rest():
+    """A drag whose frames are late with it goes without; its end, and a screenshot, have it."""
+    plotter, _ = scene(regenerate="never")
+    window = plotter.render_window
+    plotter.enable_anti_aliasing("msaa", multi_samples=4)
+    plotter.add_mesh(pv.Sphere(radius=0.4, center=(0, 1.3, 0.9)), color="w", reset_camera=False)
+    plotter.show(interactive_update=True, auto_close=False)
+    samples = []
+
+    def begun(*_):
+        samples.append(window.GetMultiSamples())
+        time.sleep(0.1 if samples[-1] else 0.0)
+
+    plotter.renderer.AddObserver("StartEvent", begun)
+    plotter.camera.Azimuth(1)
+    plotter.render()
+    full, view = pixels(plotter), plotter.camera_position
+    hand = Hand(plotter)
+    for at_first in (4, 0):
+        hand.press(100, 100)
+        samples.clear()
+        for x in (105, 110, 115):
+            hand.move(x, 100)
+        assert samples == [at_first, 0, 0], samples
+        assert window.GetMultiSamples() == 4
+        plotter.screenshot(return_img=True)
+        assert 4 in samples
+        plotter.camera_position = view
+        hand.release(115, 100)
+        assert samples[-1] == 4
+        np.testing.assert_array_equal(pixels(plotter), full)
+    hand.press(100, 100)
+    hand.move(105, 100)
+    plotter.close()
+
+
 def new_vdi_appears_by_itself():
     """At rest a VDI is made behind the frames, and shown without a frame being asked for."""
     plotter, actor = scene(regenerate="auto", regenerate_below=0.9999, status=True)
@@ -263,6 +299,7 @@ CASES = (
     every_change_is_shown,
     a_movie_has_every_step,
     previews_and_screenshots,
+    multisampling_goes_while_late_and_is_back_at_rest,
     new_vdi_appears_by_itself,
     held_still_nothing_turns_and_moving_shows_the_new_vdi,
     show_blocks_and_the_new_vdi_comes,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 
@@ -14,7 +15,8 @@ from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 import pyvista_vdi as pvdi
 from pyvista_vdi.quality import background
 from pyvista_vdi.quality.frame_rate import FrameRateController
-from pyvista_vdi.vtk_pipeline.interaction import estimation
+from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
+from pyvista_vdi.vtk_pipeline.interaction import estimation, regeneration, window_clock
 
 #: Odd, so that no smaller image divides it.
 WINDOW = (121, 103)
@@ -53,6 +55,35 @@ def gate(monkeypatch):
 def coarsest(monkeypatch):
     """Every preview is as coarse as it may be, whatever frames take."""
     monkeypatch.setattr(FrameRateController, "choose", lambda controller, full: 1)
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """A clock that counts a microsecond per ray, half of that with half the lists.
+
+    It keeps the windows of the VDIs that were raycast. ``dear`` is how many microseconds it is.
+    """
+
+    class Clock:
+        def __init__(self):
+            self.now, self.windows, self.dear = 0.0, [], 1.0
+
+        def perf_counter(self):
+            return self.now
+
+    clock = Clock()
+    render_vdi = painter_module.render_vdi
+
+    def timed(vdi, request):
+        clock.windows.append(vdi.window_size)
+        lists = math.prod(vdi.window_size) / max(map(math.prod, clock.windows))
+        clock.now += clock.dear * 1e-6 * request.size[0] * request.size[1] * lists
+        return render_vdi(vdi, request)
+
+    monkeypatch.setattr(painter_module, "render_vdi", timed)
+    for module in (window_clock, painter_module, regeneration):
+        monkeypatch.setattr(module, "time", clock)
+    return clock
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 
 import numpy as np
@@ -33,7 +32,7 @@ from pyvista_vdi.quality import ways
 from pyvista_vdi.vtk_pipeline.drawing import few_lists
 from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, sampled
-from pyvista_vdi.vtk_pipeline.interaction import regeneration, window_clock
+from pyvista_vdi.vtk_pipeline.interaction import window_clock
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import HEADROOM, Met, reduced
 
 pytestmark = pytest.mark.gl
@@ -284,35 +283,6 @@ def test_several_vdis_and_two_eyes_share_a_frame(plotter, coarsest):
     full = frame(plotter)
     assert np.abs(full[:, :120] - full[:, 121:]).max() > 8, "the two eyes see the same"
     assert 0 < np.abs(full - preview).mean() < 2
-
-
-@pytest.fixture
-def counted(monkeypatch):
-    """A clock that counts a microsecond per ray, half of that with half the lists.
-
-    It keeps the windows of the VDIs that were raycast. ``dear`` is how many microseconds it is.
-    """
-
-    class Clock:
-        def __init__(self):
-            self.now, self.windows, self.dear = 0.0, [], 1.0
-
-        def perf_counter(self):
-            return self.now
-
-    clock = Clock()
-    render_vdi = painter_module.render_vdi
-
-    def timed(vdi, request):
-        clock.windows.append(vdi.window_size)
-        lists = math.prod(vdi.window_size) / max(map(math.prod, clock.windows))
-        clock.now += clock.dear * 1e-6 * request.size[0] * request.size[1] * lists
-        return render_vdi(vdi, request)
-
-    monkeypatch.setattr(painter_module, "render_vdi", timed)
-    for module in (window_clock, painter_module, regeneration):
-        monkeypatch.setattr(module, "time", clock)
-    return clock
 
 
 def test_samples_follow_the_time_that_frames_take(plotter, counted):

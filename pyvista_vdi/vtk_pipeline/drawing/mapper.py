@@ -258,6 +258,22 @@ class VDIMapperMethods:
         """Draw every frame in full."""
         self.SetAutoAdjustSampleDistances(False)
 
+    SetAutoAdjustMultiSamples, GetAutoAdjustMultiSamples = accessors(
+        "AutoAdjustMultiSamples",
+        "painter.interaction.adjust_multi_samples",
+        "on",
+        """Draw previews without multisampling where that makes them late (on by default).
+
+        Where OpenGL is software, multisampling takes most of a frame, and a VDI has no edges that
+        it would smooth: so it is given up before rays are. Frames at rest, screenshots, exports and
+        off-screen windows have the window's ``GetMultiSamples()``, which is left as it was set.
+        With several VDIs in a window all of them must allow it.
+        """,
+        "Whether previews may be drawn without multisampling.",
+        bool,
+        modifies=False,
+    )
+
     SetInteractiveUpdateRate, GetInteractiveUpdateRate = accessors(
         "InteractiveUpdateRate",
         "painter.interaction.update_rate",

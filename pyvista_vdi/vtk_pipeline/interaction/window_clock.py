@@ -36,6 +36,9 @@ HEADROOM, _MOST_HEADROOM = 1.15, 1.6
 _LATE, _LATE_SHARE = 1.2, 0.01
 #: By which power of e a late frame raises the headroom, about; those in time take it back.
 _RAISE = 0.05
+#: Share of a frame's time from which what is beside the rays may be multisampling: where OpenGL is
+#: software that is most of a frame, on a GPU a millisecond or two (docs/decisions/frame_rate.md).
+_DEAR_BESIDE = 0.25
 
 #: What a VDI of all or of every second list is changed for, and what its rays take over its own.
 _OTHER_LISTS: dict[Cost, tuple[Cost, float]] = {
@@ -88,6 +91,7 @@ class Interaction:
     """What a mapper allows while a hand moves; VTK's names, and the meaning, are in the mapper."""
 
     adjust: bool = True
+    adjust_multi_samples: bool = True
     update_rate: float = 1.0  # 1/s, as in vtkSmartVolumeMapper
     target: float | None = None  # frames per second; None: the window's desired update rate
     off_screen: bool | None = None  # whether off-screen is watched; None: where a browser does
@@ -130,6 +134,7 @@ class _Frame:
     images: int = 0  # that were raycast
     work: float = 0.0  # seconds that this took
     cost: Cost = "vdi"  # what was raycast
+    multi_samples: int = 0  # that OpenGL takes of a pixel
 
 
 class WindowClock:
@@ -166,6 +171,9 @@ class WindowClock:
         self._floor = 0.0
         self._target = 0.0
         self._headroom = HEADROOM
+        self._dear_samples = False  # whether frames with multisampling and all rays would be late
+        self._beside = {True: 0.0, False: 0.0}  # seconds, of the last frame with it and without
+        self._given_up: int | None = None  # the window's setting, in a frame that goes without
         self._started: float | None = None
         self._interacting = False
         self._previewed = False
@@ -320,18 +328,43 @@ class WindowClock:
         self._foreground.close()
         for runtime in {painter.runtime() for painter in painters}:
             self._foreground.enter_context(runtime.foreground())
+        window = self._window.Get()
+        samples = window.GetMultiSamples()
+        if samples and self._dear_samples and self._may_go_without(window, painters):
+            self._given_up, samples = samples, 0
+            window.SetMultiSamples(0)
+        self._frame.multi_samples = samples
+
+    def _may_go_without(self, window: Any, painters: list[Any]) -> bool:
+        """Whether a frame may go without multisampling: all VDIs of the window let previews do."""
+        shown = [
+            (painter.interaction, renderer)
+            for painter in painters
+            for renderer in painter.renderers()
+            if renderer.GetRenderWindow() is window and painter.actor.GetVisibility()
+        ]
+        return bool(shown) and all(
+            interaction.adjust_multi_samples
+            and interaction.wants_preview(window)
+            and not self._keeps_picture()
+            and self._knows(renderer.GetActiveCamera())
+            for interaction, renderer in shown
+        )
 
     def _end(self) -> None:
+        window = self._window.Get()
+        given_up, self._given_up = self._given_up, None
+        if given_up is not None and not window.GetMultiSamples():  # it is as it was left here
+            window.SetMultiSamples(given_up)
         self._foreground.close()
         self.of_frame.clear()
         started, self._started = self._started, None
         frame, self._frame = self._frame, _Frame()
-        self._previewed = frame.preview
+        self._previewed = frame.preview or given_up is not None
         if frame.rays:
             # The first frame began before anybody looked at the clock: its work is known
             seconds = frame.work if started is None else time.perf_counter() - started
             self._record(frame, seconds)
-        window = self._window.Get()
         moving = any(painter.interaction.moving(window) for painter in self._painters)
         if self._interacting and not frame.interactive and not moving:
             self._interacting = False
@@ -343,6 +376,7 @@ class WindowClock:
         self._cost = frame.cost
         if not frame.interactive:
             self._resting[frame.cost] = (frame.rays, frame.work, seconds)
+            self._judge_samples(frame, seconds)
             return
         self._interacting = True
         self._target = frame.target
@@ -362,6 +396,22 @@ class WindowClock:
         if frame.cost != "volume" and frame.share is not None:
             bound = _FEW_ABOVE if frame.cost == "few lists" else _FEW_BELOW
             self._few_lists = frame.share < bound
+        self._judge_samples(frame, seconds)
+
+    def _judge_samples(self, frame: _Frame, seconds: float) -> None:
+        """Learn from a frame whether those of a motion go without multisampling."""
+        smooth = frame.multi_samples > 0
+        before, now = self._beside[smooth], seconds - frame.work
+        self._beside[smooth] = now
+        if not smooth:
+            return
+        beside = min(before, now)  # a single frame may have been held up by anything
+        # Before rays are given up: with all of them, would it be late?
+        whole = beside + frame.work * frame.full_rays / frame.rays
+        dear = whole * self._target > 1 and beside * self._target > _DEAR_BESIDE
+        if dear != self._dear_samples:
+            self._dear_samples, self._few_lists = dear, False
+            self._controllers.clear()  # frames are cheaper now, or dearer
 
     def _tuned(self, target: float, floor: float, cost: Cost) -> FrameRateController:
         """Return the window's controller, with this target and at most this floor."""
@@ -372,7 +422,10 @@ class WindowClock:
             self._floor = floor
             if cost in self._resting:
                 # What the last full frame took, so that an interaction does not begin with another
-                controller.record(*self._resting[cost])
+                rays, work, seconds = self._resting[cost]
+                if self._dear_samples:
+                    seconds = work + self._beside[False]
+                controller.record(rays, work, seconds)
         self._controllers[cost].target_fps = target
         return self._controllers[cost]
 
@@ -382,18 +435,22 @@ class WindowClock:
         A screenshot draws in tiles, or with a camera of its own; an export of vector graphics has
         a helper installed.
         """
-        if self._picture_wanted or not self.whole_picture:
+        if self._keeps_picture():
             return True
-        if vtkOpenGLGL2PSHelper.GetInstance() is not None:
-            return True
-        return self._is_new(renderer.GetActiveCamera())
+        camera = renderer.GetActiveCamera()
+        new = not self._knows(camera)
+        if new:
+            self._know(camera)
+        return new
 
-    def _is_new(self, camera: Any) -> bool:
-        """Whether nothing was drawn with this camera before; from now on it is known."""
-        if any(known.Get() is camera for known in self._known):
-            return False
-        self._know(camera)
-        return True
+    def _keeps_picture(self) -> bool:
+        """Whether this frame is drawn to be kept, whatever its cameras are."""
+        exported = vtkOpenGLGL2PSHelper.GetInstance() is not None
+        return self._picture_wanted or not self.whole_picture or exported
+
+    def _knows(self, camera: Any) -> bool:
+        """Whether something was drawn with this camera before."""
+        return any(known.Get() is camera for known in self._known)
 
     def _know(self, camera: Any) -> None:
         """Remember a camera as one that frames are drawn with."""
