@@ -13,9 +13,9 @@ import sys
 from pathlib import Path
 
 import pyvista as pv
-from vtkmodules.vtkCommonDataModel import vtkPlane
 
 from pyvista_vdi import examples
+from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 target = Path(sys.argv[1] if len(sys.argv) > 1 else "web_scene.html")
 

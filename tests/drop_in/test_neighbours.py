@@ -8,15 +8,16 @@ import pyvista as pv
 from drop_in.stage import Kind
 from drop_in.volumes import grid
 from PIL import Image
-from vtkmodules.vtkRenderingCore import (
+
+from pyvista_vdi.vtk_pipeline.vtk import (
     vtkAssembly,
     vtkBillboardTextActor3D,
     vtkFollower,
     vtkImageActor,
+    vtkImageResliceMapper,
     vtkImageSlice,
+    vtkLODActor,
 )
-from vtkmodules.vtkRenderingImage import vtkImageResliceMapper
-from vtkmodules.vtkRenderingLOD import vtkLODActor
 
 kind = Kind("Neighbours in the scene")
 

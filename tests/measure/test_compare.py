@@ -189,8 +189,7 @@ def test_settings_are_checked(options, message, volume, default_runtime):
     ],
 )
 def test_a_vtk_that_cannot_be_loaded_names_the_package(text, message):
-    pytest.importorskip("vtkmodules")
-    from pyvista_vdi.measure.vtk_baselines import explain_import_error
+    from pyvista_vdi.vtk_pipeline.vtk import explain_import_error
 
     error = explain_import_error(ImportError(text))
     assert isinstance(error, MissingDependencyError)
@@ -214,7 +213,7 @@ def test_a_machine_without_opengl_names_the_packages(volume, peer_property, monk
 
 def take_opengl_away(monkeypatch):
     """Let VTK find no window that can draw, as on a machine without EGL and OSMesa."""
-    from vtkmodules import vtkRenderingOpenGL2
+    from pyvista_vdi.vtk_pipeline.vtk import vtkRenderingOpenGL2
 
     class NoWindow:
         def __getattr__(self, name):

@@ -26,8 +26,6 @@ from scan_files import (
     write_nifti,
 )
 from strategies import random_vdi
-from vtkmodules.vtkCommonMath import vtkMatrix4x4
-from vtkmodules.vtkIOImage import vtkMetaImageWriter, vtkNIFTIImageWriter
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
@@ -38,6 +36,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
     VDIWarning,
 )
+from pyvista_vdi.vtk_pipeline.vtk import vtkMatrix4x4, vtkMetaImageWriter, vtkNIFTIImageWriter
 
 SPACING, ORIGIN = np.array([1.0, 1.5, 2.5]), np.array([-10.0, 20.0, 30.0])
 MARK = (4, 2, 1)  # x, y, z

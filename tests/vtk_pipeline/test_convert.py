@@ -7,15 +7,6 @@ import pytest
 import pyvista as pv
 from hypothesis import example, given
 from hypothesis import strategies as st
-from vtkmodules.util.numpy_support import numpy_to_vtk
-from vtkmodules.vtkCommonCore import vtkMath
-from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
-from vtkmodules.vtkRenderingCore import (
-    vtkColorTransferFunction,
-    vtkLight,
-    vtkRenderer,
-    vtkVolumeProperty,
-)
 
 from pyvista_vdi.errors import (
     InvalidArgumentError,
@@ -27,6 +18,16 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.lighting import Light, Lights, Shading
 from pyvista_vdi.vtk_pipeline.filters.convert import as_numpy, to_vtk, volume_from_vtk
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
+from pyvista_vdi.vtk_pipeline.vtk import (
+    numpy_to_vtk,
+    vtkColorTransferFunction,
+    vtkImageData,
+    vtkLight,
+    vtkMath,
+    vtkPiecewiseFunction,
+    vtkRenderer,
+    vtkVolumeProperty,
+)
 
 
 def some_grid(**arrays):

@@ -8,12 +8,6 @@ import pyvista as pv
 from plugin_scenes import soft_ball
 from strategies import random_vdi
 from vtk_sources import executions, ready_source, some_property
-from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
-from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
-from vtkmodules.vtkFiltersGeneral import vtkMultiBlockDataGroupFilter
-from vtkmodules.vtkFiltersHybrid import vtkTemporalInterpolator
-from vtkmodules.vtkImagingCore import vtkExtractVOI, vtkRTAnalyticSource
 from watched_windows import frame, frames_until
 
 import pyvista_vdi as pvdi
@@ -21,6 +15,16 @@ from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileEr
 from pyvista_vdi.vtk_pipeline import VDIReader, VDIToImage, VDIWriter, vdi_from_image, vdi_to_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import SourceInput
 from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
+from pyvista_vdi.vtk_pipeline.vtk import (
+    VTKPythonAlgorithmBase,
+    vtkDataObject,
+    vtkExtractVOI,
+    vtkImageData,
+    vtkMultiBlockDataGroupFilter,
+    vtkRTAnalyticSource,
+    vtkStreamingDemandDrivenPipeline,
+    vtkTemporalInterpolator,
+)
 
 TIMES = (0.5, 1.0, 4.0)
 #: Times that are asked for, and the step that is nearest to each; of two, the earlier.

@@ -9,9 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from vtkmodules.vtkCommonCore import vtkWeakReference
-from vtkmodules.vtkCommonDataModel import vtkImageData
-from vtkmodules.vtkRenderingCore import vtkVolumeProperty
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
@@ -33,6 +30,7 @@ from pyvista_vdi.vtk_pipeline.filters.properties import (
     transfer_function_from_property,
 )
 from pyvista_vdi.vtk_pipeline.filters.view import TrackedCamera
+from pyvista_vdi.vtk_pipeline.vtk import vtkImageData, vtkVolumeProperty, vtkWeakReference
 
 #: What a VDI's window covers.
 COVERAGES = ("bounds", "view")
