@@ -127,7 +127,7 @@ def __getattr__(name: str) -> Any:
     except ImportError as error:
         raise explain_import_error(error) from error
     except AttributeError as error:
-        raise explain_import_error(ImportError(f"it has no {name}")) from error
+        raise explain_import_error(ImportError(f"{BACKEND} has no {name}")) from error
     globals()[name] = value
     return value
 
@@ -147,9 +147,9 @@ def explain_import_error(error: ImportError) -> MissingDependencyError:
             f'VTK cannot be loaded ({text}): install it by pip install "pyvista-vdi[plot]"'
         )
     return MissingDependencyError(
-        f"{BACKEND}, which PyVista takes as its VTK, cannot be loaded ({text}): install all of it, "
-        f'as by pip install "{BACKEND}[all]", or have PyVista take VTK itself, by the environment '
-        "variable PYVISTA_VTK_BACKEND=vtk"
+        f"VTK cannot be loaded from {BACKEND} ({text}): install all of it, as by pip install "
+        f'"{BACKEND}[all]", or choose another build by the environment variable '
+        "PYVISTA_VTK_BACKEND=vtk"
     )
 
 

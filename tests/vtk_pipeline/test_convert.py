@@ -26,6 +26,7 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkMath,
     vtkPiecewiseFunction,
     vtkRenderer,
+    vtkVersion,
     vtkVolumeProperty,
 )
 
@@ -379,7 +380,8 @@ def test_values_do_not_keep_an_array_of_vtk_that_has_attributes():
     while kept[-1] is not None:
         last = kept[-1]
         kept.append(last.obj if isinstance(last, memoryview) else getattr(last, "base", None))
-    assert not vars(array) or not any(each is array for each in kept)
+    frees_once = (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) >= (9, 7)
+    assert frees_once or not vars(array) or not any(each is array for each in kept)
     array.SetNumberOfTuples(2)  # of the same memory
     np.testing.assert_array_equal(as_numpy(array), numbers[:2])
     array.SetNumberOfTuples(40)  # of other memory

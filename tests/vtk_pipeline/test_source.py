@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import soft_ball
+from vtk_builds import vtk_or_skip
 from vtk_sources import SIZE, behind, camera_at, executions, ready_source, some_property
 
 import pyvista_vdi as pvdi
@@ -23,7 +24,6 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkImageResample,
     vtkImageShiftScale,
     vtkMetaImageReader,
-    vtkMetaImageWriter,
     vtkMultiBlockDataGroupFilter,
     vtkNrrdReader,
     vtkRTAnalyticSource,
@@ -186,7 +186,7 @@ def nrrd(folder, image):
 
 
 def meta_image(folder, image):
-    file_of(image, folder / "a.mha", vtkMetaImageWriter())
+    file_of(image, folder / "a.mha", vtk_or_skip("vtkMetaImageWriter")())
     return read_from(folder / "a.mha", vtkMetaImageReader())
 
 

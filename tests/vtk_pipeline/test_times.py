@@ -7,6 +7,7 @@ import pytest
 import pyvista as pv
 from plugin_scenes import soft_ball
 from strategies import random_vdi
+from vtk_builds import vtk_or_skip
 from vtk_sources import executions, ready_source, some_property
 from watched_windows import frame, frames_until
 
@@ -23,7 +24,6 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkMultiBlockDataGroupFilter,
     vtkRTAnalyticSource,
     vtkStreamingDemandDrivenPipeline,
-    vtkTemporalInterpolator,
 )
 
 TIMES = (0.5, 1.0, 4.0)
@@ -210,7 +210,7 @@ def test_a_source_behind_what_interpolates_in_time(default_runtime):
     """VTK's filter asks for the two steps around the time; its image is what the VDI is made of."""
     balls = [ball_at(0), ball_at(0), ball_at(0)]
     balls[1]["v"] = balls[0]["v"] / 3
-    producer, between = Moving(balls), vtkTemporalInterpolator()
+    producer, between = Moving(balls), vtk_or_skip("vtkTemporalInterpolator")()
     between.SetInputConnection(producer.GetOutputPort())
     source = source_of(between)
     source.UpdateTimeStep(0.75)
