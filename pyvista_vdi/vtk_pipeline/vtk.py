@@ -19,7 +19,10 @@ from packaging.version import Version
 from pyvista_vdi.errors import MissingDependencyError, UnsupportedError
 
 if TYPE_CHECKING:  # what editors show; with mypy every name is Any, by __getattr__
-    from vtkmodules.all import *  # noqa: F403
+    from vtkmodules.all import *
+    from vtkmodules.util.misc import calldata_type
+    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+    from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
 
 #: The names that this package, its tests and its examples use, by module.
 _NAMES = {
