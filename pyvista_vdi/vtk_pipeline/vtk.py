@@ -20,9 +20,9 @@ from pyvista_vdi.errors import MissingDependencyError, UnsupportedError
 
 if TYPE_CHECKING:  # what editors show; with mypy every name is Any, by __getattr__
     from vtkmodules.all import *
-    from vtkmodules.util.misc import calldata_type
-    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-    from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
+    from vtkmodules.util.misc import *
+    from vtkmodules.util.numpy_support import *
+    from vtkmodules.util.vtkAlgorithm import *
 
 #: The names that this package, its tests and its examples use, by module.
 _NAMES = {
