@@ -130,6 +130,9 @@ class vtkObjectBase:  # noqa: N801 - what stands for the base class of another b
     def GetIndependentComponents(self):
         return 1
 
+    def GetTwoSidedLighting(self):
+        return 1
+
 
 class vtkImageData(vtkObjectBase):  # noqa: N801
     pass
@@ -148,6 +151,8 @@ class vtkImageData(vtkObjectBase):  # noqa: N801
         lambda data: pvdi.VDISource().SetInputData(data),
         lambda data: pvdi.VDISource().SetInputConnection(data),
         lambda data: pvdi.VDISource().SetVolumeProperty(data),
+        lambda data: pvdi.VDISource().SetCamera(data),
+        lambda data: pvdi.VDISource().SetLights(data),
         lambda data: VDIWriter().SetInputData(data),
         lambda data: VDIWriter().SetInputConnection(0, data),
         lambda data: pvdi.VDIMapper().SetInputData(data),
