@@ -30,7 +30,12 @@ from pyvista_vdi.vtk_pipeline.filters.properties import (
     transfer_function_from_property,
 )
 from pyvista_vdi.vtk_pipeline.filters.view import TrackedCamera
-from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData, vtkVolumeProperty, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import (
+    require_this_build,
+    vtkImageData,
+    vtkVolumeProperty,
+    vtkWeakReference,
+)
 
 #: What a VDI's window covers.
 COVERAGES = ("bounds", "view")
