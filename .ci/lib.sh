@@ -178,6 +178,19 @@ tests_on_second_implementation() {
     tests_of "$work/venv" "$@"
 }
 
+# tests_with_cvista [arguments of pytest]: with the build of VTK that PyVista takes once it is there
+tests_with_cvista() {
+    if ! "$work/venv/bin/python" -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then
+        log "cvista is for Python 3.11 and newer: nothing is tested with it"
+        return 0
+    fi
+    "$work/venv/bin/pip" install --quiet --target "$work/cvista" "cvista[all]<9.8"
+    export PYTHONPATH=$work/cvista
+    [[ $("$work/venv/bin/python" -c 'import pyvista; print(pyvista.vtk_backend())') == cvista ]]
+    "$work/venv/bin/pyvista-vdi" compare --example brain --size 320x180 --out "$work/cvista-out"
+    tests_of "$work/venv" "$@"
+}
+
 # checks SESSION...: those of noxfile.py, in the environment with the wheel
 checks() {
     export PATH="$work/venv/bin:$PATH" PYVISTA_VDI_SITE="$work/docs-html"

@@ -17,10 +17,9 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from PIL import Image
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkUnsignedCharArray
 
 #: Pictures per second of the animation, and of the simulated hand.
 RATE = 12

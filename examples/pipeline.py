@@ -10,20 +10,24 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-import vtkmodules.vtkInteractionStyle  # noqa: F401 - lets the window be turned
-from vtkmodules.util.numpy_support import numpy_to_vtk
-from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction, vtkPlane
-from vtkmodules.vtkIOImage import vtkPNGWriter
-from vtkmodules.vtkRenderingCore import (
+
+import pyvista_vdi as pvdi
+
+# VTK's names, from vtkmodules or, where PyVista takes that, from cvista
+from pyvista_vdi.vtk_pipeline.vtk import (
+    numpy_to_vtk,
     vtkColorTransferFunction,
+    vtkImageData,
+    vtkInteractionStyle,  # noqa: F401 - lets the window be turned
+    vtkPiecewiseFunction,
+    vtkPlane,
+    vtkPNGWriter,
     vtkRenderer,
     vtkRenderWindow,
     vtkRenderWindowInteractor,
     vtkVolumeProperty,
     vtkWindowToImageFilter,
 )
-
-import pyvista_vdi as pvdi
 
 
 def soft_ball(n: int = 96) -> vtkImageData:

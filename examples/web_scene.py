@@ -13,7 +13,6 @@ import sys
 from pathlib import Path
 
 import pyvista as pv
-from vtkmodules.vtkCommonDataModel import vtkPlane
 
 from pyvista_vdi import examples
 
@@ -21,9 +20,7 @@ target = Path(sys.argv[1] if len(sys.argv) > 1 else "web_scene.html")
 
 volume = examples.load_brain()
 x, y, z = volume.center
-cut = vtkPlane()
-cut.SetOrigin(x + 20, y, z)
-cut.SetNormal(-1, 0, 0)
+cut = pv.generate_plane(normal=(-1, 0, 0), origin=(x + 20, y, z))
 
 plotter = pv.Plotter(off_screen=True, window_size=(640, 360))
 actor = plotter.add_vdi(volume, cmap="bone", opacity="linear", scalar_bar_args={"title": "MRI"})

@@ -26,6 +26,7 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.progress import DelayedBar
+from pyvista_vdi.vtk_pipeline.vtk import BACKEND
 
 _T = TypeVar("_T")
 
@@ -152,7 +153,7 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
 
 def has_vtk(options: argparse.Namespace) -> bool:
     """Whether VTK's mappers take part; says so where they cannot."""
-    if not options.no_vtk and find_spec("vtkmodules") is None:
+    if not options.no_vtk and find_spec(BACKEND) is None:
         print("VTK is not installed: its mappers are left out", file=sys.stderr)
         return False
     return not options.no_vtk

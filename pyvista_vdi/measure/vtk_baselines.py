@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,8 @@ from pyvista_vdi.errors import DeviceError, InvalidArgumentError, MissingDepende
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.plotting.imports import explain_import_error, import_pyvista
+from pyvista_vdi.plotting.imports import import_pyvista
+from pyvista_vdi.vtk_pipeline import vtk
 
 #: VTK's mappers by the names that ``Plotter.add_volume(mapper=...)`` has for them.
 MAPPERS = ("gpu", "fixed_point")
@@ -37,7 +37,7 @@ class OffScreenVolume:
     def __init__(self, name: str, actor: Any, window_size: tuple[int, int]) -> None:
         self.name = name
         self._window = _off_screen_window(check_window_size(window_size))
-        self._renderer = _vtk("vtkRenderingCore").vtkRenderer()
+        self._renderer = vtk.vtkRenderer()
         self._renderer.SetBackground(0, 0, 0)
         self._window.AddRenderer(self._renderer)
         self._volume = actor
@@ -70,10 +70,10 @@ class OffScreenVolume:
         """
         self.render(camera)
         width, height = self._window.GetSize()
-        pixels = _vtk("vtkCommonCore").vtkUnsignedCharArray()
+        pixels = vtk.vtkUnsignedCharArray()
         # Of the left eye; what has been drawn lies in the back buffer, off-screen as well
         self._window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
-        bottom_up = _vtk("util.numpy_support").vtk_to_numpy(pixels).reshape(height, width, 3)
+        bottom_up = vtk.vtk_to_numpy(pixels).reshape(height, width, 3)
         if not bottom_up.any():
             raise DeviceError(
                 f"{self.name} drew nothing: every pixel is black; check that the "
@@ -91,7 +91,7 @@ class OffScreenVolume:
         from pyvista_vdi.vtk_pipeline.filters.view import aim
 
         aim(self._renderer.GetActiveCamera(), camera)
-        matrix = _vtk("vtkCommonMath").vtkMatrix4x4()
+        matrix = vtk.vtkMatrix4x4()
         matrix.DeepCopy(camera.model_transform.ravel().tolist())
         self._volume.SetUserMatrix(matrix)
         self._renderer.ResetCameraClippingRange()
@@ -115,7 +115,7 @@ class VTKBaseline(OffScreenVolume):
     ) -> None:
         if mapper not in MAPPERS:
             raise InvalidArgumentError(f"mapper must be one of {MAPPERS}; got {mapper!r}")
-        actor = _vtk("vtkRenderingCore").vtkVolume()
+        actor = vtk.vtkVolume()
         from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
 
         self._mapper = _make_mapper(mapper)
@@ -134,22 +134,13 @@ class VTKBaseline(OffScreenVolume):
         self._mapper.SetImageSampleDistance(distance)
 
 
-def _vtk(module: str) -> Any:
-    """Return one of VTK's modules; MissingDependencyError says how to get it."""
-    try:
-        return import_module(f"vtkmodules.{module}")
-    except ImportError as error:
-        raise explain_import_error(error) from error
-
-
 def property_from_transfer_function(volume: Volume, table: TransferFunction) -> Any:
     """Return the ``vtkVolumeProperty`` with which VTK draws a volume as our raycaster does.
 
     ``table`` is without shading and gradient opacity; the property has a node at each entry.
     """
-    core = _vtk("vtkRenderingCore")
-    color, prop = core.vtkColorTransferFunction(), core.vtkVolumeProperty()
-    opacity = _vtk("vtkCommonDataModel").vtkPiecewiseFunction()
+    color, prop = vtk.vtkColorTransferFunction(), vtk.vtkVolumeProperty()
+    opacity = vtk.vtkPiecewiseFunction()
     low, high = table.scalar_range
     n = len(table.opacities)
     color.BuildFunctionFromTable(low, high, n, table.colors.astype(np.float64).ravel())
@@ -181,12 +172,12 @@ def add_volume_property(volume: Volume, arguments: Mapping[str, Any]) -> Any:
 
 
 def _make_mapper(name: str) -> Any:
-    opengl = _vtk("vtkRenderingVolumeOpenGL2")  # without it the other mapper crashes, too
+    opengl = vtk.vtkRenderingVolumeOpenGL2  # without it the other mapper crashes, too
     if name == "gpu":
         mapper = opengl.vtkOpenGLGPUVolumeRayCastMapper()
         mapper.SetUseJittering(False)
     else:
-        mapper = _vtk("vtkRenderingVolume").vtkFixedPointVolumeRayCastMapper()
+        mapper = vtk.vtkFixedPointVolumeRayCastMapper()
     mapper.SetAutoAdjustSampleDistances(False)
     mapper.SetLockSampleDistanceToInputSpacing(False)
     mapper.SetImageSampleDistance(1.0)
@@ -195,8 +186,8 @@ def _make_mapper(name: str) -> Any:
 
 def _off_screen_window(size: tuple[int, int]) -> Any:
     """Return an off-screen window that can draw; EGL, then OSMesa, where there is no display."""
-    opengl = _vtk("vtkRenderingOpenGL2")
-    kinds = [_vtk("vtkRenderingCore").vtkRenderWindow]
+    opengl = vtk.vtkRenderingOpenGL2
+    kinds = [vtk.vtkRenderWindow]
     chosen = os.environ.get("VTK_DEFAULT_OPENGL_WINDOW")
     if sys.platform.startswith("linux") and not chosen and not os.environ.get("DISPLAY"):
         # Asked by name: VTK's own search tries an X server first and warns that there is none

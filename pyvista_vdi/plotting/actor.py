@@ -7,11 +7,14 @@ from typing import Any
 import pyvista as pv
 from pyvista.plotting.mapper import OpenGLGPUVolumeRayCastMapper
 from pyvista.plotting.volume import Volume
-from vtkmodules.vtkCommonCore import vtkWeakReference
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
+from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkWeakReference
+
+# PYVISTA_VTK_BACKEND may have changed between our first use of VTK and PyVista's
+require_this_build(Volume)
 
 
 class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):

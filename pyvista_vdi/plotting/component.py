@@ -9,9 +9,6 @@ from typing import Any, Literal
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from vtkmodules.vtkCommonCore import vtkWeakReference
-from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet
-from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentTypeError, UnsupportedError
@@ -34,6 +31,7 @@ from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.interaction.regeneration import Policy, checked_policy
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import checked_rate
+from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet, vtkVolume, vtkWeakReference
 
 #: ``add_volume``'s aliases.
 _ALIASES = {"rng": "clim", "colormap": "cmap", "backface_culling": "culling"}

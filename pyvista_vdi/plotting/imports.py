@@ -6,34 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.errors import MissingDependencyError
-
-#: Debian's packages of the libraries that VTK's wheels link to and do not bring.
-_PACKAGES = {
-    "libGL.so.1": "libgl1",
-    "libEGL.so.1": "libegl1",
-    "libX11.so.6": "libx11-6",
-    "libXrender.so.1": "libxrender1",
-    "libXcursor.so.1": "libxcursor1",
-    "libXft.so.2": "libxft2",
-    "libXt.so.6": "libxt6",
-    "libSM.so.6": "libsm6",
-    "libICE.so.6": "libice6",
-}
-
-
-def explain_import_error(error: ImportError) -> MissingDependencyError:
-    """Return the error that tells how to make VTK importable: which Debian package it lacks."""
-    text = str(error)
-    for library, package in _PACKAGES.items():
-        if library in text:
-            return MissingDependencyError(
-                f"VTK cannot be loaded, because the system library {library} is missing: on "
-                f"Debian and Ubuntu install '{package}' (and 'libegl1 libgl1-mesa-dri' to render "
-                "off-screen)"
-            )
-    return MissingDependencyError(
-        f'VTK cannot be loaded ({text}): install it by pip install "pyvista-vdi[plot]"'
-    )
+from pyvista_vdi.vtk_pipeline.vtk import explain_import_error
 
 
 def import_pyvista() -> Any:

@@ -22,7 +22,7 @@ def why_no_window() -> str | None:
     if not display:
         return "DISPLAY names no X display"
     import_pyvista()  # says what is missing where VTK cannot be loaded
-    from vtkmodules.vtkRenderingCore import vtkRenderWindow
+    from pyvista_vdi.vtk_pipeline.vtk import vtkRenderWindow
 
     kind = vtkRenderWindow().GetClassName()
     if kind not in _OFF_SCREEN:

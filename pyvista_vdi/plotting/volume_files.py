@@ -14,11 +14,15 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from vtkmodules.vtkIOImage import vtkDICOMImageReader, vtkMetaImageReader, vtkNIFTIImageReader
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIError, VDIWarning
 from pyvista_vdi.plotting.dicom import Slice, read_slice, require_uncompressed, slices_of, values_of
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkDICOMImageReader,
+    vtkMetaImageReader,
+    vtkNIFTIImageReader,
+)
 
 #: Names of files that hold VDIs, not volumes.
 _VDI_SUFFIXES = (".vdi", ".exr", ".html")
@@ -123,9 +127,12 @@ def _read_whole(reader: Any, file: Path) -> pv.ImageData:
 
 
 def _code(reader: Any) -> str:
-    from vtkmodules.vtkCommonCore import vtkErrorCode
-
-    return str(vtkErrorCode.GetStringFromErrorCode(reader.GetErrorCode()))
+    code = reader.GetErrorCode()
+    try:
+        from pyvista_vdi.vtk_pipeline.vtk import vtkErrorCode
+    except ImportError:  # as in cvista
+        return f"VTK's error {code}"
+    return str(vtkErrorCode.GetStringFromErrorCode(code))
 
 
 def _place(data: pv.ImageData, to_world: NDArray[np.float64], file: Path) -> pv.ImageData:

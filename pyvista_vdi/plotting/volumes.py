@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from vtkmodules.vtkCommonDataModel import vtkRectilinearGrid
 
 from pyvista_vdi.errors import (
     InvalidArgumentError,
@@ -17,6 +16,7 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.convert import to_image_data
 from pyvista_vdi.vtk_pipeline.filters.convert import as_numpy, require_image
+from pyvista_vdi.vtk_pipeline.vtk import vtkRectilinearGrid
 
 #: What ``add_volume`` calls scalars that are given as an array.
 _UNNAMED = "Data"

@@ -137,7 +137,7 @@ def test_help_shows_every_classification_argument_with_add_volumes_defaults():
 def test_the_engine_works_without_vtk_and_pyvista(default_runtime):
     code = """
 import sys
-sys.modules.update(dict.fromkeys(("pyvista", "vtk", "vtkmodules", "matplotlib")))
+sys.modules.update(dict.fromkeys(("cvista", "pyvista", "vtk", "vtkmodules", "matplotlib")))
 import numpy as np, pyvista_vdi as pvdi
 volume = pvdi.Volume(np.arange(60.0).reshape(3, 4, 5))
 camera = pvdi.Camera((2, 2, 20), (2, 2, 1), (0, 1, 0))

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
-from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 
 from pyvista_vdi import compare_images
 from pyvista_vdi.errors import VDIError, VDIWarning
+from pyvista_vdi.vtk_pipeline.vtk import vtkOutputWindow, vtkStringOutputWindow
 
 #: The issue's bound for a picture.
 LEAST_SSIM = 0.98

@@ -8,8 +8,8 @@ import pyvista as pv
 from drop_in.stage import WINDOW, Kind, half_voxel_steps, shot
 from drop_in.volumes import grid, values
 from PIL import Image, ImageSequence
-from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction, vtkPlane
-from vtkmodules.vtkRenderingCore import vtkColorTransferFunction
+
+from pyvista_vdi.vtk_pipeline.vtk import vtkColorTransferFunction, vtkPiecewiseFunction, vtkPlane
 
 kind = Kind("Changes after the first picture")
 

@@ -7,7 +7,8 @@ import numpy as np
 import pyvista as pv
 from drop_in.stage import Kind, expectations
 from drop_in.volumes import grid, values
-from vtkmodules.vtkCommonDataModel import vtkImageData
+
+from pyvista_vdi.vtk_pipeline.vtk import vtkImageData
 
 kind = Kind("Kinds of data")
 

@@ -8,15 +8,14 @@ import pyvista as pv
 from drop_in.stage import Kind
 from drop_in.volumes import grid
 from PIL import Image
-from vtkmodules.vtkRenderingCore import (
+from vtk_builds import vtk_or_skip
+
+from pyvista_vdi.vtk_pipeline.vtk import (
     vtkAssembly,
-    vtkBillboardTextActor3D,
     vtkFollower,
     vtkImageActor,
     vtkImageSlice,
 )
-from vtkmodules.vtkRenderingImage import vtkImageResliceMapper
-from vtkmodules.vtkRenderingLOD import vtkLODActor
 
 kind = Kind("Neighbours in the scene")
 
@@ -111,7 +110,7 @@ def environment(pl):
 
 
 def billboard(pl):
-    made = vtkBillboardTextActor3D()
+    made = vtk_or_skip("vtkBillboardTextActor3D")()
     made.SetInput("billboard")
     made.SetPosition(0.3, 0, 1)
     return made
@@ -143,7 +142,7 @@ def assembly(pl):
 
 
 def image_slice(pl):
-    made, mapper = vtkImageSlice(), vtkImageResliceMapper()
+    made, mapper = vtkImageSlice(), vtk_or_skip("vtkImageResliceMapper")()
     mapper.SetInputData(grid())
     made.SetMapper(mapper)
     made.GetProperty().SetColorWindow(255)
@@ -159,7 +158,7 @@ def image_actor(pl):
 
 
 def lod(pl):
-    made = vtkLODActor()
+    made = vtk_or_skip("vtkLODActor")()
     made.SetMapper(pv.DataSetMapper(ball()))
     return made
 

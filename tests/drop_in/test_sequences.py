@@ -7,9 +7,9 @@ import pytest
 import pyvista as pv
 from drop_in.stage import CONTRAST, LEAST_CONTRAST, LEAST_SSIM, contrast, half_voxel_steps
 from drop_in.volumes import grid, values
-from vtkmodules.vtkCommonDataModel import vtkPlane
 
 from pyvista_vdi import compare_images
+from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
 

@@ -420,10 +420,8 @@ def validator(data: bytes) -> None:
 
 def vtk_form(data: bytes) -> None:
     """The canonical VTK image, damaged, and back to a VDI."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-    from vtkmodules.vtkCommonCore import vtkStringArray
-
     from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image
+    from pyvista_vdi.vtk_pipeline.vtk import numpy_to_vtk, vtk_to_numpy, vtkStringArray
 
     choices = Choices(data)
     image = vdi_to_image(base_vdi(choices.integer(0, 15)))
@@ -454,8 +452,6 @@ def vtk_form(data: bytes) -> None:
             array = where.GetArray(name)
             if array is None:
                 continue
-            from vtkmodules.util.numpy_support import vtk_to_numpy
-
             changed = _changed_array(choices, vtk_to_numpy(array).copy())
             if not isinstance(changed, np.ndarray) or changed.dtype.kind not in "uif":
                 continue

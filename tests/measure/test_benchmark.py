@@ -107,7 +107,7 @@ def test_vtk_takes_part_and_draws_the_same(default_runtime, tmp_path):
 
 
 def test_vtk_gets_the_same_transfer_function():
-    pytest.importorskip("vtkmodules")
+    pytest.importorskip("pyvista")
     from pyvista_vdi.measure.vtk_baselines import property_from_transfer_function
     from pyvista_vdi.vtk_pipeline.filters.convert import transfer_function_from_property
 

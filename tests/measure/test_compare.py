@@ -177,27 +177,6 @@ def test_settings_are_checked(options, message, volume, default_runtime):
         measure(volume, Settings(**{"classification": LOOKS, "vtk": False, **options}))
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            "libGL.so.1: cannot open shared object file",
-            "the system library libGL.so.1 is missing: on Debian and Ubuntu install 'libgl1'",
-        ),
-        ("libXrender.so.1: cannot open", "install 'libxrender1'"),
-        ("No module named 'vtkmodules'", r'install it by pip install "pyvista-vdi\[plot\]"'),
-    ],
-)
-def test_a_vtk_that_cannot_be_loaded_names_the_package(text, message):
-    pytest.importorskip("vtkmodules")
-    from pyvista_vdi.measure.vtk_baselines import explain_import_error
-
-    error = explain_import_error(ImportError(text))
-    assert isinstance(error, MissingDependencyError)
-    with pytest.raises(MissingDependencyError, match=message):
-        raise error
-
-
 def test_a_machine_without_opengl_names_the_packages(volume, peer_property, monkeypatch):
     from pyvista_vdi.measure.front import Plan, measure_front
     from pyvista_vdi.measure.vtk_baselines import VTKBaseline
@@ -214,7 +193,7 @@ def test_a_machine_without_opengl_names_the_packages(volume, peer_property, monk
 
 def take_opengl_away(monkeypatch):
     """Let VTK find no window that can draw, as on a machine without EGL and OSMesa."""
-    from vtkmodules import vtkRenderingOpenGL2
+    from pyvista_vdi.vtk_pipeline.vtk import vtkRenderingOpenGL2
 
     class NoWindow:
         def __getattr__(self, name):

@@ -35,9 +35,8 @@ LIKE_OTHERS = ("coloured headlight", "scene light", "gradient opacity", "RGBA")
 
 
 def the_property(volume, case):
-    from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
-
     from pyvista_vdi.plotting.classify import Looks
+    from pyvista_vdi.vtk_pipeline.vtk import vtkPiecewiseFunction
 
     distance = volume.default_unit_distance
     looks = Looks(
@@ -55,7 +54,7 @@ def the_property(volume, case):
 
 
 def put_lights(renderer, kind):
-    from vtkmodules.vtkRenderingCore import vtkLight, vtkLightKit
+    from pyvista_vdi.vtk_pipeline.vtk import vtkLight, vtkLightKit
 
     if kind == "kit":
         vtkLightKit().AddLightsToRenderer(renderer)

@@ -106,8 +106,10 @@ def test_a_tile_s_rays_are_those_of_its_pixels(rng):
 
 
 def vtk_camera(camera):
-    vtk_rendering = pytest.importorskip("vtkmodules.vtkRenderingCore")
-    other = vtk_rendering.vtkCamera()
+    pytest.importorskip("pyvista")
+    from pyvista_vdi.vtk_pipeline.vtk import vtkCamera
+
+    other = vtkCamera()
     other.SetPosition(camera.position)
     other.SetFocalPoint(camera.focal_point)
     other.SetViewUp(camera.view_up)

@@ -109,7 +109,6 @@ def _anchors(page):
 
 
 def test_where_is_what_names_python_that_exists():
-    pytest.importorskip("vtkmodules")
     pytest.importorskip("pyvista")
     missing = [name for row in _rows() for name in _named(row[1]) if not _is_importable(name)]
     assert not missing, f"docs/where_is_what.md: {missing}"

@@ -18,14 +18,17 @@ import pytest
 from PIL import Image
 from plugin_scenes import soft_ball
 from virtual_screen import virtual_screen
-from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
-from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import examples
 from pyvista_vdi.device.icd import INTEL_LIBRARY
 from pyvista_vdi.model.metrics import compare_images, over_background
 from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkColorTransferFunction,
+    vtkPiecewiseFunction,
+    vtkVolumeProperty,
+)
 
 pytestmark = pytest.mark.paraview
 

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import LOOKS, WINDOW, shown, soft_ball
-from vtkmodules.vtkCommonCore import vtkWeakReference
-from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 from watched_windows import small_vdi
 
 import pyvista_vdi as pvdi
@@ -20,6 +18,7 @@ from pyvista_vdi.plotting.progress import DelayedBar, progress_callback
 from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.filters import source as source_module
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
+from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper, vtkWeakReference
 
 pytestmark = pytest.mark.gl
 

@@ -23,12 +23,14 @@ from plugin_scenes import (
 )
 from pyvista import Plotter
 
-# Before any widget: else PyVista 0.49's pv.Spline fails once a spline widget was added
-from vtkmodules import vtkCommonComputationalGeometry  # noqa: F401
-from vtkmodules.vtkCommonDataModel import vtkPlane
-from vtkmodules.vtkRenderingCore import vtkAssembly, vtkPropAssembly
-
 from pyvista_vdi.errors import VDIWarning
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkAssembly,
+    # Before any widget: else PyVista 0.49's pv.Spline fails once a spline widget was added
+    vtkCommonComputationalGeometry,  # noqa: F401
+    vtkPlane,
+    vtkPropAssembly,
+)
 
 pytestmark = pytest.mark.gl
 

@@ -18,10 +18,10 @@ from plugin_scenes import (
     soft_ball,
     tiled_picture,
 )
-from vtkmodules.vtkCommonDataModel import vtkPlane
 
 from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.quality.view_error import angle_from_generating_view
+from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
 

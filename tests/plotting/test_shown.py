@@ -16,12 +16,11 @@ from plugin_scenes import (
     soft_ball,
     vdi_of_one_list,
 )
-from vtkmodules.vtkCommonDataModel import vtkPlane
-from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
 from pyvista_vdi.model.cropping import PRESETS
+from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper, vtkPlane
 
 pytestmark = pytest.mark.gl
 

@@ -26,8 +26,7 @@ from scan_files import (
     write_nifti,
 )
 from strategies import random_vdi
-from vtkmodules.vtkCommonMath import vtkMatrix4x4
-from vtkmodules.vtkIOImage import vtkMetaImageWriter, vtkNIFTIImageWriter
+from vtk_builds import vtk_or_skip
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
@@ -38,6 +37,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
     VDIWarning,
 )
+from pyvista_vdi.vtk_pipeline.vtk import vtkMatrix4x4, vtkNIFTIImageWriter
 
 SPACING, ORIGIN = np.array([1.0, 1.5, 2.5]), np.array([-10.0, 20.0, 30.0])
 MARK = (4, 2, 1)  # x, y, z
@@ -189,7 +189,7 @@ def test_files_of_vtks_writers(tmp_path):
     writer.SetSFormMatrix(matrix)
     writer.Write()
     assert_marked_at(tmp_path / "a.nii", affine(turned(30, 20)) @ [*MARK, 1])
-    writer = vtkMetaImageWriter()
+    writer = vtk_or_skip("vtkMetaImageWriter")()
     writer.SetFileName(str(tmp_path / "a.mha"))
     writer.SetInputData(as_grid(np.eye(3)))
     writer.Write()

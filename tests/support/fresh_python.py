@@ -11,7 +11,7 @@ PATIENCE = 600
 
 
 #: What the engine does without.
-EXTRAS = ("matplotlib", "pyvista", "vtk", "vtkmodules")
+EXTRAS = ("cvista", "matplotlib", "pyvista", "vtk", "vtkmodules")
 
 
 def run_bare(arguments: list[str]) -> subprocess.CompletedProcess[str]:

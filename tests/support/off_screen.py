@@ -14,7 +14,8 @@ if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 import pyvista as pv
-from vtkmodules.vtkCommonCore import (
+
+from pyvista_vdi.vtk_pipeline.vtk import (
     vtkObjectBase,
     vtkOutputWindow,
     vtkStringOutputWindow,

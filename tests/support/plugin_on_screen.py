@@ -18,12 +18,10 @@ import numpy as np
 import pyvista as pv
 from plugin_scenes import LOOKS, soft_ball
 from skimage.io import imread
-from vtkmodules.util.misc import calldata_type
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import VTK_INT, vtkUnsignedCharArray
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.quality.frame_rate import FrameRateController
+from pyvista_vdi.vtk_pipeline.vtk import VTK_INT, calldata_type, vtk_to_numpy, vtkUnsignedCharArray
 
 LONG = 250.0
 

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkWindowToImageFilter
 
 #: Everything both sides need: soft, so that the step along the ray decides nothing.
 LOOKS: dict[str, Any] = {

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pyvista as pv
 from plugin_scenes import CLASSIFICATION, soft_ball
-from vtkmodules.vtkFiltersCore import vtkCellDataToPointData
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.vtk_pipeline.vtk import vtkCellDataToPointData
 
 SIZE = (40, 30)
 

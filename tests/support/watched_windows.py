@@ -9,14 +9,13 @@ import time
 import pytest
 import pyvista as pv
 from plugin_scenes import CLASSIFICATION, LOOKS, soft_ball
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.quality import background
 from pyvista_vdi.quality.frame_rate import FrameRateController
 from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.interaction import estimation, regeneration, window_clock
+from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkUnsignedCharArray
 
 #: Odd, so that no smaller image divides it.
 WINDOW = (121, 103)

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import LOOKS, opaque_sphere, shown, soft_ball
-from vtkmodules.vtkCommonDataModel import vtkPlane
-from vtkmodules.vtkRenderingOpenGL2 import vtkTextureObject
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.vtk_pipeline.drawing import frame as frame_module
@@ -15,6 +13,7 @@ from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.drawing import texture as texture_module
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import WindowClock
+from pyvista_vdi.vtk_pipeline.vtk import vtkPlane, vtkTextureObject
 
 pytestmark = pytest.mark.gl
 

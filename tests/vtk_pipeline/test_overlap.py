@@ -16,14 +16,12 @@ from plugin_scenes import (
     tiled_picture,
 )
 from skimage.metrics import structural_similarity
-from vtkmodules.vtkRenderingCore import vtkVolume
-from vtkmodules.vtkRenderingVolume import vtkMultiVolume
-from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 from watched_windows import on_screen
 
 from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.vtk_pipeline.drawing import overlap
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
+from pyvista_vdi.vtk_pipeline.vtk import vtkMultiVolume, vtkOpenGLGPUVolumeRayCastMapper, vtkVolume
 
 pytestmark = pytest.mark.gl
 

@@ -6,19 +6,21 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import add_ours, soft_ball
-from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkPlane, vtkSelectionNode
-from vtkmodules.vtkRenderingCore import (
-    vtkHardwarePicker,
-    vtkHardwareSelector,
-    vtkPropPicker,
-    vtkRenderer,
-    vtkRenderWindow,
-)
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, VDIWarning
 from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.drawing import selection
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkDataObject,
+    vtkHardwarePicker,
+    vtkHardwareSelector,
+    vtkPlane,
+    vtkPropPicker,
+    vtkRenderer,
+    vtkRenderWindow,
+    vtkSelectionNode,
+)
 
 pytestmark = pytest.mark.gl
 

@@ -6,12 +6,6 @@ import numpy as np
 import pytest
 from plugin_scenes import soft_ball, vdi_of_one_list
 from vtk_sources import ready_source
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
-from vtkmodules.vtkImagingCore import vtkImageFlip
-from vtkmodules.vtkIOXML import vtkXMLImageDataReader
-from vtkmodules.vtkRenderingCore import vtkCamera
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import errors
@@ -23,6 +17,15 @@ from pyvista_vdi.vtk_pipeline import (
     VDIWriter,
     vdi_from_image,
     vdi_to_image,
+)
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtk_to_numpy,
+    vtkCamera,
+    vtkDataObject,
+    vtkImageData,
+    vtkImageFlip,
+    vtkStreamingDemandDrivenPipeline,
+    vtkXMLImageDataReader,
 )
 
 

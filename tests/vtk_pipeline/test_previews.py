@@ -8,11 +8,6 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import LOOKS, opaque_sphere, soft_ball
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonDataModel import vtkPlane
-from vtkmodules.vtkInteractionStyle import vtkInteractorStyleTrackballCamera
-from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow, vtkWindowToImageFilter
-from vtkmodules.vtkRenderingUI import vtkGenericRenderWindowInteractor
 from watched_windows import (
     MOVING,
     WINDOW,
@@ -34,6 +29,15 @@ from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, sampled
 from pyvista_vdi.vtk_pipeline.interaction import window_clock
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import HEADROOM, Met, reduced
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtk_to_numpy,
+    vtkGenericRenderWindowInteractor,
+    vtkInteractorStyleTrackballCamera,
+    vtkPlane,
+    vtkRenderer,
+    vtkRenderWindow,
+    vtkWindowToImageFilter,
+)
 
 pytestmark = pytest.mark.gl
 

@@ -10,7 +10,6 @@ import pytest
 import pyvista as pv
 from plugin_scenes import CLASSIFICATION, LOOKS, soft_ball
 from vtk_sources import ready_source
-from vtkmodules.vtkCommonDataModel import vtkPlane
 from watched_windows import (
     LONG,
     MOVING,
@@ -30,6 +29,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.errors import DeviceError, VDIWarning
 from pyvista_vdi.quality import background
 from pyvista_vdi.vtk_pipeline.interaction.estimation import Estimation
+from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
 

@@ -9,26 +9,29 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import soft_ball
+from vtk_builds import vtk_or_skip
 from vtk_sources import SIZE, behind, camera_at, executions, ready_source, some_property
-from vtkmodules.vtkCommonExecutionModel import vtkTrivialProducer
-from vtkmodules.vtkFiltersCore import vtkContourFilter
-from vtkmodules.vtkFiltersGeneral import vtkMultiBlockDataGroupFilter
-from vtkmodules.vtkFiltersSources import vtkSphereSource
-from vtkmodules.vtkImagingCore import (
-    vtkExtractVOI,
-    vtkImageCast,
-    vtkImagePermute,
-    vtkImageResample,
-    vtkImageShiftScale,
-    vtkRTAnalyticSource,
-)
-from vtkmodules.vtkIOImage import vtkMetaImageReader, vtkMetaImageWriter, vtkNrrdReader
-from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLImageDataWriter
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import errors
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkContourFilter,
+    vtkExtractVOI,
+    vtkImageCast,
+    vtkImagePermute,
+    vtkImageResample,
+    vtkImageShiftScale,
+    vtkMetaImageReader,
+    vtkMultiBlockDataGroupFilter,
+    vtkNrrdReader,
+    vtkRTAnalyticSource,
+    vtkSphereSource,
+    vtkTrivialProducer,
+    vtkXMLImageDataReader,
+    vtkXMLImageDataWriter,
+)
 
 pytestmark = pytest.mark.gl
 
@@ -183,7 +186,7 @@ def nrrd(folder, image):
 
 
 def meta_image(folder, image):
-    file_of(image, folder / "a.mha", vtkMetaImageWriter())
+    file_of(image, folder / "a.mha", vtk_or_skip("vtkMetaImageWriter")())
     return read_from(folder / "a.mha", vtkMetaImageReader())
 
 

@@ -7,13 +7,12 @@ import pytest
 import pyvista as pv
 from plugin_scenes import CLASSIFICATION, LOOKS, add_judge, soft_ball
 from skimage.metrics import structural_similarity
-from vtkmodules.vtkCommonDataModel import vtkPlane
-from vtkmodules.vtkRenderingCore import vtkPropPicker
 from watched_windows import WINDOW, finish, frame, frames_until, picture_of, watched
 
 from pyvista_vdi.device import programs
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.vtk_pipeline.drawing import stand_in
+from pyvista_vdi.vtk_pipeline.vtk import vtkPlane, vtkPropPicker
 
 pytestmark = pytest.mark.gl
 

@@ -7,13 +7,8 @@ import pytest
 import pyvista as pv
 from plugin_scenes import soft_ball
 from strategies import random_vdi
+from vtk_builds import vtk_or_skip
 from vtk_sources import executions, ready_source, some_property
-from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
-from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
-from vtkmodules.vtkFiltersGeneral import vtkMultiBlockDataGroupFilter
-from vtkmodules.vtkFiltersHybrid import vtkTemporalInterpolator
-from vtkmodules.vtkImagingCore import vtkExtractVOI, vtkRTAnalyticSource
 from watched_windows import frame, frames_until
 
 import pyvista_vdi as pvdi
@@ -21,6 +16,15 @@ from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileEr
 from pyvista_vdi.vtk_pipeline import VDIReader, VDIToImage, VDIWriter, vdi_from_image, vdi_to_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import SourceInput
 from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
+from pyvista_vdi.vtk_pipeline.vtk import (
+    VTKPythonAlgorithmBase,
+    vtkDataObject,
+    vtkExtractVOI,
+    vtkImageData,
+    vtkMultiBlockDataGroupFilter,
+    vtkRTAnalyticSource,
+    vtkStreamingDemandDrivenPipeline,
+)
 
 TIMES = (0.5, 1.0, 4.0)
 #: Times that are asked for, and the step that is nearest to each; of two, the earlier.
@@ -206,7 +210,7 @@ def test_a_source_behind_what_interpolates_in_time(default_runtime):
     """VTK's filter asks for the two steps around the time; its image is what the VDI is made of."""
     balls = [ball_at(0), ball_at(0), ball_at(0)]
     balls[1]["v"] = balls[0]["v"] / 3
-    producer, between = Moving(balls), vtkTemporalInterpolator()
+    producer, between = Moving(balls), vtk_or_skip("vtkTemporalInterpolator")()
     between.SetInputConnection(producer.GetOutputPort())
     source = source_of(between)
     source.UpdateTimeStep(0.75)

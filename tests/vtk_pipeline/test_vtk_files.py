@@ -12,10 +12,6 @@ import pyvista as pv
 import strategies
 from hypothesis import given, settings
 from plugin_scenes import soft_ball
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonExecutionModel import vtkTrivialProducer
-from vtkmodules.vtkImagingCore import vtkExtractVOI, vtkImageFlip
-from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLImageDataWriter
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.cli import main
@@ -39,6 +35,14 @@ from pyvista_vdi.vtk_pipeline import (
     vdi_to_image,
 )
 from pyvista_vdi.vtk_pipeline.filters.dense import is_dense_image
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtk_to_numpy,
+    vtkExtractVOI,
+    vtkImageFlip,
+    vtkTrivialProducer,
+    vtkXMLImageDataReader,
+    vtkXMLImageDataWriter,
+)
 
 #: Metadata that text could spoil.
 METADATA = {

@@ -14,10 +14,10 @@ import pytest
 import pyvista as pv
 from browsers import in_base64, picture
 from PIL import Image
-from vtkmodules.vtkCommonDataModel import vtkPlane
 from web_client import soft_ball
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 from pyvista_vdi.web.camera import camera_of, viewer_camera
 from pyvista_vdi.web.notebook import mime_bundle, show_plotter
 

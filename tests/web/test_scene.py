@@ -13,10 +13,10 @@ from browsers import COUNTING, file_of, in_base64, picture
 from plugin_scenes import soft_ball
 from scipy import ndimage
 from skimage.metrics import structural_similarity
-from vtkmodules.vtkCommonDataModel import vtkPlane
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
+from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 from pyvista_vdi.web.bundle import viewer_script
 from pyvista_vdi.web.scenes.scene import scene_of
 

@@ -39,6 +39,7 @@ from pyvista_vdi.model.metrics import SSIM_WINDOW
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.prepared import prepared_vdi
+from pyvista_vdi.vtk_pipeline.vtk import BACKEND
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -211,7 +212,7 @@ def measure_tradeoff(
         "angles": [float(angle) for angle in angles],
         "repeats": repeats,
         "generations": generations,
-        "vtk": find_spec("vtkmodules") is not None if vtk is None else vtk,
+        "vtk": find_spec(BACKEND) is not None if vtk is None else vtk,
         "settings": [setting.to_dict() for setting in settings],
     }
     results = Results.begun("tradeoff", plan, path=path, rooms=ROOMS, device=device, resume=resume)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from vtkmodules.vtkRenderingCore import vtkVolume
-
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
@@ -18,6 +16,7 @@ from pyvista_vdi.vtk_pipeline.drawing.playing import PlayingMethods
 from pyvista_vdi.vtk_pipeline.drawing.shader import show_image
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
+from pyvista_vdi.vtk_pipeline.vtk import vtkVolume
 
 
 class VDIActorMethods(PlayingMethods):

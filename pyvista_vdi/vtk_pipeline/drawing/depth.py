@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from vtkmodules.vtkRenderingCore import vtkActor2D, vtkMapper, vtkVolume
 
 from pyvista_vdi.vtk_pipeline.drawing.frame import (
     Area,
@@ -18,6 +17,7 @@ from pyvista_vdi.vtk_pipeline.drawing.frame import (
     consumers,
     depths_of,
 )
+from pyvista_vdi.vtk_pipeline.vtk import vtkActor2D, vtkMapper, vtkVolume
 
 #: Pixels around a rectangle that are read as well: a pixel is drawn where its centre is inside.
 _MARGIN = 2

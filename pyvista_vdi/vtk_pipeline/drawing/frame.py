@@ -10,9 +10,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import VTK_FLOAT, vtkFloatArray
-from vtkmodules.vtkRenderingOpenGL2 import vtkPixelBufferObject, vtkTextureObject
 
 from pyvista_vdi.device import aligned_empty
 from pyvista_vdi.errors import UnsupportedError
@@ -25,6 +22,13 @@ from pyvista_vdi.quality.ways import Way, rise
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import Cost, WindowClock
+from pyvista_vdi.vtk_pipeline.vtk import (
+    VTK_FLOAT,
+    vtk_to_numpy,
+    vtkFloatArray,
+    vtkPixelBufferObject,
+    vtkTextureObject,
+)
 
 T = TypeVar("T")
 

@@ -11,9 +11,9 @@ import weakref
 from typing import Any
 
 import numpy as np
-from vtkmodules.util.numpy_support import numpy_to_vtk
 
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import Met
+from pyvista_vdi.vtk_pipeline.vtk import numpy_to_vtk
 
 _STYLES = ("vtkInteractorStyleTrackballActor", "vtkInteractorStyleJoystickActor")
 _BUTTONS = ("LeftButtonPressEvent", "MiddleButtonPressEvent", "RightButtonPressEvent")

@@ -11,8 +11,6 @@ from __future__ import annotations
 from functools import partial
 from typing import Any, NoReturn
 
-from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
-
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.cropping import checked_opacity_multiplier
 from pyvista_vdi.model.render_options import checked_transmittance_cutoff
@@ -31,6 +29,7 @@ from pyvista_vdi.vtk_pipeline.interaction.window_clock import (
     checked_image_distance,
     checked_rate,
 )
+from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper
 
 #: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.
 COARSEST = 4.0

@@ -9,9 +9,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from vtkmodules.vtkCommonCore import vtkWeakReference
-from vtkmodules.vtkCommonDataModel import vtkImageData
-from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.device import Runtime, aligned_empty, get_runtime
 from pyvista_vdi.errors import InvalidArgumentError
@@ -49,6 +46,7 @@ from pyvista_vdi.vtk_pipeline.interaction.window_clock import (
     WindowClock,
     reduced,
 )
+from pyvista_vdi.vtk_pipeline.vtk import vtkImageData, vtkVolume, vtkWeakReference
 
 #: Frames per second that stand-ins keep where no rate is asked for: changes are followed by eye.
 _STAND_IN_RATE = 30.0

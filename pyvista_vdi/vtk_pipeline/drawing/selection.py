@@ -13,9 +13,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from vtkmodules.vtkCommonCore import vtkInformation
-from vtkmodules.vtkCommonDataModel import vtkDataObject
-from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLActor
 
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit, Pick, pick_vdi
@@ -23,6 +20,7 @@ from pyvista_vdi.raycasting.raycast import render_first_hits
 from pyvista_vdi.vtk_pipeline.drawing.frame import Area, Frame, Image
 from pyvista_vdi.vtk_pipeline.drawing.shader import place_texture, show_first_hits, show_image
 from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture
+from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkInformation, vtkOpenGLActor
 
 
 class Selection:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from vtkmodules.vtkCommonCore import reference
-from vtkmodules.vtkRenderingCore import vtkHardwareSelector
+from pyvista_vdi.vtk_pipeline.vtk import reference, vtkHardwareSelector
 
 _DECLARATION = "//VTK::Base::Dec\nuniform sampler2D vdiImage;\n"
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.vtkCommonCore import VTK_FLOAT
-from vtkmodules.vtkRenderingOpenGL2 import vtkTextureObject
+
+from pyvista_vdi.vtk_pipeline.vtk import VTK_FLOAT, vtkTextureObject
 
 
 class _Texture:

@@ -7,17 +7,18 @@ from inspect import Parameter, Signature
 from operator import attrgetter
 from typing import Any
 
-from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
-from vtkmodules.vtkCommonCore import (
+from pyvista_vdi.errors import Cancelled, InvalidVDIError, VDIError
+from pyvista_vdi.vtk_pipeline.vtk import (
     VTK_UNSIGNED_INT,
+    VTKPythonAlgorithmBase,
+    require_this_build,
     vtkCollection,
+    vtkDataObject,
+    vtkImageData,
     vtkOutputWindow,
+    vtkStreamingDemandDrivenPipeline,
     vtkWeakReference,
 )
-from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
-
-from pyvista_vdi.errors import Cancelled, InvalidVDIError, VDIError
 
 TIME_STEPS = vtkStreamingDemandDrivenPipeline.TIME_STEPS()
 TIME_RANGE = vtkStreamingDemandDrivenPipeline.TIME_RANGE()
@@ -46,6 +47,18 @@ class Algorithm(VTKPythonAlgorithmBase):
         super().__init__(**ports)
         self._error: BaseException | None = None
         self._python_waits = False
+
+    def SetInputDataObject(self, *args: Any) -> None:
+        """Set the input (optionally after a port number, 0)."""
+        for each in args:
+            require_this_build(type(each))
+        super().SetInputDataObject(*args)
+
+    def SetInputConnection(self, *args: Any) -> None:
+        """Set what makes the input, a port of another algorithm (optionally after a number)."""
+        for each in args:
+            require_this_build(type(each))
+        super().SetInputConnection(*args)
 
     def Update(self, *args: Any) -> None:
         """Bring the output up to date, and raise what went wrong."""

@@ -8,11 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules import vtkCommonDataModel
-from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonCore import VTK_UNSIGNED_CHAR, vtkDataArray, vtkStringArray
-from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
-from vtkmodules.vtkFiltersCore import vtkCellDataToPointData
 
 from pyvista_vdi.errors import (
     InvalidCameraError,
@@ -29,6 +24,18 @@ from pyvista_vdi.model.volume import Volume
 # The documented name of it is here
 from pyvista_vdi.vtk_pipeline.filters.properties import (
     transfer_function_from_property as transfer_function_from_property,
+)
+from pyvista_vdi.vtk_pipeline.vtk import (
+    VTK_UNSIGNED_CHAR,
+    numpy_to_vtk,
+    require_this_build,
+    vtk_to_numpy,
+    vtkCellDataToPointData,
+    vtkCommonDataModel,
+    vtkDataArray,
+    vtkDataObject,
+    vtkImageData,
+    vtkStringArray,
 )
 
 #: Point scalars of the canonical form: how many supersegments each pixel's list has.
@@ -64,6 +71,7 @@ def require_image(data: Any) -> vtkImageData:
         raise InvalidVolumeTypeError(
             f"expected a vtkImageData or pyvista.ImageData; got {type(data).__name__}"
         )
+    require_this_build(type(data))
     raise _refusal(type(data))
 
 
@@ -72,6 +80,7 @@ def require_image_port(port: Any) -> None:
 
     A port that promises no more than a ``vtkDataSet``, say, passes.
     """
+    require_this_build(type(port))
     information = port.GetProducer().GetOutputPortInformation(port.GetIndex())
     name = str(information.Get(vtkDataObject.DATA_TYPE_NAME()))
     promised = getattr(vtkCommonDataModel, name, None)
@@ -320,6 +329,7 @@ def vdi_from_image(image: Any) -> VDI:
     InvalidVDIError
         If the image is not such a form, of a newer version, or its arrays break a rule.
     """
+    require_this_build(type(image))
     if not is_vdi_image(image):
         kind = type(image).__name__
         raise InvalidVDIError(

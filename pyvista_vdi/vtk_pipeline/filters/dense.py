@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.vtkCommonCore import VTK_FLOAT, VTK_UNSIGNED_CHAR
-from vtkmodules.vtkCommonDataModel import vtkImageData
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.compositing import opacity
@@ -36,6 +34,7 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     vdi_from_image,
     view_from_description,
 )
+from pyvista_vdi.vtk_pipeline.vtk import VTK_FLOAT, VTK_UNSIGNED_CHAR, vtkImageData
 
 #: Field string of the dense form: everything that is not an array, as JSON.
 DESCRIPTION = "vdi_dense"

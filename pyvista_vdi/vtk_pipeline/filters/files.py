@@ -7,8 +7,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
-
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.io import checked_target, read, read_info
 from pyvista_vdi.model.vdi import picture_size
@@ -25,6 +23,7 @@ from pyvista_vdi.vtk_pipeline.filters.algorithm import (
 )
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image
 from pyvista_vdi.vtk_pipeline.filters.temporal import Steps, steps_and_times
+from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkImageData
 
 
 def _as_path(path: str | os.PathLike[str] | None) -> str | None:

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from vtkmodules.vtkCommonCore import VTK_UNSIGNED_CHAR
-from vtkmodules.vtkCommonDataModel import vtkImageData
 
 from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.io import to_bytes
@@ -32,6 +30,7 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     vdi_from_image,
     view_from_description,
 )
+from pyvista_vdi.vtk_pipeline.vtk import VTK_UNSIGNED_CHAR, vtkImageData
 
 #: Point scalars of the picture: straight RGBA, uint8.
 STRAIGHT = "RGBA"

@@ -18,6 +18,7 @@ from pyvista_vdi.sets.vdi_set import VDISet
 from pyvista_vdi.vtk_pipeline.filters.algorithm import wanted_time
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
+from pyvista_vdi.vtk_pipeline.vtk import require_this_build
 
 
 class Input:
@@ -259,6 +260,7 @@ def input_of(data: Any) -> Input:
         image = ImageInput(data)
         image.vdi()  # refuse a damaged one now
         return image
+    require_this_build(type(data))
     raise InvalidVDIError(
         f"a VDIMapper draws a VDI, its canonical image, a series, a set or a VDISource's output; "
         f"got {type(data).__name__}: put a VDISource between a volume and the mapper"
@@ -267,6 +269,7 @@ def input_of(data: Any) -> Input:
 
 def input_of_port(port: Any) -> Input:
     """Return what to draw for an output port."""
+    require_this_build(type(port))
     producer = port.GetProducer()
     if isinstance(producer, VDISource):
         return SourceInput(producer)

@@ -6,12 +6,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
-from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.lighting import Shading
 from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.vtk_pipeline.vtk import (
+    require_this_build,
+    vtkColorTransferFunction,
+    vtkPiecewiseFunction,
+    vtkVolumeProperty,
+)
 
 #: Entries of the table where the property's nodes do not lie on a common equidistant grid: the
 #: functions are sampled this often over the union of their ranges, and a step in them becomes a
@@ -61,6 +65,7 @@ def transfer_function_from_property(
     InvalidArgumentError
         If it is no volume property, or its functions have no points.
     """
+    require_this_build(type(prop))
     if not isinstance(prop, vtkVolumeProperty):
         raise InvalidArgumentError(
             f"volume_property must be a vtkVolumeProperty; got {type(prop).__name__}"

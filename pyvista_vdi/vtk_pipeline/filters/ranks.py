@@ -13,8 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.vtkCommonDataModel import vtkImageData
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
 from pyvista_vdi.large.on_mpi import generate_on_mpi, mpi, together
@@ -24,6 +22,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.filters.algorithm import whole_extent
 from pyvista_vdi.vtk_pipeline.filters.convert import require_image, scalars_of, volume_from_vtk
 from pyvista_vdi.vtk_pipeline.filters.source import Request, VDISource
+from pyvista_vdi.vtk_pipeline.vtk import vtkImageData, vtkStreamingDemandDrivenPipeline
 
 #: Points that a block has along each axis at least, see generate_on_mpi.
 _LEAST_POINTS = 4
@@ -42,7 +41,7 @@ def communicator() -> Any:
         If there are several ranks and mpi4py is missing.
     """
     try:
-        from vtkmodules.vtkParallelCore import vtkMultiProcessController
+        from pyvista_vdi.vtk_pipeline.vtk import vtkMultiProcessController
     except ImportError:  # a VTK without its parallel modules
         return None
     controller = vtkMultiProcessController.GetGlobalController()

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 
 from pyvista_vdi.errors import (
     Cancelled,
@@ -43,6 +42,7 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 from pyvista_vdi.vtk_pipeline.filters.source_settings import SourceSettings
 from pyvista_vdi.vtk_pipeline.filters.view import View
+from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkImageData
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from vtkmodules.vtkCommonCore import vtkWeakReference
-from vtkmodules.vtkCommonDataModel import vtkImageData
-from vtkmodules.vtkRenderingCore import vtkVolumeProperty
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
@@ -33,6 +30,12 @@ from pyvista_vdi.vtk_pipeline.filters.properties import (
     transfer_function_from_property,
 )
 from pyvista_vdi.vtk_pipeline.filters.view import TrackedCamera
+from pyvista_vdi.vtk_pipeline.vtk import (
+    require_this_build,
+    vtkImageData,
+    vtkVolumeProperty,
+    vtkWeakReference,
+)
 
 #: What a VDI's window covers.
 COVERAGES = ("bounds", "view")
@@ -163,6 +166,7 @@ class SourceSettings(Algorithm):
         InvalidCameraError, UnsupportedError
             If it is no camera, or has what the optical model has no place for.
         """
+        require_this_build(type(camera))
         view = None if camera is None else Camera.from_any(camera, model_transform=model_transform)
         if self._given is not None:
             self._given.watch(None)
@@ -262,6 +266,7 @@ class SourceSettings(Algorithm):
         """
         renderer = lights if hasattr(lights, "GetTwoSidedLighting") else None
         fixed = None if lights is None or renderer is not None else Lights.from_any(lights)
+        require_this_build(type(renderer))
         if renderer is not self._lit_by.Get():
             self._lit_by.Set(renderer)
             self.Modified()

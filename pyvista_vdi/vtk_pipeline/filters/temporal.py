@@ -7,10 +7,9 @@ from functools import partial
 from threading import Lock
 from typing import Any
 
-from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
-
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.filters.algorithm import announced_times
+from pyvista_vdi.vtk_pipeline.vtk import vtkCompositeDataSet
 
 
 def steps_and_times(source: Any) -> tuple[Sequence[Any], tuple[float, ...]]:

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from vtkmodules.vtkCommonCore import vtkWeakReference
 
 from pyvista_vdi.model import view as model_view
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Held
+from pyvista_vdi.vtk_pipeline.vtk import vtkWeakReference
 
 
 def as_array(matrix: Any) -> NDArray[np.float64]:

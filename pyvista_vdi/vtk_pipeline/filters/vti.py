@@ -11,9 +11,6 @@ from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
-from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
-from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLImageDataWriter
-
 from pyvista_vdi.errors import InvalidVDIError, VDIFileError
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.whole_file import whole_file
@@ -26,6 +23,12 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
 )
 from pyvista_vdi.vtk_pipeline.filters.dense import DESCRIPTION as DENSE_DESCRIPTION
 from pyvista_vdi.vtk_pipeline.filters.dense import is_dense_image, vdi_from_dense_image
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkOutputWindow,
+    vtkStringOutputWindow,
+    vtkXMLImageDataReader,
+    vtkXMLImageDataWriter,
+)
 
 #: Names of VTK's compressors, as its writer's methods have them.
 _COMPRESSORS = {"lz4": "LZ4", "zlib": "ZLib", "lzma": "LZMA", "none": "None"}

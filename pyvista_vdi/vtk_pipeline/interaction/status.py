@@ -8,13 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from vtkmodules.vtkCommonCore import vtkWeakReference
-from vtkmodules.vtkRenderingAnnotation import vtkCornerAnnotation
-
 from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.dial import describe
 from pyvista_vdi.quality.ways import Way
+from pyvista_vdi.vtk_pipeline.vtk import vtkCornerAnnotation, vtkWeakReference
 
 _log = logging.getLogger(__name__)
 

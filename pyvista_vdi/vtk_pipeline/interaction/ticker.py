@@ -7,8 +7,7 @@ import weakref
 from collections.abc import Callable
 from typing import Any
 
-from vtkmodules.util.misc import calldata_type
-from vtkmodules.vtkCommonCore import VTK_INT, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import VTK_INT, calldata_type, vtkWeakReference
 
 #: Milliseconds between two looks: a new VDI appears at most two frames of 30 per second late.
 PERIOD = 50

@@ -9,14 +9,12 @@ import weakref
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
-from vtkmodules.vtkCommonCore import vtkWeakReference
-from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLGL2PSHelper
-
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.quality.frame_rate import FrameRateController
 from pyvista_vdi.quality.ways import Way
 from pyvista_vdi.vtk_pipeline.interaction import browser
+from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGL2PSHelper, vtkWeakReference
 
 T = TypeVar("T")
 

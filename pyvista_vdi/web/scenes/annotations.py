@@ -11,15 +11,18 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from vtkmodules.vtkRenderingAnnotation import vtkCornerAnnotation, vtkScalarBarActor
-from vtkmodules.vtkRenderingCore import (
+
+from pyvista_vdi.vtk_pipeline.vtk import (
     vtkActor2D,
+    vtkCornerAnnotation,
+    vtkLabelPlacementMapper,
+    vtkPointSetToLabelHierarchy,
+    vtkScalarBarActor,
     vtkSelectVisiblePoints,
     vtkTextActor,
     vtkTextMapper,
     vtkTextProperty,
 )
-from vtkmodules.vtkRenderingLabel import vtkLabelPlacementMapper, vtkPointSetToLabelHierarchy
 
 _HORIZONTAL = ("left", "center", "right")  # vtkTextProperty's justifications
 _VERTICAL = ("bottom", "middle", "top")

@@ -13,13 +13,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import mutable
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
-from vtkmodules.vtkFiltersCore import vtkTriangleFilter
-from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
-from vtkmodules.vtkRenderingCore import vtkPolyDataMapper
 
+from pyvista_vdi.vtk_pipeline.vtk import (
+    mutable,
+    vtk_to_numpy,
+    vtkCellArray,
+    vtkDataSetSurfaceFilter,
+    vtkPolyData,
+    vtkPolyDataMapper,
+    vtkTriangleFilter,
+)
 from pyvista_vdi.web.placing import planes_of
 
 Array = NDArray[Any]

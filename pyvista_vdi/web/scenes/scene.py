@@ -10,18 +10,19 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.vtkRenderingAnnotation import vtkAnnotatedCubeActor, vtkAxesActor
-from vtkmodules.vtkRenderingCore import (
-    vtkActor,
-    vtkProp3D,
-    vtkPropAssembly,
-    vtkPropCollection,
-)
 
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkActor,
+    vtkAnnotatedCubeActor,
+    vtkAxesActor,
+    vtkProp3D,
+    vtkPropAssembly,
+    vtkPropCollection,
+)
 from pyvista_vdi.web.camera import viewer_camera
 from pyvista_vdi.web.encode import encoded
 from pyvista_vdi.web.placing import look_of, planes_of, thinned
