@@ -120,7 +120,7 @@ class AddVDI(Component):
         progress_bar: bool | Callable[[float], object] | None = None,
         **aliases: Any,
     ) -> PlotterVDIActor | list[Any]:
-        """Add a volume that turns fluently: frames are raycast from its VDI.
+        """Add a volume that turns fluently: frames are raycast from its VDI where it serves.
 
         All arguments of ``Plotter.add_volume`` are taken, with its names, defaults and meaning;
         what cannot be honoured is refused by name. The picture is ``add_volume``'s.
@@ -128,7 +128,8 @@ class AddVDI(Component):
         In a window on the screen, frames get fewer pixels while the view moves, as many as
         ``target_fps`` allows, and all of them as soon as it rests; a view for which the VDI does
         not do is given one of its own, made in the background while the old one is drawn. What is
-        drawn off-screen, and every screenshot, is full and made in step.
+        drawn off-screen, and every screenshot, is full, and drawn by the VDI or the volume itself,
+        whichever is right for the view; a script that takes one picture makes no VDI.
 
         Parameters
         ----------
@@ -210,7 +211,8 @@ class AddVDI(Component):
         interpolation : {"nearest", "linear"}
             Between voxels; ``add_volume`` draws ``"nearest"``.
         camera : pyvista.Camera or vtkCamera or Camera, optional
-            The generating view; by default the plotter's camera at the first render.
+            The generating view; by default the plotter's camera at the first render, and that of
+            the frame where ``regenerate`` says so.
         coverage : {"bounds", "view"}
             ``"bounds"``: the VDI covers the whole volume, so that neither panning nor zooming out
             shows a cut edge. ``"view"``: it covers the window.
@@ -228,15 +230,20 @@ class AddVDI(Component):
             A callable gets ``actor.status`` once per frame and returns whether to regenerate; it
             is asked off-screen, too, and the VDI is then made before the frame. ``"never"``: only
             ``actor.regenerate()``. Changed data and transfer functions are always made anew.
-        regenerate_below : float
-            SSIM for ``"auto"``, 0 to 1; while the view moves, twice the error is borne.
+        regenerate_below : float, optional
+            Estimated SSIM, 0 to 1, below which a VDI does not do for a view: ``regenerate="auto"``
+            makes another, by default below 0.95 (while the view moves, twice the error is borne),
+            and ``draw="auto"`` draws the volume in its place, by default below 0.98 or without the
+            detail of the picture's pixels.
         draw : {"auto", "vdi", "volume"}
             What is raycast where the volume is at hand. ``"auto"``: in windows on the screen, each
             frame by what is expected to give the better picture within ``target_fps``, the VDI
             near its generating view and the volume far from it; at rest by what is there sooner,
-            where the VDI does; elsewhere the VDI. ``"vdi"``: always the VDI. ``"volume"``: always
-            the volume, by :func:`pyvista_vdi.render_volume`'s kernel, right from every view.
-            ``actor.status.drawn`` says what was.
+            where the VDI does. Off-screen the volume, until so many pictures of nearly the same
+            view are taken that a VDI costs less, and then that where it does; never by measured
+            time. ``"vdi"``: always the VDI. ``"volume"``: always the volume, by
+            :func:`pyvista_vdi.render_volume`'s kernel, right from every view. Volumes that overlap
+            are drawn by VDIs. ``actor.status.drawn`` says what was.
         status : bool
             Show ``actor.status`` in the upper left corner.
         device : str or int, optional
@@ -251,10 +258,10 @@ class AddVDI(Component):
         Returns
         -------
         PlotterVDIActor or list
-            A ``pyvista.Volume``; ``actor.vdi`` is the current VDI, ``actor.regenerate()`` makes
-            another from the current view, and ``actor.status`` says how it is drawn. Changes to
-            ``actor.prop`` or to the array's values make it anew: off-screen before the next frame,
-            on the screen behind the next frames. A ``MultiBlock`` gives a list of actors.
+            A ``pyvista.Volume``; ``actor.vdi`` is the current VDI, made now where there is none,
+            ``actor.regenerate()`` makes another from the current view, and ``actor.status`` says
+            how it is drawn. Changes to ``actor.prop`` or to the array's values are in the next
+            picture. A ``MultiBlock`` gives a list of actors.
 
         Raises
         ------

@@ -104,8 +104,9 @@ class Pictures:
         return next((e for other, _, e in reversed(self._judged) if other == view), None)
 
     def drawn_by_volume(self, view: View) -> None:
-        """Note a picture that the volume drew."""
-        self._by_volume.append(view)
+        """Note a picture that the volume drew; the same one once more costs nothing."""
+        if not self._by_volume or self._by_volume[-1] != view:
+            self._by_volume.append(view)
 
     def deserves_vdi(self, view: View, bounds: tuple[float, ...]) -> bool:
         """Whether so many pictures were drawn near this view that a VDI of it is worth while."""

@@ -1,0 +1,251 @@
+"""Off-screen pictures: drawn by VDI or volume, whichever is right for the view, never by time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista as pv
+from plugin_scenes import LOOKS, add_judge, shown, soft_ball
+from skimage.metrics import structural_similarity
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.quality.pictures import SIMILAR
+
+pytestmark = pytest.mark.gl
+
+WINDOW = (160, 120)
+VIEW = ((5, 2, 3), (0, 0, 0), (0, 0, 1))
+
+
+def alike(a, b):
+    return structural_similarity(a, b, channel_axis=2, data_range=255)
+
+
+@pytest.fixture
+def pair():
+    """A plotter with ours and one with VTK's own mapper of the same ball, to be treated alike."""
+    plotters = [pv.Plotter(window_size=WINDOW) for _ in range(2)]
+    yield plotters
+    for plotter in plotters:
+        plotter.close()
+
+
+def film(angles, **options):
+    """Return the pictures of a turn, and by what each was drawn."""
+    plotter = pv.Plotter(window_size=WINDOW)
+    actor = plotter.add_vdi(soft_ball(), **LOOKS, **options)
+    pictures, drawn = [], []
+    for angle in angles:
+        plotter.camera_position = VIEW
+        plotter.camera.Azimuth(angle)
+        pictures.append(shown(plotter))
+        drawn.append(actor.status.drawn)
+    plotter.close()
+    return pictures, drawn
+
+
+def test_one_picture_makes_no_vdi_and_actor_vdi_makes_that_of_its_view(plotter):
+    actor = plotter.add_vdi(soft_ball(), **LOOKS)
+    assert actor.vdi is None
+    plotter.camera_position = VIEW
+    shown(plotter)
+    assert (actor.status.drawn, actor.status.generation, actor.status.vdi) == ("volume", 0, None)
+    assert "a volume" in repr(actor)
+    plotter.camera.Azimuth(50)
+    shown(plotter)
+    made = actor.vdi
+    np.testing.assert_allclose(made.camera.position, VIEW[0])
+    assert actor.vdi is made
+    # A change makes another, when it is asked for
+    actor.prop.interpolation_type = "linear"
+    assert shown(plotter).min() < 200
+    assert actor.vdi is not made
+
+
+def test_a_camera_that_was_given_is_that_of_the_vdi(plotter):
+    chosen = pvdi.Camera((0, 6, 1), (0, 0, 0), (0, 0, 1))
+    actor = plotter.add_vdi(soft_ball(), camera=chosen, **LOOKS)
+    plotter.camera_position = VIEW
+    shown(plotter)
+    np.testing.assert_allclose(actor.vdi.camera.position, chosen.position)
+
+
+def test_a_film_of_nearly_one_view_gets_a_vdi_and_the_same_bits_in_every_run():
+    angles = np.linspace(0, 3, 30)
+    (pictures, drawn), (again, drawn_again) = film(angles), film(angles)
+    n = drawn.count("volume")
+    assert drawn == drawn_again == ["volume"] * n + ["vdi"] * (30 - n)
+    assert 10 <= n <= 12
+    for picture, other in zip(pictures, again, strict=True):
+        np.testing.assert_array_equal(picture, other)
+    truth, _ = film(angles[n:], draw="volume")
+    assert min(map(alike, pictures[n:], truth)) >= SIMILAR
+    # Once around no view is nearly the same, and then a VDI costs more than it saves
+    assert set(film(range(0, 360, 15))[1]) == {"volume"}
+
+
+@pytest.mark.parametrize("policy", ["never", "callable"])
+def test_who_says_when_vdis_are_made_says_it_off_screen(policy):
+    asked = []
+
+    def far(status):
+        asked.append(status.angle)
+        return status.angle > 2
+
+    _, drawn = film(np.linspace(0, 3, 20), regenerate=far if policy == "callable" else policy)
+    if policy == "never":
+        assert set(drawn) == {"volume"}
+    else:
+        assert set(drawn) == {"vdi"}  # there from the first picture on
+        assert max(asked) > 2
+
+
+def test_a_bound_that_was_given_is_what_does():
+    angles = np.linspace(0, 3, 30)
+    # Of the view itself the VDI is exact; it is not tried again
+    assert film(angles, regenerate_below=0.99999)[1].count("vdi") <= 3
+    assert "vdi" in film(angles, regenerate_below=0.5)[1]
+
+
+def _added_late(plotter, add):
+    plotter.add_mesh(pv.Cube())
+    plotter.show(auto_close=False)
+    add()
+    plotter.reset_camera()
+
+
+def _looked_around(plotter, add):
+    add()
+    for x, y in ((1, 0), (-1, 0.3)):
+        plotter.camera_position = ((0.2, 0.1, 0.2), (0.2 + x, 0.1 + y, 0.2), (0, 0, 1))
+        plotter.show(auto_close=False)
+        plotter.render()
+
+
+def _closed_up(plotter, add, size=300):
+    add()
+    plotter.add_mesh(pv.Plane(center=(0, 0, -1.2), i_size=size, j_size=size), color="w")
+    plotter.show(auto_close=False)
+    plotter.reset_camera(bounds=(-1, 1) * 3)
+
+
+def _moved(plotter, add):
+    """A VDI made for another place of the actor."""
+    add()
+    shown(plotter)
+    plotter.volume.position = (0.5, 0.7, 0.1)
+    plotter.camera.zoom(1.7)
+
+
+def _enlarged(plotter, add):
+    add()
+    plotter.camera_position = VIEW
+    shown(plotter)
+    plotter.window_size = [3 * edge for edge in WINDOW]
+
+
+@pytest.mark.parametrize("script", [_added_late, _looked_around, _closed_up, _moved, _enlarged])
+@pytest.mark.parametrize("made", [False, True])
+def test_every_view_is_as_with_vtks_mapper(pair, script, made):
+    """With and without a VDI of the first picture's view."""
+    ours, judge = pair
+    looks = {**LOOKS, "interpolation": "linear", "sample_distance": 0.02}
+
+    def add():
+        actor = ours.add_vdi(soft_ball(), **looks)
+        if made:
+            ours.render()
+            shown(ours)
+            assert actor.vdi is not None
+
+    script(ours, add)
+    script(judge, lambda: add_judge(judge, soft_ball()))
+    judge.camera = ours.camera.copy()
+    pictures = shown(ours), shown(judge)
+    assert np.ptp(pictures[1]) > 100
+    assert alike(*pictures) >= SIMILAR
+
+
+def test_a_picture_at_a_scale_has_the_detail_of_its_pixels(plotter):
+    rng = np.random.default_rng(0)
+    noise = pv.ImageData(dimensions=(48, 48, 48))
+    noise["v"] = rng.random(noise.n_points)
+    noise = noise.gaussian_smooth(std_dev=1.0)
+    contrast = []
+    for draw in ("auto", "volume", "vdi"):
+        plotter.clear()
+        actor = plotter.add_vdi(noise, opacity=[0, 0, 0, 0.3, 1], show_scalar_bar=False, draw=draw)
+        shown(plotter)
+        assert actor.vdi is not None
+        picture = plotter.screenshot(None, return_img=True, scale=4).astype(float)
+        rows, columns = (edge // 4 * 4 for edge in picture.shape[:2])
+        blocks = picture[:rows, :columns].reshape(rows // 4, 4, columns // 4, 4, 3)
+        contrast.append(blocks.std(axis=(1, 3)).mean())
+    assert contrast[0] == pytest.approx(contrast[1], rel=0.1)
+    assert contrast[2] < contrast[1] / 2  # what lists can show of it
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_volumes_that_overlap_are_right_in_whatever_order_they_came(first, plotter):
+    """The judge is a VDI of each at its own view, merged by depth."""
+
+    def scene(target, **options):
+        balls = [soft_ball(16), soft_ball(16)]
+        for place in (first, 1 - first):
+            actor = target.add_vdi(balls[place], name=f"{place}", **LOOKS, **options)
+            actor.position = (1.1 * place, 0.3 * place, 0.2)
+        target.camera_position = VIEW
+        shown(target)
+        target.camera.Azimuth(70)
+        target.camera.zoom(2)
+        return shown(target)
+
+    picture = scene(plotter)
+    assert {actor.status.drawn for actor in plotter.actors.values()} == {"vdi"}
+    judge = pv.Plotter(window_size=WINDOW)
+    scene(judge, draw="vdi")
+    for actor in judge.actors.values():
+        actor.regenerate()
+    # VDIs of this very view: but for those whose lists are wider than its pixels
+    assert alike(picture, shown(judge)) > 0.97
+    judge.close()
+
+
+def test_a_volume_in_bricks_has_its_picture(plotter):
+    actor = plotter.add_vdi(soft_ball(80), memory_limit="12 MB", **LOOKS)
+    plotter.camera_position = VIEW
+    picture = shown(plotter)
+    assert actor.status.drawn == "volume"
+    other = pv.Plotter(window_size=plotter.window_size)
+    other.add_vdi(soft_ball(80), draw="volume", **LOOKS)
+    other.camera_position = VIEW
+    np.testing.assert_allclose(picture, shown(other), atol=1)
+    other.close()
+
+
+@pytest.mark.parametrize("draw", ["auto", "vdi", "volume"])
+def test_an_actor_is_seen_in_every_plotter_that_it_is_added_to(plotter, draw):
+    actor = plotter.add_vdi(soft_ball(), draw=draw, **LOOKS)
+    plotter.camera_position = VIEW
+    first = shown(plotter)
+    other = pv.Plotter(window_size=plotter.window_size)
+    other.add_actor(actor)
+    other.camera_position = VIEW
+    assert alike(first, shown(other)) >= SIMILAR  # at once
+    linked = pv.Plotter(window_size=(200, 100), shape=(1, 2))
+    for column in range(2):
+        linked.subplot(0, column)
+        linked.add_actor(actor)
+    linked.link_views()
+    linked.camera_position = VIEW
+    picture = shown(linked)
+    assert alike(picture[:, :98], picture[:, 102:]) > 0.9
+    # Taken from one and closed, the others go on
+    plotter.remove_actor(actor)
+    other.close()
+    again = pv.Plotter(window_size=plotter.window_size)
+    again.add_actor(actor)
+    again.camera_position = VIEW
+    assert alike(first, shown(again)) >= SIMILAR
+    for each in (linked, again):
+        each.close()
