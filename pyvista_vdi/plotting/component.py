@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -14,7 +15,7 @@ from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet
 from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
 from pyvista_vdi.model.classification import DEFAULTS, Classification, refuse_unknown
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.vdi import VDI
@@ -43,6 +44,9 @@ _OF_A_VOLUME = (
     *("resolution", "categories", "camera", "coverage", "quality", "target_ssim", "full_fps"),
     *("max_bytes", "target_angle"),
 )
+
+#: What ``add_actor`` understands as culling, besides nothing.
+_CULLING = (True, "back", "backface", "b", "front", "frontface", "f")
 
 #: SSIM by which a view may fall below what was asked for before it regenerates.
 _BELOW_GOAL = 0.02
@@ -284,8 +288,17 @@ class AddVDI(Component):
             raise InvalidArgumentTypeError(
                 f"scalar_bar_args must be a dictionary; got {scalar_bar_args!r}"
             )
+        if culling and (culling.lower() if isinstance(culling, str) else culling) not in _CULLING:
+            raise InvalidArgumentError(
+                f"culling must be False or one of {_CULLING}; got {culling!r} (faces are a mesh's: "
+                "it changes nothing of a volume)"
+            )
         if isinstance(volume, vtkMultiBlockDataSet):
-            return add_blocks(self, volume, arguments)
+            actors: list[Any] = []
+            with _all_or_nothing(plotter, actors):
+                for added in add_blocks(self, volume, arguments):
+                    actors.append(added)
+            return actors
         if target_fps is not None:
             checked_rate("target_fps", target_fps)
         checked_policy(regenerate)
@@ -387,19 +400,20 @@ class AddVDI(Component):
         vdi_mapper.SetRegenerateBelow(regenerate_below)
         vdi_mapper.SetDraw(draw)
         actor = self._actor(vdi_mapper, shown if several is None else several, prop, user_matrix)
-        plotter.add_actor(
-            actor,
-            reset_camera=reset_camera,
-            name=name,
-            culling="backface" if culling is True else culling,
-            pickable=pickable,
-            render=not plotter._first_time if render is None else render,
-        )
         themed = plotter._theme.show_scalar_bar or scalar_bar_args
-        if themed if show_scalar_bar is None else show_scalar_bar:
-            plotter.add_scalar_bar(**{"title": title, **(scalar_bar_args or {})})
-        if status:
-            actor.show_status(plotter)
+        with _all_or_nothing(plotter, actor):
+            plotter.add_actor(
+                actor,
+                reset_camera=reset_camera,
+                name=name,
+                culling="backface" if culling is True else culling,
+                pickable=pickable,
+                render=not plotter._first_time if render is None else render,
+            )
+            if themed if show_scalar_bar is None else show_scalar_bar:
+                plotter.add_scalar_bar(**{"title": title, **(scalar_bar_args or {})})
+            if status:
+                actor.show_status(plotter)
         plotter.renderer.Modified()
         return actor
 
@@ -451,6 +465,16 @@ _DEFAULTS = {
     for name, parameter in _signature.parameters.items()
     if name not in ("self", "aliases")
 }
+
+
+@contextlib.contextmanager
+def _all_or_nothing(plotter: Any, actors: Any) -> Iterator[None]:
+    """Take an actor, or several, away again where something is refused on the way."""
+    try:
+        yield
+    except BaseException:
+        plotter.remove_actor(actors, reset_camera=False, render=False)
+        raise
 
 
 def _changed(given: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
