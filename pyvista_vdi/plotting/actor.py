@@ -46,8 +46,8 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
         A VDI is never copied: it does not change. The lookup table is shared.
         """
         other = PlotterVDIMapper(theme=self._theme)
+        other.scalar_range = self.scalar_range  # before there is a table that it would change
         other.lookup_table = self.lookup_table
-        other.scalar_range = self.scalar_range
         if self.painter.input is not None:
             other.painter.set_input(self.painter.input.shared())
         other.SetDevice(self.GetDevice())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import inspect
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -16,7 +17,12 @@ from vtkmodules.vtkRenderingCore import vtkVolume
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
-from pyvista_vdi.model.classification import DEFAULTS, Classification, refuse_unknown
+from pyvista_vdi.model.classification import (
+    DEFAULTS,
+    Classification,
+    range_to_classify,
+    refuse_unknown,
+)
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
@@ -358,6 +364,7 @@ class AddVDI(Component):
                 show_scalar_bar, table = False, pv.LookupTable()
             if annotations:
                 table.annotations = annotations
+            scalar_range = table.scalar_range
         else:
             shown = source = VDISource()
             image, array_name = as_image(volume, scalars, resolution)
@@ -381,7 +388,9 @@ class AddVDI(Component):
             title = read.name if scalars is None or isinstance(scalars, str) else ""
             if read.rgba:
                 looks, show_scalar_bar = looks.of_rgba(), False
+            looks = replace(looks, clim=range_to_classify(scalars, looks.clim))
             table = looks.lookup_table(read.array)
+            scalar_range = looks.scalar_range(table, read)
             prop = looks.volume_property(table, read.default_unit_distance, rgba=read.rgba)
             looks.light(prop)
             source.SetLights(plotter.renderer)
@@ -390,8 +399,8 @@ class AddVDI(Component):
                 source.SetCamera(camera, _matrix(plotter, user_matrix))
 
         vdi_mapper = PlotterVDIMapper(theme=plotter._theme)
+        vdi_mapper.scalar_range = scalar_range  # before there is a table that it would change
         vdi_mapper.lookup_table = table
-        vdi_mapper.scalar_range = table.scalar_range
         vdi_mapper.SetDevice(device)
         vdi_mapper.SetTargetFrameRate(target_fps)
         vdi_mapper.SetRegenerate(regenerate)
