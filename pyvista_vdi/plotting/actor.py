@@ -8,10 +8,12 @@ import pyvista as pv
 from pyvista.plotting.mapper import OpenGLGPUVolumeRayCastMapper
 from pyvista.plotting.volume import Volume
 from vtkmodules.vtkCommonCore import vtkWeakReference
+from vtkmodules.vtkCommonDataModel import vtkImageData
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
+from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
 
 
 class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
@@ -34,11 +36,24 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
 
     @dataset.setter
     def dataset(self, volume: Any) -> None:
-        source = self.GetSource()
-        if source is None:
-            self.SetInputDataObject(volume)  # a VDI, or refused by name
+        if self.GetSource() is None:
+            super().SetInputDataObject(volume)  # a VDI, or refused by name
         else:
-            source.SetInputDataObject(volume)
+            self.own_source("its volume").SetInputDataObject(volume)
+
+    def SetInputDataObject(self, *args: Any) -> None:  # noqa: N802
+        """Draw another volume as this one, or a VDI in its canonical form."""
+        if self.GetSource() is None or is_vdi_image(args[-1]):
+            super().SetInputDataObject(*args)
+        else:
+            self.dataset = args[-1]
+
+    def SetInputData(self, data: Any) -> None:  # noqa: N802
+        """Draw another volume as this one, or a VDI, or its canonical image."""
+        if self.GetSource() is None or not isinstance(data, vtkImageData) or is_vdi_image(data):
+            super().SetInputData(data)
+        else:
+            self.dataset = data
 
     def copy(self) -> PlotterVDIMapper:
         """Return a mapper, for another actor, that draws the same VDI in the same way.
@@ -50,6 +65,7 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
         other.lookup_table = self.lookup_table
         if self.painter.input is not None:
             other.painter.set_input(self.painter.input.shared())
+        other.take_array_choice(self)
         other.SetDevice(self.GetDevice())
         other.painter.take_settings(self.painter)
         other.SetMaximumImageSampleDistance(self.GetMaximumImageSampleDistance())

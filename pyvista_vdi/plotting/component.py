@@ -370,7 +370,13 @@ class AddVDI(Component):
             image, array_name = as_image(volume, scalars, resolution)
             described = Classification(changed, "add_vdi").describe()
             source.SetMetadata({"classification": described})
-            source.SetInputDataObject(held(image))
+            data = held(image)
+            named = None if array_name is None else data.GetPointData().GetArray(array_name)
+            if named is not None and preference == "point":
+                # As add_volume: another may be made the active one of the mapper's dataset
+                data.GetPointData().SetActiveScalars(array_name)
+                array_name = None
+            source.SetInputDataObject(data)
             source.SetScalars(array_name, preference)
             source.SetOptions(options)
             source.SetDial(

@@ -22,6 +22,7 @@ from pyvista_vdi.quality.when_anew import checked_bound
 from pyvista_vdi.raycasting.picking import checked_opacity
 from pyvista_vdi.series.series import VDISeries
 from pyvista_vdi.sets.vdi_set import VDISet
+from pyvista_vdi.vtk_pipeline.drawing.array_choice import ArrayChoiceMethods
 from pyvista_vdi.vtk_pipeline.drawing.far_box import FarBox
 from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
 from pyvista_vdi.vtk_pipeline.filters.algorithm import DEVICE, accessors
@@ -47,7 +48,7 @@ def _on_end(mapper: Any, event: str) -> None:
     mapper._far_box.end(mapper.painter.proxy)
 
 
-class VDIMapperMethods:
+class VDIMapperMethods(ArrayChoiceMethods):
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
 
     _painter: Painter | None = None
@@ -97,6 +98,8 @@ class VDIMapperMethods:
         source = self.GetSource()
         volume = None if source is None else source.GetInputDataObject(0, 0)
         return self.painter.proxy if volume is None else volume
+
+    GetInput = GetDataObjectInput = GetDataSetInput
 
     def SetVDI(self, vdi: VDI) -> None:
         """Draw this VDI."""
