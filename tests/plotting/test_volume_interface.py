@@ -246,12 +246,8 @@ def test_the_user_s_arrays_stay_as_they_are(plotter, draw):
         parts = [data.GetPointData(), data.GetCellData(), data.GetFieldData()]
         arrays = [part.GetArray(i) for part in parts for i in range(part.GetNumberOfArrays())]
         times = [thing.GetMTime() for thing in (data, *parts, *arrays)]
-        return (
-            data.active_scalars_name,
-            data.array_names,
-            times,
-            [a.tobytes() for a in data.values()],
-        )
+        values = [data[name].tobytes() for name in data.array_names]
+        return data.active_scalars_name, data.array_names, times, values
 
     before = state()
     actor = plotter.add_vdi(data, draw=draw)
