@@ -113,12 +113,14 @@ class Volume(Geometry):
 
     def _check_places(self) -> None:
         """Warn where float64 rounds the places of voxels by more than pictures bear."""
-        farthest, step = max(map(abs, self.bounds)), min(self.spacing)
-        rounding = math.ulp(farthest)
+        farthest = np.abs(self.bounds).reshape(3, 2).max(axis=1)
+        rounded = np.abs(self.direction.T) @ [math.ulp(at) for at in farthest]  # along each axis
+        worst = int(np.argmax(rounded / self.spacing))
+        rounding, step = rounded[worst], self.spacing[worst]
         if rounding * _PLACES_IN_A_STEP > step:
             warnings.warn(
-                f"the volume {self.name!r} is {farthest:.3g} model units from the origin, where "
-                f"float64 places points to {rounding:.2g}, and its voxels are {step:.2g} apart: "
+                f"the volume {self.name!r} is {farthest.max():.3g} model units from the origin, "
+                f"where float64 places points to {rounding:.2g}, and its voxels are {step:.2g} apart: "
                 "pictures are off by that share of a voxel; move its origin, and the camera with "
                 "it, towards 0",
                 VDIWarning,
