@@ -120,9 +120,9 @@ class Volume(Geometry):
         if rounding * _PLACES_IN_A_STEP > step:
             warnings.warn(
                 f"the volume {self.name!r} is {farthest.max():.3g} model units from the origin, "
-                f"where float64 places points to {rounding:.2g}, and its voxels are {step:.2g} apart: "
-                "pictures are off by that share of a voxel; move its origin, and the camera with "
-                "it, towards 0",
+                f"where float64 places points to {rounding:.2g}, and its voxels are {step:.2g} "
+                "apart: pictures are off by that share of a voxel; move its origin, and the "
+                "camera with it, towards 0",
                 VDIWarning,
                 stacklevel=3,
             )
