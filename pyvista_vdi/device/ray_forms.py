@@ -30,6 +30,8 @@ NEAREST_DEPTH = 1e-6
 #: Tangents of a hull between which :func:`cells_of_points` looks for cells.
 _TANGENTS = 32
 
+_AXES = np.eye(3)
+
 #: Lengths times reciprocal depths beyond which, or below whose reciprocal, float32 loses digits.
 LARGEST_PRODUCT = 1e36
 
@@ -148,11 +150,12 @@ def eye_plane(camera: Camera, rays: PixelRays) -> list[Floats]:
     return [np.array([rays.reference_depth, 0, 0, 1.0, 0, 0])]
 
 
-def box_planes(rays: PixelRays, bounds: Sequence[float]) -> list[Floats]:
-    """Return the six forms that keep what is inside axis-aligned bounds of the model frame."""
+def box_planes(
+    rays: PixelRays, bounds: Sequence[float], normals: ArrayLike = _AXES
+) -> list[Floats]:
+    """Return the six forms that keep what is inside bounds along normals of the model frame."""
     forms = []
-    for axis in range(3):
-        normal = np.eye(3)[axis]
+    for axis, normal in enumerate(np.asarray(normals)):
         forms.append(rays.form(normal, -bounds[2 * axis]))
         forms.append(rays.form(-normal, bounds[2 * axis + 1]))
     return forms
@@ -209,15 +212,15 @@ def cropped(rays: PixelRays, cropping: Cropping | None, bounds: Sequence[float])
         return CroppedRays([], [], 0)
     within = cropping.within(bounds)
     if within.box is None:
-        normals = np.repeat(np.eye(3), 2, axis=0)
+        normals = np.repeat(cropping.normals, 2, axis=0)
         offsets = within.cuts.ravel()
         forms = [rays.form(normal, -at) for normal, at in zip(normals, offsets, strict=True)]
         return CroppedRays([], forms, cropping.regions)
     if np.isnan(within.box).any():
         return CroppedRays([np.array([-1.0, 0, 0, 0, 0, 0])], [], 0)  # a plane that keeps nothing
-    if np.array_equal(within.box.ravel(), bounds):
+    if np.array_equal(within.box, cropping.reach(bounds)):
         return CroppedRays([], [], 0)
-    return CroppedRays(box_planes(rays, within.box.ravel().tolist()), [], 0)
+    return CroppedRays(box_planes(rays, within.box.ravel().tolist(), cropping.normals), [], 0)
 
 
 def direction_forms(

@@ -9,7 +9,14 @@ from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, UnsupportedError
+import numpy as np
+
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidVolumeError,
+    MissingDependencyError,
+    UnsupportedError,
+)
 from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
@@ -60,6 +67,18 @@ _MEANT = MappingProxyType(
         "size": "window_size",
     }
 )
+
+
+def range_to_classify(scalars: Any, clim: Any) -> Any:
+    """Return ``clim``, or the range of what a masked array does not mask, as ``add_volume`` does.
+
+    What is masked is drawn by its value all the same.
+    """
+    if clim is not None or not isinstance(scalars, np.ma.MaskedArray):
+        return clim
+    if scalars.mask.all():
+        raise InvalidVolumeError("every one of the scalars is masked: there is nothing to render")
+    return float(np.nanmin(scalars)), float(np.nanmax(scalars))
 
 
 class Classification:
@@ -154,6 +173,7 @@ class Classification:
             )
         left_out = (*_CHOOSE_THE_ARRAY, "blending")
         arguments = {n: v for n, v in {**DEFAULTS, **self._given}.items() if n not in left_out}
+        arguments["clim"] = range_to_classify(self.scalars, arguments["clim"])
         from_arguments = provider("transfer_function_from_arguments")
         return from_arguments(  # type: ignore[no-any-return]
             volume.array, rgba=volume.rgba, **arguments

@@ -24,6 +24,8 @@ PRESETS = {
 
 _N_REGIONS = 27
 
+_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
 
 @dataclass(frozen=True)
 class Cropping:
@@ -32,6 +34,9 @@ class Cropping:
     Two planes across each axis cut the data's own coordinates (the model frame) into 3 x 3 x 3
     regions. Region (i, j, k) is kept if bit ``i + 3 j + 9 k`` of ``regions`` is set: i = 0 before
     the first x plane, 1 between the two, 2 behind the second.
+
+    ``vtkVolumeMapper`` has the planes of an image with a direction matrix across the image's own
+    axes; ``normals`` says so, and :meth:`from_any` makes them of a mapper.
 
     Parameters
     ----------
@@ -42,15 +47,20 @@ class Cropping:
     regions : int or str
         27 flags, or the name of one of VTK's sets: ``"subvolume"`` (the box between the planes,
         the default), ``"fence"``, ``"inverted_fence"``, ``"cross"``, ``"inverted_cross"``.
+    normals : array_like of float, shape (3, 3), optional
+        A point p of the model frame is placed among the planes of axis i by ``normals[i] @ p``;
+        the axes of the model frame by default.
 
     Raises
     ------
     InvalidArgumentError
-        If the planes are not six numbers, or the regions no such set.
+        If the planes are not six numbers, the regions no such set, or the normals not three
+        independent directions.
     """
 
     planes: tuple[float, float, float, float, float, float]
     regions: int = PRESETS["subvolume"]
+    normals: tuple[tuple[float, float, float], ...] = _AXES
 
     #: Every region.
     ALL: ClassVar[int] = 2**_N_REGIONS - 1
@@ -59,6 +69,7 @@ class Cropping:
         put = object.__setattr__
         put(self, "planes", _checked_planes(self.planes))
         put(self, "regions", _checked_regions(self.regions))
+        put(self, "normals", _checked_normals(self.normals))
 
     @classmethod
     def from_any(cls, cropping: Any) -> Cropping | None:
@@ -67,8 +78,8 @@ class Cropping:
         Parameters
         ----------
         cropping : None, Cropping, vtkVolumeMapper, sequence of six numbers, or a pair
-            A mapper's own cropping, which may be off; the planes of a sub-volume; or the planes
-            and the regions.
+            A mapper's own cropping, which may be off, as VTK's GPU mapper cuts the image at its
+            input; the planes of a sub-volume; or the planes and the regions.
 
         Returns
         -------
@@ -85,7 +96,10 @@ class Cropping:
         if hasattr(cropping, "GetCroppingRegionFlags"):
             if not cropping.GetCropping():
                 return None
-            return cls(cropping.GetCroppingRegionPlanes(), cropping.GetCroppingRegionFlags())
+            planes, normals = _of_image(
+                cropping.GetCroppingRegionPlanes(), cropping.GetDataSetInput()
+            )
+            return cls(planes, cropping.GetCroppingRegionFlags(), normals)
         try:
             parts = list(cropping)
         except TypeError:
@@ -114,6 +128,7 @@ class Cropping:
             First and last t of each part, float64 (k, 2), ascending.
         """
         planes = np.maximum.accumulate(np.reshape(np.asarray(self.planes), (3, 2)), axis=1)
+        origin, direction = (np.asarray(self.normals) @ along for along in (origin, direction))
         with np.errstate(divide="ignore", invalid="ignore"):  # a plane that is never reached
             t = ((planes - origin[:, None]) / direction[:, None]).ravel()
         cuts = np.unique(np.concatenate([[first, last], t[(t > first) & (t < last)]]))
@@ -121,6 +136,12 @@ class Cropping:
         region = (middles[:, :, None] >= planes).sum(axis=2) @ (1, 3, 9)
         keeps = (self.regions >> region & 1) == 1
         return np.stack([cuts[:-1], cuts[1:]], axis=1)[keeps]
+
+    def reach(self, bounds: Sequence[float]) -> NDArray[np.float64]:
+        """Return between which places along each normal a box of the model frame lies, (3, 2)."""
+        box = np.reshape(np.asarray(bounds, dtype=np.float64), (3, 2))
+        ends = np.asarray(self.normals)[:, :, None] * box  # normal, axis, low or high
+        return np.stack([ends.min(axis=2).sum(axis=1), ends.max(axis=2).sum(axis=1)], axis=1)
 
     def within(self, bounds: Sequence[float]) -> Within:
         """Return what is kept of a box, and how simply that can be said.
@@ -130,7 +151,7 @@ class Cropping:
         bounds : sequence of float, shape (6,)
             Of the data, model frame. Regions that lie outside do not count.
         """
-        box = np.reshape(np.asarray(bounds, dtype=np.float64), (3, 2))
+        box = self.reach(bounds)
         planes = np.reshape(np.asarray(self.planes), (3, 2))
         planes = np.maximum.accumulate(planes, axis=1)  # nothing is between a low one and less
         # Within the bounds, so that a plane far away costs float32 nothing
@@ -161,8 +182,8 @@ class Within:
     cuts : numpy.ndarray
         The low and the high plane of each axis, moved into the box, float64 (3, 2).
     box : numpy.ndarray or None
-        Low and high of what is kept, where that is a box, float64 (3, 2): NaN if it is nothing.
-        ``None`` where it takes the regions to say it.
+        Low and high of what is kept along each normal, where that is a box, float64 (3, 2): NaN if
+        it is nothing. ``None`` where it takes the regions to say it.
     """
 
     cuts: NDArray[np.float64]
@@ -206,3 +227,29 @@ def _checked_regions(regions: Any) -> int:
             f"{', '.join(map(repr, PRESETS))}; got {regions!r}"
         )
     return int(flags)
+
+
+def _checked_normals(normals: Any) -> tuple[tuple[float, ...], ...]:
+    values = as_floats(normals)
+    if values.shape != (3, 3) or not np.isfinite(values).all() or not np.linalg.det(values):
+        raise InvalidArgumentError(
+            "the normals of cropping are three independent directions of the model frame, (3, 3) "
+            f"finite numbers; got {normals!r}"
+        )
+    return tuple(map(tuple, values.tolist()))
+
+
+def _of_image(planes: Sequence[float], image: Any) -> tuple[Any, Any]:
+    """Return planes and normals as VTK's GPU mapper has them for an image.
+
+    It puts the planes' places into the image's bounds, takes each as a point on its axis of the
+    model frame, and cuts across the image's axis where that point lies along it.
+    """
+    matrix = image.GetDirectionMatrix() if hasattr(image, "GetDirectionMatrix") else None
+    if matrix is None or matrix.IsIdentity():
+        return planes, _AXES
+    normals = np.array([[matrix.GetElement(i, j) for j in range(3)] for i in range(3)])
+    normals = np.linalg.inv(normals)
+    low, high = np.reshape(image.GetBounds(), (3, 2)).T[..., None]
+    places = np.clip(np.reshape(planes, (3, 2)), low, high) * np.diag(normals)[:, None]
+    return places.ravel(), normals

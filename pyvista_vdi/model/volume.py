@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.errors import InvalidVolumeError
+from pyvista_vdi.errors import InvalidVolumeError, VDIWarning
 from pyvista_vdi.model.checks import as_floats
 from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
 from pyvista_vdi.model.grid import Geometry
@@ -25,6 +27,9 @@ VOXEL_TYPES: tuple[str, ...] = (
     "float32",
     "float64",
 )
+
+#: Numbers that float64 must have from voxel to voxel, so that rounding is not seen.
+_PLACES_IN_A_STEP = 256
 
 #: Types that one of those represents without loss for every value they can hold.
 _WIDENED = {"bool": "uint8", "float16": "float32"}
@@ -82,6 +87,7 @@ class Volume(Geometry):
                 f"spacing must be positive along each axis; got {self.spacing}: "
                 "flip the array (or the direction matrix) instead of a negative spacing"
             )
+        self._check_places()
 
     @property
     def dimensions(self) -> tuple[int, int, int]:  # type: ignore[override]
@@ -104,6 +110,22 @@ class Volume(Geometry):
     def chunked(self) -> bool:
         """Whether the voxels are read chunk by chunk: VDIs are then made block by block."""
         return self.chunks is not None
+
+    def _check_places(self) -> None:
+        """Warn where float64 rounds the places of voxels by more than pictures bear."""
+        farthest = np.abs(self.bounds).reshape(3, 2).max(axis=1)
+        rounded = np.abs(self.direction.T) @ [math.ulp(at) for at in farthest]  # along each axis
+        worst = int(np.argmax(rounded / self.spacing))
+        rounding, step = rounded[worst], self.spacing[worst]
+        if rounding * _PLACES_IN_A_STEP > step:
+            warnings.warn(
+                f"the volume {self.name!r} is {farthest.max():.3g} model units from the origin, "
+                f"where float64 places points to {rounding:.2g}, and its voxels are {step:.2g} "
+                "apart: pictures are off by that share of a voxel; move its origin, and the "
+                "camera with it, towards 0",
+                VDIWarning,
+                stacklevel=3,
+            )
 
     def load(self) -> Volume:
         """Return the volume with all its voxels in memory."""

@@ -11,7 +11,8 @@ from pyvista.plotting.volume import Volume
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
-from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
+from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData, vtkWeakReference
 
 # PYVISTA_VTK_BACKEND may have changed between our first use of VTK and PyVista's
 require_this_build(Volume)
@@ -37,11 +38,24 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
 
     @dataset.setter
     def dataset(self, volume: Any) -> None:
-        source = self.GetSource()
-        if source is None:
-            self.SetInputDataObject(volume)  # a VDI, or refused by name
+        if self.GetSource() is None:
+            super().SetInputDataObject(volume)  # a VDI, or refused by name
         else:
-            source.SetInputDataObject(volume)
+            self.own_source("its volume").SetInputDataObject(volume)
+
+    def SetInputDataObject(self, *args: Any) -> None:  # noqa: N802
+        """Draw another volume as this one, or a VDI in its canonical form."""
+        if self.GetSource() is None or is_vdi_image(args[-1]):
+            super().SetInputDataObject(*args)
+        else:
+            self.dataset = args[-1]
+
+    def SetInputData(self, data: Any) -> None:  # noqa: N802
+        """Draw another volume as this one, or a VDI, or its canonical image."""
+        if self.GetSource() is None or not isinstance(data, vtkImageData) or is_vdi_image(data):
+            super().SetInputData(data)
+        else:
+            self.dataset = data
 
     def copy(self) -> PlotterVDIMapper:
         """Return a mapper, for another actor, that draws the same VDI in the same way.
@@ -49,10 +63,11 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
         A VDI is never copied: it does not change. The lookup table is shared.
         """
         other = PlotterVDIMapper(theme=self._theme)
+        other.scalar_range = self.scalar_range  # before there is a table that it would change
         other.lookup_table = self.lookup_table
-        other.scalar_range = self.scalar_range
         if self.painter.input is not None:
             other.painter.set_input(self.painter.input.shared())
+        other.take_array_choice(self)
         other.SetDevice(self.GetDevice())
         other.painter.take_settings(self.painter)
         other.SetMaximumImageSampleDistance(self.GetMaximumImageSampleDistance())

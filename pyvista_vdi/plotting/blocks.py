@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from itertools import cycle
 from typing import Any
 
@@ -14,8 +14,8 @@ from pyvista_vdi.vtk_pipeline.filters.convert import require_image
 _MAPS = ("Reds", "Greens", "Blues", "Greys", "Oranges", "Purples")
 
 
-def add_blocks(add: Callable[..., Any], blocks: Any, arguments: Mapping[str, Any]) -> list[Any]:
-    """Add each block with the same arguments; return their actors, lists of those within blocks.
+def add_blocks(add: Callable[..., Any], blocks: Any, arguments: Mapping[str, Any]) -> Iterator[Any]:
+    """Add each block with the same arguments; give their actors, lists of those within blocks.
 
     Blocks that are missing are left out, and a name gets the block's number. A block that is no
     uniform grid is refused before anything is added.
@@ -25,11 +25,10 @@ def add_blocks(add: Callable[..., Any], blocks: Any, arguments: Mapping[str, Any
         require_image(block)
     found = [(i, block) for i, block in enumerate(blocks) if block is not None]
     own: dict[str, Any] = {}
-    actors, maps = [], cycle(_MAPS)
+    maps = cycle(_MAPS)
     for i, block in found:
         if arguments["multi_colors"]:
             own["cmap"] = next(maps)
         if arguments["name"] is not None:
             own["name"] = f"{arguments['name']}-{i}"
-        actors.append(add(block, **{**arguments, **own}))
-    return actors
+        yield add(block, **{**arguments, **own})

@@ -27,6 +27,7 @@ from pyvista_vdi.model.lighting import Shading
 from pyvista_vdi.model.presets import presets
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.vtk_pipeline.filters.properties import (
     RGBA_OPACITY,
     transfer_function_from_property,
@@ -79,6 +80,12 @@ class Looks:
         if not (isinstance(self.opacity, str) and self.opacity == "linear"):
             warnings.warn("opacity is ignored: RGBA scalars bring theirs", VDIWarning, stacklevel=3)
         return replace(self, opacity="linear")
+
+    def scalar_range(self, table: pv.LookupTable, volume: Volume) -> tuple[float, float]:
+        """Return what ``add_volume``'s mapper says: not a given table's own range, which it has."""
+        if table is not self.cmap:
+            return table.scalar_range
+        return volume.finite_range() if self.clim is None else _scalar_range(None, self.clim)
 
     def lookup_table(self, scalars: NDArray[Any]) -> pv.LookupTable:
         """Return the lookup table that ``Plotter.add_volume`` would build for some values."""

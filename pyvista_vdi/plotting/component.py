@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -11,8 +13,13 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import InvalidArgumentTypeError, UnsupportedError
-from pyvista_vdi.model.classification import DEFAULTS, Classification, refuse_unknown
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.model.classification import (
+    DEFAULTS,
+    Classification,
+    range_to_classify,
+    refuse_unknown,
+)
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
@@ -41,6 +48,9 @@ _OF_A_VOLUME = (
     *("resolution", "categories", "camera", "coverage", "quality", "target_ssim", "full_fps"),
     *("max_bytes", "target_angle"),
 )
+
+#: What ``add_actor`` understands as culling, besides nothing.
+_CULLING = (True, "back", "backface", "b", "front", "frontface", "f")
 
 #: SSIM by which a view may fall below what was asked for before it regenerates.
 _BELOW_GOAL = 0.02
@@ -294,8 +304,17 @@ class AddVDI(Component):
             raise InvalidArgumentTypeError(
                 f"scalar_bar_args must be a dictionary; got {scalar_bar_args!r}"
             )
+        if culling and (culling.lower() if isinstance(culling, str) else culling) not in _CULLING:
+            raise InvalidArgumentError(
+                f"culling must be False or one of {_CULLING}; got {culling!r} (faces are a mesh's: "
+                "it changes nothing of a volume)"
+            )
         if isinstance(volume, vtkMultiBlockDataSet):
-            return add_blocks(self, volume, arguments)
+            actors: list[Any] = []
+            with _all_or_nothing(plotter, actors):
+                for added in add_blocks(self, volume, arguments):
+                    actors.append(added)
+            return actors
         if target_fps is not None:
             checked_rate("target_fps", target_fps)
         checked_policy(regenerate)
@@ -356,12 +375,19 @@ class AddVDI(Component):
                 show_scalar_bar, table = False, pv.LookupTable()
             if annotations:
                 table.annotations = annotations
+            scalar_range = table.scalar_range
         else:
             shown = source = VDISource()
             image, array_name = as_image(volume, scalars, resolution)
             described = Classification(changed, "add_vdi").describe()
             source.SetMetadata({"classification": described})
-            source.SetInputDataObject(held(image))
+            data = held(image)
+            named = None if array_name is None else data.GetPointData().GetArray(array_name)
+            if named is not None and preference == "point":
+                # As add_volume: another may be made the active one of the mapper's dataset
+                data.GetPointData().SetActiveScalars(array_name)
+                array_name = None
+            source.SetInputDataObject(data)
             source.SetScalars(array_name, preference)
             source.SetOptions(options)
             source.SetDial(
@@ -379,7 +405,9 @@ class AddVDI(Component):
             title = read.name if scalars is None or isinstance(scalars, str) else ""
             if read.rgba:
                 looks, show_scalar_bar = looks.of_rgba(), False
+            looks = replace(looks, clim=range_to_classify(scalars, looks.clim))
             table = looks.lookup_table(read.array)
+            scalar_range = looks.scalar_range(table, read)
             prop = looks.volume_property(table, read.default_unit_distance, rgba=read.rgba)
             looks.light(prop)
             source.SetLights(plotter.renderer)
@@ -388,8 +416,8 @@ class AddVDI(Component):
                 source.SetCamera(camera, _matrix(plotter, user_matrix))
 
         vdi_mapper = PlotterVDIMapper(theme=plotter._theme)
+        vdi_mapper.scalar_range = scalar_range  # before there is a table that it would change
         vdi_mapper.lookup_table = table
-        vdi_mapper.scalar_range = table.scalar_range
         vdi_mapper.SetDevice(device)
         vdi_mapper.SetTargetFrameRate(target_fps)
         vdi_mapper.SetAutoAdjustMultiSamples(adjust_multi_samples)
@@ -400,19 +428,20 @@ class AddVDI(Component):
         vdi_mapper.SetRegenerateBelow(regenerate_below)
         vdi_mapper.SetDraw(draw)
         actor = self._actor(vdi_mapper, shown if several is None else several, prop, user_matrix)
-        plotter.add_actor(
-            actor,
-            reset_camera=reset_camera,
-            name=name,
-            culling="backface" if culling is True else culling,
-            pickable=pickable,
-            render=not plotter._first_time if render is None else render,
-        )
         themed = plotter._theme.show_scalar_bar or scalar_bar_args
-        if themed if show_scalar_bar is None else show_scalar_bar:
-            plotter.add_scalar_bar(**{"title": title, **(scalar_bar_args or {})})
-        if status:
-            actor.show_status(plotter)
+        with _all_or_nothing(plotter, actor):
+            plotter.add_actor(
+                actor,
+                reset_camera=reset_camera,
+                name=name,
+                culling="backface" if culling is True else culling,
+                pickable=pickable,
+                render=not plotter._first_time if render is None else render,
+            )
+            if themed if show_scalar_bar is None else show_scalar_bar:
+                plotter.add_scalar_bar(**{"title": title, **(scalar_bar_args or {})})
+            if status:
+                actor.show_status(plotter)
         plotter.renderer.Modified()
         return actor
 
@@ -464,6 +493,16 @@ _DEFAULTS = {
     for name, parameter in _signature.parameters.items()
     if name not in ("self", "aliases")
 }
+
+
+@contextlib.contextmanager
+def _all_or_nothing(plotter: Any, actors: Any) -> Iterator[None]:
+    """Take an actor, or several, away again where something is refused on the way."""
+    try:
+        yield
+    except BaseException:
+        plotter.remove_actor(actors, reset_camera=False, render=False)
+        raise
 
 
 def _changed(given: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:

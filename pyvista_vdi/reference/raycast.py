@@ -275,12 +275,13 @@ def kept_parts(
     planes = np.reshape(cropping.planes, (3, 2))
     # Nothing lies between a low plane and a high one below it
     planes[:, 1] = planes.max(axis=1)
+    origin, direction = (np.dot(cropping.normals, along) for along in (ray.origin, ray.direction))
     with np.errstate(divide="ignore", invalid="ignore"):  # a plane that is never reached
-        t = ((planes - ray.origin[:, None]) / ray.direction[:, None]).ravel()
+        t = ((planes - origin[:, None]) / direction[:, None]).ravel()
     cuts = np.unique(np.concatenate([[t0], t[(t > t0) & (t < t1)], [t1]]))
     parts: list[tuple[float, float]] = []
     for begin, end in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
-        point = ray.origin + (begin + end) / 2 * ray.direction
+        point = origin + (begin + end) / 2 * direction
         region = (int(np.searchsorted(planes[axis], point[axis], "right")) for axis in range(3))
         if not cropping.keeps(*region):
             continue

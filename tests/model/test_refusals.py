@@ -39,6 +39,7 @@ pytestmark = pytest.mark.fast
 HUGE, TWO = 10**400, np.array([1, 2])
 NAN, INF = math.nan, math.inf
 PLANES = (0, 1, 0, 1, 0, 1)
+NORMALS = ([[1, 0, 0], [0, 1, 0], [1, 1, 0]], [1, 0, 0], [[NAN] * 3] * 3, "x")
 FLAT = np.diag([1.0, 1.0, 0.0, 1.0])
 PROJECTIVE = np.eye(4) + np.diag([0, 0, 1], -1)
 PICTURE, CUBE = np.zeros((24, 32, 3)), np.zeros((2, 2, 2))
@@ -129,6 +130,7 @@ REFUSED = {
         ((PLANES, TWO), "27 flags, .* got array"),
         ((PLANES, "hedge"), "27 flags, 0 to 0x7ffffff, or one of 'subvolume'.*got 'hedge'"),
         *(((PLANES, regions), "27 flags") for regions in (2**27, -1, 1.5, True, None)),
+        *(((PLANES, 0, normals), "three independent directions.*got") for normals in NORMALS),
     ],
     Cropping.from_any: [
         *each("six planes.*got", (1, 2, 3), 5, "fence", (0, 1, 0, 1, 0, NAN)),

@@ -13,7 +13,7 @@ from plugin_scenes import LOOKS, WINDOW, shown, soft_ball
 from watched_windows import small_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import VDIWarning
+from pyvista_vdi.errors import InvalidVolumeError, VDIWarning
 from pyvista_vdi.plotting.progress import DelayedBar, progress_callback
 from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.filters import source as source_module
@@ -82,11 +82,51 @@ def test_arguments_mean_what_they_mean_in_add_volume(plotter, arguments):
         source.GetVolume().array.ravel(), theirs.mapper.dataset.active_scalars, rtol=1e-6
     )
     assert ours.bounds == pytest.approx(theirs.bounds)
-    # A lookup table brings its range, which add_volume leaves to the property
-    given = getattr(arguments.get("cmap"), "scalar_range", theirs.mapper.scalar_range)
-    assert ours.mapper.scalar_range == pytest.approx(given)
+    assert ours.mapper.scalar_range == pytest.approx(theirs.mapper.scalar_range)
     assert list(plotter.scalar_bars.keys()) == list(judge.scalar_bars.keys())
     assert len(plotter.scalar_bars) == 1
+
+
+def masked(shape, dtype):
+    """Values of which some, far beyond the others, are masked."""
+    values = np.linspace(0, 200, np.prod(shape)).astype(dtype).reshape(shape)
+    values[:3] = 30000
+    return np.ma.masked_greater(values, 1000)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.int16])
+@pytest.mark.parametrize("given", ["scalars", "cells", "dataset", "bare"])
+def test_masked_arrays_are_taken_as_by_add_volume(plotter, given, dtype):
+    """Of scalars= the others give the range; elsewhere PyVista takes no notice of a mask."""
+    grid, arguments = pv.ImageData(dimensions=(9, 8, 7)), {}
+    if given == "scalars":
+        arguments["scalars"] = masked(grid.n_points, dtype)
+    elif given == "cells":
+        arguments["scalars"] = masked(grid.n_cells, dtype)
+    elif given == "dataset":
+        grid["v"] = masked(grid.n_points, dtype)
+    else:
+        grid = masked((9, 8, 7), dtype)
+    judge = pv.Plotter(off_screen=True)
+    theirs = judge.add_volume(grid, **arguments).mapper
+    source = plotter.add_vdi(grid, **arguments).mapper
+    assert source.scalar_range == pytest.approx(theirs.scalar_range)
+    assert source.scalar_range[1] == (200 if "scalars" in arguments else 30000)
+    np.testing.assert_allclose(source.GetSource().GetVolume().scalars.max(), 30000)
+    judge.close()
+
+
+def test_scalars_that_are_all_masked_are_refused_and_the_engine_ranges_the_others():
+    grid = pv.ImageData(dimensions=(9, 8, 7))
+    values = masked(grid.n_points, np.float32)
+    camera, window = pvdi.Camera((30, 9, 9), (4, 4, 3), (0, 0, 1)), (24, 18)
+    pictures = [
+        pvdi.render_volume(grid, camera, window, scalars=scalars, clim=clim)
+        for scalars, clim in ((values, None), (values.data, (values.min(), values.max())))
+    ]
+    np.testing.assert_array_equal(*pictures)
+    with pytest.raises(InvalidVolumeError, match="every one of the scalars is masked"):
+        pv.Plotter(off_screen=True).add_vdi(grid, scalars=np.ma.masked_all(grid.n_points))
 
 
 def test_numpy_volume_with_resolution_and_engine_volume(plotter):

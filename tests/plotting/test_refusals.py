@@ -45,6 +45,7 @@ ARGUMENTS = {
     "interpolation": ({"interpolation": "cubic"}, "'nearest' or 'linear'"),
     "occlusion": ({"ambient_occlusion": "strong"}, "must be True, a radius.*got 'strong'"),
     "occlusion's radius": ({"ambient_occlusion": 0.0}, "radius of ambient occlusion.*got 0"),
+    "culling": ({"culling": "sideways"}, "culling must be False or one of.*got 'sideways'"),
     "mapper": ({"mapper": "cpu"}, "mapper='cpu' is none of"),
     "no supersegments": ({"max_supersegments": 0}, "from 1 to 4096; got 0"),
     "too many": ({"max_supersegments": 4097}, "1 to 4096; got 4097"),
@@ -117,6 +118,32 @@ def test_add_vdi_refuses(plotter, volume, arguments, error, message):
         plotter.add_vdi(volume, **arguments)
     assert not plotter.renderer.actors, "something was added although it was refused"
     assert not plotter.scalar_bars
+
+
+ADD_VDI = inspect.signature(pv.Plotter(off_screen=True).add_vdi).parameters
+
+
+@pytest.mark.parametrize("name", [n for n in ADD_VDI if n not in ("volume", "aliases")])
+def test_a_wrong_value_of_any_argument_leaves_the_plotter_as_it_was(plotter, name):
+    """Those that PyVista finds only after it has added the actor included."""
+    plotter.add_mesh(pv.Sphere(), name="ball")
+    wrong_ones = ("sideways", -3.5, object(), (1, 2), np.ones(3), {"bogus": 1}, {"n_labels": "x"})
+    for wrong in wrong_ones:
+        before = dict(plotter.actors)
+        try:
+            actor = plotter.add_vdi(VOLUME, **{name: wrong})
+        except Exception:
+            assert dict(plotter.actors) == before, wrong
+            assert not plotter.scalar_bars, wrong
+        else:  # what is wrong for one argument is right for another
+            plotter.remove_actor(actor)
+
+
+def test_a_block_that_is_refused_takes_those_before_it_along(plotter):
+    blocks = pv.MultiBlock([VOLUME, pv.MultiBlock([VOLUME, grid_of([np.nan] * 64)])])
+    with pytest.raises(errors.InvalidVolumeError, match="every value is NaN"):
+        plotter.add_vdi(blocks)
+    assert not plotter.actors
 
 
 @pytest.mark.parametrize(

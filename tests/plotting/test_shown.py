@@ -85,6 +85,51 @@ def test_planes_are_in_the_data_s_own_coordinates():
     assert_as_vtk(cropped("cross", user_matrix=matrix))
 
 
+def turned(*, x=0, y=0, z=0):
+    return pv.Transform().rotate_x(x).rotate_y(y).rotate_z(z).matrix[:3, :3]
+
+
+@pytest.mark.parametrize("regions", ["subvolume", "inverted_cross"])
+@pytest.mark.parametrize(
+    "direction",
+    [
+        turned(x=50),
+        turned(y=-20),
+        turned(x=20, y=35, z=30),
+        [[1, 0.3, 0], [0, 1, 0.2], [0, 0, 1]],  # a shear
+        turned(z=180),  # the low planes are beyond the high ones
+        [[0, 1, 0], [0, 0, 1], [1, 0, 0]],  # no plane's place depends on the number it was given
+    ],
+)
+def test_an_oblique_image_is_cropped_as_by_vtk(direction, regions):
+    """With planes within and beyond the bounds; VTK's are up to half a voxel off: see for_vtk."""
+    direction = np.asarray(direction, dtype=float)
+    image = pv.ImageData(dimensions=(54, 60, 50), spacing=(0.03, 0.04, 0.05))
+    image.direction_matrix, image.origin = direction, (0.3, -0.2, 0.4)
+    image["v"] = np.ones(image.n_points)
+    low, high = np.reshape(image.bounds, (3, 2)).T
+    planes = low[:, None] + [[0.3, 0.7], [0.25, 0.8], [0.4, 1.3]] * (high - low)[:, None]
+    matrix = pv.Transform().rotate_y(40).translate(0.2, 0.1, 0).matrix
+
+    def kept(add, cropped=True):
+        plotter = pv.Plotter(off_screen=True, window_size=WINDOW)
+        looks = {"opacity": 0.8, "clim": (0, 1), "show_scalar_bar": False}
+        actor = add(plotter, image, **looks)
+        actor.user_matrix = matrix
+        crop(actor.mapper, regions, planes.ravel())
+        actor.mapper.SetCropping(cropped)
+        plotter.view_isometric()
+        picture = plotter.screenshot(return_img=True)
+        plotter.close()
+        return picture[..., :3].min(axis=2) < 250
+
+    ours, theirs = kept(add_ours), kept(add_judge)
+    whole = np.count_nonzero(kept(add_ours, cropped=False))
+    # Seen: up to .058, half a voxel at many edges; with planes across the model frame's axes, .21
+    # to .43
+    assert np.count_nonzero(ours ^ theirs) < 0.08 * whole
+
+
 def test_cropping_and_a_clipping_plane_together():
     plane = vtkPlane()
     plane.SetNormal(0.3, -1.0, 0.2)

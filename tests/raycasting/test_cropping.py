@@ -12,7 +12,7 @@ import pytest
 import strategies
 from drawing import pick_vdi, raycast_volume, render_first_hits, render_vdi
 from oracle import assert_explained, total
-from ray_scenes import random_ends, random_planes
+from ray_scenes import random_cropping, random_ends, random_planes
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import ray_forms as rays
@@ -43,7 +43,7 @@ def test_every_pixel_is_within_the_range_of_the_moved_ray(runtime, kind, dealt):
         rng, vdi, camera, size, name = case(seed)
         regions = int(rng.integers(Cropping.ALL + 1)) if kind == "flags" else kind
         shown = {
-            "cropping": Cropping(random_planes(rng, vdi.bounds), regions),
+            "cropping": random_cropping(rng, vdi.bounds, regions),
             "opacity_multiplier": float(2 ** rng.uniform(-3, 3)),
         }
         if seed % 3 == 2:
@@ -153,7 +153,7 @@ def test_what_is_picked_is_what_is_shown(runtime):
         if strategies.VIEWS[seed % len(strategies.VIEWS)] == "half":
             continue  # every ray runs along borders
         rng, vdi, camera, size, _ = case(seed, thinnest=0.05)
-        cropping = Cropping(random_planes(rng, vdi.bounds), int(rng.integers(Cropping.ALL)))
+        cropping = random_cropping(rng, vdi.bounds, int(rng.integers(Cropping.ALL)))
         shown = {"cropping": cropping, "opacity_multiplier": 2.0, "opacity_threshold": 0.3}
         depth = render_first_hits(vdi, camera, size, device=runtime, **shown)[::-1]
         whole = pick_depths(vdi, camera, size, opacity_threshold=0.3)
@@ -184,6 +184,7 @@ def pick_depths(vdi, camera, size, cropping=None, **shown):
             to_model = np.linalg.inv(camera.model_transform)
             beyond = 1e-9 * (np.array(hit.position) - camera.position)
             point = (to_model @ [*(np.array(hit.position) + beyond), 1])[:3]
+            point = cropping.normals @ point
             planes = np.reshape(cropping.planes, (3, 2))
             assert cropping.keeps(*(int((point[a] >= planes[a]).sum()) for a in range(3)))
     return depth

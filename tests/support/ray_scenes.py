@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import strategies
 
-from pyvista_vdi import VDI, Camera
+from pyvista_vdi import VDI, Camera, Cropping
 
 #: Lenses of :func:`generating_view` that differ from a perspective three radii away.
 _LENSES = {
@@ -58,6 +58,18 @@ def random_planes(rng, bounds):
     box = np.reshape(bounds, (3, 2))
     shares = np.sort(rng.uniform(-0.1, 1.1, size=(3, 2)), axis=1)
     return (box[:, :1] + shares * (box[:, 1:] - box[:, :1])).ravel()
+
+
+def random_cropping(rng, bounds, regions):
+    """Two planes across each axis, or across each of three directions that are not at right angles.
+
+    Some planes are outside the bounds.
+    """
+    normals = np.eye(3)
+    if rng.random() < 0.5:
+        normals = normals + rng.uniform(-0.4, 0.4, (3, 3))
+    reach = Cropping((0,) * 6, normals=normals).reach(bounds)
+    return Cropping(random_planes(rng, reach.ravel()), regions, normals)
 
 
 def rebuilt(vdi, **changes):

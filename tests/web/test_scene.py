@@ -46,8 +46,8 @@ def plotter():
     made.close()
 
 
-def ball(plotter, *, at=(0, 0, 0), **more):
-    volume = soft_ball(20)
+def ball(plotter, *, at=(0, 0, 0), direction=None, **more):
+    volume = soft_ball(20, direction=direction)
     volume.origin = np.add(volume.origin, at)
     looks = {"cmap": "viridis", "opacity": "linear", "show_scalar_bar": False}
     return plotter.add_vdi(volume, **{**looks, **more})
@@ -156,6 +156,14 @@ def clipped_and_moved(plotter):
     actor.opacity_multiplier = 2
 
 
+def oblique_and_cropped(plotter):
+    turned = pv.Transform().rotate_x(20).rotate_z(30).matrix[:3, :3]
+    actor = ball(plotter, direction=turned)
+    actor.mapper.SetCropping(True)
+    actor.mapper.SetCroppingRegionPlanes(-0.5, 2, -0.4, 0.6, -2, 2)
+    actor.rotate_z(50)
+
+
 def translucent_and_textured(plotter):
     """By VTK's own sums of translucent layers; RGB, texture, blocks; one headlight."""
     ball(plotter)
@@ -191,7 +199,7 @@ def overlapping(plotter):
 
 slow = pytest.mark.slow
 SCENES = [in_parallel, cells_lines_points, translucent_and_textured]
-SCENES += [meshes, clipped_and_moved, apart, overlapping]
+SCENES += [meshes, clipped_and_moved, oblique_and_cropped, apart, overlapping]
 AT_ONCE = (cells_lines_points, translucent_and_textured)
 
 

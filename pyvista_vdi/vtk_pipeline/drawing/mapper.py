@@ -20,6 +20,8 @@ from pyvista_vdi.quality.when_anew import checked_bound
 from pyvista_vdi.raycasting.picking import checked_opacity
 from pyvista_vdi.series.series import VDISeries
 from pyvista_vdi.sets.vdi_set import VDISet
+from pyvista_vdi.vtk_pipeline.drawing.array_choice import ArrayChoiceMethods
+from pyvista_vdi.vtk_pipeline.drawing.far_box import FarBox
 from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
 from pyvista_vdi.vtk_pipeline.filters.algorithm import DEVICE, accessors
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
@@ -37,20 +39,23 @@ COARSEST = 4.0
 
 def _on_start(mapper: Any, event: str) -> None:
     mapper.painter.begin(mapper)
+    mapper._far_box.begin(mapper.painter.actor, mapper.painter.proxy)
 
 
 def _on_end(mapper: Any, event: str) -> None:
     mapper.painter.end()
+    mapper._far_box.end(mapper.painter.proxy)
 
 
-class VDIMapperMethods:
+class VDIMapperMethods(ArrayChoiceMethods):
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
 
     _painter: Painter | None = None
+    _far_box: FarBox | None = None
 
     def _become_vdi_mapper(self: Any) -> None:
         """Install proxy and observers; to be called once, from ``__init__``."""
-        self._painter = Painter()
+        self._painter, self._far_box = Painter(), FarBox()
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)
@@ -92,6 +97,8 @@ class VDIMapperMethods:
         source = self.GetSource()
         volume = None if source is None else source.GetInputDataObject(0, 0)
         return self.painter.proxy if volume is None else volume
+
+    GetInput = GetDataObjectInput = GetDataSetInput
 
     def SetVDI(self, vdi: VDI) -> None:
         """Draw this VDI."""

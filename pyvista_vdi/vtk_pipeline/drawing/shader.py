@@ -1,4 +1,4 @@
-"""What takes the place of VTK's ray caster in the fragment shader of a VDI's actor."""
+"""What takes the place of VTK's ray caster in the shaders of a VDI's actor."""
 
 from __future__ import annotations
 
@@ -65,9 +65,16 @@ _CELL = """
 """
 
 
+#: For boxes that float32 cannot place: one about the origin, whose front or back face, whichever is
+#: not culled, is made the viewport, at the near plane.
+_FILL = """
+  gl_Position = vec4(in_vertexPos.xy * {scale!r}, -0.999, 1.0);
+"""
+
 #: What in VTK's template calls its ray caster, and what declares custom uniforms.
 _CUSTOM = "//VTK::CustomUniforms::Dec"
 _CALL = "//VTK::CallWorker::Impl"
+_POSITION = "//VTK::ComputeClipPos::Impl"
 
 #: What only VTK's ray caster needs, and render passes would add to.
 _UNUSED = (
@@ -100,6 +107,18 @@ def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int,
     actor.GetShaderProperty().GetFragmentCustomUniforms().SetUniform4f(_VIEWPORT, place)
 
 
+def fill_viewport(actor: Any, edge: float | None) -> None:
+    """Have a cube about the origin, of that edge, fill the viewport; ``None``: boxes are boxes."""
+    shader = actor.GetShaderProperty()
+    text = None if edge is None else _FILL.format(scale=2 / edge)
+    if text == _replacement(shader, _POSITION):
+        return
+    if text is None:
+        shader.ClearVertexShaderReplacement(_POSITION, True)
+    else:
+        shader.AddVertexShaderReplacement(_POSITION, True, text, False)
+
+
 def place_texture(actor: Any, unit: int) -> None:
     """Say in which texture unit the image is, in the frame that begins."""
     actor.GetShaderProperty().GetFragmentCustomUniforms().SetUniformi("vdiImage", unit)
@@ -121,11 +140,11 @@ def _replace(shader: Any, text: str) -> None:
         shader.AddFragmentShaderReplacement(_CALL, True, text, False)
 
 
-def _replacement(shader: Any) -> str | None:
+def _replacement(shader: Any, of: str = _CALL) -> str | None:
     """Return what is in place now. Asked of VTK: copies of an actor share its shader."""
     for i in range(shader.GetNumberOfShaderReplacements()):
         name, first, text, everywhere = (reference(kind) for kind in ("", False, "", False))
         shader.GetNthShaderReplacement(i, name, first, text, everywhere)
-        if str(name) == _CALL:
+        if str(name) == of:
             return str(text)
     return None

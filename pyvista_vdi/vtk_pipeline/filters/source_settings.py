@@ -150,6 +150,10 @@ class SourceSettings(Algorithm):
         """Return the array's name, or ``None`` for the active scalars."""
         return self._scalars
 
+    def GetPreference(self) -> str:
+        """Return which array is taken where points and cells have one of that name."""
+        return self._preference
+
     def SetCamera(self, camera: Any, model_transform: ArrayLike | None = None) -> None:
         """Set the generating view V_O.
 

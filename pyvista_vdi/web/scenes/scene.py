@@ -307,13 +307,13 @@ def _sides(
     if not all(cropping.keeps(*region) == (region == (1, 1, 1)) for region in regions):
         return None
     sides = []
-    for number, (place, edge) in enumerate(zip(cropping.planes, bounds, strict=True)):
-        axis, sense = number // 2, 1 - 2 * (number % 2)
+    edges = cropping.reach(bounds).ravel()
+    for number, (place, edge) in enumerate(zip(cropping.planes, edges, strict=True)):
+        normal, sense = np.asarray(cropping.normals[number // 2]), 1 - 2 * (number % 2)
         if sense * (place - edge) <= 0:  # outside of what there is
             continue
-        point = np.append(np.zeros(3), 1.0)
-        point[axis] = place
-        normal = sense * np.linalg.inv(matrix[:3, :3])[axis]
+        point = np.append(place * normal / (normal @ normal), 1.0)
+        normal = sense * normal @ np.linalg.inv(matrix[:3, :3])
         sides.append([*(matrix @ point)[:3].tolist(), *normal.tolist()])
     return sides
 
