@@ -13,11 +13,15 @@ import sys
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import platformdirs
+
 from pyvista_vdi.device.icd import Discovery, drivers_visible, own_loader_bound
 from pyvista_vdi.errors import DeviceError, MissingDependencyError, NoDeviceError
+from pyvista_vdi.model.user_cache import can_be_written
 
 DEVICE_VARIABLE = "PYVISTA_VDI_DEVICE"
 
@@ -279,12 +283,16 @@ def opencl() -> ModuleType:
 def _import_pyopencl() -> ModuleType:
     try:
         with own_loader_bound():
-            return importlib.import_module("pyopencl")
+            cl: Any = importlib.import_module("pyopencl")
     except ImportError as exc:
         raise MissingDependencyError(
             f"pyopencl cannot be imported ({exc}); install it with  pip install --upgrade pyopencl"
             "  (its wheels bring an OpenCL loader; a build from source needs libOpenCL)"
         ) from exc
+    # There pyopencl keeps the Python code that it makes for kernels, and it fails where it cannot
+    if not can_be_written(Path(platformdirs.user_cache_dir("pytools", "pytools"))):
+        cl._PYOPENCL_NO_CACHE = True
+    return cl
 
 
 def find_candidates() -> tuple[list[Candidate], list[str]]:

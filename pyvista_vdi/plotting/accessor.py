@@ -14,7 +14,7 @@ from pyvista_vdi.vtk_pipeline.filters.convert import require_image
 from pyvista_vdi.vtk_pipeline.filters.view import aim
 
 
-@pv.register_dataset_accessor("vdi", pv.DataSet)
+@pv.register_dataset_accessor("vdi", pv.DataSet, override=True)  # of registration._Pending
 class VDIAccessor:
     """Makes VDIs of a data set: ``volume.vdi``.
 

@@ -19,7 +19,7 @@ from pyvista_vdi.errors import (
     InvalidVolumeError,
     MissingDependencyError,
     UnsupportedError,
-    VDIWarning,
+    warn_external,
 )
 from pyvista_vdi.model.host_memory import require_free_memory
 
@@ -74,11 +74,9 @@ def slices_of(folder: Path) -> list[Slice]:
             "them): give the folder that holds the slices themselves"
         )
     if damaged:
-        warnings.warn(
+        warn_external(
             f"{len(damaged)} of {len(files)} files in the folder {folder} are left out, as they "
-            f"are damaged; the first: {damaged[0]}",
-            VDIWarning,
-            stacklevel=5,
+            f"are damaged; the first: {damaged[0]}"
         )
     series = Counter(each.series for each in found)
     if len(series) > 1:

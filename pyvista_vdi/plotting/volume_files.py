@@ -16,7 +16,13 @@ import pyvista as pv
 from numpy.typing import NDArray
 from vtkmodules.vtkIOImage import vtkDICOMImageReader, vtkMetaImageReader, vtkNIFTIImageReader
 
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIError, VDIWarning
+from pyvista_vdi.errors import (
+    InvalidVolumeError,
+    UnsupportedError,
+    VDIError,
+    warn_external,
+    with_article,
+)
 from pyvista_vdi.plotting.dicom import Slice, read_slice, require_uncompressed, slices_of, values_of
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
 
@@ -72,8 +78,8 @@ def read_volume(path: str | os.PathLike[str]) -> pv.ImageData:
         raise InvalidVolumeError(f"{file} cannot be read as a volume: {error}") from error
     if not isinstance(data, pv.ImageData):
         raise UnsupportedError(
-            f"{file} holds a {type(data).__name__}, not a uniform grid: resample it to a "
-            "pyvista.ImageData first"
+            f"{file} holds {with_article(type(data).__name__)}, not a uniform grid: resample "
+            "it to a pyvista.ImageData first"
         )
     if is_vdi_image(data):
         raise InvalidVolumeError(
@@ -224,12 +230,10 @@ def _dicom_series(folder: Path) -> pv.ImageData:
     if any(p is None for p in positions) or any(o is None for o in orientations):
         data = _stacked(slices)
         apart = slices[0].thickness or data.spacing[0]
-        warnings.warn(
+        warn_external(
             f"slices in the folder {folder} do not say where they lie or how they are turned: rows "
             f"are taken to run along y, slices along z, {apart:g} apart, in an order that may be "
-            "the wrong one",
-            VDIWarning,
-            stacklevel=4,
+            "the wrong one"
         )
         data.spacing = (*data.spacing[:2], apart)
         return data
@@ -248,11 +252,9 @@ def _dicom_series(folder: Path) -> pv.ImageData:
             "times or echoes do: put those of one into a folder of their own"
         )
     if np.ptp(gaps) > _EVEN * gaps.mean():
-        warnings.warn(
+        warn_external(
             f"slices in the folder {folder} are {gaps.min():g} to {gaps.max():g} apart, and are "
-            f"taken as {gaps.mean():g} apart: some are missing, or resample them",
-            VDIWarning,
-            stacklevel=4,
+            f"taken as {gaps.mean():g} apart: some are missing, or resample them"
         )
     data = _stacked([slices[i] for i in np.argsort(-places)])
     n_rows = data.dimensions[1]
