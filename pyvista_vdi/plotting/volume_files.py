@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
-import logging
 import os
 import re
-import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -70,8 +66,7 @@ def read_volume(path: str | os.PathLike[str]) -> pv.ImageData:
         elif name.endswith((".mha", ".mhd")):
             data = _meta_image(file)
         else:
-            with _silence():
-                data = pv.read(file)
+            data = _by_pyvista(file)
     except VDIError:
         raise
     except Exception as error:  # each format has readers, and exceptions, of its own
@@ -91,21 +86,21 @@ def read_volume(path: str | os.PathLike[str]) -> pv.ImageData:
     return data
 
 
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    """Make an error of what PyVista's readers log or warn of."""
-    before = logging.root.manager.disable
-    logging.disable(logging.ERROR)
+def _by_pyvista(file: Path) -> Any:
+    """Read by PyVista, and raise what VTK's reader would only print."""
     try:
-        with pv.vtk_verbosity("off"), warnings.catch_warnings():
-            warnings.filterwarnings("error", "The VTK reader .* raised an error", UserWarning)
-            yield
-    finally:
-        logging.disable(before)
+        reader = pv.get_reader(file)
+    except ValueError:  # formats that are not VTK's
+        return pv.read(file)
+    messages = _messages_of(reader.reader)
+    data = reader.read()
+    if messages:
+        raise _refusal(messages[0], file)
+    return data
 
 
-def _read_whole(reader: Any, file: Path) -> pv.ImageData:
-    """Read by a reader of VTK, and raise what it would only print."""
+def _messages_of(reader: Any) -> list[str]:
+    """Return a list that gets the errors of a reader of VTK, in place of the terminal."""
     messages: list[str] = []
 
     def note(_reader: Any, _event: str, message: str) -> None:
@@ -118,10 +113,20 @@ def _read_whole(reader: Any, file: Path) -> pv.ImageData:
     for source in (reader, reader.GetExecutive()):
         source.AddObserver("ErrorEvent", note)
         source.AddObserver("WarningEvent", pass_over)
+    return messages
+
+
+def _refusal(message: str, file: Path) -> InvalidVolumeError:
+    why = message.split("): ", 1)[-1].strip()
+    return InvalidVolumeError(f"{file} cannot be read as a volume: {why}")
+
+
+def _read_whole(reader: Any, file: Path) -> pv.ImageData:
+    """Read by a reader of VTK, and raise what it would only print."""
+    messages = _messages_of(reader)
     reader.Update()
     if messages or reader.GetErrorCode():
-        why = messages[0].split("): ", 1)[-1].strip() if messages else _code(reader)
-        raise InvalidVolumeError(f"{file} cannot be read as a volume: {why}")
+        raise _refusal(messages[0] if messages else _code(reader), file)
     data = pv.wrap(reader.GetOutput())
     if data.n_points == 0 or data.active_scalars is None:
         raise InvalidVolumeError(f"{file} holds no scalars that VTK could read")
