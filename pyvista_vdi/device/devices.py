@@ -13,15 +13,12 @@ import sys
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import platformdirs
-
 from pyvista_vdi.device.icd import Discovery, drivers_visible, own_loader_bound
 from pyvista_vdi.errors import DeviceError, MissingDependencyError, NoDeviceError
-from pyvista_vdi.model.user_cache import can_be_written
+from pyvista_vdi.model.user_cache import writable_cache
 
 DEVICE_VARIABLE = "PYVISTA_VDI_DEVICE"
 
@@ -290,7 +287,9 @@ def _import_pyopencl() -> ModuleType:
             "  (its wheels bring an OpenCL loader; a build from source needs libOpenCL)"
         ) from exc
     # There pyopencl keeps the Python code that it makes for kernels, and it fails where it cannot
-    if not can_be_written(Path(platformdirs.user_cache_dir("pytools", "pytools"))):
+    try:
+        writable_cache("pytools", "pytools")
+    except OSError:
         cl._PYOPENCL_NO_CACHE = True
     return cl
 

@@ -22,34 +22,43 @@ def user_cache() -> Path | None:
     Services and containers often run without a home. That another folder is used, or none, goes
     to the log, once.
     """
-    wanted = Path(platformdirs.user_cache_dir("pyvista-vdi", appauthor=False))
-    with _lock:  # so that it is said once
-        return _found(wanted)
-
-
-def can_be_written(folder: Path) -> bool:
-    """Whether files can be made in a folder, which is made if it is not there."""
-    if not folder.is_absolute():  # "~": there is no home
-        return False
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return False
-    return os.access(folder, os.W_OK | os.X_OK)
+        return writable_cache("pyvista-vdi")
+    except OSError as error:
+        found = _temporary()
+        with _lock:  # so that it is said once
+            _say(str(error), found)
+        return found
+
+
+def writable_cache(name: str, author: str | None = None) -> Path:
+    """Return the user's cache folder of a program, which is made if it is not there.
+
+    Raises
+    ------
+    OSError
+        If files cannot be made in it.
+    """
+    try:
+        folder = Path(platformdirs.user_cache_dir(name, author or False))
+    except RuntimeError as error:  # there is no home, and the system does not know the user
+        raise OSError(str(error)) from error
+    if not folder.is_absolute():  # likewise, of older versions
+        raise OSError(f"there is no home for {folder}")
+    folder.mkdir(parents=True, exist_ok=True)
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise PermissionError(f"{folder} is write-protected")
+    return folder
 
 
 @cache
-def _found(wanted: Path) -> Path | None:
-    if can_be_written(wanted):
-        return wanted
-    found = _temporary()
+def _say(why: str, found: Path | None) -> None:
     _logger.warning(
-        "the cache folder %s cannot be written: compiled kernels are kept %s; set HOME or "
+        "the user's cache folder cannot be written (%s): compiled kernels are kept %s; set "
         "XDG_CACHE_HOME to a folder that can be",
-        wanted,
+        why,
         f"in {found}" if found else "nowhere, and made anew in each process",
     )
-    return found
 
 
 def _temporary() -> Path | None:
@@ -64,4 +73,4 @@ def _temporary() -> Path | None:
         return None
     others = state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
     own = stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid() and not others
-    return folder if own and can_be_written(folder) else None
+    return folder if own and os.access(folder, os.W_OK | os.X_OK) else None

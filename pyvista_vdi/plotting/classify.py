@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
+import pyvista.plotting  # whole: pv.LookupTable is missing while another thread imports it
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import (
