@@ -9,7 +9,6 @@ import logging
 import os
 import re
 import sqlite3
-import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
@@ -344,9 +343,12 @@ def _write(place: Path | None, program: Any) -> None:
     (binary,) = program.get_info(opencl().program_info.BINARIES)
     with contextlib.suppress(OSError):  # a full disk, say: it is compiled again
         place.parent.mkdir(exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=place.parent, delete=False) as file:
-            file.write(hashlib.sha256(binary).digest() + binary)
-        Path(file.name).replace(place)  # whole, or not at all
+        new = place.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
+        try:
+            new.write_bytes(hashlib.sha256(binary).digest() + binary)
+            new.replace(place)  # whole, or not at all
+        finally:
+            new.unlink(missing_ok=True)
 
 
 def _log(program: Any, device: Any) -> str:
