@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
-from pyvista_vdi.device.icd import Discovery, drivers_visible, own_loader_bound
+from pyvista_vdi.device.icd import Discovery, drivers_visible, own_loader_bound, pocl_cache_at_hand
 from pyvista_vdi.errors import DeviceError, MissingDependencyError, NoDeviceError
 from pyvista_vdi.model.user_cache import writable_cache
 
@@ -315,7 +315,7 @@ def find_candidates() -> tuple[list[Candidate], list[str]]:
         return _found  # likewise without a lock
     with _lock:
         if _found is None:
-            with drivers_visible() as discovery:
+            with drivers_visible() as discovery, pocl_cache_at_hand():
                 cl = _import_pyopencl()
                 _found = _list(cl, discovery)
         return _found

@@ -38,6 +38,8 @@ _NOT_IN_OPTIONS = re.compile(r"[\s\"'\\;]")
 _PLACE_OF_GROUP = re.compile(r"\bget_(group_id|num_groups|global_size|global_offset)\b")
 _logger = logging.getLogger(__name__)
 _numbers = itertools.count(1)
+# pyopencl makes Python code for each, under names that it takes for free in two threads at a time
+_kernel_lock = threading.Lock()
 
 
 def define_options(defines: Mapping[str, Define]) -> tuple[str, ...]:
@@ -228,12 +230,12 @@ def _rounding_options(device: Any) -> tuple[str, ...]:
 
 def _kernel_object(program: Any, name: str) -> Any:
     cl: Any = opencl()
-    try:
-        return cl.Kernel(program, name)
-    except sqlite3.Error:
-        # pyopencl keeps the Python code that it makes for a kernel, in a file that cannot be used
-        cl._PYOPENCL_NO_CACHE = True
-        return cl.Kernel(program, name)
+    with _kernel_lock:
+        try:
+            return cl.Kernel(program, name)
+        except sqlite3.Error:  # the file in which it keeps that code cannot be used
+            cl._PYOPENCL_NO_CACHE = True
+            return cl.Kernel(program, name)
 
 
 def build(context: Any, device: Any, path: str, source: str, options: tuple[str, ...]) -> Any:

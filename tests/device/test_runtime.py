@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from importlib import resources
@@ -393,3 +394,14 @@ def test_kernels_are_built_where_nothing_can_be_cached(runtime, new_kernel, monk
     # A folder cannot be made below a file
     monkeypatch.setattr(programs, "user_cache", lambda: new_kernel / "folder")
     assert runtime.kernel(new_kernel, "twice").argument_count == 1
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="folders and variables of Linux")
+def test_a_device_is_there_without_a_home(runtime, tmp_path):
+    """PoCL has none where its cache cannot be written."""
+    code = f"from pyvista_vdi.device import get_runtime\nget_runtime({runtime.info.selector!r})"
+    nowhere = {"HOME": "/proc", "XDG_CACHE_HOME": "/proc/cache", "TMPDIR": str(tmp_path)}
+    done = run_python(code, **nowhere)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("\n") == 1
+    assert "cannot be written" in done.stderr
