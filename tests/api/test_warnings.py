@@ -28,7 +28,9 @@ def plotter():
 
 def missed_by_a_dial(plotter, tmp_path):
     camera = pvdi.Camera((5, -40, 20), (5, 5, 5), (0, 0, 1))
-    pvdi.generate(pvdi.Volume(VALUES), camera, (48, 32), cmap="bone", max_bytes=1, target_ssim=0.999)
+    pvdi.generate(
+        pvdi.Volume(VALUES), camera, (48, 32), cmap="bone", max_bytes=1, target_ssim=0.999
+    )
 
 
 def opacity_of_colours(plotter, tmp_path):
