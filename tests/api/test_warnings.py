@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from pathlib import Path
 
@@ -99,6 +100,16 @@ def test_a_warning_points_at_the_caller_s_line(case, plotter, tmp_path):
     for each in ours:
         lines = {line for *_, line in case.__code__.co_lines()}
         assert (Path(each.filename), each.lineno in lines) == (Path(__file__), True), each
+
+
+def test_no_module_warns_by_itself_or_changes_the_filters():
+    """Filters are the whole process's; only the command line has that to itself."""
+    package = Path(pvdi.__file__).parent
+    forbidden = re.compile(r"(?<![\w.])warnings\.(warn|catch_warnings|(simple)?filter\w*)\(")
+        r"(?<![\w.])warnings\.(warn|catch_warnings|simplefilter|filterwarnings)\("
+    )
+    found = [path for path in package.rglob("*.py") if forbidden.search(path.read_text("utf-8"))]
+    assert {path.relative_to(package).parts[0] for path in found} <= {"cli"}, found
 
 
 @pytest.mark.parametrize(
