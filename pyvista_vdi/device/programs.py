@@ -39,7 +39,7 @@ _PLACE_OF_GROUP = re.compile(r"\bget_(group_id|num_groups|global_size|global_off
 _logger = logging.getLogger(__name__)
 _numbers = itertools.count(1)
 # pyopencl makes Python code for each, under names that it takes for free in two threads at a time
-_kernel_lock = threading.Lock()
+_kernel_lock = threading.RLock()
 
 
 def define_options(defines: Mapping[str, Define]) -> tuple[str, ...]:
@@ -277,7 +277,6 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
             return cl.Program(program)
 
     program = cl._cl._Program(context, source)
-    log = ""
     try:
         with _announced(path, _SLOW if kept_by_driver else 0.0):
             program._build(**call)
