@@ -235,7 +235,7 @@ def generate(
         progress=progress,
         metadata=metadata,
     )
-    warn_missed(vdi, stacklevel=2)
+    warn_missed(vdi)
     return vdi
 
 

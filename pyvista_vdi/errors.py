@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
+
 __all__ = [
     "Cancelled",
     "DataNotFoundError",
@@ -125,3 +128,30 @@ class Cancelled(VDIError, RuntimeError):  # noqa: N818 - an outcome that a callb
 
 class VDIWarning(UserWarning):
     """Base of the package's warnings: what was asked for was done, but not quite as asked."""
+
+
+#: What stands between a line of the user's and a warning: this package, PyVista and VTK, which call
+#: it while they read and draw, and the standard library's wrappers of functions.
+_BETWEEN = ("pyvista_vdi", "pyvista", "vtkmodules", "cvista", "paraview", "contextlib", "functools")
+
+
+def warn_external(message: str, category: type[Warning] = VDIWarning) -> None:
+    """Give a warning that points at the line outside this package that led to it."""
+    frame = sys._getframe(1)
+    while (frame.f_globals.get("__name__") or "").partition(".")[0] in _BETWEEN and frame.f_back:
+        frame = frame.f_back
+    # Python 3.12 has skip_file_prefixes for this, and counts no frames of the import system
+    warnings.warn_explicit(
+        message,
+        category,
+        frame.f_code.co_filename,
+        frame.f_lineno,
+        module=frame.f_globals.get("__name__"),
+        registry=frame.f_globals.setdefault("__warningregistry__", {}),
+    )
+
+
+def with_article(name: str) -> str:
+    """Return the name of a type after its indefinite article."""
+    sounds_like_you = name.lower().startswith(("uni", "ui", "us"))
+    return f"{'an' if name[:1] in 'AEIOUaeiou' and not sounds_like_you else 'a'} {name}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -21,10 +22,12 @@ from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.inputs import as_volume
+from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.plotting.imports import import_pyvista
 from pyvista_vdi.plotting.progress import DelayedBar
 from pyvista_vdi.vtk_pipeline.vtk import BACKEND
 
@@ -71,7 +74,7 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
 
             volume = examples.load_data(options.example, as_volume=True)
         else:
-            volume = read_file(Path(options.file))
+            volume = read_file(Path(options.file), _read_quietly)
     taken = as_volume(volume, options.scalars, options.preference or "point")
     if options.spacing is None and options.origin is None:
         return taken
@@ -82,6 +85,17 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
         taken.direction,
         name=taken.name,
     )
+
+
+def _read_quietly(file: Path) -> Any:
+    """Read by PyVista, and let VTK's readers write nothing: the error says what is wrong."""
+    before = logging.root.manager.disable
+    logging.disable(logging.ERROR)
+    try:
+        with import_pyvista().vtk_verbosity("off"):
+            return provider("read_by_pyvista")(file)
+    finally:
+        logging.disable(before)
 
 
 def _open_store(options: argparse.Namespace) -> StoredVolume:

@@ -16,8 +16,9 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
-from pyvista_vdi.device.icd import Discovery, drivers_visible, own_loader_bound
+from pyvista_vdi.device.icd import Discovery, drivers_visible, own_loader_bound, pocl_cache_at_hand
 from pyvista_vdi.errors import DeviceError, MissingDependencyError, NoDeviceError
+from pyvista_vdi.model.user_cache import writable_cache
 
 DEVICE_VARIABLE = "PYVISTA_VDI_DEVICE"
 
@@ -279,12 +280,18 @@ def opencl() -> ModuleType:
 def _import_pyopencl() -> ModuleType:
     try:
         with own_loader_bound():
-            return importlib.import_module("pyopencl")
+            cl: Any = importlib.import_module("pyopencl")
     except ImportError as exc:
         raise MissingDependencyError(
             f"pyopencl cannot be imported ({exc}); install it with  pip install --upgrade pyopencl"
             "  (its wheels bring an OpenCL loader; a build from source needs libOpenCL)"
         ) from exc
+    # There pyopencl keeps the Python code that it makes for kernels, and it fails where it cannot
+    try:
+        writable_cache("pytools", "pytools")
+    except OSError:
+        cl._PYOPENCL_NO_CACHE = True
+    return cl
 
 
 def find_candidates() -> tuple[list[Candidate], list[str]]:
@@ -308,7 +315,7 @@ def find_candidates() -> tuple[list[Candidate], list[str]]:
         return _found  # likewise without a lock
     with _lock:
         if _found is None:
-            with drivers_visible() as discovery:
+            with drivers_visible() as discovery, pocl_cache_at_hand():
                 cl = _import_pyopencl()
                 _found = _list(cl, discovery)
         return _found

@@ -25,6 +25,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from pyvista_vdi.model.user_cache import user_cache, writable_cache
+
 SYSTEM_VENDORS = Path("/etc/OpenCL/vendors")
 """Where Linux loaders look by default."""
 
@@ -168,6 +170,27 @@ def drivers_visible() -> Iterator[Discovery]:
             yield discovery
         finally:
             os.environ.pop("OCL_ICD_VENDORS", None)
+
+
+@contextlib.contextmanager
+def pocl_cache_at_hand() -> Iterator[None]:
+    """While inside, PoCL finds a folder where the user's cannot be written: else it has no device.
+
+    List the platforms inside: it keeps what it found. The environment is put back.
+    """
+    try:
+        writable_cache("pyvista-vdi")
+        folder = None
+    except OSError:
+        folder = user_cache()
+    if folder is None or os.environ.get("POCL_CACHE_DIR"):
+        yield
+        return
+    os.environ["POCL_CACHE_DIR"] = str(folder / "pocl")
+    try:
+        yield
+    finally:
+        os.environ.pop("POCL_CACHE_DIR", None)
 
 
 @contextlib.contextmanager

@@ -3,41 +3,43 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import itertools
 import logging
 import os
 import re
-import sys
+import sqlite3
 import threading
-import time
-import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import platformdirs
 
 from pyvista_vdi.device import sources
 from pyvista_vdi.device.constants import KERNEL_CONSTANTS
 from pyvista_vdi.device.devices import opencl
 from pyvista_vdi.errors import InvalidArgumentError, KernelBuildError
+from pyvista_vdi.model.user_cache import user_cache
 
 Define = str | int | float | bool | None
 LOG_LINES_SHOWN = 30
 _LINE_MARK = re.compile(r'#line (\d+) "(.*)"')
-#: Age in seconds from which pyopencl's lock on its cache belongs to no living process: it is held
-#: while a program's file is read or written, which takes milliseconds.
-STALE_LOCK = 20.0
+#: Seconds from which a driver that keeps programs itself is taken to be compiling.
+_SLOW = 2.0
+
+#: Called when a program begins to be compiled, which may take seconds; from any thread.
+on_compiling: set[Callable[[], object]] = set()
 
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*")
 _NOT_IN_OPTIONS = re.compile(r"[\s\"'\\;]")
 #: What several launches with offsets answer otherwise than one launch does.
 _PLACE_OF_GROUP = re.compile(r"\bget_(group_id|num_groups|global_size|global_offset)\b")
 _logger = logging.getLogger(__name__)
-
-# One build at a time in the process: warning filters are global, and not every driver's compiler
-# is thread safe.
-_build_lock = threading.RLock()
+_numbers = itertools.count(1)
+# pyopencl makes Python code for each, under names that it takes for free in two threads at a time
+_kernel_lock = threading.RLock()
 
 
 def define_options(defines: Mapping[str, Define]) -> tuple[str, ...]:
@@ -113,7 +115,7 @@ class Kernel:
         """The driver's kernel object of the calling thread."""
         found = getattr(self._local, "kernel", None)
         if found is None:
-            found = self._local.kernel = opencl().Kernel(self._program, self.name)
+            found = self._local.kernel = _kernel_object(self._program, self.name)
         return found
 
     @property
@@ -144,6 +146,7 @@ class ProgramCache:
         self._device = device
         self._kernels: dict[tuple[Any, ...], Kernel] = {}
         self._programs: dict[tuple[str, tuple[str, ...]], Any] = {}
+        self._locks: dict[tuple[str, tuple[str, ...]], threading.Lock] = {}
         self._base_options = (
             "-cl-std=CL1.2",
             *_rounding_options(device),
@@ -182,9 +185,11 @@ class ProgramCache:
         if kernel is not None:
             return kernel
         options = self._options(defines)
-        with _build_lock:
-            source = sources.expand(path)
-            key = (path, name, options) if isinstance(path, str) else (source, name, options)
+        source = sources.expand(path)
+        key = (path, name, options) if isinstance(path, str) else (source, name, options)
+        # Different programs are compiled side by side. OpenCL has every function thread safe but
+        # the one that sets arguments (1.2, A.2); compilers that are not are locked by their drivers
+        with self._locks.setdefault((source, options), threading.Lock()):
             kernel = self._kernels.get(key)
             if kernel is None:
                 program = self._program(str(path), source, options)
@@ -223,8 +228,18 @@ def _rounding_options(device: Any) -> tuple[str, ...]:
     return ()
 
 
+def _kernel_object(program: Any, name: str) -> Any:
+    cl: Any = opencl()
+    with _kernel_lock:
+        try:
+            return cl.Kernel(program, name)
+        except sqlite3.Error:  # the file in which it keeps that code cannot be used
+            cl._PYOPENCL_NO_CACHE = True
+            return cl.Kernel(program, name)
+
+
 def build(context: Any, device: Any, path: str, source: str, options: tuple[str, ...]) -> Any:
-    """Compile a source, quietly; the compiler's remarks go to the log at level DEBUG.
+    """Compile a source, or take it from the cache; the compiler's remarks go to the log (DEBUG).
 
     Parameters
     ----------
@@ -247,50 +262,98 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
     KernelBuildError
         With the compiler's log, the options and the source.
     """
-    cl = opencl()
-    # pyopencl asks for this without a default where its cache fails; empty, it compiles instead
-    os.environ.setdefault("PYOPENCL_CACHE_FAILURE_FATAL", "")
-    with _build_lock, warnings.catch_warnings(record=True) as remarks:
-        warnings.simplefilter("always")
-        cache = cache_folder()
-        _remove_stale_lock(cache / "lock")
+    # Not Program.build: that warns of all that compilers say, and to silence warnings would silence
+    # those of other threads; and its cache fails where its folder cannot be written
+    cl: Any = opencl()
+    joined = " ".join(options)
+    call = {"options": joined.encode(), "devices": [device]}
+    kept_by_driver = import_module("pyopencl.characterize").has_src_build_cache(device)
+    place = None if kept_by_driver else _place(device, joined, source)
+    binary = _read(place)
+    if binary is not None:
+        with contextlib.suppress(cl.Error):  # made for another processor of that name
+            program = cl._cl._Program(context, [device], [binary])
+            program._build(**call)
+            return cl.Program(program)
+
+    program = cl._cl._Program(context, source)
+    try:
+        with _announced(path, _SLOW if kept_by_driver else 0.0):
+            program._build(**call)
+    except cl.Error as exc:
+        log = _placed(_log(program, device) or str(exc), source)
+        raise KernelBuildError(
+            f"{path} does not compile on {device.platform.name.strip()} / "
+            f"{device.name.strip()} with {joined}:\n{_trimmed(log)}",
+            log=log,
+            options=joined,
+            source=source,
+        ) from exc
+    _logger.debug("%s: %s", path, _log(program, device))
+    _write(place, program)
+    return cl.Program(program)
+
+
+@contextlib.contextmanager
+def _announced(path: str, delay: float) -> Iterator[None]:
+    """Tell that a program is being compiled, if that takes longer than a delay in seconds."""
+    timer = threading.Timer(delay, _announce, [path])
+    timer.daemon = True
+    if delay > 0:
+        timer.start()
+    else:
+        _announce(path)
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _announce(path: str) -> None:
+    number = next(_numbers)
+    level = logging.INFO if number == 1 else logging.DEBUG
+    _logger.log(level, "compiling kernels, program %d of this process: %s", number, path)
+    for tell in tuple(on_compiling):
+        tell()
+
+
+def _place(device: Any, options: str, source: str) -> Path | None:
+    """Return the file of a compiled program in the cache; None where there is none."""
+    if os.environ.get("PYOPENCL_NO_CACHE", "").lower() in ("1", "true", "yes", "on"):
+        return None
+    folder = user_cache()
+    names = ("vendor", "name", "version")
+    driver = [getattr(each, name) for each in (device.platform, device) for name in names]
+    key = repr((driver, device.driver_version, options, source))
+    return folder and folder / "programs" / hashlib.sha256(key.encode()).hexdigest()
+
+
+def _read(place: Path | None) -> bytes | None:
+    if place is None:
+        return None
+    try:
+        content = place.read_bytes()
+    except OSError:
+        return None
+    return content[32:] if hashlib.sha256(content[32:]).digest() == content[:32] else None
+
+
+def _write(place: Path | None, program: Any) -> None:
+    if place is None:
+        return
+    (binary,) = program.get_info(opencl().program_info.BINARIES)
+    with contextlib.suppress(OSError):  # a full disk, say: it is compiled again
+        place.parent.mkdir(exist_ok=True)
+        new = place.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
         try:
-            program = cl.Program(context, source).build(list(options), cache_dir=str(cache))
-        except cl.Error as exc:
-            log = _placed(_compiler_log(str(exc)), source)
-            raise KernelBuildError(
-                f"{path} does not compile on {device.platform.name.strip()} / "
-                f"{device.name.strip()} with {' '.join(options)}:\n{_trimmed(log)}",
-                log=log,
-                options=" ".join(options),
-                source=source,
-            ) from exc
-    for remark in remarks:
-        _logger.debug("%s: %s", path, remark.message)
-    return program
+            new.write_bytes(hashlib.sha256(binary).digest() + binary)
+            new.replace(place)  # whole, or not at all
+        finally:
+            new.unlink(missing_ok=True)
 
 
-def cache_folder() -> Path:
-    """Return where compiled programs are kept, by the system's convention for such folders."""
-    versions = f"pyopencl{opencl().VERSION_TEXT}-py{'.'.join(map(str, sys.version_info[:3]))}"
-    return Path(platformdirs.user_cache_dir("pyvista-vdi", appauthor=False)) / versions
-
-
-def _remove_stale_lock(lock: Path) -> None:
-    """Remove the lock of a process that was killed: everybody else would wait a minute for it."""
-    with contextlib.suppress(OSError):
-        if time.time() - lock.stat().st_mtime > STALE_LOCK:
-            lock.unlink()
-
-
-def _compiler_log(message: str) -> str:
-    """The log inside pyopencl's message, and its copy of the source removed from the disk."""
-    saved = re.search(r"\n\(source saved as (.+)\)\s*$", message)
-    if saved:
-        Path(saved[1]).unlink(missing_ok=True)  # the error carries the source
-        message = message[: saved.start()]
-    message = re.sub(r"\A.*?Build on [^\n]*:\n", "", message, count=1, flags=re.DOTALL)
-    return re.sub(r"\n\(options: .*\)\s*$", "", message)
+def _log(program: Any, device: Any) -> str:
+    return str(program.get_build_info(device, opencl().program_build_info.LOG) or "").strip()
 
 
 def _placed(log: str, source: str) -> str:

@@ -84,6 +84,7 @@ def generate_vdi(
     camera = Camera.from_any(camera)
     width, height = size = check_window_size(window_size)
     require_room(0, size)
+    report(progress, 0.0)  # first: a bar says that kernels are compiled
     runtime = get_runtime(device)
     slices = Slices(runtime, size, options)
     medium = DeviceVolume(runtime, volume, transfer_function, options, room=slices.room(volume))
@@ -94,7 +95,6 @@ def generate_vdi(
         growing_lists(runtime, size, options.max_supersegments, slices.rows * width) as lists,
     ):
         merge, pack = Merge(records, options), Pack(records, lists)
-        report(progress, 0.0)
         for part in slices:
             records.clear()
             for chunk in march.chunks(part):

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIWarning
+from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.volume import Volume
 
@@ -79,12 +78,10 @@ def _warn_of_gaps(files: list[Path]) -> None:
     found = [re.findall(r"\d+", file.stem) for file in files]
     numbers = [int(each[-1]) for each in found if each]
     if len(numbers) == len(files) and len(set(np.diff(numbers))) > 1:
-        warnings.warn(
+        warn_external(
             f"the numbers of the slices in the folder {files[0].parent} are not evenly spaced "
             f"({files[0].name} to {files[-1].name}, {len(files)} files), and are taken as if: are "
-            "some missing?",
-            VDIWarning,
-            stacklevel=4,
+            "some missing?"
         )
 
 

@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import platformdirs
 from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import VDIFileError
 from pyvista_vdi.io.whole_file import whole_file
+from pyvista_vdi.model.user_cache import user_cache
 
 Ranges = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -83,8 +83,8 @@ class RangeFile:
 
     def _places(self) -> Iterator[Path]:
         yield self._store.with_name(self._store.name + ".ranges") / self._name
-        cache = Path(platformdirs.user_cache_dir("pyvista-vdi", appauthor=False)) / "ranges"
-        yield cache / _digest(str(self._store))[:16] / self._name
+        if (cache := user_cache()) is not None:
+            yield cache / "ranges" / _digest(str(self._store))[:16] / self._name
 
     def load(self) -> Ranges | None:
         """Return the ranges, if they are of the chunks as they are now."""

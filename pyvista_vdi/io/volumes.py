@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 from tokenize import TokenError
 from typing import Any
@@ -21,13 +22,13 @@ from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
 _BAD_ARRAY = (ValueError, TypeError, SyntaxError, OverflowError, RecursionError, TokenError)
 
 
-def read_file(file: Path) -> Any:
+def read_file(file: Path, by_pyvista: Callable[[Path], Any] | None = None) -> Any:
     """Read a volume of any format that can be read here, or a folder of slices.
 
     Raw files are those of the Open Scientific Visualization Datasets, whose names tell what they
     hold: ``kingsnake_1024x1024x795_uint8.raw``. NumPy's ``.npy`` holds scalars (nz, ny, nx). These,
     NRRD and folders of TIFF or PNG become a Volume and need no PyVista; others, folders of DICOM
-    among them, become a ``pyvista.ImageData``.
+    among them, become a ``pyvista.ImageData``, by another function where one is given.
     """
     if os.path.isdir(file):  # noqa: PTH112 - pathlib's raises for a name that is too long
         slices = image_stack.slices_in(file)
@@ -42,7 +43,7 @@ def read_file(file: Path) -> Any:
         # By pynrrd: VTK takes the first axis for components in files that do not say what their
         # axes are
         return provider("read_nrrd")(file, "values")
-    return provider("read_by_pyvista")(file)
+    return (by_pyvista or provider("read_by_pyvista"))(file)
 
 
 def _read_raw(file: Path) -> Volume:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import threading
 import uuid
-import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -39,7 +38,7 @@ from pyvista_vdi.errors import (
     NoDeviceError,
     VDIError,
     VDIFileError,
-    VDIWarning,
+    warn_external,
 )
 from pyvista_vdi.generation.generate import Progress, report
 from pyvista_vdi.large.blocks import Indices, Values
@@ -368,11 +367,9 @@ def _workers_with_device(
     if len(without) == len(answers):
         raise NoDeviceError(f"no worker of the cluster has an OpenCL device: {names}")
     if without:
-        warnings.warn(
+        warn_external(
             f"{len(without)} of {len(answers)} workers have no OpenCL device and do nothing: "
-            f"{names}",
-            VDIWarning,
-            stacklevel=4,
+            f"{names}"
         )
     return {at: name for at, name in answers.items() if at not in without}
 

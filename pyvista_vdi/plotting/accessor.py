@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
 import pyvista as pv
@@ -14,7 +15,7 @@ from pyvista_vdi.vtk_pipeline.filters.convert import require_image
 from pyvista_vdi.vtk_pipeline.filters.view import aim
 
 
-@pv.register_dataset_accessor("vdi", pv.DataSet)
+@pv.register_dataset_accessor("vdi", pv.DataSet, override=True)  # of registration._Pending
 class VDIAccessor:
     """Makes VDIs of a data set: ``volume.vdi``.
 
@@ -103,6 +104,7 @@ class VDIAccessor:
         shown = self._dataset
         if isinstance(shown, VDI):
             arguments.setdefault("window_size", [*shown.picture_size])
+        import_module("pyvista.plotting")  # pv.Plotter is missing while another thread does so
         plotter = pv.Plotter(**_taken(arguments, pv.Plotter.__init__))
         showing = _taken(arguments, pv.Plotter.show, "jupyter_kwargs")
         try:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import difflib
 import functools
 import sys
-import warnings
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 import pyvista as pv
+import pyvista.plotting  # whole: pv.LookupTable is missing while another thread imports it
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import (
@@ -19,7 +19,7 @@ from pyvista_vdi.errors import (
     InvalidVolumeError,
     MissingDependencyError,
     VDIError,
-    VDIWarning,
+    warn_external,
 )
 from pyvista_vdi.model.checks import as_float, not_taken
 from pyvista_vdi.model.classification import BLENDINGS
@@ -78,7 +78,7 @@ class Looks:
     def of_rgba(self) -> Looks:
         """Return those of RGBA scalars: opacity is linear over ``clim``, as in ``add_volume``."""
         if not (isinstance(self.opacity, str) and self.opacity == "linear"):
-            warnings.warn("opacity is ignored: RGBA scalars bring theirs", VDIWarning, stacklevel=3)
+            warn_external("opacity is ignored: RGBA scalars bring theirs")
         return replace(self, opacity="linear")
 
     def scalar_range(self, table: pv.LookupTable, volume: Volume) -> tuple[float, float]:
@@ -199,10 +199,8 @@ def note_mapper(mapper: str) -> None:
             f"mapper={mapper!r} is none of VTK's volume mappers, {', '.join(_MAPPERS)}; a VDI has "
             "its own: leave it out"
         )
-    warnings.warn(
-        f"mapper={mapper!r} chooses among VTK's volume mappers and is ignored: a VDI has its own",
-        VDIWarning,
-        stacklevel=3,
+    warn_external(
+        f"mapper={mapper!r} chooses among VTK's volume mappers and is ignored: a VDI has its own"
     )
 
 

@@ -6,6 +6,7 @@ import inspect
 from typing import Any
 
 import pyvista as pv
+import pyvista.plotting  # whole: pv.Plotter is missing while another thread imports it
 
 from pyvista_vdi.plotting.registration import Component
 

@@ -6,7 +6,6 @@ drops where they lie in the patient: pydicom reads slices one by one.
 
 from __future__ import annotations
 
-import warnings
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,7 @@ from pyvista_vdi.errors import (
     InvalidVolumeError,
     MissingDependencyError,
     UnsupportedError,
-    VDIWarning,
+    warn_external,
 )
 from pyvista_vdi.model.host_memory import require_free_memory
 
@@ -74,11 +73,9 @@ def slices_of(folder: Path) -> list[Slice]:
             "them): give the folder that holds the slices themselves"
         )
     if damaged:
-        warnings.warn(
+        warn_external(
             f"{len(damaged)} of {len(files)} files in the folder {folder} are left out, as they "
-            f"are damaged; the first: {damaged[0]}",
-            VDIWarning,
-            stacklevel=5,
+            f"are damaged; the first: {damaged[0]}"
         )
     series = Counter(each.series for each in found)
     if len(series) > 1:
@@ -112,26 +109,24 @@ def read_slice(path: Path) -> Slice | None:
     """
     pydicom = _pydicom()
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of values that break a rule
-            header = pydicom.dcmread(path, stop_before_pixels=True, specific_tags=_WANTED)
-            if "Rows" not in header:  # a directory, a report, a plan ...
-                kind = getattr(header.get("SOPClassUID"), "name", "")
-                if kind.endswith("Image Storage"):
-                    raise EOFError("it ends within its header")
-                return None
-            thickness = _numbers(header, "SliceThickness", ())
-            return Slice(
-                path,
-                str(header.get("SeriesInstanceUID", "")),
-                str(header.get("SeriesDescription", "")),
-                str(header.file_meta.TransferSyntaxUID),
-                _numbers(header, "ImagePositionPatient", (3,)),
-                _numbers(header, "ImageOrientationPatient", (2, 3)),
-                None if thickness is None else float(thickness),
-                _numbers(header, "PixelSpacing", (2,)),
-                int(header.get("InstanceNumber") or 0),
-            )
+        header = pydicom.dcmread(path, stop_before_pixels=True, specific_tags=_WANTED)
+        if "Rows" not in header:  # a directory, a report, a plan ...
+            uid = pydicom.uid.UID(_text(header, "SOPClassUID"), pydicom.config.IGNORE)
+            if uid.name.endswith("Image Storage"):
+                raise EOFError("it ends within its header")
+            return None
+        thickness = _numbers(header, "SliceThickness", ())
+        return Slice(
+            path,
+            _text(header, "SeriesInstanceUID"),
+            _text(header, "SeriesDescription"),
+            _text(header.file_meta, "TransferSyntaxUID"),
+            _numbers(header, "ImagePositionPatient", (3,)),
+            _numbers(header, "ImageOrientationPatient", (2, 3)),
+            None if thickness is None else float(thickness),
+            _numbers(header, "PixelSpacing", (2,)),
+            int(_text(header, "InstanceNumber") or 0),
+        )
     except pydicom.errors.InvalidDicomError:  # it does not begin as one
         return None
     except Exception as error:  # damage shows at whatever pydicom comes to first
@@ -191,10 +186,16 @@ def _values(one: Slice) -> NDArray[Any]:
 
 
 def _numbers(header: Any, name: str, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
-    value = header.get(name)
-    if value is None or value == "":
-        return None
-    return np.array(value, dtype=np.float64).reshape(shape)
+    text = _text(header, name)
+    return np.array(text.split("\\"), dtype=np.float64).reshape(shape) if text else None
+
+
+def _text(header: Any, name: str) -> str:
+    """Return an element as it is in the file: pydicom's values warn where they break a rule."""
+    element = header.get_item(name)
+    value = b"" if element is None else element.value or b""
+    text = value.decode(errors="replace") if isinstance(value, bytes) else str(value)
+    return text.strip(" \0")
 
 
 def _pydicom() -> Any:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from threading import RLock
+from threading import RLock, Timer
 from typing import Any
 
 from tqdm import tqdm
+
+from pyvista_vdi.device.programs import on_compiling
 
 #: Work that takes longer than this gets a bar, seconds.
 PATIENCE = 1.0
@@ -19,6 +21,7 @@ class DelayedBar:
 
     def __init__(self, *, always: bool = False, label: str = "generating a VDI") -> None:
         self._label = label
+        self._doing: str | None = None
         self._disable = False if always else None  # None: tqdm asks whether it is a terminal
         self._bar: Any = None
         self._began = 0.0
@@ -40,11 +43,25 @@ class DelayedBar:
                     leave=False,
                     bar_format="{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}",
                 )
-            if doing is not None:
-                self._bar.set_description_str(f"{self._label}: {doing}", refresh=False)
+                on_compiling.add(self._compiling)
+            self._doing = doing or self._doing
+            self._describe(self._doing)
             self._bar.update(fraction - self._bar.n)
             if fraction >= 1.0:
                 self.close()
+
+    def _describe(self, doing: str | None) -> None:
+        text = f"{self._label}: {doing}" if doing else self._label
+        self._bar.set_description_str(text, refresh=False)
+
+    def _compiling(self) -> None:
+        """Say why nothing goes on: the first use of a kernel may take seconds."""
+        with self._lock:
+            if self._bar is not None:
+                self._describe("compiling kernels")
+        later = Timer(PATIENCE, self.pulse)
+        later.daemon = True
+        later.start()
 
     def pulse(self) -> None:
         """Show the time that has passed, where work does not say how far it is; from any thread."""
@@ -56,8 +73,9 @@ class DelayedBar:
         """Take the bar away."""
         with self._lock:
             if self._bar is not None:
+                on_compiling.discard(self._compiling)
                 self._bar.close()
-                self._bar = None
+                self._bar = self._doing = None
 
 
 def progress_callback(

@@ -1,5 +1,8 @@
 """``add_vdi`` on every class of plotters, as soon as this package and PyVista's plotters are there.
 
+Data sets get ``vdi`` in the same way: where several threads ask for what an entry point names,
+PyVista gives it to one and an error to others.
+
 Besides, ``export_html`` of a plotter with VDIs writes a page that shows them; of others it is
 PyVista's own.
 
@@ -13,7 +16,6 @@ from __future__ import annotations
 
 import functools
 import importlib
-import importlib.util
 import sys
 import weakref
 from collections.abc import Sequence
@@ -27,11 +29,13 @@ from pyvista_vdi.model.providers import provider
 
 _PLOTTERS = "pyvista.plotting"
 
-#: What plotters get, and the modules that register it, as the entry points in ``pyproject.toml``.
+#: What plotters and data sets get, and the modules that register it, as the entry points in
+#: ``pyproject.toml``.
 COMPONENTS = {
     "add_vdi": "pyvista_vdi.plotting.component",
     "add_vdi_clip_plane": "pyvista_vdi.plotting.clip_plane",
 }
+ACCESSORS = {"vdi": "pyvista_vdi.plotting.accessor"}
 
 
 class Component:
@@ -55,17 +59,18 @@ class Component:
 
 
 class _Pending:
-    """A component whose module is imported when it is first asked for; that takes its place."""
+    """What registers itself in this place, when its module is imported: once it is asked for."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, home: str) -> None:
         self._name = name
+        self._home = home
 
-    def __get__(self, plotter: Any, kind: Any) -> Any:
+    def __get__(self, thing: Any, kind: Any) -> Any:
+        importlib.import_module(self._home)  # other threads wait here
         for owner in kind.__mro__:
-            if vars(owner).get(self._name) is self:
+            if vars(owner).get(self._name) is self:  # put back by PyVista: it was unregistered
                 delattr(owner, self._name)
-        importlib.import_module(COMPONENTS[self._name])
-        return getattr(kind if plotter is None else plotter, self._name)
+        return getattr(kind if thing is None else thing, self._name)
 
 
 class _Watch(MetaPathFinder):
@@ -77,8 +82,10 @@ class _Watch(MetaPathFinder):
         """Find nothing of its own, and have the plotters' module offer what there is."""
         if name != _PLOTTERS:
             return None
-        sys.meta_path.remove(self)
-        spec = importlib.util.find_spec(name)
+        # It stays in the list: other threads may be walking it, and would miss the next finder
+        others = (each for each in sys.meta_path if each is not self)
+        found = (each.find_spec(name, path, target) for each in others)
+        spec = next((each for each in found if each is not None), None)
         loader: Any = None if spec is None else spec.loader
         if loader is not None:
             execute = loader.exec_module
@@ -95,9 +102,11 @@ def _offer(plotters: ModuleType) -> None:
     base = getattr(plotters, "BasePlotter", None)
     if base is None:  # it is being imported, by somebody else
         return
-    for name, home in COMPONENTS.items():
-        if home not in sys.modules:
-            setattr(base, name, _Pending(name))
+    data_set = importlib.import_module("pyvista.core.dataset").DataSet
+    for kind, offered in ((base, COMPONENTS), (data_set, ACCESSORS)):
+        for name, home in offered.items():
+            if home not in sys.modules:
+                setattr(kind, name, _Pending(name, home))
     if hasattr(base, "export_html"):
         base.export_html = _with_vdis(base.export_html)
 
@@ -126,8 +135,7 @@ def _shows_vdis(plotter: Any) -> bool:
 
 def install() -> None:
     """Offer it now, or once PyVista's plotters are imported; import nothing."""
-    plotters = sys.modules.get(_PLOTTERS)
-    if plotters is None:
-        sys.meta_path.insert(0, _Watch())
+    if _PLOTTERS in sys.modules:
+        _offer(importlib.import_module(_PLOTTERS))  # which waits where another thread imports it
     else:
-        _offer(plotters)
+        sys.meta_path.insert(0, _Watch())

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
-import logging
 import os
 import re
-import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +11,13 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIError, VDIWarning
+from pyvista_vdi.errors import (
+    InvalidVolumeError,
+    UnsupportedError,
+    VDIError,
+    warn_external,
+    with_article,
+)
 from pyvista_vdi.plotting.dicom import Slice, read_slice, require_uncompressed, slices_of, values_of
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
 from pyvista_vdi.vtk_pipeline.vtk import (
@@ -68,16 +70,15 @@ def read_volume(path: str | os.PathLike[str]) -> pv.ImageData:
         elif name.endswith((".mha", ".mhd")):
             data = _meta_image(file)
         else:
-            with _silence():
-                data = pv.read(file)
+            data = _by_pyvista(file)
     except VDIError:
         raise
     except Exception as error:  # each format has readers, and exceptions, of its own
         raise InvalidVolumeError(f"{file} cannot be read as a volume: {error}") from error
     if not isinstance(data, pv.ImageData):
         raise UnsupportedError(
-            f"{file} holds a {type(data).__name__}, not a uniform grid: resample it to a "
-            "pyvista.ImageData first"
+            f"{file} holds {with_article(type(data).__name__)}, not a uniform grid: resample "
+            "it to a pyvista.ImageData first"
         )
     if is_vdi_image(data):
         raise InvalidVolumeError(
@@ -89,21 +90,21 @@ def read_volume(path: str | os.PathLike[str]) -> pv.ImageData:
     return data
 
 
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    """Make an error of what PyVista's readers log or warn of."""
-    before = logging.root.manager.disable
-    logging.disable(logging.ERROR)
+def _by_pyvista(file: Path) -> Any:
+    """Read by PyVista, and raise what VTK's reader would only print."""
     try:
-        with pv.vtk_verbosity("off"), warnings.catch_warnings():
-            warnings.filterwarnings("error", "The VTK reader .* raised an error", UserWarning)
-            yield
-    finally:
-        logging.disable(before)
+        reader = pv.get_reader(file)
+    except ValueError:  # formats that are not VTK's
+        return pv.read(file)
+    messages = _messages_of(reader.reader)
+    data = reader.read()
+    if messages:
+        raise _refusal(messages[0], file)
+    return data
 
 
-def _read_whole(reader: Any, file: Path) -> pv.ImageData:
-    """Read by a reader of VTK, and raise what it would only print."""
+def _messages_of(reader: Any) -> list[str]:
+    """Return a list that gets the errors of a reader of VTK, in place of the terminal."""
     messages: list[str] = []
 
     def note(_reader: Any, _event: str, message: str) -> None:
@@ -116,10 +117,20 @@ def _read_whole(reader: Any, file: Path) -> pv.ImageData:
     for source in (reader, reader.GetExecutive()):
         source.AddObserver("ErrorEvent", note)
         source.AddObserver("WarningEvent", pass_over)
+    return messages
+
+
+def _refusal(message: str, file: Path) -> InvalidVolumeError:
+    why = message.split("): ", 1)[-1].strip()
+    return InvalidVolumeError(f"{file} cannot be read as a volume: {why}")
+
+
+def _read_whole(reader: Any, file: Path) -> pv.ImageData:
+    """Read by a reader of VTK, and raise what it would only print."""
+    messages = _messages_of(reader)
     reader.Update()
     if messages or reader.GetErrorCode():
-        why = messages[0].split("): ", 1)[-1].strip() if messages else _code(reader)
-        raise InvalidVolumeError(f"{file} cannot be read as a volume: {why}")
+        raise _refusal(messages[0] if messages else _code(reader), file)
     data = pv.wrap(reader.GetOutput())
     if data.n_points == 0 or data.active_scalars is None:
         raise InvalidVolumeError(f"{file} holds no scalars that VTK could read")
@@ -231,12 +242,10 @@ def _dicom_series(folder: Path) -> pv.ImageData:
     if any(p is None for p in positions) or any(o is None for o in orientations):
         data = _stacked(slices)
         apart = slices[0].thickness or data.spacing[0]
-        warnings.warn(
+        warn_external(
             f"slices in the folder {folder} do not say where they lie or how they are turned: rows "
             f"are taken to run along y, slices along z, {apart:g} apart, in an order that may be "
-            "the wrong one",
-            VDIWarning,
-            stacklevel=4,
+            "the wrong one"
         )
         data.spacing = (*data.spacing[:2], apart)
         return data
@@ -255,11 +264,9 @@ def _dicom_series(folder: Path) -> pv.ImageData:
             "times or echoes do: put those of one into a folder of their own"
         )
     if np.ptp(gaps) > _EVEN * gaps.mean():
-        warnings.warn(
+        warn_external(
             f"slices in the folder {folder} are {gaps.min():g} to {gaps.max():g} apart, and are "
-            f"taken as {gaps.mean():g} apart: some are missing, or resample them",
-            VDIWarning,
-            stacklevel=4,
+            f"taken as {gaps.mean():g} apart: some are missing, or resample them"
         )
     data = _stacked([slices[i] for i in np.argsort(-places)])
     n_rows = data.dimensions[1]

@@ -9,7 +9,6 @@ docs/dial.md says how, and how well that predicts.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
+from pyvista_vdi.errors import InvalidArgumentError, warn_external
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.options import GenerationOptions
 
@@ -313,10 +312,10 @@ def describe(metadata: dict[str, Any]) -> str | None:
         return None
 
 
-def warn_missed(vdi: VDI, *, stacklevel: int) -> None:
+def warn_missed(vdi: VDI) -> None:
     """Give a VDIWarning for what the dial of a VDI could not reach."""
     for missed in vdi.metadata.get("dial", {}).get("missed", ()):
-        warnings.warn(missed, VDIWarning, stacklevel=stacklevel + 1)
+        warn_external(missed)
 
 
 def chosen(

@@ -62,7 +62,8 @@ class Worker:
         self._thread: threading.Thread | None = None
         self._made: Any = None
         self._error: BaseException | None = None
-        _workers.add(self)
+        with _workers_lock:
+            _workers.add(self)
 
     @property
     def running(self) -> bool:
@@ -144,12 +145,14 @@ class Worker:
 
 
 _workers: weakref.WeakSet[Worker] = weakref.WeakSet()
+_workers_lock = threading.Lock()  # a set that grows cannot be walked
 
 
 @atexit.register
 def _end_all() -> None:
     """End every thread before drivers are unloaded."""
-    workers = list(_workers)
+    with _workers_lock:
+        workers = list(_workers)
     for worker in workers:
         worker.close()
     for worker in workers:

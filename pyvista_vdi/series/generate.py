@@ -105,7 +105,7 @@ def generate_series(
         if known_times is not None and len(vdis) == len(known_times):
             raise InvalidArgumentError(f"there are more steps than the {len(vdis)} times")
         vdis.append(make(volume, _part(progress, len(vdis), total)))
-        warn_missed(vdis[-1], stacklevel=2)
+        warn_missed(vdis[-1])
     again: Sequence[Volume] | None = None
     if isinstance(steps, Sized) and hasattr(steps, "__getitem__"):
         again = Called(lambda i: make.volume(steps[i]), range(len(vdis)))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import math
 import os
-import warnings
 import weakref
 import zlib
 from bisect import bisect_left
@@ -29,7 +28,7 @@ from pyvista_vdi.errors import (
     KernelBuildError,
     VDIError,
     VDIFileError,
-    VDIWarning,
+    warn_external,
 )
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import reader as vdi_reader
@@ -346,11 +345,9 @@ class StepsReader(Sequence[VDI]):
         numbers = [header.number for _, header in frames]
         lost = sorted(set(range(numbers[-1] + 1)) - set(numbers)) if numbers else []
         if lost:
-            warnings.warn(
+            warn_external(
                 f"{self._path} is damaged: {self._PART}s {', '.join(map(str, lost))} cannot be "
-                f"found, {len(frames)} others are read; {_REMEDY}",
-                VDIWarning,
-                stacklevel=4,
+                f"found, {len(frames)} others are read; {_REMEDY}"
             )
         return frames
 

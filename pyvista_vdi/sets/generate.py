@@ -6,7 +6,6 @@ import dataclasses
 import io
 import logging
 import math
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError, VDIWarning
+from pyvista_vdi.errors import Cancelled, InvalidArgumentError, warn_external
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float
@@ -482,12 +481,10 @@ class _Placing:
         least = float(ssim.min())
         missed = int((ssim < self._goal).sum())
         if missed:
-            warnings.warn(
+            warn_external(
                 f"target_ssim={self._goal:g} is not reached in {missed} of {len(ssim)} directions: "
                 f"{least:.4f} is the worst; allow more bytes or views, more or "
-                "longer lists, or ask for less",
-                VDIWarning,
-                stacklevel=4,
+                "longer lists, or ask for less"
             )
         return {
             "target_ssim": self._goal,

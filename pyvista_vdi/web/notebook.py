@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import html
 import sys
-import warnings
 from collections.abc import Collection
 from typing import Any
 
-from pyvista_vdi.errors import MissingDependencyError
+from pyvista_vdi.errors import MissingDependencyError, warn_external
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.web.still import still
 
@@ -73,7 +72,7 @@ def show_plotter(plotter: Any, *, screenshot: Any = None, **options: Any) -> Any
     try:
         from pyvista_vdi.web.plotter_widget import PlotterWidget
     except MissingDependencyError as error:
-        warnings.warn(str(error), stacklevel=2)
+        warn_external(str(error))
         return _shown_by_pyvista(plotter, screenshot, options)
     from pyvista_vdi.web.scenes.export import around
     from pyvista_vdi.web.scenes.scene import scene_of
@@ -81,10 +80,9 @@ def show_plotter(plotter: Any, *, screenshot: Any = None, **options: Any) -> Any
     scene = scene_of(renderer, renderer.actors, camera=False)
     without = [*scene.left_out, *around(plotter)]
     if without:
-        warnings.warn(
+        warn_external(
             f"the notebook's viewer shows the scene without {', '.join(without)}: see all by "
-            'jupyter_backend="server"',
-            stacklevel=2,
+            'jupyter_backend="server"'
         )
     return PlotterWidget(plotter, scene, plotter.screenshot(screenshot, return_img=True))
 

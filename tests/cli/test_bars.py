@@ -17,6 +17,7 @@ from virtual_screen import virtual_screen
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
 from pyvista_vdi.cli import inputs
+from pyvista_vdi.device import programs
 from pyvista_vdi.errors import Cancelled
 from pyvista_vdi.plotting import progress
 
@@ -145,3 +146,20 @@ def test_view_takes_a_display_that_is_there():
             check=False,
         )
     assert (result.returncode, result.stdout) == (0, "None\n"), result.stderr
+
+
+def test_a_bar_says_that_kernels_are_compiled_while_they_are(capsys, monkeypatch):
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    monkeypatch.setattr(programs, "on_compiling", set())
+    monkeypatch.setattr(progress, "on_compiling", programs.on_compiling)
+    bar = progress.DelayedBar(always=True)
+    bar(0.0)
+    for tell in tuple(programs.on_compiling):
+        tell()
+    bar.pulse()
+    assert "generating a VDI: compiling kernels:   0%" in capsys.readouterr().err
+    bar(0.5)
+    bar.pulse()
+    assert "generating a VDI:  50%" in capsys.readouterr().err.split("\r")[-1]
+    bar(1.0)
+    assert not programs.on_compiling

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import re
+import sys
 import threading
-import time
 from concurrent.futures import ThreadPoolExecutor
 from importlib import resources
 
@@ -339,21 +338,70 @@ def new_kernel(tmp_path):
     return path
 
 
-def test_a_lock_that_a_killed_process_left_does_not_hold_up_builds(
+def test_different_programs_are_compiled_side_by_side_and_each_once(
+    runtime, new_kernel, monkeypatch
+):
+    """Two compilations wait for each other; four threads ask for each of the two programs."""
+    built, both, build = [], threading.Barrier(2, timeout=60), programs.build
+
+    def slow(*arguments):
+        built.append(arguments[-1])
+        both.wait()
+        return build(*arguments)
+
+    monkeypatch.setattr(programs, "build", slow)
+    with ThreadPoolExecutor(8) as pool:
+        kernels = list(
+            pool.map(lambda i: runtime.kernel(new_kernel, "twice", {"N": i % 2}), range(8))
+        )
+    assert len(built) == 2
+    assert len(set(kernels[::2])) == len(set(kernels[1::2])) == 1
+
+
+def test_compiled_programs_are_kept_and_what_is_damaged_is_compiled_again(
     runtime, new_kernel, tmp_path, monkeypatch, caplog
 ):
-    monkeypatch.setattr(programs, "cache_folder", lambda: tmp_path)
-    lock = tmp_path / "lock"
-    lock.touch()
-    killed = time.time() - 2 * programs.STALE_LOCK
-    os.utime(lock, (killed, killed))
-    with caplog.at_level("DEBUG", "pyvista_vdi"):
-        runtime.kernel(new_kernel, "twice")
-    assert not lock.exists()
-    assert "cache lock" not in caplog.text  # of pyopencl, when it has waited ten seconds
+    """What is told: the first compilation of a process at level INFO, others at DEBUG."""
+    monkeypatch.setattr(programs, "user_cache", lambda: tmp_path)
+    caplog.set_level("DEBUG", "pyvista_vdi.device.programs")
+    told = []
+    monkeypatch.setattr(programs, "on_compiling", {lambda: told.append(len(told))})
+    if runtime.info.platform == "Portable Computing Language":
+        pytest.skip("PoCL keeps compiled programs itself")
+
+    def compiled():
+        before = len(told)
+        fresh_runtime(runtime).kernel(new_kernel, "twice")
+        return len(told) - before
+
+    assert compiled() == 1
+    assert "compiling kernels, program" in caplog.text
+    (kept,) = (tmp_path / "programs").iterdir()
+    assert compiled() == 0
+    kept.write_bytes(kept.read_bytes()[:-1])
+    assert compiled() == 1
+    assert compiled() == 0
+    kept.unlink()
+    kept.mkdir()  # which cannot be replaced by a file
+    assert compiled() == 1
+    assert list((tmp_path / "programs").iterdir()) == [kept]
+    kept.rmdir()
+    monkeypatch.setenv("PYOPENCL_NO_CACHE", "1")
+    assert [compiled(), compiled()] == [1, 1]
 
 
 def test_kernels_are_built_where_nothing_can_be_cached(runtime, new_kernel, monkeypatch):
     # A folder cannot be made below a file
-    monkeypatch.setattr(programs, "cache_folder", lambda: new_kernel / "folder")
+    monkeypatch.setattr(programs, "user_cache", lambda: new_kernel / "folder")
     assert runtime.kernel(new_kernel, "twice").argument_count == 1
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="folders and variables of Linux")
+def test_a_device_is_there_without_a_home(runtime, tmp_path):
+    """PoCL has none where its cache cannot be written."""
+    code = f"from pyvista_vdi.device import get_runtime\nget_runtime({runtime.info.selector!r})"
+    nowhere = {"HOME": "/proc", "XDG_CACHE_HOME": "/proc/cache", "TMPDIR": str(tmp_path)}
+    done = run_python(code, **nowhere)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("\n") == 1
+    assert "cannot be written" in done.stderr

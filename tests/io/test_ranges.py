@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
 
 import numpy as np
 import platformdirs
@@ -99,9 +100,10 @@ def test_in_the_cache_where_the_store_s_folder_cannot_be_written(store, tmp_path
     assert_same(pvdi.open_volume(store).array.ranges(), VALUES)
 
 
-def test_in_memory_where_neither_can(store, tmp_path):
+def test_in_memory_where_neither_can(store, tmp_path, monkeypatch):
     store.with_name(store.name + ".ranges").touch()
     (tmp_path / "cache").touch()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "cache"))  # nor among temporary files
     volume = pvdi.open_volume(store)
     volume.finite_range()
     assert_same(volume.array.ranges(), VALUES)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import struct
-import warnings
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any, NoReturn
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi._version import __version__
-from pyvista_vdi.errors import InvalidCameraError, VDIError, VDIFileError, VDIWarning
+from pyvista_vdi.errors import InvalidCameraError, VDIError, VDIFileError, warn_external
 from pyvista_vdi.io.deep_exr.corrections import (
     COLOR_BITS,
     DEPTH_BITS,
@@ -341,11 +340,9 @@ class _File:
             what = ("the number of samples",)
         elif set(what) & set(STANDARD):
             what = tuple(name for name in what if name in STANDARD)
-        warnings.warn(
+        warn_external(
             f"{self._path} was changed after pyvista-vdi wrote it ({', '.join(what)}): its "
-            "standard channels are read, as those of any program's files",
-            VDIWarning,
-            stacklevel=5,
+            "standard channels are read, as those of any program's files"
         )
 
     def _exact_vdi(self, record: Record) -> VDI:

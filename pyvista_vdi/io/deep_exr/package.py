@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import MissingDependencyError, VDIFileError, VDIWarning
+from pyvista_vdi.errors import MissingDependencyError, VDIFileError, warn_external
 from pyvista_vdi.io.deep_exr.layout import DeepImage
 from pyvista_vdi.model.camera import MAX_WINDOW_EDGE
 
@@ -65,11 +64,9 @@ def read_by_package(path: Path, wanted: set[str], form: str) -> DeepImage:
             "deep scan line image with ZIPS compression"
         ) from error
     if others:
-        warnings.warn(
+        warn_external(
             f"{path} has {1 + len(others)} deep parts, of which the first is read, part {index}: "
-            f"take another out by oiiotool in.exr --subimage {others[0]} -o out.exr",
-            VDIWarning,
-            stacklevel=6,
+            f"take another out by oiiotool in.exr --subimage {others[0]} -o out.exr"
         )
     return image
 

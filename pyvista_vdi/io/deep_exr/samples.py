@@ -7,13 +7,12 @@ add theirs.
 
 from __future__ import annotations
 
-import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, VDIWarning
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, warn_external
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.compositing import optical_depth as optical_depth_of
@@ -143,11 +142,9 @@ def _warn_of_colors(of_nothing: Any, straight: Any, name: str) -> None:
     outside = (straight < -_COLOR_ROUNDING) | (straight > 1 + _COLOR_ROUNDING)
     n_clamped, n_lost = int(outside.any(axis=1).sum()), int((of_nothing != 0).any(axis=1).sum())
     if n_clamped or n_lost:
-        warnings.warn(
+        warn_external(
             f"{name}: a VDI's colours lie between 0 and 1; those of {n_clamped} samples were "
-            f"clamped, and {n_lost} samples that shine without opacity were left out",
-            VDIWarning,
-            stacklevel=2,
+            f"clamped, and {n_lost} samples that shine without opacity were left out"
         )
 
 

@@ -16,6 +16,7 @@ from pyvista_vdi.errors import (
     InvalidVolumeTypeError,
     UnknownArrayError,
     UnsupportedError,
+    with_article,
 )
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
@@ -90,7 +91,7 @@ def require_image_port(port: Any) -> None:
 
 
 def _refusal(kind: type) -> UnsupportedError:
-    named = f"a {kind.__name__} is not a uniform grid"
+    named = f"{with_article(kind.__name__)} is not a uniform grid"
     for name, remedy in _REMEDIES.items():
         if issubclass(kind, getattr(vtkCommonDataModel, name)):
             return UnsupportedError(f"{named}, which is all that a VDI is made from: {remedy}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 import weakref
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -15,7 +14,7 @@ from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVolumeError,
     VDIError,
-    VDIWarning,
+    warn_external,
 )
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
@@ -249,7 +248,7 @@ class VDISource(SourceSettings):
         if self._vdi is None or self._request is None or request.key != self._request.key:
             self._vdi = self._generate(request)
             self._request = request
-            warn_missed(self._vdi, stacklevel=2)
+            warn_missed(self._vdi)
         vtkImageData.GetData(outputs, 0).ShallowCopy(vdi_to_image(self._vdi))
         # A dial has chosen it only now, and a volume's bounds may change with time
         announce(outputs, self._vdi.window_size)
@@ -331,12 +330,10 @@ class VDISource(SourceSettings):
             if wide is not None:
                 return wide
             if warn:
-                warnings.warn(
+                warn_external(
                     "coverage='bounds' needs the eye outside the volume, with all of it in "
                     "front: the VDI covers the current view only (coverage='view'); move the "
-                    "camera back and regenerate for the whole volume",
-                    VDIWarning,
-                    stacklevel=2,
+                    "camera back and regenerate for the whole volume"
                 )
         return camera, window_size
 

@@ -9,6 +9,7 @@ version of it keeps other names, nobody seems to.
 from __future__ import annotations
 
 import sys
+import threading
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -26,11 +27,15 @@ class Follower(Protocol):
 
 
 _followers: weakref.WeakSet[Follower] = weakref.WeakSet()
+_lock = (
+    threading.Lock()
+)  # windows are drawn in other threads, and a set that grows cannot be walked
 
 
 def follow(follower: Follower) -> None:
     """Keep, weakly, what follows a window."""
-    _followers.add(follower)
+    with _lock:
+        _followers.add(follower)
 
 
 def watches(window: Any) -> bool:
@@ -82,7 +87,9 @@ def _mode_changed(begun: Any, view: Any, /, **_: Any) -> None:
 
 
 def _following(window: Any) -> list[Follower]:
-    return [follower for follower in _followers if follower.window is window]
+    with _lock:
+        followers = list(_followers)
+    return [follower for follower in followers if follower.window is window]
 
 
 def _helpers() -> list[Any]:

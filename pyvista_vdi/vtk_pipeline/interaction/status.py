@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import logging
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
+from pyvista_vdi.errors import InvalidArgumentError, VDIWarning, warn_external
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.dial import describe
 from pyvista_vdi.quality.ways import Way
@@ -190,7 +189,7 @@ class Warnings:
             return
         self._said.add(cause or message)
         try:
-            warnings.warn(message, VDIWarning, stacklevel=3)
+            warn_external(message)
         except VDIWarning:  # warnings are errors: the log is what is left
             _log.error(message)
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import io
 import os
-import warnings
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi.errors import VDIWarning
+from pyvista_vdi.errors import warn_external
 from pyvista_vdi.io.whole_file import whole_file
 from pyvista_vdi.web.page import View, assembled
 from pyvista_vdi.web.scenes.scene import css, scene_of
@@ -60,7 +59,7 @@ def export_html(plotter: Any, filename: str | os.PathLike[str] | None) -> io.Str
         views.append(view)
     if left_out:
         words = ", ".join(dict.fromkeys(left_out))
-        warnings.warn(f"the page shows the scene without {words}", VDIWarning, stacklevel=3)
+        warn_external(f"the page shows the scene without {words}")
     target = None if filename is None else Path(filename).with_suffix(".html")
     views.sort(key=lambda view: view.vdi is None)  # the first can be read again
     page = assembled(views, title=plotter.title if target is None else target.stem)
