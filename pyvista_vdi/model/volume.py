@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.errors import InvalidVolumeError, VDIWarning
+from pyvista_vdi.errors import InvalidVolumeError, warn_external
 from pyvista_vdi.model.checks import as_floats
 from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
 from pyvista_vdi.model.grid import Geometry
@@ -118,13 +117,11 @@ class Volume(Geometry):
         worst = int(np.argmax(rounded / self.spacing))
         rounding, step = rounded[worst], self.spacing[worst]
         if rounding * _PLACES_IN_A_STEP > step:
-            warnings.warn(
+            warn_external(
                 f"the volume {self.name!r} is {farthest.max():.3g} model units from the origin, "
                 f"where float64 places points to {rounding:.2g}, and its voxels are {step:.2g} "
                 "apart: pictures are off by that share of a voxel; move its origin, and the "
-                "camera with it, towards 0",
-                VDIWarning,
-                stacklevel=3,
+                "camera with it, towards 0"
             )
 
     def load(self) -> Volume:

@@ -151,7 +151,7 @@ def test_user_matrix_name_pickable_and_culling(plotter):
 
 
 def test_the_view_is_that_of_the_first_frame_and_kept_while_nothing_changes(plotter, calls):
-    actor = plotter.add_vdi(soft_ball(), coverage="view", **LOOKS)
+    actor = plotter.add_vdi(soft_ball(), coverage="view", draw="vdi", **LOOKS)
     assert actor.vdi is None
     plotter.camera_position = view(9, 1, 1)
     shown(plotter)
@@ -175,7 +175,7 @@ def test_the_view_is_that_of_the_first_frame_and_kept_while_nothing_changes(plot
 
 
 def test_moving_opaque_geometry_is_seen_without_moving_the_camera(plotter, calls):
-    plotter.add_vdi(soft_ball(), **LOOKS)
+    plotter.add_vdi(soft_ball(), draw="vdi", **LOOKS)
     sphere = plotter.add_mesh(pv.Sphere(radius=0.4), color="w", reset_camera=False)
     first = shown(plotter)
     for _ in range(3):  # images are freed and made anew: none may be taken for another
@@ -215,7 +215,7 @@ def test_covered_bounds_show_no_cut_edge_when_panned(plotter):
 
 def test_changed_property_and_data_generate_anew(plotter, calls):
     volume = soft_ball()
-    actor = plotter.add_vdi(volume, **LOOKS)
+    actor = plotter.add_vdi(volume, draw="vdi", **LOOKS)
     before = shown(plotter)
     actor.mapper.lookup_table.cmap = "inferno"
     after = shown(plotter)
@@ -236,7 +236,7 @@ def test_changed_property_and_data_generate_anew(plotter, calls):
 def test_what_has_changed_is_made_anew_from_the_frame_s_view(plotter, calls):
     """Off-screen as on it; a view that somebody chose, and ``regenerate="never"``, keep theirs."""
     volume = soft_ball()
-    actor = plotter.add_vdi(volume, coverage="view", **LOOKS)
+    actor = plotter.add_vdi(volume, coverage="view", draw="vdi", **LOOKS)
     shown(plotter)
     plotter.camera_position = view(0, 9, 1)
     plotter.render()
@@ -356,7 +356,7 @@ def test_progress_reaches_a_callable_that_can_stop_the_work(plotter):
         fractions.append(fraction)
         return False
 
-    actor = plotter.add_vdi(soft_ball(), progress_bar=stop, **LOOKS)
+    actor = plotter.add_vdi(soft_ball(), progress_bar=stop, draw="vdi", **LOOKS)
     with pytest.warns(VDIWarning, match="cannot be drawn: Cancelled") as said:
         shown(plotter)  # three frames
     assert len(said) == 1
@@ -372,7 +372,7 @@ def test_interrupt_leaves_a_usable_plotter(plotter):
     def interrupt(fraction):
         signal.raise_signal(signal.SIGINT)
 
-    actor = plotter.add_vdi(soft_ball(), progress_bar=interrupt, **LOOKS)
+    actor = plotter.add_vdi(soft_ball(), progress_bar=interrupt, draw="vdi", **LOOKS)
     with pytest.warns(VDIWarning, match="interrupted.*actor.regenerate"):
         shown(plotter)
     with pytest.raises(KeyboardInterrupt):

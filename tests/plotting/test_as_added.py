@@ -172,7 +172,7 @@ PROPERTIES = {
 @pytest.mark.every(3)
 @pytest.mark.parametrize("change", PROPERTIES.values(), ids=PROPERTIES)
 def test_a_copy_s_properties_are_its_own(plotter, change):
-    actor = plotter.add_vdi(ramp(), **LOOKS)
+    actor = plotter.add_vdi(ramp(), draw="vdi", **LOOKS)
     actor.mapper.SetMaximumImageSampleDistance(8.0)
     actor.mapper.SetAutomaticView(False)
     actor.mapper.GetSource().SetCamera(plotter.camera)

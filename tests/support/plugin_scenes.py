@@ -62,6 +62,7 @@ def add_judge(
 def add_ours(plotter: pv.Plotter, volume: pv.ImageData, **more: Any) -> Any:
     """``add_vdi`` with the same looks."""
     how = {"interpolation": "linear", "sample_distance": 0.02, "max_supersegments": 64}
+    how["draw"] = "vdi"  # what is tested here; tests/drop_in has both
     return plotter.add_vdi(volume, **{**how, **LOOKS, **more})
 
 
