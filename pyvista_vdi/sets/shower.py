@@ -115,6 +115,18 @@ class SetShower:
 
         self._grower.put(Job(make, self.device))
 
+    def grow_now(self) -> None:
+        """Add a VDI of the view to the set, made first, if its picture misses the target."""
+        view = self._view
+        if view == self._grown_for or not self.vdi_set.can_grow:
+            return
+        self._grown_for = view
+        vdi = self.vdi_set.lacking(view)
+        if vdi is not None:
+            self.vdi_set.add(vdi)
+            self._keep(len(self.vdi_set) - 1, vdi)
+            self._weights = self.vdi_set.weights(view)
+
     def stop_growing(self) -> None:
         """Give up what is being made: the view turns."""
         if self._grower.running:

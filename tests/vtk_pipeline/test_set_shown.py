@@ -155,6 +155,16 @@ def test_it_grows_where_the_picture_misses_the_target(plotter, made, once):
     assert len(once) <= n
 
 
+def test_off_screen_it_grows_in_the_picture_that_misses_the_target(plotter, made, once):
+    made._maker, n = Hungry(once._maker), len(made)
+    plotter.add_vdi(made, show_scalar_bar=False)
+    plotter.show(auto_close=False)
+    assert (len(made), threads(GROWTH)) == (n + 1, [])
+    assert made.nearest(plotter.camera) == n
+    plotter.render()
+    assert len(made) == n + 1  # once for a view
+
+
 def test_it_does_not_grow_where_the_target_is_reached_or_nothing_is_to_be_made(plotter, made, once):
     view, n = made.cameras[0], len(made)
     assert made.lacking(view) is None or made._maker.maker.ssim([(made[0], 1.0)], view) < 0.8

@@ -326,8 +326,11 @@ class Upkeep:
         shower.look(frame.view.camera)
         if self._interaction.moving(window):
             shower.stop_growing()
-        elif self._interaction.asynchronous(window) and self.regeneration.policy == "auto":
-            shower.grow()
+        elif self.regeneration.policy == "auto":
+            if self._interaction.asynchronous(window):
+                shower.grow()
+            elif self.draw == "auto":
+                shower.grow_now()
 
     def tick(self, window: Any) -> None:
         """Have the event loop look at what goes on, if something does and no hand moves."""
