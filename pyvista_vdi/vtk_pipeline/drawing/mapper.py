@@ -8,6 +8,7 @@ and the fragment shader that ``VDIActor`` installs looks it up.
 
 from __future__ import annotations
 
+import gc
 from functools import partial
 from typing import Any, NoReturn
 
@@ -31,7 +32,22 @@ from pyvista_vdi.vtk_pipeline.interaction.window_clock import (
     checked_image_distance,
     checked_rate,
 )
-from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper
+from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper, vtkWeakReference
+
+#: Painters, with their mappers held weakly. VTK's garbage collector deletes a mapper under a lock;
+#: Python code that ran then, such as callbacks of weak references to what a painter holds, would
+#: let another thread take the interpreter and wait for that lock. So a painter outlives its mapper
+#: until ordinary code, or Python's garbage collector, finds it here.
+_painters: dict[int, tuple[vtkWeakReference, Painter]] = {}
+
+
+def _let_go_of_painters(*_: Any) -> None:
+    for key, (mapper, _painter) in list(_painters.items()):
+        if mapper.Get() is None:
+            _painters.pop(key, None)
+
+
+gc.callbacks.append(_let_go_of_painters)
 
 #: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.
 COARSEST = 4.0
@@ -55,7 +71,10 @@ class VDIMapperMethods(ArrayChoiceMethods):
 
     def _become_vdi_mapper(self: Any) -> None:
         """Install proxy and observers; to be called once, from ``__init__``."""
-        self._painter, self._far_box = Painter(), FarBox()
+        self._painter, self._far_box, weak = Painter(), FarBox(), vtkWeakReference()
+        weak.Set(self)
+        _let_go_of_painters()
+        _painters[id(self._painter)] = weak, self._painter
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)

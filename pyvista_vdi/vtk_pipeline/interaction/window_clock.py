@@ -47,7 +47,8 @@ _OTHER_LISTS: dict[Cost, tuple[Cost, float]] = {
 #: Cameras remembered per window; more than any scene has viewports that are turned in turn.
 _KNOWN_CAMERAS = 16
 
-_clocks: weakref.WeakValueDictionary[str, WindowClock] = weakref.WeakValueDictionary()
+#: By the windows' addresses; without callbacks, as ``drawing.mapper._painters`` explains.
+_clocks: dict[str, weakref.ref[WindowClock]] = {}
 
 
 def checked_rate(name: str, value: Any) -> float:
@@ -188,9 +189,13 @@ class WindowClock:
     def of(cls, window: Any) -> WindowClock:
         """Return the window's clock, made on first use."""
         address = window.GetAddressAsString("")
-        clock = _clocks.get(address)
+        known = _clocks.get(address)
+        clock = None if known is None else known()
         if clock is None or clock._window.Get() is not window:
-            clock = _clocks[address] = cls(window)
+            for gone in [key for key, each in list(_clocks.items()) if each() is None]:
+                _clocks.pop(gone, None)
+            clock = cls(window)
+            _clocks[address] = weakref.ref(clock)
         return clock
 
     def shared(self, kind: type[T]) -> T:
