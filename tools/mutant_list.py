@@ -582,7 +582,7 @@ PYTHON_MUTANTS = (
     _m(
         "options: a preset of quality is regenerated before it is missed",
         "pyvista_vdi/plotting/component.py",
-        "regenerate_below = min(regenerate_below, max(0.0, dial.ssim - _BELOW_GOAL))",
+        "regenerate_below = min(given, max(0.0, dial.ssim - _BELOW_GOAL))",
         "pass",
         ("plotting",),
     ),

@@ -33,6 +33,7 @@ import shared  # noqa: E402
 #: The least that reaches each script's end.
 RUNS = {
     "accuracy": "--volumes brain",
+    "films": "--volumes brain --repeats 1",
     "baselines": "--size 64x36 --repeats 1",
     "files": "--volumes brain --repeats 1",
     "frames": "--volumes brain --repeats 1",

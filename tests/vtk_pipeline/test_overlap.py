@@ -308,10 +308,10 @@ def test_previews_are_of_one_size():
 def test_what_cannot_be_drawn_leaves_the_other(raycasts, monkeypatch):
     plotter, actors = two_balls()
 
-    def fail(request):
+    def fail():
         raise RuntimeError("no such luck")
 
-    monkeypatch.setattr(actors[0].mapper.GetSource(), "MakeVDI", fail)
+    monkeypatch.setattr(actors[0].mapper.GetSource(), "GetVDI", fail)
     with pytest.warns(VDIWarning, match="no such luck"):
         plotter.show(auto_close=False)
     assert raycasts == []
