@@ -40,6 +40,7 @@ class Pictures:
         self._by_volume: deque[View] = deque(maxlen=_REMEMBERED)
         self._judged: list[tuple[View, Any, ViewError]] = []
         self._of: Callable[[], VDI | None] = lambda: None  # a weak reference
+        self._poor_from = float("inf")  # degrees from V_O, of the nearest view that the VDI fails
         self._in_vain = False  # whether a VDI was too poor near its own view
 
     def serves(
@@ -74,11 +75,12 @@ class Pictures:
             Degrees from V_O.
         """
         if self._of() is not vdi:
-            self._of, self._judged = weakref.ref(vdi), []
+            self._of, self._judged, self._poor_from = weakref.ref(vdi), [], float("inf")
         if bound is None and detail > FINE_ENOUGH:
             return False
         angle = angle_from_generating_view(vdi, view.camera)
-        if angle > within or coverage(vdi, view.camera, view.size) < 1:
+        # What fails near V_O fails farther away: the loss comes with the first degrees
+        if angle > within or angle >= self._poor_from or coverage(vdi, view.camera, view.size) < 1:
             return False
         nearest, error = min(
             (
@@ -95,8 +97,9 @@ class Pictures:
         does = error.ssim >= (SIMILAR if bound is None else bound)
         if bound is None:
             does = does and abs(error.contrast - 1) <= _SAME_CONTRAST
-        if not does and angle <= _FASTER_WITHIN and detail <= FINE_ENOUGH:
-            self._in_vain = True
+        if not does and detail <= FINE_ENOUGH:
+            self._poor_from = angle
+            self._in_vain = self._in_vain or angle <= _FASTER_WITHIN
         return does
 
     def error(self, view: View) -> ViewError | None:
