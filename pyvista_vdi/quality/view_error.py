@@ -207,13 +207,11 @@ def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
     meets = last > first
     if not meets.any():
         return 1.0
-    held = np.ones(np.count_nonzero(meets), dtype=bool)
+    near, far = (origins[:, meets] + t[meets] * directions[:, meets] for t in (first, last))
     to_lists = vdi.camera.viewport_matrix(vdi.window_size) @ vdi.camera.model_to_view
-    for end in (first, last):
-        points = origins[:, meets] + end[meets] * directions[:, meets]
-        u, v, _, w = to_lists @ _homogeneous(points.T)
-        held &= np.maximum(np.abs(u), np.abs(v)) <= w + _COVERAGE_SLACK * np.abs(w).max()
-    return float(held.mean())
+    u, v, _, w = to_lists @ _homogeneous(np.hstack([near, far]).T)
+    held = np.maximum(np.abs(u), np.abs(v)) <= w + _COVERAGE_SLACK * np.abs(w).max()
+    return float(held.reshape(2, -1).all(axis=0).mean())
 
 
 def _homogeneous(points: Floats) -> Floats:
