@@ -44,8 +44,9 @@ _log = logging.getLogger(__name__)
 #: Views that a VDI is made to serve, degrees from V_O, where its metadata do not say.
 _VIEW_CONE = 60.0
 
-#: Pixels as wide as one list from which on a VDI without its volume is said to be too coarse.
-_TOO_COARSE = 2.0
+#: Pixels as wide as one list from which on a VDI without its volume is said to be too coarse, and
+#: the share of rays below which it is said to cover too little: corners of bounds are often empty.
+_TOO_COARSE, _TOO_LITTLE = 2.0, 0.9
 #: What two equal sizes of pixels differ by at most.
 _ROUNDING = 1e-6
 
@@ -94,7 +95,6 @@ class Upkeep:
             self.input.rest()
         self.input = source
         self._failed_at = None
-        self._warnings.forget()
         self.regeneration.cancel()
         self._forget_volume()
         if source is not None:
@@ -490,7 +490,7 @@ class Upkeep:
                 f"the view is {angle:.0f} degrees from the VDI's generating view, which was to "
                 f"serve {cone:.0f}: it shows less, and less of what was hidden"
             )
-        if covered < 1:
+        if covered < _TOO_LITTLE:
             lacking["coverage"] = (
                 f"{1 - covered:.0%} of the view's rays through the volume leave what the VDI "
                 "covers: there it shows nothing"
@@ -502,7 +502,8 @@ class Upkeep:
             )
         for cause, what in lacking.items():
             message = f"{what}; {remedy}; regenerate='never' takes this as it is"
-            self._warnings.warn(message, cause=cause)
+            # Once for all VDIs of one V_O, such as the steps of a series
+            self._warnings.warn(message, cause=(cause, vdi.camera, vdi.window_size))
 
     def collect(self) -> bool:
         """Take what was made in the background; whether there is another VDI to be drawn."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -177,10 +177,10 @@ class Warnings:
     """
 
     def __init__(self) -> None:
-        self._said: set[str] = set()
+        self._said: set[Hashable] = set()
 
     def warn(
-        self, message: str, error: BaseException | None = None, *, cause: str | None = None
+        self, message: str, error: BaseException | None = None, *, cause: Hashable = None
     ) -> None:
         """Say it, unless it, or its cause, was said before; a traceback goes to the log."""
         if error is not None:
