@@ -42,6 +42,7 @@ def coverage(session: nox.Session) -> None:
     settings = folder / "coveragerc"
     settings.write_text(
         "[run]\nbranch = true\nparallel = true\nsource_pkgs = pyvista_vdi\npatch = subprocess\n"
+        "omit = */pytest-of-*\n"  # copies that tests of packaging make
         f"data_file = {folder / 'data'}\n"
     )
     rc = f"--rcfile={settings}"
